@@ -75,7 +75,8 @@ Result<std::vector<std::string>> split_pointer(std::string_view pointer) {
   return tokens;
 }
 
-// The element of an array named by a token; one past the end, also written "-", is appended.
+// The element of an array selected by a token; the position after the last, also written "-",
+// appends an element.
 Json* element_at(Json& array, const std::string& token) {
   if (token == "-") return &array.emplace_back();
   const bool digits = !token.empty() && token.size() <= 3 &&
@@ -90,8 +91,8 @@ Json* element_at(Json& array, const std::string& token) {
 Result<ViewDocument> checked_document(const Json& json) {
   try {
     return ViewDocument::parse(json.dump());
-  } catch (const Json::type_error&) {  // a string of the command line with invalid UTF-8
-    return make_error(ErrorKind::malformed, "a view's text must be valid UTF-8");
+  } catch (const Json::type_error&) {  // a string from the command line with invalid UTF-8
+    return make_error(ErrorKind::malformed, "the text of a view must be valid UTF-8");
   }
 }
 
@@ -148,7 +149,7 @@ Result<void> put(Json& tree, std::string_view pointer, std::string_view value) {
       target = &(*target)[token];
     } else {
       return make_error_at(ErrorKind::invalid, join_pointer(at, token),
-                           "lies within " + described(*target) + ", which is not a container");
+                           "is within " + described(*target) + ", which is not a container");
     }
     at = join_pointer(at, token);
   }

@@ -12,7 +12,7 @@ namespace windsplat::protocol {
 
 namespace {
 
-constexpr int number_overflow_error = 406;  // of the parser: number exceeds double
+constexpr int number_overflow_error = 406;  // error code of the parser: a number exceeds double
 constexpr std::size_t token_bytes_max = 64;
 constexpr double exact_integer_max = 9007199254740992.0;  // 2^53
 
@@ -67,7 +67,7 @@ class TreeBuilder : public nlohmann::json_sax<Json> {
  private:
   struct Open {
     Json value;
-    std::string key;           // of the current member, objects only
+    std::string key;           // key of the current member, objects only
     bool key_pending = false;  // a key without its value yet
   };
 

@@ -19,17 +19,18 @@
 namespace windsplat::protocol {
 
 // Errors: too_large (over message_bytes_max), malformed (syntax, UTF-8, NUL, byte order mark,
-// nesting, duplicate keys), invalid (a number that no double holds).
+// nesting, duplicate keys), invalid (a number beyond the range of double).
 Result<Json> parse_json(std::string_view text);
 
-// Without spaces, keys sorted, invalid UTF-8 replaced, non-finite numbers as null.
+// Serialises without spaces, with sorted keys, with invalid UTF-8 replaced and non-finite numbers
+// as null.
 std::string dump(const Json& value);
 
 // The canonical form of a number: an integer if it is one exactly; no negative zero.
 Json canonical_number(double value);
 Json number_or_null(const std::optional<double>& value);
 Json numbers_json(const std::vector<double>& values);
-// Canonical numbers throughout a tree.
+// Makes all numbers of a tree canonical.
 void make_numbers_canonical(Json& value);
 
 // pointer + "/" + key, escaped by RFC 6901; long or unprintable keys are shortened to a printable
@@ -37,7 +38,7 @@ void make_numbers_canonical(Json& value);
 std::string join_pointer(const std::string& pointer, std::string_view key);
 std::string join_pointer(const std::string& pointer, std::size_t index);
 
-// Invalid values in the order found. One answer lists at most problem_errors_max of them.
+// Invalid values in the order found. A response lists at most problem_errors_max of them.
 class Faults {
  public:
   void add(std::string pointer, std::string detail, ErrorKind kind = ErrorKind::invalid);

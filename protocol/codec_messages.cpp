@@ -66,7 +66,7 @@ void check_still(const StillMessage& message, ObjectReader& reader) {
       std::ceil(*message.width * message.scale) * std::ceil(*message.height * message.scale);
   if (pixels > static_cast<double>(limits::image_pixels_max)) {
     reader.faults().add(reader.pointer(),
-                        "asks for " + dump(canonical_number(pixels)) + " pixels; the limit is " +
+                        "requests " + dump(canonical_number(pixels)) + " pixels; the limit is " +
                             std::to_string(limits::image_pixels_max),
                         ErrorKind::too_large);
   }
@@ -163,7 +163,7 @@ Json to_json(const ChosenMessage& message) {
   out["type"] = "chosen";
   out["seq"] = message.seq;
   auto view = parse_json(message.view_json);
-  WINDSPLAT_CHECK(view.has_value());  // the server's own text
+  WINDSPLAT_CHECK(view.has_value());  // text made by the server itself
   out["view"] = std::move(*view);
   return out;
 }
@@ -220,7 +220,7 @@ MessageTag message_tag(std::string_view json) {
   return tag;
 }
 
-// With keys in the order of all other messages.
+// The keys are in the order of all other messages.
 std::string opened_with(const std::string& dataset, std::uint32_t id) {
   std::string text = R"({"dataset":)";
   text.reserve(dataset.size() + 64);

@@ -112,7 +112,7 @@ GeometryView read_geometry(const Json& json, const std::string& pointer, Faults&
   return geometry;
 }
 
-// Descending ranges reverse the map. The ends must differ enough that the slope is finite.
+// Descending ranges reverse the map. The ends must differ enough for the slope to be finite.
 void check_color_range(const std::optional<Range>& range, ObjectReader& reader) {
   if (range && !(std::abs((*range)[1] - (*range)[0]) >= limits::range_width_min)) {
     reader.faults().add(reader.at("range"), "must have ends that differ by at least " +

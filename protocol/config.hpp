@@ -15,8 +15,8 @@ struct ConfigEntry {
 
   std::string key;
   Kind kind = Kind::text;
-  // As on the command line: one word, "true" or "false", a number as in JSON, or the strings of a
-  // list.
+  // Words as on the command line: one word, "true" or "false", a number as in JSON, or the strings
+  // of a list.
   std::vector<std::string> words;
 };
 

@@ -23,7 +23,7 @@ struct FrameHeader {
   std::uint8_t version = 1;
   std::uint8_t kind = 1;  // 1 frame
   std::uint32_t seq = 0;  // 4 + 4: from 1
-  std::uint32_t rev = 0;  // of the rendered view
+  std::uint32_t rev = 0;  // revision of the rendered view
   std::uint32_t step = 0;
   std::uint32_t flags = 0;
   std::uint16_t width = 0;

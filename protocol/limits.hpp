@@ -32,7 +32,7 @@ inline constexpr double geometry_scale_max = 1e3;
 inline constexpr double component_scale_max = 1e9;
 inline constexpr double line_length_max = 10;  // world units
 inline constexpr double span_min = 0.1;        // grid strides
-inline constexpr double value_max = 1e38;      // of a field
+inline constexpr double value_max = 1e38;      // largest value of a field
 inline constexpr double range_width_min = 1e-30;
 inline constexpr double motion_rate_max = 1e3;
 inline constexpr double motion_time_max = 1e6;      // steps
@@ -47,24 +47,26 @@ inline constexpr double max_error_min = 1e-6;  // linear RMSE
 inline constexpr double max_error_max = 1;
 inline constexpr std::int64_t step_max = 2147483647;
 inline constexpr std::int64_t seed_max = 4294967295;
-inline constexpr std::size_t name_chars_max = 256;  // code points of a dataset, field or map name
+inline constexpr std::size_t name_chars_max = 256;  // maximum length of the name of a dataset,
+                                                    // field or map, in code points
 
 inline constexpr std::int64_t serial_max = 4294967295;  // id, rev and seq of messages
 inline constexpr double fps_min = 0.1;
 inline constexpr double fps_max = 120;
 inline constexpr double still_scale_max = 4;
 inline constexpr double decode_ms_max = 1e9;
-inline constexpr std::size_t problem_errors_max = 16;  // invalid values listed in one answer
+inline constexpr std::size_t problem_errors_max = 16;  // invalid values listed in one response
 
 inline constexpr std::size_t path_chars_max = 4096;  // code points of a path below the data root
 inline constexpr int histogram_bins_max = 4096;
-inline constexpr double histogram_clip_max = 0.49;  // fraction of the values, at either end
-inline constexpr double coordinate_max = 1e30;      // of a probe, in the units of the axes
+inline constexpr double histogram_clip_max = 0.49;  // maximum fraction of the values at either end
+inline constexpr double coordinate_max = 1e30;      // largest coordinate of a probe, in the units
+                                                    // of the axes
 inline constexpr int series_steps_max = 100000;
 inline constexpr int jobs_max = 64;  // including finished ones
 inline constexpr int jobs_running_max = 2;
 inline constexpr int views_max = 10000;           // stored by a server
-inline constexpr int views_bytes_max = 16777216;  // of all of them as JSON
+inline constexpr int views_bytes_max = 16777216;  // total of all views as JSON
 
 inline constexpr int frames_in_flight_max = 2;  // unacknowledged, per session
 inline constexpr int sessions_max_default = 64;

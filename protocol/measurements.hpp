@@ -1,4 +1,4 @@
-// Answers of the HTTP API about values, forecasts and jobs, as typed values. Mirrors
+// Responses of the HTTP API about values, forecasts and jobs, as typed values. Mirrors
 // messages.schema.json.
 #pragma once
 
@@ -71,7 +71,8 @@ struct ReferenceDescription {
   std::string picture;  // path
   int width = 0;
   int height = 0;
-  // In linear premultiplied RGBA; psnr in dB for a peak of 1, infinite for identical pictures.
+  // Errors are in linear premultiplied RGBA; psnr is in dB for a peak of 1, infinite for identical
+  // pictures.
   double rmse = 0;
   double max = 0;
   double psnr = 0;
@@ -98,7 +99,7 @@ struct ForecastPoint {
   bool pareto = false;    // on the Pareto front of time and error
 };
 struct ForecastDescription {
-  int width = 0;  // of the view, pixels
+  int width = 0;  // size of the view, pixels
   int height = 0;
   std::vector<ForecastPoint> points;  // fastest first
   std::optional<std::size_t> chosen;  // index of `points`, if the view has a budget or error limit

@@ -97,7 +97,7 @@ struct DatasetDescription {
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason
   std::vector<std::string> notes;  // conversions of the data, problems found
   std::vector<StepDescription> steps;
-  std::size_t step_count = 0;  // also if `steps` is omitted
+  std::size_t step_count = 0;  // number of steps, also if `steps` is omitted
   std::string time_units;
   std::uint64_t resident_bytes = 0;
   std::uint64_t bytes_when_resident = 0;  // every field at every step
@@ -143,7 +143,7 @@ struct ServiceDescription {
   std::string name = "windsplat";
   std::string version;
   std::vector<std::pair<std::string, std::string>> links;
-  std::int64_t image_pixels_max = limits::image_pixels_max;  // of this server
+  std::int64_t image_pixels_max = limits::image_pixels_max;  // limit of this server
 };
 
 // --- server to client -------------------------------------------------------------------------
@@ -152,7 +152,7 @@ struct HelloMessage {
   std::string version;
   std::string session;
   std::vector<DatasetDescription> datasets;                  // short forms
-  std::int64_t image_pixels_max = limits::image_pixels_max;  // of this server
+  std::int64_t image_pixels_max = limits::image_pixels_max;  // limit of this server
 };
 struct OpenedMessage {
   std::uint32_t id = 0;
@@ -171,7 +171,7 @@ struct ChosenMessage {
 };
 // The patch was applied and causes no new frame.
 struct UnchangedMessage {
-  std::uint32_t rev = 0;  // of the patch; includes all earlier ones
+  std::uint32_t rev = 0;  // revision of the patch; includes all earlier ones
   std::uint32_t seq = 0;  // the frame that already shows the view
 };
 struct StatsMessage {
@@ -179,13 +179,13 @@ struct StatsMessage {
   std::uint64_t dropped = 0;
   std::uint64_t cancelled = 0;
   std::uint64_t bytes = 0;
-  std::optional<double> play_fps;  // of displayed steps
+  std::optional<double> play_fps;  // rate of displayed steps
   std::uint64_t steps_dropped = 0;
   std::uint64_t steps_not_ready = 0;
 };
 struct ErrorMessage {
-  std::optional<std::uint32_t> id;   // of the invalid message, if it had one
-  std::optional<std::uint32_t> rev;  // of the invalid patch
+  std::optional<std::uint32_t> id;   // id of the invalid message, if it had one
+  std::optional<std::uint32_t> rev;  // rev of the invalid patch
   Problem problem;
 };
 using ServerMessage = std::variant<HelloMessage, OpenedMessage, ProgressMessage, ChosenMessage,

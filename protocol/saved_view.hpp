@@ -22,7 +22,7 @@ struct SavedView {
   ViewDocument view;
 };
 
-// The answer to clients; `kept`: "memory" or "disk".
+// The response to clients; `kept`: "memory" or "disk".
 std::string encode_saved_view(const SavedView& saved, std::string_view kept);
 
 // The file format of saved views. Errors of parsers: see codec.hpp.

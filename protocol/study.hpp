@@ -47,37 +47,37 @@ struct StudyReference {
   std::int64_t pieces = 0, evaluations = 0;
 };
 
-// Reported against true errors: shares within a factor of 2, and within the predicted bound.
+// Reported against true errors: fractions within a factor of 2, and within the predicted bound.
 struct StudyAgreement {
   std::string of;
   std::size_t count = 0;
   double within_two = 0, median = 0, bounded = 0;
 };
 
-// Held-out frames whose setting was chosen for a requested maximum error.
+// Held-out frames whose setting was chosen to meet a requested maximum error.
 struct StudyAim {
   double max_error = 0;
   std::size_t frames = 0;
-  std::size_t promised = 0, promised_kept = 0;  // forecast to meet it; and met it
-  std::size_t possible = 0, possible_kept = 0;  // some setting meets it; and the chosen one did
+  std::size_t promised = 0, promised_kept = 0;  // forecast to meet it; actually met it
+  std::size_t possible = 0, possible_kept = 0;  // any setting meets it; the chosen one does
 };
 
-// One setting at one held-out view.
+// Result of one setting at one held-out view.
 struct StudyCompared {
   std::string look;
   std::size_t view = 0;
   std::string setting_class;  // as in the agreement
   std::string method;
   int half_level = 0, coarser = 0, thinner = 1;
-  double error = 0;  // true
+  double error = 0;  // true error
   double estimate = 0, spread = 0, prior = 0;
 };
 
-// A frame of a held-out view whose error was measured by rendering it more finely.
+// A frame of a held-out view, with its error measured relative to a finer rendering.
 struct StudyMeasuredFrame {
   std::string look;
   std::string method;
-  double error = 0;  // true
+  double error = 0;  // true error
   double measured = 0;
 };
 
@@ -89,7 +89,7 @@ struct StudyCheck {
 
 struct StudyCalibration {
   int width = 0, height = 0;
-  int surveyed = 0, held_out = 0;  // views per look for calibration and for testing
+  int surveyed = 0, held_out = 0;  // number of views per scene for calibration and for testing
   double seconds = 0;
   std::vector<std::string> looks;
   std::vector<StudyAgreement> agreement;

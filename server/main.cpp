@@ -1,5 +1,5 @@
-// The program: everything is put together by the commands in server/cli.
-#include <cstdlib>  // defines __GLIBC__ where that is the library
+// The program; server/cli assembles it from the commands.
+#include <cstdlib>  // defines __GLIBC__ if the C library is glibc
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -9,8 +9,9 @@
 
 namespace {
 
-// Large blocks come from the system and go back to it at once. Left to itself, glibc keeps ever
-// larger ones for later, scattered among those in use: after a file is read, twice its data.
+// Map large blocks individually, so that they are returned to the system when freed. Otherwise
+// glibc raises its threshold and keeps large free blocks between blocks in use: after reading a
+// file, twice the size of its data.
 void return_large_blocks() {
 #ifdef __GLIBC__
   constexpr int block_bytes = 1 << 20;

@@ -16,7 +16,7 @@ using Bytes = std::array<std::uint8_t, 16>;
 
 constexpr std::size_t text_max = 64;  // longer than any address with a zone
 constexpr std::size_t mapped_prefix = 12;
-constexpr std::size_t counted_bytes = 8;  // of IPv6: 64 bits
+constexpr std::size_t counted_bytes = 8;  // network part of an IPv6 address: 64 bits
 
 // The zone ("%eth0") names the interface and is not part of the address.
 std::optional<Bytes> parse_bytes(std::string_view text) {
@@ -101,7 +101,7 @@ std::string client_address(const std::string& peer, std::string_view forwarded_f
   std::string client = peer;
   for (auto hop = hops.rbegin(); hop != hops.rend(); ++hop) {
     const std::string_view address = without_port(*hop);
-    if (!parse_bytes(address)) return client;  // not written by a trusted proxy
+    if (!parse_bytes(address)) return client;  // the element was not written by a trusted proxy
     client = address;
     if (!is_trusted(address, trusted)) return client;
   }

@@ -62,9 +62,9 @@ std::string detail_of(const Refusal& refusal) {
 // TLS connections closed because handshakes exceeded their processor time.
 struct ClosedHandshakes {
   std::int64_t connections = 0;
-  std::string address;  // of the first one
+  std::string address;  // address of the first one
   bool several = false;
-  Admission::Micros since = 0;  // when the first was closed; logged as an age
+  Admission::Micros since = 0;  // time when the first one was closed; logged as an age
 };
 
 void log_closed(const ClosedHandshakes& closed) {
@@ -84,7 +84,8 @@ struct Admission::State {
   State(const Limits& limits, std::function<Micros()> clock)
       : quota(limits), now(clock ? std::move(clock) : steady_us) {}
 
-  // Both require the mutex. A value: closures since the last log line; at most one a minute.
+  // Both require the mutex. Returns the closures since the last log line; nullopt if that was less
+  // than a minute ago.
   std::optional<Closed> count_refused_handshake(const std::string& address, Micros at) {
     if (closed.connections == 0) {
       closed.address = address;

@@ -17,14 +17,14 @@
 
 namespace windsplat::access {
 
-// Holds a place among connections or sessions until the last copy is destroyed.
+// Holds a slot among connections or sessions until the last copy is destroyed.
 using Ticket = std::shared_ptr<const void>;
 
 // An admitted connection.
 struct Visitor {
   std::string peer;  // remote address
   Ticket place;
-  std::optional<Refusal> reserve;  // only health is served, for this reason
+  std::optional<Refusal> reserve;  // reason why only health requests are served
   bool trusted = false;            // a proxy, which has connections of many clients
   bool known = false;              // a proxy, or the address has shown the token
 };
@@ -40,31 +40,29 @@ class Admission {
   // `now`: clock in microseconds; empty: a steady clock.
   Admission(const Limits& limits, metrics::Metrics& metrics, std::function<Micros()> now = {});
 
-  // False: too many recent connections; close it without a response. Call before connect(). Excess
-  // handshake time is logged at most once a minute.
+  // Returns false if there are too many recent connections: close it without a response. Call
+  // before connect(). Excess handshake time is logged at most once a minute.
   bool arrive(const std::string& peer, bool tls);
   // Call periodically: logs refusals since the last log line.
   void log_refused_handshakes();
-  // Charges processor time of a TLS handshake to the address. Does not allocate.
-  // memory.
+  // Charges processor time of a TLS handshake to the address. Does not allocate memory.
   void handshake_took(const std::string& address, bool trusted, Micros took);
-  // A request has shown the token.
+  // Records that a request has shown the token.
   void authenticated(const std::string& address);
-  // None: at the limit; close without a response.
+  // Returns nullopt at the limit: close the connection without a response.
   std::optional<Visitor> connect(const std::string& peer);
 
-  // For a refused one: whether a place freed in the reserve would admit it.
+  // Whether a connection in the reserve would be admitted if a slot of the reserve were freed.
   bool is_kept_out_by_others(const std::string& peer);
 
-  // Sets request.address to the client's. A value: the request is refused with it.
+  // Sets request.address to that of the client. Returns a response if the request is refused.
   std::optional<http::Response> request(const Visitor& visitor, http::Request& request,
                                         bool health);
-  // Counts a request refused before parsing. False: too many, do not log this one.
-  // were too many, and this one is not worth a line in the log.
+  // Counts a request refused before parsing. False: too many recently, so do not log this one.
   bool count_malformed(const Visitor& visitor, const http::Request& request);
-  // Whether the address may have a picture drawn.
+  // Whether a picture may be drawn for the address.
   std::optional<http::Response> picture(const std::string& address);
-  // A place for a stream, or the refusal.
+  // A slot for a stream, or the refusal.
   struct Seat {
     Ticket place;
     std::optional<http::Response> refusal;
@@ -72,7 +70,7 @@ class Admission {
   Seat open_session(const std::string& address);
   // Whether a token may be compared: the number of recent failures is within the limit.
   std::optional<http::Response> may_try_login(const std::string& address);
-  // The response to a wrong token above the limit of failures; none: the usual one.
+  // The response to a wrong token beyond the limit of failures; nullopt: the usual one.
   std::optional<http::Response> failed_login(const std::string& address);
   // Counts a message of a stream; returns how long to pause reading.
   Micros message_received(const std::string& address, std::size_t bytes);
@@ -82,7 +80,7 @@ class Admission {
   void sent(const std::string& address, std::size_t bytes);
   void rendered(const std::string& address, Micros took);
 
-  // Both count refusals.
+  // Both functions count refusals.
   Result<void> check(const frame::Cost& cost);
   Result<void> check_estimate(const frame::Cost& cost, double estimate_ms);
 
@@ -95,7 +93,7 @@ class Admission {
   const Limits limits_;
   std::vector<Network> trusted_;
   metrics::Metrics& metrics_;
-  std::shared_ptr<State> state_;  // shared with tickets
+  std::shared_ptr<State> state_;  // shared with the slots
 };
 
 }  // namespace windsplat::access

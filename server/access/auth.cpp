@@ -119,7 +119,7 @@ bool has_good_cookie(const http::Request& request, const Token& token, std::int6
 
 enum class Credential { none, wrong, token, cookie };
 
-// The first credential decides: a valid cookie does not make up for a wrong token.
+// The first credential decides: a valid cookie does not compensate for a wrong token.
 Credential credential_of(const http::Request& request, bool upgrade, const Token& token,
                          std::int64_t now_s) {
   auto shown = bearer_of(request);

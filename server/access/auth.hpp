@@ -1,5 +1,5 @@
-// Authentication: bearer token, login cookie and origins of web pages. Pure functions: a request
-// in, a verdict out.
+// Authentication: bearer token, login cookie and origins of web pages. Pure functions: request in,
+// verdict out.
 #pragma once
 
 #include <array>
@@ -71,7 +71,7 @@ Verdict judge(const http::Request& request, bool upgrade, const Token* token,
 // Whether judge() would compare a token of the request, which may be an attempt to guess it.
 bool shows_token(const http::Request& request, bool upgrade);
 
-// Whether it posts the login form; only if a token is set.
+// Whether the request posts the login form; only if a token is set.
 bool is_login(const http::Request& request);
 
 }  // namespace windsplat::access

@@ -29,13 +29,14 @@ struct Limits {
   double handshake_ms_per_address = 100;
   std::size_t sessions_per_address = 48;  // total: ServerOptions::sessions_max
   double requests_per_address = 1000;     // per second; bursts of ten seconds' worth
-  double messages_per_address = 4000;     // of streams, per second
+  double messages_per_address = 4000;     // stream messages per second
   double received_per_address = 8e6;      // bytes of those messages per second
   double bytes_per_address = 0;           // sent per second; the last response may exceed it
   double render_s_per_address = 0;        // render time per minute; the last one may exceed it
   double failed_logins_per_address = 30;  // per minute
-  std::int64_t pixels = protocol::limits::image_pixels_max;  // of a picture
-  double kernels = 1e10;                                     // of a picture (frame/cost.hpp)
+  std::int64_t pixels = protocol::limits::image_pixels_max;  // maximum of a picture
+  double kernels = 1e10;                                     // maximum of a picture
+                                                             // (frame/cost.hpp)
   double render_s = 120;  // estimated time of a picture requested by HTTP
   // Limit in milliseconds on how long requests of other addresses may delay a picture requested by
   // HTTP that is itself shorter; above it the picture is refused, which bounds the delay of

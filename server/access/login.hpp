@@ -11,7 +11,8 @@ namespace windsplat::access {
 
 inline constexpr std::int64_t cookie_lasts_s = std::int64_t{7} * 24 * 3600;
 
-// For every verdict but `allowed`: a problem, or the login page if a browser navigates to a page.
+// The response for every verdict but `allowed`: a problem, or the login page if a browser navigates
+// to a page.
 http::Response turned_away(Verdict verdict, const http::Request& request,
                            const std::string& base_path);
 

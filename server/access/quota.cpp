@@ -46,7 +46,7 @@ Quota::Rate Quota::request_rate() const {
 Quota::Rate Quota::byte_rate() const {
   return {limits_.bytes_per_address, at_once_s * limits_.bytes_per_address};
 }
-Quota::Rate Quota::render_rate() const {  // in seconds
+Quota::Rate Quota::render_rate() const {  // the limit is configured in seconds
   return {limits_.render_s_per_address / s_per_minute, limits_.render_s_per_address};
 }
 Quota::Rate Quota::login_rate() const {
@@ -284,7 +284,8 @@ bool Quota::is_idle(Entry& entry, Micros now) const {
   if (entry.connections + entry.reserved + entry.sessions > 0) return false;
   entry.bytes.refill(byte_rate(), now);
   entry.render.refill(render_rate(), now);
-  return entry.bytes.taken <= 0 && entry.render.taken <= 0;  // the other buckets refilled long ago
+  return entry.bytes.taken <= 0 && entry.render.taken <= 0;  // by then the other buckets have
+                                                             // refilled
 }
 
 // Evict one or two at a time to bound the time of a call.

@@ -16,17 +16,17 @@ namespace windsplat::access {
 
 struct Refusal {
   metrics::LimitKind kind = metrics::LimitKind::connections;
-  double limit = 0;       // as in Limits
+  double limit = 0;       // limit as in Limits
   int retry_after_s = 1;  // estimated time until admission
 };
 
 class Quota {
  public:
-  using Micros = std::int64_t;  // of a monotonic clock
+  using Micros = std::int64_t;  // time of a monotonic clock
 
   static constexpr std::size_t addresses_max = 4096;  // tracked at a time
-  // Size of the reserve: connections above the limits that serve health only. One address may use a
-  // quarter of it.
+  // Size of the reserve: connections beyond the limits, which serve health requests only. One
+  // address may use a quarter of it.
   static constexpr std::size_t reserve_max = 64;
   static constexpr std::size_t reserve_per_address = reserve_max / 4;
   static constexpr double tls_arrivals = 5;  // cost of a handshake in plain connections
@@ -47,9 +47,9 @@ class Quota {
   // The address has shown the token: until its entry is evicted, its handshakes do not compete with
   // those of unknown addresses.
   void authenticated(const std::string& address, Micros now);
-  // `trusted`: of a proxy, which is counted in the total only.
+  // `trusted`: a proxy, which is counted in the total only.
   Arrival connect(const std::string& address, bool trusted, Micros now);
-  // Whether it was refused because the reserve is filled by other addresses.
+  // Whether a connection was refused because other addresses fill the reserve.
   [[nodiscard]] bool is_kept_out_by_others(const std::string& address, bool trusted, Micros now);
   void disconnect(const std::string& address, Slot place);  // does not allocate
 
@@ -67,7 +67,7 @@ class Quota {
   void rendered(const std::string& address, Micros took, Micros now);
   // Call before comparing a token: whether recent failures are within the limit.
   std::optional<Refusal> may_try_login(const std::string& address, Micros now);
-  // A message of a stream; returns how long to pause reading.
+  // Counts a message of a stream; returns how long to pause reading.
   Micros message_received(const std::string& address, std::size_t bytes, Micros now);
   // Refused above the limit of recent failures; otherwise the failure is only counted.
   std::optional<Refusal> failed_login(const std::string& address, Micros now);
@@ -83,7 +83,7 @@ class Quota {
     double at_once = 0;
   };
   struct Bucket {
-    double taken = 0;  // net of refill; 0 is full
+    double taken = 0;  // after refill; 0 is full
     Micros at = 0;
     void refill(const Rate& rate, Micros now);
   };
@@ -101,7 +101,7 @@ class Quota {
   [[nodiscard]] static Rate rate_for_ten_seconds(double a_second);
   [[nodiscard]] Rate request_rate() const;
   std::optional<Refusal> may_handshake(Entry& entry, bool trusted, Micros now);
-  // The bucket for an address's handshakes besides its own; null: none.
+  // The bucket for handshakes of an address besides its own; null: none.
   Bucket* shared_handshakes(const Entry* entry, bool trusted);
   [[nodiscard]] Rate byte_rate() const;
   [[nodiscard]] Rate render_rate() const;
@@ -122,7 +122,7 @@ class Quota {
   Limits limits_;
   Entries entries_;
   std::unordered_map<std::string, Entries::iterator> by_address_;
-  Bucket arrivals_;  // of all addresses
+  Bucket arrivals_;  // total of all addresses
   Bucket stranger_handshakes_, known_handshakes_;
   std::size_t connections_ = 0;
   std::size_t reserved_ = 0;

@@ -28,7 +28,7 @@ http::Response open_in_job(Services& services, data::Location location) {
   return job_response(services, job);
 }
 
-// Only resolves the name; reads nothing.
+// Resolves only the name; reads nothing.
 http::Response locate_and_open(Services& services, const std::string& path) {
   const auto located = data::locate_beneath(services.options.data_root, path);
   if (located) return open_in_job(services, *located);
@@ -84,8 +84,7 @@ http::Response delete_dataset(Services& services, const std::string& id,
     return http::problem_response(403, "Forbidden", "only datasets opened by POST can be deleted");
   }
   if (forget) {
-    services.backend.catalogue.forget(
-        id);  // first, so that reads in progress end with the right error
+    services.backend.catalogue.forget(id);  // first, so that reads in progress end with this error
   } else {
     (*dataset)->evict();
   }

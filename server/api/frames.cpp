@@ -39,10 +39,10 @@ struct Orbit {
 struct Picture {
   protocol::View view;
   frame::Encoding encoding;
-  std::string preset;  // empty: none
+  std::string preset;  // nullopt: none
   std::optional<Orbit> orbit;
   std::string if_none_match;
-  frame::Cost cost;  // of the view before preset and orbit, which change only the camera
+  frame::Cost cost;  // cost of the view before preset and orbit, which change only the camera
 };
 
 std::string_view media_type(frame::Format format) {
@@ -137,7 +137,7 @@ http::Response unchanged_response(const std::string& etag) {
   return {304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
 }
 
-// Null if the client has the picture already: `reply` is called with 304.
+// Returns null if the client already has the picture: `reply` is then called with 304.
 Result<work::PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
                                   work::ViewCompletion& completion, data::Dataset& dataset,
                                   work::Loading loading, const http::Reply& reply) {
@@ -178,7 +178,7 @@ Result<http::Response> draw(Services& services, const Picture& picture,
     response.headers = {{"Cache-Control", "no-cache"},
                         {"ETag", picture_etag(drawn->view, dataset, picture.encoding)}};
     // Settings chosen by the server reduce the work below the estimate; the scene of a picture that
-    // waited for data was built elsewhere.
+    // waited for data was prepared elsewhere.
     if (loading == work::Loading::none) {
       services.backend.costs.learn(drawn->view.dataset, drawn->view.method.name,
                                    picture.cost.kernels, drawn->render_us + drawn->encode_us);
@@ -191,7 +191,7 @@ Result<http::Response> draw(Services& services, const Picture& picture,
                                     ", encode;dur=" + milliseconds(drawn->encode_us));
   response.headers.emplace_back("Windsplat-Frame", ascii_json(protocol::encode_frame_info(info)));
   response.headers.emplace_back("Vary", "Accept");
-  // Other sites may embed a picture by <img>, but not read its pixels.
+  // Other sites may embed a picture by <img>, but cannot read its pixels.
   response.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
   response.body = http::Body::of(std::move(drawn->bytes));
   return response;

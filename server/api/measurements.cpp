@@ -28,7 +28,7 @@ using DatasetPtr = std::shared_ptr<data::Dataset>;
 
 constexpr int histogram_bins = 64;
 constexpr std::chrono::milliseconds turn_budget{
-    30};  // for reading steps before yielding to other jobs
+    30};  // time for reading steps before yielding to other jobs
 
 // Dataset and field of a query, resolved before loading.
 struct Subject {
@@ -100,7 +100,7 @@ protocol::ProbedField describe(const data::FieldInfo& field) {
 
 // --- over all steps -----------------------------------------------------------------------------
 
-// One pass over the steps of a field, several per job.
+// A pass over the steps of a field, several steps per job.
 struct Pass {
   Subject subject;
   CancelToken cancel;
@@ -112,7 +112,7 @@ struct Pass {
   std::size_t next_step = 0;
 };
 
-// The response, or none if steps remain.
+// The response, or nullopt if steps remain.
 Result<std::optional<http::Response>> take_turn(Pass& pass) {
   const std::size_t steps = pass.subject.dataset->info().steps.size();
   const auto until = Clock::now() + turn_budget;

@@ -88,13 +88,14 @@ http::Response get_page(const http::Request& request, const std::string& path) {
   WINDSPLAT_CHECK(asset != nullptr);
   const bool gzip = http::accepts_gzip(request.header("Accept-Encoding"));
   std::string etag = etag_of(as_text(asset->gzip));
-  // One tag per representation (RFC 9110, 8.8.3.3).
+  // Each representation has its own tag (RFC 9110, 8.8.3.3).
   if (gzip) etag.insert(etag.size() - 1, "-gzip");
   http::Response response;
   response.headers = {{"Cache-Control", asset->immutable ? immutable_policy : "no-cache"},
                       {"ETag", etag},
                       {"Vary", "Accept-Encoding"},
-                      // Also sent with a 304, where they replace the cached headers.
+                      // Headers of a 304 replace the cached ones, so the policy is sent with it
+                      // too.
                       {"Content-Security-Policy", page_policy},
                       {"Cross-Origin-Opener-Policy", "same-origin"}};
   if (http::matches_etag(request.header("If-None-Match"), etag)) {

@@ -71,7 +71,7 @@ http::Response get_reference(Services& services, const std::string& name,
   const auto kept = services.backend.references.find(id);
   if (!kept) {
     return http::problem_response(
-        make_error(ErrorKind::not_found, "unknown or expired reference: post its view again"));
+        make_error(ErrorKind::not_found, "unknown or expired reference: post the view again"));
   }
   http::Response response;
   const std::string etag = '"' + id + '"';

@@ -19,7 +19,7 @@ namespace {
 
 using Segments = std::vector<std::string>;
 
-// The segments of a path as routes() states it.
+// The segments of a path as written in routes().
 std::vector<std::string_view> segments_of(std::string_view path) {
   std::vector<std::string_view> segments;
   for (std::size_t at = 1; at <= path.size();) {

@@ -18,7 +18,7 @@ http::Response upgrade_required() {
   return response;
 }
 
-// Handlers that answer at once, or need the request alone.
+// Handlers that reply at once, or use only the request.
 template <auto respond>
 void at_once(Services& services, const PathValues& values, const http::Request& request,
              const http::Reply& reply) {

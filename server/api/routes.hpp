@@ -19,12 +19,12 @@ using Handler = void (*)(Services& services, const PathValues& values, const htt
 enum class Query { refused, taken };
 enum class Charge {
   none,
-  picture,       // counts as a picture of the address before the handler is called
-  valid_picture  // the same, counted by the handler once the view is valid
+  picture,       // counts as a picture of the address, before the handler is called
+  valid_picture  // like `picture`, but counted by the handler once the view is valid
 };
 enum class Place {
   base,  // below the base path
-  root   // at the root as well, and answered under any load
+  root   // also available at the root, and answered under any load
 };
 
 struct Route {
@@ -34,18 +34,18 @@ struct Route {
   Query query = Query::refused;
   Charge charge = Charge::none;
   Place place = Place::base;
-  const char* name = path;  // by which requests are logged and counted
+  const char* name = path;  // name by which requests are logged and counted
 };
 
-// In the order of methods that Allow states. Documented in docs/user/api.md.
+// The table is in the order of methods in Allow. Documented in docs/user/api.md.
 std::span<const Route> routes();
 
-// What requests are counted by besides the paths of routes().
+// Names by which requests are counted, besides the paths of routes().
 inline constexpr const char* route_stream = "/v1/stream";
 inline constexpr const char* route_login = "/login";
 inline constexpr const char* route_page = "page";
 inline constexpr const char* route_other = "other";  // unknown or unparsed path
-// All of them, without repetition: a bounded set.
+// All names, without duplicates: a bounded set.
 std::vector<const char*> route_names();
 
 }  // namespace windsplat::api

@@ -26,7 +26,7 @@ struct ServerOptions {
   bool local_hosts_only = false;
   // Allow IP addresses as Host, too, when other machines reach the server.
   bool known_hosts_only = false;
-  std::vector<std::string> allow_hosts;  // further names for both, without port
+  std::vector<std::string> allow_hosts;  // additional names for both, without port
   // The folder below which POST /v1/datasets opens files, absolute; empty: none.
   std::string data_root;
   std::shared_ptr<views::SavedViews> views;  // null: in memory only
@@ -35,7 +35,7 @@ struct ServerOptions {
   int idle_timeout_s = 300;
   // Limit on the waiting time of requests for pictures, milliseconds; further ones are refused.
   double requests_waiting_ms_max = 30'000;
-  std::vector<std::string> allow_origins;      // besides the server's own
+  std::vector<std::string> allow_origins;      // besides the origin of the server
   std::shared_ptr<const access::Token> token;  // null: no authentication
   std::shared_ptr<transport::TlsContext> tls;  // null: plain TCP
   // Phases of a drain: when rendering is cancelled, and when connections are closed.

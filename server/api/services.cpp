@@ -9,7 +9,7 @@
 namespace windsplat::api {
 namespace {
 
-constexpr std::size_t view_changes_waiting_max = 64;  // each may take one disk sync
+constexpr std::size_t view_changes_waiting_max = 64;  // each change may need one disk sync
 
 }  // namespace
 

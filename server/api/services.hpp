@@ -24,7 +24,7 @@ struct Services {
   void end();
 
   ServerOptions options;     // base_path normalised
-  metrics::Metrics metrics;  // before the members that count
+  metrics::Metrics metrics;  // declared before the members that count in it
   access::Admission admission;
   http::RequestIds request_ids;  // used by the io thread only
   std::atomic<bool> draining{false};

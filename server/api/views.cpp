@@ -1,5 +1,5 @@
-// Saved views: create, read, change and delete. Changes run on a thread of their own, since they
-// may wait for a disk.
+// Saved views: create, read, change and delete. Changes run on a separate thread, because they may
+// wait for a disk.
 #include <array>
 #include <ctime>
 #include <functional>

@@ -108,7 +108,7 @@ std::optional<Pattern> parse_pattern(std::string_view text) {
   return pattern;
 }
 
-// A progress line on stderr, overwritten on a terminal; coloured unless NO_COLOR is set.
+// A progress line on stderr, overwritten if stderr is a terminal; coloured unless NO_COLOR is set.
 class Progress {
  public:
   explicit Progress(int total) : total_(total) {

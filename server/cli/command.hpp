@@ -23,7 +23,7 @@ inline constexpr int exit_interrupted = 130;  // the shell convention for SIGINT
 // Runs a command with validated arguments; the value is the exit code.
 using Action = std::function<int()>;
 
-// Each adds its subcommand, which sets `chosen` when selected.
+// Each function adds a subcommand, which sets `chosen` when selected.
 void add_serve(CLI::App& app, Action& chosen);
 void add_render(CLI::App& app, Action& chosen);
 void add_animate(CLI::App& app, Action& chosen);
@@ -62,7 +62,7 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text);
 // The whole file. Errors: not_found, too_large beyond `bytes_max`.
 Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max);
 
-// To a file (see write_whole_file), or to stdout for "-".
+// Writes to a file (see write_whole_file), or to stdout for "-".
 Result<void> write_output(const std::string& path, std::span<const std::uint8_t> bytes);
 Result<void> write_stdout(std::string_view text);
 

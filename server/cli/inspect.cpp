@@ -17,8 +17,8 @@
 namespace windsplat::cli {
 namespace {
 
-// By default ranges are over all steps if reading them is fast, else over the first step, and
-// omitted if even that decodes much more than is stored.
+// Ranges are by default over all steps if reading them is fast, otherwise over the first step; they
+// are omitted if even that decodes much more than is stored.
 constexpr std::uint64_t whole_series_bytes_max = 1ULL << 30;
 constexpr std::uint64_t bytes_of_a_read = 65536;  // minimum cost of a read
 

@@ -16,9 +16,9 @@ namespace {
 using Row = std::vector<std::string>;
 
 // Float32 coordinates deviate from even spacing by rounding.
-constexpr double uneven_tolerance = 1e-3;  // of the mean spacing
+constexpr double uneven_tolerance = 1e-3;  // relative to the mean spacing
 constexpr std::size_t steps_listed_max = 12;
-constexpr std::size_t line_bytes_max = 80;  // of notes and reasons
+constexpr std::size_t line_bytes_max = 80;  // for notes and reasons
 
 std::string number(double value) {
   std::array<char, 40> text{};
@@ -193,7 +193,7 @@ std::string inspect_text(const protocol::DatasetDescription& dataset) {
   if (!dataset.left_out.empty()) {
     std::size_t width = 0;
     for (const auto& left : dataset.left_out) width = std::max(width, word(left.first).size());
-    out += "\nleft out\n";
+    out += "\nomitted\n";
     for (const auto& [variable, reason] : dataset.left_out) {
       const std::string name = word(variable);
       out += "  " + name + std::string(width - name.size() + 2, ' ');

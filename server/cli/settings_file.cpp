@@ -24,7 +24,7 @@ Error read_error(const char* what, const std::string& path) {
                     what + (": " + std::generic_category().message(errno)));
 }
 
-// Reads to the end, or one byte above the limit.
+// Reads to the end, or to one byte beyond the limit.
 Result<std::string> read_descriptor(int file, const std::string& path, std::size_t bytes_max) {
   struct stat facts {};
   if (::fstat(file, &facts) != 0) return read_error("cannot be read", path);

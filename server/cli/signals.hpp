@@ -10,7 +10,7 @@
 
 namespace windsplat::cli {
 
-// Runs a call on a thread of its own, so that requesting it never blocks. A request during a call
+// Runs a call on a separate thread, so that requesting it never blocks. A request during a call
 // causes one more call. Exceptions are logged.
 class Errand {
  public:
@@ -37,11 +37,11 @@ class Errand {
 // Action on a second SIGTERM or SIGINT: exit at once.
 struct AtOnce {
   int code = 1;                            // exit code
-  std::function<void()> before = nullptr;  // on the watching thread, while others run
+  std::function<void()> before = nullptr;  // called on the watching thread before the action
 };
 
 // Construct before any other thread: blocks the signals for this thread and those it starts, and
-// waits for them on a thread of its own.
+// waits for them on a separate thread.
 class SignalWatch {
  public:
   // Calls `on_first` once on the watching thread for SIGTERM or SIGINT: it must not block. Calls

@@ -188,8 +188,8 @@ int study_command(const StudyArguments& arguments) {
   }
   const auto written = study::write_report(*report, arguments.output);
   if (!written) return answer(written.error());
-  const auto said = write_stdout(summary(*report, arguments.output));
-  return said ? exit_ok : answer(said.error());
+  const auto printed = write_stdout(summary(*report, arguments.output));
+  return printed ? exit_ok : answer(written.error());
 }
 
 }  // namespace

@@ -30,12 +30,12 @@ Box curved_box(const Pass& pass, const Brick& brick) {
   };
   for (int v = 0; v < brick.v_count; ++v) {
     for (int u = 0; u < brick.u_count; ++u) {
-      const float* place =
+      const float* position =
           pass.places + 3 * (offset(pass.major, brick.sheet) + offset(pass.v, brick.v_first + v) +
                              offset(pass.u, brick.u_first + u));
       for (int c = 0; c < 3; ++c) {
-        box.low[c] = std::min<double>(box.low[c], place[c]);
-        box.high[c] = std::max<double>(box.high[c], place[c]);
+        box.low[c] = std::min<double>(box.low[c], position[c]);
+        box.high[c] = std::max<double>(box.high[c], position[c]);
       }
     }
   }
@@ -93,7 +93,7 @@ double left_out(const RenderPlan& plan, const PassPlan& pass, const KeptSummary&
   const kernels::Camera& camera = plan.camera;
   const kernels::LineStyle& line = pass.kernel.line;
   const double pixels = static_cast<double>(camera.width) * camera.height;
-  double oblique = 1;  // longest ray at unit depth
+  double oblique = 1;  // length of the longest ray at unit depth
   if (camera.perspective != 0) {
     oblique = std::hypot(1.0, std::hypot(camera.half_width_px, camera.half_height_px) *
                                   static_cast<double>(camera.pixel));
@@ -262,11 +262,11 @@ void Binner::count_regions(std::size_t row, BrickCounts& counts) {
 // The same brick with indices in lattice order instead of visit order.
 Brick in_lattice(const PassPlan& pass, const Brick& brick) {
   const Pass& kernel = pass.kernel;
-  Brick own = brick;
-  own.sheet = pass.axis[kernel.major].visit[brick.sheet];
-  own.u_first = brick_start(pass.axis[kernel.u].visit[brick.u_first]);
-  own.v_first = brick_start(pass.axis[kernel.v].visit[brick.v_first]);
-  return own;
+  Brick in_lattice = brick;
+  in_lattice.sheet = pass.axis[kernel.major].visit[brick.sheet];
+  in_lattice.u_first = brick_start(pass.axis[kernel.u].visit[brick.u_first]);
+  in_lattice.v_first = brick_start(pass.axis[kernel.v].visit[brick.v_first]);
+  return in_lattice;
 }
 
 KeptSummary& summary_at(const PassPlan& pass, PassBins& shared, const Brick& brick) {
@@ -361,7 +361,7 @@ void Binner::add_sheet(const SheetKey& key, SheetBricks& out) {
   }
 }
 
-// The tiles that a brick may touch, both ends included.
+// Range of the tiles that a brick may touch, both ends included.
 struct TileRange {
   int x0, x1, y0, y1;
 };
@@ -402,7 +402,7 @@ void list_by_tile(const RenderPlan& plan, const CancelToken& cancel, BinSpace& s
 }
 
 void add_load(const RenderPlan& plan, Bins& bins, const SheetBricks& sheet) {
-  constexpr std::int64_t brick_overhead = 8;  // in kernels
+  constexpr std::int64_t brick_overhead = 8;  // number of kernels
   for (std::size_t b = 0; b < sheet.bricks.size(); ++b) {
     const Brick& brick = sheet.bricks[b];
     const TileRange range = tiles_of(plan, brick);

@@ -17,7 +17,7 @@ namespace windsplat::engine {
 struct Bins {
   int tiles_x = 0;
   int tiles_y = 0;
-  std::vector<kernels::Brick> bricks;  // those with something to draw, front to back
+  std::vector<kernels::Brick> bricks;  // bricks with something to draw, front to back
   // Tile t (row by row) draws bricks[entries[e]] for e in [first[t], first[t + 1]), ascending.
   std::vector<std::size_t> first;
   std::vector<std::uint32_t> entries;
@@ -50,7 +50,7 @@ struct SheetBricks {
 // interleaved by distance, lines first.
 struct SheetKey {
   int side;      // 0: from the eye upward; 1: downward
-  int distance;  // in samples from the sample of the eye
+  int distance;  // distance in samples from the sample of the eye
   int pass;
   int sheet;
 };
@@ -61,8 +61,8 @@ struct PassBins {
   std::array<std::vector<int>, 3> in_order;  // kernel positions in lattice order
   kernels::Pass pass{};                      // the pass with these visit lists
   double longest = 0;                        // half the longest line that the style allows
-  std::array<double, 3> reach{};             // of kernels with that line
-  std::vector<std::uint8_t> done;            // by region of PassSummaries; 1: counted as a whole
+  std::array<double, 3> reach{};             // extent of kernels with that line
+  std::vector<std::uint8_t> done;            // per region of PassSummaries; 1: counted as a whole
 };
 
 // Storage of make_bins that the caller keeps between frames: further frames of the same kind
@@ -72,8 +72,8 @@ struct BinSpace {
   SummaryCache summaries;
   std::vector<PassBins> passes;
   std::vector<SheetKey> sheets;
-  std::vector<SheetBricks> found;  // by sheet
-  std::vector<BrickCounts> rows;   // of the regions counted as a whole, by row
+  std::vector<SheetBricks> found;  // per sheet
+  std::vector<BrickCounts> rows;   // counts of the regions counted as a whole, per row
   struct DepthKey {
     float depth;
     std::uint32_t brick;

@@ -27,7 +27,7 @@ double kernel_at(double r) {
 // The integral of K from the middle of the ray to each of `count` + 1 equidistant points of its
 // half chord, by composite two-point Gauss quadrature.
 std::vector<double> integrals(double b2, int count) {
-  constexpr int pieces = 32;  // per step
+  constexpr int pieces = 32;  // pieces per step
   const double chord = std::sqrt(std::max(t * t - b2, 0.0));
   const double h = chord / (count * pieces);
   const double node = 0.5 / std::sqrt(3.0);

@@ -84,14 +84,14 @@ struct RenderPlan {
   bool slabs = false;               // the slab method
   bool curved = false;              // visibility order by depth only
   int compositing = 0;              // scene::Compositing
-  double slab_depth = 1;            // of a slab along the view, world units
+  double slab_depth = 1;            // depth of a slab along the view, world units
   float stop_transmittance = 0;
   int tile_pixels = 0;  // along a tile's side, at most kernels::tile_side
-  Variant variant;      // without its target and level
-  SampleWays ways;      // of the last curved lattice
+  Variant variant;      // variant, without target and level
+  SampleWays ways;      // distances of the last curved lattice
 
   RenderPlan() = default;
-  RenderPlan(const RenderPlan&) = delete;  // passes point into themselves
+  RenderPlan(const RenderPlan&) = delete;  // not copyable: passes contain pointers into themselves
   RenderPlan& operator=(const RenderPlan&) = delete;
   RenderPlan(RenderPlan&&) = default;
   RenderPlan& operator=(RenderPlan&&) = default;

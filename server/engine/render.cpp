@@ -14,7 +14,7 @@ namespace windsplat::engine {
 
 struct RenderSpace::Parts {
   Image image;
-  RenderPlan plan;  // of the last frame; its scene may have been destroyed
+  RenderPlan plan;  // plan of the last frame; its scene may have been destroyed
   BinSpace bins;
   TileSpace tiles;
 };

@@ -78,7 +78,7 @@ class SummaryCache {
 
   std::uint64_t frame_ = 0;
   std::vector<std::unique_ptr<Entry>> entries_;
-  std::vector<std::uint32_t> key_;  // of the requested pass
+  std::vector<std::uint32_t> key_;  // key of the requested pass
 };
 
 // Reads the fields of a brick and returns its summary.

@@ -30,8 +30,8 @@ struct WaitingSplats {
 
   std::vector<kernels::SplatRecord> records;
   std::vector<std::uint32_t> free;
-  std::vector<std::uint32_t> behind;       // by record: the next one in its queue
-  std::array<std::uint32_t, slabs> first;  // by slab, modulo
+  std::vector<std::uint32_t> behind;       // per record: the next one in its queue
+  std::array<std::uint32_t, slabs> first;  // per slab, modulo
   std::array<std::uint32_t, slabs> last;
   std::size_t count = 0;
 };
@@ -52,10 +52,10 @@ struct WaitingLines {
 
   std::vector<kernels::RibbonRecord> records;
   std::vector<std::uint32_t> free;
-  std::vector<std::uint32_t> waiting;  // by record: number of queued hits
+  std::vector<std::uint32_t> waiting;  // per record: number of queued hits
   std::vector<HitChunk> chunks;
   std::vector<std::uint32_t> free_chunks;
-  std::array<std::uint32_t, slabs> first;  // by slab, modulo
+  std::array<std::uint32_t, slabs> first;  // per slab, modulo
   std::array<std::uint32_t, slabs> last;
   std::size_t count = 0;  // hits
 };
@@ -67,17 +67,17 @@ struct SweepSpace {
   std::vector<std::int32_t> free;
   std::vector<DepthEntry> active;  // last depth and slot of each prepared brick
   std::vector<DepthEntry> order;
-  std::vector<DepthEntry> spare;  // for sorting
+  std::vector<DepthEntry> spare;  // storage for sorting
   // Slabs.
   std::unique_ptr<kernels::Prepared> prepared;
   WaitingSplats splats;
   WaitingLines lines;
   std::vector<std::uint32_t> here;          // splats in the current slab
-  AlignedVector<float> gathered;            // by slab, modulo
-  std::vector<kernels::Hit> listed;         // of one brick
-  std::vector<kernels::Hit> hits;           // in the current slab
-  std::vector<kernels::MetLine> met;        // the same by block
-  std::vector<kernels::MetLine> spare_met;  // for sorting
+  AlignedVector<float> gathered;            // records of one brick
+  std::vector<kernels::Hit> listed;         // hits of one brick
+  std::vector<kernels::Hit> hits;           // hits in the current slab
+  std::vector<kernels::MetLine> met;        // the same hits, grouped by block
+  std::vector<kernels::MetLine> spare_met;  // storage for sorting
 };
 
 // Calls visit(member) for each vector that grows with the contents of a tile; member(space) returns

@@ -20,7 +20,7 @@ using kernels::tile_blocks;
 
 constexpr std::size_t blocks_of_tile = static_cast<std::size_t>(tile_blocks) * tile_blocks;
 constexpr std::size_t row_floats = std::size_t{4} * kernels::tile_side;
-constexpr int rows_delivered = 8;  // per call of the sink; even
+constexpr int rows_delivered = 8;  // number of rows per call of the sink; even
 
 // Reserves the storage of every worker, including those that draw no tile this time.
 void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {

@@ -15,7 +15,7 @@ namespace windsplat::engine {
 struct Workspace {
   AlignedVector<float> blocks;
   AlignedVector<float> rays;
-  AlignedVector<float> rows;  // of a finished tile
+  AlignedVector<float> rows;  // rows of a finished tile
   SweepSpace sweep;
 };
 

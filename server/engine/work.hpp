@@ -29,7 +29,8 @@ std::string text_of(const Variant& variant);
 
 struct WorkReport {
   std::int64_t samples = 0;  // kernel positions of the scene
-  // In bricks of 8 x 8 x 1 that lie entirely outside the picture or before the near plane.
+  // Kernel positions in bricks of 8 x 8 x 1 that lie entirely outside the picture or before the
+  // near plane.
   std::int64_t culled = 0;
   // Among the others, independent of the view direction:
   std::int64_t skipped_vector = 0;  // line skipped: magnitude below its tolerance, or masked
@@ -39,13 +40,13 @@ struct WorkReport {
   std::int64_t pixel_updates = 0;
   std::int64_t exponentials = 0;
   std::int64_t tiles = 0;
-  std::int64_t tiles_stopped = 0;  // ended early by stop transmittance
+  std::int64_t tiles_stopped = 0;  // tiles ended early because of the stop transmittance
   // Upper bounds: mean over the picture of the alphas skipped by tolerances, and the largest change
   // of a pixel by early termination.
   double skipped_bound = 0;
   double stop_bound = 0;
   std::vector<std::string> fields;  // set by the caller
-  std::int64_t bytes = 0;           // of the fields read
+  std::int64_t bytes = 0;           // size of the fields read
   Variant variant;
 };
 

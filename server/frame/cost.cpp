@@ -17,17 +17,17 @@ namespace {
 
 constexpr double footprint = 5.9;         // area of a splat in cells: pi 1.37^2
 constexpr double covered_min = 16;        // pixels: kernels are drawn into blocks of 4 x 4
-constexpr double reference_height = 720;  // pixels, for which a view gives its radii
+constexpr double reference_height = 720;  // pixels, for which the radii of a view are defined
 
-// The visible part of the volume: its share, and the size of a world unit there.
+// The visible part of the volume: its fraction of the volume, and the size of a world unit in it.
 struct VisiblePart {
   double share = 1;
-  double px = 1;   // mean pixels a world unit
+  double px = 1;   // mean number of pixels per world unit
   double px2 = 1;  // mean of its square
 };
 
-// Between the depths of the box the frustum holds V = 4 h^2 a (f^3 - n^3) / 3, h its half height at
-// depth 1 and a its aspect; the means of 1 / d and 1 / d^2 over it follow.
+// Between the depths of the box the frustum contains V = 4 h^2 a (f^3 - n^3) / 3, with h half its
+// height at depth 1 and a its aspect ratio; the means of 1 / d and 1 / d^2 over it follow.
 VisiblePart visible_part(const scene::Camera& camera, const scene::Lattice& lattice) {
   const auto [near, far] = scene::view_depths(camera, lattice);
   const double depth = std::max(far - near, 1e-9);
@@ -101,7 +101,8 @@ class Counting {
            Cost::pixels_a_kernel;
   }
 
-  // Of the largest length that the view allows, within the box of a kernel.
+  // Lines are assumed to have the largest length that the view allows, clipped to the box of a
+  // kernel.
   void add_lines(const protocol::VectorView& vector) {
     const double widest = *std::max_element(cell_.begin(), cell_.end());
     const double length =
@@ -115,7 +116,7 @@ class Counting {
   }
 
   void add_medium(const protocol::ScalarView& scalar, const std::string& pointer) {
-    // A default extinction absorbs.
+    // A default extinction absorbs light.
     const bool absorbs =
         !scalar.extinction || std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
                                           [](const auto& point) { return point[1] > 0; });

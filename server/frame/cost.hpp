@@ -1,5 +1,5 @@
 // Upper bound of the work of a picture, from its view and the description of its dataset, before
-// anything is read or queued.
+// any data are read or the picture is queued.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 namespace windsplat::frame {
 
 // Work is counted in kernels: one for each kernel position of the lines and each sample of a
-// medium, and one for every pixels_a_kernel pixels that a kernel covers, that slabs cross, or that
-// the picture has. The fixed work of a kernel is about that of so many pixels.
+// medium, and one per pixels_a_kernel pixels that a kernel covers, that slabs cross, or that the
+// picture has. The fixed work of a kernel is about that of so many pixels.
 struct Cost {
   static constexpr double pixels_a_kernel = 16;
 
@@ -21,8 +21,8 @@ struct Cost {
   std::string dominant;  // JSON pointer to the setting with the largest share
 };
 
-// Every sample of a bent lattice is drawn. What lies outside the picture counts by its share of the
-// volume.
+// All samples of a bent lattice are drawn. The part outside the picture counts by its fraction of
+// the volume.
 Cost cost_of(const scene::ViewOutline& outline);
 
 }  // namespace windsplat::frame

@@ -1,4 +1,4 @@
-// One pass over both pictures.
+// Compares the pictures in one pass.
 #include "server/frame/difference.hpp"
 
 #include <algorithm>

@@ -37,8 +37,8 @@ void name_field(const data::Volume& volume, const std::string& name, engine::Wor
   name_field(name, static_cast<std::int64_t>(volume.bytes()), work);
 }
 
-// The engine knows volumes, not names: the scene's layers are the view's, in its order, without
-// those that absorb nothing. A field drawn twice counts once.
+// The engine knows volumes, not names: the layers of the scene are those of the view, in the same
+// order, without media of zero extinction. A field drawn twice counts once.
 void name_fields(const scene::Scene& scene, const protocol::View& completed,
                  engine::WorkReport& work) {
   work.fields.clear();
@@ -148,7 +148,7 @@ Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& po
   return work;
 }
 
-// Pixels that are not encoded are freed: they may take half a gigabyte.
+// Pixels that are not encoded are freed: they may occupy half a gigabyte.
 Error given_up(Error error, Workspace& workspace) {
   trim_storage(workspace.space.image().rgba, 0, 0);
   return error;
@@ -174,7 +174,7 @@ std::uint64_t bytes_beyond_kept(int width, int height, Format format) {
   const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
   if (pixels <= retained_pixels) return 0;
   constexpr std::uint64_t linear = 4 * sizeof(float);
-  constexpr std::uint64_t codes = 4;  // 8 bits each, and as many of what is encoded
+  constexpr std::uint64_t codes = 4;  // 8 bits each, and as many for the encoded form
   const std::uint64_t bytes_a_pixel = format == Format::jpeg  ? 2 * codes
                                       : format == Format::png ? linear + 2 * codes
                                                               : 2 * linear;
@@ -224,8 +224,8 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
 Result<Frame> encode(Workspace& workspace, ThreadPool& pool, const CancelToken& cancel) {
   const Clock::time_point start = Clock::now();
   Result<image::Bytes> bytes = bytes_of(workspace, pool, cancel);
-  // The pixels are no longer needed: those of a JPEG, used only to measure it, are freed, others
-  // beyond retained_pixels.
+  // The pixels are no longer needed: those of a JPEG, which only served to measure it, are freed,
+  // others beyond retained_pixels.
   const bool jpeg = workspace.encoding.format == Format::jpeg;
   trim_storage(workspace.space.image().rgba, 0, jpeg ? 0 : 4 * retained_pixels);
   if (!bytes) return bytes.error();

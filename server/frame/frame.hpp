@@ -1,4 +1,4 @@
-// One frame in four steps, which REST, the stream and the command line share: complete the view
+// A frame in four steps, common to REST, stream and command line: complete the view
 // (scene/completed_view.hpp), prepare its scene, draw it, encode it.
 #pragma once
 
@@ -30,32 +30,34 @@ struct Encoding {
   int quality = 90;
   image::Subsampling subsampling = image::Subsampling::s444;
   bool allow_reference = false;  // see complete()
-  // Whether the picture's error is measured by a second, finer run, and a JPEG's own.
+  // Whether the error of the picture is measured by a second, finer rendering, and that of a JPEG
+  // by decoding it.
   bool measure = false;
 };
 
 struct Frame {
   image::Bytes bytes;
-  protocol::View view;  // what was drawn: completed, its image as large as the view asked
-  int width = 0;        // as rendered
+  protocol::View view;  // the completed view that was drawn, with the requested size of the picture
+  int width = 0;        // rendered width
   int height = 0;
-  double detail = 0;  // at the view's size (scene::detail_shown)
+  double detail = 0;  // at the size of the view (scene::detail_shown)
   engine::WorkReport work;
-  std::int64_t render_us = 0;  // scene and engine, a JPEG's tone map in its tiles among it
+  std::int64_t render_us = 0;  // time of scene and engine, including the tone mapping of JPEG tiles
   std::int64_t measure_us = 0;
   std::int64_t encode_us = 0;
-  // Measured in linear light: of the picture against the truth of the view, and of its encoding.
+  // Measured in linear light: the error of the picture relative to the reference of the view, and
+  // that of its encoding.
   std::optional<double> error;
   std::optional<double> jpeg_error;
 };
 
-// Storage reused from frame to frame, and the frame between drawing and encoding. One frame at a
-// time.
+// Storage reused between frames, which also holds the frame between drawing and encoding. Used for
+// one frame at a time.
 struct Workspace {
-  engine::RenderSpace space;  // with the picture of every format but JPEG
-  image::YccPicture planes;   // of a JPEG
+  engine::RenderSpace space;  // contains the picture of every format except JPEG
+  image::YccPicture planes;   // contains the picture of a JPEG
   image::JpegEncoder jpeg;
-  Frame drawn;  // has no bytes yet
+  Frame drawn;  // the frame, without bytes until it is encoded
   Encoding encoding;
   std::array<float, 3> background{};  // linear
 };
@@ -64,52 +66,52 @@ struct Workspace {
 // retained_pixels (base/trim_storage.hpp).
 std::uint64_t bytes_beyond_kept(int width, int height, Format format);
 
-// A view completed for its dataset; where memory does not suffice the error states what all fields
-// of the view need. Errors: those of scene::complete(); invalid at /method/name for a reference
-// that is not allowed: it takes seconds to minutes, so that only a command line that has the
-// machine to itself allows it.
+// Completes a view for its dataset; if memory does not suffice, the error states what all fields of
+// the view need. Errors: those of scene::complete(); invalid at /method/name for a reference that
+// is not allowed: it takes seconds to minutes, so only a command line that does not share the
+// machine allows it.
 Result<scene::CompletedView> complete(const protocol::View& view, data::Dataset& dataset,
                                       bool allow_reference = false);
 
-// The view as a setting draws it: its method and slabs, the size of the picture, the level of the
-// data. Defaults stay those of the whole picture, so that every size frames the volume alike; radii
-// follow the height that is drawn.
+// The view as drawn at a setting: its method and slabs, the size of the picture, the level of the
+// data. Defaults remain those of the full size, so that the volume is framed equally at every size;
+// radii follow the height that is drawn.
 Result<scene::CompletedView> at_setting(const scene::CompletedView& completed,
                                         const quality::Setting& setting);
 
-// A scene ready to be drawn: what it shows is loaded and stays resident while this lives.
+// A scene ready to be drawn: its data are loaded and stay resident during its lifetime.
 struct Prepared {
-  scene::CompletedView completed;  // at the setting
-  protocol::ImageView asked;       // the size that the view asks for
+  scene::CompletedView completed;  // at the size of the setting
+  protocol::ImageView asked;       // at the size of the view
   scene::Scene scene;
   quality::Setting setting;
   Encoding encoding;
-  std::int64_t prepare_us = 0;  // of completing and preparing, counted in render_us
+  std::int64_t prepare_us = 0;  // time of completing and preparing, counted in render_us
 };
 // Errors: those of the scene.
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
                          data::Dataset& dataset, const Encoding& encoding);
-// The setting that draws the view as it stands.
+// The setting at which the view is drawn unchanged.
 quality::Setting own_setting(const scene::CompletedView& completed);
 
-// The report's fields and bytes are those of the volumes shown. `dataset` is read only to measure
-// the error, and only as far as it is resident. Errors: those of the engine (out_of_memory,
+// The fields and bytes of the report are those of the volumes shown. `dataset` is read only to
+// measure the error, and only its resident data. Errors: those of the engine (out_of_memory,
 // cancelled, ...).
 Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
                   const CancelToken& cancel, Workspace& workspace);
 
-// The bytes of what was drawn, once. Errors: too_large (for the format), cancelled.
+// Encodes what was drawn; call it once. Errors: too_large (for the format), cancelled.
 Result<Frame> encode(Workspace& workspace, ThreadPool& pool, const CancelToken& cancel = {});
 
 // Draws and encodes.
 Result<Frame> produce(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
                       const CancelToken& cancel, Workspace& workspace);
 
-// All four steps, at the view's own setting.
+// All four steps, at the setting of the view itself.
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel, Workspace& workspace);
 
-// The same with a workspace of its own.
+// The same with a temporary workspace.
 Result<Frame> produce(const protocol::View& view, data::Dataset& dataset, const Encoding& encoding,
                       ThreadPool& pool, const CancelToken& cancel);
 

@@ -1,4 +1,4 @@
-// Copies a frame's report into the words of the protocol.
+// Converts the report of a frame to the terms of the protocol.
 #include "server/frame/frame_info.hpp"
 
 namespace windsplat::frame {

@@ -6,7 +6,7 @@
 
 namespace windsplat::frame {
 
-// `view` is the one drawn, completed or not.
+// `view` is the one that was drawn, completed or not.
 protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view);
 
 }  // namespace windsplat::frame

@@ -25,14 +25,15 @@ double samples_of(const scene::Lattice& lattice) {
   return samples;
 }
 
-// Whether thinner slabs by the rules of the scene converge to the truth.
+// Whether pictures by thinner slabs converge to the reference, by the compositing rules of the
+// scene.
 bool is_exact(const scene::Scene& scene) {
   return scene.compositing == scene::Compositing::analytic &&
          scene.stop_transmittance <= quality::stop_of_the_truth;
 }
 
-// The view by analytic slabs of its thickness over `thinner`, from every sample if possible. The
-// second value: whether it is.
+// The view by analytic slabs of its thickness divided by `thinner`, from every sample if possible.
+// The second value: whether every sample is used.
 Result<std::pair<scene::Scene, bool>> finer_scene(const scene::CompletedView& completed,
                                                   data::Dataset& dataset, int thinner,
                                                   double samples_max) {
@@ -79,8 +80,8 @@ double rms(const std::vector<float>& values) {
   return std::sqrt(squares / static_cast<double>(values.size()));
 }
 
-// RMS of the difference between the truth and a picture resampled to its size: bilinear between
-// pixel centres, as the page displays it.
+// RMS of the difference between the reference and a picture resampled to its size: bilinear between
+// pixel centres, as displayed by the page.
 double apart(const engine::Image& picture, const std::vector<float>& truth, int width, int height,
              ThreadPool& pool) {
   struct Tap {
@@ -124,10 +125,10 @@ double apart(const engine::Image& picture, const std::vector<float>& truth, int 
   return std::sqrt(sum / static_cast<double>(truth.size()));
 }
 
-// The truth of a view and the errors of the two runs that it comes from.
+// The reference of a view, and the errors of the two renderings from which it is extrapolated.
 struct Truth {
   std::vector<float> rgba;
-  double squares = 0;  // of all values
+  double squares = 0;  // over all values
   double error_of_half = 0;
   double error_of_quarter = 0;
 };
@@ -199,7 +200,7 @@ class CalibrationRun {
     return {};
   }
 
-  // I + (I - I_half) / 3: slabs err by order 2.
+  // I + (I - I_half) / 3: the error of slabs is of order 2.
   Result<void> draw_quarter(const scene::Scene& scene) {
     std::mutex mutex;
     double squares = 0;
@@ -236,8 +237,9 @@ class CalibrationRun {
     quality::Measured out;
     const bool full = setting.half_level == 0;
     double beyond = 0;
-    // The first run fills caches that are independent of the camera.
-    constexpr double quick_ms = 20;  // such runs are repeated, for others disturb them most
+    // The first rendering fills caches that are independent of the camera.
+    constexpr double quick_ms = 20;  // shorter renderings are repeated, because other load disturbs
+                                     // them most
     for (int run = 0; run < 4; ++run) {
       if (run > 1 && *out.ms > quick_ms) break;
       const Clock::time_point start = Clock::now();
@@ -258,8 +260,8 @@ class CalibrationRun {
     return out;
   }
 
-  // Pictures of the truth's size are compared tile by tile: sum of (v - t)^2 - t^2 over the tiles
-  // drawn, since pixels outside them are 0.
+  // Pictures of the size of the reference are compared tile by tile: the sum of (v - t)^2 - t^2
+  // over the tiles drawn, since pixels outside them are 0.
   Result<engine::WorkReport> compare(const scene::Scene& scene, double& beyond) {
     std::mutex mutex;
     beyond = 0;
@@ -290,7 +292,8 @@ class CalibrationRun {
   quality::Viewpoint viewpoint_;
   Truth truth_;
   std::vector<double> ms_;
-  bool told_ = false;  // the truth's two runs are pictures of settings too, and were reported
+  bool told_ = false;  // the two renderings of the reference are pictures of settings too and have
+                       // been reported
 };
 
 }  // namespace

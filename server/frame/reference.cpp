@@ -1,4 +1,4 @@
-// Draws runs of pixels, each once, by the first thread that is free.
+// Draws runs of pixels, each once, on the first free thread.
 #include "server/frame/reference.hpp"
 
 #include <algorithm>
@@ -15,9 +15,9 @@ namespace windsplat::frame {
 namespace {
 
 constexpr std::size_t rgba_channels = 4;
-constexpr int piece_pixels = 32;  // of a row: a few milliseconds
+constexpr int piece_pixels = 32;  // pixels of a row: a few milliseconds
 
-// Reserves the memory of one drawing; a refusal states what all of it needs.
+// Reserves the memory of one drawing; an error states the total that is needed.
 class CountedMemory {
  public:
   explicit CountedMemory(const WorkMemory& memory) : memory_(memory) {}
@@ -29,7 +29,7 @@ class CountedMemory {
       return held;
     }
     std::string detail = "the reference of this view needs at least ";
-    detail += data::megabytes(held_ + bytes) + " of memory, and ";
+    detail += data::megabytes(held_ + bytes) + " of memory, but ";
     detail += data::megabytes(held_ + memory_.room()) + " are free: ";
     detail += "ask for a smaller picture or a larger stride";
     return make_error_at(ErrorKind::out_of_memory, "/image", std::move(detail));

@@ -1,5 +1,5 @@
-// View -> its truth, drawn in parts between which the renderer does other work, and the error of
-// the view's own picture.
+// View -> its reference, drawn in parts so that the renderer can do other work in between, and the
+// error of the picture of the view.
 #pragma once
 
 #include <array>
@@ -22,29 +22,29 @@
 
 namespace windsplat::frame {
 
-// Counts the memory of the work within a limit.
+// Counts the memory of the work in a limit.
 struct WorkMemory {
   engine::reference::Reserve reserve;   // errors: out_of_memory
-  std::function<std::uint64_t()> room;  // that could be had now
+  std::function<std::uint64_t()> room;  // bytes available now
 };
 
-// Of one view: what is loaded for it stays resident as long as this lives. One call at a time.
+// The drawing of one view, whose data stay resident during its lifetime. Not thread-safe.
 class ReferenceDrawing {
  public:
-  // Loads what the view shows and lists its kernels, which takes up to seconds: not for the
-  // renderer's thread. The view's method is what the truth is compared with.
+  // Loads the data of the view and lists its kernels, which takes up to seconds: do not call it on
+  // the renderer's thread. The picture by the method of the view is compared with the reference.
   // Errors: those of the scene; cancelled; out_of_memory at /image.
   static Result<std::unique_ptr<ReferenceDrawing>> begin(const scene::CompletedView& completed,
                                                          data::Dataset& dataset, unsigned workers,
                                                          const CancelToken& cancel,
                                                          const WorkMemory& memory);
 
-  // Continues where the last call ended, until `enough` (called by any worker) or all is drawn. A
-  // cancelled call loses only the few pixels in work.
+  // Continues where the last call ended, until `enough` (called by any worker) returns true or
+  // everything is drawn. Cancelling a call loses only the few pixels being drawn.
   void draw(ThreadPool& pool, const CancelToken& cancel, const std::function<bool()>& enough);
-  [[nodiscard]] double done() const;  // 1: all
+  [[nodiscard]] double done() const;  // fraction drawn, 0 to 1
 
-  // The view's own picture at full size against the truth, when that is drawn. Errors: those of the
+  // The picture of the view at full size compared with the finished reference. Errors: those of the
   // engine.
   Result<Difference> compare(ThreadPool& pool, const CancelToken& cancel, Workspace& workspace);
   // Errors: those of encoding.
@@ -65,8 +65,8 @@ class ReferenceDrawing {
   std::shared_ptr<const void> reserved_;
   std::unique_ptr<engine::reference::Painting> painting_;
   std::vector<float> rgba_;
-  std::vector<std::uint8_t> drawn_;  // by piece, row by row
-  std::size_t first_open_ = 0;       // pieces before it are drawn
+  std::vector<std::uint8_t> drawn_;  // number of kernels, by piece, row by row
+  std::size_t first_open_ = 0;       // all earlier pieces are drawn
 };
 
 }  // namespace windsplat::frame

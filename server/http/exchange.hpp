@@ -20,22 +20,23 @@ using Parameters = std::vector<std::pair<std::string, std::string>>;
 
 struct Request {
   std::string method;             // "GET"
-  std::vector<std::string> path;  // decoded segments below the base path; a last "" is left out
+  std::vector<std::string> path;  // decoded segments below the base path; an empty last segment is
+                                  // omitted
   bool below_base = true;         // false: `path` is the whole path
   bool ends_in_slash = false;
   Parameters query;  // decoded, in order
-  Headers headers;   // in order received
+  Headers headers;   // in the order received
   std::string body;
   CancelToken cancel;      // raised when the client disconnects
-  std::uint64_t peer = 0;  // connection id
-  std::string address;     // of the client, without port; empty: unknown
+  std::uint64_t peer = 0;  // id of the connection
+  std::string address;     // address of the client, without port; empty: unknown
   std::string id;          // sent with the response and logged (request_id.hpp)
 
   // All values of the header in order, joined by ", "; names are case-insensitive.
   [[nodiscard]] std::string header(std::string_view name) const;
 };
 
-// Bytes to send with their owner.
+// Bytes to send, with shared ownership.
 struct Body {
   std::shared_ptr<const void> owner;
   std::span<const std::uint8_t> bytes;
@@ -53,14 +54,14 @@ struct Response {
   bool close = false;  // close the connection after the response
 };
 
-// Answers a request; call once, from any thread.
+// Responds to a request; call it once, from any thread.
 using Reply = std::function<void(Response)>;
 
 bool equal_without_case(std::string_view a, std::string_view b);
 std::string_view trimmed(std::string_view text);  // without leading and trailing spaces and tabs
 std::vector<std::string_view> split_list(std::string_view text, char separator);  // trimmed parts
 
-// Status line and headers up to the empty line: the response's own, those of the connection, and
+// Status line and headers up to the empty line: those of the response, those of the connection, and
 // the security headers of every response.
 std::string response_head(const Response& response, bool keep_alive);
 

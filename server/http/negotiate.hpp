@@ -10,8 +10,8 @@
 
 namespace windsplat::http {
 
-// Returns the offer that an Accept header prefers (RFC 9110, 12.5.1); the first wins a tie or an
-// empty header. None if none is acceptable.
+// Returns the offer that an Accept header prefers (RFC 9110, 12.5.1); the first offer if there is a
+// tie or the header is empty. nullopt if none is acceptable.
 std::optional<std::size_t> choose_type(std::string_view accept,
                                        std::span<const std::string_view> offers);
 

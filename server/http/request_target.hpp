@@ -19,7 +19,8 @@ std::string normal_base_path(std::string_view path);
 // names the request's Host. Errors: malformed.
 Result<void> parse_target(std::string_view target, std::string_view base_path, Request& request);
 
-// Reads parameters one by one; finish() rejects unknown ones, listing the known, and repeated ones.
+// Reads parameters one by one; finish() rejects repeated and unknown parameters, with a list of the
+// known ones.
 class QueryReader {
  public:
   explicit QueryReader(const Parameters& query) : query_(query) {}
@@ -43,7 +44,7 @@ class QueryReader {
 
   const Parameters& query_;
   std::vector<std::string_view> asked_;
-  std::optional<Error> fault_;  // the first
+  std::optional<Error> fault_;  // the first error
 };
 
 }  // namespace windsplat::http

@@ -87,10 +87,10 @@ struct Strip {
 }  // namespace
 
 struct JpegEncoder::State {
-  std::vector<Compressor> compressors;  // by thread
+  std::vector<Compressor> compressors;  // per thread
   std::vector<Strip> strips;
   std::vector<std::span<const std::uint8_t>> pieces;
-  std::vector<int> failed;  // by thread
+  std::vector<int> failed;  // per thread
 
   // Releases the storage of a very large picture before a smaller one.
   void make_room(const Cut& cut, int mcu) {

@@ -18,14 +18,14 @@ constexpr std::uint8_t huffman_tables = 0xC4;
 constexpr std::uint8_t start_of_scan = 0xDA;
 constexpr std::uint8_t quantization_tables = 0xDB;
 constexpr std::uint8_t restart_interval = 0xDD;
-constexpr std::uint8_t first_restart = 0xD0;  // of 8, used cyclically
+constexpr std::uint8_t first_restart = 0xD0;  // first of 8 markers that are used cyclically
 constexpr std::uint8_t first_application = 0xE0;
 constexpr std::uint8_t last_application = 0xEF;
 
 struct Layout {
-  std::size_t frame = 0;  // of the SOF0 segment's marker
-  std::size_t scan = 0;   // of the SOS segment's marker
-  std::size_t data = 0;   // after it
+  std::size_t frame = 0;  // offset of the SOF0 marker
+  std::size_t scan = 0;   // offset of the SOS marker
+  std::size_t data = 0;   // offset after the SOS segment
 };
 
 Error broken(const char* what) {
@@ -43,11 +43,11 @@ Result<Layout> layout_of(std::span<const std::uint8_t> jpeg) {
   }
   Layout layout;
   for (std::size_t at = 2; at + 4 <= jpeg.size();) {
-    if (jpeg[at] != 0xFF) return broken("has no marker where one is due");
+    if (jpeg[at] != 0xFF) return broken("lacks a marker");
     const std::uint8_t code = jpeg[at + 1];
     const std::size_t length = (std::size_t{jpeg[at + 2]} << 8U) + jpeg[at + 3];
     const std::size_t next = at + 2 + length;
-    if (length < 2 || next + 2 > jpeg.size()) return broken("is cut short");
+    if (length < 2 || next + 2 > jpeg.size()) return broken("is truncated");
     const bool application = code >= first_application && code <= last_application;
     if (code == start_of_scan) {
       if (layout.frame == 0) return broken("has no frame");
@@ -66,7 +66,7 @@ Result<Layout> layout_of(std::span<const std::uint8_t> jpeg) {
   return broken("has no scan");
 }
 
-// Whether two strips have the same headers but for the height; different tables could not be
+// Whether two strips have the same headers except for the height; different tables could not be
 // decoded in one scan.
 bool same_header(std::span<const std::uint8_t> first, const Layout& a,
                  std::span<const std::uint8_t> other, const Layout& b) {

@@ -10,9 +10,9 @@
 namespace windsplat::image {
 
 struct Stitching {
-  int width = 0;  // of the whole picture, pixels
+  int width = 0;  // size of the whole picture, pixels
   int height = 0;
-  int strip_mcus = 0;  // of every strip but the last, which may be shorter; at most 65535
+  int strip_mcus = 0;  // height of every strip but the last, which may be less; at most 65535
 };
 
 // Each strip must be a baseline JPEG of one scan without restart intervals, with the same tables

@@ -13,7 +13,7 @@
 namespace windsplat::image {
 namespace {
 
-constexpr int compression_level = 1;                        // of zlib
+constexpr int compression_level = 1;                        // level of zlib
 constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // largest IDAT
 
 enum class Fate { done, cancelled, failed };
@@ -90,7 +90,7 @@ class PngWriter {
     keep(png, message);
     png_longjmp(png, 1);
   }
-  // A library of another version than the headers' warns, and then makes nothing.
+  // If the version of the library differs from that of the headers, it warns and creates nothing.
   static void on_warning(png_structp png, const char* message) { keep(png, message); }
   static void keep(png_structp png, const char* message) {
     auto& kept = static_cast<PngWriter*>(png_get_error_ptr(png))->message_;

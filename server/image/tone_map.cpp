@@ -40,7 +40,7 @@ class CodeTable {
   }
 
   [[nodiscard]] std::uint8_t operator()(float linear) const {
-    const float above_zero = linear > 0.0F ? linear : 0.0F;  // also of NaN
+    const float above_zero = linear > 0.0F ? linear : 0.0F;  // NaN becomes 0 too
     const float x = above_zero < 1.0F ? above_zero : 1.0F;
     const std::uint8_t code = code_at_start_[static_cast<std::uint32_t>(x * bins)];
     return static_cast<std::uint8_t>(code + static_cast<std::uint8_t>(x >= border_[code]));

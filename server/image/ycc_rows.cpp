@@ -38,7 +38,7 @@ HWY_INLINE Floats times_plus(Floats a, Floats b, float c) {
 // rounded before luma and chroma are computed.
 HWY_INLINE Floats srgb_value(Floats linear) {
   const Floats zero = hn::Zero(tag);
-  const Floats above_zero = hn::IfThenElseZero(hn::Gt(linear, zero), linear);  // also of NaN
+  const Floats above_zero = hn::IfThenElseZero(hn::Gt(linear, zero), linear);  // NaN becomes 0 too
   const Floats x = hn::Min(above_zero, hn::Set(tag, 1.0F));
   const Floats s = hn::Sqrt(x);
   Floats curve = times_plus(s, hn::Set(tag, 131.912689F), -414.033696F);

@@ -23,7 +23,7 @@ class Metrics {
   enum class Stage { queue, render, encode, write };
   enum class Over { http, stream };
 
-  // Responses are counted by route: one of `routes`, else "other".
+  // Counts responses by route: one of `routes`, otherwise "other".
   explicit Metrics(const std::vector<const char*>& routes = {});
   ~Metrics();
   Metrics(const Metrics&) = delete;
@@ -41,12 +41,12 @@ class Metrics {
   void answered(std::string_view route, int status);
   void accept_failed();
   void handshake_took(std::int64_t us);  // processor time
-  void connection_refused();             // closed without a response at the limit
+  void connection_refused();             // closed without a response because of a limit
   void refused(LimitKind kind);
   void dataset_opened(bool ok);
   void background_done(bool cancelled);
 
-  // All metrics, with those of `budget` and of the process.
+  // All metrics, including those of `budget` and of the process.
   [[nodiscard]] std::string text(const data::BudgetCounts& budget) const;
 
  private:

@@ -50,7 +50,7 @@ protocol::ForecastDescription curve(const protocol::View& completed, const Forec
   for (const std::size_t i : order) {
     out.points.push_back(point_at(completed, settings[i], forecasts[i]));
     protocol::ForecastPoint& point = out.points.back();
-    point.pareto = point.error < least;  // by the clamped error that is reported
+    point.pareto = point.error < least;  // uses the clamped error that is reported
     least = std::min(least, point.error);
   }
   const Aim aim{completed.quality.budget_ms, completed.quality.max_error};

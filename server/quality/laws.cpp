@@ -1,4 +1,4 @@
-// Power laws, fitted to calibration runs of the samples in five looks (docs/benchmarks/error.md).
+// Power laws, fitted to calibration runs of the samples in five scenes (docs/benchmarks/error.md).
 #include "server/quality/laws.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 // its height long with a radius of 1.4 pixels, a medium of optical depth 1 along the length of a
 // line.
 constexpr double pixels_high_of_laws = 480;
-constexpr double height_of_laws = 10;  // in lengths of a line
+constexpr double height_of_laws = 10;  // height of the picture in lengths of a line
 constexpr double radius_of_laws = 1.4;
 
 // error = factor (height / length)^by_height (pixels high)^by_pixels.

@@ -9,9 +9,9 @@ namespace windsplat::quality {
 
 // Standard deviations of the logarithm of measured over expected values.
 struct Scatter {
-  double signature = 0;  // between scene signatures, the same at every viewpoint
-  double viewpoint = 0;  // between viewpoints of one signature
-  double noise = 0;      // of one measurement
+  double signature = 0;  // standard deviation between scene signatures, the same at every viewpoint
+  double viewpoint = 0;  // standard deviation between viewpoints of one signature
+  double noise = 0;      // standard deviation of one measurement
 };
 
 struct Expected {

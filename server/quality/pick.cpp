@@ -8,7 +8,7 @@
 namespace windsplat::quality {
 namespace {
 
-// Times vary: a setting fits if its expected time is at most this share of the budget.
+// Times vary: a setting fits if its expected time is at most this fraction of the budget.
 constexpr double headroom = 0.92;
 constexpr double spreads = 1.65;  // standard deviations to the 95 % quantile
 

@@ -1,4 +1,4 @@
-// Measurements near by -> forecasts, in logarithms.
+// Nearby measurements -> forecasts, in logarithms.
 #include "server/quality/table.hpp"
 
 #include <algorithm>
@@ -41,7 +41,7 @@ struct Observation {
 
 struct Kriged {
   double log_ratio = 0;
-  double variance = 0;  // of a new measurement
+  double variance = 0;  // noise of a new measurement
 };
 
 double squared(double x) { return x * x; }

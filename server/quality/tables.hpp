@@ -14,7 +14,8 @@ namespace windsplat::quality {
 
 class Tables {
  public:
-  static constexpr std::size_t styles_max = 64;  // scene signatures; least recently used go first
+  static constexpr std::size_t styles_max = 64;  // scene signatures; the least recently used are
+                                                 // evicted first
 
   // A signature without a key yields the prior of its kind, and nothing is stored for it.
   Forecasts forecasts(const SceneSignature& signature, const Viewpoint& viewpoint);
@@ -24,7 +25,7 @@ class Tables {
            const Measured& measured);
 
   // True if a calibration run at this viewpoint is due and none is in progress. The caller must
-  // then run it and call end_study.
+  // then run it and call end_study().
   bool begin_study(const SceneSignature& signature, const Viewpoint& viewpoint);
   void end_study(const SceneSignature& signature, bool complete);
 

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double radians_per_degree = 0.017453292519943295;
 // Differences that correspond to a distance of 1.
-constexpr double height_scale = 0.5;     // of the logarithm of heights
-constexpr double pixels_scale = 1;       // of the logarithm of pixels
+constexpr double height_scale = 0.5;     // change of the logarithm of heights
+constexpr double pixels_scale = 1;       // change of the logarithm of pixels
 constexpr double direction_scale = 1.2;  // radians
 
 // Optical depth of the densest medium along the length of a line; 0 if unknown.

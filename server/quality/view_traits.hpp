@@ -8,9 +8,10 @@
 namespace windsplat::quality {
 
 struct Viewpoint {
-  double height = 1;                  // of the picture at the centre of the volume, world units
-  protocol::Vec3 direction{0, 1, 0};  // from the eye, unit
-  int width = 1;                      // of the picture, pixels
+  double height = 1;                  // height of the picture at the centre of the volume, world
+                                      // units
+  protocol::Vec3 direction{0, 1, 0};  // view direction from the eye, unit length
+  int width = 1;                      // width of the picture, pixels
   int pixels_high = 1;
   // Size of the finest cells relative to that below which samples are averaged; 0: never averaged,
   // or unknown.
@@ -28,10 +29,10 @@ inline constexpr double stop_of_the_truth = 1.5e-4;
 struct Kind {
   bool lines = true;
   bool medium = true;
-  double length = 0;     // of the lines, world units; by default 5 cells; 0: unknown
-  double radius = 1.4;   // of the lines, pixels at a picture height of 720
+  double length = 0;     // length of the lines, world units; by default 5 cells; 0: unknown
+  double radius = 1.4;   // radius of the lines, pixels at a picture height of 720
   double depth = 1;      // optical depth of the densest medium along the length of a line
-  double thickness = 1;  // of slabs, cells
+  double thickness = 1;  // thickness of slabs, cells
   double rule = 0;       // error of approximate compositing, at the slab thickness of the view
   double stop = 0;       // error of early termination
 };
@@ -40,12 +41,13 @@ struct Kind {
 // key. An empty key disables measurements.
 struct SceneSignature {
   std::string key;
-  std::string dataset;  // its id
+  std::string dataset;  // id of its dataset
   Kind kind;
 };
 SceneSignature signature_of(const protocol::View& completed);
 
-// Distance of two viewpoints; at about 1, measurements at one say little about the other.
+// Distance of two viewpoints; at about 1, measurements at one are hardly informative about the
+// other.
 double distance(const Viewpoint& a, const Viewpoint& b);
 
 }  // namespace windsplat::quality

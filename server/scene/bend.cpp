@@ -18,7 +18,7 @@ namespace {
 using data::AxisKind;
 using protocol::GeometryMapping;
 
-constexpr double shell_share = 0.15;  // of the inner radius
+constexpr double shell_share = 0.15;  // fraction of the inner radius
 
 Error no_heights(const std::string& detail) {
   return make_error_at(ErrorKind::invalid, "/geometry/heightField", detail);
@@ -222,7 +222,8 @@ struct Shell {
   [[nodiscard]] double radius(double share) const { return inner + share * (1.0 - inner); }
 };
 
-// A single level has the thickness of the distance of its columns, at most that of a full shell.
+// A single level has the thickness of the distance between its columns, at most that of a full
+// shell.
 Shell shell_of(const Lattice& straight, const data::Grid& even, double vertical_scale,
                bool one_height) {
   Shell shell{1.0 / (1.0 + shell_share * vertical_scale)};

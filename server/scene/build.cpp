@@ -18,7 +18,7 @@ using protocol::View;
 constexpr int table_entries = 256;
 constexpr double reference_height = 720;  // pixels, for which a view gives r1 and r2
 
-// A reversed range turns the map about.
+// A reversed range reverses the colour map.
 ColorTable make_table(const std::string& map, const protocol::Range& range) {
   ColorTable table;
   table.range = range;
@@ -78,9 +78,9 @@ Compositing engine_compositing(protocol::Compositing compositing) {
   return Compositing::analytic;
 }
 
-// Line radii in pixels of this picture. A line thinner than the pixel filter keeps the filter's
-// width and gives up opacity instead: with the half width h = (r1 + r2) / 2,
-// r1 = max(0, h - 1/2), r2 = max(1, h + 1/2), opacity times min(1, 2 h).
+// Line radii in pixels of this picture. A line thinner than the pixel filter is drawn with the
+// width of the filter and less opacity: with the half width h = (r1 + r2) / 2, r1 = max(0, h -
+// 1/2), r2 = max(1, h + 1/2), opacity times min(1, 2 h).
 void set_radii(const protocol::VectorView& from, int height, VectorLayer& layer) {
   const double scale = height / reference_height;
   layer.r1 = from.r1 * scale;
@@ -107,8 +107,7 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.magnitude_intensity = from.magnitude_intensity;
 }
 
-// Of the level that is drawn: fields are fetched as coarse as it, from wherever the view names
-// them.
+// Fields of the level that is drawn: all are averaged to the same level.
 struct Fields {
   data::Dataset& dataset;
   std::size_t step;
@@ -118,13 +117,13 @@ struct Fields {
   }
 };
 
-// Cells that cover less than this are averaged; 0: none are.
+// Cells that cover less than this are averaged; 0: no averaging.
 double averaged_below_px(const View& view) {
   const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
   const bool strided = (lines && view.vector.stride > 1) ||
                        std::any_of(view.scalars->begin(), view.scalars->end(),
                                    [](const auto& scalar) { return scalar.stride > 1; });
-  // A stride counts samples of the data, and the truth is that of all of them.
+  // A stride counts samples of the data, and the reference uses all of them.
   if (view.method.detail == protocol::Detail::full || strided ||
       view.method.name == protocol::MethodName::reference) {
     return 0;
@@ -132,7 +131,7 @@ double averaged_below_px(const View& view) {
   return lines ? halved_with_lines_below_px : halved_below_px;
 }
 
-// How much of the detail a view asks for its picture can show.
+// The fraction of the requested detail that the picture can show.
 std::array<int, 3> level_for(const View& view, const Camera& camera, const Lattice& lattice,
                              int coarser) {
   const double below_px = averaged_below_px(view);
@@ -155,7 +154,7 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
     layer.rate_y = rates->y;
     layer.rate_z = coarsen_along(rates->z, placed.lattice.spacing[2], level[2]);
   } else if (rises_where_negative(placed.grid, field)) {
-    // Drawn as it stands omega would show rising air sink.
+    // Omega is positive downward, so drawing it unchanged would show rising air as sinking.
     layer.scale[2] = -layer.scale[2];
   }
   layer.length = from.length.value();
@@ -202,7 +201,7 @@ Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, const Fi
   return layer;
 }
 
-// The scene, so far without lattice and layers, at a level.
+// The scene at a level, still without lattice and layers.
 Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View& view,
                        const Placed& placed, data::Dataset& dataset) {
   scene.level = level;
@@ -254,7 +253,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   auto built = at_level(scene, level, view, placed, dataset);
   const bool reduced = level != std::array{0, 0, 0};
   if (built || !reduced || built.error().kind != ErrorKind::out_of_memory) return built;
-  // If memory has room for the volumes but not for their levels, every sample is drawn; the report
+  // If there is memory for the volumes but not for their levels, every sample is drawn; the report
   // of the frame says so.
   return at_level(std::move(scene), {0, 0, 0}, view, placed, dataset);
 }

@@ -1,4 +1,4 @@
-// Completed view + dataset -> Scene: tables, camera, placement and the fields that are shown.
+// Completed view + dataset -> Scene: tables, camera, placement and the fields to show.
 #pragma once
 
 #include <array>
@@ -17,16 +17,16 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
 // Completes the view first.
 Result<Scene> build_scene(const protocol::View& view, data::Dataset& dataset);
 
-// How many times larger the finest cells are in the picture than those that are averaged: below 1
-// not every sample is drawn. 0 where every sample always is.
+// The size of the finest cells in the picture relative to the size below which cells are averaged:
+// below 1, not every sample is drawn. 0 if every sample is always drawn.
 double detail_shown(const CompletedView& completed);
 
-// How often each axis of the data is halved for this picture.
+// Number of halvings of each axis of the data for this picture.
 std::array<int, 3> level_of(const CompletedView& completed);
 std::array<int, 3> level_of(const ViewOutline& outline);
 
-// What a completed view shows of its dataset at any step, without loading it: the names of fields,
-// and how coarse.
+// The fields that a completed view shows at any step, and their level of detail, determined without
+// loading them.
 struct Shown {
   std::vector<std::string> fields;
   data::Coarsening coarsening;

@@ -17,7 +17,7 @@ constexpr double distance_max = 5e5;    // world units, well within the limits o
 constexpr double parallel_sine = 1e-6;  // sine of the least angle between up and view direction
 constexpr double near_min = 1e-4;
 constexpr double near_max = 1e-2;
-constexpr std::size_t outline_samples = 8192;  // of each end of a curved lattice
+constexpr std::size_t outline_samples = 8192;  // samples of each end of a curved lattice
 constexpr double aside_min = 0.05;             // world units; nearer boxes count as centred
 
 glm::dvec3 to_glm(const protocol::Vec3& v) { return {v[0], v[1], v[2]}; }
@@ -44,7 +44,7 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   const auto& places = *lattice.places;
   const std::size_t layer =
       static_cast<std::size_t>(lattice.dims[0]) * static_cast<std::size_t>(lattice.dims[1]);
-  // Only the bottom and top level; those between are rarely farther out.
+  // Only the bottom and top level are used; those between are rarely farther out.
   for (const std::size_t first : {std::size_t{0}, places.size() - layer}) {
     const std::size_t step = std::max<std::size_t>(1, layer / outline_samples);
     for (std::size_t n = 0; n < layer; n += step) {
@@ -54,7 +54,7 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   }
 }
 
-// Half a cell, the extent of a curved lattice beyond its samples.
+// Half a cell: the extent of a curved lattice beyond its samples.
 double outline_reach(const Lattice& lattice) {
   double reach = 0;
   for (std::size_t a = 0; lattice.places && a < 3; ++a) {

@@ -26,8 +26,8 @@ OrbitFrame orbit_frame(double azimuth, double elevation);
 // The distance and height that show the whole box (for a curved lattice: its samples) with a small
 // margin when looking along `frame` at `target`.
 struct Framing {
-  double distance;  // from eye to target, world units
-  double height;    // of the picture at the target, world units, orthographic
+  double distance;  // distance from the eye to the target, world units
+  double height;    // height of the picture at the target, world units, orthographic
 };
 Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dvec3& target,
                   double fov_y, const protocol::ImageView& image);

@@ -22,7 +22,7 @@ struct Stops {
   const char* kind;
   std::vector<std::uint32_t> codes;  // 0xrrggbb
   Spacing spacing = Spacing::uniform;
-  std::vector<Rgb> lab{};    // the same in OKLab
+  std::vector<Rgb> lab{};    // the control points in OKLab
   std::vector<double> at{};  // position of each, 0 to 1
 };
 
@@ -116,7 +116,7 @@ double distance(const Rgb& a, const Rgb& b) {
 }
 
 // Positions of the control points: uniform, or by distance in OKLab; the centre of a diverging map
-// remains at 0.5.
+// stays at 0.5.
 std::vector<double> places(const Stops& stops) {
   const std::size_t last = stops.lab.size() - 1;
   std::vector<double> at(last + 1);

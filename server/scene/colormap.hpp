@@ -22,7 +22,7 @@ std::vector<std::array<float, 3>> color_map_linear(std::string_view name, int co
 // The same as sRGB codes, for legends.
 std::vector<std::array<unsigned char, 3>> color_map_srgb(std::string_view name, int count);
 
-// "#rrggbb" to linear RGB; empty if it is not of that form.
+// "#rrggbb" to linear RGB; nullopt if malformed.
 std::optional<std::array<float, 3>> parse_color(std::string_view text);
 float srgb_from_linear(float linear);
 float linear_from_srgb(float srgb);

@@ -1,5 +1,5 @@
-// Completes a view in two passes: what the dataset's description determines, then what follows from
-// data. A view that states everything loads nothing.
+// Completes a view in two passes: first what the description of the dataset determines, then what
+// follows from its data. Completing a view without omitted values loads nothing.
 #include "server/scene/completed_view.hpp"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using protocol::View;
 
 Result<void> check_map(const std::string& name, const std::string& pointer) {
   if (!has_color_map(name)) {
-    return invalid_at(pointer, "no colour map is called " + in_double_quotes(name));
+    return invalid_at(pointer, "unknown colour map " + in_double_quotes(name));
   }
   return {};
 }
@@ -39,7 +39,7 @@ Result<void> check_color(const std::string& text, const std::string& pointer) {
 }
 
 Result<void> check_color_range(const std::optional<Range>& range, const std::string& pointer) {
-  if (range && (*range)[0] == (*range)[1]) return invalid_at(pointer, "its two ends are equal");
+  if (range && (*range)[0] == (*range)[1]) return invalid_at(pointer, "both ends are equal");
   return {};
 }
 
@@ -64,13 +64,13 @@ Result<void> check_color_field(const protocol::VectorColorView& color,
     auto field = find_field(info, *color.field, data::FieldKind::scalar, pointer);
     if (!field) return field.error();
   } else if (color.by == ColorBy::scalar) {
-    return invalid_at(pointer, "is needed for colour by scalar: the name of a scalar field");
+    return invalid_at(pointer, "is required for colour by scalar: the name of a scalar field");
   }
   return {};
 }
 
-// Numbers that follow from a field at the first step and from `arguments`: made once, so that later
-// steps do not need the first one resident.
+// Numbers that follow from a field at the first step and from `arguments`: computed once, so that
+// later steps do not need the first step resident.
 template <class Make>
 Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* what,
                                             const std::string& field,
@@ -89,7 +89,7 @@ Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* 
 
 std::vector<double> numbers_of(const Range& range) { return {range.begin(), range.end()}; }
 
-// What placement and slice say, for a key.
+// Placement and slice as part of a cache key.
 std::vector<double> numbers_of(const Lattice& lattice, const std::optional<Slice>& slice) {
   std::vector<double> out{slice ? slice->axis + 1.0 : 0.0,
                           slice ? static_cast<double>(slice->sample) : 0.0};
@@ -116,8 +116,7 @@ Result<void> complete_magnitudes(View& view, const Lattice& lattice,
   if (!vector.magnitude_range) vector.magnitude_range = Range{0, 1};
   const Range& range = *vector.magnitude_range;
   if (!vector.min_magnitude && named) {
-    // Of the lines as they are by default: a view that changes one of their keys changes that
-    // alone.
+    // Checks the default lines only: a view that changes one of their keys changes nothing else.
     protocol::VectorView plain;
     plain.length = default_length(lattice, plain.stride, slice);
     plain.magnitude_range = vector.magnitude_range;
@@ -150,7 +149,7 @@ Result<Range> first_scalar_range(const data::FieldInfo& field, data::Dataset& da
   return Range{(*range)[0], (*range)[1]};
 }
 
-// What the colour's value spans.
+// The range of the value that determines the colour.
 Result<Range> default_color_range(const View& view, const Lattice& lattice,
                                   const std::array<double, 2>& depths, data::Dataset& dataset) {
   const protocol::VectorView& vector = view.vector;
@@ -208,13 +207,13 @@ Result<void> check_extinction(const protocol::ScalarView& scalar, const std::str
     const std::string at = pointer + "/extinction/" + std::to_string(n);
     if (!std::isfinite(point[0]) || !(point[1] >= 0)) return invalid_at(at, "is not an extinction");
     if (n > 0 && point[0] < (*scalar.extinction)[n - 1][0]) {
-      return invalid_at(at, "its value is less than the one before it");
+      return invalid_at(at, "its value is less than the previous one");
     }
   }
   return {};
 }
 
-// Style and checks of a medium; no data.
+// Completes the style of a medium and checks it; needs no data.
 Result<void> outline_scalar(protocol::ScalarView& scalar, const std::string& pointer,
                             const data::DatasetInfo& info) {
   const auto field = find_field(info, scalar.field, data::FieldKind::scalar, pointer + "/field");
@@ -264,7 +263,7 @@ Result<void> check(const View& view, const data::DatasetInfo& info) {
   return check_geometry(view.geometry, info);
 }
 
-// The first pass: camera, fields and styles, as the description and the placement determine them.
+// The first pass: camera, fields and styles, as determined by description and placement.
 Result<Camera> complete_from_description(View& view, const data::DatasetInfo& info,
                                          const Lattice& lattice) {
   complete_camera(view, lattice);

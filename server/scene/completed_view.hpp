@@ -1,4 +1,4 @@
-// A view with every default of its dataset filled in: the only form that is drawn.
+// A view with all defaults of its dataset filled in. Only completed views are drawn.
 #pragma once
 
 #include <cstdint>
@@ -15,21 +15,21 @@
 
 namespace windsplat::scene {
 
-// Made by complete() alone. Immutable; independent of how long the dataset stays resident.
+// Made by complete() only. Immutable; independent of how long the dataset stays resident.
 class CompletedView {
  public:
   [[nodiscard]] const protocol::View& view() const { return view_; }
-  // Where the dataset's samples stand for it.
+  // The placement of the samples of the dataset for this view.
   [[nodiscard]] const Placed& placed() const { return *placed_; }
   [[nodiscard]] const Lattice& lattice() const { return placed_->lattice; }
   [[nodiscard]] const Camera& camera() const { return camera_; }
-  // How often more than the picture asks for the data is halved, where the view leaves that open
-  // (detail.hpp, coarser_level).
+  // Additional halvings of the data, if the view does not set the level of detail (detail.hpp,
+  // coarser_level).
   [[nodiscard]] int coarser() const { return coarser_; }
 
   // The same view after change(protocol::View&), which may set the camera, the method, the size of
-  // the picture and `quality`, or remove layers. Defaults stay as they were filled in. Errors:
-  // invalid with a pointer (its camera).
+  // the picture and `quality`, or remove layers. Defaults that were filled in are kept. Errors:
+  // invalid with a pointer (camera).
   template <class Change>
   [[nodiscard]] Result<CompletedView> with(const Change& change) const {
     CompletedView changed = *this;
@@ -55,16 +55,17 @@ class CompletedView {
   int coarser_ = 0;
 };
 
-// Fills in every default; values that the view states are kept. Loads nothing but what ranges and
-// placement need, and nothing at all where the view states them. Errors: invalid with a pointer (no
-// such field, step, colour map; up parallel to the view; eye on the target); those of loading.
+// Fills in all defaults; values given by the view are kept. Loads only the data needed for ranges
+// and placement, and none if the view gives them. Errors: invalid with a pointer (no such field,
+// step or colour map; up parallel to the view direction; eye equal to target); those of loading.
 Result<CompletedView> complete(const protocol::View& view, data::Dataset& dataset);
 
-// Views completed in this process: tests compare it with the number of views drawn.
+// Number of views completed in this process: tests compare it with the number of views drawn.
 std::uint64_t completions();
 
-// A view as far as the description of its dataset determines it, placed flat: enough to refuse it
-// or to estimate its cost before data is read. Defaults that follow from data stay open.
+// A view completed as far as the description of its dataset determines it, with a flat mapping:
+// enough to validate it or to estimate its cost before data are read. Defaults that follow from
+// data are not filled in.
 struct ViewOutline {
   protocol::View view;
   Lattice lattice;
@@ -74,8 +75,8 @@ struct ViewOutline {
 // Loads nothing. Errors: those of complete() that need no data.
 Result<ViewOutline> outline(const protocol::View& view, const data::DatasetInfo& info);
 
-// The fields that a view, completed or not, may load of a dataset: each once, without those that
-// do not exist. Loads nothing.
+// The fields of a dataset that a view, completed or not, may load: without duplicates, and without
+// those that do not exist. Loads nothing.
 std::vector<std::string> fields_of(const protocol::View& view, const data::DatasetInfo& info);
 
 }  // namespace windsplat::scene

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t quantile_samples_max = std::size_t{1} << 15U;
 constexpr double length_spacings = 5.0;
-constexpr double coverage = 3.0;     // of the projected box by lines
+constexpr double coverage = 3.0;     // coverage of the projected box by lines
 constexpr double line_share = 0.75;  // mean length of the drawn lines relative to full length
 constexpr double value_max = 1e38;   // limit of numbers in a view
 
@@ -100,7 +100,7 @@ class SampleOrder {
 
  private:
   std::size_t all_ = 1;
-  std::size_t length_ = 1;  // of the axis normal to the slice
+  std::size_t length_ = 1;  // length of the axis normal to the slice
   std::size_t stride_ = 1;
   std::size_t sample_ = 0;
 };
@@ -223,7 +223,7 @@ double default_min_magnitude(const protocol::VectorView& vector, const data::Vol
 
 protocol::Range default_height_range(const protocol::VectorView& vector, const data::Volume& volume,
                                      const Lattice& lattice) {
-  constexpr double below = 0.25;  // of the width
+  constexpr double below = 0.25;  // fraction of the width
   const std::size_t layer =
       static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   std::vector<double> heights;

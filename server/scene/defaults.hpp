@@ -61,11 +61,12 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
                                                       const Lattice& lattice,
                                                       const std::optional<Slice>& slice);
 
-// About five grid spacings per stride; for a slice, of the axes in its plane.
+// The default length of lines at full magnitude: about five grid spacings per stride, for a slice
+// those of the axes in its plane.
 double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice);
 
-// By height if the vertical axis has another unit than the horizontal ones (as in the atmosphere),
-// otherwise by magnitude.
+// The default: by height if the vertical axis has another unit than the horizontal ones (as in the
+// atmosphere), otherwise by magnitude.
 protocol::ColorBy default_color_by(const data::Grid& grid);
 
 }  // namespace windsplat::scene

@@ -129,7 +129,7 @@ Lattice coarsen_lattice(const Lattice& lattice, const std::array<int, 3>& level)
 
 void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pixels_per_unit,
                  VectorLayer& layer) {
-  // Mean over groups, so that an incomplete last group counts with its actual size.
+  // Mean over the groups, so that an incomplete last group counts with its actual size.
   double lines = 1;
   double apart_px = 0;  // first to last sample of a group, at the nearest point of the box
   for (std::size_t a = 0; a < 3; ++a) {

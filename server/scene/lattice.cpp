@@ -17,9 +17,9 @@ using data::Axis;
 using data::AxisKind;
 using protocol::VerticalPlacement;
 
-constexpr double box_edge = 2.0;         // of the longest edge, world units
-constexpr double cell_min = 1e-19;       // its square is a normal float
-constexpr double vertical_share = 0.15;  // of the longest horizontal edge, if units differ
+constexpr double box_edge = 2.0;         // length of the longest edge, world units
+constexpr double cell_min = 1e-19;       // the square of cell_min is a normal float
+constexpr double vertical_share = 0.15;  // fraction of the longest horizontal edge, if units differ
 
 bool all_positive(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
@@ -81,8 +81,8 @@ struct RawAxis {
   std::vector<double> positions;
   std::vector<double> edges;
   std::array<double, 2> extent{0, 1};  // first to last edge, or as given by the caller
-  bool thin = false;                   // one sample of unknown thickness
-  double length = 1;                   // after proportion, before the uniform scale
+  bool thin = false;                   // true: one sample of unknown thickness
+  double length = 1;                   // relative length, before the uniform scale
   [[nodiscard]] double raw_length() const { return extent[1] - extent[0]; }
 };
 

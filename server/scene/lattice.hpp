@@ -1,4 +1,4 @@
-// Where a grid's samples stand in the world (docs/design/rendering-model.md, "World space").
+// Positions of the samples of a grid in the world (docs/design/rendering-model.md, "World space").
 #pragma once
 
 #include <cstddef>

@@ -15,9 +15,10 @@ namespace windsplat::scene {
 
 namespace {
 
-// What a dataset keeps: a placement and what it follows from besides the dataset.
+// The cache entry of a dataset: a placement with the parameters that determine it.
 struct Kept {
-  protocol::GeometryView geometry;  // without a slice, which moves nothing
+  protocol::GeometryView geometry;  // the geometry without its slice, which does not change
+                                    // positions
   std::shared_ptr<const Placed> placed;
 };
 using KeptPtr = std::shared_ptr<const Kept>;

@@ -1,4 +1,4 @@
-// A view's geometry and a dataset -> what is wrong with it, or where its samples stand.
+// Geometry of a view + dataset -> placement of the samples, or an error.
 #pragma once
 
 #include <memory>
@@ -12,29 +12,29 @@
 
 namespace windsplat::scene {
 
-// A dataset's grid as placed (heights are its vertical axis) and where its samples stand.
+// The placed grid of a dataset (heights as its vertical axis) and the positions of its samples.
 struct Placed {
   data::Grid grid;
   Lattice lattice;
 };
 
-// Loads the height field if there is one; a bent lattice is remembered by the dataset. Errors:
-// those of place_lattice() and of loading.
+// Loads the height field if there is one; the dataset caches a bent lattice. Errors: those of
+// place_lattice() and of loading.
 Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView& geometry,
                                                     data::Dataset& dataset);
 
-// Whether samples stand on a bent lattice: mapped onto a sphere or by a height field.
+// Whether the samples are on a bent lattice: mapped onto a sphere or displaced by a height field.
 bool is_bent(const protocol::GeometryView& geometry);
 
-// A field of that kind by its name. Errors: invalid at `pointer`.
+// The field of that kind and name. Errors: invalid at `pointer`.
 Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const std::string& name,
                                           data::FieldKind kind, const std::string& pointer);
 
-// The view's layer of the grid, if it shows but one.
+// The layer of the grid that the view shows, if it is a slice.
 std::optional<Slice> slice_of(const protocol::GeometryView& geometry);
 
-// Checks a geometry without loading or placing anything: the height field is a scalar, the grid
-// has what the mapping needs, the slice lies within it. Errors: invalid with a pointer.
+// Validates a geometry without loading or placing anything: the height field is a scalar, the grid
+// supports the mapping, the slice is within the grid. Errors: invalid with a pointer.
 Result<void> check_geometry(const protocol::GeometryView& geometry, const data::DatasetInfo& info);
 
 }  // namespace windsplat::scene

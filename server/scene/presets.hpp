@@ -1,4 +1,4 @@
-// Named starting points of a view.
+// Named initial views.
 #pragma once
 
 #include <string>

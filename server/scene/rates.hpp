@@ -17,22 +17,21 @@ namespace windsplat::scene {
 bool rises_where_negative(const data::Grid& grid, const data::FieldInfo& field);
 
 struct Rates {
-  std::vector<double> x;  // by y index: meridians converge
+  std::vector<double> x;  // indexed by y, because meridians converge
   double y = 1;
-  std::vector<double> z;  // by z index
+  std::vector<double> z;  // indexed by z
 };
 
-// World units per second per unit of each component. Horizontal: a metre per second covers
-// 1 / (R cos(latitude)) of longitude, 1 / R of latitude (R = 6371 km), or the axis' own length.
-// Vertical, with pressure p(z) = 1000 hPa exp(-z / H) and H = 7.4 km (an isothermal atmosphere
-// near 253 K): w in m/s moves dp/dt = -w p / H along a pressure axis; omega in Pa/s is dp/dt there
-// and dz/dt = -omega H / p along a height axis; depth decreases with positive w. The rate along an
-// axis of one sample is 0.
-// On the sphere, directions are along local east, north and up, so that the scale is uniform: the
-// middle radius of the shell over R. On a curvilinear map, degrees are scaled as on a flat one at
-// the mean latitude of each row. With a height field the vertical axis is that of the heights (see
-// Placed).
-// Errors: invalid at /vector/space if a third component has no known rate along its axis.
+// World units per second per unit of each component. Horizontal: a metre per second covers 1 / (R
+// cos(latitude)) of longitude, 1 / R of latitude (R = 6371 km), or its length along an axis in
+// metres. Vertical, with pressure p(z) = 1000 hPa exp(-z / H) and H = 7.4 km (an isothermal
+// atmosphere near 253 K): w in m/s moves dp/dt = -w p / H along a pressure axis; omega in Pa/s is
+// dp/dt there and dz/dt = -omega H / p along a height axis; depth decreases with positive w. The
+// rate along an axis of one sample is 0. On the sphere, directions are along local east, north and
+// up, so that the scale is uniform: the middle radius of the shell over R. On a curvilinear map,
+// degrees are scaled as on a flat one at the mean latitude of each row. With a height field the
+// vertical axis is that of the heights (see Placed). Errors: invalid at /vector/space if a third
+// component has no known rate along its axis.
 Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
                           const protocol::GeometryView& geometry, const Lattice& lattice);
 

@@ -22,7 +22,7 @@ struct Camera {
   glm::dvec3 right{1, 0, 0};
   glm::dvec3 up{0, 0, 1};
   glm::dvec3 forward{0, 1, 0};
-  // Half the picture's height: tan(fovY / 2) in perspective, world units in orthographic.
+  // Half the height of the picture: tan(fovY / 2) in perspective, world units in orthographic.
   double half_height = 0.3;
   double near = 1e-3;  // world units; nothing nearer is drawn (perspective only)
   int width = 1;
@@ -46,7 +46,7 @@ struct Lattice {
   glm::dvec3 box_max{1, 1, 1};
 };
 
-// World heights of the lowest and the highest cell's edge.
+// World heights of the edges of the lowest and the highest cell.
 std::array<double, 2> height_range(const Lattice& lattice);
 
 // 256 linear RGB entries over range; a value maps to its linear interpolation, clamped at the ends.
@@ -55,16 +55,16 @@ struct ColorTable {
   std::vector<std::array<float, 3>> entries;
 };
 
-// direction: the compass bearing that the vector points to in degrees, 0 along +y (north), 90 along
-// +x (east), below 360. scalar: the value of a second field; a masked one is drawn mid-grey.
+// direction: the compass bearing of the vector in degrees, 0 along +y (north), 90 along +x (east),
+// below 360. scalar: the value of a second field, mid-grey where it is masked.
 enum class LineColor { world_z, screen_z, rise, magnitude, direction, scalar, constant };
 
 // The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in docs/design/rendering-model.md).
 struct VectorLayer {
   std::shared_ptr<const data::Volume> field;
-  glm::dvec3 scale{1, 1, 1};  // times each component before anything else
-  // For lines along trajectories in the world (space = world): world units per second per unit of
-  // each component, by y index for x (meridians converge), constant for y, by z index for z.
+  glm::dvec3 scale{1, 1, 1};  // factor of each component, applied first
+  // Used for lines along trajectories in the world (space = world): world units per second per unit
+  // of each component, by y index for x (meridians converge), constant for y, by z index for z.
   // Empty: components are not scaled.
   std::vector<double> rate_x;
   double rate_y = 1;
@@ -88,9 +88,9 @@ struct VectorLayer {
   bool overlap = true;
   std::uint32_t seed = 1;
   std::uint32_t epoch = 0;
-  // Phase motion: a line's opacity is multiplied by W(frac(q + 1/2 - phase)), W(p) = 1 - |2p - 1|,
-  // q from -1/2 at its tail to 1/2 at its head, phase = a hash of the sample + motion_cycles times
-  // min(|V| / magnitude_range[1], 1).
+  // Phase motion: the opacity of a line is multiplied by W(frac(q + 1/2 - phase)), W(p) = 1 - |2p -
+  // 1|, with q from -1/2 at its tail to 1/2 at its head and phase = a hash of the sample +
+  // motion_cycles times min(|V| / magnitude_range[1], 1).
   bool moving = false;
   double motion_cycles = 0;
 };
@@ -117,7 +117,7 @@ enum class Method { kernel, slab, reference };
 // Compositing of a line in a homogeneous piece of medium (docs/design/rendering-model.md).
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
 
-// Draws only the samples of one layer, and of vectors the part within its plane: the
+// Draws only the samples of one layer, and only the part of vectors within its plane: the
 // two-dimensional filter of [CM92].
 struct Slice {
   int axis = 2;
@@ -126,7 +126,7 @@ struct Slice {
 
 struct Scene {
   Camera camera;
-  Lattice lattice;                    // of the drawn level
+  Lattice lattice;                    // lattice of the drawn level
   std::array<int, 3> level{0, 0, 0};  // how often each axis of the data was halved
   std::optional<VectorLayer> vector;
   std::vector<ScalarLayer> scalars;
@@ -134,7 +134,7 @@ struct Scene {
   std::optional<Slice> slice;
   Method method = Method::kernel;
   Compositing compositing = Compositing::analytic;
-  double slab_thickness = 1;  // in cells along the line of sight
+  double slab_thickness = 1;  // thickness in cells along the line of sight
   double stop_transmittance = 1.5e-4;
   std::array<float, 3> background{0, 0, 0};  // linear; not part of the rendered image
 };

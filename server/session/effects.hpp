@@ -48,9 +48,9 @@ struct CancelRender {
 enum class Tier { moving, rest, final, still };
 // Sent directly before the next message or not at all. The pong calls Session::on_pong.
 struct Ping {
-  std::uint32_t seq = 0;  // of the next frame
+  std::uint32_t seq = 0;  // number of the next frame
 };
-// At most one is being written: the next follows Session::on_written.
+// At most one frame is being written: the next one follows Session::on_written().
 struct SendFrame {
   protocol::FrameHeader header;
   Payload payload;
@@ -61,7 +61,7 @@ struct SendFrame {
 struct Prefetch {
   protocol::View view;  // not completed; names its dataset unless there are no steps
   std::vector<int> steps;
-  quality::Setting setting;  // for drawing them
+  quality::Setting setting;  // setting with which they will be drawn
 };
 // The view is at rest: measure time and error of each setting for it. Not answered; cancelled by
 // the next render.
@@ -82,14 +82,14 @@ struct Drawn {
   Payload payload;
   protocol::FrameInfo info;
   std::string view_json;              // the completed view, canonical
-  quality::SceneSignature signature;  // of the requested view, with its viewpoint
+  quality::SceneSignature signature;  // signature of the requested view, with its viewpoint
   quality::Viewpoint viewpoint;
   std::int64_t queue_us = 0;
   std::int64_t render_us = 0;
-  std::int64_t measure_us = 0;  // the finer run
+  std::int64_t measure_us = 0;  // time of the finer rendering
   std::int64_t encode_us = 0;
   bool loaded =
-      false;  // fields were read or averaged for it: its time says nothing of the next one's
+      false;  // fields were read or averaged for it: its time does not predict that of the next one
 };
 
 }  // namespace windsplat::session

@@ -13,11 +13,11 @@ namespace windsplat::session {
 
 class LoadProgress {
  public:
-  // `waited_for`: 0 for a description, the ticket for a frame, none if nothing waits.
+  // `waited_for`: 0 for a description, the ticket for a frame, nullopt if nothing is waited for.
   std::optional<protocol::ProgressMessage> due(std::optional<std::uint64_t> waited_for,
                                                const WhatIsRead& what_is_read,
                                                const std::string& dataset, Micros now);
-  // When the next report is due.
+  // Time at which the next report is due.
   [[nodiscard]] std::optional<Micros> due_at() const;
 
  private:

@@ -1,4 +1,4 @@
-// The client's requests to open datasets, until each has been described or refused.
+// Requests of the client to open datasets, until each has been described or refused.
 #pragma once
 
 #include <cstddef>
@@ -17,12 +17,12 @@ class OpenRequests {
   [[nodiscard]] bool pending() const { return !pending_.empty(); }
   [[nodiscard]] bool full() const { return pending_.size() >= pending_max; }
 
-  // `version`: of the change of the view that the request made; 0 if it made none.
+  // `version`: that of the change of the view made by the request; 0 if it made none.
   void add(std::uint32_t id, std::uint64_t version);
-  // Ends the request: its version. None: it is not pending.
+  // Ends the request and returns its version; nullopt if it is not pending.
   std::optional<std::uint64_t> take(std::uint32_t id);
-  // Repeats the latest request, after its dataset was reopened: its id. None if there was none, it
-  // is pending, or too many are.
+  // Repeats the latest request after its dataset was reopened and returns its id; nullopt if there
+  // was none, it is pending, or too many are.
   std::optional<std::uint32_t> repeat();
 
   // Why the last view could not be shown.

@@ -17,7 +17,7 @@ constexpr int close_drain = 1001;
 constexpr int close_bad_message = 4400;
 constexpr int close_idle = 4410;
 
-// What is being read for: 0 for a description, the ticket for a frame.
+// What the data are being read for: 0 for a description, the ticket for a frame.
 std::optional<std::uint64_t> waiting_for_data(const SessionState& state) {
   if (state.hidden) return std::nullopt;
   if (state.openings.pending()) return 0;

@@ -70,16 +70,16 @@ class Session {
   Effects on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros now);
   Effects on_written(Micros now);  // the frame was written completely
   // The pong of the ping sent directly before the frame of that seq and its texts.
-  void on_pong(std::uint32_t seq, Micros now) { state_.flow.heard(seq, now); }
+  void on_pong(std::uint32_t seq, Micros now) { state_.flow.answered(seq, now); }
   Effects on_time(Micros now);
   Effects on_drain(Micros now);
   // The dataset was reopened: earlier frames of it are invalid.
   Effects on_changed(const std::string& dataset, Micros now);
 
-  // Counts of frames sent, dropped and cancelled.
+  // Numbers of frames sent, dropped and cancelled.
   [[nodiscard]] const protocol::StatsMessage& stats() const { return state_.stats; }
 
-  // When to call on_time() unless another input arrives first; none after Close.
+  // Time to call on_time() unless another input arrives first; nullopt after Close.
   [[nodiscard]] std::optional<Micros> wake_at() const;
 
  private:

@@ -1,4 +1,4 @@
-// Everything a session remembers, by subject, and the effects of the current input.
+// The state of a session, by subject, and the effects of the current input.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct SessionState {
               std::optional<std::uint32_t> rev) {
     send(protocol::ErrorMessage{id, rev, protocol::problem_from(error)});
   }
-  // The newest view, or at least its step, needs no frame any more.
+  // The newest view, or at least its step, needs no further frame.
   [[nodiscard]] bool view_is_shown() const { return displayed.version() == view.version(); }
   [[nodiscard]] bool step_is_shown() const { return displayed.version() >= view.step_version(); }
 

@@ -1,4 +1,4 @@
-// What a session may ask of its environment, and its time limits.
+// The interface of a session to its environment, and its time limits.
 #pragma once
 
 #include <functional>
@@ -13,9 +13,9 @@
 namespace windsplat::session {
 
 struct Options {
-  Micros idle_timeout_us = 300'000'000;  // without a message
-  Micros quiet_us = 120'000;             // without a change, before the final frame
-  Micros quiet_most_us = 1'000'000;      // maximum of it for slow links
+  Micros idle_timeout_us = 300'000'000;  // time without a message
+  Micros quiet_us = 120'000;             // time without a change, before the final frame
+  Micros quiet_most_us = 1'000'000;      // maximum of quiet_us for slow links
 };
 
 // Checks whether a view can be drawn, without loading; the value is the number of steps of its

@@ -1,4 +1,4 @@
-// The changes of a view that no frame has confirmed as drawable, and the view before them.
+// The changes of a view that are not confirmed as drawable by a frame, and the view before them.
 #pragma once
 
 #include <cstdint>
@@ -14,21 +14,21 @@ class UnconfirmedChanges {
  public:
   struct Change {
     std::uint64_t version = 0;
-    std::optional<std::uint32_t> rev;  // none if the client did not send it
+    std::optional<std::uint32_t> rev;  // nullopt if the client did not send it
     std::string patch_json;
   };
 
-  // More changes than a limit, or larger ones, count the oldest as confirmed.
+  // Beyond a limit of number or size, the oldest changes count as confirmed.
   void add(Change change);
-  // A frame of that version was drawn.
+  // Records that a frame of that version was drawn.
   void confirm(std::uint64_t version);
-  // The newest version was drawn: its document.
+  // Records that the newest version was drawn, with its document.
   void confirm_all(const protocol::ViewDocument& document, std::uint32_t rev);
-  // The change that a failed render of the version is blamed on. A view reconstructed by a removal
-  // has no change of its own (`newest`): the newest one is next, until the rest has been drawn
-  // before.
+  // The change to which a failed render of the version is attributed. A view reconstructed by a
+  // removal has no change of its own (`newest`): then the newest change is chosen, until the
+  // remaining view has been drawn before.
   [[nodiscard]] std::optional<Change> find_fault(std::uint64_t version, bool newest) const;
-  // False: no such change.
+  // Returns false if there is no such change.
   bool remove(std::uint64_t version);
 
   // The view with the changes that remain.

@@ -1,5 +1,5 @@
-// Changes of a session's view and what follows from them: renders of the view at rest are
-// cancelled, and what was learnt of another dataset is forgotten.
+// Applies changes to the view of a session: cancels renders of the view at rest, and resets what
+// was learned about another dataset.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ void change_view(SessionState& state, protocol::ViewDocument next,
 void change_step(SessionState& state, int step, Micros now);
 // The same view must be drawn again.
 void renew_view(SessionState& state, Micros now);
-// The change of that version was rejected later.
+// Call when the change of that version was rejected later.
 void undo_change(SessionState& state, std::uint64_t version, Micros now);
 
 }  // namespace windsplat::session

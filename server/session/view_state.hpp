@@ -1,4 +1,4 @@
-// The newest view of a session, how its changes are counted, and how they are taken back.
+// The newest view of a session, the counts of its changes, and their removal.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class ViewState {
   [[nodiscard]] std::uint32_t rev() const { return rev_; }
   [[nodiscard]] double t() const { return t_; }
   [[nodiscard]] std::uint64_t version() const { return version_; }
-  // Of the last change of /step.
+  // Version of the last change of /step.
   [[nodiscard]] std::uint64_t step_version() const { return step_version_; }
   [[nodiscard]] Micros changed_at() const { return changed_at_; }
 
@@ -32,14 +32,14 @@ class ViewState {
   void change(protocol::ViewDocument next, std::string patch_json, Micros now);
   // The same for a patch of the client, which expects an answer.
   void change(protocol::ViewDocument next, const protocol::PatchMessage& patch, Micros now);
-  // Counts as a change without one: the same view must be drawn again.
+  // Counts as a change, although there is none: the same view must be drawn again.
   void renew(Micros now) { show(document_, now); }
 
-  // The view of that version can be drawn.
+  // Records that the view of that version can be drawn.
   void confirm(std::uint64_t version);
-  // The change that a failed render of the version is blamed on.
+  // The change to which a failed render of the version is attributed.
   [[nodiscard]] std::optional<Change> find_fault(std::uint64_t version) const;
-  // Takes back the change of that version. False: there is none, or it was confirmed.
+  // Removes the change of that version. False: there is none, or it was confirmed.
   bool undo(std::uint64_t version, Micros now);
 
   // Whether a patch still needs a frame or `unchanged`.
@@ -50,7 +50,7 @@ class ViewState {
   void show(protocol::ViewDocument next, Micros now);
 
   protocol::ViewDocument document_;
-  protocol::View view_;  // the same, typed
+  protocol::View view_;  // the same view, typed
   std::uint32_t rev_ = 0;
   double t_ = 0;
   std::uint64_t version_ = 0;

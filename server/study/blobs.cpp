@@ -1,4 +1,4 @@
-// Formulas -> the blobs' density and flow.
+// Formulas -> density and flow of the blobs.
 #include "server/study/blobs.hpp"
 
 #include <algorithm>

@@ -33,7 +33,7 @@ constexpr double zoom_least = 0.6;
 constexpr double zoom_most = 4;
 // Indices into the sequence. quality/laws.cpp was fitted to views before the first one.
 constexpr std::uint64_t first_view = 100'000;
-constexpr std::uint64_t views_of_a_look = 1000;  // at most
+constexpr std::uint64_t views_per_variant = 1000;  // upper bound
 constexpr std::array<double, 7> max_errors{0.1, 0.05, 0.03, 0.02, 0.01, 3e-3, 1e-3};
 constexpr std::array<int, 5> qualities{40, 60, 75, 90, 95};
 constexpr int learnt_quality = 90;
@@ -61,31 +61,32 @@ class Calibrator {
 
   Result<Calibration> run() {
     const auto start = std::chrono::steady_clock::now();
-    const std::vector<Look> looks = looks_of(subject_);
-    for (look_ = 0; look_ < looks.size(); ++look_) {
-      out_.looks.push_back(looks[look_].name);
-      if (auto done = calibrate_look(looks[look_].view); !done) return done.error();
+    const std::vector<Variant> variants = variants_of(subject_);
+    for (variant_ = 0; variant_ < variants.size(); ++variant_) {
+      out_.variants.push_back(variants[variant_].name);
+      if (auto done = calibrate_variant(variants[variant_].view); !done) return done.error();
     }
     out_.seconds = seconds_since(start);
     return std::move(out_);
   }
 
  private:
-  Result<void> calibrate_look(const protocol::View& view) {
+  Result<void> calibrate_variant(const protocol::View& view) {
     const quality::SceneSignature signature = quality::signature_of(view);
     quality::Table table(signature.kind);
-    for (int n = 0; n < out_.plan.surveyed + out_.plan.held_out; ++n) {
+    for (int n = 0; n < out_.plan.calibrated + out_.plan.held_out; ++n) {
       if (cancel_.cancelled()) return make_error(ErrorKind::cancelled, "interrupted");
-      auto seen = seen_from(view, *subject_.dataset,
-                            first_view + views_of_a_look * look_ + static_cast<std::uint64_t>(n));
+      auto seen =
+          seen_from(view, *subject_.dataset,
+                    first_view + views_per_variant * variant_ + static_cast<std::uint64_t>(n));
       if (!seen) return seen.error();
       protocol::View held = std::move(*seen);
       held.image.width = out_.plan.width;
       held.image.height = out_.plan.height;
       const auto done =
-          n < out_.plan.surveyed
+          n < out_.plan.calibrated
               ? calibrate(held, n == 0, table)
-              : compare(held, static_cast<std::size_t>(n - out_.plan.surveyed), signature, table);
+              : compare(held, static_cast<std::size_t>(n - out_.plan.calibrated), signature, table);
       if (!done) return done.error();
       if (progress_) progress_(++views_);
     }
@@ -123,7 +124,7 @@ class Calibrator {
     const quality::Forecasts forecasts = table.forecasts(viewpoint);
     for (std::size_t i = 0; i < errors->size(); ++i) {
       if (std::isnan((*errors)[i])) continue;
-      out_.compared.push_back({look_, n, i, (*errors)[i], forecasts[i],
+      out_.compared.push_back({variant_, n, i, (*errors)[i], forecasts[i],
                                quality::prior(signature.kind, quality::settings[i], viewpoint)});
     }
     aim(view, forecasts, *errors);
@@ -135,7 +136,7 @@ class Calibrator {
       const double error =
           frame::difference_of(workspace_.space.image().rgba, truth->picture.rgba).rmse;
       out_.measured.push_back(
-          {look_, method == protocol::MethodName::slab, error, *workspace_.drawn.error});
+          {variant_, method == protocol::MethodName::slab, error, *workspace_.drawn.error});
     }
     if (auto done = compare_encodings(view, signature, table); !done) return done.error();
     return n == 0 && truth_ ? check_truth(view) : Result<void>();
@@ -222,7 +223,7 @@ class Calibrator {
         const auto decoded = image::decode_jpeg(*jpeg, width, height);
         if (!decoded) return decoded.error();
         const bool full = subsampling == image::Subsampling::s444;
-        out_.encodings.push_back({look_, quality, full, linear_rmse(rgb, *decoded),
+        out_.encodings.push_back({variant_, quality, full, linear_rmse(rgb, *decoded),
                                   table.encoding_error(quality, full, viewpoint),
                                   untaught.encoding_error(quality, full, viewpoint)});
       }
@@ -241,7 +242,7 @@ class Calibrator {
     if (!scene) return scene.error();
     const auto integral = truth_(*scene);
     if (!integral) return integral.error();
-    out_.checks.push_back({look_,
+    out_.checks.push_back({variant_,
                            frame::difference_of(to_floats(made->picture), integral->rgba).rmse,
                            made->estimate});
     return {};
@@ -254,7 +255,7 @@ class Calibrator {
   const std::function<void(int)>& progress_;
   frame::Workspace workspace_;
   Calibration out_;
-  std::size_t look_ = 0;
+  std::size_t variant_ = 0;
   int views_ = 0;
 };
 
@@ -289,31 +290,31 @@ Agreement agreement_of(const std::vector<Pair>& pairs) {
 
 }  // namespace
 
-std::vector<Look> looks_of(const Subject& subject) {
+std::vector<Variant> variants_of(const Subject& subject) {
   const protocol::View& own = subject.view;
   const bool lines = own.vector.field.kind == protocol::FieldChoice::Kind::named;
   const bool medium = !own.scalars->empty();
-  std::vector<Look> looks{{"unchanged", own}};
+  std::vector<Variant> variants{{"unchanged", own}};
   if (lines && medium) {
-    looks.push_back({"lines only", own});
-    looks.back().view.scalars->clear();
-    looks.push_back({"medium only", own});
-    looks.back().view.vector.field = {protocol::FieldChoice::Kind::none, ""};
+    variants.push_back({"lines only", own});
+    variants.back().view.scalars->clear();
+    variants.push_back({"medium only", own});
+    variants.back().view.vector.field = {protocol::FieldChoice::Kind::none, ""};
   }
   if (medium) {
-    looks.push_back({"ten times as dense", own});
-    for (protocol::ScalarView& layer : *looks.back().view.scalars) {
+    variants.push_back({"ten times as dense", own});
+    for (protocol::ScalarView& layer : *variants.back().view.scalars) {
       for (auto& point : *layer.extinction) point[1] = std::min(density_factor * point[1], 1e30);
     }
   }
   if (lines) {
-    looks.push_back({"thick lines", own});
-    protocol::VectorView& vector = looks.back().view.vector;
+    variants.push_back({"thick lines", own});
+    protocol::VectorView& vector = variants.back().view.vector;
     vector.r1 = thick_radius / 2;
     vector.r2 = thick_radius;
     *vector.length *= 2;
   }
-  return looks;
+  return variants;
 }
 
 Result<protocol::View> seen_from(const protocol::View& view, data::Dataset& dataset,

@@ -1,6 +1,6 @@
-// LDR-FLIP: two sRGB pictures -> their mean perceived difference. The names and constants are the
-// paper's (Andersson et al. 2020): colours are blurred as the eye blurs them, compared in a
-// perceptual space and amplified where edges or points differ.
+// LDR-FLIP: two sRGB pictures -> their mean perceived difference. Names and constants are those of
+// the paper (Andersson et al. 2020): colours are blurred by the contrast sensitivity of the eye,
+// compared in a perceptual space, and the difference amplified where edges or points differ.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,7 +20,7 @@ using Color = std::array<double, 3>;
 
 constexpr double pixels_per_degree = 67;
 
-// Color comparison: exponent, and the share of the largest difference that is mapped to 0.95.
+// Color comparison: exponent, and the fraction of the largest difference that is mapped to 0.95.
 constexpr double q_c = 0.7;
 constexpr double p_c = 0.4;
 constexpr double p_t = 0.95;
@@ -84,7 +84,7 @@ Color linear_from_ycxcz(const Color& color) {
   return times(rgb_from_xyz, {x * reference[0], y * reference[1], z * reference[2]});
 }
 
-// L*a*b* whose chroma counts for less in the dark (Hunt).
+// L*a*b* with the chroma of dark colours reduced (Hunt).
 Color hunt_lab_from_linear(const Color& rgb) {
   static const Color reference = white();
   const Color xyz = times(xyz_from_rgb, rgb);
@@ -103,7 +103,8 @@ double hyab(const Color& a, const Color& b) {
   return std::abs(a[0] - b[0]) + std::hypot(a[1] - b[1], a[2] - b[2]);
 }
 
-// Rows, then columns, each by a kernel of odd length; the border repeats its outermost pixels.
+// Filters rows, then columns, by a kernel of odd length each; beyond the border the outermost
+// pixels are repeated.
 Plane convolve(const Plane& in, Size size, const std::vector<double>& along_x,
                const std::vector<double>& along_y) {
   const int width = size.width;
@@ -234,7 +235,7 @@ Seen look_at(std::span<const std::uint8_t> rgb, Size size) {
   return out;
 }
 
-// Most of the range goes to small differences.
+// Most of the output range is used for small differences.
 double redistributed(double e, double e_max) {
   const double knee = p_c * e_max;
   return e < knee ? p_t / knee * e : p_t + (e - knee) / (e_max - knee) * (1 - p_t);

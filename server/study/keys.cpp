@@ -17,7 +17,7 @@ std::string exactly(double value) {
   return text.data();
 }
 
-// What a scene's numbers depend on, except reference and setting.
+// Everything that determines the numbers of a scene, except reference and setting.
 std::string identity(const Subject& subject, const Machine& machine) {
   std::string text = "windsplat " + machine.program;
   text += ' ';

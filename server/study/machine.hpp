@@ -11,7 +11,7 @@ struct Machine {
   std::string processor;
   std::string system;
   std::string compiler;
-  std::string version;  // of windsplat
+  std::string version;  // version of windsplat
   std::string program;  // digest of the running executable's bytes
   std::string kernels;  // the selected instruction set
   unsigned hardware_threads = 0;

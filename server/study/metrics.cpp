@@ -1,4 +1,4 @@
-// Errors in linear light, and pictures resampled for them.
+// Errors in linear light, and resampling of pictures for them.
 #include "server/study/metrics.hpp"
 
 #include <algorithm>

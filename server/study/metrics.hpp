@@ -1,4 +1,4 @@
-// Picture and reference -> their difference: in linear light, and perceived.
+// Picture and reference -> their difference, in linear light and as perceived.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace windsplat::study {
 bool within_unit(std::span<const float> rgba, double slack);
 
 // Mean of LDR-FLIP (Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG
-// 2020) of two sRGB pictures, 3 bytes a pixel, at 67 pixels per degree: 0 identical, 1 the
+// 2020) of two sRGB pictures, 3 bytes per pixel, at 67 pixels per degree: 0 identical, 1 the
 // largest difference.
 double mean_flip(std::span<const std::uint8_t> reference_rgb,
                  std::span<const std::uint8_t> test_rgb, int width, int height);

@@ -42,7 +42,7 @@ std::string line_of(const std::string& key, const Measurement& m) {
   return line;
 }
 
-// Empty if the line is malformed.
+// nullopt if the line is malformed.
 std::optional<std::pair<std::string, Measurement>> read_line(const std::string& line) {
   std::string key = line.substr(0, line.find(','));
   if (key.size() != key_digits || key.find_first_not_of("0123456789abcdef") != std::string::npos) {
@@ -63,7 +63,7 @@ std::optional<std::pair<std::string, Measurement>> read_line(const std::string& 
                    Measurement{rmse, max, psnr, flip, ms, ms_min, ms_max, stable == 1.0}};
 }
 
-// Empty if there is no file.
+// nullopt if there is no file.
 Result<std::string> read_whole(const std::filesystem::path& path) {
   errno = 0;
   std::ifstream in(path, std::ios::binary);
@@ -107,7 +107,7 @@ Result<PointsFile> PointsFile::open(const std::filesystem::path& path) {
   if (!text.empty() && !text.starts_with(heading)) {
     std::string message = "'";
     message += printable(path.native());
-    message += "' is not of a study: it does not start with the heading of points.csv";
+    message += "' does not belong to a study: it does not start with the heading of points.csv";
     return make_error(ErrorKind::bad_data, std::move(message));
   }
   for (std::size_t start = text.find('\n') + 1; start != 0 && start < text.size();) {

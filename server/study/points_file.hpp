@@ -1,5 +1,5 @@
-// DIR/points.csv: one line for each finished point of a study, appended as soon as it is measured,
-// so that an interrupted study can resume.
+// DIR/points.csv: one line per finished point of a study, appended as soon as it is measured, so
+// that an interrupted study can resume.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace windsplat::study {
 // FNV-1a, 64 bits.
 std::uint64_t hash_of(std::string_view bytes);
 
-// Hash of a text that lists everything a result depends on: 16 hexadecimal digits.
+// Hash of a text that lists everything on which a result depends: 16 hexadecimal digits.
 std::string key_of(std::string_view text);
 
 class PointsFile {

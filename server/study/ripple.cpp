@@ -1,4 +1,5 @@
-// The ripple of overlapping footprints: a uniform medium as splats against its closed form.
+// The ripple of overlapping footprints: a uniform medium rendered as splats, compared with its
+// closed form.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -13,10 +14,10 @@ namespace windsplat::study {
 namespace {
 
 constexpr int side = 48;            // pixels
-constexpr double seen_cells = 4;    // of the widest, along the picture's side
+constexpr double seen_cells = 4;    // cells of the widest axis along the side of the picture
 constexpr double margin_cells = 2;  // a footprint reaches 1.37 beyond its sample
 
-// The segment of a ray inside the box; empty if it misses.
+// The segment of a ray inside the box; nullopt if the ray misses it.
 struct Chord {
   double enter = 0;
   double leave = 0;
@@ -39,7 +40,7 @@ Chord chord(const scene::Lattice& lattice, const glm::dvec3& from, const glm::dv
   return {enter, leave};
 }
 
-// Distance in cells from a point to the faces of the box other than those that the ray crosses;
+// Distance in cells from a point to the faces of the box other than those crossed by the ray;
 // beyond the margin, these faces do not affect a splat.
 bool clear_of_edges(const scene::Lattice& lattice, const glm::dvec3& point) {
   int near = 0;

@@ -73,9 +73,10 @@ Result<Subject> blob_subject(const std::string& name, bool quick) {
     view.vector.field = {protocol::FieldChoice::Kind::none, ""};
   } else {
     view.vector.field = {protocol::FieldChoice::Kind::named, "flow"};
-    // Only the fastest tenth, or less before a medium: more would hide everything behind them.
+    // Only the fastest tenth is drawn, or less in front of a medium: more would hide everything
+    // behind them.
     view.vector.min_magnitude = name == "vectors" ? 0.34 : 0.45;
-    view.vector.r1 = 3;  // about a pixel wide at the study's size
+    view.vector.r1 = 3;  // about one pixel wide at the size of the study
     view.vector.r2 = 7;
     view.vector.magnitude_range = {0.0, 0.8};
     view.vector.color.by = protocol::ColorBy::magnitude;
@@ -148,7 +149,8 @@ Knobs own_knobs(const Subject& subject) { return own_knobs(subject.view); }
 Result<scene::Scene> scene_at(const Subject& subject, const Setting& setting) {
   const Knobs& knobs = setting.knobs;
   protocol::View view = subject.view;
-  view.method.detail = protocol::Detail::full;  // one medium and one set of lines for all methods
+  view.method.detail = protocol::Detail::full;  // all methods use the same medium and the same
+                                                // lines
   view.image.width = knobs.width;
   view.image.height =
       std::max(1, static_cast<int>(std::lround(static_cast<double>(subject.view.image.height) *

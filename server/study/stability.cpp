@@ -1,5 +1,5 @@
-// One cell or a row of cells behind each other. Its line is almost parallel to the view, so that
-// the pixels of one row meet it at different depths of the cell.
+// One cell or a row of cells one behind the other. The line is almost parallel to the view
+// direction, so that the pixels of one row meet it at different depths of the cell.
 #include "server/study/stability.hpp"
 
 #include <algorithm>
@@ -16,8 +16,10 @@ namespace windsplat::study {
 namespace {
 
 constexpr double footprint_integral = 1.4476982547;  // C of docs/design/rendering-model.md
-constexpr int pixels = 9;                            // of the row, from the line's tail to its head
-constexpr double row_width = 2e-4;                   // of the row, in cells: g = 1 over all of it
+constexpr int pixels = 9;                            // pixels of the row, from the tail to the head
+                                                     // of the line
+constexpr double row_width = 2e-4;                   // width of the row, in cells: g = 1 over the
+                                                     // whole row
 constexpr double line_opacity = 0.6;
 constexpr std::array<float, 3> medium_color{0.8F, 0.3F, 0.1F};
 constexpr std::array<float, 3> line_color{0.1F, 0.9F, 0.7F};
@@ -41,7 +43,7 @@ scene::ColorTable one_color(const std::array<float, 3>& rgb) {
 scene::Scene make_scene(int layers, double tau, scene::Compositing compositing, bool with_line) {
   scene::Scene scene;
   scene.compositing = compositing;
-  // No early termination, not even at a negative transmittance of an unstable compositing.
+  // Disables early termination, even at a negative transmittance of an unstable compositing.
   scene.stop_transmittance = -1e30;
   scene.lattice.dims = {1, layers, 1};
   for (int a = 0; a < 3; ++a) {
@@ -82,7 +84,7 @@ scene::Scene make_scene(int layers, double tau, scene::Compositing compositing, 
   return scene;
 }
 
-// The exact kernel, its line at the fraction x of the cell's depth.
+// The exact kernel with its line at the fraction x of the depth of the cell.
 std::array<double, 4> exact(double tau, double x) {
   const double alpha = -std::expm1(-tau) + line_opacity * std::exp(-tau);
   std::array<double, 4> out{0, 0, 0, alpha};
@@ -99,7 +101,7 @@ void take(const std::vector<float>& rgba, double& low, double& high) {
   low = std::numeric_limits<double>::infinity();
   high = -low;
   for (const float v : rgba) {
-    if (std::isnan(v)) {  // counts as the largest excess
+    if (std::isnan(v)) {  // a non-finite value counts as the largest excess
       low = -std::numeric_limits<double>::infinity();
       high = -low;
       return;

@@ -10,21 +10,22 @@
 
 namespace windsplat::study {
 
-// 1e-30 .. 1e30, the last being the largest: extinctions of a view are bounded by 1e30 per world
-// unit. As a float its transmittance equals that of infinity.
+// 1e-30 .. 1e30; the last value is the largest, since extinctions of a view are bounded by 1e30 per
+// world unit. As a float its transmittance equals that of infinity.
 const std::vector<double>& stiffness();
 
 struct Stiffness {
   scene::Compositing compositing = scene::Compositing::analytic;
   double tau = 0;
-  double error = 0;  // largest of any channel and line depth, against the exact kernel
+  double error = 0;  // largest of any channel and line depth, relative to the exact kernel
   double min = 0;    // over channels and line depths
   double max = 0;
-  bool bounded = true;    // within [0, 1] but for 1e-3
-  bool monotone = true;   // alpha no less than at the next smaller tau, at every depth of the line
-  double layers_min = 0;  // of stiff_layers cells behind each other, without line
+  bool bounded = true;    // within [0, 1] except for 1e-3
+  bool monotone = true;   // alpha is at least that at the next smaller tau, at every depth of the
+                          // line
+  double layers_min = 0;  // for stiff_layers cells one behind the other, without line
   double layers_max = 0;
-  bool diverges = false;  // the layers do not reduce one cell's excess over [0, 1]
+  bool diverges = false;  // the layers do not reduce the excess of one cell over [0, 1]
 };
 
 inline constexpr int stiff_layers = 17;  // odd: an even number of sign changes cancels

@@ -20,8 +20,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double truth_weight = 12;       // cost of a reference, in points
-constexpr double pictures_weight = 2;     // of the rest of a scene
-constexpr double calibration_weight = 3;  // of one view of a calibration
+constexpr double pictures_weight = 2;     // work of the remaining part of a scene
+constexpr double calibration_weight = 3;  // work of one view of a calibration
 constexpr int amplification = 10;
 
 double seconds_since(Clock::time_point start) {
@@ -92,7 +92,7 @@ class Study {
 
   int views_of(const Subject& subject) const {
     const CalibrationPlan plan = calibration_plan(subject, options_.quick);
-    return static_cast<int>(looks_of(subject).size()) * (plan.surveyed + plan.held_out);
+    return static_cast<int>(variants_of(subject).size()) * (plan.calibrated + plan.held_out);
   }
 
   void report_progress(const Subject& subject, const std::string& doing) const {
@@ -158,7 +158,8 @@ class Study {
     return {};
   }
 
-  // The reference, every compositing of method kernel, and method slab, at the view's own knobs.
+  // The reference, every compositing of method kernel, and method slab, with the parameters of the
+  // view.
   Result<void> draw_pictures(const Subject& subject, const Picture& truth, SceneReport& scene) {
     const auto base = scene_at(
         subject, {scene::Method::kernel, scene::Compositing::analytic, own_knobs(subject)});

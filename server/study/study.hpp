@@ -22,7 +22,8 @@ namespace windsplat::study {
 struct Shown {
   std::string title;
   std::vector<std::uint8_t> rgb;
-  std::vector<std::uint8_t> difference_rgb;  // ten times, in sRGB codes; empty: the reference
+  std::vector<std::uint8_t> difference_rgb;  // amplified ten times, in sRGB codes; empty: the
+                                             // reference
 };
 
 struct SceneReport {
@@ -31,9 +32,9 @@ struct SceneReport {
   int width = 0;
   int height = 0;
   bool integral = true;       // kind of the reference: integral, or extrapolated from slabs
-  double truth_estimate = 0;  // RMS of an extrapolated reference's own error
-  double truth_seconds = 0;   // to compute the reference; NaN: unknown
-  double tolerance = 0;       // of the integral
+  double truth_estimate = 0;  // RMS of the error of an extrapolated reference itself
+  double truth_seconds = 0;   // time to compute the reference; NaN: unknown
+  double tolerance = 0;       // tolerance of the integral
   std::int64_t pieces = 0;
   std::int64_t evaluations = 0;
   std::vector<Point> points;
@@ -41,14 +42,14 @@ struct SceneReport {
   double reconstruction_ripple = 0;  // 0: no medium; NaN: bent lattice or slice
   std::vector<Encoded> encoded;
   std::vector<Shown> pictures;
-  std::optional<Calibration> calibration;  // of calibrated subjects
+  std::optional<Calibration> calibration;  // for calibrated subjects
 };
 
 struct Report {
   Machine machine;
   bool quick = false;
   int runs = timed_runs;  // timed runs of each point
-  double seconds = 0;     // of this run
+  double seconds = 0;     // duration of this run
   std::size_t measured = 0;
   std::size_t skipped = 0;  // points of earlier runs
   std::vector<SceneReport> scenes;
@@ -58,20 +59,20 @@ struct Report {
 struct Progress {
   std::string scene;
   std::string doing;
-  double done = 0;  // share of the work of this run, 0..1
+  double done = 0;  // fraction of the work of this run, 0..1
 };
 
 struct Options {
   std::filesystem::path folder;
   bool quick = false;
-  Truth truth;           // empty: extrapolated from slabs
-  double tolerance = 0;  // of `truth`
+  Truth truth;           // empty: the reference is extrapolated from slabs
+  double tolerance = 0;  // tolerance of `truth`
   bool calibrate = true;
 };
 
 using Listener = std::function<void(const Progress&)>;
 
-// Measures the points that the folder does not hold yet. Errors: cancelled (the folder then holds
+// Measures the points that are not yet in the folder. Errors: cancelled (the folder then holds
 // every finished point); internal (a reference that is not finite); those of the scenes, the engine
 // and the files.
 Result<Report> run_study(const std::vector<Subject>& subjects, const Options& options,

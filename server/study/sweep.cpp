@@ -23,7 +23,7 @@ class Planner {
  public:
   explicit Planner(const Knobs& own) : own_(own) {}
 
-  // A curve from the subject's own knobs with one of them changed.
+  // A curve from the subject's own parameters with one of them changed.
   template <class T>
   void curve(Method method, Compositing compositing, Knob knob, T Knobs::*member,
              const std::vector<T>& values) {

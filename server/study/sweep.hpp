@@ -13,7 +13,7 @@
 namespace windsplat::study {
 
 inline constexpr int timed_runs = 9;
-inline constexpr int quick_runs = 3;        // of a quick study
+inline constexpr int quick_runs = 3;        // runs of a quick study
 inline constexpr double unit_slack = 1e-3;  // allowed excess of a stable picture over [0, 1]
 
 struct Sweep {
@@ -21,11 +21,11 @@ struct Sweep {
   std::vector<Curve> curves;      // points are indices of settings
 };
 
-// Method kernel and method slab, each with every compositing, over its knobs; without lines no
-// span, without a medium one compositing (they are the same picture). `quick`: fewer of each.
+// Method kernel and method slab, each with every compositing, over their parameters; without lines
+// no span, without a medium one compositing (all yield the same picture). `quick`: fewer of each.
 Sweep plan_sweep(const Subject& subject, bool quick);
 
-// One rendering of the setting, at its own size. Errors: those of scene_at and the engine.
+// One rendering of the setting, at its own size. Errors: those of scene_at() and the engine.
 Result<engine::Image> draw(const Subject& subject, const Setting& setting, ThreadPool& pool,
                            const CancelToken& cancel);
 
@@ -48,14 +48,15 @@ struct Extrapolated {
 Result<Extrapolated> extrapolate(const Subject& subject, ThreadPool& pool,
                                  const CancelToken& cancel);
 
-// RMSE over RGBA of a uniform white medium, optical depth 1 through the middle, on the subject's
-// lattice in the subject's direction, against -expm1(-rho L): the ripple of overlapping footprints.
-// It is not part of the errors against the integral, which has the same footprints, and no lower
-// bound of them. NaN for a bent lattice and a slice, which are no box with a uniform medium.
+// RMSE over RGBA of a uniform white medium, of optical depth 1 through the middle, on the lattice
+// of the subject and from its view direction, relative to -expm1(-rho L): the ripple of overlapping
+// footprints. It is not part of the errors relative to the integral, which has the same footprints,
+// and not a lower bound of them. NaN for a bent lattice and for a slice, which are not boxes with a
+// uniform medium.
 Result<double> reconstruction_ripple(const Subject& subject, ThreadPool& pool,
                                      const CancelToken& cancel);
 
-// The error of the encoding alone, in linear light and by FLIP, of the subject's picture.
+// The error of the encoding only, in linear light and by FLIP, of the picture of the subject.
 struct Encoded {
   int quality = 0;
   double rmse = 0;

@@ -1,4 +1,5 @@
-// A reference stored in the study's folder, because it may take minutes. Picture <-> doubles.
+// A reference stored in the folder of the study, because computing it may take minutes. Picture <->
+// doubles.
 #pragma once
 
 #include <filesystem>
@@ -10,11 +11,11 @@ namespace windsplat::study {
 
 struct KeptTruth {
   Picture picture;
-  double seconds = 0;    // to compute it
-  double tolerance = 0;  // of the integral
+  double seconds = 0;    // time to compute it
+  double tolerance = 0;  // tolerance of the integral
 };
 
-// Empty if the file is missing or damaged, not finite, or of another size or tolerance.
+// nullopt if the file is missing or damaged, not finite, or of another size or tolerance.
 std::optional<KeptTruth> read_truth(const std::filesystem::path& path, int width, int height,
                                     double tolerance);
 

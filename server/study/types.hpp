@@ -12,7 +12,7 @@
 
 namespace windsplat::study {
 
-// The parameters that a study varies, named as in the view.
+// The parameters varied by a study, named as in the view.
 struct Knobs {
   int stride = 1;
   double span = 7;
@@ -38,7 +38,7 @@ struct Measurement {
   double ms = 0;  // the median
   double ms_min = 0;
   double ms_max = 0;
-  bool stable = true;  // finite and within [0, 1] but for 1e-3
+  bool stable = true;  // finite and within [0, 1] except for 1e-3
 };
 
 struct Point {
@@ -49,13 +49,13 @@ struct Point {
 
 enum class Knob { stride, span, slab_thickness, stop_transmittance, width };
 
-// Points of one method and compositing that differ in one knob, in the knob's order.
+// Points of one method and compositing that differ in one parameter, in its order.
 struct Curve {
   scene::Method method = scene::Method::kernel;
   scene::Compositing compositing = scene::Compositing::analytic;
   Knob knob = Knob::stride;
   std::vector<std::size_t> points;
-  double order = 0;  // slope of log rmse over log knob; NaN below three stable points
+  double order = 0;  // slope of log rmse over log parameter; NaN below three stable points
 };
 
 // A picture in double precision.
@@ -63,7 +63,7 @@ struct Picture {
   int width = 0;
   int height = 0;
   std::vector<double> rgba;  // linear premultiplied, row 0 on top
-  std::int64_t pieces = 0;   // of the integration
+  std::int64_t pieces = 0;   // intervals of the integration
   std::int64_t evaluations = 0;
 };
 
@@ -82,12 +82,12 @@ double value_of(const Knobs& knobs, Knob knob);
 // Marks the stable points that no other stable point dominates in time and error.
 void mark_pareto(std::vector<Point>& points);
 
-// Least-squares slope of log y over log x; only pairs of two positive finite numbers count. NaN for
-// fewer than three of them or a single x.
+// Least-squares slope of log y over log x; only pairs of positive finite numbers count. NaN for
+// fewer than three pairs or if all x are equal.
 double log_slope(const std::vector<double>& x, const std::vector<double>& y);
 
 void find_order(const std::vector<Point>& points, Curve& curve);
 
-double median(std::vector<double> values);  // of at least one
+double median(std::vector<double> values);  // requires at least one value
 
 }  // namespace windsplat::study

@@ -1,4 +1,4 @@
-// Registry of open connections, so that a drain reaches all. Used by the io thread only.
+// Registry of open connections, so that a drain reaches all of them. Used by the io thread only.
 #pragma once
 
 #include <algorithm>
@@ -19,18 +19,21 @@ class Connection {
  public:
   virtual ~Connection() = default;
   virtual void drain() = 0;  // close after the current response
-  virtual void abort() = 0;  // end now
+  virtual void abort() = 0;  // end immediately
   // A dataset was reopened because its files changed.
   virtual void on_changed(const std::string& /*dataset*/) {}
   // The access token has changed.
   virtual void on_new_token() {}
 
-  // For admission of a new connection in place of this one: since when it is in a state; none in
-  // other states or after its place was freed.
+  // Used to admit a new connection in place of this one: the time since when it is in a state;
+  // nullopt in other states, or after its slot was freed.
   using Since = std::optional<std::chrono::steady_clock::time_point>;
   virtual Since idle_since() const { return {}; }     // waiting for the first byte of a request
   virtual Since unasked_since() const { return {}; }  // in the reserve, without a complete request
-  virtual Since handshaking_since() const { return {}; }  // in the TLS handshake; uses the next two
+  virtual Since handshaking_since() const {
+    return {};
+  }                                                        // in the TLS handshake; only then the
+                                                           // next two members are used
   virtual std::string_view address() const { return {}; }  // as counted by quotas
   virtual bool is_known() const { return false; }  // a proxy, or the address has shown the token
 };
@@ -60,7 +63,8 @@ class Connections {
   [[nodiscard]] std::size_t size() const { return waited_for_; }
   [[nodiscard]] std::size_t streams() const { return streams_; }
 
-  // Calls the function for each; any of them may close during its call. Does not allocate.
+  // Calls the function for each connection; any of them may close during its call. Does not
+  // allocate.
   template <class Call>
   void each(const Call& call) const {
     for (auto at = live_.begin(); at != live_.end();) {
@@ -70,8 +74,9 @@ class Connections {
     }
   }
 
-  // If more than `most` are in a state, closes the one that is in it longest, which frees its place
-  // at once. False: none was closed. `since`: takes a const Connection&, returns its Since.
+  // If more than `most` connections are in a state, closes the one that has been in it longest,
+  // which frees its slot at once. False: none was closed. `since`: takes a const Connection& and
+  // returns its Since.
   template <class Since>
   bool end_longest(const Since& since, std::size_t most = 0) const {
     std::size_t count = 0;
@@ -88,8 +93,8 @@ class Connections {
     return true;
   }
 
-  // If more than `most` handshakes are in progress, closes one: of unknown addresses if any, the
-  // oldest of the address with most of them.
+  // If more than `most` handshakes are in progress, closes one: of unknown addresses if there are
+  // any, the oldest of the address with most handshakes.
   bool end_handshake(std::size_t most) const {
     struct Held {
       std::size_t count = 0;

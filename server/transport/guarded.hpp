@@ -20,7 +20,7 @@ void end_failed(Session& session, const char* fault) noexcept {
   try {
     log::error("connection failed", {{"request", session.request_id()}, {"fault", fault}});
   } catch (const std::exception&) {
-    log::error("connection failed; no memory to log which one");
+    log::error("connection failed; no memory to log details");
   }
 }
 

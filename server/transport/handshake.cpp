@@ -1,7 +1,7 @@
 // TLS handshakes in two halves. `Handshake` belongs to the io thread and holds the connection's
-// place and deadline. `TlsTask` holds the socket and belongs to the handshake thread until it is
+// slot and deadline. `TlsTask` holds the socket and belongs to the handshake thread until it is
 // posted back. `Handshake` ends it by shutdown(2), which is safe from any thread, and removes its
-// waiting step: the descriptor is held no longer than the running step.
+// waiting step: the descriptor then stays open only until the running step ends.
 #include "server/transport/handshake.hpp"
 
 #include <sys/socket.h>
@@ -36,7 +36,7 @@ constexpr std::chrono::seconds tls_reserve_timeout{2};  // for connections of th
 // Limit of concurrent handshakes; above it another one is ended.
 constexpr std::size_t tls_handshakes_max = 256;
 constexpr std::size_t handshakes_per_address_max = 64;
-// Limit of bytes read. A ClientHello has some 500 bytes, 2 KB with a post-quantum key share;
+// Limit of bytes read. A ClientHello has about 500 bytes, 2 KB with a post-quantum key share;
 // OpenSSL would accept 131 kB.
 constexpr std::size_t handshake_bytes_max = std::size_t{16} * 1024;
 // Size of one read of Asio: the client's last message may arrive with following data.
@@ -57,7 +57,8 @@ class TlsTask final : public HandshakeTask {
   TlsTask(const TlsTask&) = delete;
   TlsTask& operator=(const TlsTask&) = delete;
 
-  // On the io thread. `done` is called there with the error; after abandoning, any number of times.
+  // Call on the io thread. `done` is called there with the error; after abandon() it may be called
+  // any number of times.
   void start(std::function<void(ErrorCode)> done) {
     done_ = std::move(done);
     submit([this] {
@@ -67,7 +68,7 @@ class TlsTask final : public HandshakeTask {
     });
   }
 
-  // On the io thread. Fails the handshake.
+  // Call on the io thread. Fails the handshake.
   void abandon() {
     drop();
     ::shutdown(handle_, SHUT_RDWR);
@@ -76,7 +77,7 @@ class TlsTask final : public HandshakeTask {
 
   [[nodiscard]] bool is_abandoned() const { return is_dropped(); }
 
-  // On the io thread, after completion.
+  // Call on the io thread, after completion.
   Wire take_wire() { return std::move(wire_); }
 
  private:
@@ -107,7 +108,7 @@ class TlsTask final : public HandshakeTask {
     if (us > 0) admission_.handshake_took(address(), trusted_, us);
   }
 
-  const int handle_;  // open while this lives, or wire_ after the move
+  const int handle_;  // the descriptor is open while this object, or wire_ after the move, exists
   Wire wire_;
   const asio::any_io_executor io_;
   access::Admission& admission_;
@@ -190,8 +191,8 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
 
   void end() {
     task_.reset();
-    deadline_.cancel();      // its handler holds the last reference
-    visitor_.place.reset();  // free the place at once
+    deadline_.cancel();      // the handler of the timer holds the last reference
+    visitor_.place.reset();  // free the slot at once
   }
 
   api::Services& services_;
@@ -201,7 +202,7 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
   const std::string address_;
   const Clock::time_point came_ = Clock::now();
   asio::steady_timer deadline_;
-  std::shared_ptr<TlsTask> task_;  // null: done
+  std::shared_ptr<TlsTask> task_;  // null: the handshake has ended
   bool late_ = false;              // accepted during a drain
 };
 

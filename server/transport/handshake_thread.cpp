@@ -17,7 +17,7 @@ namespace {
 
 // For setpriority(2): rendering and streams get ten times this thread's share of a contended core.
 constexpr int handshake_nice = 10;
-constexpr std::size_t address_chars_max = 64;  // of the address key
+constexpr std::size_t address_chars_max = 64;  // limit of an address key
 
 }  // namespace
 
@@ -101,7 +101,8 @@ void HandshakeThread::run() {
       if (step == nullptr) return;
       step->run();
     } catch (const std::exception& fault) {
-      work::log_fault("TLS handshake step failed", fault);  // its deadline closes the connection
+      // The deadline of the handshake closes the connection.
+      work::log_fault("TLS handshake step failed", fault);
     }
   }
 }

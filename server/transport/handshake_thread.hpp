@@ -55,7 +55,7 @@ class HandshakeThread {
   // Entries are allocated before locking and freed after it: the io thread must not wait for this
   // thread, which has low priority.
   using Lane = std::list<Waiting>;
-  using Lanes = std::map<std::string, Lane>;  // none is empty
+  using Lanes = std::map<std::string, Lane>;  // no lane is empty
 
   void add(const std::string& address, const void* owner, std::unique_ptr<Step> step);
   std::unique_ptr<Step> next();  // blocks; null: shutdown
@@ -81,7 +81,7 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   HandshakeTask(const HandshakeTask&) = delete;
   HandshakeTask& operator=(const HandshakeTask&) = delete;
 
-  // On the io thread. Keeps this alive until the step is done. After drop() the step and its
+  // Call on the io thread. Keeps this alive until the step is done. After drop() the step and its
   // resources are released at once.
   template <class Step>
   void submit(Step step) {
@@ -98,18 +98,18 @@ class HandshakeTask : public std::enable_shared_from_this<HandshakeTask> {
   }
 
  protected:
-  // On the io thread. Starts no further steps and removes waiting ones; the resources are released
-  // with the last reference, after a running step at the latest.
+  // Call on the io thread. Starts no further steps and removes waiting ones; the resources are
+  // released with the last reference, after a running step at the latest.
   void drop() {
     dropped_ = true;
     thread_.drop(address_, this);
   }
-  void begin_no_more() { dropped_ = true; }  // on the handshake thread
+  void begin_no_more() { dropped_ = true; }  // called on the handshake thread
   [[nodiscard]] bool is_dropped() const { return dropped_; }
   [[nodiscard]] const std::string& address() const { return address_; }
 
  private:
-  class Timed {  // charges the time of a step that throws, too
+  class Timed {  // also charges the time of a step that throws
    public:
     explicit Timed(HandshakeTask& task) : task_(task) {}
     ~Timed() { task_.step_took(thread_cpu_us() - begin_); }

@@ -80,7 +80,7 @@ struct Exchange {
     const int named =
         is_name ? SSL_set1_host(ssl, question.host.c_str())
                 : X509_VERIFY_PARAM_set1_ip_asc(SSL_get0_param(ssl), question.host.c_str());
-    if (named != 1) {  // never proceed unverified
+    if (named != 1) {  // never continue unverified
       fault = asio::error::invalid_argument;
       return;
     }

@@ -19,7 +19,7 @@ using Tcp = asio::ip::tcp;
 using ErrorCode = boost::system::error_code;
 
 constexpr std::chrono::milliseconds retry_delay{100};
-// Send buffer of the kernel; it doubles this value.
+// Size of the kernel's send buffer; the kernel doubles this value.
 constexpr int send_buffer_bytes = 128 * 1024;
 
 // Limit of unsent bytes in the kernel (TCP_NOTSENT_LOWAT): with more, writes complete long before
@@ -38,7 +38,7 @@ ErrorCode bind(Tcp::acceptor& acceptor, const Tcp::endpoint& endpoint) {
   ErrorCode fault;
   acceptor.open(endpoint.protocol(), fault);
   if (!fault) acceptor.set_option(Tcp::acceptor::reuse_address(true), fault);
-  // Inherited by every accepted socket.
+  // Accepted sockets inherit these options.
   if (!fault) acceptor.set_option(asio::socket_base::send_buffer_size(send_buffer_bytes), fault);
   if (!fault) acceptor.bind(endpoint, fault);
   if (!fault) acceptor.listen(asio::socket_base::max_listen_connections, fault);

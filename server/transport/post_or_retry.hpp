@@ -25,7 +25,7 @@ constexpr std::chrono::milliseconds post_patience{5000};
 
 // If allocation fails, blocks and retries up to this limit. On the io thread, which alone can free
 // memory, the handler is called at once instead. The handler is destroyed by the thread that runs
-// it. False: given up and destroyed on this thread.
+// it. False: the handler was given up and destroyed on this thread.
 template <class Executor, class Handler>
 bool post_or_retry(const Executor& executor, Handler handler,
                    std::chrono::milliseconds patience = post_patience) {

@@ -62,7 +62,7 @@ struct Server::State {
         io.poll();
         break;
       } catch (const std::exception& fault) {
-        work::log_fault("a fault reached the io loop", fault);
+        work::log_fault("an exception reached the io loop", fault);
       }
     }
   }
@@ -77,8 +77,8 @@ struct Server::State {
                      std::move(*visitor));
   }
 
-  // Frees a place by closing the connection that is idle longest, or in the reserve the longest one
-  // without a request.
+  // Frees a slot by closing the connection that has been idle longest, or in the reserve the one
+  // that has waited longest without a request.
   std::optional<access::Visitor> admit(const std::string& address) {
     access::Admission& admission = services.admission;
     if (!admission.arrive(address, services.options.tls != nullptr)) return std::nullopt;
@@ -214,14 +214,14 @@ struct Server::State {
   asio::io_context io{1};
   // The loop ends by stop() only, not when all pending operations failed to allocate.
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
-  // Null: plain TCP. Its thread posts to io, too.
+  // Null for plain TCP. Its thread also posts to io.
   const std::unique_ptr<HandshakeThread> handshakes{
       services.options.tls ? std::make_unique<HandshakeThread>() : nullptr};
   Listener listener;
   asio::steady_timer look_timer;
   asio::steady_timer cancel_timer;
   asio::steady_timer abort_timer;
-  const CancelToken never;        // for work that is never cancelled
+  const CancelToken never;        // for work that cannot be cancelled
   bool checking_files = false;    // a file check is scheduled or running
   bool drain_timers_set = false;  // the timers of a drain run
   std::thread ending;             // ends pending reads when a drain takes long
@@ -259,7 +259,7 @@ void Server::run() {
       state_->go_on();
       state_->io.run();
     } catch (const std::exception& fault) {
-      work::log_fault("a fault reached the io loop", fault);
+      work::log_fault("an exception reached the io loop", fault);
       std::this_thread::sleep_for(after_a_fault);
     }
   }

@@ -19,7 +19,7 @@ namespace windsplat::transport {
 struct Access {
   std::vector<std::string> allow_origins;
   std::shared_ptr<const access::Token> token;
-  std::shared_ptr<TlsContext> tls;  // for new connections; null only if it was null before
+  std::shared_ptr<TlsContext> tls;  // for new connections; may be null only if it was null before
   bool known_hosts_only = false;
   std::vector<std::string> allow_hosts;
 };
@@ -35,10 +35,10 @@ class Server {
   [[nodiscard]] std::string url() const;  // to open in a browser, with the base path
 
   void run();  // serves until drained; blocks
-  // Any thread. /readyz fails, streams close with 1001, current frames end or are cancelled, and
-  // run() returns within 10 s.
+  // May be called from any thread. /readyz fails, streams close with 1001, current frames end or
+  // are cancelled, and run() returns within 10 s.
   void drain();
-  // Any thread. Streams authorised by the previous token are closed.
+  // May be called from any thread. Streams authorised by the previous token are closed.
   void change(Access access);
 
  private:

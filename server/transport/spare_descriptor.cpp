@@ -20,7 +20,7 @@ SpareDescriptor::~SpareDescriptor() {
 
 bool SpareDescriptor::turn_away(int listening) {
   if (spare_ >= 0) ::close(spare_);
-  // The listening socket is non-blocking, as Asio sets it.
+  // The listening socket is non-blocking, as set by Asio.
   const int taken = ::accept4(listening, nullptr, nullptr, SOCK_CLOEXEC);
   if (taken >= 0) ::close(taken);
   spare_ = take();

@@ -44,7 +44,7 @@ int choose_protocol(SSL* /*ssl*/, const unsigned char** chosen, unsigned char* c
   return SSL_TLSEXT_ERR_OK;
 }
 
-// Refuses a passphrase: there is no terminal to ask at.
+// Refuses a passphrase: there is no terminal to prompt on.
 int no_passphrase(char* /*text*/, int /*size*/, int /*writing*/, void* /*data*/) { return -1; }
 
 Error pem_error(const char* what, const ErrorCode& fault) {
@@ -78,7 +78,7 @@ Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std
   tls->context.use_certificate_chain(asio::buffer(chain), fault);
   if (fault && chain.find("PRIVATE KEY-----") != std::string::npos) {
     return make_error(ErrorKind::invalid,
-                      "the certificate's file holds a private key; are the two swapped?");
+                      "the certificate file contains a private key; are the two files swapped?");
   }
   if (fault) return pem_error("is not a PEM certificate", fault);
   // Also checks that the key matches the certificate.
@@ -88,7 +88,7 @@ Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std
 }
 
 std::int64_t certificate_ends(const TlsContext& tls) {
-  auto& context = const_cast<asio::ssl::context&>(tls.context);  // its handle is not const
+  auto& context = const_cast<asio::ssl::context&>(tls.context);  // native_handle() is not const
   const X509* const own = SSL_CTX_get0_certificate(context.native_handle());
   std::tm end{};
   if (own == nullptr || ASN1_TIME_to_tm(X509_get0_notAfter(own), &end) != 1) return 0;
@@ -96,7 +96,7 @@ std::int64_t certificate_ends(const TlsContext& tls) {
 }
 
 std::string expensive_handshakes(const TlsContext& tls) {
-  auto& context = const_cast<asio::ssl::context&>(tls.context);  // its handle is not const
+  auto& context = const_cast<asio::ssl::context&>(tls.context);  // native_handle() is not const
   SSL_CTX* const handle = context.native_handle();
   X509* const own = SSL_CTX_get0_certificate(handle);
   const EVP_PKEY* const key = SSL_CTX_get0_privatekey(handle);

@@ -22,7 +22,7 @@ Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std
 // Expiry of the server's certificate, in seconds since 1970.
 std::int64_t certificate_ends(const TlsContext& tls);
 
-// Reason why handshakes are expensive: a large RSA key or a long chain. Empty: they are not.
+// Reason why handshakes are expensive (a large RSA key or a long chain); empty if they are not.
 std::string expensive_handshakes(const TlsContext& tls);
 
 }  // namespace windsplat::transport

@@ -68,8 +68,8 @@ class Wire {
   [[nodiscard]] const next_layer_type& next_layer() const { return *tcp_; }
   [[nodiscard]] bool secure() const { return tls_ != nullptr; }
 
-  // The handshake runs on `executor`; until `done` is called use this object there only. Another
-  // thread can abort it by shutdown() of the descriptor.
+  // The handshake runs on `executor`; until `done` is called, use this object on that executor
+  // only. Another thread can abort it by shutdown() of the descriptor.
   void handshake(const HandshakeExecutor& executor, IoHandler done);
   // Falls back to plain TCP after a failed handshake.
   void forgo_tls();
@@ -103,7 +103,7 @@ class Wire {
   struct Tls;
 
   TcpStream& tcp() { return *tcp_; }
-  using Record = std::array<std::uint8_t, 16384>;  // capacity of one TLS record
+  using Record = std::array<std::uint8_t, 16384>;  // capacity for one TLS record
   Record& record();                                // allocated on first use
   void read_tls(asio::mutable_buffer into, IoHandler done);
   void write_tls(asio::const_buffer from, IoHandler done);
@@ -116,7 +116,8 @@ class Wire {
     }
     return {};
   }
-  // Gathers small buffers into one record, and so one packet: a frame's header with its picture.
+  // Combines small buffers into one record, and so one packet: the header of a frame with its
+  // picture.
   template <class Buffers>
   asio::const_buffer gathered(const Buffers& buffers) {
     const auto begin = asio::buffer_sequence_begin(buffers);

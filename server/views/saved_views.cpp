@@ -159,7 +159,7 @@ Error full(const std::string& what) {
 struct SavedViews::State {
   struct Entry {
     SavedView saved;
-    std::size_t bytes = 0;  // as JSON
+    std::size_t bytes = 0;  // size of the view as JSON
   };
 
   [[nodiscard]] bool on_disk() const { return lock.get() >= 0; }

@@ -18,10 +18,11 @@ struct Options {
   // Views are stored in its subfolder "views"; both are created if missing. Empty: memory only.
   std::filesystem::path state_folder;
   std::size_t views_max = std::size_t{protocol::limits::views_max};
-  std::size_t bytes_max = std::size_t{protocol::limits::views_bytes_max};  // total, as JSON
+  std::size_t bytes_max = std::size_t{protocol::limits::views_bytes_max};  // limit of all views, as
+                                                                           // JSON
 };
 
-// Any thread. find() never waits for a disk; changes do, one at a time.
+// Thread-safe. find() never waits for a disk; changes do, one at a time.
 class SavedViews {
  public:
   // Reads the stored views. Other files are logged and ignored; a read-only folder serves its views
@@ -43,7 +44,7 @@ class SavedViews {
   // serialised.
   using Check = std::function<bool(const protocol::SavedView& now)>;
   using Change = std::function<Result<protocol::ViewDocument>(const protocol::ViewDocument& now)>;
-  // Empty if the change is not permitted. Errors: not_found, those of the change, those of add().
+  // nullopt if the change is not permitted. Errors: not_found, those of the change, those of add().
   Result<std::optional<protocol::SavedView>> replace(const std::string& id, const Check& may,
                                                      const Change& change);
   // False if not permitted. Errors: not_found, those of the disk as in add().

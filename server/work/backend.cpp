@@ -9,7 +9,7 @@ namespace windsplat::work {
 namespace {
 
 constexpr std::size_t load_threads = 2;
-constexpr std::size_t load_threads_spare = 4;  // for loads that hang or wait for memory
+constexpr std::size_t load_threads_spare = 4;  // for loads that block or wait for memory
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Datasets, renderer, loading threads and history: all that makes pictures and answers about data.
-// Independent of HTTP and sockets.
+// Datasets, renderer, loading threads and history: everything that draws pictures and answers
+// queries of data. Independent of HTTP and sockets.
 #pragma once
 
 #include <functional>
@@ -26,7 +26,7 @@ struct BackendOptions {
   double wait_ms = 0;                       // delay by requests of other addresses
   // Called on the renderer's thread with the time of a picture and the address charged.
   std::function<void(const std::string& payer, std::int64_t us)> charge;
-  // Limit on the cost of a picture.
+  // Limit of the cost of a picture.
   std::function<Result<void>(const frame::Cost& cost)> check_cost;
 };
 

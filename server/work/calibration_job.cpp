@@ -10,7 +10,7 @@
 namespace windsplat::work {
 namespace {
 
-// A study that is started in the tables and ended there by its destructor.
+// An entry in the tables that marks a running calibration; removed by its destructor.
 class Study {
  public:
   Study(Backend& backend, scene::CompletedView completed, quality::SceneSignature signature)
@@ -22,8 +22,8 @@ class Study {
   Study(const Study&) = delete;
   Study& operator=(const Study&) = delete;
 
-  // Prepares the averages of coarser settings as far as memory allows. Nothing is pinned: until the
-  // renderer is idle, others may need the memory.
+  // Prepares the averages of coarser settings as far as memory allows. Nothing is pinned: others
+  // may need the memory until the renderer is idle.
   Result<void> load(data::Dataset& dataset, const CancelToken& unwanted) {
     for (const int coarser : {0, 1, 2}) {
       if (unwanted.cancelled()) return make_error(ErrorKind::cancelled, "calibration cancelled");
@@ -40,12 +40,13 @@ class Study {
       if (unwanted.cancelled()) stop.cancel();
       backend_.quality.add(signature_, found.setting, found.viewpoint, found.measured);
     };
-    complete_ = static_cast<bool>(run_guarded<void>("a survey", stop, [&]() -> Result<void> {
-      const auto room =
-          backend_.catalogue.reserve(frame::calibration_bytes(completed_.view().image));
-      if (!room) return room.error();  // memory is in use by others
-      return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
-    }));
+    complete_ =
+        static_cast<bool>(run_guarded<void>("a calibration run", stop, [&]() -> Result<void> {
+          const auto room =
+              backend_.catalogue.reserve(frame::calibration_bytes(completed_.view().image));
+          if (!room) return room.error();  // other users occupy the memory
+          return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
+        }));
   }
 
  private:
@@ -88,7 +89,8 @@ void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::V
       data::Dataset resident = dataset->resident_only();
       study->draw(resident, stop, unwanted);
     };
-    (void)backend.renderer.submit(std::move(job));  // if refused, the study ends with the job
+    (void)backend.renderer.submit(std::move(job));  // if refused, the calibration run ends with the
+                                                    // job
   };
   (void)backend.loads.submit({unwanted, run, true, (*found)->shared_info()});
 }

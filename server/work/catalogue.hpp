@@ -33,24 +33,24 @@ class Catalogue {
   Result<protocol::DatasetDescription> describe(const std::string& id,
                                                 const CancelToken& cancel = {});
 
-  // Opens a located dataset and lists it, so that forget() can remove it; the value is its id. A
-  // dataset that is already listed is shared by all who opened it. Errors: those of opening;
-  // cancelled, and then it is listed only if another caller still holds it. May block for long.
+  // Opens a located dataset and lists it, so that forget() can remove it; the value is its id. All
+  // callers that open a dataset share it. Errors: those of opening; cancelled, in which case the
+  // dataset is listed only if another caller still holds it. May block for long.
   Result<std::string> open(const data::Location& location, const CancelToken& cancel);
-  // Replaces the prefetch requests of a session; see data::Store::wish.
+  // Replaces the prefetch requests of a session; see data::Store::request_prefetch().
   void request_prefetch(std::uint64_t owner, std::vector<data::PrefetchRequest> requests) {
     store_->request_prefetch(owner, std::move(requests));
   }
   // Reopens datasets that changed on disk and closes files that are not being read; returns the ids
-  // of the changed ones. Do not call on the io thread.
+  // of the changed ones. Do not call it on the io thread.
   std::vector<std::string> look_after() {
     store_->release_idle();
     return store_->look_for_changes();
   }
   [[nodiscard]] data::BudgetCounts counts() const { return store_->counts(); }
-  // Calls load(data::Dataset&). If memory does not suffice, calls it once more after waiting for
-  // its turn, until others release memory (data::Dataset::in_turn()). `cancel` ends the wait with
-  // the error cancelled.
+  // Calls load(data::Dataset&). If memory does not suffice, waits for its turn until others release
+  // memory (data::Dataset::in_turn()) and calls it once more. `cancel` ends the wait with the error
+  // cancelled.
   template <class Load>
   auto load(const data::Dataset& dataset, const Load& load, const CancelToken& cancel = {}) {
     data::Dataset handle = dataset;
@@ -64,12 +64,12 @@ class Catalogue {
     handle = dataset.in_turn(cancel);
     return load(handle);
   }
-  // See data::Store::reserve.
+  // See data::Store::reserve().
   Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) {
     return store_->reserve(bytes);
   }
   [[nodiscard]] std::uint64_t room() const { return store_->room(); }
-  // See data::Store::end.
+  // See data::Store::end().
   void end() { store_->end(); }
   // Whether open() added it after the start of the server.
   [[nodiscard]] bool is_opened_later(const std::string& id) const;
@@ -80,18 +80,18 @@ class Catalogue {
   // Checks whether the view can be drawn, without loading. Errors: not_found (dataset), invalid
   // (with a pointer).
   struct Checked {
-    int steps = 0;  // of the dataset
+    int steps = 0;  // number of steps of the dataset
     frame::Cost cost;
   };
   [[nodiscard]] Result<Checked> check(const protocol::View& view) const;
 
  private:
   struct Described {
-    std::weak_ptr<const data::DatasetInfo> of;  // a reopened dataset has another info
+    std::weak_ptr<const data::DatasetInfo> of;  // a reopened dataset has a new info
     protocol::DatasetDescription description;
     protocol::DatasetDescription brief;  // without steps and axes, of which there may be millions
   };
-  // Requests that opened a dataset by open() and still hold it.
+  // Number of requests that opened a dataset by open() and still hold it.
   struct Openers {
     int count = 0;
     bool brought = false;  // added by one of them; removed with the last one
@@ -110,10 +110,10 @@ class Catalogue {
   std::shared_ptr<data::Store> store_;
   mutable std::mutex mutex_;
   std::map<std::string, Described> described_;
-  std::map<std::string, OpenersPtr> openers_;  // by dataset
+  std::map<std::string, OpenersPtr> openers_;  // keyed by dataset
 };
 
-// An out-of-memory error with the name of what was being loaded; other errors unchanged.
+// An out-of-memory error extended by the name of what was being loaded; other errors are unchanged.
 Error with_dataset_name(Error error, const std::string& dataset, const std::string& field = "");
 
 }  // namespace windsplat::work

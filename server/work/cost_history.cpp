@@ -7,7 +7,7 @@ namespace windsplat::work {
 
 namespace {
 
-// With upward steps five times the downward ones, about five of six samples lie below the level.
+// With upward steps five times the downward ones, about five of six samples are below the level.
 constexpr double weight_above = 0.5;
 constexpr double weight_below = 0.1;
 

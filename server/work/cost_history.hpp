@@ -22,7 +22,8 @@ class RenderCosts {
   // Several times the largest measured value. Longer times are due to other load of the processor
   // and must not cause such pictures to be refused permanently.
   static constexpr double us_a_kernel_max = 0.05;
-  static constexpr std::size_t known_max = 256;  // the least recently drawn one is removed
+  static constexpr std::size_t known_max = 256;  // maximum number of entries; the least recently
+                                                 // drawn one is removed
 
   explicit RenderCosts(unsigned threads) : threads_(threads) {}
 
@@ -34,7 +35,7 @@ class RenderCosts {
  private:
   using Key = std::pair<std::string, protocol::MethodName>;
   struct Known {
-    double us_a_kernel = 0;  // upper estimate: views of a dataset differ
+    double us_a_kernel = 0;  // an upper estimate, because views of a dataset differ
     std::uint64_t used = 0;
   };
 

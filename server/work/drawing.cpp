@@ -29,7 +29,8 @@ Result<void> draw_after_load(Backend& backend, const DrawingPtr& drawing, Prepar
                                   [drawing, picture = std::move(picture)](std::int64_t queue_us) {
                                     draw(*drawing, picture, queue_us, Loading::allowed);
                                   },
-                                  true, drawing->cost_ms, drawing->payer});  // admitted before
+                                  true, drawing->cost_ms, drawing->payer});  // the request was
+                                                                             // admitted before
 }
 
 void load(Backend& backend, const DrawingPtr& drawing) {
@@ -44,7 +45,7 @@ void load(Backend& backend, const DrawingPtr& drawing) {
     auto picture = backend.catalogue.load(*drawing->dataset, prepare, drawing->cancel);
     if (!picture) return drawing->fail(picture.error());
     if (*picture == nullptr) return;
-    (*picture)->frame.prepare_us = 0;  // not on the renderer's thread
+    (*picture)->frame.prepare_us = 0;  // preparation did not take place on the renderer's thread
     if (const auto queued = draw_after_load(backend, drawing, std::move(*picture)); !queued) {
       drawing->fail(queued.error());
     }
@@ -87,7 +88,7 @@ Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
     if (loading == Loading::none) return prepared.error();
     return with_dataset_name(prepared.error(), dataset.info().id);
   }
-  // Reserve after loading, so that a conflict of the two is found at once.
+  // Reserve after loading, so that a conflict between loading and drawing is detected at once.
   if (loading == Loading::allowed) {
     auto room = room_for(dataset, width, height, encoding.format);
     if (!room) return room.error();

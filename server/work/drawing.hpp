@@ -27,8 +27,8 @@ struct Drawing {
   std::uint64_t owner = 0;
   CancelToken cancel;
   std::shared_ptr<data::Dataset> dataset;
-  // On the renderer's thread from resident data, and again, if that gives not_resident, on a
-  // loading thread. Null: has replied, there is nothing to draw. Must not throw.
+  // On the renderer's thread with resident data and, if that yields not_resident, again on a
+  // loading thread. Null: it has replied, and there is nothing to draw. Must not throw.
   std::function<Result<PreparedPtr>(data::Dataset& dataset, Loading loading)> prepare;
   // On the renderer's thread: draws and replies. Must not throw.
   std::function<void(const PreparedPicture& picture, data::Dataset& dataset, std::int64_t queue_us,
@@ -49,8 +49,9 @@ Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
                                     const frame::Encoding& encoding, data::Dataset& dataset,
                                     Loading loading);
 
-// draw() or fail() replies exactly once unless this returns an error: busy. Loads of requests are
-// subject to admission; sessions bound the loads of streams, one picture at a time each.
+// draw() or fail() replies exactly once unless this function returns an error: busy. Loads of
+// requests are subject to admission; sessions limit the loads of streams to one picture at a time
+// each.
 Result<void> submit(Backend& backend, Drawing drawing);
 
 }  // namespace windsplat::work

@@ -20,7 +20,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double progress_for_eta = 0.01;  // below this the remaining time cannot be estimated
+constexpr double progress_for_eta = 0.01;  // progress below which the remaining time cannot be
+                                           // estimated
 
 enum class Stage { queued, running, done, failed, cancelled };
 
@@ -70,7 +71,7 @@ protocol::JobDescription describe(const Job& job) {
   return out;
 }
 
-// Throws nothing.
+// Does not throw.
 Result<protocol::JobResult> run_work(const Jobs::Work& work, const std::shared_ptr<Job>& job) {
   return run_guarded<protocol::JobResult>("client job", job->cancel, [&] {
     return work({job->cancel, [job](double done) { job->progress = std::clamp(done, 0.0, 1.0); }});
@@ -101,7 +102,7 @@ struct Jobs::State {
     }
   }
 
-  // Moves only: no exception may leave the thread.
+  // Only moves values: no exception may leave the thread.
   static void finish(Job& job, Result<protocol::JobResult> outcome) noexcept {
     if (outcome) {
       job.stage = Stage::done;

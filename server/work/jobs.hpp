@@ -1,5 +1,5 @@
-// Asynchronous jobs of clients: submitted from any thread, run on threads of their own, looked up
-// by id.
+// Asynchronous jobs of clients: submitted from any thread, run on separate threads, looked up by
+// id.
 #pragma once
 
 #include <cstddef>
@@ -44,7 +44,7 @@ class Jobs {
   [[nodiscard]] std::vector<protocol::JobDescription> list() const;  // oldest first
   // Errors: not_found.
   [[nodiscard]] Result<protocol::JobDescription> find(const std::string& id) const;
-  // A waiting job is cancelled at once, a running one at its next check; a finished one is
+  // A waiting job is cancelled at once, a running one at its next check; a finished job is
   // unchanged. Errors: not_found.
   Result<void> cancel(const std::string& id);
   void cancel_all();

@@ -22,7 +22,7 @@ struct LoadService::State {
   State(std::size_t at_a_time, std::size_t most, const char* name, std::function<void()> told)
       : places(at_a_time), jobs_max(most), what(name), refused(std::move(told)) {}
 
-  // Cannot throw: its bookkeeping was allocated before.
+  // Cannot throw: memory for its bookkeeping was allocated before.
 
   void work() {
     std::unique_lock lock(mutex);
@@ -51,7 +51,7 @@ struct LoadService::State {
     }
   }
 
-  // Waits for a job that may start; none at shutdown.
+  // Waits for a job that may start; null at shutdown.
   std::deque<Job>::iterator next_job(std::unique_lock<std::mutex>& lock) {
     for (;;) {
       const auto next = first_free();
@@ -61,8 +61,7 @@ struct LoadService::State {
       } else if (running.size() < places) {
         return next;
       } else {
-        // The most recent jobs are limited to the number of places until one has run for
-        // `long_run`.
+        // The most recent jobs are limited to the number of slots until one has run for `long_run`.
         const Clock::time_point at = running[running.size() - places] + long_run;
         if (at <= Clock::now()) return next;
         wake.wait_until(lock, at);
@@ -94,7 +93,7 @@ struct LoadService::State {
 
   struct Count {
     std::size_t jobs = 0;
-    std::size_t own = 0;  // waiting jobs of this payer
+    std::size_t own = 0;  // number of waiting jobs of this payer
     void add(bool is_own) {
       ++jobs;
       own += is_own ? 1U : 0U;
@@ -142,7 +141,7 @@ Result<void> LoadService::submit(Job job) {
     }
     state_->jobs.push_back(std::move(job));
   }
-  state_->wake.notify_all();  // every waiting thread checks for a free place
+  state_->wake.notify_all();  // every waiting thread checks for a free slot
   return {};
 }
 

@@ -1,7 +1,7 @@
-// Threads that load data which a picture needs and which is not resident, so that the renderer
-// never waits for a disk. Jobs run in order of arrival, one at a time per dataset: a dataset whose
-// files hang occupies one thread only. A job that runs for long, because its files hang or it waits
-// for memory, gives its place to the next one while there are spare threads.
+// Threads that load data for pictures if they are not resident, so that the renderer never waits
+// for a disk. Jobs run in order of arrival, one at a time per dataset: a dataset whose files block
+// occupies one thread only. A job that runs for long, because its files block or it waits for
+// memory, yields its slot to the next one while there are spare threads.
 #pragma once
 
 #include <chrono>
@@ -21,7 +21,7 @@ class LoadService {
     CancelToken cancel;
     // Called exactly once on a thread of the service, cancelled or not. Must not throw.
     std::function<void()> run;
-    // Bounded elsewhere: a job of a session, or the continuation of an admitted request. Neither
+    // Limited elsewhere: a job of a session, or the continuation of an admitted request. Neither
     // counted nor refused.
     bool admitted = false;
     // The dataset that is read (Dataset::shared_info()): its jobs run one at a time. Empty: none.

@@ -1,4 +1,4 @@
-// A short list, most recently used first.
+// The cache is a short list, most recently used first.
 #include "server/work/references.hpp"
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 namespace windsplat::work {
 namespace {
 
-// Retry time for a reference that has not been started, whose duration is unknown.
+// Retry-After time for a reference that has not been started, whose duration is unknown.
 constexpr int retry_after_s = 5;
 
 Error too_many(std::string detail) {

@@ -20,7 +20,8 @@ void Shares::come(std::uint64_t party) {
 
 void Shares::rest(std::uint64_t party) {
   parties_[party].active = false;
-  // A party that is not ahead needs no entry; without active parties the virtual time advances.
+  // A party whose usage is not above the virtual time needs no entry; without active parties the
+  // virtual time advances.
   const bool all_rest = std::none_of(parties_.begin(), parties_.end(),
                                      [](const auto& known) { return known.second.active; });
   if (all_rest) {
@@ -105,8 +106,8 @@ std::optional<RenderQueue::Next> RenderQueue::pop(std::int64_t now_us) {
   return kind ? take(*kind) : std::nullopt;
 }
 
-// Cancelled jobs use no turn. Waiting for one, they would hold their resources while new owners
-// keep the renderer busy.
+// Cancelled jobs run out of turn. Otherwise they would hold their resources while new owners keep
+// the renderer busy.
 std::optional<RenderQueue::Next> RenderQueue::take_cancelled() {
   for (Line& line : lines_) {
     for (auto owner = line.owners.begin(); owner != line.owners.end(); ++owner) {

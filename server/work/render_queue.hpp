@@ -1,5 +1,5 @@
 // Scheduling of the renderer as a pure state machine: jobs and their run times in, the next job
-// out. Owns no thread, lock or clock.
+// out. Has no thread, lock or clock.
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ struct RenderJob {
 };
 
 // Usage of a shared resource by several parties. A party that becomes active again starts at the
-// virtual time of the party served at present, so that idle time earns no credit (start-time fair
+// virtual time of the party being served, so that idle time earns no credit (start-time fair
 // queueing: Goyal, Vin, Cheng 1997).
 class Shares {
  public:
@@ -51,12 +51,13 @@ class Shares {
     std::int64_t used_us = 0;
     bool active = false;
   };
-  std::map<std::uint64_t, Party> parties_;  // idle parties are kept only while they are ahead
+  std::map<std::uint64_t, Party> parties_;  // idle parties are kept only while their usage is above
+                                            // the virtual time
   std::int64_t present_us_ = 0;
 };
 
 // Streams and requests share the renderer's time equally while both have jobs, and so do the owners
-// within a kind: the next job belongs to the one with the least usage, then to the earliest.
+// within a kind: the next job is that of the owner with the least usage, then the earliest.
 // Background jobs run when no other job waits. A running one is cancelled when another job arrives.
 // An owner has at most one waiting background job: a newer one replaces it, and the cancelled one
 // runs before all others so that its submitter is notified. The next job of an owner also runs
@@ -70,8 +71,8 @@ class RenderQueue {
 
   // Strong exception guarantee if an allocation fails.
   void push(RenderJob job, std::int64_t now_us);
-  // The job to run now, at the time from which rest_ms() counts. Call done() before the next. None:
-  // the queue is empty.
+  // The job to run now, at the time from which rest_ms() counts. Call done() before the next.
+  // nullopt: the queue is empty.
   std::optional<Next> pop(std::int64_t now_us = 0);
   void done(std::int64_t took_us);
 
@@ -98,7 +99,7 @@ class RenderQueue {
   using Jobs = std::list<Waiting>;  // jobs move between lists without allocation
   using Owners = std::map<std::uint64_t, Jobs>;
   struct Line {
-    Owners owners;  // none of them empty
+    Owners owners;  // no list is empty
     Shares shares;
   };
   struct Running {
@@ -119,12 +120,12 @@ class RenderQueue {
   template <class Wanted>
   [[nodiscard]] Load sum(double unknown_ms, const Wanted& wanted) const;
 
-  std::array<Line, 3> lines_;  // by kind
+  std::array<Line, 3> lines_;  // per kind
   Shares kinds_;               // streams against requests
   Jobs replaced_;
   std::optional<Running> running_;
   std::uint64_t arrivals_ = 0;
-  std::int64_t now_us_ = 0;  // when the last job was started
+  std::int64_t now_us_ = 0;  // start of the last job
   std::size_t waiting_ = 0;
 };
 

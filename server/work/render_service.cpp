@@ -24,10 +24,10 @@ std::int64_t steady_us() {
   return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
 }
 
-// Share of a request's own time that earlier requests may take.
+// Fraction of a request's own time that earlier requests may take.
 constexpr double patient_share = 0.75;
-// Above this rate of refusals per second the renderer is soon used again: admit a job only when the
-// running one is nearly done.
+// Above this rate of refusals per second, new jobs arrive soon: admit a job only when the running
+// one is nearly done.
 constexpr double refusals_of_overload = 8;
 constexpr double hurried_share = 0.5;
 
@@ -95,7 +95,7 @@ struct RenderService::State {
         waiting.cost_ms + job.cost_ms > options.requests_ms_max) {
       return false;
     }
-    // One payer cannot occupy all places.
+    // One payer cannot occupy all slots.
     const std::size_t own_max = std::max<std::size_t>(options.requests_max / 2, 1);
     if (!job.payer.empty() && queue.requests_of(job.payer).count >= own_max) return false;
     if (options.others_ms_max <= 0) return true;

@@ -1,5 +1,5 @@
 // The render thread. Jobs in from any thread; each runs to completion before the next, so that a
-// frame has the whole thread pool. Scheduling: render_queue.hpp.
+// frame has the whole thread pool. For the scheduling see render_queue.hpp.
 #pragma once
 
 #include <cstddef>
@@ -19,13 +19,14 @@ class RenderService {
   using Job = RenderJob;
 
   struct Options {
-    // Limit of waiting jobs of kind request, cancelled ones not counted; half as many per payer.
-    // Sessions bound the jobs of streams (one at a time each), owners those of the background.
+    // Limit of waiting jobs of kind request, not counting cancelled ones; a payer may have half of
+    // it. Sessions limit the jobs of streams to one at a time each, owners those of the background.
     std::size_t requests_max = 16;
-    double requests_ms_max = 30'000;  // sum of the jobs' estimates; a single job is always admitted
+    double requests_ms_max = 30'000;  // limit of the sum of the jobs' estimates; a single job is
+                                      // always admitted
     std::function<std::int64_t()> now_us = {};  // empty: a steady clock
     // Limit on how long requests of other payers may delay a request that is itself shorter; 0: no
-    // limit beyond those above.
+    // additional limit.
     double others_ms_max = 0;
     // Called on the renderer's thread with the time of each job that has a payer, and on each
     // refusal.

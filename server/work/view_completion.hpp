@@ -1,4 +1,4 @@
-// The completed form of the latest view: completed once for all work that needs it.
+// The completed form of the latest view, completed once for all work that needs it.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,8 @@
 
 namespace windsplat::work {
 
-// Thread-safe. Never held locked while a view is completed, which may wait for a file. Views on a
-// bent lattice are completed anew: their placement is as large as a field and is kept, once, by the
+// Thread-safe. The lock is not held while a view is completed, which may wait for a file. Views on
+// a bent lattice are not cached: their placement is as large as a field and is cached by the
 // dataset.
 class ViewCompletion {
  public:

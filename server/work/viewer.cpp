@@ -51,7 +51,7 @@ Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
   return out;
 }
 
-// Serialised here, with long lists left out, to keep the io thread free.
+// Serialised here, without long lists, to keep the io thread free.
 Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription> description) {
   if (!description) return description;
   description->encoded =
@@ -91,8 +91,8 @@ struct Viewer::PrefetchState {
     session::Prefetch effect;
   };
   std::mutex
-      mutex;  // held while a request is submitted, so that none is submitted after its withdrawal
-  std::optional<Newest> newest;           // until it is evaluated
+      mutex;  // held while a request is submitted, so that none is submitted after it was withdrawn
+  std::optional<Newest> newest;           // set until the request is evaluated
   const data::DatasetInfo* of = nullptr;  // dataset of the newest request; compared only
   std::uint64_t epoch = 0;                // counts withdrawals and changes of dataset
   std::set<const data::DatasetInfo*> queued;
@@ -110,7 +110,7 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   running_.emplace(effect.ticket, cancel);
   auto dataset = backend_.catalogue.find(effect.view.dataset);
   if (!dataset) return reply(effect.ticket, dataset.error());
-  // A still may be larger than the view that was checked before.
+  // A final frame may be larger than the view that was checked before.
   if (const auto fits = backend_.check(effect.view); !fits) {
     return reply(effect.ticket, fits.error());
   }
@@ -174,7 +174,7 @@ void Viewer::start(const session::Prefetch& effect) {
     requests_->newest.emplace(PrefetchState::Newest{**found, effect});
     if (!requests_->queued.insert(of.get()).second) return;
   }
-  // Completing the view, to find its fields and levels, may block: not here.
+  // Completing the view finds its fields and levels but may block, so the job does it.
   const auto run = [&backend = backend_, owner = owner_, requests = requests_,
                     completion = completion_, key = of.get()] {
     resolve_prefetch(backend, owner, *requests, completion, key);

@@ -46,14 +46,14 @@ class Viewer {
   Backend& backend_;
   const std::uint64_t owner_;
   const std::string payer_;
-  std::map<std::uint64_t, CancelToken> running_;  // by ticket
+  std::map<std::uint64_t, CancelToken> running_;  // keyed by ticket
   std::shared_ptr<PrefetchState> requests_;       // shared with the jobs that evaluate them
   // Shared with jobs.
   std::shared_ptr<ViewCompletion> completion_ = std::make_shared<ViewCompletion>();
   CancelToken gone_;  // cancels descriptions
   std::shared_ptr<const char> describing_ =
       std::make_shared<const char>();  // held by each description job
-  CancelToken calibration_;            // of the latest calibration
+  CancelToken calibration_;            // cancels the latest calibration
 };
 
 }  // namespace windsplat::work

@@ -6,9 +6,9 @@
 namespace windsplat::bench {
 
 struct Allocations {
-  std::int64_t count = 0;      // ever
-  std::int64_t bytes = 0;      // ever, as asked for
-  std::int64_t live = 0;       // now, as the heap gives them
+  std::int64_t count = 0;      // since the start
+  std::int64_t bytes = 0;      // since the start, as requested
+  std::int64_t live = 0;       // now, as allocated by the heap
   std::int64_t live_peak = 0;  // since forget_peak()
 };
 

@@ -1,5 +1,5 @@
-// Whole frames, engine against naive renderer in one run: times and a table of ratios on stdout,
-// and JSON with machine, compiler and target where asked for:
+// Whole frames, engine compared with the naive renderer in one run: times and a table of ratios on
+// stdout, and optionally JSON with machine, compiler and target:
 //
 //   bench_frame [--all] [--markdown=FILE] [--benchmark_out=FILE] [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>
@@ -93,7 +93,7 @@ void add_large(const Size& size, std::vector<Workload>& out) {
   }
 }
 
-// Where a cell is smaller than a pixel.
+// Cells smaller than a pixel.
 void add_levels(std::vector<Workload>& out) {
   Workload scalar;
   scalar.name = "scalar 512^3 640x480";
@@ -164,8 +164,8 @@ void engine_frame(benchmark::State& state, const Workload& workload, unsigned th
 // Difference of two displayed pictures.
 struct Apart {
   int codes = 0;      // of 255, in the worst channel of the worst pixel
-  double beyond = 0;  // channels that are more than one code apart, of a million
-  double psnr_db;     // over all channels; infinite where they are the same, and then not told
+  double beyond = 0;  // channels that differ by more than one code, per million
+  double psnr_db;     // over all channels; infinite, and not reported, if the pictures are equal
 };
 
 Apart apart(const image::Bytes& a, const image::Bytes& b) {
@@ -187,7 +187,7 @@ void naive_frame(benchmark::State& state, const Workload& workload) {
     auto picture = naive::render<float>(scene);
     benchmark::DoNotOptimize(picture.rgba.data());
   }
-  // In double precision, so that the difference is the engine's own.
+  // In double precision, so that the difference is that of the engine only.
   const naive::Picture<double> exact = naive::render<double>(scene);
   ThreadPool pool(0);
   const auto engine = value_or_give_up(engine::render(scene, pool, CancelToken()));

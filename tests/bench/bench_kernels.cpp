@@ -1,5 +1,6 @@
-// The kernels of every target that this processor runs, one at a time on one thread: nanoseconds
-// and time-stamp ticks an item, and a table of targets against portable on stdout:
+// The kernels of every target that this processor supports, one at a time on one thread:
+// nanoseconds and time-stamp ticks per item, and a table of targets compared with portable on
+// stdout:
 //
 //   bench_kernels [--markdown=FILE] [--benchmark_out=FILE] [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>
@@ -47,7 +48,8 @@ double ticks_per_ns() {
 #endif
 }
 
-// Runs `body`, which returns its number of items, until the benchmark has enough. Processor time.
+// Runs `body`, which returns its number of items, until the benchmark has enough samples. Processor
+// time.
 template <class Body>
 void time_items(benchmark::State& state, const Body& body) {
   double items = 0;
@@ -156,7 +158,8 @@ struct Case {
 
 std::vector<Case> cases(bool smoke) {
   using protocol::MethodName;
-  std::vector<Case> out{{"attenuate, a value", attenuate}, {"jitter, a stop", jitter}};
+  std::vector<Case> out{{"attenuate, per value", attenuate},
+                        {"jitter, per kernel position", jitter}};
   const auto add = [&](const char* name, const auto& body, const char* preset, MethodName method) {
     Workload workload;
     workload.preset = preset;
@@ -169,12 +172,12 @@ std::vector<Case> cases(bool smoke) {
                      body(state, table, workload);
                    }});
   };
-  add("summarise winds+clouds, a stop", summarise, "default", MethodName::kernel);
-  add("bin winds+clouds, a stop", bin, "default", MethodName::kernel);
-  add("draw winds, a stop", draw, "winds", MethodName::kernel);
-  add("draw clouds, a stop", draw, "clouds", MethodName::kernel);
-  add("draw winds+clouds, a stop", draw, "default", MethodName::kernel);
-  add("draw winds+clouds by slab, a stop", draw, "default", MethodName::slab);
+  add("summarise winds+clouds, per kernel position", summarise, "default", MethodName::kernel);
+  add("bin winds+clouds, per kernel position", bin, "default", MethodName::kernel);
+  add("draw winds, per kernel position", draw, "winds", MethodName::kernel);
+  add("draw clouds, per kernel position", draw, "clouds", MethodName::kernel);
+  add("draw winds+clouds, per kernel position", draw, "default", MethodName::kernel);
+  add("draw winds+clouds by slab, per kernel position", draw, "default", MethodName::slab);
   return out;
 }
 

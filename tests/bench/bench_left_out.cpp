@@ -1,5 +1,5 @@
-// What a scene does without, and what that saves: pairs of frames with and without a feature, drawn
-// in turns by one thread, as a table on stdout and as Markdown where asked for:
+// Features that a scene may omit, and the savings: pairs of frames with and without a feature,
+// drawn in turns by one thread, as a table on stdout and optionally as Markdown:
 //
 //   bench_left_out [--markdown=FILE] [--benchmark_filter=REGEX] [--benchmark_out=FILE]
 #include <benchmark/benchmark.h>
@@ -36,7 +36,7 @@ using protocol::View;
 
 using Change = std::function<void(View&)>;
 
-// `with` and `without` change the dataset's own first picture, winds and clouds, 640 x 480.
+// `with` and `without` change the default view of the dataset, winds and clouds, 640 x 480.
 struct Feature {
   std::string name;
   std::string dataset;
@@ -138,7 +138,8 @@ void globe(View& view) {
 }
 void one_layer(View& view) { view.geometry.slice = {protocol::GridAxis::z, 8}; }
 
-// Every wind is rendered except where that is the feature, as in the figures of the paper.
+// Every wind is rendered except where omitting winds is the feature, as in the figures of the
+// paper.
 std::vector<Feature> features() {
   using protocol::Compositing;
   const Change all = weakest_line(1e-3);
@@ -167,10 +168,10 @@ std::vector<Feature> features() {
       {"optical depths below 1e-4", "climate", then(all, thinnest_splat(0)), all, true},
       {"optical depths below 1e-2", "climate", then(all, thinnest_splat(0)),
        then(all, thinnest_splat(1e-2)), true},
-      {"what is behind 1 - 1.5e-4", "climate", then(all, stop_at(0)), all, true},
+      {"samples behind an opacity of 1 - 1.5e-4", "climate", then(all, stop_at(0)), all, true},
       {"the same, clouds 30 times as dense", "climate", then(then(all, stop_at(0)), denser(30)),
        then(all, denser(30)), true},
-      {"what is behind 1 - 1.5e-4", "tornado", then(all, stop_at(0)), all, true},
+      {"samples behind an opacity of 1 - 1.5e-4", "tornado", then(all, stop_at(0)), all, true},
   };
 }
 

@@ -1,8 +1,8 @@
-// How fast a dataset's volumes are read: by the bare library or bare reads, by our reader in this
-// process, and by the loader apart (which also hands them over and has them checked). Files are
-// written and read once before, so that they come from the system's memory; each reads into memory
-// that is new to the process, as what stays resident must. Milliseconds a step of all fields, the
-// least of the rounds, and ratios to the bare read.
+// Speed of reading the volumes of a dataset: by the bare library or bare reads, by the reader in
+// this process, and by a loader process (which also transfers and validates them). Files are
+// written and read once before, so that they are in the page cache; each read uses memory that is
+// new to the process, as resident volumes do. Milliseconds per step of all fields, the minimum of
+// the rounds, and ratios to the bare read.
 //
 //   bench_load [--program=windsplat] [--dims=320x160x19] [--steps=8] [--rounds=7] [--only=raw]
 //              [--markdown]
@@ -42,7 +42,7 @@ struct Options {
   std::array<int, 3> dims{320, 160, 19};
   int steps = 8;
   int rounds = 7;
-  std::string only;  // the name of one kind of file
+  std::string only;  // one kind of file, by name
   bool markdown = false;
 };
 
@@ -70,7 +70,7 @@ void check(int status) {
   if (status != NC_NOERR) bench::give_up(nc_strerror(status));
 }
 
-// The variables u, v, w and cloud as one netCDF file, chunked by step and deflated or not.
+// The variables u, v, w and cloud as one netCDF file, chunked by step, optionally deflated.
 void write_netcdf(const std::string& path, data::Source& source, int format, int deflate) {
   const auto dims = source.info().grid.dims();
   const std::size_t steps = source.info().steps.size();
@@ -169,7 +169,7 @@ void read_bare(const std::string& path, std::size_t steps, std::size_t samples) 
   for (std::size_t i = 0; i < 4 * steps; ++i) {
     const auto at = static_cast<off_t>(i) * bytes;
     if (::pread(file, take(kept, samples), static_cast<std::size_t>(bytes), at) != bytes) {
-      bench::give_up("a file is shorter than it was written");
+      bench::give_up("a file is shorter than when it was written");
     }
   }
   ::close(file);
@@ -189,7 +189,7 @@ void read_all(data::Source& source) {
 
 bench::Row measure(const std::string& name, const std::string& path, const Options& options,
                    const std::function<void()>& bare) {
-  // First: HDF5 would share unpacked chunks of an earlier opening of the file.
+  // Call first: HDF5 would share unpacked chunks of an earlier opening of the file.
   const double plain = least_seconds(options.rounds, bare);
   const auto here = bench::value_or_give_up(data::open_file(path));
   const auto apart =

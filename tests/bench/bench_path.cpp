@@ -1,5 +1,6 @@
-// A dataset and a camera path -> times of its frames as JSON on stdout, and the first as a picture.
-// The path is a file of views, one JSON document a line; what compare.py runs beside its peers:
+// A dataset and a camera path -> times of its frames as JSON on stdout, and the first frame as a
+// picture. The path is a file of views, one JSON document per line. compare.py runs it beside other
+// renderers:
 //
 //   bench_path DATASET VIEWS.jsonl PICTURE.png [--threads=N]
 #include <sys/resource.h>

@@ -1,5 +1,5 @@
-// From linear pixels to JPEG bytes, by planes and strips and by rounded RGB in one piece, in one
-// run, and whole frames with and without overlap: rates on stdout, and JSON where asked for:
+// From linear pixels to JPEG bytes, by planes and strips or by rounded RGB in one piece, in one
+// run, and whole frames with and without overlap: rates on stdout, and optionally JSON:
 //
 //   bench_picture [--benchmark_out=FILE] [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>
@@ -148,7 +148,7 @@ class Loop {
     view_.image.width = size.width;
     view_.image.height = size.height;
     view_.method.name = protocol::MethodName::kernel;
-    draw(spaces_[0]);  // loads
+    draw(spaces_[0]);  // loads the data
   }
 
   void draw(frame::Workspace& space) {
@@ -237,9 +237,9 @@ void register_all() {
       std::string on = at;
       on += " threads ";
       on += std::to_string(threads);
-      add(std::string("frames, one after the other").append(on), frame_loop, size, threads, false);
-      add(std::string("frames, encode beside the next").append(on), frame_loop, size, threads,
-          true);
+      add(std::string("frames, sequential").append(on), frame_loop, size, threads, false);
+      add(std::string("frames, encoding in parallel with the next").append(on), frame_loop, size,
+          threads, true);
     }
     for (const Setting& setting : settings) {
       std::string what = setting.name;

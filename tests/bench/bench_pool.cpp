@@ -1,6 +1,6 @@
-// The round trip of a loop, by how long the pool was left alone before it: what a frame pays for
-// each of its loops. Before the workers fall asleep, and after. `alone`: the body does nothing, so
-// that the caller may be done before any worker comes. Otherwise every thread has to come.
+// Round-trip time of a loop, by the time since the previous loop: the overhead of each loop of a
+// frame, before and after the workers fall asleep. `alone`: the body is empty, so that the caller
+// may finish before any worker starts. Otherwise every thread has to take part.
 //
 //   bench_pool [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>

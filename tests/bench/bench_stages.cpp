@@ -1,6 +1,6 @@
-// Where a frame's time and memory go while the camera moves: every stage by itself, the whole from
-// a changed view to JPEG bytes, and what the frame takes from the heap. What a daemon keeps between
-// frames is kept here:
+// Time and memory of a frame while the camera moves: every stage by itself, all stages from a
+// changed view to JPEG bytes, and heap allocations per frame. What a daemon keeps between frames is
+// kept here too:
 //
 //   bench_stages [--markdown=FILE] [--benchmark_out=FILE] [--benchmark_filter=REGEX]
 #include <benchmark/benchmark.h>
@@ -33,7 +33,7 @@ using bench::value_or_give_up;
 using bench::Workload;
 using Clock = std::chrono::steady_clock;
 
-constexpr int jpeg_quality = 80;  // as frames in motion are sent, 4:2:0
+constexpr int jpeg_quality = 80;  // as moving frames are sent, 4:2:0
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();

@@ -94,7 +94,7 @@ class Orbit:
         return kept
 
 
-def wait_for_survey(port, seconds):
+def wait_for_calibration(port, seconds):
     """Waits until the daemon has calibrated the view; prints a message on a timeout."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -103,7 +103,7 @@ def wait_for_survey(port, seconds):
         if re.search(r'^windsplat_background_jobs_total{result="done"} [1-9]', told, re.M):
             return
         time.sleep(0.2)
-    print(f"not surveyed within {seconds} s", file=sys.stderr)
+    print(f"not calibrated within {seconds} s", file=sys.stderr)
 
 
 def used(kept):
@@ -125,7 +125,7 @@ def measure(options, dataset):
         port = int(daemon.stdout.readline().strip().rstrip("/").rsplit(":", 1)[1])
         name = pathlib.Path(dataset).stem if "/" in dataset else dataset
         orbit = Orbit(Viewer(port), name, options.size)
-        wait_for_survey(port, options.rest)
+        wait_for_calibration(port, options.rest)
         last = math.inf
         for budget in options.budgets:
             kept = orbit.run({"budgetMs": budget, "maxError": None}, options.frames)
@@ -161,7 +161,7 @@ def main():
     parser.add_argument("--budgets", type=numbers, default=[16, 33, 66, 100])
     parser.add_argument("--max-errors", type=numbers, default=[0.05, 0.02, 0.005])
     parser.add_argument("--frames", type=int, default=120)
-    parser.add_argument("--rest", type=float, default=60, help="seconds to wait for a survey")
+    parser.add_argument("--rest", type=float, default=60, help="seconds to wait for calibration")
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
     print("| data | aim | render ms, median | p95 | p95 / budget | with encoding, p95 | "

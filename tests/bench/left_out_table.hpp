@@ -48,7 +48,7 @@ inline std::string counts(std::int64_t with, std::int64_t without) {
   return both("%.2f", static_cast<double>(with) / million, static_cast<double>(without) / million);
 }
 
-// "wind+cloud 15.6 MB"
+// For example "wind+cloud 15.6 MB".
 inline std::string touched(const engine::WorkReport& work) {
   std::string text;
   for (const std::string& field : work.fields) {
@@ -60,7 +60,7 @@ inline std::string touched(const engine::WorkReport& work) {
   return text;
 }
 
-// Savings: the median over the rounds of each pair, in which drift cancels.
+// Savings: the median over the rounds of each pair, so that drift cancels.
 inline double saved_percent(const Pair& pair) {
   std::vector<double> ratios;
   for (std::size_t i = 0; i < pair.with.ms.size(); ++i) {
@@ -120,11 +120,11 @@ inline Row error_row(const Pair& pair) {
           number("%.2g", found.rmse)};
 }
 
-// Cost of each, and the difference of pictures that should be equal.
+// Costs of each frame, and the difference of pictures that should be equal.
 inline std::vector<Table> tables(const std::vector<Pair>& pairs) {
-  Table costs{{"left out", "method", "with, ms", "without, ms", "saved", "exponentials, M",
+  Table costs{{"omitted", "method", "with, ms", "without, ms", "saved", "exponentials, M",
                "pixel updates, M", "fields touched", "samples, M", "kernels skipped, M"}};
-  Table errors{{"left out", "method", "mean at most", "stop at most", "mean", "max", "RMSE"}};
+  Table errors{{"omitted", "method", "mean at most", "stop at most", "mean", "max", "RMSE"}};
   for (const Pair& pair : pairs) {
     if (pair.with.ms.empty()) continue;
     costs.push_back(cost_row(pair));

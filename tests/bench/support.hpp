@@ -32,7 +32,7 @@ inline constexpr Sample climate{"climate"};
 inline constexpr Sample tornado_256{"tornado", {256, 256, 256}};
 inline constexpr Sample tornado_512{"tornado", {512, 512, 512}};
 
-// every_line: every wind above a thousandth of the range has its line, as in the figures of the
+// every_line: draws a line for every wind above a thousandth of the range, as in the figures of the
 // paper, instead of the default of the view.
 struct Workload {
   std::string name;
@@ -42,9 +42,10 @@ struct Workload {
   int height = 480;
   bool every_line = true;
   protocol::MethodName method = protocol::MethodName::kernel;  // as moving frames are drawn
-  protocol::Detail detail = protocol::Detail::full;  // every sample, whatever the picture's size
-  bool naive = true;   // also by the naive renderer, whose picture is compared
-  bool heavy = false;  // seconds a frame by the naive renderer, or a gigabyte of data
+  protocol::Detail detail = protocol::Detail::full;  // every sample, whatever the size of the
+                                                     // picture
+  bool naive = true;   // also rendered by the naive renderer, for comparison
+  bool heavy = false;  // takes seconds per frame by the naive renderer, or a gigabyte of data
 };
 
 // The first step, opened once and kept until another sample is requested.

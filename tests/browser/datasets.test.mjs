@@ -52,7 +52,7 @@ test("the reason why a dataset cannot be shown stays visible", async (t) => {
   await finalPicture(page);
   assert.deepEqual(await texts(page), ["My storm (ok)", "My storm (torn)", "big — failed"]);
   for (const [id, why] of [
-    ["big", /--memory-limit \d+M would do/],
+    ["big", /--memory-limit \d+M would suffice/],
     ["torn", /torn\.nrrd/],
   ]) {
     await page.locator("#dataset").selectOption(id);

@@ -51,7 +51,7 @@ BURST = 40  # calls in a row that fail
 LOG_S = 10  # until a line of the log is here
 # What the log says of a stream that ended, and where it had no memory to say so.
 ENDS = ("connection failed", "session disconnected", "closing session")
-LOST_LINES = ("log line lost", "no memory to log which")
+LOST_LINES = ("log line lost", "no memory to log details")
 SERVED = [kind for kind in KINDS if kind != "thread"]  # all threads are there from the start
 # What is called at all, by phase: each must fail there.
 CALLED = {"serve": SERVED, "guarded": SERVED,

@@ -1,7 +1,7 @@
-// Preloaded into a program: makes chosen calls of the system's library fail, as a page of memory
-// shared with the test (tests/faults/shim.py) says: the n-th call, or the first from a place in the
-// program that has not failed before. Calls of the dynamic loader itself never fail, nor any before
-// main.
+// Preloaded into a program: makes chosen calls of system libraries fail, as directed by a page of
+// memory shared with the test (tests/faults/shim.py): the n-th call, or the first from a place in
+// the program that has not failed before. Calls of the dynamic loader itself never fail, nor does
+// any call before main.
 #include <dlfcn.h>
 #include <elf.h>
 #include <execinfo.h>
@@ -52,27 +52,28 @@ enum Kind {
 };
 
 struct Counter {
-  std::atomic<std::int64_t> at;     // this call from now on fails: 1 is the next; 0: none
-  std::atomic<std::int64_t> times;  // so many from there on; sites: so many places
-  std::atomic<std::int64_t> sites;  // not 0: calls from places that have not failed yet
+  std::atomic<std::int64_t> at;     // the number of calls until one fails: 1 is the next; 0: none
+  std::atomic<std::int64_t> times;  // number of consecutive calls that fail; with sites: number of
+                                    // places
+  std::atomic<std::int64_t> sites;  // nonzero: only calls from places that have not failed yet
   std::atomic<std::int64_t> fault;  // the errno
   std::atomic<std::int64_t> seen;
   std::atomic<std::int64_t> failed;
   std::atomic<std::int64_t> known;  // places that have failed
-  std::atomic<std::int64_t> depth;  // frames that make a place
+  std::atomic<std::int64_t> depth;  // number of stack frames that identify a place
 };
 
 constexpr std::size_t sites_max = 1 << 16;
 
 struct Control {
-  std::atomic<std::int64_t> process;     // who has it; 0: nobody yet
+  std::atomic<std::int64_t> process;     // process that uses the page; 0: none yet
   std::atomic<std::int64_t> clock_jump;  // seconds added to the time of day
   std::array<Counter, k_count> kinds;
-  std::array<std::atomic<std::uint64_t>, sites_max> sites;  // of all kinds, by hash
+  std::array<std::atomic<std::uint64_t>, sites_max> sites;  // places of all kinds, by hash
 };
 
 Control* control = nullptr;
-bool begun = false;  // main has: what libraries do before it nobody can catch
+bool begun = false;  // main has started: failures of library initialisation cannot be handled
 std::uintptr_t loader_begin = 0;
 std::uintptr_t loader_end = 0;
 __attribute__((tls_model("initial-exec"))) thread_local bool inside = false;
@@ -99,14 +100,15 @@ __attribute__((constructor)) void start() {
   if (page == MAP_FAILED) return;
   dl_iterate_phdr(note_loader, nullptr);
   std::array<void*, 4> frames{};
-  backtrace(frames.data(), frames.size());  // it loads what it needs on its first call
+  backtrace(frames.data(), frames.size());  // loads what it needs at its first call
   auto* mapped = static_cast<Control*>(page);
   std::int64_t nobody = 0;
-  // The first process only, not its children.
+  // Applies to the first process only, not to its children.
   if (mapped->process.compare_exchange_strong(nobody, ::getpid())) control = mapped;
 }
 
-// True the first time that this call site, the addresses of the innermost callers, is seen.
+// True the first time that this call site, given by the addresses of the innermost callers, is
+// seen.
 bool is_new_site(Kind kind, Counter& counter) {
   constexpr int frames_max = 24;
   constexpr int own_frames = 3;
@@ -188,7 +190,7 @@ bool is_file(int file) {
 
 }  // namespace
 
-// NOLINTBEGIN(readability-identifier-naming): the names are the system's
+// NOLINTBEGIN(readability-identifier-naming): the names are those of the system
 #define FAIL(kind, value) \
   if (fails(kind, __builtin_return_address(0))) return value
 #define NEXT(name) static auto* const real = next<decltype(name)>(#name)
@@ -265,7 +267,7 @@ ssize_t pread(int file, void* data, size_t bytes, off_t at) {
 size_t fread(void* data, size_t size, size_t count, FILE* stream) {
   NEXT(fread);
   if (fails(k_read, __builtin_return_address(0))) {
-    constexpr int error_seen = 0x20;  // of glibc's: what ferror() asks
+    constexpr int error_seen = 0x20;  // the error flag of glibc that ferror() returns
     stream->_flags |= error_seen;
     return 0;
   }

@@ -1,10 +1,9 @@
-// A script of client messages and events with their times -> what the session asks for, as text.
+// A script of client messages and events with their times -> the effects of the session, as text.
 // Part of scripts/fingerprint. Usage: session_transcript SCRIPT
-//
-// A line of the script is one JSON object: {"at": MS, "say": MESSAGE} for a client message, or
-// {"at": MS, "event": "describe" | "fail" | "drain" | "change" | "binary" | "wait"}, where "fail"
-// makes the next render fail and "wait" lets time pass. A render takes 12 ms and a frame is
-// acknowledged 8 ms after it was sent. The dataset "wind" has ten steps.
+//  A line of the script is one JSON object: {"at": MS, "say": MESSAGE} for a client message, or
+//  {"at": MS, "event": "describe" | "fail" | "drain" | "change" | "binary" | "wait"}, where "fail"
+//  makes the next render fail and "wait" lets time pass. A render takes 12 ms and a frame is
+//  acknowledged 8 ms after it was sent. The dataset "wind" has ten steps.
 #include <algorithm>
 #include <fstream>
 #include <iostream>
@@ -89,7 +88,8 @@ class Transcript {
     return wind;
   }
 
-  // The earliest event: a render ends, an acknowledgement arrives, or the session wakes.
+  // The earliest event: a render ends, an acknowledgement arrives, or the requested call of
+  // on_time() is due.
   void advance(Micros end) {
     while (true) {
       const Micros never = end + 1;
@@ -191,10 +191,10 @@ class Transcript {
 
   Micros now_ = 0;
   std::uint32_t described_ = 0;
-  std::optional<StartRender> render_;  // the newest while it is running
-  std::optional<Micros> render_end_;   // while it is under way
+  std::optional<StartRender> render_;  // the newest render in progress
+  std::optional<Micros> render_end_;   // while it is in progress
   std::optional<Micros> ack_at_;
-  std::uint32_t sent_ = 0;  // the newest frame's seq
+  std::uint32_t sent_ = 0;  // seq of the newest frame
   bool cancelled_ = false;
   bool fail_next_ = false;
   Session session_;

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-extern char** environ;  // POSIX leaves its declaration to the program
+extern char** environ;  // POSIX requires programs to declare it
 
 namespace cli_test {
 
@@ -93,7 +93,7 @@ class Process {
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // Signals this program only: kill() with a pid of -1 or 0 signals every process.
+  // Signals this program only: kill() with a pid of -1 or 0 would signal every process.
   void send(int signal) const {
     if (pid_ > 0) {
       kill(pid_, signal);
@@ -106,7 +106,7 @@ class Process {
   std::string read_until(char stop) { return read_stdout(&stop); }
   std::string read_all() { return read_stdout(nullptr); }
 
-  // The exit code; 128 + n when ended by signal n. Kills a program that takes more than a minute.
+  // The exit code; 128 + n if ended by signal n. Kills a program that runs for more than a minute.
   int wait() {
     if (pid_ <= 0) {
       ADD_FAILURE() << "the program is not running";
@@ -176,7 +176,7 @@ inline Outcome run(const Words& arguments, const Words& environment = {}) {
   return outcome;
 }
 
-// The port of a daemon's URL line.
+// The port in the URL line of a daemon.
 inline std::uint16_t port_of(Process& daemon) {
   const std::string url = daemon.read_until('\n');
   const auto colon = url.rfind(':');

@@ -14,9 +14,9 @@ namespace server_test {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
-inline constexpr int patience_ms = 60'000;  // a longer wait is a failure
+inline constexpr int patience_ms = 60'000;  // longer waits are failures
 
-// A port of this machine, and whether TLS is spoken there.
+// A port of this machine, and whether it uses TLS.
 struct Place {
   Place(std::uint16_t number, bool with_tls = false)  // NOLINT: a port's number is a place
       : port(number), tls(with_tls) {}
@@ -48,7 +48,7 @@ class Socket {
   [[nodiscard]] std::string version() const;
   [[nodiscard]] std::string protocol() const;
   void say_goodbye();  // close_notify of TLS 1.3: a record without application data
-  bool change_key();   // of TLS 1.3: a record that holds nothing for HTTP
+  bool change_key();   // of TLS 1.3: a record without data for HTTP
 
  private:
   struct Tls;
@@ -60,22 +60,22 @@ class Socket {
 };
 
 struct Answer {
-  int status = 0;                              // 0: there was none
-  std::map<std::string, std::string> headers;  // names in small letters
+  int status = 0;                              // 0: no response
+  std::map<std::string, std::string> headers;  // names in lower case
   std::string body;
 
   [[nodiscard]] std::string header(const std::string& name) const;
 };
 
-// Reads one response. `head`: it has no body regardless of its length.
+// Reads one response. `head`: it has no body, whatever its length header.
 Answer read_answer(Socket& socket, bool head = false);
 
-// One request on its own connection.
+// Sends one request on a separate connection.
 Answer request(Place place, const std::string& method, const std::string& target,
                const Headers& headers = {}, const std::string& body = "");
 Answer get(Place place, const std::string& target, const Headers& headers = {});
 Answer post_view(Place place, const std::string& json, const Headers& headers = {});
-// Bytes as they are.
+// unmodified bytes
 Answer raw(Place place, std::string_view bytes);
 
 enum class Opcode : std::uint8_t { more = 0, text = 1, binary = 2, close = 8, ping = 9, pong = 10 };
@@ -96,7 +96,7 @@ class StreamClient {
 
   bool say(std::string_view json) { return send_frame(Opcode::text, json); }
   bool send_frame(Opcode opcode, std::string_view payload, bool fin = true);
-  // Text, binary or close; none if the connection ended otherwise or the deadline passed.
+  // Text, binary or close; nullopt if the connection ended otherwise or the deadline passed.
   std::optional<Message> next(int timeout_ms = patience_ms);
   // The next text message of that type; others are skipped.
   std::optional<std::string> next_text(const std::string& type, int timeout_ms = patience_ms);
@@ -105,7 +105,7 @@ class StreamClient {
   // The code of the next close, skipping earlier messages; 0 if there is none.
   int close_code(int timeout_ms = patience_ms);
 
-  std::vector<std::string> texts;  // every text so far
+  std::vector<std::string> texts;  // all texts so far
   Socket socket;
 
  private:

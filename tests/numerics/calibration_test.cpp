@@ -1,4 +1,4 @@
-// Forecast errors of frames against their true errors, at viewpoints without measurements.
+// Forecast errors of frames compared with their true errors, at viewpoints without measurements.
 #include "server/study/calibration.hpp"
 
 #include <gtest/gtest.h>
@@ -70,7 +70,7 @@ TEST(Calibration, JpegErrorsAreWithinAFactorOfTwoAfterOneMeasurement) {
 TEST(Calibration, ReferenceEqualsTheIntegral) {
   ASSERT_EQ(calibrated().checks.size(), 5U);
   for (const TruthCheck& check : calibrated().checks) {
-    EXPECT_LT(check.apart, 5e-5) << calibrated().looks[check.look];
+    EXPECT_LT(check.apart, 5e-5) << calibrated().variants[check.variant];
   }
 }
 

@@ -75,7 +75,7 @@ double slope(const std::vector<double>& x, const std::vector<double>& y) {
   return (n * sxy - sx * sy) / (n * sxx - sx * sx);
 }
 
-// ---- the reference's own rule ----
+// ---- the rule of the reference ----
 
 double uniform_error(int nodes, int pieces) {
   const reference::Rules rules = reference::make_rules(nodes);
@@ -122,14 +122,14 @@ TEST(ReferenceRule, ErrorStaysBelowItsTolerance) {
   }
 }
 
-// ---- the orders of the cells' rules ----
+// ---- orders of the rules of cells ----
 
 enum class Rule {
-  euler,          // 1 - rho L for exp(-rho L), the line at its place
-  snapped,        // simple: the line at its cell's back
+  euler,          // 1 - rho L for exp(-rho L), the line at its position
+  snapped,        // simple: the line at the back of its cell
   corrected,      // C*D with the chord
   exact,          // the homogeneous cell
-  split_at_lines  // midpoint cells that end at each line
+  split_at_lines  // midpoint cells, divided at each line
 };
 
 CellLight haze_cell(const Haze& haze, Compositing by, double from, double to, const Surface* line) {
@@ -145,7 +145,7 @@ CellLight haze_cell(const Haze& haze, Compositing by, double from, double to, co
   return reference::cell_light(by, cell);
 }
 
-// One cell, all of it within the medium; at most one line in it.
+// One cell, entirely within the medium; at most one line in it.
 void add_cell(const Haze& haze, Rule rule, double from, double to, const Surface* line,
               Light& light) {
   switch (rule) {
@@ -171,8 +171,8 @@ void add_cell(const Haze& haze, Rule rule, double from, double to, const Surface
   }
 }
 
-// Cells of width 1 / n whose borders lie at (i + phase) / n, cut off at the medium's ends (and at
-// its edge, if told).
+// Cells of width 1 / n with borders at (i + phase) / n, clipped to the medium (and optionally at
+// its edge).
 Light by_cells(const Haze& haze, const std::vector<Surface>& lines, Rule rule, int n, double phase,
                bool split_at_edge) {
   std::vector<double> borders{0};
@@ -195,7 +195,7 @@ Light by_cells(const Haze& haze, const std::vector<Surface>& lines, Rule rule, i
   return light;
 }
 
-// Slope of the phase-averaged RMS error over the cell's width.
+// Slope of the phase-averaged RMS error over the cell width.
 double order(const Haze& haze, const std::vector<Surface>& lines, Rule rule, bool split_at_edge) {
   const Light exact = truth(haze, lines);
   std::mt19937 random(17);
@@ -263,7 +263,7 @@ TEST(CellRules, NaiveLosesAQuarterOfTheLightOfTheMediumAroundALine) {
   }
 }
 
-// ---- the engine's cell is this cell ----
+// ---- the cell of the engine equals this cell ----
 
 scene::Scene one_kernel(double rho, double slope_y) {
   scene::Scene scene;

@@ -153,7 +153,7 @@ TEST(Extremes, VeryFarEyeRendersLikeANearOne) {
   float brightest = 0;
   for (std::size_t i = 0; i < near.rgba.size(); ++i) {
     ASSERT_NEAR(near.rgba[i], far.rgba[i], 1e-5);
-    // A position error of 1e-5 of the line, times the slope of its edge.
+    // A position error of 1e-5 times the slope of the edge of the line.
     ASSERT_NEAR(near.rgba[i], narrow.rgba[i], 5e-3);
     brightest = std::max(brightest, near.rgba[i]);
   }

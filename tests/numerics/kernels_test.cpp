@@ -1,4 +1,4 @@
-// Kernels in isolation: exponentials, jitter, and every target against the portable code.
+// Kernels in isolation: exponentials, jitter, and every target compared with the portable code.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -187,7 +187,7 @@ TEST(Targets, AgreeAtAwkwardSizes) {
   }
 }
 
-// Whole numbers give integer lengths, some equal to the tolerance.
+// Whole numbers yield integer lengths, some equal to the tolerance.
 TEST(Targets, RenderLinesExactlyAtTheTolerance) {
   for (const Table* table : usable_tables()) {
     int drawn = 0;
@@ -205,7 +205,7 @@ TEST(Targets, RenderLinesExactlyAtTheTolerance) {
   }
 }
 
-// Squares of such vectors overflow or vanish.
+// Squares of such vectors overflow or underflow.
 TEST(Targets, MeasureVectorsOfAnySize) {
   for (const Table* table : usable_tables()) {
     for (const double size : {1e-35, 1e-20, 1.0, 1e20, 1e35}) {

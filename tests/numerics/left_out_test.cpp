@@ -30,7 +30,7 @@ Scene wind_and_cloud(Method method) {
       medium(make_volume(scene.lattice, 1, [](int, double, double, double) { return 0.8F; }),
              {0.5F, 0.7F, 1.0F}));
   scene.method = method;
-  scene.stop_transmittance = 0;  // lines hide nothing: the counts are comparable
+  scene.stop_transmittance = 0;  // lines alone: nothing is hidden, so the counts are comparable
   return scene;
 }
 
@@ -91,7 +91,7 @@ TEST_P(EitherMethod, WithoutAVectorNoLineIsPreparedOrComputed) {
       << "the rule of a line was evaluated";
 }
 
-// The exact integral inside a line needs a second exponential; the other rules must not use it.
+// The exact integral inside a line needs a second exponential; the other rules must not use one.
 TEST_P(EitherMethod, OnlyTheAnalyticRuleEvaluatesASecondExponential) {
   Scene scene = wind_and_cloud(GetParam());
   const auto exponentials = [&](Compositing compositing) {
@@ -162,7 +162,7 @@ class Weak {
   }
 
  private:
-  // Shears and waves, so that cells are not upright.
+  // Shears and waves, so that cells are not axis-aligned.
   void bend(scene::Lattice& lattice) {
     auto places = std::make_shared<std::vector<std::array<float, 3>>>();
     const double wave = between(0, 0.1);

@@ -13,7 +13,7 @@ std::shared_ptr<const data::Volume> wind(const scene::Lattice& lattice, float u,
                      [=](int c, double, double, double) { return c == 0 ? u : (c == 1 ? v : w); });
 }
 
-// One line in the middle of 81 x 81 pixels, 20 pixels to a world unit, seen from the south.
+// One line in the middle of 81 x 81 pixels, 20 pixels per world unit, seen from the south.
 scene::Scene one_line(float u, float v, float w) {
   scene::Scene scene;
   scene.lattice = even_lattice({1, 1, 1}, {2, 2, 2});
@@ -40,7 +40,7 @@ TEST(Line, OpacityRampsFromInnerToOuterRadius) {
 TEST(Line, LengthFollowsTheMagnitudeUpToFullLength) {
   const auto half_length = [](float u) {
     const engine::Image image = render(one_line(u, 0, 0)).image;
-    // The rounded end: opacity ramps about 2.5 pixels beyond the segment's end.
+    // The rounded end: opacity decreases over about 2.5 pixels beyond the end of the segment.
     double lit = 0;
     for (int x = 40; x < 81; ++x) lit += static_cast<double>(pixel(image, x, 40)[3]) / 0.75;
     return lit - 0.5 - 2.5;
@@ -98,7 +98,7 @@ TEST(Line, DimsByMagnitudeAndDistance) {
   scene::Scene scene = one_line(5, 0, 0);
   scene.vector->magnitude_range = {0, 10};
   scene.vector->magnitude_intensity = 0.6;
-  scene.depth_cue = {0.4, 4, 8};  // the line is 5 away
+  scene.depth_cue = {0.4, 4, 8};  // the line is 5 units away
   const engine::Image image = render(scene).image;
   const double dim = (1 - 0.6 * 0.5) * (1 - 0.4 * 0.25);
   EXPECT_NEAR(pixel(image, 40, 40)[2], 0.75 * 0.8 * dim, 1e-6);
@@ -136,7 +136,7 @@ TEST(Line, DirectionIsCorrectForHugeAndTinyMagnitudes) {
 }
 
 // A line inside its own cell: I = c_s A + a exp(-tf) (c_v - c_s), A = -expm1(-tau) + a exp(-tau),
-// tf = tau x, x the line's place in its cell.
+// tf = tau x, where x is the position of the line in its cell.
 TEST(Line, InsideItsMediumCellHasTheClosedForm) {
   for (const double rho : {0.01, 0.7, 3.0, 60.0}) {
     for (const float slope : {0.0F, 4.0F, -9.0F}) {

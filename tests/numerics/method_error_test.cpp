@@ -1,5 +1,5 @@
-// Errors of each method against the integral: slab below kernel, lines alone exact, order in slab
-// thickness, and the seam around a line with naive compositing.
+// Errors of each method relative to the integral: slab below kernel, lines alone exact, order in
+// slab thickness, and the seam around a line with naive compositing.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -12,10 +12,10 @@ namespace windsplat::naive {
 
 namespace {
 
-using engine::reference::AxisStop;
+using engine::reference::AxisPosition;
+using engine::reference::KernelPosition;
 using engine::reference::LayerGroup;
 using engine::reference::ScreenBox;
-using engine::reference::Stop;
 using engine::reference::View;
 using scene::Scene;
 
@@ -36,28 +36,29 @@ Vec<Real> cross(const Vec<Real>& a, const Vec<Real>& b) {
 
 // Rank of a kernel position along its axis: bricks of eight outward from the brick of the eye,
 // upper side first; within a brick outward from the position nearest to the eye, upper side first.
-std::tuple<bool, int, bool, int> place_in_bricks(int stop, int eye, int count) {
-  const int brick = stop / 8;
+std::tuple<bool, int, bool, int> place_in_bricks(int position, int eye, int count) {
+  const int brick = position / 8;
   const int eye_brick = eye / 8;
   const int start = std::clamp(eye, 8 * brick, std::min(8 * brick + 7, count - 1));
-  return {brick < eye_brick, std::abs(brick - eye_brick), stop < start, std::abs(stop - start)};
+  return {brick < eye_brick, std::abs(brick - eye_brick), position < start,
+          std::abs(position - start)};
 }
 
-struct AxisStops {
-  std::vector<AxisStop> stops;
+struct OrderedAxis {
+  std::vector<AxisPosition> positions;
   int eye = 0;
   std::vector<int> order;  // kernel positions in rendering order
 };
 
-AxisStops order_axis(const Scene& scene, int a, const std::vector<AxisStop>& stops) {
-  AxisStops axis;
-  axis.stops = stops;
-  const int count = static_cast<int>(stops.size());
+OrderedAxis order_axis(const Scene& scene, int a, const std::vector<AxisPosition>& positions) {
+  OrderedAxis axis;
+  axis.positions = positions;
+  const int count = static_cast<int>(positions.size());
   if (scene.camera.perspective) {
     // The kernel position whose cell, bounded midway to its neighbours, contains the eye.
     for (int i = 1; i < count; ++i) {
-      const double border = (scene.lattice.positions[a][stops[i - 1].sample] +
-                             scene.lattice.positions[a][stops[i].sample]) /
+      const double border = (scene.lattice.positions[a][positions[i - 1].sample] +
+                             scene.lattice.positions[a][positions[i].sample]) /
                             2;
       if (scene.camera.eye[a] >= border) axis.eye = i;
     }
@@ -74,7 +75,7 @@ AxisStops order_axis(const Scene& scene, int a, const std::vector<AxisStop>& sto
 // Layers of one stride.
 struct Group {
   LayerGroup layers;
-  std::array<AxisStops, 3> axis;
+  std::array<OrderedAxis, 3> axis;
 };
 
 std::vector<Group> order_groups(const Scene& scene) {
@@ -108,7 +109,7 @@ struct Slab {
   bool below;
   int distance;
   int group;
-  int stop;
+  int position;
   bool operator<(const Slab& other) const {
     return std::tie(below, distance, group) < std::tie(other.below, other.distance, other.group);
   }
@@ -129,9 +130,9 @@ int eye_sample(const Scene& scene, int a) {
 std::vector<Slab> order_slabs(const std::vector<Group>& groups, int major, int eye) {
   std::vector<Slab> slabs;
   for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
-    const AxisStops& axis = groups[g].axis[major];
-    for (int i = 0; i < static_cast<int>(axis.stops.size()); ++i) {
-      const int ahead = axis.stops[i].sample - eye;
+    const OrderedAxis& axis = groups[g].axis[major];
+    for (int i = 0; i < static_cast<int>(axis.positions.size()); ++i) {
+      const int ahead = axis.positions[i].sample - eye;
       slabs.push_back({ahead < 0, std::abs(ahead), g, i});
     }
   }
@@ -202,15 +203,15 @@ class Renderer {
     const int v = major == 2 ? 1 : 2;
     for (const Slab& slab : order_slabs(groups, major, eye_sample(scene_, major))) {
       const Group& group = groups[slab.group];
-      std::array<int, 3> stop{};
-      stop[major] = slab.stop;
+      std::array<int, 3> index{};
+      index[major] = slab.position;
       each_brick(group.axis[v].order, [&](const int* v_first, const int* v_last) {
         each_brick(group.axis[u].order, [&](const int* u_first, const int* u_last) {
           for (const int* p = v_first; p != v_last; ++p) {
             for (const int* q = u_first; q != u_last; ++q) {
-              stop[v] = *p;
-              stop[u] = *q;
-              kernel(group, stop);
+              index[v] = *p;
+              index[u] = *q;
+              kernel(group, index);
             }
           }
         });
@@ -232,20 +233,21 @@ class Renderer {
     }
   }
 
-  void kernel(const Group& group, const std::array<int, 3>& stops) {
-    stop_ =
-        engine::reference::make_stop(scene_, view_,
-                                     {group.axis[0].stops[stops[0]], group.axis[1].stops[stops[1]],
-                                      group.axis[2].stops[stops[2]]});
-    if (!stop_.has_cell || (view_.perspective && stop_.centre[2] < view_.near)) return;
-    cell_ = cast<Real>(stop_.cell);
-    from_eye_ = cast<Real>(stop_.from_eye);
-    centre_ = cast<Real>(stop_.centre);
-    for (int a = 0; a < 3; ++a) inverse_[a] = cast<Real>(stop_.inverse[a]);
+  void kernel(const Group& group, const std::array<int, 3>& index) {
+    position_ = engine::reference::make_kernel_position(
+        scene_, view_,
+        {group.axis[0].positions[index[0]], group.axis[1].positions[index[1]],
+         group.axis[2].positions[index[2]]});
+    if (!position_.has_cell || (view_.perspective && position_.centre[2] < view_.near)) return;
+    cell_ = cast<Real>(position_.cell);
+    from_eye_ = cast<Real>(position_.from_eye);
+    centre_ = cast<Real>(position_.centre);
+    for (int a = 0; a < 3; ++a) inverse_[a] = cast<Real>(position_.inverse[a]);
     Line<Real> line;
     bool drawn = false;
     if (group.layers.lines != nullptr) {
-      const auto ribbon = engine::reference::make_ribbon(scene_, view_, *group.layers.lines, stop_);
+      const auto ribbon =
+          engine::reference::make_ribbon(scene_, view_, *group.layers.lines, position_);
       drawn = ribbon.has_value();
       if (drawn) line = cast<Real>(*ribbon);
     }
@@ -254,23 +256,24 @@ class Renderer {
     if (drawn || medium.drawn) composite(drawn ? &line : nullptr, medium);
   }
 
-  // A splat below the tolerance of every layer, for all view directions, is omitted.
+  // A splat whose optical depth is below the tolerance of every layer, for all view directions, is
+  // omitted.
   Medium<Real> make_medium(const Group& group) const {
-    const auto density = engine::reference::make_density(group.layers.media, stop_);
+    const auto density = engine::reference::make_density(group.layers.media, position_);
     if (density.rho <= 0) return {};
     double tolerance = 1e300;
     for (const auto* layer : group.layers.media) {
       tolerance = std::min(tolerance, layer->min_optical_depth);
     }
     double widest = 0;
-    for (const auto& edge : stop_.edge) widest = std::max(widest, std::sqrt(dot(edge, edge)));
+    for (const auto& edge : position_.edge) widest = std::max(widest, std::sqrt(dot(edge, edge)));
     return {density.rho * widest / engine::reference::footprint_integral >= tolerance,
             static_cast<Real>(density.rho), cast<Real>(density.color)};
   }
 
   ScreenBox kernel_box(const Line<Real>* line, const Medium<Real>& medium) const {
     ScreenBox box{1e30, -1e30, 1e30, -1e30};
-    if (medium.drawn) box = engine::reference::splat_box(view_, stop_);
+    if (medium.drawn) box = engine::reference::splat_box(view_, position_);
     if (line != nullptr) {
       box.x0 = std::min<double>(box.x0, std::min(line->x0, line->x1) - line->r2);
       box.x1 = std::max<double>(box.x1, std::max(line->x0, line->x1) + line->r2);
@@ -310,10 +313,10 @@ class Renderer {
     const Vec<Real> d = to_cells(ray);
     const Real cells = std::sqrt(dot(d, d));
     Real tau = 0;
-    Real closest = centre_[2];  // the view depth at which the ray passes nearest to the sample
+    Real closest = centre_[2];  // the view depth at which the ray is nearest to the sample
     if (medium.drawn) {
-      // From the eye in perspective, from the pixel's point of the eye plane in orthographic
-      // projection.
+      // From the eye in perspective, from the point of the pixel in the plane of the eye in
+      // orthographic projection.
       Vec<Real> o{};
       for (int a = 0; a < 3; ++a) {
         Real from = from_eye_[a];
@@ -394,7 +397,7 @@ class Renderer {
   Vec<Real> right_{}, down_{}, forward_{};
   Real pixel_ = 1;
   // The current kernel.
-  Stop stop_;
+  KernelPosition position_;
   Vec<Real> cell_{}, from_eye_{}, centre_{};
   std::array<Vec<Real>, 3> inverse_{};
 };

@@ -16,7 +16,7 @@ struct Picture {
   std::vector<Real> rgba;  // linear premultiplied, top row first
 };
 
-// Instantiated for double (the oracle) and float (what the benchmark measures against).
+// Instantiated for double (the oracle) and float (the baseline of the benchmark).
 template <class Real>
 Picture<Real> render(const scene::Scene& scene);
 

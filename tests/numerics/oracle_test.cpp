@@ -1,4 +1,4 @@
-// The engine against the naive renderer, over random views of random scenes.
+// The engine compared with the naive renderer, for random views of random scenes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -235,7 +235,7 @@ TEST(EndOn, LinesKeepTheirColors) {
   EXPECT_GT(d.brightest, 0.3);
 }
 
-// Forward Euler amplifies differences where tau exceeds 1: compared below that.
+// Forward Euler amplifies differences where tau exceeds 1, so pictures are compared below that.
 TEST(Euler, EqualsTheNaiveRendererWhereStable) {
   for (const std::uint32_t seed : {2U, 3U, 8U, 15U}) {
     Scene scene = SceneMaker(seed).make(What::both, seed != 3, false);

@@ -51,7 +51,7 @@ TEST(ReferencePainting, RenderingInPiecesEqualsTheWholePicture) {
 TEST(ReferencePainting, RequestsMemoryBeforeUseAndStopsWhenCancelled) {
   const scene::Scene scene = cloudy_scene(8, 33);
   std::vector<std::uint64_t> asked;
-  // The error, if any, when the n-th memory request is refused or cancels.
+  // The error, if any, when the n-th memory request is refused or cancelled.
   const auto error_at = [&](std::size_t n, bool refuses, const CancelToken& cancel) {
     asked.clear();
     const auto begun = reference::Painting::begin(
@@ -64,7 +64,7 @@ TEST(ReferencePainting, RequestsMemoryBeforeUseAndStopsWhenCancelled) {
     return begun ? std::optional<ErrorKind>() : begun.error().kind;
   };
   EXPECT_EQ(error_at(0, false, {}), std::nullopt);
-  ASSERT_EQ(asked.size(), 2U) << "the kernels, and the lists of the tiles that they cover";
+  ASSERT_EQ(asked.size(), 2U) << "for the kernels, and for the lists of tiles that they cover";
   const auto kernels = reference::list_kernels(scene, reference::make_view(scene.camera));
   ASSERT_GT(kernels.splats.size(), 0U);
   EXPECT_GE(asked[0], kernels.splats.size() * sizeof(reference::Splat) +

@@ -1,4 +1,4 @@
-// Parts of the footprint by integrals over the kernel.
+// Parts of the footprint, computed by integrals over the kernel.
 #pragma once
 
 #include <algorithm>
@@ -21,10 +21,10 @@ inline double simpson(const std::function<double(double)>& f, double from, doubl
   return sum * (to - from) / (3 * steps);
 }
 
-// The integral of K from far before to z (in cells from the middle) along a line at distance b.
+// The integral of K from minus infinity to z (in cells from the middle) along a line at distance b.
 inline double partial_footprint(double b, double z) {
-  constexpr double s = 0.48;  // where K's two formulas meet
-  constexpr double t = 1.37;  // where it ends
+  constexpr double s = 0.48;  // radius at which the two formulas of K meet
+  constexpr double t = 1.37;  // radius beyond which K is 0
   if (b >= t) return 0;
   const double end = std::sqrt(t * t - b * b);
   const double inner = b < s ? std::sqrt(s * s - b * b) : 0;

@@ -1,4 +1,4 @@
-// The reference's kernel, and its rule along one ray, against closed forms.
+// The kernel of the reference, and its quadrature along one ray, compared with closed forms.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -126,7 +126,7 @@ TEST(Ray, LinearColorHasTheClosedFormOfPhi) {
                            for (int i = 0; i < 3; ++i) c[i] = fog[i] + (to[i] - fog[i]) * z / 2;
                            return c;
                          }};
-    // phi = (1 - e^-tau) / tau, and phi - e^-tau by its series where that would cancel.
+    // phi = (1 - e^-tau) / tau; phi - e^-tau by its series where the difference would cancel.
     const double phi = -std::expm1(-tau) / tau;
     const double second = tau < 0.03
                               ? tau * (1.0 / 2 - tau * (1.0 / 3 - tau * (1.0 / 8 - tau / 30)))
@@ -150,7 +150,7 @@ TEST(Ray, SheetsInASlabHaveTheirClosedForm) {
       }
       if (count == 7) sheets[3].opacity = 1;
       sheets.push_back({-0.5, 0.3, {1, 1, 0}});  // before the slab
-      sheets.push_back({1.5, 0.8, {0, 1, 1}});   // and behind
+      sheets.push_back({1.5, 0.8, {0, 1, 1}});   // and behind it
       std::sort(sheets.begin(), sheets.end(),
                 [](const Surface& a, const Surface& b) { return a.depth < b.depth; });
       double open = 1;
@@ -182,7 +182,7 @@ TEST(Ray, CheckeredRayIsCompositedPieceByPiece) {
     open *= 1 - here;
   }
   expect_light(along(medium, {0, 1, 2, 3, 4, 5, 6, 7, 8}), 1 - open, rgb);
-  // Not told where the steps are, it finds them.
+  // Finds discontinuities that are not given as breaks.
   expect_light(along(medium, {0, 8}, {}, 1e-9), 1 - open, rgb, 1e-7);
 }
 

@@ -1,4 +1,5 @@
-// The reference against closed forms: its kernel, its quadrature along one ray, and whole pictures.
+// The reference compared with closed forms: its kernel, its quadrature along one ray, and whole
+// pictures.
 
 #include "server/engine/reference/reference.hpp"
 
@@ -38,7 +39,7 @@ std::shared_ptr<const data::Volume> constant_scalar(const scene::Lattice& lattic
 }
 
 struct Cut {
-  double r = 0;      // the ray's distance from the splat's middle, cells
+  double r = 0;      // distance of the ray from the centre of the splat, cells
   double cells = 0;  // per world unit along the ray
 };
 
@@ -83,7 +84,8 @@ TEST(Reference, OneSplatIsItsFootprintInAnisotropicCells) {
 
 TEST(Reference, SplatsApartAreCompositedByOver) {
   scene::Scene scene;
-  scene.lattice = even_lattice({1, 2, 1}, {1, 3, 1});  // their centres are 3 apart, 1.37 * 3 wide
+  scene.lattice = even_lattice({1, 2, 1}, {1, 3, 1});  // their centres are 3 apart, and they are
+                                                       // 1.37 * 3 wide
   scene.lattice.positions[1] = {-5, 5};
   const auto red = make_volume(scene.lattice, 1,
                                [](int, double, double y, double) { return y < 0 ? 1.0F : 0.0F; });
@@ -125,7 +127,7 @@ TEST(Reference, LineInASplatSeesThePartOfTheSplatInFront) {
       scene.vector->opacity = 0.75;
       scene.scalars = {medium(constant_scalar(scene.lattice, rho), {0.9F, 0.1F, 0.3F})};
       const reference::Picture picture = truth(scene);
-      const double per_x = static_cast<double>(slope) / 10;  // the line's depth per width
+      const double per_x = static_cast<double>(slope) / 10;  // depth of the line per width
       const double m = std::hypot(1.0, per_x);
       for (int x = 0; x < 81; ++x) {
         const double world = (x - 40) / 20.0;

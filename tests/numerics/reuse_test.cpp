@@ -96,7 +96,7 @@ TEST_F(Reuse, EverySceneChangeTakesEffectAtOnce) {
        [](Scene& s) {
          s.camera = look({0, 0, 0}, {-1, 0.2, 0.4}, 3, 90, 70, true, 0.4);
        }},
-      {"near by",
+      {"nearby",
        [](Scene& s) {
          s.camera = look({0, 0, 0}, {0, 1, 0}, 0.4, 90, 70, true, 0.4);
        }},

@@ -9,7 +9,7 @@ namespace windsplat::test {
 namespace {
 
 // Two opaque splats, red at sample a and green at b; the centre pixel shows one of them when the
-// view direction is the line through both.
+// view direction is along the line through both.
 scene::Scene two_splats(const scene::Lattice& lattice, std::array<int, 3> red,
                         std::array<int, 3> green) {
   scene::Scene scene;

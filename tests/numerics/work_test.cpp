@@ -60,7 +60,7 @@ TEST(Work, OpticalDepthToleranceCoversAllViewDirections) {
 
 TEST(Work, SamplesOutsideThePictureAreCulled) {
   scene::Scene scene = counted_scene();
-  scene.camera = look({0, 0, 0}, {0, -1, 0}, -5, 70, 50, true, 0.4);  // looks away
+  scene.camera = look({0, 0, 0}, {0, -1, 0}, -5, 70, 50, true, 0.4);  // looks away from the volume
   const engine::Rendered away = render(scene);
   EXPECT_EQ(away.work.culled, 8 * 8 * 4);
   EXPECT_EQ(away.work.pixel_updates, 0);
@@ -104,7 +104,7 @@ TEST(Work, OpaqueTilesTerminateEarlyAndLookTheSame) {
 }
 
 TEST(Cancel, BeforeAndDuringAFrame) {
-  // Enough work that a thread that wakes late still cancels before the end.
+  // Enough work that a thread that wakes up late still cancels before the end.
   scene::Scene scene;
   scene.lattice = even_lattice({80, 80, 80}, {0.024, 0.024, 0.024});
   const auto wind = make_volume(scene.lattice, 3, [](int, double, double, double) { return 1.0F; });
@@ -249,7 +249,7 @@ TEST(Extremes, StrideThatDoesNotDivideAnAxisOmitsNothing) {
   scene.vector->stride = scene.scalars[0].stride = 9;
   scene.camera = look({0, 0, 0}, {0.3, 1, -0.4}, 3, 40, 30, true, 0.3);
   const engine::Rendered rendered = render(scene);
-  EXPECT_EQ(rendered.work.samples, 4 * 4 * 1);  // 9 + 9 + 9 + 3 samples; all 3
+  EXPECT_EQ(rendered.work.samples, 4 * 4 * 1);  // strides of 9, 9, 9 and 3 samples; along z all 3
   EXPECT_TRUE(all_finite(rendered.image));
 }
 

@@ -1,4 +1,4 @@
-// The frame header's 64 bytes, against vectors written by hand.
+// The 64 bytes of the frame header, compared with vectors written by hand.
 #include "protocol/frame_header.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// REST responses about values and jobs against messages.schema.json; requests for datasets.
+// REST responses about values and jobs, validated against messages.schema.json; requests for
+// datasets.
 #include "protocol/measurements.hpp"
 
 #include <gmock/gmock.h>

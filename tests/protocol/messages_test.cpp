@@ -1,4 +1,5 @@
-// Client messages as typed values; server messages and REST shapes against messages.schema.json.
+// Client messages as typed values; server messages and REST shapes validated against
+// messages.schema.json.
 #include "protocol/messages.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,6 @@
-// Property test: for any mutation of a valid document the codec either accepts it and gives a
-// stable canonical text, or refuses it with a message. Seeds are fixed, so that failures repeat.
+// Property test: for any mutation of a valid document, the codec either accepts it and yields a
+// stable canonical text, or rejects it with a message. Seeds are fixed, so that failures are
+// reproducible.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -200,7 +201,7 @@ TEST(Mutation, ParsedHeaderEncodesToItself) {
     ++parsed;
     const auto again = encode_frame_header(*read);
     for (std::size_t i = 0; i < again.size(); ++i) {
-      // A signalling NaN may come back quiet; every other byte is unchanged.
+      // A signalling NaN may become quiet; every other byte is unchanged.
       const bool in_float = i >= 32 && i < 40;
       ASSERT_TRUE(in_float || again[i] == bytes[i]) << "byte " << i;
     }

@@ -76,7 +76,7 @@ TEST(SavedViews, IdsAreTenLettersOfBase32) {
   EXPECT_FALSE(is_view_id(std::string_view("012345678\0", 10)));
 }
 
-// A view with every list, name and number at its longest is stored completely.
+// A view with the maximum length of every list, name and number is stored completely.
 TEST(SavedViews, LongestViewFitsAFile) {
   std::string name;
   for (std::size_t i = 0; i < limits::name_chars_max; ++i) name += "\xf0\x9f\x8c\x80";

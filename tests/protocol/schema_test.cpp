@@ -101,7 +101,7 @@ TEST(Schema, EncodedViewsHoldExactlyTheSchemasKeys) {
   });
 }
 
-// The bound passes and the next number beyond it does not: codec and schema have the same range.
+// The limit is accepted and the next number beyond it is not: codec and schema have the same range.
 TEST(Schema, RangesOfNumbersMatchTheCodec) {
   int bounds = 0;
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
@@ -111,7 +111,8 @@ TEST(Schema, RangesOfNumbersMatchTheCodec) {
       ++bounds;
       const auto bound = schema[keyword].get<double>();
       const double beyond = integer ? bound + outward : std::nextafter(bound, outward * 1e300);
-      // near < far leaves no partner for the largest near and the smallest far.
+      // near < far leaves no valid far for the largest near, and no valid near for the smallest
+      // far.
       const bool lonely =
           (at == "/depthCue/near" && outward > 0) || (at == "/depthCue/far" && outward < 0);
       EXPECT_EQ(first_pointer(view_with(at, schema[keyword])), lonely ? "/depthCue/near" : "")

@@ -1,4 +1,4 @@
-// A study's document against study.schema.json.
+// The document of a study validated against study.schema.json.
 #include "protocol/study.hpp"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ StudyPoint unstable_point() {
   return point;
 }
 
-// One of everything.
+// One element of every kind.
 StudyDocument whole_document() {
   StudyDocument study;
   study.runs = 3;

@@ -71,7 +71,7 @@ class Validator {
     } else if (keyword == "properties" || keyword == "additionalProperties") {
       check_members(file, schema, keyword, rule, value, at);
     } else {
-      complain(at, "the schema says " + keyword + ", which this validator does not know");
+      complain(at, "the schema has " + keyword + ", which this validator does not support");
     }
   }
 

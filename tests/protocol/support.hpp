@@ -24,7 +24,7 @@ struct Vector {
   Json body;
   [[nodiscard]] std::string kind() const { return body.at("kind"); }
   [[nodiscard]] std::string name() const;
-  [[nodiscard]] std::string text() const;  // the document as it would arrive
+  [[nodiscard]] std::string text() const;  // the document as a client would send it
 };
 std::vector<Vector> read_vectors(const std::string& folder);  // "valid" or "invalid"
 

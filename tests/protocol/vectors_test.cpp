@@ -1,4 +1,4 @@
-// The shared vectors, against the codec and against the schemas.
+// The shared vectors, checked by the codec and by the schemas.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

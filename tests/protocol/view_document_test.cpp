@@ -143,8 +143,7 @@ TEST(ViewDocument, ErrorsDoNotRepeatOversizeOrHostileKeys) {
   EXPECT_LT(value.error().message.size(), 300U);
 }
 
-// The cases of RFC 7396's appendix whose shape fits a view, with the view's keys in place of
-// letters.
+// The cases of RFC 7396's appendix whose shape fits a view, with keys of views in place of letters.
 TEST(MergePatch, FollowsTheAppendixOfTheRfc) {
   EXPECT_EQ(patched(R"({"dataset":"b"})", R"({"dataset":"c"})"), R"({"dataset":"c"})");
   EXPECT_EQ(patched(R"({"dataset":"b"})", R"({"step":3})"), R"({"dataset":"b","step":3})");
@@ -189,9 +188,9 @@ TEST(MergePatch, InvalidPatchLeavesTheViewUnchanged) {
     EXPECT_FALSE(before.patched(patch).has_value()) << patch;
     EXPECT_EQ(before.canonical(), text) << patch;
   }
-  // r1 fits the r2 set before, though not the default.
+  // r1 is valid with the r2 set before, although not with the default.
   EXPECT_TRUE(before.patched(R"({"vector":{"r1":1.9}})").has_value());
-  // Removing r2 restores its default, which r1 no longer fits.
+  // Removing r2 restores its default, with which r1 is no longer valid.
   const auto wide = before.patched(R"({"vector":{"r1":1.9}})");
   EXPECT_FALSE(wide->patched(R"({"vector":{"r2":null}})").has_value());
 }

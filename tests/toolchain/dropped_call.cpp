@@ -1,7 +1,7 @@
-// Whether the compiler keeps a call whose only effect is to fill arrays: GCC bug 110702. The
+// Checks whether the compiler keeps a call whose only effect is to fill arrays: GCC bug 110702. The
 // optimisation of induction variables may address samples.offset[l] from the base 0. Two later
-// analyses (-fipa-modref, -fipa-pure-const) take that for a null dereference, the function for one
-// without effect, and its calls are removed. The program ends with 0 if the call is kept.
+// analyses (-fipa-modref, -fipa-pure-const) treat that as a null dereference and the function as
+// one without effect, so its calls are removed. The program exits with 0 if the call is kept.
 #include <cstdint>
 
 namespace {
@@ -46,7 +46,7 @@ int main() {
   const Camera camera = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}, 0};
   Samples samples = {};
   samples.count = 1;
-  // Called by address: main itself is optimised as code that runs once.
+  // Called through a pointer: main itself is optimised as code that runs once.
   float (*const volatile called)(const Camera&, const float*, Samples&) = first_x;
   return called(camera, positions, samples) == 7 ? 0 : 1;
 }

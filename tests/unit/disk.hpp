@@ -21,7 +21,7 @@ class Folder {
     path_ = name;
   }
   ~Folder() {
-    std::error_code ignored;  // what cannot be removed is the machine's to keep
+    std::error_code ignored;  // what cannot be removed is left behind
     std::filesystem::remove_all(path_, ignored);
   }
   Folder(const Folder&) = delete;

@@ -1,4 +1,4 @@
-// Flags and environment of what one address, and all of them together, may take.
+// Options and environment variables that limit the usage per address and in total.
 #include "server/cli/serve/limits.hpp"
 
 #include <sstream>

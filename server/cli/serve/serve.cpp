@@ -36,7 +36,7 @@ constexpr std::array<std::string_view, 9> live_options{"token-file",   "tls-cert
                                                        "allow-origin", "allow-host", "allow-remote",
                                                        "allow-root",   "log-format", "log-level"};
 
-// Limit of the wait for a reload at shutdown: a disk may hang.
+// Limit of the wait for a reload at shutdown, because a disk may not respond.
 constexpr std::chrono::seconds reload_patience{1};
 
 void configure_log(const ServeArguments& arguments) {
@@ -140,7 +140,7 @@ class Control {
   const CLI::App& given_;
   std::shared_ptr<data::Store> store_;
   std::unique_ptr<ServeSettings> started_;
-  std::shared_ptr<transport::TlsContext> tls_;  // the newest
+  std::shared_ptr<transport::TlsContext> tls_;  // the newest one
   std::mutex mutex_;                            // guards the members below, held briefly
   transport::Server* server_ = nullptr;
   bool reload_wanted_ = false;
@@ -219,7 +219,7 @@ int serve(const CLI::App& given) {
     server.run();
     log::info("drained");
   }
-  control->disarm();  // from here on a signal ends the process
+  control->disarm();  // a further signal now ends the process
   if (!signals.settle(reload_patience)) {
     log::warn("reload did not finish before shutdown");
     _exit(code);

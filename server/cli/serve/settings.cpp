@@ -87,8 +87,8 @@ Result<std::shared_ptr<transport::TlsContext>> read_tls(const ServeArguments& ar
   return tls;
 }
 
-// A core dump would contain the secrets. 1 rather than 0: with 0 the kernel still passes a dump to
-// a collecting program (core(5)).
+// A core dump would contain the secrets. The limit is 1 instead of 0, because with 0 the kernel
+// still passes a dump to a collecting program (core(5)).
 Result<void> forbid_dumps() {
   const rlimit one{1, 1};
   rlimit now{};

@@ -13,7 +13,7 @@ namespace windsplat::cli {
 struct ServeSettings {
   CLI::App command;  // records which arguments were given
   ServeArguments arguments;
-  api::ServerOptions options;  // without members built from other folders
+  api::ServerOptions options;  // without members that are created from other settings
 };
 
 // Settings from `given` (command line and environment) and the current configuration, token and

@@ -1,4 +1,4 @@
-// Offsets of a whole -> the piece they fall into, and its file.
+// Maps offsets of the whole run to pieces and their files.
 #include "server/data/bytes/byte_store.hpp"
 
 #include <algorithm>
@@ -65,7 +65,7 @@ class JoinedStore final : public ByteStore {
   }
 
  private:
-  // The piece's store; the one that was not used for longest makes place.
+  // The store of a piece; closes the least recently used one if too many are open.
   Result<std::shared_ptr<ByteStore>> opened(std::size_t index) {
     const auto at = std::find_if(open_.begin(), open_.end(),
                                  [index](const auto& known) { return known.first == index; });
@@ -96,8 +96,8 @@ std::shared_ptr<ByteStore> joined_store(std::vector<Piece> pieces) {
 }
 
 Error absent_companion(const std::string& name, const std::string& by) {
-  return make_error(ErrorKind::not_found, in_quotes(name) + ", which " + in_quotes(by) +
-                                              " names, is not there: it is looked for in the "
+  return make_error(ErrorKind::not_found, in_quotes(name) + ", referred to by " + in_quotes(by) +
+                                              ", is missing; expected in the "
                                               "folder of " +
                                               in_quotes(by));
 }

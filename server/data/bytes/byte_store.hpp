@@ -1,5 +1,5 @@
-// Where an array's bytes lie, as one run of them: a file's tail, an encoded stream unrolled, many
-// files one after another. Readers of plain formats put these together.
+// The bytes of an array as one contiguous run, from the end of a file, a decoded stream or several
+// files. Readers of plain formats combine these.
 #pragma once
 
 #include <cstddef>
@@ -23,28 +23,27 @@ class ByteStore {
   [[nodiscard]] virtual Result<void> check_unchanged() const = 0;
 };
 
-// A file from an offset on.
+// The bytes of a file from an offset on.
 std::shared_ptr<ByteStore> file_store(std::shared_ptr<const InputFile> file, std::uint64_t skip);
 
-// One of many files, or none: of a piece that is absent every byte is 0xff, which as a float is
-// not a number.
+// Part of a joined store: a file or, if the file is absent, bytes 0xff (NaN as float).
 struct Piece {
   std::uint64_t bytes = 0;
   std::function<Result<std::shared_ptr<ByteStore>>()> open;  // empty: absent
 };
 
-// Pieces one after another, opened when they are read; a few stay open.
+// Concatenates pieces. Their files are opened on demand; a few stay open.
 std::shared_ptr<ByteStore> joined_store(std::vector<Piece> pieces);
 
-// Error for a file that `by` refers to and that is absent: names the reference and the folder.
+// Error for an absent file that `by` refers to; names the reference and the folder.
 Error absent_companion(const std::string& name, const std::string& by);
 
-// The file of a name that the file `by` refers to, beside it. Errors: as Files::open(), and
+// Opens the file that `by` refers to by name, in the same folder. Errors: as Files::open(), and
 // absent_companion().
 Result<std::shared_ptr<const InputFile>> open_named(Files& files, const std::string& name,
                                                     const std::string& by);
 
-// A companion opened again later; it must still be what it was when `identity` was taken.
+// Opens a companion again later; it must be unchanged since `identity` was taken.
 Result<std::shared_ptr<const InputFile>> open_again(Files& files, const std::string& name,
                                                     const std::string& identity);
 

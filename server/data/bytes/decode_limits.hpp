@@ -1,5 +1,5 @@
-// Limits on what stored bytes may make a reader decode, for all formats. A file of a few kB can
-// declare terabytes; whatever is done without being asked for is bounded by what the file has.
+// Limits on decoding, for all formats. A file of a few kB can declare terabytes; what is decoded
+// without a request is limited in proportion to the size of the file.
 #pragma once
 
 #include <cstddef>
@@ -7,22 +7,22 @@
 
 namespace windsplat::data {
 
-// One decoded chunk of a chunked format (HDF5, Zarr).
+// Limit of one decoded chunk of a chunked format (HDF5, Zarr).
 constexpr std::size_t chunk_bytes_max = std::size_t{1} << 30;
 
-// A chunk that does not compress grows, by less than this with every compressor.
+// Compressors enlarge an incompressible chunk by less than this.
 constexpr std::uint64_t stored_chunk_bytes_max(std::uint64_t decoded_bytes) {
   return decoded_bytes + decoded_bytes / 8 + 65536;
 }
 
-// What finding one chunk costs at least, in bytes that are decoded in the time: of HDF5 5 us, of
-// Zarr, whose chunks are files, 50 us.
+// Least cost of finding a chunk, as the number of bytes decoded in the same time: 5 us for HDF5, 50
+// us for Zarr, whose chunks are files.
 constexpr std::size_t hdf5_chunk_cost_bytes = 1024;
 constexpr std::size_t zarr_chunk_cost_bytes = 4096;
 
 // Decoded bytes that opening a dataset (its coordinates) may take. Longitudes and latitudes of a
-// regular grid, stored as two 2-D arrays, compress hundreds of times: those of 2000 x 2000 samples
-// take 61 MiB.
+// regular grid, stored as two 2-D arrays, have compression ratios of hundreds: those of 2000 x 2000
+// samples take 61 MiB.
 constexpr std::uint64_t voluntary_bytes_max(std::uint64_t stored_bytes) {
   return (std::uint64_t{64} << 20) + 16 * stored_bytes;
 }
@@ -30,25 +30,25 @@ constexpr std::uint64_t voluntary_bytes_max(std::uint64_t stored_bytes) {
 // Private memory of an idle loader.
 inline constexpr std::uint64_t loader_bytes_min = std::uint64_t{8} << 20;
 
-// Decoded bytes that `inspect` may spend on ranges without being asked: a step of a few fields that
-// compress 64 times is read whole, and one of 178 MiB that compresses a hundred times.
+// Decoded bytes that `inspect` may spend on value ranges without a request. Enough for all of a
+// step with a compression ratio of 64, or for 178 MiB with a ratio of 100.
 constexpr std::uint64_t range_bytes_max(std::uint64_t stored_bytes) {
   return (std::uint64_t{64} << 20) + 64 * stored_bytes;
 }
 
-// Memory for a volume and the chunks that it is made of, while its range is found.
+// Memory for a volume and its chunks while its range is computed.
 constexpr std::uint64_t range_memory_max(std::uint64_t stored_bytes) {
   return (std::uint64_t{128} << 20) + 32 * stored_bytes;
 }
 
-// Private memory of a loader while it opens files of so many bytes.
+// Private memory of a loader that has files of so many bytes open.
 constexpr std::uint64_t opening_memory_bytes(std::uint64_t stored_bytes) {
   return (std::uint64_t{144} << 20) + 32 * stored_bytes;
 }
 
-// Coordinates of an axis, and time steps: each takes memory even where no data were stored. Of a
-// store of many files those count that were opened to find the axes: a century of hourly steps,
-// 876,600, may compress to a few kB.
+// Coordinates of an axis, and time steps: each takes memory even if no data were stored. Files
+// opened to find the axes of a store count as stored bytes: a century of hourly steps, 876,600, may
+// compress to a few kB.
 constexpr std::uint64_t entries_max(std::uint64_t stored_bytes) {
   return (std::uint64_t{1} << 20) + stored_bytes / 4;
 }

@@ -1,4 +1,4 @@
-// One loop a type and byte order.
+// Conversions have one loop per type and byte order.
 #include "server/data/bytes/scalar.hpp"
 
 #include <algorithm>

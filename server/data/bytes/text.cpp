@@ -1,4 +1,4 @@
-// Locale-free: std::from_chars.
+// std::from_chars does not depend on the locale.
 #include "server/data/bytes/text.hpp"
 
 #include <charconv>

@@ -1,4 +1,4 @@
-// Words and numbers of text headers, and names of files that are counted.
+// Words and numbers of text headers, and numbered file names.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@ namespace windsplat::data::bytes {
 
 std::vector<std::string_view> words_of(std::string_view text);
 
-// The whole of the text as a number, in the C locale; a leading + is allowed.
+// The entire text as a number, in the C locale; a leading + is allowed.
 std::optional<double> to_double(std::string_view text);
 std::optional<std::int64_t> to_integer(std::string_view text);
-// The same for a sample among data: beyond a double's range it is infinite, or 0, with its sign.
+// The same for a sample: a value beyond the range of double becomes infinite or 0, with its sign.
 std::optional<double> to_sample(std::string_view text);
 
 // 0 to 15; -1 if it is not a hexadecimal digit.
 int hex_digit(char c);
 
-// A name with one %d, %4d or %04d and that number in its place. Nothing where there is no such
-// place, more than one, or another kind.
+// Replaces the only %d, %4d or %04d of a name by a number. nullopt if there is no or more than one
+// such conversion, or one of another kind.
 std::optional<std::string> numbered_name(std::string_view pattern, std::int64_t number);
 
 }  // namespace windsplat::data::bytes

@@ -1,4 +1,4 @@
-// Decoders whose state can be copied, and the store that resumes from such a copy.
+// Decoders with copyable state, and the store that resumes from such copies.
 #include "server/data/bytes/unrolled.hpp"
 
 #include <zlib.h>
@@ -23,7 +23,7 @@ constexpr std::size_t window_max = std::size_t{1} << 16;
 constexpr std::size_t places_max = 64;
 constexpr std::uint64_t first_spacing = std::uint64_t{4} << 20;
 
-// The encoded bytes from a place on, some of them in memory. A copy reads them anew.
+// The encoded bytes from an offset on, partly buffered. A copy has its own buffer.
 class Input {
  public:
   Input(std::shared_ptr<const InputFile> file, std::uint64_t at)
@@ -31,7 +31,7 @@ class Input {
   Input(const Input& other) : file_(other.file_), at_(other.at_) {}
   Input& operator=(const Input&) = delete;
 
-  // What follows, at least one byte unless the file ends.
+  // The next bytes, at least one unless the file ends.
   Result<std::string_view> window() {
     if (at_ < begin_ || at_ >= begin_ + bytes_.size()) {
       const std::uint64_t left = file_->size() - std::min(at_, file_->size());
@@ -56,7 +56,7 @@ class Decoder {
  public:
   virtual ~Decoder() = default;
   Decoder& operator=(const Decoder&) = delete;
-  // Up to `count` bytes, none only at the end.
+  // Up to `count` bytes; 0 only at the end.
   virtual Result<std::size_t> produce(unsigned char* out, std::size_t count) = 0;
   [[nodiscard]] virtual std::unique_ptr<Decoder> copy() const = 0;
   [[nodiscard]] const Input& input() const { return input_; }
@@ -95,7 +95,7 @@ class GzipDecoder final : public Decoder {
         inflateReset(&stream_);
         ended_ = false;
       }
-      // The library takes a pointer to what it does not change.
+      // The library takes a non-const pointer to input that it does not change.
       stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(window->data()));
       stream_.avail_in = static_cast<uInt>(window->size());
       const int status = inflate(&stream_, Z_NO_FLUSH);
@@ -104,11 +104,11 @@ class GzipDecoder final : public Decoder {
       if (status == Z_STREAM_END) {
         ended_ = true;
       } else if (status == Z_MEM_ERROR) {
-        return make_error(ErrorKind::out_of_memory, "no memory to unpack gzip data");
+        return make_error(ErrorKind::out_of_memory, "not enough memory to decompress gzip data");
       } else if (status == Z_BUF_ERROR && window->empty()) {
         return 0;
       } else if (status != Z_OK) {
-        return input_.file()->fault("is damaged: its gzip data cannot be unpacked at byte " +
+        return input_.file()->fault("is damaged: its gzip data cannot be decompressed at byte " +
                                     std::to_string(input_.at()));
       }
     }
@@ -159,7 +159,7 @@ class HexDecoder final : public Decoder {
   int high_ = -1;
 };
 
-// "nan", "-inf", "+1.5e3", "1.0D5": what printf and Fortran write.
+// Formats written by printf and Fortran: "nan", "-inf", "+1.5e3", "1.0D5".
 bool parse_number(std::string token, double& out) {
   std::replace_if(
       token.begin(), token.end(), [](char c) { return c == 'D' || c == 'd'; }, 'e');
@@ -179,7 +179,7 @@ class TextDecoder final : public Decoder {
   [[nodiscard]] std::unique_ptr<Decoder> copy() const override {
     return std::make_unique<TextDecoder>(*this);
   }
-  // Whole numbers only: `count` must be a multiple of eight, as all positions are.
+  // Whole numbers only: `count` and all offsets must be multiples of eight.
   Result<std::size_t> produce(unsigned char* out, std::size_t count) override {
     std::size_t made = 0;
     for (; made + sizeof(double) <= count; made += sizeof(double)) {
@@ -197,7 +197,7 @@ class TextDecoder final : public Decoder {
   }
 
  private:
-  // Empty at the file's end.
+  // Returns an empty token at the end of the file.
   Result<std::string> next_token() {
     constexpr std::size_t token_max = 64;
     std::string token;
@@ -237,7 +237,7 @@ class UnrolledStore final : public ByteStore {
   Result<void> read(std::uint64_t offset, unsigned char* out, std::size_t count) override {
     WINDSPLAT_CHECK(offset <= bytes_ && count <= bytes_ - offset);
     offset += drop_;
-    // Text comes as whole numbers: begin and end there.
+    // Text is decoded to whole numbers: align both ends to them.
     const std::uint64_t ahead = offset % sizeof(double);
     go_back_to(offset - ahead);
     std::vector<unsigned char> scratch(window_max);
@@ -255,7 +255,7 @@ class UnrolledStore final : public ByteStore {
         count -= body;
         continue;
       }
-      // Eight bytes of which some are wanted.
+      // A single number, of which only some bytes are requested.
       if (auto done = produce(scratch.data(), whole_eight(offset - lead)); !done) return done;
       const std::size_t some = std::min<std::size_t>(count, sizeof(double) - lead);
       std::memcpy(out, scratch.data() + lead, some);
@@ -276,7 +276,7 @@ class UnrolledStore final : public ByteStore {
     std::unique_ptr<Decoder> decoder;
   };
 
-  // Eight, or what is left of the data.
+  // Eight bytes, or the rest of the data.
   [[nodiscard]] std::size_t whole_eight(std::uint64_t from) const {
     return static_cast<std::size_t>(std::min<std::uint64_t>(sizeof(double), bytes_ + drop_ - from));
   }
@@ -296,7 +296,7 @@ class UnrolledStore final : public ByteStore {
       auto made = now_->produce(out, count);
       if (!made) return made.error();
       if (*made == 0) {
-        return now_->input().file()->fault("is cut short: its data end after " +
+        return now_->input().file()->fault("is truncated: its data end after " +
                                            std::to_string(at_) + " of " +
                                            std::to_string(bytes_ + drop_) + " bytes");
       }
@@ -325,7 +325,7 @@ class UnrolledStore final : public ByteStore {
   std::uint64_t bytes_;
   std::uint64_t drop_;
   std::uint64_t spacing_ = first_spacing;
-  std::vector<Place> places_;  // in order, the first at 0
+  std::vector<Place> places_;  // ascending; the first is at offset 0
 };
 
 }  // namespace
@@ -333,7 +333,7 @@ class UnrolledStore final : public ByteStore {
 bool can_hold(Encoding encoding, std::uint64_t encoded, std::uint64_t claim) {
   if (encoding == Encoding::hex) return claim <= encoded / 2;
   if (encoding == Encoding::text) return claim / sizeof(double) <= (encoded + 1) / 2;
-  return claim / 1040 <= encoded;  // deflate makes at most 1032 bytes of one
+  return claim / 1040 <= encoded;  // deflate expands one byte to at most 1032
 }
 
 std::shared_ptr<ByteStore> unrolled_store(std::shared_ptr<const InputFile> file, Encoding encoding,
@@ -351,9 +351,9 @@ Result<std::uint64_t> end_of_text(const std::shared_ptr<const InputFile>& file, 
         scratch.data(), static_cast<std::size_t>(std::min<std::uint64_t>(left, scratch.size())));
     if (!made) return made.error();
     if (*made == 0) {
-      return file->fault("is cut short: " + std::to_string(left / sizeof(double)) + " of the " +
+      return file->fault("is truncated: " + std::to_string(left / sizeof(double)) + " of the " +
                          std::to_string(count) + " numbers from byte " + std::to_string(skip) +
-                         " on are not there");
+                         " on are missing");
     }
     left -= *made;
   }

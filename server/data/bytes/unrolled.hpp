@@ -1,6 +1,6 @@
-// Encoded bytes (gzip, hexadecimal, numbers as text) as if they lay there plain. A stream can only
-// be followed forwards: where it was passed is remembered here and there, so that a step of a long
-// series is reached without memory for the others.
+// Random access to encoded bytes (gzip, hexadecimal, numbers as text). A stream can be decoded
+// forwards only: the decoder state is saved at checkpoints, so that a step of a long series is
+// reached without keeping the others in memory.
 #pragma once
 
 #include <cstdint>
@@ -12,22 +12,24 @@
 namespace windsplat::data::bytes {
 
 enum class Encoding {
-  gzip,  // or zlib; members may follow one another
-  hex,   // two digits a byte, blanks between them
-  text,  // numbers between blanks or commas: eight bytes each, float64 of this machine
+  gzip,  // or zlib; may have several members
+  hex,   // two digits per byte, separated by optional blanks
+  text,  // numbers separated by blanks or commas; decoded to eight bytes each, float64 in native
+         // byte order
 };
 
-// Refused as impossible: a claim that no encoding of so few bytes can fulfil.
-// encoded: bytes of the file from the data's beginning on; claim: decoded ones.
+// Whether a declared size is impossible for so few encoded bytes. encoded: bytes of the file from
+// the start of the data on; claim: declared decoded bytes.
 bool can_hold(Encoding encoding, std::uint64_t encoded, std::uint64_t claim);
 
-// The encoded data of a file from `skip` on, of which `bytes` are wanted once decoded; the first
-// `drop` decoded bytes count as not there.
+// The encoded data of a file from `skip` on, of which `bytes` decoded bytes are used after the
+// first `drop` ones.
 std::shared_ptr<ByteStore> unrolled_store(std::shared_ptr<const InputFile> file, Encoding encoding,
                                           std::uint64_t skip, std::uint64_t bytes,
                                           std::uint64_t drop = 0);
 
-// Where `count` numbers of text that begin at `skip` end. Errors: bad_data for what is no number.
+// Offset after `count` numbers of text that begin at `skip`. Errors: bad_data if one is not a
+// number.
 Result<std::uint64_t> end_of_text(const std::shared_ptr<const InputFile>& file, std::uint64_t skip,
                                   std::uint64_t count);
 

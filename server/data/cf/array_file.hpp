@@ -48,7 +48,7 @@ class ArrayFile {
   [[nodiscard]] virtual std::string identity() const = 0;
 
   // Attributes that are not in FileVariable: _FillValue, missing_value, valid_min, valid_max,
-  // valid_range, scale_factor, add_offset, those of a grid mapping.
+  // valid_range, scale_factor, add_offset and those of grid mappings.
   [[nodiscard]] virtual Numbers numbers(int variable, const char* attribute) const = 0;
   // A text attribute, trimmed; empty if it is absent.
   [[nodiscard]] virtual std::string text_of(int variable, const char* attribute) const = 0;
@@ -58,15 +58,16 @@ class ArrayFile {
   // If the variable is stored in chunks of this size: the least cost of a chunk, in decoded bytes.
   [[nodiscard]] virtual std::size_t chunk_cost_bytes(int /*variable*/) const { return 0; }
 
-  // Reads a block of a numeric variable as stored. start, count: one per dimension, slowest first;
-  // `out` has the product of the counts as size, last dimension fastest. Errors: bad_data, also if
-  // a file changed since it was opened.
+  // Reads a block of a numeric variable as stored. start, count: one per dimension, slowest first.
+  // `out` holds the product of the counts, last dimension fastest. Errors: bad_data, also if a file
+  // changed since it was opened.
   virtual Result<void> read(int variable, const std::vector<std::size_t>& start,
                             const std::vector<std::size_t>& count, double* out) const = 0;
   // The same for a variable of type float32, without conversion.
   virtual Result<void> read(int variable, const std::vector<std::size_t>& start,
                             const std::vector<std::size_t>& count, float* out) const = 0;
-  // Looks for at most `most` chunks of a variable, without reading them.
+  // Checks which chunks of a variable were written, for at most `most` chunks, without reading
+  // them.
   [[nodiscard]] virtual Unwritten unwritten(int /*variable*/, std::size_t /*most*/) const {
     return {};
   }

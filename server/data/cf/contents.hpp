@@ -41,11 +41,11 @@ struct FileVariable {
 struct FileContents {
   std::string title;
   std::vector<FileDimension> dimensions;
-  std::vector<FileVariable>
-      variables;                    // of the root group; readers address a variable by its index
-  std::vector<std::string> groups;  // names of groups below the root, which are not searched
-  std::vector<LeftOut> left_out;    // variables that cannot be read
-  std::vector<std::string> notes;   // assumptions and conversions of the reader, for users
+  std::vector<FileVariable> variables;  // variables of the root group; readers address a variable
+                                        // by its index
+  std::vector<std::string> groups;      // names of groups below the root, which are not searched
+  std::vector<LeftOut> left_out;        // variables that cannot be read
+  std::vector<std::string> notes;       // assumptions and conversions of the reader, for users
 };
 
 }  // namespace windsplat::data

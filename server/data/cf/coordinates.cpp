@@ -1,4 +1,4 @@
-// Read whole, unpacked one by one; radians become degrees.
+// Reads whole variables, unpacks value by value and converts radians to degrees.
 #include "server/data/cf/coordinates.hpp"
 
 #include <numbers>

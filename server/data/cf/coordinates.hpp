@@ -8,7 +8,7 @@
 
 namespace windsplat::data::cf {
 
-// All values of a variable of few values, unpacked, NaN where missing. Errors: bad_data.
+// All values of a small variable, unpacked, NaN where missing. Errors: bad_data.
 Result<std::vector<double>> unpacked_values(const ArrayFile& file, int variable);
 
 // The same for longitudes or latitudes, converted from any angular unit to degrees.

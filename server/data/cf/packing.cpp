@@ -39,7 +39,7 @@ double as_stored(double value, bool is_float32) {
              : value;
 }
 
-// With the digits of single precision.
+// Formats a number with the digits of single precision.
 std::string short_text(double value) {
   std::array<char, 40> out{};
   const auto end =
@@ -151,12 +151,12 @@ float unpack(const Packing& packing, double stored) {
 std::optional<FloatMask> float_mask(const Packing& packing) {
   if (packing.packed || packing.wrap != 0) return std::nullopt;
   FloatMask mask;
-  // A missing value that no float32 equals masks no sample.
+  // A missing value that is not representable as float32 masks no sample.
   for (const double missing : packing.missing) {
     const auto rounded = static_cast<float>(missing);
     if (static_cast<double>(rounded) == missing) mask.missing.push_back(rounded);
   }
-  // Limits between two floats are rounded inward; limits beyond all floats have no effect.
+  // Limits between two floats are rounded inward; limits beyond the range of float have no effect.
   const auto largest = static_cast<double>(std::numeric_limits<float>::max());
   if (std::isnan(packing.valid_min) || std::isnan(packing.valid_max)) return std::nullopt;
   if (packing.valid_min > largest || packing.valid_max < -largest) return std::nullopt;
@@ -182,7 +182,7 @@ void apply(const FloatMask& mask, float* values, std::size_t count) {
       values[i] = values[i] == missing ? masked_value : values[i];
     }
   }
-  // NaN compares false and stays what it is.
+  // NaN compares false and stays NaN.
   for (std::size_t i = 0; i < count; ++i) {
     const bool valid = values[i] >= mask.valid_min && values[i] <= mask.valid_max;
     values[i] = valid ? values[i] : masked_value;

@@ -15,16 +15,17 @@ struct Packing {
   bool packed = false;  // scale and offset apply; otherwise numbers are unchanged, including -0
   double scale = 1;
   double offset = 0;
-  double wrap = 0;              // added to negative stored numbers: a signed type that is unsigned
+  double wrap = 0;              // added to negative stored numbers of a signed type that is marked
+                                // as unsigned
   std::vector<double> missing;  // stored numbers that mean "no value"
   double valid_min = -std::numeric_limits<double>::infinity();
   double valid_max = std::numeric_limits<double>::infinity();
   bool valid_is_unpacked = false;  // the limits are physical values, not stored numbers
 };
 
-// From _FillValue, missing_value, valid_min, valid_max, valid_range, scale_factor, add_offset and
-// _Unsigned. Without _FillValue, the default fill value of the type is missing, except for 8-bit
-// types.
+// Packing from _FillValue, missing_value, valid_min, valid_max, valid_range, scale_factor,
+// add_offset and _Unsigned. Without _FillValue, the default fill value of the type is missing,
+// except for 8-bit types.
 Packing packing_of(const ArrayFile& file, int variable);
 
 // "-150 to 5000", "from 0", "up to 1": the valid values, unpacked; empty if all are.
@@ -41,9 +42,9 @@ struct FloatMask {
   float valid_min = -std::numeric_limits<float>::max();
   float valid_max = std::numeric_limits<float>::max();
 };
-// Empty if the packing requires more than that.
+// The mask alone; empty if the packing needs more than a mask.
 std::optional<FloatMask> float_mask(const Packing& packing);
-// unpack() of every value, in place.
+// Applies unpack() to every value, in place.
 void apply(const FloatMask& mask, float* values, std::size_t count);
 
 }  // namespace windsplat::data::cf

@@ -18,7 +18,8 @@ constexpr std::size_t plain_values = std::size_t{1} << 18;
 struct Way {
   std::size_t first = 0;      // index in the file where reading starts
   std::size_t length = 1;     // how many indices are read
-  std::ptrdiff_t stride = 0;  // floats between neighbours in the volume, negative if turned
+  std::ptrdiff_t stride = 0;  // floats between neighbours in the volume, negative if the axis is
+                              // reversed
 };
 
 // Calls row(offset of its first value in the volume, its values) for all rows of a block (counts,
@@ -36,7 +37,7 @@ void for_rows(const T* block, const std::vector<std::size_t>& count, const std::
     row(offset, block);
     block += count.back();
     std::size_t d = rank - 1;
-    for (; d > 0; --d) {  // an odometer over all but the last dimension
+    for (; d > 0; --d) {  // counts through all dimensions but the last
       if (++index[d - 1] < count[d - 1]) {
         break;
       }
@@ -190,7 +191,7 @@ Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<
   for (const Way& way : ways) all *= way.length;
   std::vector<T> buffer;
   std::size_t done = 0;
-  std::vector<std::size_t> index(ways.size(), 0);  // of the block, relative to `first`
+  std::vector<std::size_t> index(ways.size(), 0);  // index in the block, relative to `first`
   do {
     const Walk walk = block_at(ways, block, index, origin);
     bool in_place = false;

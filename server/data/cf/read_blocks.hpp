@@ -1,5 +1,5 @@
-// One variable at one step -> a volume, x fastest: reads blocks in the order of the file, unpacks
-// and scatters them with reversed axes.
+// Reads one variable at one step into a volume, x fastest: in blocks in the order of the file,
+// unpacked and stored with reversed axes.
 #pragma once
 
 #include <array>
@@ -20,20 +20,20 @@ struct Placement {
   [[nodiscard]] std::size_t layer() const { return length[0] * length[1]; }
 };
 
-// Levels of a volume, from below.
+// A range of levels of a volume, lowest first.
 struct Levels {
   std::size_t first = 0;
   std::size_t count = 0;
 };
 
 // Unpacked values of those levels of a variable, NaN where masked; `out` has levels.count layers,
-// one for a variable without levels. `tell` receives the fraction done. Errors: bad_data.
+// one for a variable without levels. Calls `tell` with the fraction done. Errors: bad_data.
 Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
                            std::size_t step, const Levels& levels, float* out,
                            const Progress& tell);
 
-// Bytes that reading those levels of a variable at one step decodes (see decoded_bytes()), at least
-// those of the volume.
+// Bytes decoded to read those levels of a variable at one step (see decoded_bytes()), at least the
+// size of the volume.
 double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int variable,
                           const Levels& levels);
 

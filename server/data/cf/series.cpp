@@ -1,4 +1,4 @@
-// Members are compared with the first one, and their times put on one axis.
+// Compares members with the first one and combines their times in one axis.
 #include "server/data/cf/series.hpp"
 
 #include <algorithm>
@@ -177,7 +177,7 @@ Result<void> SeriesFile::check_values(const ArrayFile& file) const {
     }
     if (!file.contents().variables[at(other)].numeric ||
         dimension_names(contents, static_cast<int>(v)) != dimension_names(file.contents(), other)) {
-      return misfit(file, *first_, in_quotes(variable.name) + " is another kind of variable");
+      return misfit(file, *first_, in_quotes(variable.name) + " is a variable of another kind");
     }
     auto own = unpacked_values(*first_, static_cast<int>(v));
     auto others = unpacked_values(file, other);
@@ -210,7 +210,7 @@ void SeriesFile::compare_variables(const ArrayFile& file, Member& member) {
     same = same && other == static_cast<int>(v);
     if (is_static(v) || static_cast<int>(v) == time_coordinate_ || !dropped_[v].empty()) continue;
     if (other < 0) {
-      dropped_[v] = "only some files have it: " + in_quotes(file.name()) + " does not";
+      dropped_[v] = "not in all files: " + in_quotes(file.name()) + " lacks it";
       continue;
     }
     const FileVariable& found = others.variables[at(other)];
@@ -231,11 +231,12 @@ void SeriesFile::compare_variables(const ArrayFile& file, Member& member) {
     }
   }
   for (const FileVariable& variable : others.variables) {
-    const bool told = std::any_of(contents_.left_out.begin(), contents_.left_out.end(),
-                                  [&](const LeftOut& left) { return left.name == variable.name; });
-    if (variable_named(own, variable.name) < 0 && variable.dims.size() > 1 && !told) {
+    const bool listed =
+        std::any_of(contents_.left_out.begin(), contents_.left_out.end(),
+                    [&](const LeftOut& left) { return left.name == variable.name; });
+    if (variable_named(own, variable.name) < 0 && variable.dims.size() > 1 && !listed) {
       contents_.left_out.push_back(
-          {variable.name, "only some files have it: " + in_quotes(first_->name()) + " does not"});
+          {variable.name, "not in all files: " + in_quotes(first_->name()) + " lacks it"});
     }
   }
   if (!same) member.variables = std::move(indices);
@@ -272,7 +273,7 @@ Result<void> SeriesFile::add_times(std::size_t member, const ArrayFile& file) {
   const bool complete = std::all_of(values->begin(), values->end(),
                                     [](double value) { return std::isfinite(value); });
   if (values->size() != records || !complete) {
-    return misfit(file, *first_, "it does not give the times of all its steps");
+    return misfit(file, *first_, "some of its steps have no time");
   }
   const auto times = convert_times(*values, {found.units, found.calendar},
                                    {coordinate.units, coordinate.calendar});
@@ -291,8 +292,8 @@ void SeriesFile::sort_steps() {
   std::stable_sort(steps_.begin(), steps_.end(),
                    [](const Step& a, const Step& b) { return a.time < b.time; });
   std::vector<Step> kept;
-  std::size_t twice = 0;   // in two files
-  std::size_t within = 0;  // in one
+  std::size_t twice = 0;   // times that occur in two files
+  std::size_t within = 0;  // times that are repeated within one file
   for (const Step& step : steps_) {
     const bool again =
         !kept.empty() && step.time - kept.back().time <= 1e-12 * std::max(1.0, std::abs(step.time));
@@ -304,12 +305,13 @@ void SeriesFile::sort_steps() {
     }
   }
   if (twice > 0) {
-    contents_.notes.push_back(std::to_string(twice) + (twice == 1 ? " time lies" : " times lie") +
-                              " in more than one file: the later file's is shown");
+    contents_.notes.push_back(std::to_string(twice) +
+                              (twice == 1 ? " time occurs" : " times occur") +
+                              " in more than one file: those of the later file are shown");
   }
   if (within > 0) {
     contents_.notes.push_back(std::to_string(within) + (within == 1 ? " time is" : " times are") +
-                              " repeated within one file: the later one is shown");
+                              " repeated within one file: the last of each is shown");
   }
   steps_ = std::move(kept);
 }

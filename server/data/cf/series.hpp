@@ -13,18 +13,18 @@
 
 namespace windsplat::data::cf {
 
-// Opens a member by its index.
+// Opens the member with this index.
 using OpenMember = std::function<Result<std::unique_ptr<ArrayFile>>(std::size_t member)>;
 
 // All members are opened once to read their times; afterwards at most `open_max` are open at a
-// time. Steps are sorted by time across epochs; of steps with equal times the one of the later file
-// is used. Files without a time dimension are one step each.
+// time. Steps are sorted by time across epochs; of steps with equal times, that of the later file
+// is used. A file without a time dimension is one step.
 class SeriesFile final : public ArrayFile {
  public:
   static constexpr std::size_t open_max = 32;
 
   // `name`: name of the series; `origin`: pattern or folder of its files. Errors: bad_data, naming
-  // the member that does not match the first one and the difference.
+  // the first member that does not match the first file, and the difference.
   static Result<std::unique_ptr<SeriesFile>> open(std::string name, std::size_t members,
                                                   OpenMember open_member, std::string origin = "");
 
@@ -60,7 +60,7 @@ class SeriesFile final : public ArrayFile {
   struct Variable {
     int in_first = -1;       // its index in the first member
     int time_axis = -1;      // index of its time dimension; -1: always read from the first member
-    bool as_values = false;  // members store it differently: unpacked on reading
+    bool as_values = false;  // stored differently by some members: unpacked on reading
   };
   struct Opened {
     std::size_t member = 0;
@@ -96,9 +96,9 @@ class SeriesFile final : public ArrayFile {
   std::unique_ptr<ArrayFile> first_;
   std::array<int, 3> space_{-1, -1, -1};  // the first member's dimensions
   int time_ = -1;                         // time dimension; -1: members are single steps
-  int time_coordinate_ = -1;              // variable of the first member; -1: steps are counted
-  std::vector<std::string> dropped_;      // by variable: why it is omitted, or empty
-  std::vector<bool> as_values_;           // of the first member's variables
+  int time_coordinate_ = -1;              // variable of the first member; -1: steps are numbered
+  std::vector<std::string> dropped_;      // per variable: why it is omitted, or empty
+  std::vector<bool> as_values_;           // per variable of the first member
   std::vector<Member> members_;
   std::vector<Step> steps_;
   FileContents contents_;

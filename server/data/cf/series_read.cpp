@@ -1,4 +1,4 @@
-// Blocks of a series, passed on to the members that have the steps.
+// Reads blocks of a series from the members that have the steps.
 #include <algorithm>
 #include <cstddef>
 #include <string>

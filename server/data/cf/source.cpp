@@ -113,14 +113,15 @@ class ArraySource final : public FileSource {
   struct Plan {
     std::vector<int> variables;
     int derived = -1;           // index into derived_
-    bool rotated = false;       // components from east and north to the axes
-    bool follows_rows = false;  // components from rows and columns of the file to the axes
+    bool rotated = false;       // rotation of components from east and north to the axes
+    bool follows_rows = false;  // exchange and sign of components from rows and columns of the file
+                                // to the axes
   };
 
   // Directions of vector components given along the rows and columns of the file.
   struct ToAxes {
     bool swapped = false;
-    std::array<bool, 2> negated{false, false};  // after the exchange
+    std::array<bool, 2> negated{false, false};  // signs after the axes are exchanged
     [[nodiscard]] bool any() const { return swapped || negated[0] || negated[1]; }
   };
 
@@ -138,7 +139,7 @@ class ArraySource final : public FileSource {
     return id < 0 ? -1 : roles_.at(at(id)).coordinate;
   }
 
-  // Dimensions without coordinates get counted ones, which need memory per entry.
+  // Dimensions without coordinates are numbered, which takes memory per entry.
   [[nodiscard]] Result<void> check_entries() const {
     const auto stored = file_->stored_bytes();
     for (const int id : {choice_.space[0], choice_.space[1], choice_.space[2], choice_.time}) {
@@ -216,7 +217,7 @@ class ArraySource final : public FileSource {
 
   [[nodiscard]] Levels all_levels() const { return {0, placement_.length[2]}; }
 
-  // The axis of a missing dimension.
+  // Creates the axis of a missing dimension, with one sample.
   [[nodiscard]] Axis flat_axis(std::size_t which) const {
     constexpr std::array<const char*, 3> known_names{"x", "y", "z"};
     Axis axis;
@@ -285,22 +286,22 @@ class ArraySource final : public FileSource {
   }
 
   void tell_valid_values() {
-    constexpr std::size_t told_max = 20;
+    constexpr std::size_t listed_max = 20;
     std::string text;
     std::size_t count = 0;
     for (const int v : choice_.variables) {
       const std::string valid = valid_text(packing_of(*file_, v));
-      if (valid.empty() || ++count > told_max) continue;
+      if (valid.empty() || ++count > listed_max) continue;
       text += text.empty() ? "" : ", ";
       text += in_quotes(variable_name(v)) + " (" + valid + ')';
     }
     if (count == 0) return;
-    if (count > told_max) text += " and " + std::to_string(count - told_max) + " more";
-    info_.notes.push_back("masked beyond what the file calls valid: " + text);
+    if (count > listed_max) text += " and " + std::to_string(count - listed_max) + " more";
+    info_.notes.push_back("values outside the valid range of the file are masked: " + text);
   }
 
   void tell_unwritten() {
-    constexpr std::size_t told_max = 20;
+    constexpr std::size_t listed_max = 20;
     constexpr std::size_t chunks_of_one = 4096;
     std::size_t left = 4 * chunks_of_one;
     std::string text;
@@ -308,14 +309,13 @@ class ArraySource final : public FileSource {
     for (const int v : choice_.variables) {
       const Unwritten missing = file_->unwritten(v, std::min(left, chunks_of_one));
       left -= std::min(left, missing.looked_at);
-      if (missing.chunks == 0 || ++count > told_max) continue;
+      if (missing.chunks == 0 || ++count > listed_max) continue;
       text += text.empty() ? "" : ", ";
       text += in_quotes(variable_name(v)) + " (" + unwritten_text(missing) + ')';
     }
     if (count == 0) return;
-    if (count > told_max) text += " and " + std::to_string(count - told_max) + " more";
-    info_.notes.push_back("masked where nothing was ever written, whatever the fill value: " +
-                          text);
+    if (count > listed_max) text += " and " + std::to_string(count - listed_max) + " more";
+    info_.notes.push_back("chunks that were never written are masked: " + text);
   }
 
   static std::string unwritten_text(const Unwritten& missing) {
@@ -329,7 +329,7 @@ class ArraySource final : public FileSource {
       info_.left_out.push_back({info.name, "more than 16 GiB a step"});
       return;
     }
-    if (info.kind == FieldKind::vector && follows_other_axes_) find_turning(info, plan);
+    if (info.kind == FieldKind::vector && follows_other_axes_) find_rotation(info, plan);
     double decoded = 0;
     double chunk = 0;
     for (const int v : plan.variables) {
@@ -344,7 +344,7 @@ class ArraySource final : public FileSource {
 
   // Determines how a vector is converted to the axes of the grid, which may differ from east and
   // north.
-  void find_turning(const FieldInfo& info, Plan& plan) {
+  void find_rotation(const FieldInfo& info, Plan& plan) {
     const auto& first =
         file_->contents().variables.at(static_cast<std::size_t>(plan.variables.front()));
     const bool by_earth = first.standard_name.starts_with("eastward_");
@@ -353,12 +353,11 @@ class ArraySource final : public FileSource {
                          first.standard_name.find("_x_") != std::string::npos;
     std::string note = in_quotes(info.name);
     if (by_earth && info_.grid.columns) {
-      note +=
-          " is given by east and north: turned into the directions of the grid's rows and columns";
+      note += " has components along east and north: rotated to the rows and columns of the grid";
     } else if (by_earth) {
       note +=
-          " is given by east and north, but the grid's longitudes and latitudes have gaps or are "
-          "not in the file: it is drawn as if rows ran east";
+          " has components along east and north, but longitudes and latitudes of the grid are "
+          "missing or incomplete: it is drawn as if rows ran east";
     } else if (!by_grid) {
       note += " does not specify the direction of its components: assumed to be along the axes";
     }
@@ -367,10 +366,9 @@ class ArraySource final : public FileSource {
     // u and v without attributes more often mean east and north than rows and columns.
     plan.follows_rows = by_grid && to_axes_.any();
     if (!plan.follows_rows) return;
-    note =
-        in_quotes(info.name) + " is given along the file's rows and columns: its components are ";
+    note = in_quotes(info.name) + " has components along rows and columns of the file: they are ";
     const bool turned = to_axes_.negated[0] || to_axes_.negated[1];
-    note += to_axes_.swapped ? (turned ? "exchanged and turned" : "exchanged") : "turned";
+    note += to_axes_.swapped ? (turned ? "exchanged and reversed" : "exchanged") : "reversed";
     note += " with the axes";
     info_.notes.push_back(std::move(note));
   }
@@ -394,7 +392,7 @@ class ArraySource final : public FileSource {
   Placement placement_;
   DatasetInfo info_;
   PressureLevels pressures_;
-  bool follows_other_axes_ = false;  // rows may not point east
+  bool follows_other_axes_ = false;  // rows may not run east
   ToAxes to_axes_;
   std::optional<GridBearing> bearing_;
   std::vector<DerivedField> derived_;

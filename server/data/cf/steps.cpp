@@ -18,7 +18,7 @@ std::string times_text(std::size_t count) {
   return count == 1 ? std::string("once") : std::to_string(count) + " times";
 }
 
-// A series is sorted by time; a single file is shown in its own order.
+// Sorts the times of a series; a single file keeps its own order.
 void note_disorder(const std::string& name, const std::vector<double>& times, DatasetInfo& info) {
   std::size_t falls = 0;
   std::size_t repeats = 0;
@@ -28,10 +28,10 @@ void note_disorder(const std::string& name, const std::vector<double>& times, Da
   }
   if (falls + repeats == 0) return;
   std::string note = in_quotes(name);
-  if (falls > 0) note += " goes back " + times_text(falls);
+  if (falls > 0) note += " decreases " + times_text(falls);
   if (falls > 0 && repeats > 0) note += " and";
-  if (repeats > 0) note += " does not advance " + times_text(repeats);
-  note += ": steps are in the file's own order";
+  if (repeats > 0) note += " does not increase " + times_text(repeats);
+  note += ": steps are kept in the order of the file";
   info.notes.push_back(std::move(note));
 }
 
@@ -68,16 +68,16 @@ Result<void> find_steps(const ArrayFile& file, int time, int coordinate, Dataset
     info.time_units = variable.units;
     info.time_calendar = variable.calendar;
     if (!decoded.reason.empty()) {
-      info.left_out.push_back({variable.name, "time is shown as a number: " + decoded.reason});
+      info.left_out.push_back({variable.name, "times are shown as numbers: " + decoded.reason});
     }
     note_disorder(variable.name, values, info);
     return {};
   }
   if (time >= 0) {
     info.left_out.push_back({contents.dimensions.at(at(time)).name,
-                             coordinate >= 0 ? "time has missing values: steps are counted"
+                             coordinate >= 0 ? "time has missing values: steps are numbered"
                                              : "dimension without a coordinate variable: steps "
-                                               "are counted"});
+                                               "are numbered"});
   }
   for (std::size_t i = 0; i < count; ++i) {
     info.steps.push_back({static_cast<double>(i), std::to_string(i)});

@@ -7,9 +7,9 @@
 
 namespace windsplat::data::cf {
 
-// Steps, time units and calendar of `info`, with what was taken for what. time: the dimension of
-// time, coordinate: its variable; -1: there is none, and a scalar time is looked for. Errors:
-// bad_data.
+// Sets steps, time units and calendar of `info`, and adds notes of assumptions. time: the time
+// dimension, coordinate: its variable; -1: there is none, and a scalar time is searched for.
+// Errors: bad_data.
 Result<void> find_steps(const ArrayFile& file, int time, int coordinate, DatasetInfo& info);
 
 }  // namespace windsplat::data::cf

@@ -47,8 +47,8 @@ int month_length(std::int64_t year, int month, Calendar calendar) {
          (month == 2 && is_leap(year, calendar) ? 1 : 0);
 }
 
-// Days in the years 0 .. year-1; negative before year 0. Year 0 is itself a leap year, so the
-// multiples of n below `year` number ceil(year / n).
+// Days in the years 0 .. year-1; negative before year 0. Year 0 is itself a leap year, so ceil(year
+// / n) multiples of n lie in 0 .. year-1.
 std::int64_t days_before_year(std::int64_t year, Calendar calendar) {
   const auto multiples = [year](std::int64_t n) { return floor_div(year + n - 1, n); };
   switch (calendar) {
@@ -65,7 +65,7 @@ std::int64_t days_before_year(std::int64_t year, Calendar calendar) {
   }
 }
 
-// Any calendar but the mixed one.
+// Any calendar except the mixed one.
 std::int64_t plain_day_number(const Date& date, Calendar calendar) {
   std::int64_t days = days_before_year(date.year, calendar);
   for (int month = 1; month < date.month; ++month) {
@@ -108,7 +108,7 @@ bool is_gregorian_part(const Date& date) {
          std::pair<std::int64_t, int>(1582, 1015);
 }
 
-// Reads the text of an epoch from left to right.
+// Parses an epoch from left to right.
 class Cursor {
  public:
   explicit Cursor(std::string_view text) : rest_(text) {}
@@ -306,7 +306,7 @@ int unit_months(std::string_view unit) {
 
 struct Scale {
   std::int64_t unit_ms = 0;
-  int unit_months = 0;  // if unit_ms is 0
+  int unit_months = 0;  // used if unit_ms is 0
   std::int64_t epoch_ms = 0;
   Calendar calendar = Calendar::standard;
 };
@@ -317,8 +317,8 @@ std::optional<Scale> parse_scale(std::string_view units, std::string_view calend
   const std::string text = lower(trim(units));
   const auto since = text.find(" since ");
   if (since == std::string::npos) {
-    // Elapsed time ("s") is complete as a number.
-    if (unit_ms(text) == 0) reason = "its units name no epoch";
+    // An elapsed time ("s") needs no date.
+    if (unit_ms(text) == 0) reason = "its units have no epoch";
     return std::nullopt;
   }
   Scale scale;
@@ -326,26 +326,26 @@ std::optional<Scale> parse_scale(std::string_view units, std::string_view calend
   scale.unit_ms = unit_ms(unit);
   scale.unit_months = unit_months(unit);
   if (scale.unit_ms == 0 && scale.unit_months == 0) {
-    reason = "the unit is not known";
+    reason = "its unit is unknown";
     return std::nullopt;
   }
   const auto known = parse_calendar(calendar);
   if (!known) {
-    reason = "the calendar is not known";
+    reason = "its calendar is unknown";
     return std::nullopt;
   }
   scale.calendar = *known;
-  // From the original text, because T and Z are upper case.
+  // Parsed from the original text, because T and Z are upper case there.
   const auto epoch = parse_epoch(trim(units).substr(since + 7), scale.calendar);
   if (!epoch) {
-    reason = "its epoch is not a date of the calendar";
+    reason = "its epoch is not a date of its calendar";
     return std::nullopt;
   }
   scale.epoch_ms = *epoch;
   return scale;
 }
 
-// The same day and time `months` later, or the last day of that month if it is shorter.
+// The same day and time `months` later, or the last day of a shorter month.
 std::int64_t months_on(std::int64_t epoch_ms, std::int64_t months, Calendar calendar) {
   const std::int64_t epoch_day = floor_div(epoch_ms, ms_per_day);
   Date date = date_of(epoch_day, calendar);
@@ -373,7 +373,8 @@ std::optional<std::int64_t> months_to_ms(double value, const Scale& scale) {
   return from + std::llround((months - whole) * static_cast<double>(to - from));
 }
 
-// Whole units are exact, the fraction is rounded to the millisecond. Empty beyond about 10^7 years.
+// Whole units are exact; the fraction is rounded to the millisecond. nullopt beyond about 10^7
+// years.
 std::optional<std::int64_t> to_ms(double value, const Scale& scale) {
   if (scale.unit_months > 0) return months_to_ms(value, scale);
   const double whole = std::floor(value);
@@ -454,7 +455,7 @@ DecodedTime decode_time(const std::vector<double>& values, std::string_view unit
       if (const auto ms = to_ms(value, *scale)) {
         step.text = iso_text(*ms, scale->calendar);
       } else {
-        out.reason = "a value is outside the range of the calendar";
+        out.reason = "a value is out of range";
       }
     }
     out.steps.push_back(std::move(step));

@@ -1,4 +1,5 @@
-// CF time coordinates -> steps with ISO 8601 text. Pure: numbers and attribute text in, steps out.
+// Converts CF time coordinates to steps with ISO 8601 text. Depends on the arguments only, without
+// I/O.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@ enum class Calendar { standard, proleptic_gregorian, julian, noleap, all_leap, d
 // The calendar of a `calendar` attribute; empty text means standard. nullopt if unknown.
 std::optional<Calendar> parse_calendar(std::string_view text);
 
-// A day of a calendar. Years count astronomically: the year before 1 is 0.
+// A day of a calendar. Years are numbered astronomically: year 0 precedes year 1.
 struct Date {
   std::int64_t year = 0;
   int month = 1;  // 1..12
@@ -39,7 +40,7 @@ struct DecodedTime {
 
 // values: one per step, in `units` ("hours since 2001-01-01 00:00"). Texts are rounded to the
 // millisecond. Months and years are calendar months and years; fractions are relative to the length
-// of their month. If unit, epoch or calendar is not supported, the texts are the numbers.
+// of their month. If unit, epoch or calendar is not supported, the texts are numbers.
 DecodedTime decode_time(const std::vector<double>& values, std::string_view units,
                         std::string_view calendar);
 

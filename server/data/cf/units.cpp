@@ -1,4 +1,4 @@
-// One table per quantity.
+// Units are listed in one table per quantity.
 #include "server/data/cf/units.hpp"
 
 #include <array>
@@ -15,7 +15,7 @@ struct Unit {
   double si;
 };
 
-// A geopotential metre is taken as a metre.
+// A geopotential metre is treated as a metre.
 constexpr auto lengths = std::to_array<Unit>({{"m", 1},
                                               {"meter", 1},
                                               {"meters", 1},

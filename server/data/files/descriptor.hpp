@@ -20,7 +20,7 @@ class Descriptor {
   Descriptor& operator=(const Descriptor&) = delete;
   ~Descriptor() { reset(); }
 
-  [[nodiscard]] int number() const { return number_; }  // -1 if there is none
+  [[nodiscard]] int number() const { return number_; }  // -1: none
   explicit operator bool() const { return number_ >= 0; }
   [[nodiscard]] int give() { return std::exchange(number_, -1); }
   void reset(int number = -1) {

@@ -1,4 +1,4 @@
-// Files opened by this process, within the bounds of their location.
+// Opens files directly in this process, restricted to their location.
 #include <dirent.h>
 #include <fcntl.h>
 #include <linux/openat2.h>
@@ -26,14 +26,15 @@ std::string last_part(const std::string& name) { return name.substr(name.find_la
 Error not_opened(const std::string& name, int reason) {
   const bool absent = reason == ENOENT || reason == ENOTDIR;
   const bool outside = reason == EXDEV || reason == ELOOP;
-  const bool unasked = reason == ENOTSUP;
-  return make_error(absent ? ErrorKind::not_found : ErrorKind::bad_data,
-                    in_quotes(name) + ": " +
-                        (absent    ? std::string("no such file")
-                         : outside ? std::string("lies outside the dataset's folder")
-                         : unasked ? std::string("is another file, which only one may name that "
-                                                 "ends in .nhdr, .json, .ctl, .dx or .pvd")
-                                   : std::generic_category().message(reason)));
+  const bool not_companion = reason == ENOTSUP;
+  return make_error(
+      absent ? ErrorKind::not_found : ErrorKind::bad_data,
+      in_quotes(name) + ": " +
+          (absent          ? std::string("no such file")
+           : outside       ? std::string("lies outside the dataset's folder")
+           : not_companion ? std::string("is another file; only files whose name ends in "
+                                         ".nhdr, .json, .ctl, .dx or .pvd may refer to others")
+                           : std::generic_category().message(reason)));
 }
 
 int open_in(int folder, const std::string& name, std::uint64_t flags, std::uint64_t resolve) {
@@ -46,19 +47,19 @@ int open_in(int folder, const std::string& name, std::uint64_t flags, std::uint6
 class DirectFiles final : public Files {
  public:
   explicit DirectFiles(Location location) : location_(std::move(location)) {
-    // Links were resolved when it was located; what has become one since leads elsewhere.
+    // Links were resolved when the dataset was located; a later link may lead elsewhere.
     folder_.reset(
         open_in(AT_FDCWD, location_.folder, O_PATH | O_DIRECTORY | O_CLOEXEC, RESOLVE_NO_SYMLINKS));
   }
   [[nodiscard]] const Location& location() const override { return location_; }
 
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
-    // O_NONBLOCK: opening a pipe must not wait for a writer; adopt() refuses it.
+    // O_NONBLOCK: opening a pipe must not wait for a writer; adopt() rejects pipes.
     const int descriptor = open_any(name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (descriptor < 0) {
       const int reason = errno;
-      if (reason == ENOENT && leads_nowhere(name)) {
-        return make_error(ErrorKind::bad_data, in_quotes(name) + ": is a link that leads nowhere");
+      if (reason == ENOENT && is_dangling(name)) {
+        return make_error(ErrorKind::bad_data, in_quotes(name) + ": dangling link");
       }
       return not_opened(name, reason);
     }
@@ -108,9 +109,9 @@ class DirectFiles final : public Files {
   }
 
  private:
-  // Of a name that cannot be found: whether it, or a folder above it, is a link that leads nowhere.
-  // What was never written and what was lost are not the same.
-  [[nodiscard]] bool leads_nowhere(std::string name) {
+  // Whether a name that cannot be opened, or a folder above it, is a dangling link. Distinguishes
+  // lost files from files that were never written.
+  [[nodiscard]] bool is_dangling(std::string name) {
     for (;;) {
       const Descriptor found(open_any(name, O_PATH | O_NOFOLLOW | O_CLOEXEC));
       struct stat status {};
@@ -123,13 +124,13 @@ class DirectFiles final : public Files {
     }
   }
 
-  // -1 and errno where it may not be opened.
+  // -1, with errno set, if opening fails.
   [[nodiscard]] int open_any(const std::string& name, std::uint64_t flags) const {
     if (const auto member = find_member(name); member != location_.members.end()) {
       return open_in(AT_FDCWD, member->path, flags, RESOLVE_NO_SYMLINKS);
     }
     if (!location_.companions && location_.kind != Location::Kind::folder) {
-      errno = ENOTSUP;  // of this class alone: no file is opened with it
+      errno = ENOTSUP;  // permits access only to the folder; no file is opened through it
       return -1;
     }
     if (name.find('\0') != std::string::npos || name.empty() || name.front() == '/') {

@@ -1,5 +1,4 @@
-// The files of a dataset, and the only way to open them. User input -> Location -> Files ->
-// InputFile.
+// The files of a dataset. All files are opened here: user input -> Location -> Files -> InputFile.
 #pragma once
 
 #include <cstdint>
@@ -26,24 +25,23 @@ struct Location {
     std::string path;  // absolute
   };
   Kind kind = Kind::file;
-  std::string folder;           // absolute; of Kind::folder the dataset itself
-  std::vector<Member> members;  // of a file one, of a folder none
+  std::string folder;           // absolute; for Kind::folder the dataset itself
+  std::vector<Member> members;  // one for a file, none for a folder
   bool companions = false;      // other files below `folder` may be opened too
   std::string inside;           // a group within the file or files ("a/b"), for formats with groups
-  std::string stem;             // what a dataset of these is called: no folder, no extension
-  std::string pattern;          // of a series, absolute, or below `root` if that is not empty
+  std::string stem;             // name of the dataset: without folder and extension
+  std::string pattern;          // for a series: absolute, or below `root` if that is not empty
   std::string root;
 };
 
-// A path of a file or folder, or a pattern whose last part has * ? or [...]; of files that hold
-// groups also "path#/group". Whether a file may
-// have companions follows from the ending of its name (those of formats whose header refers to
-// other files). Errors: not_found; bad_data for URLs and what is neither file nor folder.
+// Locates a path of a file or folder, or a pattern whose last part has * ? or [...]; for files with
+// groups also "path#/group". The ending of a file name determines whether the file may have
+// companions. Errors: not_found; bad_data for URLs and special files.
 Result<Location> locate(const std::string& path_or_pattern);
 
 // The same for an untrusted path below the folder `root`: "..", absolute paths and links cannot
-// leave it, and absolute links are not followed. Reads names only. Errors: invalid (refused, or
-// neither file nor folder), not_found; they contain the path as given, not the root.
+// leave it, and absolute links are not followed. Reads names only. Errors: invalid (refused, or a
+// special file), not_found; messages contain the path as given, not the root.
 Result<Location> locate_beneath(const std::string& root, const std::string& path_or_pattern);
 
 // Matches the pattern of a series again. Errors: those of the function that located it.
@@ -53,17 +51,17 @@ class Files {
  public:
   virtual ~Files() = default;
   [[nodiscard]] virtual const Location& location() const = 0;
-  // `name`: a member's, or that of a companion, relative to the folder, parts between '/'; never
-  // above the folder. Errors: not_found, bad_data.
+  // `name`: a member, or a companion relative to the folder, with '/' as separator; never above the
+  // folder. Errors: not_found, bad_data.
   virtual Result<std::shared_ptr<const InputFile>> open(const std::string& name) = 0;
-  // Entries of a folder below (empty: the folder itself), sorted; folders end in '/'. Errors:
+  // Entries of the folder or, unless empty, of `below` in it, sorted; folders end in '/'. Errors:
   // not_found, bad_data.
   virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;
-  // Whether there is such a file or folder.
+  // Whether a file or folder with this name exists.
   virtual bool exists(const std::string& name) = 0;
-  // The companions that were opened so far, the first few hundred of them.
+  // The companions opened so far, at most a few hundred.
   [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }
-  // Bytes of all files that were opened until stop_counting(), which forgets their names.
+  // Total size of all files opened until stop_counting(), which also forgets their names.
   [[nodiscard]] std::uint64_t opened_bytes() const { return opened_bytes_; }
   void stop_counting() {
     counts_ = false;
@@ -81,7 +79,7 @@ class Files {
   std::uint64_t opened_bytes_ = 0;
 };
 
-// Opens what the location allows, by way of openat2 with RESOLVE_BENEATH for companions.
+// Opens files within a location; companions by openat2 with RESOLVE_BENEATH.
 std::shared_ptr<Files> direct_files(Location location);
 
 }  // namespace windsplat::data

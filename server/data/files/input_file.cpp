@@ -32,7 +32,7 @@ Result<void> InputFile::read(std::uint64_t offset, void* out, std::size_t count)
     const ssize_t got = ::pread(descriptor_, to, count, static_cast<off_t>(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return fault("cannot be read: " + std::generic_category().message(errno));
-    if (got == 0) return fault("is cut short: it ends at byte " + std::to_string(offset));
+    if (got == 0) return fault("is truncated: it ends at byte " + std::to_string(offset));
     to += got;
     offset += static_cast<std::uint64_t>(got);
     count -= static_cast<std::size_t>(got);

@@ -1,4 +1,4 @@
-// One regular file, open for reading, whatever happens to its name.
+// One regular file, open for reading. Renaming or deleting it has no effect.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,11 @@
 
 namespace windsplat::data {
 
-// Thread-safe: reads carry their own offset.
+// Thread-safe: every read passes its own offset.
 class InputFile {
  public:
-  // Takes over an open descriptor; `name` is for messages. Errors: bad_data for what is not a
-  // regular file or is empty.
+  // Takes ownership of an open descriptor; `name` is for messages. Errors: bad_data if it is empty
+  // or not a regular file.
   static Result<std::shared_ptr<const InputFile>> adopt(int descriptor, std::string name);
   ~InputFile();
   InputFile(const InputFile&) = delete;
@@ -22,16 +22,16 @@ class InputFile {
   [[nodiscard]] const std::string& name() const { return name_; }  // without its folder
   [[nodiscard]] std::uint64_t size() const { return stamp_.bytes; }
   [[nodiscard]] int descriptor() const { return descriptor_; }
-  // Exactly `count` bytes. Errors: bad_data if the file ends before or cannot be read.
+  // Exactly `count` bytes. Errors: bad_data if the file ends earlier or cannot be read.
   Result<void> read(std::uint64_t offset, void* out, std::size_t count) const;
   // The first bytes as text, at most `bytes_max`.
   [[nodiscard]] Result<std::string> head(std::size_t bytes_max) const;
 
   // Name, size and modification time, so independent of the folder of the file.
   [[nodiscard]] std::string identity() const;
-  // Errors: bad_data if size or time of change are no longer those at the time of opening.
+  // Errors: bad_data if size or time of change differ from those on opening.
   [[nodiscard]] Result<void> check_unchanged() const;
-  // A path by which a library that opens files itself reaches this open file.
+  // A path through which a library can open this open file.
   [[nodiscard]] std::string library_path() const;
 
   // bad_data: "'name' what".

@@ -1,4 +1,4 @@
-// A path or pattern -> Location: links resolved, patterns matched, names put in order.
+// Converts a path or pattern to a Location: resolves links, matches patterns and sorts names.
 #include <fnmatch.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Endings of formats whose header names files beside it.
+// Extensions of formats whose headers name companion files.
 constexpr auto with_companions = std::to_array<std::string_view>(
     {".pvd", ".pvti", ".pvtr", ".pvts", ".pvtu", ".ctl", ".json", ".nhdr", ".dx"});
 
@@ -119,7 +119,7 @@ Result<Location> locate_series(const std::string& pattern) {
   return out;
 }
 
-// "path#/group" where no file is called so. Errors as locate().
+// "path#/group", unless a file has this name. Errors as locate().
 Result<Location> locate_inside(const std::string& path, std::size_t mark) {
   const std::string file = path.substr(0, mark);
   std::error_code fault;
@@ -130,7 +130,7 @@ Result<Location> locate_inside(const std::string& path, std::size_t mark) {
   if (!out) return out;
   if (out->kind == Location::Kind::folder) {
     return make_error(ErrorKind::bad_data,
-                      in_quotes(path) + ": a folder has no groups to name behind '#'");
+                      in_quotes(path) + ": a folder has no groups to select by '#'");
   }
   out->inside = path.substr(mark + 2);
   return out;
@@ -141,7 +141,7 @@ Result<Location> locate_inside(const std::string& path, std::size_t mark) {
 Result<Location> locate(const std::string& path_or_pattern) {
   const std::string& path = path_or_pattern;
   if (path.empty() || path.find('\0') != std::string::npos) {
-    return make_error(ErrorKind::not_found, "no file name is given");
+    return make_error(ErrorKind::not_found, "no file name given");
   }
   if (path.find("://") != std::string::npos) {
     return make_error(ErrorKind::bad_data,
@@ -157,7 +157,7 @@ Result<Location> locate(const std::string& path_or_pattern) {
     return pattern ? locate_series(path) : Result<Location>(not_reached(path, fault));
   }
   Location out;
-  // A folder may be named with a slash at its end.
+  // The path of a folder may end in a slash.
   const fs::path named =
       fs::path(path).has_filename() ? fs::path(path) : fs::path(path).parent_path();
   out.stem = named.stem().native();
@@ -189,10 +189,9 @@ std::string links_left_out(const Location& series) {
   }
   if (links == 0) return "";
   return std::to_string(links) + " of " + std::to_string(links + members.size()) +
-         " names that the pattern matches " +
-         (links == 1 ? "is a link that leads " : "are links that lead ") +
-         (series.root.empty() ? "" : "out of the data root or ") + "to no file, and " +
-         (links == 1 ? "is left out" : "are left out");
+         " names that match the pattern " + (links == 1 ? "is" : "are") +
+         " omitted: links that are dangling" +
+         (series.root.empty() ? "" : " or lead out of the data root");
 }
 
 Result<Location> locate_again(const Location& series) {

@@ -1,5 +1,5 @@
-// Untrusted path -> Location confined to the data root: the
-// kernel resolves every component, and the resolved path is the one reported.
+// Converts an untrusted path to a Location below the data root: the kernel resolves every
+// component, and the resolved path is read back.
 #include <dirent.h>
 #include <fcntl.h>
 #include <fnmatch.h>
@@ -42,14 +42,14 @@ Error not_reached(const std::string& path, int reason) {
   if (reason == ENOENT || reason == ENOTDIR) {
     return make_error(ErrorKind::not_found, in_quotes(path) + ": no such file below the data root");
   }
-  if (reason == EXDEV || reason == ELOOP) return refused(path, "leads out of the data root");
+  if (reason == EXDEV || reason == ELOOP) return refused(path, "is outside the data root");
   return refused(path, "cannot be reached: " + std::generic_category().message(reason));
 }
 
 // Checks the text alone, before the file system is accessed.
 Result<void> check_letters(const std::string& path) {
   if (path.empty() || path.find('\0') != std::string::npos) {
-    return make_error(ErrorKind::invalid, "no path is given");
+    return make_error(ErrorKind::invalid, "no path given");
   }
   if (path.find("://") != std::string::npos) {
     return refused(path, "is a URL; only files below the data root are opened");
@@ -57,20 +57,20 @@ Result<void> check_letters(const std::string& path) {
   if (path.front() == '/') return refused(path, "is absolute; paths are below the data root");
   bool names_something = false;
   for (const fs::path& part : fs::path(path)) {
-    if (part == "..") return refused(path, "leads out of the data root");
+    if (part == "..") return refused(path, "is outside the data root");
     names_something = names_something || (!part.empty() && part != ".");
   }
   if (!names_something) return refused(path, "is the data root itself");
   return {};
 }
 
-// Where a descriptor really is, every link resolved.
+// The path of an open descriptor, all links resolved.
 Result<std::string> path_of(const Descriptor& descriptor, const std::string& path) {
   std::array<char, PATH_MAX> target{};
   const std::string link = "/proc/self/fd/" + std::to_string(descriptor.number());
   const ssize_t length = ::readlink(link.c_str(), target.data(), target.size());
   if (length <= 0 || static_cast<std::size_t>(length) == target.size() || target[0] != '/') {
-    return refused(path, "has no printable name");
+    return refused(path, "has an unprintable name");
   }
   return std::string(target.data(), static_cast<std::size_t>(length));
 }
@@ -97,7 +97,7 @@ Result<Location> located(const Descriptor& found, const std::string& path) {
   return out;
 }
 
-// Names in a folder that a pattern matches, in no order.
+// Names in a folder that match a pattern, unsorted.
 Result<std::vector<std::string>> matches_in(int root, const std::string& folder,
                                             const std::string& pattern) {
   const int descriptor = open_beneath(root, folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
@@ -140,7 +140,7 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
   for (const std::string& name : *names) {
     const std::string below = (fs::path(folder) / name).native();
     const Descriptor found(open_beneath(root, below, O_PATH));
-    // A link that leads out of the root or is dangling is not part of the series.
+    // A link that is dangling or leads out of the root is not part of the series.
     const bool no_member = !found && (errno == EXDEV || errno == ELOOP || errno == ENOENT);
     left_out += no_member ? 1U : 0U;
     if (no_member) continue;
@@ -173,7 +173,7 @@ Result<Location> find_plain(int top, const std::string& root, const std::string&
   return not_reached(path, reason);
 }
 
-// "path#/group" is a group only where no file is called so.
+// "path#/group" denotes a group unless a file has this name.
 Result<Location> find(int top, const std::string& root, const std::string& path) {
   const auto mark = path.rfind("#/");
   if (mark == std::string::npos || mark == 0 || Descriptor(open_beneath(top, path, O_PATH))) {

@@ -1,5 +1,5 @@
-// What the two ways of locating files share: order of names, what a series is called, which
-// formats name files beside them, what of a series is left out.
+// Shared by both ways to locate files: order of names, name of a series, formats with companion
+// files, and the note on omitted links.
 #pragma once
 
 #include <cstddef>
@@ -14,13 +14,13 @@ inline constexpr std::size_t series_members_max = 100'000;
 
 // Runs of digits compare as numbers: f2 before f10.
 bool comes_before(std::string_view a, std::string_view b);
-// The name without what a pattern leaves open and without its extension: "wrf_*.nc" is "wrf".
+// The name without the wildcards of a pattern and without extension: "wrf_*.nc" is "wrf".
 std::string stem_of_pattern(const std::string& pattern);
 bool has_wildcard(std::string_view name);
 // Whether the file name belongs to a format whose header names companion files.
 bool may_have_companions(const std::string& name);
-// Of links that a series' pattern matches and that are none of its files: a note that says how many
-// and why. Empty where there are none.
+// A note on the links that match the pattern of a series but are omitted: how many and why. Empty
+// if there are none.
 std::string links_left_out(const Location& series);
 
 }  // namespace windsplat::data

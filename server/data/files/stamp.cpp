@@ -1,4 +1,4 @@
-// stat() in words.
+// Formats the result of stat().
 #include "server/data/files/stamp.hpp"
 
 namespace windsplat::data {

@@ -8,15 +8,17 @@
 namespace windsplat::data {
 
 struct FileStamp {
-  std::string text;      // identity, size and modification time of the file; "gone" if absent
-  double changed_s = 0;  // that time, since the epoch
+  std::string text;      // identity, size and modification time of the file; "gone" if it does not
+                         // exist
+  double changed_s = 0;  // time of modification, since the epoch
   bool operator==(const FileStamp& other) const { return text == other.text; }
 };
 
 FileStamp stamp_of(const struct stat& status);
 FileStamp stamp_of(const std::string& path);
 
-// A file besides the members of a location that was opened for a dataset, as it was then.
+// A file opened for a dataset in addition to the members of its location, with its state at that
+// time.
 struct Companion {
   std::string path;  // absolute
   FileStamp stamp;

@@ -1,5 +1,5 @@
-// The handler runs wherever a library opens a file, maybe with the allocator's lock held: it
-// allocates nothing and takes no lock.
+// Runs wherever a library opens a file, possibly while the allocator's lock is held: it must not
+// allocate memory or take locks.
 #include "server/data/loader/by_name.hpp"
 
 #include <fcntl.h>
@@ -27,10 +27,10 @@ constexpr std::string_view own_files = "/proc/self/fd/";
 
 struct Asking {
   int socket = -1;
-  std::vector<std::string> folders;  // each ends in '/'
+  std::vector<std::string> folders;  // every entry ends in '/'
 };
 
-// A signal handler has no other way to know.
+// A signal handler has no context argument.
 Asking& asking() {
   static Asking all;
   return all;
@@ -41,7 +41,7 @@ bool is_regular(int descriptor) {
   return ::syscall(SYS_fstat, descriptor, &status) == 0 && S_ISREG(status.st_mode);
 }
 
-// The number of "/proc/self/fd/N"; -1 if it is no such path or no regular file.
+// The number of "/proc/self/fd/N"; -1 if the path differs or is not a regular file.
 int own_file(std::string_view path) {
   if (!path.starts_with(own_files)) return -1;
   int number = -1;
@@ -69,12 +69,12 @@ long ask_for(std::string_view path) {
   if (receive_bytes(socket, reinterpret_cast<char*>(&frame), sizeof frame, &came, {}) !=
           Fate::done ||
       frame.bytes != 0) {
-    ::_exit(1);  // the daemon and we no longer understand each other
+    ::_exit(1);  // the channel to the daemon is out of sync
   }
   return came ? came.give() : -ENOENT;
 }
 
-// A descriptor of one's own for the file of that name, or a negative errno.
+// A new descriptor for the file of this name, or a negative errno.
 long open_named(const char* name, int flags) {
   if (name == nullptr) return -EFAULT;
   const std::string_view path(name);
@@ -83,7 +83,7 @@ long open_named(const char* name, int flags) {
   if (const int number = own_file(path); number >= 0) {
     const int copy = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
     if (copy < 0) return -errno;
-    // It shares its position with the one it is copied from, which InputFile does not use.
+    // A duplicate shares its file offset with the original, which InputFile does not use.
     ::lseek(copy, 0, SEEK_SET);
     return copy;
   }
@@ -151,7 +151,7 @@ void on_call(int /*signal*/, siginfo_t* about, void* context) {
   const Arguments given{machine.regs[0], machine.regs[1], machine.regs[2], machine.regs[3]};
   machine.regs[0] = static_cast<std::uint64_t>(answer(about->si_syscall, given));
 #else
-#error "loaders know how this machine passes arguments of system calls: not yet"
+#error "system call arguments are unknown for this processor architecture: loaders are unsupported"
 #endif
   errno = kept;
 }
@@ -175,7 +175,7 @@ Result<void> answer_calls_by_name(int socket, std::vector<std::string> library_f
   sigfillset(&action.sa_mask);
   sigdelset(&action.sa_mask, SIGIO);
   if (::sigaction(SIGSYS, &action, nullptr) != 0) {
-    return make_error(ErrorKind::internal, "no handler for system calls");
+    return make_error(ErrorKind::internal, "cannot install the handler of SIGSYS");
   }
   return {};
 }

@@ -1,4 +1,5 @@
-// Calls that name a file, inside a confined process: a signal handler replaces the kernel.
+// Emulates system calls with a file name inside a confined process: a signal handler replaces the
+// kernel.
 #pragma once
 
 #include <string>
@@ -8,11 +9,11 @@
 
 namespace windsplat::data::loader {
 
-// The calls that the filter hands to the handler instead of the kernel, as libseccomp numbers them:
-// negative where this machine has no such call.
+// The system calls that the filter redirects to the handler, as numbered by libseccomp; negative if
+// this architecture has no such call.
 const std::vector<int>& calls_by_name();
 
-// Sets the handler of SIGSYS; see confine(). socket -1: no library's file is asked for.
+// Installs the handler of SIGSYS; see confine(). socket -1: files of libraries are not available.
 Result<void> answer_calls_by_name(int socket, std::vector<std::string> library_folders);
 
 }  // namespace windsplat::data::loader

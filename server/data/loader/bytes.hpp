@@ -1,5 +1,5 @@
-// Values -> bytes of a message and back. Reading trusts nothing: what is short or out of bounds
-// gives zeros and fails at the end.
+// Serialises values to the bytes of a message and back. The reader does not trust its input:
+// missing or out-of-range values become zeros and finally an error.
 #pragma once
 
 #include <cstdint>
@@ -30,12 +30,12 @@ class Writer {
     count(values.size());
     const auto at = bytes_.size();
     bytes_.resize(at + values.size() * sizeof(double));
-    // An empty vector has no place to copy from.
+    // An empty vector has no address to copy from.
     if (!values.empty()) {
       std::memcpy(bytes_.data() + at, values.data(), values.size() * sizeof(double));
     }
   }
-  // Reserves exactly so many more bytes.
+  // Reserves exactly this many more bytes.
   void reserve(std::size_t more) { bytes_.reserve(bytes_.size() + more); }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
   [[nodiscard]] std::string take() { return std::move(bytes_); }
@@ -60,7 +60,7 @@ class Reader {
     rest_.remove_prefix(sizeof value);
     return value;
   }
-  // How many things follow that take at least `each` bytes; at most `most`.
+  // The number of items that follow, each of at least `each` bytes; at most `most`.
   std::size_t count(std::size_t most, std::size_t each) {
     const auto value = number<std::uint64_t>();
     if (value > most || value > rest_.size() / each) {

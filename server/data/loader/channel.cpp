@@ -1,4 +1,4 @@
-// sendmsg and recvmsg until all bytes went or the time is over.
+// sendmsg and recvmsg until all bytes are transferred or the deadline passes.
 #include "server/data/loader/channel.hpp"
 
 #include <poll.h>
@@ -14,7 +14,7 @@ namespace windsplat::data::loader {
 
 namespace {
 
-// done: the socket may be tried again.
+// done: the socket call can be retried.
 Fate wait_for(int socket, short events, const Deadline& deadline) {
   int timeout_ms = -1;
   if (deadline) {

@@ -18,10 +18,10 @@ enum class Kind : std::uint32_t {
   open = 1,  // settings and location -> opened or failed
   read,      // field, step; with the memory to fill -> filled or failed
   // daemon -> loader: answers to requests of the loader
-  descriptor,  // with a descriptor
+  descriptor,  // answer: success, with a descriptor
   names,
   yes,
-  no,  // with an error, or empty
+  no,  // answer: failure, with an error or empty
   // loader -> daemon: requests
   ask_open,
   ask_list,
@@ -39,12 +39,12 @@ using Deadline = std::optional<Clock::time_point>;  // none: unlimited
 
 enum class Fate {
   done,
-  closed,  // by the peer, at any point
+  closed,  // closed by the peer, at any point
   late,
-  broken,  // the bytes received are not a message, or exceed its limit
+  broken,  // the received bytes are not a message or exceed its limit
 };
 
-// done: there is data to receive, or the peer has closed.
+// done: data can be received, or the peer has closed the channel.
 Fate wait_for_message(int socket, const Deadline& deadline);
 
 struct Frame {
@@ -68,7 +68,7 @@ struct Message {
 
 enum class Descriptors { refused, taken };
 
-// Payloads are allocated as they arrive, not by the length that a frame announces.
+// Payloads are allocated as they arrive, not by the announced length.
 Fate receive_message(int socket, Message& out, std::size_t bytes_max, Descriptors descriptors,
                      const Deadline& deadline);
 

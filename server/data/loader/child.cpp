@@ -1,4 +1,4 @@
-// Loader side: task -> confined -> opened -> reads, one after another, until the socket
+// Loader side: receives a task, confines itself, opens the files and serves reads until the socket
 // closes. File errors are sent as answers; channel errors end the process.
 #include <fcntl.h>
 #include <malloc.h>
@@ -47,7 +47,7 @@ void hear(Message& out) {
   }
 }
 
-// Files that the daemon opens: sends requests, receives descriptors.
+// Files opened by the daemon: sends requests, receives descriptors.
 class BrokeredFiles final : public Files {
  public:
   explicit BrokeredFiles(Location location) : location_(std::move(location)) {}
@@ -74,7 +74,7 @@ class BrokeredFiles final : public Files {
     Message out;
     if (name.size() > question_bytes_max) {
       out.kind = Kind::no;
-      out.payload = encode_error(make_error(ErrorKind::bad_data, "a file's name is too long"));
+      out.payload = encode_error(make_error(ErrorKind::bad_data, "a file name is too long"));
     } else {
       say(what, name);
       hear(out);
@@ -85,7 +85,7 @@ class BrokeredFiles final : public Files {
   Location location_;
 };
 
-// Calls `work`; exceptions become errors.
+// Calls `work` and converts exceptions to errors.
 template <class Work>
 auto guarded(const Work& work) -> decltype(work()) {
   try {
@@ -100,24 +100,25 @@ auto guarded(const Work& work) -> decltype(work()) {
 Result<void> fill(FileSource& source, std::size_t field, std::size_t step, const Mapping& memory) {
   const DatasetInfo& info = source.info();
   if (field >= info.fields.size() || step >= info.steps.size()) {
-    return make_error(ErrorKind::internal, "there is no such field or step");
+    return make_error(ErrorKind::internal, "no such field or step");
   }
   const std::size_t components = info.fields[field].components.size();
   const std::size_t samples = info.grid.samples();
   if (samples * components > memory.floats()) {
     return make_error(ErrorKind::internal, "the memory of a volume has another size");
   }
-  std::fill_n(memory.data(), samples * components, 0.0F);  // of the volume before
+  std::fill_n(memory.data(), samples * components, 0.0F);  // overwrites numbers of the previous
+                                                           // volume
   if (auto done = source.fill(field, step, memory.data()); !done) return done;
   mask_volume(memory.data(), samples, static_cast<int>(components));
   return {};
 }
 
-// Libraries allocate and free chunk-sized buffers at every read. If these were returned to the
-// system, clearing and mapping the pages anew would take a third of the read time. With little
-// memory that cost is accepted.
+// Libraries allocate and free chunk-sized buffers at every read. Returning them to the system each
+// time would cost a third of the read time, because pages are cleared and mapped anew. If memory is
+// scarce, that cost is accepted.
 void keep_freed_memory(std::uint64_t memory_bytes) {
-  constexpr std::uint64_t mapped_from = 32U << 20U;  // the most that glibc allows
+  constexpr std::uint64_t mapped_from = 32U << 20U;  // the maximum that glibc allows
   constexpr std::uint64_t kept = 48U << 20U;
   ::mallopt(M_MMAP_THRESHOLD, static_cast<int>(std::min(mapped_from, memory_bytes / 8)));
   ::mallopt(M_TRIM_THRESHOLD, static_cast<int>(std::min(kept, memory_bytes / 8)));
@@ -187,7 +188,7 @@ class Loader {
   }
 
   std::unique_ptr<FileSource> source_;
-  Mapping memory_;  // for volumes, until another is sent
+  Mapping memory_;  // receives volumes until it is replaced
   Clock::time_point told_;
 };
 
@@ -209,7 +210,7 @@ bool end_with_daemon() {
 int run() {
   std::signal(SIGIO, SIG_DFL);
   if (!end_with_daemon()) {
-    std::fputs("windsplat: load is what windsplat starts by itself\n", stderr);
+    std::fputs("windsplat: 'load' is internal: windsplat runs it by itself\n", stderr);
     return 2;
   }
   static_cast<void>(::setpriority(PRIO_PROCESS, 0, niceness));
@@ -218,7 +219,7 @@ int run() {
     Message message;
     const Fate fate =
         receive_message(socket_of_loader, message, answer_bytes_max, Descriptors::taken, {});
-    if (fate == Fate::closed) ::_exit(0);  // skip exit handlers of libraries and sanitizers
+    if (fate == Fate::closed) ::_exit(0);  // skips exit handlers of libraries and sanitizers
     if (fate != Fate::done) leave();
     if (message.kind == Kind::open) {
       loader.open(message.payload);

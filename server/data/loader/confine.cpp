@@ -1,5 +1,5 @@
-// Limits, no capabilities, then Landlock where the kernel has it, then a list of the system calls
-// that are left.
+// Sets resource limits, drops all capabilities, then applies Landlock if the kernel has it, and a
+// filter of system calls.
 #include "server/data/loader/confine.hpp"
 
 #include <fcntl.h>
@@ -28,7 +28,8 @@ namespace windsplat::data::loader {
 namespace {
 
 #ifdef WINDSPLAT_SANITIZED
-constexpr bool memory_is_shadowed = true;  // terabytes of it, which count as taken
+constexpr bool memory_is_shadowed = true;  // The sanitizer's shadow memory takes terabytes of
+                                           // address space, which count as used.
 #else
 constexpr bool memory_is_shadowed = false;
 #endif
@@ -48,7 +49,7 @@ bool limit(__rlimit_resource which, std::uint64_t most, std::uint64_t at_first) 
 bool limit(__rlimit_resource which, std::uint64_t most) { return limit(which, most, most); }
 
 Result<void> set_limits(const Confinement& how) {
-  // Private memory; what is shared is given by the daemon and bounded there.
+  // Private memory only; shared memory is provided and limited by the daemon.
   const bool memory = memory_is_shadowed ||
                       limit(RLIMIT_DATA, how.memory_bytes + room_of_libraries,
                             std::min(how.opening_bytes, how.memory_bytes) + room_of_libraries);
@@ -59,9 +60,8 @@ Result<void> set_limits(const Confinement& how) {
   return {};
 }
 
-// Started as root a loader would keep root's privileges. The bounding set can only be emptied by
-// who may (CAP_SETPCAP); for others nothing is left that it could bring back, with no_new_privs
-// set.
+// A loader started as root would keep root's privileges. Only a process with CAP_SETPCAP can empty
+// the bounding set; without it, the set has no effect, because no_new_privs is set.
 Result<void> drop_capabilities() {
   for (unsigned long capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0;
        ++capability) {
@@ -78,20 +78,20 @@ Result<void> drop_capabilities() {
   const bool holds_any = std::any_of(held.begin(), held.end(), [](const auto& set) {
     return (set.effective | set.permitted | set.inheritable) != 0;
   });
-  if (!holds_any) return {};  // a service manager's filter may refuse capset
+  if (!holds_any) return {};  // the filter of a service manager may reject capset
   held = {};
   if (::syscall(SYS_capset, &header, held.data()) != 0) return not_confined("capabilities");
   return {};
 }
 
-// An empty Landlock ruleset: no file can be opened by name. Without Landlock the filter does that.
+// An empty Landlock ruleset: no file can be opened by name. Without Landlock, the filter does this.
 void forbid_paths() {
 #ifdef SYS_landlock_create_ruleset
   const long version =
       ::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION);
   if (version < 1) return;
   landlock_ruleset_attr rules{};
-  rules.handled_access_fs = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1U) - 1;  // what version 1 knows
+  rules.handled_access_fs = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1U) - 1;  // access rights of version 1
   const long set = ::syscall(SYS_landlock_create_ruleset, &rules, sizeof rules, 0);
   if (set < 0) return;
   ::syscall(SYS_landlock_restrict_self, static_cast<int>(set), 0);
@@ -103,16 +103,17 @@ struct ReleaseFilter {
   void operator()(void* filter) const { seccomp_release(filter); }
 };
 
-// Rules of a filter until one of them fails.
+// Adds rules to a filter until one fails.
 class Filter {
  public:
   Filter() : filter_(seccomp_init(SCMP_ACT_ERRNO(EPERM))), fault_(filter_ ? 0 : -ENOMEM) {
     set(SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS);
     set(SCMP_FLTATR_CTL_TSYNC, 1);
-    set(SCMP_FLTATR_API_SYSRAWRC, 1);  // the kernel's errno, not ECANCELED for all
+    set(SCMP_FLTATR_API_SYSRAWRC, 1);  // report the errno of the kernel instead of ECANCELED
   }
 
-  // Where all conditions hold. A call that this machine does not have is a number no kernel knows.
+  // Adds a rule that applies if all conditions hold. A call that this architecture lacks has a
+  // number that no kernel uses.
   void add(std::uint32_t action, int call, std::initializer_list<scmp_arg_cmp> conditions = {}) {
     if (fault_ != 0) return;
     fault_ = seccomp_rule_add_array(filter_.get(), action, call,
@@ -133,7 +134,8 @@ class Filter {
 scmp_arg_cmp has_bits(unsigned argument, scmp_datum_t mask, scmp_datum_t value) {
   return {argument, SCMP_CMP_MASKED_EQ, mask, value};
 }
-// Of an int: the kernel ignores the upper half of the register, which callers need not clear.
+// Compares an int argument: the kernel ignores the upper half of the register, which callers need
+// not clear.
 scmp_arg_cmp equals(unsigned argument, int value) {
   return has_bits(argument, 0xffffffff, static_cast<std::uint32_t>(value));
 }
@@ -149,7 +151,7 @@ int forbid_calls() {
         SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
         SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group),
 #ifdef WINDSPLAT_SANITIZED
-        // The sanitizers probe through a pipe whether memory can be read.
+        // Sanitizers probe through a pipe whether memory can be read.
         SCMP_SYS(pipe2), SCMP_SYS(pipe),
 #endif
         SCMP_SYS(sendmsg), SCMP_SYS(recvmsg), SCMP_SYS(ppoll), SCMP_SYS(poll), SCMP_SYS(write),
@@ -159,8 +161,8 @@ int forbid_calls() {
     filter.add(SCMP_ACT_ALLOW, call);
   }
   for (const int call : calls_by_name()) filter.add(SCMP_ACT_TRAP, call);
-  // A mapping: never code, and no memory that no limit counts: what is shared without a file, and
-  // what grows by itself.
+  // Mappings must not be executable, nor escape the memory limit: neither shared and anonymous nor
+  // growing automatically.
   for (const int kind : {0, MAP_SHARED, MAP_ANONYMOUS}) {
     filter.add(
         SCMP_ACT_ALLOW, SCMP_SYS(mmap),
@@ -170,7 +172,7 @@ int forbid_calls() {
   for (const int command : {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL}) {
     filter.add(SCMP_ACT_ALLOW, SCMP_SYS(fcntl), {equals(1, command)});
   }
-  // What abort() sends to itself.
+  // Signals that abort() sends to its own process.
   filter.add(SCMP_ACT_ALLOW, SCMP_SYS(tgkill), {equals(0, ::getpid())});
   filter.add(SCMP_ACT_ERRNO(ENOTTY), SCMP_SYS(ioctl));
   filter.add(SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(flock));

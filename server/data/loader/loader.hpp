@@ -1,5 +1,6 @@
 // Reads files in a separate, sandboxed process: Location -> RemoteSource in the daemon, run() in
-// the loader. Info returns as a validated message, numbers in shared memory.
+// the loader. The loader returns the info in a message, which is validated, and numbers in shared
+// memory.
 #pragma once
 
 #include <sys/types.h>
@@ -20,15 +21,16 @@
 
 namespace windsplat::data::loader {
 
-// Limits of one loader. Its volumes do not count as its memory: they are the caller's. When a call
-// exceeds a limit it fails with the reason, the loader is killed, and the next call starts another.
+// Limits of one loader. Volumes do not count in its memory, because the caller provides them. A
+// call that exceeds a limit fails with the reason; the loader is killed, and the next call starts
+// another.
 struct Limits {
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;
-  // Whether reads may use that much, or only as much as opening (opening_memory_bytes()).
+  // true: reads may use all of that memory; false: only as much as opening (opening_memory_bytes())
   bool reads_take_all = true;
   // Wall clock limits of a whole call.
   std::chrono::milliseconds open_time{60'000};
-  std::chrono::milliseconds read_time{60'000};  // and beyond that:
+  std::chrono::milliseconds read_time{60'000};  // additional time:
   std::uint64_t read_bytes_per_second = 10'000'000;
   // A loader that sends no message and uses no processor time for so long has stalled, for example
   // on a disk that does not respond.
@@ -36,24 +38,24 @@ struct Limits {
   // Budget for its private memory and that of the transfer; null: not counted.
   std::shared_ptr<Budget> budget = nullptr;
   std::size_t opens_max = 400'000;  // files opened in answer to one call
-  // Absolute folders of library tables, whose files may be read besides.
+  // Absolute folders of library tables, whose files may also be read.
   std::vector<std::string> library_folders{"/usr/share/eccodes/definitions"};
 };
 
-// Sets the executable of loaders, run as `program load`: call once, before the first is started.
-// There is no default, so that a program without that command never starts itself.
+// Sets the executable of loaders, run as `program load`; call it once, before the first loader is
+// started. There is no default, so that a program without that command never starts itself.
 void set_program(std::string path);
 
-// A dataset whose files a loader reads. The loader is started on demand, and again for the next
-// call after it was released or ended. One thread at a time, except for cancel().
+// A dataset whose files are read by a loader. The loader is started on demand, and restarted by the
+// next call after it was released or ended. Not thread-safe, except for cancel().
 class RemoteSource : public Source {
  public:
   ~RemoteSource() override;
   [[nodiscard]] const DatasetInfo& info() const override;
 
-  // Errors: those of readers; bad_data also where the loader died, exceeded its time or sent an
-  // invalid message, and where the files changed since opening; out_of_memory where the limit
-  // leaves too little for the loader; cancelled.
+  // Errors: those of readers; bad_data also if the loader crashed, exceeded its time limit or sent
+  // an invalid message, or if the files changed since opening; out_of_memory if the limit leaves
+  // too little for the loader; cancelled.
   Result<Volume> read(std::size_t field, std::size_t step) override;
 
   // Called during reads, on the reading thread, about every 50 ms.
@@ -64,7 +66,7 @@ class RemoteSource : public Source {
 
   [[nodiscard]] std::vector<Companion> companions() const override;
 
-  // Ends the loader, and with it all open files. The next read starts another.
+  // Ends the loader and closes all its files. The next read starts another.
   void release() override;
 
   // Process id of the current loader; -1 if there is none.

@@ -1,4 +1,5 @@
-// Structures <-> bytes, field by field; numbers as this machine has them, for both ends run on it.
+// Structures <-> bytes, field by field, in native byte order, because both ends run on the same
+// machine.
 #include "server/data/loader/messages.hpp"
 
 #include <algorithm>
@@ -15,15 +16,16 @@ namespace windsplat::data::loader {
 namespace {
 
 constexpr std::size_t text_max = std::size_t{1} << 16;
-constexpr std::size_t things_max = 1'000'000;  // fields, notes, names of a folder
+constexpr std::size_t things_max = 1'000'000;  // limits of the numbers of fields, of notes and of
+                                               // names in a folder
 constexpr std::size_t steps_max = std::size_t{1} << 24;
 constexpr std::size_t axis_max = std::size_t{1} << 24;
 constexpr std::size_t text_bytes_min = sizeof(std::uint64_t);
 
-// Whether text may go on as it is; what may not is spelt out (see printable()).
+// Whether text can be passed on unchanged; otherwise it is escaped (see printable()).
 std::string text_of(Reader& in) {
   const std::string text = in.text(text_max);
-  // Four bytes a byte that is spelt out, so that nothing is cut.
+  // An escaped byte takes four bytes, so that nothing is truncated.
   return printable(text, 4 * text.size() + 1);
 }
 
@@ -48,7 +50,7 @@ Axis axis_of(Reader& in, bool vertical) {
   axis.kind = static_cast<AxisKind>(in.sound() ? kind : 0);
   axis.coordinates = in.doubles(axis_max);
   const std::vector<double>& at = axis.coordinates;
-  // Only a vertical axis may descend: pressure, depth, levels counted from the top.
+  // Only a vertical axis may descend: pressure, depth, levels numbered from the top.
   if (!axis_fault(at).empty() || (!vertical && at.back() < at.front())) in.fail();
   return axis;
 }
@@ -65,7 +67,7 @@ std::shared_ptr<const Columns> columns_of(Reader& in, std::size_t expected) {
   return std::make_shared<const Columns>(std::move(columns));
 }
 
-// Counts up to 2^24 each, so that products are checked two by two.
+// Each count is at most 2^24, so that the product of two cannot overflow.
 Grid grid_of(Reader& in) {
   Grid grid;
   for (std::size_t a = 0; a < 3; ++a) grid.axes.at(a) = axis_of(in, a == 2);
@@ -124,7 +126,7 @@ void put_field(Writer& out, const FieldInfo& field) {
   out.number(field.chunk_bytes);
 }
 
-Error nonsense(const char* what) {
+Error malformed(const char* what) {
   return make_error(ErrorKind::bad_data, std::string("the loader sent ") + what);
 }
 
@@ -159,7 +161,7 @@ Result<Task> decode_task(std::string_view bytes) {
   out.location.pattern = in.text(text_max);
   out.location.members.resize(in.count(things_max, text_bytes_min));
   for (Location::Member& member : out.location.members) member.name = in.text(text_max);
-  if (!in.complete()) return make_error(ErrorKind::internal, "the loader's task is broken");
+  if (!in.complete()) return make_error(ErrorKind::internal, "the task of the loader is malformed");
   return out;
 }
 
@@ -175,7 +177,7 @@ Error decode_error(std::string_view bytes) {
   const auto number = in.number<std::uint8_t>();
   std::string message = printable(in.text(text_max), 4000);
   const auto is = [number](ErrorKind kind) { return number == static_cast<std::uint8_t>(kind); };
-  if (!in.complete() || message.empty()) return nonsense("an error that cannot be read");
+  if (!in.complete() || message.empty()) return malformed("a malformed error");
   for (const ErrorKind kind : {ErrorKind::not_found, ErrorKind::out_of_memory, ErrorKind::internal,
                                ErrorKind::too_large}) {
     if (is(kind)) return make_error(kind, std::move(message));
@@ -203,7 +205,7 @@ std::string encode_info(const DatasetInfo& info) {
     out.number(step.value);
     out.text(step.text);
   }
-  // By far the largest part comes last, so that the message grows once and not beyond it.
+  // The largest part by far comes last, so that the message is reallocated only once.
   out.number(static_cast<std::uint8_t>(info.grid.columns ? 1 : 0));
   if (info.grid.columns) {
     const Columns& columns = *info.grid.columns;
@@ -246,8 +248,8 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
     const auto& [x, y, z] = info.grid.axes;
     info.grid.columns = columns_of(in, x.coordinates.size() * y.coordinates.size());
   }
-  if (!in.complete()) return nonsense("a description that cannot be read");
-  if (info.fields.empty() || info.steps.empty()) return nonsense("a dataset without data");
+  if (!in.complete()) return malformed("a malformed description");
+  if (info.fields.empty() || info.steps.empty()) return malformed("a dataset without data");
   return info;
 }
 
@@ -261,7 +263,7 @@ Result<std::vector<std::string>> decode_names(std::string_view bytes) {
   Reader in(bytes);
   std::vector<std::string> out(in.count(things_max + 1, text_bytes_min));
   for (std::string& name : out) name = in.text(text_max);
-  if (!in.complete()) return make_error(ErrorKind::internal, "a folder's list is broken");
+  if (!in.complete()) return make_error(ErrorKind::internal, "a folder's list is malformed");
   return out;
 }
 

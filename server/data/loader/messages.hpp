@@ -1,5 +1,5 @@
-// Message payloads: location and limits to the loader, errors and dataset info back. Decoding
-// validates everything that the rest of the program relies on.
+// Message payloads: location and limits to the loader; errors and dataset info back. Decoding
+// validates everything on which the rest of the program relies.
 #pragma once
 
 #include <cstdint>
@@ -27,13 +27,14 @@ std::string encode_task(const Task& task);
 Result<Task> decode_task(std::string_view bytes);
 
 std::string encode_error(const Error& error);
-// For any bytes: an error of a kind that readers return, its message printable.
+// Decodes any bytes: the result is an error of a kind that readers return, with a printable
+// message.
 Error decode_error(std::string_view bytes);
 
 std::string encode_info(const DatasetInfo& info);
-// Errors: bad_data for invalid info, or info that no reader returns: axes that are not finite and
-// strictly monotonic, fields without components, no steps, more than cf's limits. Texts are made
-// printable.
+// Errors: bad_data for malformed info, or for info that no reader returns: axes that are not finite
+// and strictly monotonic, fields without components, no steps, or more than the limits of cf. Texts
+// are made printable.
 Result<DatasetInfo> decode_info(std::string_view bytes);
 
 std::string encode_names(const std::vector<std::string>& names);

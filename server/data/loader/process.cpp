@@ -1,4 +1,4 @@
-// posix_spawn with a socket and a pipe, and waitpid.
+// Starts a process by posix_spawn with a socket and a pipe, and reaps it by waitpid.
 #include "server/data/loader/process.hpp"
 
 #include <fcntl.h>
@@ -28,7 +28,7 @@ namespace windsplat::data::loader {
 namespace {
 
 #ifdef WINDSPLAT_SANITIZED
-constexpr bool messages_are_shown = true;  // those of the sanitizer
+constexpr bool messages_are_shown = true;  // options of the sanitizer
 #else
 constexpr bool messages_are_shown = false;
 #endif
@@ -38,14 +38,14 @@ Error not_started(int reason) {
                     "a loader cannot be started: " + std::generic_category().message(reason));
 }
 
-// Beyond the numbers that the loader finds them under.
+// Above the descriptor numbers that the loader uses.
 Descriptor moved_up(Descriptor from) {
   constexpr int first_free = 16;
   return Descriptor(::fcntl(from.number(), F_DUPFD_CLOEXEC, first_free));
 }
 
-// Opened once, so that loaders still start where /dev/null is gone while the daemon runs: replaced
-// by a program that runs as root, or hidden by a mount. Errors: internal.
+// Opened once, so that loaders still start if /dev/null disappears while the daemon runs (replaced
+// by a program that runs as root, or hidden by a mount). Errors: internal.
 Result<int> null_device() {
   static std::mutex mutex;
   static Descriptor device;
@@ -61,7 +61,7 @@ Result<int> null_device() {
   return device.number();
 }
 
-// What files libraries would look for, they must not find through a user's variables.
+// Libraries must not search for files by variables of the user's environment.
 std::vector<std::string> environment_of_loader() {
   std::vector<std::string> out{"HDF5_USE_FILE_LOCKING=FALSE"};
   for (const char* name : {"ASAN_OPTIONS", "UBSAN_OPTIONS", "TSAN_OPTIONS", "LSAN_OPTIONS"}) {
@@ -101,7 +101,8 @@ int spawn(const std::string& program, int null, int socket, int life, pid_t& id)
   sigfillset(&all);
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setsigdefault(&attributes, &all);
-  // A group of its own: what a terminal sends to the daemon's is the daemon's to act on.
+  // A separate process group: a terminal sends signals to the group of the daemon only, which ends
+  // its loaders.
   posix_spawnattr_setpgroup(&attributes, 0);
   posix_spawnattr_setflags(&attributes,
                            POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
@@ -160,7 +161,7 @@ std::optional<int> Process::reap(std::chrono::milliseconds patience) noexcept {
   const pid_t id = this->id();
   std::optional<int> ended;
   if (id > 0) {
-    // Waited for without being reaped, so that its number stays its own until it is forgotten.
+    // Waits without reaping, so that the process id stays reserved until end().
     siginfo_t about{};
     const auto late = std::chrono::steady_clock::now() + patience;
     while (::waitid(P_PID, static_cast<id_t>(id), &about, WEXITED | WNOHANG | WNOWAIT) == 0 &&
@@ -202,7 +203,7 @@ std::uint64_t Process::private_bytes() const {
   std::array<char, 128> text{};
   if (!file || ::read(file.number(), text.data(), text.size() - 1) <= 0) return 0;
   char* at = text.data();
-  static_cast<void>(std::strtoull(at, &at, 10));  // addresses that are mapped
+  static_cast<void>(std::strtoull(at, &at, 10));  // mapped address space
   const std::uint64_t resident = std::strtoull(at, &at, 10);
   const std::uint64_t shared = std::strtoull(at, &at, 10);
   return (resident - std::min(shared, resident)) * static_cast<std::uint64_t>(::getpagesize());
@@ -221,7 +222,7 @@ void Process::allow_cpu(std::chrono::seconds more) {
 void Process::allow_memory(std::uint64_t bytes) {
   const pid_t id = this->id();
   rlimit bound{};
-  // Where there is no bound none was set: a sanitizer's shadow takes terabytes.
+  // No limit was set under a sanitizer: its shadow memory takes terabytes.
   if (id < 0 || ::prlimit(id, RLIMIT_DATA, nullptr, &bound) != 0 ||
       bound.rlim_max == RLIM_INFINITY) {
     return;

@@ -1,4 +1,4 @@
-// One loader process: start, communication, end. Outlives neither its object nor the daemon.
+// One loader process: start, communication, end. It outlives neither this object nor the daemon.
 #pragma once
 
 #include <sys/types.h>
@@ -14,7 +14,7 @@
 
 namespace windsplat::data::loader {
 
-// Descriptors of a loader at its start.
+// Numbers of the descriptors that a loader has at its start.
 inline constexpr int socket_of_loader = 3;
 inline constexpr int life_of_loader = 4;  // pipe whose other end closes when the daemon exits
 
@@ -38,10 +38,10 @@ class Process {
   [[nodiscard]] std::uint64_t private_bytes() const;
   // Limits further processor time to that many seconds.
   void allow_cpu(std::chrono::seconds more);
-  // Raises the private memory limit, at most to the one set by confinement.
+  // Raises the private memory limit, up to that of confinement.
   void allow_memory(std::uint64_t bytes);
 
-  // Started, and not known to have exited.
+  // Started, and not known to have ended.
   [[nodiscard]] bool runs() const;
   [[nodiscard]] int socket() const { return socket_.number(); }
   [[nodiscard]] pid_t id() const;  // -1 if there is none
@@ -50,7 +50,7 @@ class Process {
   // The same without allocation: the status as of waitpid.
   std::optional<int> reap(std::chrono::milliseconds patience) noexcept;
 
-  mutable std::mutex mutex_;  // of id_: a number is signalled only before it is waited for
+  mutable std::mutex mutex_;  // protects id_: signals must not be sent after the process is reaped
   pid_t id_ = -1;
   Descriptor socket_;
   Descriptor life_;

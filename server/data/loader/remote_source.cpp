@@ -1,5 +1,5 @@
-// Daemon side: sends a call, serves the loader's requests, validates its answer.
-// Any other event ends the loader and is an error of the call.
+// Daemon side: sends a call, serves the requests of the loader and validates its answer. Any other
+// event ends the loader and becomes an error of the call.
 #include <fcntl.h>
 #include <linux/openat2.h>
 #include <sys/stat.h>
@@ -47,7 +47,7 @@ Descriptor open_of_library(const std::vector<std::string>& folders, const std::s
   for (const std::string& folder : folders) {
     if (!path.starts_with(folder + '/') || path.find('\0') != std::string::npos) continue;
     const std::size_t below = path.find_first_not_of('/', folder.size());
-    if (below == std::string::npos) continue;  // the folder itself
+    if (below == std::string::npos) continue;  // the folder itself is not a file
     const Descriptor root(::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
     open_how how{};
     how.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
@@ -100,17 +100,17 @@ struct RemoteSource::State {
   Location location;
   Limits limits;
   DatasetInfo info;
-  std::string digest;  // of the info as received
+  std::string digest;  // the info as received
   std::vector<Companion> companions;
-  std::uint64_t opened_bytes = 0;  // of the files read to open the dataset
+  std::uint64_t opened_bytes = 0;  // total size of the files read to open the dataset
   Progress progress;
   std::shared_ptr<Files> files;  // set while a loader runs
   Process process;
   std::optional<Transfer> transfer;  // as mapped by the loader
   Reservation process_memory;
-  Reservation transfer_memory;  // of a transfer that is reused; otherwise it belongs to the volume
-                                // being read
-  std::mutex mutex;             // of the two below
+  Reservation transfer_memory;  // true: a transfer that is reused; false: its memory belongs to the
+                                // volume being read
+  std::mutex mutex;             // guards the next two members
   bool under_way = false;
   bool cancelled = false;
 
@@ -118,7 +118,7 @@ struct RemoteSource::State {
   Result<std::string> start() {
     release();
     const std::string path = program_path();
-    if (path.empty()) return make_error(ErrorKind::internal, "no program is set to load files");
+    if (path.empty()) return make_error(ErrorKind::internal, "no loader executable is set");
     if (auto room = process_memory.resize(loader_bytes_min); !room) return room.error();
     if (auto started = process.start(path); !started) {
       release();
@@ -140,7 +140,7 @@ struct RemoteSource::State {
         call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits.open_time});
     if (!answer) {
       Error error = answer.error();
-      // Without files the loader has already ended for lack of memory.
+      // Without files, the loader has already exited because of lack of memory.
       if (files && error.kind == ErrorKind::out_of_memory) error.message += opening_limit();
       release();
       return error;
@@ -174,7 +174,7 @@ struct RemoteSource::State {
     process.kill();
   }
 
-  // Ensures a running loader with the same files open as at first.
+  // Ensures a running loader with the same files open as initially.
   Result<void> be_ready() {
     if (process.runs()) return {};
     auto encoded = start();
@@ -204,23 +204,23 @@ struct RemoteSource::State {
                              next_deadline(patience));
     std::size_t questions = 0;
     while (fate == Fate::done) {
-      Message heard;
+      Message message;
       const std::size_t bytes_max =
           what.answer == Kind::opened ? opened_bytes_max() : std::size_t{question_bytes_max};
       const Result<Fate> waited = wait(patience);
       if (!waited) return crowded_out(waited.error(), what);
       fate = *waited;
       if (fate == Fate::done) {
-        fate = receive_message(process.socket(), heard, bytes_max, Descriptors::refused,
+        fate = receive_message(process.socket(), message, bytes_max, Descriptors::refused,
                                next_deadline(patience));
       }
       if (fate != Fate::done) break;
-      if (heard.kind == what.answer) return heard;
-      if (heard.kind == Kind::failed) return decode_error(heard.payload);
-      fate = heard.kind == Kind::progress ? hear_progress(heard.payload)
+      if (message.kind == what.answer) return message;
+      if (message.kind == Kind::failed) return decode_error(message.payload);
+      fate = message.kind == Kind::progress ? receive_progress(message.payload)
              : ++questions > 2 * limits.opens_max
                  ? Fate::broken
-                 : answer(heard, what.kind, next_deadline(patience));
+                 : answer(message, what.kind, next_deadline(patience));
       patience.moved = Clock::now();
     }
     return ended(fate, what, patience);
@@ -241,7 +241,7 @@ struct RemoteSource::State {
       const auto cpu = process.cpu_time();
       if (cpu != patience.cpu) patience.moved = now;
       patience.cpu = cpu;
-      // Time during which this process was stopped as well does not count as a stall.
+      // A period in which this process was suspended too does not count as a stall.
       if (now - patience.looked > pause_min) patience.moved += now - patience.looked;
       patience.looked = now;
       const auto end = std::min(patience.end, patience.moved + limits.stall_time);
@@ -255,11 +255,11 @@ struct RemoteSource::State {
   [[nodiscard]] std::string opening_limit() const {
     const std::uint64_t bytes =
         std::min(opening_memory_bytes(files->opened_bytes()), limits.memory_bytes);
-    return "; the limit of memory to open files of " + std::to_string(files->opened_bytes()) +
+    return "; the memory limit for opening files of " + std::to_string(files->opened_bytes()) +
            " bytes is " + megabytes(bytes);
   }
 
-  // Private memory of the loader counts in the limit.
+  // Private memory of the loader counts in the memory limit.
   Result<void> count_memory() {
     return process_memory.resize(std::max(loader_bytes_min, process.private_bytes()));
   }
@@ -268,7 +268,7 @@ struct RemoteSource::State {
     return std::min<std::size_t>(info_bytes_max, limits.memory_bytes);
   }
 
-  Fate hear_progress(const std::string& payload) const {
+  Fate receive_progress(const std::string& payload) const {
     Reader in(payload);
     const auto done = in.number<double>();
     if (!in.complete() || !(done >= 0 && done <= 1)) return Fate::broken;
@@ -276,7 +276,7 @@ struct RemoteSource::State {
     return Fate::done;
   }
 
-  // During a call of that kind.
+  // Resources used during a call of that kind.
   [[nodiscard]] Fate answer(const Message& question, Kind during, const Deadline& deadline) {
     const auto say = [&](Kind kind, std::string_view payload, int descriptor = -1) {
       return send_message(process.socket(), kind, payload, descriptor, deadline);
@@ -307,10 +307,10 @@ struct RemoteSource::State {
   Error crowded_out(const Error& error, const Call& what) {
     release();
     return make_error(error.kind,
-                      whose_loader() + " was ended while " + what.doing + ": " + error.message);
+                      loader_text() + " was ended while " + what.doing + ": " + error.message);
   }
 
-  // Why no answer was received. The loader has ended after this.
+  // Returns why no answer was received. The loader has ended afterwards.
   Error ended(Fate fate, const Call& what, const Patience& patience) {
     constexpr std::chrono::milliseconds time_to_end{500};
     std::string how =
@@ -323,15 +323,15 @@ struct RemoteSource::State {
     } else if (fate != Fate::closed) {
       how = "violated the protocol and was ended";
     }
-    return make_error(ErrorKind::bad_data, whose_loader() + ' ' + how + " while " + what.doing);
+    return make_error(ErrorKind::bad_data, loader_text() + ' ' + how + " while " + what.doing);
   }
 
-  [[nodiscard]] std::string whose_loader() const {
+  [[nodiscard]] std::string loader_text() const {
     return "the loader of " +
            in_quotes(location.members.empty() ? location.stem : location.members.front().name);
   }
 
-  // Reusing the transfer memory is faster, but only where volumes do not need the room.
+  // Reusing the transfer memory is faster, but only if volumes do not need the space.
   bool is_worth_keeping(std::uint64_t bytes) {
     constexpr std::uint64_t share = 8;
     if (bytes > Transfer::kept_bytes_max) return false;
@@ -368,7 +368,7 @@ struct RemoteSource::State {
               limits.read_time};
     what.time += std::chrono::milliseconds(bytes * 1000 / limits.read_bytes_per_second);
     if (auto done = call(what); !done) {
-      // Pages written by the loader are released with the loader unless the transfer is reused.
+      // Pages written by the loader are freed with the loader unless the transfer is reused.
       if (transfer && !transfer->is_kept()) release();
       if (is_new) drop_transfer();  // the loader may or may not have mapped it
       return done.error();
@@ -383,7 +383,8 @@ struct RemoteSource::State {
     if (!measure_volume(volume)) {
       release();
       return make_error(ErrorKind::bad_data, "the loader of " + in_quotes(info.source) +
-                                                 " left numbers unmasked while " + what.doing);
+                                                 " did not mask all invalid numbers while " +
+                                                 what.doing);
     }
     return volume;
   }
@@ -418,7 +419,7 @@ Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits) {
   auto state = std::make_unique<RemoteSource::State>(std::move(location), std::move(limits));
   auto encoded = state->start();
   if (!encoded) return encoded.error();
-  if (!state->count_memory()) state->release();  // after its answer it can be restarted
+  if (!state->count_memory()) state->release();  // the loader can be restarted after its answer
   auto info = decode_info(*encoded);
   if (!info) return info.error();
   state->info = std::move(*info);

@@ -1,4 +1,4 @@
-// memfd_create, its seals, mmap, and holes for what has been copied.
+// memfd_create, seals, mmap, and hole punching for what has been copied.
 #include "server/data/loader/transfer.hpp"
 
 #include <fcntl.h>
@@ -16,11 +16,11 @@ namespace windsplat::data::loader {
 
 namespace {
 
-constexpr std::size_t copied_at_once = std::size_t{512} << 10;  // floats: a huge page of them
+constexpr std::size_t copied_at_once = std::size_t{512} << 10;  // floats per huge page
 
 Error no_memory(std::size_t bytes) {
   return make_error(ErrorKind::out_of_memory,
-                    "no memory of " + std::to_string(bytes) +
+                    "cannot allocate " + std::to_string(bytes) +
                         " bytes for a volume: " + std::generic_category().message(errno));
 }
 
@@ -82,7 +82,7 @@ Samples Transfer::take(std::size_t floats) {
 }
 
 bool Transfer::close() {
-  mapping_ = Mapping();  // a shared mapping counts as a writer, even one that only reads
+  mapping_ = Mapping();  // even a read-only shared mapping counts as a writer
   return ::fcntl(descriptor(), F_ADD_SEALS, F_SEAL_WRITE | F_SEAL_SEAL) == 0;
 }
 

@@ -1,5 +1,5 @@
-// Shared memory for volumes: created and sealed by the daemon, filled by the loader, copied out by
-// the daemon, and reused for the next volume.
+// Shared memory for volumes: created and sealed by the daemon, filled by the loader, copied by the
+// daemon, and reused for the next volume.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace windsplat::data::loader {
 
-// A descriptor's memory, mapped whole.
+// A mapping of the whole memory of a descriptor.
 class Mapping {
  public:
   Mapping() = default;
@@ -31,11 +31,11 @@ class Mapping {
   std::size_t floats_ = 0;
 };
 
-// The daemon's side of it.
+// The transfer memory as seen by the daemon.
 class Transfer {
  public:
-  // Larger memory is never reused. Memory that is not reused is for one volume: unmapped by the
-  // loader before it answers, freed while the volume is copied out, and closed.
+  // Memory larger than this is never reused. Memory that is not reused serves one volume: unmapped
+  // by the loader before it answers, freed while the volume is copied, and closed.
   static constexpr std::size_t kept_bytes_max = std::size_t{32} << 20;
 
   // Allocates memory for so many floats, sealed against resizing. Errors: out_of_memory.
@@ -46,9 +46,9 @@ class Transfer {
   [[nodiscard]] bool is_kept() const { return kept_; }
 
   // Copies the first floats, so that later writes by a loader have no effect. Memory that is not
-  // reused is freed during the copy, so that a volume is not in memory twice.
+  // reused is freed during the copy, so that a volume is never in memory twice.
   [[nodiscard]] Samples take(std::size_t floats);
-  // No process can write to it any more. False: a writer may remain.
+  // Whether no process can write to it any more. False: there may be a writer.
   [[nodiscard]] bool close();
 
  private:

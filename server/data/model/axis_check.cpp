@@ -1,4 +1,4 @@
-// Coordinates -> what is wrong with them.
+// Finds faults of coordinates.
 #include "server/data/model/axis_check.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double coordinate_max = 1e290;
 constexpr double step_min = 1e-290;
-constexpr double share_min = 1e-18;  // its square is a float still
+constexpr double share_min = 1e-18;  // the square of share_min is still a finite float
 constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
 
 }  // namespace
@@ -29,7 +29,7 @@ std::string axis_fault(const std::vector<double>& at) {
     if (!(step > 0)) return "is not strictly monotonic";
     if (step < least) return "has steps below 1e-290 or below 1e-18 of its extent";
     if (step < rounding * std::max(std::abs(at[i]), std::abs(at[i - 1]))) {
-      return "has steps that are lost in the rounding of its coordinates";
+      return "has steps below the rounding error of its coordinates";
     }
   }
   return {};

@@ -1,4 +1,4 @@
-// Which coordinates an axis may have, whatever the format.
+// Checks of coordinates, common to all formats.
 #pragma once
 
 #include <string>
@@ -9,13 +9,13 @@
 
 namespace windsplat::data {
 
-// Why no cells can be laid out along these coordinates ("has steps below ..."), empty if they can:
-// finite, strictly monotonic, at most 1e290 in size, and with steps that are neither below 1e-290,
-// nor below 1e-18 of the axis' extent, nor lost in the rounding of the coordinates. So sums,
-// differences and midpoints of neighbours are exact enough that every cell has a width above zero.
+// Why cells cannot be placed along these coordinates ("has steps below ..."); empty if they can.
+// Coordinates must be finite, strictly monotonic and at most 1e290 in size, with steps of at least
+// 1e-290 and at least 1e-18 of the extent, and above their rounding error. Sums, differences and
+// midpoints of neighbours are then exact enough for every cell to have a positive width.
 std::string axis_fault(const std::vector<double>& coordinates);
 
-// Errors: bad_data, which names the axis.
+// Errors: bad_data, naming the axis.
 Result<void> check_axes(const Grid& grid);
 
 }  // namespace windsplat::data

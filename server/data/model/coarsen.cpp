@@ -1,6 +1,5 @@
-// Weighted box averages. A row of the coarse volume gathers the fine rows that it stands for, all
-// of them as wide as the fine volume, so that the inner loops run along memory; then it shrinks in
-// x.
+// Weighted box averages. A row of the coarse volume first accumulates its fine rows at full width,
+// so that inner loops access memory sequentially; then it is averaged along x.
 #include "server/data/model/coarsen.hpp"
 
 #include <algorithm>
@@ -25,7 +24,7 @@ Group group_at(std::size_t index, int halvings, int samples) {
   return {first, std::min(size, static_cast<std::size_t>(samples) - first)};
 }
 
-// The share of each sample in its group, so that a sum of weighted values overflows nowhere.
+// The weight of each sample within its group; normalised, so that weighted sums cannot overflow.
 std::vector<float> shares(const std::vector<double>& widths, int samples, int halvings) {
   std::vector<float> out(static_cast<std::size_t>(samples), 1.0F);
   if (halvings == 0) return out;

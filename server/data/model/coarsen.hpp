@@ -1,4 +1,4 @@
-// A volume at a coarser level: neighbours averaged by the size of their cells. Volume -> Volume.
+// Averages a volume to a coarser level; neighbours are weighted by the size of their cells.
 #pragma once
 
 #include <array>
@@ -9,24 +9,24 @@
 
 namespace windsplat::data {
 
-// halvings[a] = h: 2^h samples along axis a become one, the last one of those that are left.
-// widths[a]: of the fine cells along an axis, in any unit; only their ratios count. An axis that is
-// not halved needs none.
+// halvings[a] = h: 2^h samples along axis a are averaged to one; the last group may be smaller.
+// widths[a]: cell widths along an axis, in any unit, since only ratios matter; not needed for an
+// axis that is not halved.
 struct Coarsening {
   std::array<int, 3> halvings{0, 0, 0};
   std::array<std::vector<double>, 3> widths;
 };
 
-// Samples along an axis after it was halved so often.
+// Number of samples along an axis after so many halvings.
 int halved(int samples, int halvings);
 
-// Mean of each group's unmasked samples, weighted by the volumes of their cells, component by
-// component; masked only where all of the group is. So a scalar keeps its integral over space.
-// O(samples), one pass over the source.
+// Mean of the unmasked samples of each group, weighted by the volumes of their cells, per
+// component; masked only if the whole group is masked. This preserves the integral of a scalar over
+// space. O(samples), one pass over the source.
 Volume coarsen(const Volume& fine, const Coarsening& how);
 
-// Same text, same weights: what a coarser volume is kept under. Of widths it holds each one's share
-// of its group, rounded as coarsen() has it, so the unit that they are in does not matter.
+// Cache key of a coarser volume: equal keys have equal weights. Contains the normalised weights,
+// rounded as in coarsen(), so it does not depend on the unit of the widths.
 std::string key_of(const Coarsening& how);
 
 }  // namespace windsplat::data

@@ -1,4 +1,4 @@
-// Sizes of a grid, and fields by name or kind.
+// Sizes of a grid; fields by name or kind.
 #include "server/data/model/dataset_info.hpp"
 
 #include <algorithm>

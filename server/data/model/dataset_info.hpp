@@ -1,4 +1,4 @@
-// What is known of a dataset before any field is loaded: its grid, its fields, its steps.
+// Metadata of a dataset, known before any field is loaded: grid, fields, steps.
 #pragma once
 
 #include <array>
@@ -12,27 +12,27 @@ namespace windsplat::data {
 
 enum class AxisKind { longitude, latitude, pressure, height, depth, level, cartesian };
 
-// One axis of a rectilinear grid. Index 0 is west, south or bottom: readers turn every axis so
-// that the index grows with the world coordinate (a pressure axis therefore descends in hPa).
+// One axis of a rectilinear grid. Index 0 is west, south or bottom: readers orient every axis so
+// that the index grows with the world coordinate (hence a pressure axis descends in hPa).
 struct Axis {
-  std::string name;           // the dimension's name in the file
-  std::string standard_name;  // CF, empty if none
-  std::string units;          // as written in the file, empty if none
+  std::string name;           // name of the dimension in the file
+  std::string standard_name;  // as in CF; empty if none
+  std::string units;          // as in the file; empty if none
   AxisKind kind = AxisKind::cartesian;
-  std::vector<double> coordinates;  // one a sample, strictly monotonic, in `units`
+  std::vector<double> coordinates;  // one per sample, strictly monotonic, in `units`
 };
 
-// Where each column of a grid stands whose longitudes and latitudes are 2-D: degrees, x fastest,
-// all finite; longitudes continue from neighbour to neighbour, beyond 360 if need be.
+// Positions of the columns of a grid with 2-D longitudes and latitudes: degrees, x fastest, all
+// finite; longitudes are continuous between neighbours, beyond 360 if necessary.
 struct Columns {
   std::vector<double> longitude;
   std::vector<double> latitude;
 };
 
-// x, y, z: always three axes; a dimension the data lacks has one coordinate.
+// x, y, z: always three axes; a dimension that the data lack has one coordinate.
 struct Grid {
   std::array<Axis, 3> axes;
-  std::shared_ptr<const Columns> columns;  // null: the axes say it all
+  std::shared_ptr<const Columns> columns;  // null: the axes determine all positions
   [[nodiscard]] std::array<int, 3> dims() const;
   [[nodiscard]] std::size_t samples() const;
 };
@@ -40,47 +40,48 @@ struct Grid {
 enum class FieldKind { scalar, vector };
 
 struct FieldInfo {
-  std::string name;  // as the view names it: the variable's name, "wind" or the like for a vector
+  std::string name;  // as used by views: the name of the variable, for a vector "wind" or similar
   FieldKind kind = FieldKind::scalar;
-  std::vector<std::string> components;  // the file's variables, in x, y(, z) order; 1 for a scalar
-  std::string units;                    // of a vector: its first component's
-  std::vector<std::string> component_units;  // one a component; they may differ (m/s, Pa/s)
+  std::vector<std::string> components;  // variables of the file, in the order x, y(, z); one for a
+                                        // scalar
+  std::string units;                    // for a vector: that of its first component
+  std::vector<std::string> component_units;  // one per component; may differ (m/s, Pa/s)
   std::string standard_name;
   std::string long_name;
-  std::string dtype;     // of the file: "float32", "int16 packed", ...
+  std::string dtype;     // type in the file: "float32", "int16 packed", ...
   bool derived = false;  // computed on request from other fields, not stored in the file
-  // What is decoded to read one step, whole chunks counted; 0 where that is the volume itself.
+  // Bytes decoded to read one step, including whole chunks; 0 if equal to the size of the volume.
   std::uint64_t decoded_bytes = 0;
-  std::uint64_t chunk_bytes = 0;  // the largest chunk of it, decoded
+  std::uint64_t chunk_bytes = 0;  // the largest chunk, decoded
 };
 
-// A variable of the file that is not shown, and why.
+// A variable of the file that is not shown, with the reason.
 struct LeftOut {
   std::string name;
   std::string reason;
 };
 
 struct TimeStep {
-  double value = 0;  // in the file's own unit
+  double value = 0;  // in the unit of the file
   std::string
-      text;  // ISO 8601 where the calendar is understood ("2001-01-01T03:00:00Z"), else value
+      text;  // ISO 8601 if the calendar is supported ("2001-01-01T03:00:00Z"), otherwise the value
 };
 
-// Everything about a dataset that is known without loading a field.
+// All metadata of a dataset.
 struct DatasetInfo {
   std::string id;
   std::string title;
-  std::string source;  // "built-in sample" or the file's name without its folder
+  std::string source;  // "built-in sample", or the file name without folder
   std::string format;  // "sample", "netCDF classic", "netCDF-4", "VTK image data", ...
   std::string digest;  // changes whenever the data may have changed
   Grid grid;
   std::vector<FieldInfo> fields;
   std::vector<LeftOut> left_out;
-  std::vector<std::string> notes;  // what was done to the data: "resampled from 4096 cells ..."
+  std::vector<std::string> notes;  // how the data were converted: "resampled from 4096 cells ..."
   std::vector<TimeStep> steps;     // at least one
   std::string time_units;
-  std::string time_calendar;       // CF; empty means standard
-  std::uint64_t stored_bytes = 0;  // of the files opened by a loader; 0 for samples
+  std::string time_calendar;       // as in CF; empty means standard
+  std::uint64_t stored_bytes = 0;  // total size of the files opened by a loader; 0 for samples
 
   [[nodiscard]] const FieldInfo* find(const std::string& name) const;  // null if there is none
   [[nodiscard]] const FieldInfo* first(FieldKind kind) const;          // null if there is none

@@ -1,4 +1,4 @@
-// A short fingerprint of what identifies a dataset's numbers.
+// A short digest that identifies the numbers of a dataset.
 #pragma once
 
 #include <array>
@@ -9,7 +9,8 @@
 
 namespace windsplat::data {
 
-// 64-bit FNV-1a as 16 hexadecimal digits: not secret, only likely to differ when the text does.
+// 64-bit FNV-1a as 16 hexadecimal digits: not cryptographic; different texts are unlikely to have
+// equal digests.
 inline std::string digest_of(std::string_view text) {
   std::uint64_t hash = 0xcbf29ce484222325U;
   for (const char c : text) {

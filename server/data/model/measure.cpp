@@ -1,4 +1,4 @@
-// Volume -> histogram and range: passes over the samples, with counters as their only memory.
+// Volume -> histogram and range, by passes over the samples with counters as the only memory.
 #include "server/data/model/measure.hpp"
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t samples_between_polls = std::size_t{1} << 20;
 
-// Calls `visit` with the value of every sample that is not masked; false if it was cancelled.
+// Calls `visit` with the value of every unmasked sample; false if cancelled.
 template <class Visit>
 bool visit_values(const Volume& volume, const CancelToken& cancel, Visit visit) {
   std::array<const float*, 3> component{};
@@ -37,7 +37,7 @@ bool visit_values(const Volume& volume, const CancelToken& cancel, Visit visit) 
 
 Error request_cancelled() { return make_error(ErrorKind::cancelled, "request cancelled"); }
 
-// Floats as whole numbers of the same order, and back.
+// Converts floats to integers of the same order, and back.
 std::uint32_t order_of(float value) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
   return (bits & 0x80000000U) != 0 ? ~bits : bits | 0x80000000U;
@@ -46,17 +46,17 @@ float with_order(std::uint32_t order) {
   return std::bit_cast<float>((order & 0x80000000U) != 0 ? order & 0x7fffffffU : ~order);
 }
 
-using Counts = std::vector<std::int64_t>;  // by the upper or lower half of an order
+using Counts = std::vector<std::int64_t>;  // counts by the upper or the lower half of the bits
 
-// Which counter holds the value of that rank; the rank becomes the one within it.
+// The counter that contains the value of a rank; changes the rank to that within the counter.
 std::uint32_t counter_of(const Counts& counts, std::int64_t& rank) {
   std::uint32_t at = 0;
   while (at + 1 < counts.size() && rank >= counts[at]) rank -= counts[at++];
   return at;
 }
 
-// The least and the greatest value that are left when a share of them is left out at either end:
-// exact, by counting upper halves, then the lower halves of the two that matter.
+// The least and greatest values after the given share is trimmed at both ends. Exact: counts upper
+// halves of the bits, then lower halves for the two counters concerned.
 Result<std::optional<std::array<double, 2>>> clipped_range(const Volume& volume,
                                                            const HistogramRequest& request,
                                                            const CancelToken& cancel) {
@@ -98,7 +98,7 @@ Result<std::optional<std::array<double, 2>>> range_of(const Volume& volume,
   if (request.range) {
     const auto [low, high] = *request.range;
     if (!std::isfinite(low) || !std::isfinite(high) || low >= high) {
-      return make_error(ErrorKind::invalid, "a histogram's range must ascend");
+      return make_error(ErrorKind::invalid, "the range of a histogram must ascend");
     }
     if (request.logarithmic && low <= 0) {
       return make_error(ErrorKind::invalid, "the range of logarithmic bins must begin above 0");
@@ -117,7 +117,7 @@ std::vector<double> edges_of(const std::array<double, 2>& range, int bins, bool 
   std::vector<double> edges;
   for (int i = 0; i <= bins; ++i) {
     const double share = static_cast<double>(i) / bins;
-    // Not by the difference, which may be more than a double holds.
+    // Not by the difference, which may exceed the range of double.
     edges.push_back(logarithmic
                         ? std::exp((1 - share) * std::log(range[0]) + share * std::log(range[1]))
                         : (1 - share) * range[0] + share * range[1]);
@@ -139,7 +139,7 @@ class Binning {
   [[nodiscard]] std::size_t bin(double value) const {
     const auto last = static_cast<double>(edges_.size() - 2);
     const double near = (position(value) - low_) * per_bin_;
-    // Range of width zero: 0 / 0 is NaN, which no comparison accepts.
+    // For a range of width zero, 0 / 0 is NaN, for which all comparisons are false.
     auto at = near > 0 ? static_cast<std::size_t>(std::min(near, last)) : 0;
     while (at > 0 && value < edges_[at]) --at;
     while (at + 2 < edges_.size() && value >= edges_[at + 1] && edges_[at + 1] < edges_.back()) {
@@ -149,7 +149,8 @@ class Binning {
   }
 
  private:
-  // Halved: the difference of two finite doubles may be infinite, that of their halves is not.
+  // Halved first: the difference of two finite doubles may be infinite, that of their halves is
+  // not.
   [[nodiscard]] double position(double value) const {
     return logarithmic_ ? std::log(value) : value / 2;
   }

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double turn = 360;
 constexpr double radians_per_degree = 3.14159265358979323846 / 180;
-// Of the box's size: a place that was computed may miss its edge by rounding.
+// Relative to the size of the box: a computed position may miss the edge by rounding.
 constexpr double edge_tolerance = 1e-6;
 constexpr std::array<const char*, 3> letters{"x", "y", "z"};
 
@@ -35,7 +35,7 @@ std::string interval(const std::array<double, 2>& box, const std::string& units)
 
 Error outside(std::size_t axis, double at, const std::string& box) {
   std::string message = letters[axis];
-  message.append(" = ").append(number(at)).append(" is outside the data's box: ").append(box);
+  message.append(" = ").append(number(at)).append(" is outside the box of the data: ").append(box);
   return make_error(ErrorKind::invalid, std::move(message));
 }
 
@@ -51,7 +51,8 @@ double difference(double a, double b, bool round) {
   return std::abs(round ? std::remainder(a - b, turn) : a - b);
 }
 
-// From half a cell before the axis's least coordinate to half a cell after its greatest.
+// The range from half a cell below the least coordinate of the axis to half a cell above its
+// greatest.
 std::array<double, 2> box_of(const Axis& axis) {
   const std::vector<double>& c = axis.coordinates;
   const std::size_t n = c.size();
@@ -67,7 +68,7 @@ std::array<double, 2> box_of(const Axis& axis) {
 bool within(const std::array<double, 2>& box, double at, bool round) {
   const double slack = edge_tolerance * (box[1] - box[0]);
   if (!round) return at >= box[0] - slack && at <= box[1] + slack;
-  // The first of its turns at or beyond the box's lower end.
+  // The smallest equivalent longitude at or beyond the lower end of the box.
   const double first = box[0] - slack;
   return at + turn * std::ceil((first - at) / turn) <= box[1] + slack;
 }
@@ -84,7 +85,7 @@ Result<int> nearest_along(const Axis& axis, std::size_t letter, const std::optio
   return static_cast<int>(nearest - axis.coordinates.begin());
 }
 
-// In degrees of arc, by haversines: exact for small distances too.
+// Distance in degrees of arc, by haversines, which are exact for small distances.
 double distance(double lon_a, double lat_a, double lon_b, double lat_b) {
   const double across = std::sin((lon_a - lon_b) * radians_per_degree / 2);
   const double along = std::sin((lat_a - lat_b) * radians_per_degree / 2);
@@ -93,7 +94,7 @@ double distance(double lon_a, double lat_a, double lon_b, double lat_b) {
   return 2 * std::asin(std::sqrt(std::clamp(h, 0.0, 1.0))) / radians_per_degree;
 }
 
-// Half the way to the farthest of the column's neighbours: what may belong to its cell.
+// Half the distance to the farthest neighbour of the column: bounds its cell.
 double reach(const Columns& columns, const std::array<int, 3>& dims, int x, int y) {
   const auto at = [&](int i, int j) {
     return static_cast<std::size_t>(j) * static_cast<std::size_t>(dims[0]) +
@@ -120,11 +121,11 @@ Result<void> nearest_column(const Grid& grid, const std::array<std::optional<dou
                       static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]));
   if (!at[0]) return absent(0);
   if (!at[1]) return absent(1);
-  if (std::abs(*at[1]) > 90) return outside(1, *at[1], "latitudes are -90 to 90 degrees");
+  if (std::abs(*at[1]) > 90) return outside(1, *at[1], "latitudes must be from -90 to 90 degrees");
   double least = std::numeric_limits<double>::infinity();
   std::size_t nearest = 0;
   for (std::size_t i = 0; i < columns.latitude.size(); ++i) {
-    // No great circle is shorter than the difference in latitude.
+    // A great-circle distance is never less than the difference in latitude.
     if (std::abs(columns.latitude[i] - *at[1]) >= least) continue;
     const double d = distance(*at[0], *at[1], columns.longitude[i], columns.latitude[i]);
     if (d >= least) continue;

@@ -1,4 +1,4 @@
-// Small blocks from the heap, large ones mapped and aligned for huge pages.
+// Small blocks from the heap; large ones mapped and aligned for huge pages.
 #include "server/data/model/sample_buffer.hpp"
 
 #include <sys/mman.h>
@@ -17,11 +17,12 @@ std::shared_ptr<float> mapped(std::size_t bytes) {
   const std::size_t asked = bytes + huge_page;
   void* got = ::mmap(nullptr, asked, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (got == MAP_FAILED) throw std::bad_alloc();
-  // The part before the first huge page boundary is never touched.
+  // The part before the first huge page boundary is never accessed.
   const auto place = reinterpret_cast<std::uintptr_t>(got);
   auto* first = static_cast<std::byte*>(got) + (huge_page - place % huge_page) % huge_page;
 #ifdef MADV_HUGEPAGE
-  static_cast<void>(::madvise(first, bytes, MADV_HUGEPAGE));  // advice: without it all works
+  static_cast<void>(::madvise(first, bytes, MADV_HUGEPAGE));  // advisory: everything works without
+                                                              // it
 #endif
   return {reinterpret_cast<float*>(first), [got, asked](float*) { ::munmap(got, asked); }};
 }

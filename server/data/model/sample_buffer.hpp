@@ -10,9 +10,8 @@
 
 namespace windsplat::data {
 
-// A block of floats of fixed size. Large ones lie in huge pages where the system has them to give:
-// renderers meet all of a volume, and to map it page by page took as long as to read it. Copies are
-// of their own.
+// A block of floats of fixed size. Large blocks use huge pages where available: renderers access
+// whole volumes, and mapping them page by page took as long as reading them. Copies are deep.
 class Samples {
  public:
   Samples() = default;
@@ -44,7 +43,7 @@ class Samples {
   }
 
  private:
-  std::shared_ptr<float> memory_;  // never shared with another
+  std::shared_ptr<float> memory_;  // never shared with another buffer
   std::size_t count_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// What every reader of files does after its own part.
+// Common final steps of all readers of files.
 #include "server/data/model/source.hpp"
 
 #include "server/base/check.hpp"

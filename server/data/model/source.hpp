@@ -1,4 +1,4 @@
-// Where the values of a dataset come from: one implementation for each format.
+// Source of the values of a dataset: one implementation per format.
 #pragma once
 
 #include <cstddef>
@@ -13,24 +13,25 @@
 
 namespace windsplat::data {
 
-// How much of a read is done, from 0 to 1.
+// The fraction of a read that is done, 0 to 1.
 using Progress = std::function<void(double done)>;
 
-// Where a dataset's numbers come from: one implementation a format. Called under the store's lock
-// for that dataset, so it need not be thread-safe itself, but for cancel().
+// Source of the numbers of a dataset: one implementation per format. The store calls it under a
+// lock per dataset, so it need not be thread-safe, except for cancel().
 class Source {
  public:
   virtual ~Source() = default;
   [[nodiscard]] virtual const DatasetInfo& info() const = 0;
-  // field indexes info().fields; 0 <= step < info().steps.size().
+  // field is an index into info().fields; 0 <= step < info().steps.size().
   virtual Result<Volume> read(std::size_t field, std::size_t step) = 0;
-  // From any thread: a read in work ends soon, with cancelled, where the source can do that.
+  // May be called from any thread: a running read ends soon with the error cancelled, if the source
+  // supports this.
   virtual void cancel() {}
-  // Releases what is cached for the next read; called when the dataset is idle.
+  // Frees what is cached for the next read; called when the dataset is idle.
   virtual void release() {}
-  // Files that were opened for it besides those that its location names, as they were then.
+  // Files opened for the dataset besides those of its location, with their states at that time.
   [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }
-  // From now on called during reads, on the thread that reads.
+  // Sets a function called during reads, on the reading thread.
   virtual void on_progress(Progress progress) { progress_ = std::move(progress); }
 
  protected:
@@ -42,12 +43,12 @@ class Source {
   Progress progress_;
 };
 
-// A source that reads files. It fills memory of the caller's, so that a process apart can read into
-// memory that is shared.
+// A source that reads files. It fills memory of the caller, so that a separate process can read
+// into shared memory.
 class FileSource : public Source {
  public:
-  // All components of a field at a step, as whole arrays one after another, into `out`, which holds
-  // zeros. Masked samples become NaN; what is infinite counts as masked too (finish_volume).
+  // Reads all components of a field at a step, as consecutive arrays, into `out`, which contains
+  // zeros. Masked samples become NaN; infinite values are masked later (finish_volume()).
   virtual Result<void> fill(std::size_t field, std::size_t step, float* out) = 0;
   // fill(), then finish_volume().
   Result<Volume> read(std::size_t field, std::size_t step) override;

@@ -1,4 +1,4 @@
-// The last pass over a volume: masks, range and the number of masked samples.
+// The last pass over a volume: mask, range and number of masked samples.
 #include "server/data/model/volume.hpp"
 
 #include <algorithm>
@@ -15,9 +15,10 @@ namespace {
 constexpr float masked_value = std::numeric_limits<float>::quiet_NaN();
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-// Number of samples tested for finiteness together: a rare hit repeats the block in detail.
+// Number of samples tested for finiteness together; if one is not finite, the block is repeated
+// value by value.
 constexpr std::size_t samples_at_once = 1024;
-// Numbers that a compiler can hold in the lanes of a register, each with a result of its own.
+// As many numbers as a compiler can keep in vector lanes, each with its own partial result.
 constexpr std::size_t lanes = 16;
 
 bool are_finite(const float* values, std::size_t count) {
@@ -30,14 +31,14 @@ bool are_finite(const float* values, std::size_t count) {
   return std::all_of(zeros.begin(), zeros.end(), [](float zero) { return zero == 0; });
 }
 
-// The length of a vector by its square, which does not overflow in double.
+// The length of a vector from its squared length, which does not overflow in double.
 float length_of(double square) {
   return static_cast<float>(
       std::min(std::sqrt(square), static_cast<double>(std::numeric_limits<float>::max())));
 }
 
-// The range of a part of a volume, and its masked samples. Compared are the values of a scalar and
-// the squared lengths of a vector.
+// Range and number of masked samples of a part of a volume. Compares the values of a scalar, or the
+// squared lengths of a vector.
 struct Measured {
   double low = infinite;
   double high = -infinite;

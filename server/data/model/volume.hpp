@@ -9,13 +9,14 @@
 
 namespace windsplat::data {
 
-// One field at one step. Samples are x fastest, then y, then z; a vector's components follow each
-// other as whole arrays. A masked sample is NaN (in a vector: in every component).
+// One field at one step. Samples are x fastest, then y, then z; the components of a vector are
+// consecutive arrays. A masked sample is NaN (for a vector: in every component).
 struct Volume {
   std::array<int, 3> dims{};
-  int components = 1;  // 1 scalar, 2 a horizontal vector whose third component is zero, 3
+  int components = 1;  // 1: scalar; 2: horizontal vector, whose third component is zero; 3: vector
   Samples values;
-  std::array<float, 2> range{0, 0};  // of the values, or of a vector's magnitude; unmasked only
+  std::array<float, 2> range{0, 0};  // range of the values, or of the magnitudes of vectors;
+                                     // unmasked samples only
   std::int64_t masked = 0;
 
   [[nodiscard]] std::size_t samples() const {
@@ -28,16 +29,17 @@ struct Volume {
   [[nodiscard]] std::size_t bytes() const { return values.size() * sizeof(float); }
 };
 
-// Counts masked samples, makes a vector's mask common to its components, sets range. Readers and
-// samples call it last. Infinite values are masked too.
+// Counts masked samples, makes the mask of a vector common to its components, and sets the range.
+// Readers and samples call it last. Infinite values are masked too.
 void finish_volume(Volume& volume);
-// The two halves of it. Makes what is not finite NaN in all components; `values` as in Volume.
+// The two parts of finish_volume(). The first sets samples that are not finite to NaN in all
+// components; `values` as in Volume.
 void mask_volume(float* values, std::size_t samples, int components);
-// Sets range and masked. False if values are infinite, or NaN in some components only.
+// The second sets range and masked. False if values are infinite, or NaN in some components only.
 [[nodiscard]] bool measure_volume(Volume& volume);
 
-// |V| of a sample in double, where the square of no float overflows; clamped to what a float can
-// say.
+// Magnitude of a sample, computed in double, where squares of floats cannot overflow; clamped to
+// the range of float.
 float magnitude(const float* const* components, int count, std::size_t sample);
 
 }  // namespace windsplat::data

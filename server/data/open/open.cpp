@@ -1,4 +1,4 @@
-// Format detection by content, whatever the name. Files -> the reader of their format.
+// Detects formats by content, whatever the file name, and calls the reader of the format.
 #include "server/data/open/open.hpp"
 
 #include <array>
@@ -41,7 +41,7 @@ constexpr auto array_formats = std::to_array<ArrayFormat>({
     {dx::looks_like, dx::open},
 });
 
-// The first bytes of the file, or of a series' first one; empty if there is none.
+// The first bytes of the file, or of the first file of a series; empty if there is none.
 Result<std::string> first_bytes(Files& files) {
   if (files.location().members.empty()) return std::string();
   const auto input = files.open(files.location().members.front().name);
@@ -62,15 +62,15 @@ Result<std::unique_ptr<cf::ArrayFile>> as_arrays(Result<std::unique_ptr<File>> f
   return std::unique_ptr<cf::ArrayFile>(std::move(*file));
 }
 
-// What was named behind '#/' is there in no format but netCDF and HDF5: not to be passed over.
+// Only netCDF and HDF5 have groups; for other formats a group after '#/' must not be ignored.
 Result<void> without_group(const Files& files, const std::string& name) {
   if (files.location().inside.empty()) return {};
-  return make_error(ErrorKind::not_found, in_quotes(name) + " is of a format without groups: " +
+  return make_error(ErrorKind::not_found, in_quotes(name) + " has a format without groups: " +
                                               in_quotes("#/" + files.location().inside) +
-                                              " names nothing in it");
+                                              " does not exist");
 }
 
-// A file of arrays, by its first bytes.
+// Opens a file of arrays by its first bytes.
 Result<std::unique_ptr<cf::ArrayFile>> open_arrays(const std::shared_ptr<Files>& files,
                                                    const std::string& name) {
   auto input = files->open(name);
@@ -88,7 +88,7 @@ Result<std::unique_ptr<cf::ArrayFile>> open_arrays(const std::shared_ptr<Files>&
   }
   if (raw::is_json(*head)) {
     return (*input)->fault(
-        "is JSON, but not a description of raw files: that has \"windsplat\": \"raw\" among its "
+        "is JSON, but not a description of raw files, which has \"windsplat\": \"raw\" in its "
         "first 4096 bytes");
   }
   return as_arrays(netcdf::File::open(std::move(*input), files->location().inside));
@@ -118,7 +118,7 @@ SourceResult open_by_content(const std::shared_ptr<Files>& files) {
   if (zarr::is_store(*files)) return source_of(*files, zarr::Store::open(files));
   if (files->location().kind == Location::Kind::folder) {
     return make_error(ErrorKind::bad_data,
-                      in_quotes(files->location().stem) + " is a directory, and not a Zarr store");
+                      in_quotes(files->location().stem) + " is a directory, but not a Zarr store");
   }
   if (files->location().kind == Location::Kind::series) return open_series(files);
   return source_of(*files, open_arrays(files, files->location().members.front().name));
@@ -134,10 +134,10 @@ SourceResult open_dataset(const std::shared_ptr<Files>& files) {
     if (const auto ok = check_axes((*source)->info().grid); !ok) {
       return make_error(ErrorKind::bad_data, shown + ": " + ok.error().message);
     }
-    files->stop_counting();  // a series or store may go on to open any number
+    files->stop_counting();  // a series or store may open any number of files later
     return source;
   } catch (const std::bad_alloc&) {
-    return make_error(ErrorKind::out_of_memory, "no memory to open " + shown);
+    return make_error(ErrorKind::out_of_memory, "not enough memory to open " + shown);
   } catch (const std::exception& fault) {
     return make_error(ErrorKind::internal,
                       "opening " + shown + " failed: " + printable(fault.what()));

@@ -1,4 +1,4 @@
-// One map of resident volumes, one list in order of use.
+// A map of resident volumes, and a list in order of use.
 #include "server/data/resident/budget.hpp"
 
 #include <algorithm>
@@ -107,7 +107,7 @@ bool Budget::has(const ResidentKey& key) const {
 
 void Budget::request_prefetch(std::uint64_t owner, const std::vector<ResidentKey>& keys) {
   const std::lock_guard lock(mutex_);
-  // Removing prefetch requests needs no memory: destructors do it.
+  // Removing prefetch requests needs no memory, because destructors do it.
   if (const auto before = requests_.find(owner); before != requests_.end()) {
     for (const ResidentKey& key : before->second) requested_.erase(requested_.find(key));
     requests_.erase(before);
@@ -115,7 +115,7 @@ void Budget::request_prefetch(std::uint64_t owner, const std::vector<ResidentKey
   if (keys.empty()) return;
   std::multiset<ResidentKey> requested(keys.begin(), keys.end());
   requests_.emplace(owner, keys);
-  requested_.merge(requested);  // both or none, should memory fail
+  requested_.merge(requested);  // insert both or none if allocation fails
 }
 
 std::uint64_t Budget::bytes_of(std::uint64_t owner) const {
@@ -189,7 +189,7 @@ void Budget::drop(std::list<ResidentKey>::iterator listed) {
   recent_.erase(listed);
 }
 
-// No longer listed, but counted until released.
+// No longer listed, but counted until the last reference is released.
 void Budget::drop_held(std::list<ResidentKey>::iterator listed) {
   Entry& entry = *entries_.find(*listed)->second;
   entry.exit.front().held = entry.answer->value();
@@ -270,7 +270,7 @@ std::uint64_t Budget::bytes_of_pins(const OwnPins& own) const {
   return bytes;
 }
 
-// The least recently used first, until their release makes enough room.
+// Evicts the least recently used first, until enough room is free.
 void Budget::take_off_list(std::uint64_t bytes, const OwnPins& own) {
   std::uint64_t coming = bytes_max_ - std::min(used_, bytes_max_) + evictable_for(Urgency::demand);
   for (const Leaving& one : leaving_) coming += one.bytes;
@@ -306,7 +306,7 @@ void Budget::list_again() {
   }
 }
 
-// While a load in turn waits, others get only the room beyond its needs.
+// While a load in turn waits, other loads get only the room that it does not need.
 bool Budget::make_room_beside_turn(std::uint64_t bytes, Urgency urgency) {
   if (!in_turn_waits_) return make_room(bytes, urgency);
   const bool fits = turn_needs_ <= bytes_max_ && bytes <= bytes_max_ - turn_needs_;
@@ -317,7 +317,7 @@ bool Budget::make_room_beside_turn(std::uint64_t bytes, Urgency urgency) {
 
 bool Budget::wait_for_room(std::uint64_t bytes, const OwnPins& own, const CancelToken* cancel,
                            std::unique_lock<std::mutex>& lock) {
-  // Use counts send no notification: poll them.
+  // Reference counts send no notifications, so they are polled.
   constexpr std::chrono::milliseconds look_every{5};
   using Clock = std::chrono::steady_clock;
   std::uint64_t released_before = released_total_;
@@ -342,7 +342,7 @@ bool Budget::wait_for_room(std::uint64_t bytes, const OwnPins& own, const Cancel
       changed = Clock::now();
     }
     if (Clock::now() - changed > patience) break;
-    // Resident data stay listed where only reservations prevent the load.
+    // Resident volumes stay listed if only reservations prevent the load.
     if (needs + reserved_ <= bytes_max_) take_off_list(bytes, own);
     arrived_.wait_for(lock, look_every);
   }
@@ -363,7 +363,8 @@ bool Budget::make_room(std::uint64_t bytes, Urgency urgency) {
   if (used_ - evictable_for(urgency) > bytes_max_ - bytes) {
     return false;
   }
-  // First what can be recomputed without the file, then unrequested volumes, then the rest.
+  // Evicts first what can be recomputed without the file, then volumes without prefetch requests,
+  // then the rest.
   using Rule = bool (*)(const Budget&, const ResidentKey&);
   constexpr std::array<Rule, 3> rules{
       [](const Budget& self, const ResidentKey& key) {
@@ -405,7 +406,7 @@ Result<void> Reservation::take(std::uint64_t bytes, Urgency urgency, const OwnPi
   }
   if (!there_is_room) {
     ++budget_->counts_.refusals;
-    return budget_->no_room("what is beside the fields", bytes);
+    return budget_->no_room("memory other than fields", bytes);
   }
   set(bytes);
   return {};
@@ -429,7 +430,7 @@ Result<void> Reservation::resize(std::uint64_t bytes, Urgency urgency) {
       !(in_turn &&
         budget_->wait_for_room(bytes - bytes_, budget_->turn_.own, budget_->turn_.cancel, lock))) {
     ++budget_->counts_.refusals;
-    return budget_->no_room("what is beside the fields", bytes - bytes_);
+    return budget_->no_room("memory other than fields", bytes - bytes_);
   }
   set(bytes);
   return {};

@@ -1,6 +1,6 @@
 // The memory limit, shared by the datasets of a store: resident volumes and their averages, and
 // what loaders and large pictures reserve. A load reserves its bytes first; the least recently used
-// volume is evicted when room is needed.
+// volumes are evicted if room is needed.
 #pragma once
 
 #include <chrono>
@@ -24,7 +24,7 @@
 
 namespace windsplat::data {
 
-// Key of a resident volume: the dataset's number in the budget, field, step and variant (empty: as
+// Key of a resident volume: number of the dataset in the budget, field, step and variant (empty: as
 // loaded).
 using ResidentKey = std::tuple<std::uint64_t, std::size_t, std::size_t, std::string>;
 using Resident = std::shared_ptr<const void>;
@@ -35,7 +35,7 @@ enum class Urgency {
   prefetch,  // needed soon: volumes with prefetch requests are not evicted
 };
 
-// What the caller of get() references itself, and so cannot wait for.
+// References held by the caller of get() itself, for whose release it cannot wait.
 using OwnPins = std::multiset<const void*>;
 
 struct BudgetCounts {
@@ -44,15 +44,16 @@ struct BudgetCounts {
   std::uint64_t hits = 0;       // found resident
   std::uint64_t misses = 0;     // had to be loaded or computed
   std::uint64_t evictions = 0;  // volumes evicted to make room
-  std::uint64_t refusals = 0;   // loads without room
-  std::uint64_t reads = 0;      // volumes read from a source, and of these
+  std::uint64_t refusals = 0;   // loads that failed for lack of room
+  std::uint64_t reads = 0;      // volumes read from a source, and how many of them were prefetched
   std::uint64_t reads_failed = 0;
 };
 
-// How messages name the limit.
+// The name of the limit in messages.
 struct LimitName {
   std::string text = "the memory limit";
-  // The same for at least so many bytes of data; nullopt: the limit is not configurable.
+  // The limit that would leave so many bytes for data, as it is configured; nullopt: not
+  // configurable.
   std::function<std::string(std::uint64_t bytes)> raised = nullptr;
 };
 
@@ -67,13 +68,13 @@ class Budget {
   std::uint64_t next_owner();
 
   // The volume under `key`, or the result of `make`, which takes `bytes` bytes. At most one caller
-  // runs `make` for a key; others wait and get the same result. A failure is not remembered. Where
-  // there is no room, in_turn unlists referenced volumes, so that they gain no new references, and
-  // waits for their release; meanwhile others get room only if all of it fits together. It fails at
-  // once where `own` and lasting reservations leave too little, after `reservation_patience` where
-  // temporary ones do, else when nothing was released for `patience`; volumes still referenced then
-  // are listed again. `cancel` ends the wait for room. Errors: out_of_memory, cancelled, those of
-  // `make`.
+  // runs `make` for a key; others wait and get the same result. Failures are not cached.
+  // If there is no room, in_turn unlists referenced volumes, so that they gain no new references,
+  // and waits for their release; meanwhile other loads get room only if everything fits together.
+  // It fails at once if `own` and lasting reservations leave too little, after
+  // `reservation_patience` if temporary reservations do, otherwise if nothing was released for
+  // `patience`; volumes still referenced are then listed again. `cancel` ends the wait for room.
+  // Errors: out_of_memory, cancelled, those of `make`.
   Result<Resident> get(const ResidentKey& key, std::uint64_t bytes, Urgency urgency,
                        const Make& make, const OwnPins& own = {},
                        const CancelToken* cancel = nullptr);
@@ -92,19 +93,19 @@ class Budget {
   // Drops all volumes of a removed dataset; those referenced count until released.
   void forget(std::uint64_t owner);
   void count_read(bool ok);
-  // Ends all waits for room: later calls return what is resident or an error.
+  // Ends all waits for room: later calls return resident volumes or an error.
   void end();
   [[nodiscard]] BudgetCounts counts() const;
-  // Upper bound of a demand at present: free bytes and those that can be evicted.
+  // Upper bound of a request that can be met now: free bytes and those that can be evicted.
   [[nodiscard]] std::uint64_t room() const;
   [[nodiscard]] std::uint64_t bytes_max() const { return bytes_max_; }
   [[nodiscard]] const LimitName& name() const { return name_; }
   // "--memory-limit 192M leaves 68.0 MiB for data"
   [[nodiscard]] std::string limit_text() const;
 
-  // Longer than the slowest frames that reference a volume during rendering.
+  // Longer than the slowest frames, which reference volumes during rendering.
   static constexpr std::chrono::seconds patience{20};
-  // Loaders of other datasets and large pictures end within moments or not soon.
+  // Loaders of other datasets and large pictures end either within moments or not soon.
   static constexpr std::chrono::seconds reservation_patience{12};
 
  private:
@@ -113,7 +114,7 @@ class Budget {
     ResidentKey key;
     std::weak_ptr<const void> held;
     std::uint64_t bytes = 0;
-    bool in_the_way = false;  // removed for a load in turn, not because the dataset was removed
+    bool in_the_way = false;  // unlisted for a load in turn, not because the dataset was removed
   };
   struct Entry {
     std::uint64_t bytes = 0;
@@ -130,7 +131,7 @@ class Budget {
   void touch(Entry& entry);
   void drop(std::list<ResidentKey>::iterator listed);
   void drop_held(std::list<ResidentKey>::iterator listed);
-  // No reference can be added from outside while the lock is held, so a count of one is stable.
+  // No reference can be added from outside while the lock is held, so a use count of one is stable.
   [[nodiscard]] static bool is_held(const Entry& entry) {
     return entry.answer->value().use_count() > 1;
   }
@@ -151,7 +152,7 @@ class Budget {
   void take_off_list(std::uint64_t bytes, const OwnPins& own);
   [[nodiscard]] std::uint64_t bytes_of_pins(const OwnPins& own) const;
   void count_released();
-  [[nodiscard]] std::uint64_t released() const;  // of those that are leaving
+  [[nodiscard]] std::uint64_t released() const;  // bytes released of the volumes in leaving_
   [[nodiscard]] Error no_room(const char* what, std::uint64_t bytes) const;
 
   const std::uint64_t bytes_max_;
@@ -162,19 +163,19 @@ class Budget {
   std::map<ResidentKey, std::shared_ptr<Entry>> entries_;
   std::list<ResidentKey> recent_;  // most recently used first
   std::map<std::uint64_t, std::vector<ResidentKey>> requests_;
-  std::multiset<ResidentKey> requested_;  // of all owners
+  std::multiset<ResidentKey> requested_;  // requests of all owners
   std::list<Leaving> leaving_;
   std::uint64_t used_ = 0;            // total: listed, in construction, leaving and reserved
-  std::uint64_t reserved_ = 0;        // of this by Reservations
-  std::uint64_t lasting_ = 0;         // of these by lasting ones
-  std::uint64_t released_total_ = 0;  // by what was leaving, ever
+  std::uint64_t reserved_ = 0;        // part of used_ that is held by Reservations
+  std::uint64_t lasting_ = 0;         // part of reserved_ that is held by lasting ones
+  std::uint64_t released_total_ = 0;  // bytes released from leaving_ so far
   bool in_turn_waits_ = false;
-  std::uint64_t turn_needs_ = 0;  // while it waits: all that it holds and wants, and what others
-                                  // got beside it
-  // The thread that loads in turn, whose reservations wait for room as its load did.
+  std::uint64_t turn_needs_ = 0;  // during the wait: all that the load holds and needs, and what
+                                  // others got meanwhile
+  // The thread that loads in turn; its reservations wait for room as its load does.
   struct Turn {
     std::thread::id thread;
-    std::uint64_t bytes = 0;  // of the volume in construction
+    std::uint64_t bytes = 0;  // size of the volume in construction
     OwnPins own;
     const CancelToken* cancel = nullptr;
   } turn_;
@@ -186,8 +187,8 @@ class Budget {
 class Reservation {
  public:
   enum class Term {
-    temporary,  // for a task: a load in turn waits for its end
-    lasting,    // as long as a dataset
+    temporary,  // temporary: a load in turn waits for its end
+    lasting,    // lasting: as long as a dataset
   };
   explicit Reservation(std::shared_ptr<Budget> budget = nullptr, Term term = Term::temporary)
       : budget_(std::move(budget)), term_(term) {}
@@ -200,23 +201,23 @@ class Reservation {
   // cancelled.
   Result<void> take(std::uint64_t bytes, Urgency urgency, const OwnPins& own,
                     const CancelToken* cancel);
-  // Changes the size. Errors: out_of_memory, where evicting unreferenced volumes (`ahead`: those
-  // without prefetch requests) does not make room; the size stays. Waits as Budget::get() does when
-  // called within a load in turn. Always succeeds without a budget.
+  // Changes the size. Errors: out_of_memory if evicting unreferenced volumes (`ahead`: those
+  // without prefetch requests) does not make room; the size is then unchanged. Waits as
+  // Budget::get() does if called within a load in turn. Always succeeds without a budget.
   Result<void> resize(std::uint64_t bytes, Urgency urgency = Urgency::demand);
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
-  void set(std::uint64_t bytes);  // with the budget's mutex held
+  void set(std::uint64_t bytes);  // requires the mutex of the budget
   std::shared_ptr<Budget> budget_;
   Term term_;
   std::uint64_t bytes_ = 0;
 };
 
-// For messages: in MiB.
+// Formats bytes in MiB, for messages.
 std::string megabytes(std::uint64_t bytes);
 
-// The variant of a key under which a volume's packed twin is kept.
+// The variant of a key under which the packed form of a volume is cached.
 inline constexpr const char* packed_variant = "packed16";
 
 }  // namespace windsplat::data

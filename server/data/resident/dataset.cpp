@@ -70,7 +70,7 @@ struct Dataset::State {
     }
     if (step >= info.steps.size()) {
       return make_error(ErrorKind::not_found, "dataset " + in_quotes(info.id) + " has no step " +
-                                                  std::to_string(step) + "; its last is " +
+                                                  std::to_string(step) + "; its last step is " +
                                                   std::to_string(info.steps.size() - 1));
     }
     return static_cast<std::size_t>(found - info.fields.data());
@@ -98,7 +98,7 @@ struct Dataset::State {
   }
 
   // Measured upper bound of the memory of a loader, in addition to the volumes, while it reads
-  // these fields. Chunks needed again are cached, 128 MiB in all or one chunk.
+  // these fields. Chunks that are needed again are cached, up to 128 MiB or one chunk.
   [[nodiscard]] std::uint64_t reading_bytes(const std::vector<std::string>& fields) const {
     constexpr std::uint64_t mib = std::uint64_t{1} << 20;
     std::uint64_t bytes = 32 * mib;
@@ -117,7 +117,7 @@ struct Dataset::State {
                                                    std::to_string(step) + " is not in memory yet");
   }
 
-  // Reads the volume from its source, or restores it from its packed form.
+  // Reads the volume from its source, or unpacks it.
   Result<Resident> load(std::size_t field, std::size_t step, Urgency urgency) {
     const ResidentKey twin{owner, field, step, packed_variant};
     if (const Resident packed = budget->find_now(twin)) {
@@ -128,7 +128,7 @@ struct Dataset::State {
     }
     auto volume = read(field, step, urgency);
     if (volume && storage == Storage::packed16) {
-      // Where it does not fit, only the volume itself is kept.
+      // If the packed form does not fit too, only the volume itself is kept.
       (void)budget->get(twin, values(field) * sizeof(std::uint16_t), Urgency::prefetch,
                         [&] { return pack_volume(field, *volume); });
     }
@@ -179,7 +179,7 @@ struct Dataset::State {
   Result<Resident> pack_volume(std::size_t field, const Resident& volume) {
     auto packed = pack(*std::static_pointer_cast<const Volume>(volume));
     if (!packed) {
-      return make_error(ErrorKind::invalid, "the values lie too far apart to be packed");
+      return make_error(ErrorKind::invalid, "the range of values is too large for packing");
     }
     const std::lock_guard lock(mutex);
     for (int c = 0; c < packed->components; ++c) {
@@ -201,7 +201,7 @@ struct Dataset::State {
       return make_error(ErrorKind::out_of_memory,
                         "the machine has no memory left for " + in_quotes(info.fields[field].name));
     } catch (const std::exception& fault) {
-      // The text of an internal error is for the log only: it may name source locations.
+      // The text of an internal error is logged only, because it may contain source locations.
       log::error("loading failed", {{"field", info.fields[field].name}, {"fault", fault.what()}});
       return make_error(ErrorKind::internal,
                         "loading " + in_quotes(info.fields[field].name) + " failed");
@@ -217,17 +217,17 @@ struct Dataset::State {
   DatasetInfo info;
   std::shared_ptr<Budget> budget;
   const std::uint64_t owner;
-  Reservation charged;  // for the info
+  Reservation charged;  // memory of the info
   const Storage storage;
-  Turnstile turnstile;  // to the source
+  Turnstile turnstile;  // guards the source
 
-  mutable std::mutex mutex;  // of all below
+  mutable std::mutex mutex;  // guards all members below
   Counts counts;
   std::optional<Loading> loading;
   bool ended = false;
   bool forgotten = false;
-  std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // by field and step
-  std::map<std::size_t, float> errors;                       // by field, of packing
+  std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // keyed by field and step
+  std::map<std::size_t, float> errors;                       // packing errors, by field
   std::deque<std::pair<std::string, std::vector<double>>> remembered;
   std::string kept_key;
   std::any kept_value;
@@ -306,7 +306,7 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
   }
-  // Referenced first, so that the volume is not evicted before the level is made of it.
+  // Keep a reference, so that the volume is not evicted before the level is computed from it.
   const auto fine = volume(field, step);
   if (!fine) {
     return fine.error();
@@ -315,7 +315,7 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     state_->add(&Counts::averages);
     return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
   });
-  if (own_) own_->erase(own_->find(fine->get()));  // not yet shared
+  if (own_) own_->erase(own_->find(fine->get()));  // the volume is not yet shared
   return level;
 }
 
@@ -437,7 +437,7 @@ std::string Dataset::beyond_limit(const std::vector<std::string>& fields) const 
     }
     text += " need " + megabytes(bytes) + " together: ";
   }
-  return text + budget.name().raised(all) + " would do";
+  return text + budget.name().raised(all) + " would suffice";
 }
 
 Error Dataset::with_need(Error error, const std::vector<std::string>& fields) const {
@@ -447,7 +447,7 @@ Error Dataset::with_need(Error error, const std::vector<std::string>& fields) co
 
 Result<void> Dataset::charge_info() {
   constexpr std::uint64_t free_bytes = std::uint64_t{1} << 20;
-  constexpr std::uint64_t copies = 2;  // the source has its own
+  constexpr std::uint64_t copies = 2;  // the source has a copy
   const std::uint64_t bytes = copies * bytes_of(state_->info);
   if (bytes <= free_bytes) return {};
   return state_->charged.resize(bytes);

@@ -21,19 +21,19 @@ namespace windsplat::data {
 // How volumes stay in memory.
 enum class Storage {
   float32,
-  packed16,  // 16 bits a value, unpacked for rendering (packed.hpp)
+  packed16,  // 16 bits per value, unpacked for rendering (packed.hpp)
 };
 
-// One opened dataset. A handle: copies are the same dataset. Thread-safe.
+// One opened dataset. A handle: copies refer to the same dataset. Thread-safe.
 class Dataset {
  public:
   Dataset(std::unique_ptr<Source> source, std::string id, std::uint64_t bytes_max);
-  // Shares the budget of a store's other datasets.
+  // Shares the budget with the other datasets of a store.
   Dataset(std::unique_ptr<Source> source, std::string id, std::shared_ptr<Budget> budget,
           Storage storage = Storage::float32);
 
   [[nodiscard]] const DatasetInfo& info() const;
-  // Unique while it is held; distinguishes successive datasets of one id.
+  // Unique among the handles in existence; distinguishes successive datasets with one id.
   [[nodiscard]] std::shared_ptr<const DatasetInfo> shared_info() const;
 
   // The field at the step; loads it if it is not resident. Volumes held by a caller stay valid.
@@ -42,37 +42,37 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
 
   // The field at the step, averaged to a coarser level on first need. The level is shared and
-  // counted in the memory limit; the volume itself need not stay resident for it. Concurrent
-  // callers wait for one averaging. Level zero is the volume itself. Errors: those of volume();
-  // out_of_memory also where there is room for the volume but not for its level beside it.
+  // counts in the memory limit; the volume itself need not stay resident for it. Concurrent callers
+  // wait for one computation. Level zero is the volume itself. Errors: those of volume();
+  // out_of_memory also if there is room for the volume but not for its level in addition.
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 
   // A handle that never loads, averages or waits: absent volumes yield the error not_resident.
   [[nodiscard]] Dataset resident_only() const;
-  // A handle that waits for room that others occupy (Budget::get(), in_turn), for one thread at a
-  // time among all datasets that share a budget, so that each in turn gets all it needs. `cancel`
-  // ends its waits for room, with the error cancelled.
+  // A handle that waits for room used by others (Budget::get(), in_turn). Only one thread at a
+  // time, among all datasets that share a budget, so that each gets all the room it needs. `cancel`
+  // ends its waits for room with the error cancelled.
   [[nodiscard]] Dataset in_turn(const CancelToken& cancel = {}) const;
-  // A handle for prefetching: it yields to demanded loads and does not evict volumes with prefetch
-  // requests.
+  // A handle for prefetching: it gives precedence to demanded loads and does not evict volumes with
+  // prefetch requests.
   [[nodiscard]] Dataset prefetching() const;
-  // Reserves so many bytes of working memory beside the volumes while the result lives. A handle
-  // in_turn() waits for room; others get only room beside a waiting one. Errors: out_of_memory,
-  // cancelled.
+  // Reserves so many bytes of working memory in addition to the volumes while the result lives. A
+  // handle in_turn() waits for room; meanwhile others get only the room that it does not need.
+  // Errors: out_of_memory, cancelled.
   [[nodiscard]] Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) const;
-  // The keys under which level() stores its result and the volume it is made of; none: no such
-  // field or step.
+  // The keys under which level() stores its result and the original volume; empty: no such field or
+  // step.
   [[nodiscard]] std::vector<ResidentKey> keys_of(const std::string& field, std::size_t step,
                                                  const Coarsening& how) const;
 
-  // A cached value derived from this dataset that is slow to recompute; each new value replaces the
-  // last. Empty unless stored under this key.
+  // A single cached value that is derived from this dataset and slow to recompute; a new value
+  // replaces the last. Empty unless stored under this key.
   [[nodiscard]] std::any kept(const std::string& key) const;
   void keep(std::string key, std::any value);
 
-  // A few numbers derived from the data and identified by `key`: computed at most once while the
-  // last 256 keys are cached, so that the volumes need not stay resident. A failure is not cached.
+  // A few numbers derived from the data and identified by `key`: computed once and cached (the last
+  // 256 keys), so that the volumes need not stay resident. Failures are not cached.
   Result<std::vector<double>> remembered(const std::string& key,
                                          const std::function<Result<std::vector<double>>()>& make);
 
@@ -85,10 +85,10 @@ class Dataset {
   // see loading().
   void end();
 
-  // Frees the source's read caches if there was no read for so long.
+  // Frees the read caches of the source if nothing was read for so long.
   void release_idle(double idle_s);
 
-  // Range and masked count of a field at a step loaded before; none: never loaded.
+  // Range and masked count of a field at a step that was loaded before; nullopt: never loaded.
   struct Seen {
     std::array<float, 2> range{};
     std::int64_t masked = 0;
@@ -97,7 +97,7 @@ class Dataset {
 
   struct Counts {
     std::uint64_t loads = 0;       // volumes read from the source
-    std::uint64_t prefetched = 0;  // of these, before the first request
+    std::uint64_t prefetched = 0;  // number of loads before the first request
     std::uint64_t averages = 0;    // levels averaged
     std::uint64_t unpacked = 0;    // volumes restored from their packed form
     std::uint64_t failures = 0;    // reads that failed
@@ -111,21 +111,21 @@ class Dataset {
   struct Loading {
     std::string field;
     std::size_t step = 0;
-    double done = 0;  // 0 to 1
+    double done = 0;  // fraction, 0 to 1
   };
   [[nodiscard]] std::optional<Loading> loading() const;
 
-  // Errors: out_of_memory, where one of the fields cannot be loaded at a step even alone: states
-  // what all of them need and the limit that would suffice.
+  // Errors: out_of_memory if one of the fields cannot be loaded at a step even alone: states the
+  // memory that all of them need and the limit that would suffice.
   [[nodiscard]] Result<void> check_room(const std::vector<std::string>& fields) const;
-  // Suffix of a message where the limit leaves no room for these fields together at a step: "; ..."
-  // with what they need and the limit that would suffice. Empty where they fit, and where the limit
+  // Suffix of a message if the limit leaves no room for these fields together at a step: "; ..."
+  // with the memory they need and the limit that would suffice. Empty if they fit, or if the limit
   // is not configurable.
   [[nodiscard]] std::string beyond_limit(const std::vector<std::string>& fields) const;
-  // Appends it to an out_of_memory error; other errors are unchanged.
+  // Appends the suffix to an out_of_memory error; other errors are unchanged.
   [[nodiscard]] Error with_need(Error error, const std::vector<std::string>& fields) const;
 
-  // Counts metadata of the dataset, steps and positions, in the memory limit if they exceed one
+  // Counts metadata of the dataset (steps and positions) in the memory limit if they exceed one
   // megabyte. Errors: out_of_memory.
   Result<void> charge_info();
 
@@ -146,8 +146,8 @@ class Dataset {
 
   std::shared_ptr<State> state_;
   Manner manner_ = Manner::demand;
-  std::shared_ptr<OwnPins> own_;       // of in_turn: volumes it returned
-  std::optional<CancelToken> cancel_;  // of in_turn
+  std::shared_ptr<OwnPins> own_;       // for handles in_turn(): volumes they returned
+  std::optional<CancelToken> cancel_;  // for handles in_turn()
 };
 
 }  // namespace windsplat::data

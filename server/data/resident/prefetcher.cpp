@@ -1,4 +1,5 @@
-// Owners in turn, the earliest request of each first; failed requests wait for new ones.
+// Serves owners round-robin, the earliest request of each first; after a failure an owner waits for
+// new requests.
 #include "server/data/resident/prefetcher.hpp"
 
 #include <algorithm>
@@ -26,7 +27,7 @@ struct Prefetcher::State {
       if (stopping) return;
       const std::uint64_t owner = next_owner();
       Queue& queue = queues[owner];
-      const std::uint64_t said = queue.said;
+      const std::uint64_t version = queue.version;
       std::optional<PrefetchRequest> request = std::move(queue.requests.front());
       queue.requests.pop_front();
       if (queue.requests.empty()) queues.erase(owner);
@@ -34,13 +35,14 @@ struct Prefetcher::State {
       const bool full = !load(*request);
       request.reset();
       lock.lock();
-      // No room for this one: there is none for the later ones either, until others are said.
+      // If there is no room for this request, there is none for the later ones, until they are
+      // replaced.
       const auto rest = queues.find(owner);
-      if (full && rest != queues.end() && rest->second.said == said) queues.erase(rest);
+      if (full && rest != queues.end() && rest->second.version == version) queues.erase(rest);
     }
   }
 
-  // The one after the last, in a ring.
+  // The owner after the last one served, in cyclic order.
   std::uint64_t next_owner() {
     auto next = queues.upper_bound(last);
     if (next == queues.end()) next = queues.begin();
@@ -48,12 +50,12 @@ struct Prefetcher::State {
     return last;
   }
 
-  // False: allocation failed.
+  // Returns false if an allocation failed.
   static bool load(const PrefetchRequest& request) noexcept {
     try {
       return try_to_load(request);
     } catch (const std::exception&) {
-      log::error("loading ahead failed");  // without its words: there may be no memory for them
+      log::error("prefetch failed");  // no details: there may be no memory for them
       return false;
     }
   }
@@ -66,10 +68,10 @@ struct Prefetcher::State {
     const bool given_up = error.kind == ErrorKind::not_resident ||
                           error.kind == ErrorKind::not_found || error.kind == ErrorKind::draining;
     if (!given_up) {
-      log::debug("loading ahead failed", {{"dataset", request.dataset.info().id},
-                                          {"field", request.field},
-                                          {"step", request.step},
-                                          {"error", error.message}});
+      log::debug("prefetch failed", {{"dataset", request.dataset.info().id},
+                                     {"field", request.field},
+                                     {"step", request.step},
+                                     {"error", error.message}});
     }
     return true;
   }
@@ -78,14 +80,14 @@ struct Prefetcher::State {
   std::mutex mutex;
   std::condition_variable wake;
   struct Queue {
-    std::deque<PrefetchRequest> requests;  // not yet loaded; never empty
-    std::uint64_t said = 0;                // distinguishes it from later requests of the owner
+    std::deque<PrefetchRequest> requests;  // requests that are not yet loaded; never empty
+    std::uint64_t version = 0;             // distinguishes them from later requests of the owner
   };
-  std::map<std::uint64_t, Queue> queues;  // by owner
-  std::uint64_t said = 0;
+  std::map<std::uint64_t, Queue> queues;  // keyed by owner
+  std::uint64_t version = 0;
   std::uint64_t last = 0;
   bool stopping = false;
-  std::thread thread;  // last: it uses all of the above
+  std::thread thread;  // last member: the thread uses all of the above
 };
 
 Prefetcher::Prefetcher(std::shared_ptr<Budget> budget)
@@ -101,7 +103,7 @@ Prefetcher::~Prefetcher() {
 }
 
 void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
-  if (requests.empty()) {  // as destructors say it: without memory, which an empty deque has
+  if (requests.empty()) {  // without allocation, as destructors require
     state_->budget->request_prefetch(owner, {});
     const std::lock_guard lock(state_->mutex);
     state_->queues.erase(owner);
@@ -122,7 +124,7 @@ void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchReque
     if (absent.empty()) {
       state_->queues.erase(owner);
     } else {
-      state_->queues[owner] = {std::move(absent), ++state_->said};
+      state_->queues[owner] = {std::move(absent), ++state_->version};
     }
   }
   state_->wake.notify_one();

@@ -12,13 +12,13 @@ namespace windsplat::data {
 class Prefetcher {
  public:
   explicit Prefetcher(std::shared_ptr<Budget> budget);
-  ~Prefetcher();  // ends after the load in work
+  ~Prefetcher();  // ends after the running load
   Prefetcher(const Prefetcher&) = delete;
   Prefetcher& operator=(const Prefetcher&) = delete;
 
-  // See Store::wish.
+  // See Store::request_prefetch().
   void request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests);
-  // Stops loading for a dataset.
+  // Stops prefetching for a dataset.
   void forget(const DatasetInfo& info);
 
  private:

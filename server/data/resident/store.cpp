@@ -50,20 +50,20 @@ struct Store::State {
 
   struct Entry {
     DatasetPtr dataset;
-    std::string key;  // of its files, or the sample's name
+    std::string key;  // key of its files, or the name of the sample
     std::optional<Location> location;
     std::vector<Companion> companions;
-    std::string listed;   // of a series: the folder's stamp at the last pattern match
-    std::string stamp;    // of the files when opened
-    std::string refused;  // stamp with which reopening failed
+    std::string listed;   // for a series: stamp of the folder at the last match of its pattern
+    std::string stamp;    // stamp of the files when opened
+    std::string refused;  // stamp at which reopening failed
     std::string problem;
     std::string note;
   };
   struct FailedEntry {
     std::string named;
-    std::string key;                   // of its files at the last scan
-    std::optional<std::string> tried;  // their stamp then; none: they are to be tried at any rate
-    Clock::time_point retry_at;        // whether the stamp has changed or not
+    std::string key;                   // key of its files at the last scan
+    std::optional<std::string> tried;  // their stamp at that time; nullopt: retry in any case
+    Clock::time_point retry_at;        // retry even if the stamp is unchanged
     Failed listed;
   };
 
@@ -84,7 +84,7 @@ struct Store::State {
                                  [&](const FailedEntry& one) { return one.listed.id == id; });
     return at == failed.end() ? nullptr : &*at;
   }
-  // `key`: of a failed dataset that is replaced, so that its id is free; empty: none.
+  // `key`: that of a failed dataset that is replaced, whose id becomes free; empty: none.
   [[nodiscard]] std::string unique_id(const std::string& wanted, const std::string& key) {
     std::string id = wanted;
     const auto is_taken = [&] {
@@ -95,7 +95,7 @@ struct Store::State {
     return id;
   }
 
-  // Called without the mutex. Must not allocate: the daemon ends when allocation fails here.
+  // Called without the mutex. Must not allocate: an allocation failure here would end the daemon.
   [[nodiscard]] DatasetPtr one_that_reads() const {
     const std::lock_guard lock(mutex);
     const auto at = std::find_if(entries.begin(), entries.end(),
@@ -117,8 +117,8 @@ struct Store::State {
                  failed.end());
   }
 
-  // The dataset of `key`, opened by at most one caller at a time. `failed_id`: of a failed dataset
-  // that is retried, which may be removed meanwhile; empty: none.
+  // The dataset of `key`, opened by at most one caller at a time. `failed_id`: id of a failed
+  // dataset that is retried, which may be removed meanwhile; empty: none.
   template <class Open>
   Result<Added> add(const std::string& key, const std::string& wanted_id,
                     std::optional<Location> location, const Open& open,
@@ -145,7 +145,7 @@ struct Store::State {
       usable = make_error(ErrorKind::not_found, "it is no longer listed");
     }
     if (!usable) {
-      lock.unlock();  // its loader ends with it
+      lock.unlock();  // outside the lock: the loader of `usable` ends with it
       return usable.error();
     }
     unlist_failed(key);
@@ -155,17 +155,17 @@ struct Store::State {
   }
 
   struct Opened {
-    Entry entry;  // without a dataset
+    Entry entry;  // an entry without dataset
     std::unique_ptr<Source> source;
   };
-  // Does not throw: other threads wait for the key.
+  // Does not throw: other threads wait for this key.
   template <class Open>
   static Result<Opened> open_entry(const std::string& key, std::optional<Location> location,
                                    const Open& open) {
     try {
       Opened out;
       out.entry.key = key;
-      // Stamp taken before reading, so that changes during the read are detected.
+      // The stamp is taken before reading, so that changes during the read are detected.
       FileStamp before;
       if (location) {
         before = stamp_of_all(*location, {});
@@ -187,9 +187,9 @@ struct Store::State {
     }
   }
 
-  // Retries failed datasets: when their files have changed and are stable, once a minute while that
-  // is quick (files they refer to may have changed), and where a retry is forced. Returns the ids
-  // of those opened.
+  // Retries failed datasets if their files changed and are stable, once a minute while retrying is
+  // quick (files they refer to may have changed), and if a retry is forced. Returns the ids of
+  // those opened.
   std::vector<std::string> open_failed(double rest_s) {
     constexpr std::chrono::minutes retry_every{1};
     constexpr int share = 20;  // a slow disk must not monopolise the scans
@@ -200,7 +200,7 @@ struct Store::State {
     }
     std::vector<std::string> out;
     for (const FailedEntry& entry : looked_at) {
-      if (sized_sample(entry.named)) continue;  // it would fail for the same reason
+      if (sized_sample(entry.named)) continue;  // would fail for the same reason
       const auto location = locate(entry.named);
       const FileStamp now = location ? stamp_of_all(*location, {}) : FileStamp{};
       const bool changed = now_s() - now.changed_s >= rest_s && now.text != entry.tried;
@@ -250,7 +250,7 @@ struct Store::State {
 
   StoreOptions options;
   std::shared_ptr<Budget> budget;
-  mutable std::mutex mutex;  // of all below
+  mutable std::mutex mutex;  // guards all members below
   bool turn_is_taken = false;
   std::condition_variable turn_ended;
   std::condition_variable opened;
@@ -258,7 +258,7 @@ struct Store::State {
   std::vector<Entry> entries;
   std::vector<FailedEntry> failed;
   bool ended = false;
-  Prefetcher prefetcher;  // last: its thread uses datasets
+  Prefetcher prefetcher;  // last member: its thread uses datasets
 };
 
 Store::Store(StoreOptions options) : state_(std::make_unique<State>(std::move(options))) {}
@@ -292,7 +292,7 @@ Result<DatasetPtr> Store::add(const Location& location) {
 }
 
 Result<Store::Added> Store::add_or_find(const Location& location) {
-  // Limits idle loaders when many files are opened in sequence.
+  // Ends idle loaders, so that their number is limited when many files are opened in sequence.
   constexpr double hardly_idle_s = 0.5;
   release_idle(hardly_idle_s);
   return state_->add(key_of(location), printable(location.stem), location,
@@ -300,18 +300,18 @@ Result<Store::Added> Store::add_or_find(const Location& location) {
 }
 
 Result<void> Store::remove(const std::string& id) {
-  DatasetPtr gone;
+  DatasetPtr removed;
   {
     const std::lock_guard lock(state_->mutex);
     const State::Entry* found = state_->find(id);
     if (found == nullptr) {
       return make_error(ErrorKind::not_found, "there is no dataset " + in_quotes(id));
     }
-    gone = found->dataset;
+    removed = found->dataset;
     state_->entries.erase(state_->entries.begin() + (found - state_->entries.data()));
   }
-  state_->prefetcher.forget(gone->info());
-  gone->forget();
+  state_->prefetcher.forget(removed->info());
+  removed->forget();
   return {};
 }
 
@@ -397,18 +397,18 @@ std::vector<std::string> Store::look_for_changes(double rest_s) {
       DatasetPtr& anew = opened->entry.dataset;
       anew = std::make_shared<Dataset>(std::move(opened->source), id, state_->budget,
                                        state_->options.storage);
-      (void)anew->charge_info();  // it was resident before: keep it even if not counted
+      (void)anew->charge_info();  // it was resident before: keep it even if the budget refuses it
       if (state_->options.check) usable = state_->options.check(*anew);
       lasts = !usable;
     }
     if (usable) {
       entry = std::move(opened->entry);
       changed.push_back(id);
-      log::info("opened anew: its files have changed", {{"dataset", id}});
+      log::info("reopened: its files have changed", {{"dataset", id}});
     } else {
       if (lasts) entry.refused = now.text;
-      entry.problem = "its files have changed and cannot be opened anew: " + usable.error().message;
-      log::warn("a dataset's files have changed and cannot be opened anew",
+      entry.problem = "its files have changed and cannot be reopened: " + usable.error().message;
+      log::warn("the files of a dataset have changed and cannot be reopened",
                 {{"dataset", id}, {"error", usable.error().message}});
     }
     state_->put(std::move(entry), old);

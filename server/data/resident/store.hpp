@@ -1,5 +1,5 @@
-// The resident store: every dataset opened once, every field and step loaded once on first need,
-// shared by all sessions, the least recently used evicted beyond the memory limit.
+// The resident store: opens every dataset once, loads every field and step once on first need,
+// shares them among all sessions, and evicts the least recently used beyond the memory limit.
 #pragma once
 
 #include <any>
@@ -34,8 +34,8 @@ struct StoreOptions {
   // Opens datasets other than samples; the default reads files in this process.
   std::function<Result<std::unique_ptr<Source>>(const Location&)> open;
   std::shared_ptr<Budget> budget =
-      nullptr;  // replaces the store's own of bytes_max; shared with sources
-  // A check that a dataset must pass to be listed or reopened; none: no check. Called under the
+      nullptr;  // replaces the store's own budget of bytes_max; shared with sources
+  // A check that a dataset must pass to be listed or reopened; null: no check. Called under the
   // store's lock, so it must not call the store.
   std::function<Result<void>(const Dataset&)> check = nullptr;
 };
@@ -49,10 +49,10 @@ class Store {
   Store(const Store&) = delete;
   Store& operator=(const Store&) = delete;
 
-  // Opens and registers; the id is the sample's name or the file's name without its extension,
-  // made unique by -2, -3. A sample is named by its bare name or with a size of its own (see
-  // sized_sample), files by a path or pattern (see locate). The same files are one dataset however
-  // often and by however many callers they are added; so are samples of one name and size.
+  // Opens and registers a dataset; its id is the name of the sample or the file name without
+  // extension, made unique by -2, -3. A sample is given by its name or by name and size (see
+  // sized_sample), files by a path or pattern (see locate). The same files are one dataset, however
+  // often they are added; so are samples of equal name and size.
   Result<std::shared_ptr<Dataset>> add(const std::string& sample_or_path);
   Result<std::shared_ptr<Dataset>> add(const Location& location);
   // The same; also returns whether this call opened it.
@@ -66,9 +66,9 @@ class Store {
   [[nodiscard]] Result<std::shared_ptr<Dataset>> find(const std::string& id) const;
   [[nodiscard]] std::vector<std::shared_ptr<Dataset>> all() const;
 
-  // Lists a configured dataset that cannot be opened, under an id like a dataset's, so that find()
-  // of the id reports the reason. Replaced by add() of the same files, and by look_for_changes()
-  // once they can be opened.
+  // Lists a configured dataset that cannot be opened, under an id like that of a dataset, so that
+  // find() of the id reports the reason. Replaced by add() of the same files, and by
+  // look_for_changes() once they can be opened.
   struct Failed {
     std::string id;
     std::string problem;
@@ -80,18 +80,18 @@ class Store {
   // Removes it from the list. False: unknown id.
   bool remove_failed(const std::string& id);
 
-  // Replaces the prefetch requests of `owner`, the soonest first: loaded by a thread of the store
-  // as far as memory allows, and not evicted for less urgent data. Empty: no requests. Owners take
-  // turns.
+  // Replaces the prefetch requests of `owner`, in order of urgency: a thread of the store loads
+  // them as far as memory allows, and they are not evicted for less urgent data. Empty: no
+  // requests. Owners take turns.
   void request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests);
 
   // Checks once whether files of a dataset changed since they were opened, and reopens those that
-  // did and were stable for `rest_s`, under the same id; resident volumes of the old state are
+  // changed and were stable for `rest_s`, under the same id; resident volumes of the old state are
   // dropped. A dataset that cannot be reopened stays as it was (problem()). Failed datasets are
-  // retried when their files change, and once a minute while that is quick. Returns the reopened
-  // ids.
+  // retried when their files change, and once a minute while retrying is quick. Returns the
+  // reopened ids.
   std::vector<std::string> look_for_changes(double rest_s = 1);
-  // Ends every dataset, present and future; returns when no read is running. Resident volumes stay.
+  // Ends all present and future datasets; returns when no read is running. Resident volumes stay.
   void end();
   // Frees read caches of sources that were idle for so long.
   void release_idle(double idle_s = 10);
@@ -101,9 +101,9 @@ class Store {
   [[nodiscard]] std::string note(const std::string& id) const;
 
   [[nodiscard]] BudgetCounts counts() const;
-  // The lock for Dataset::in_turn(), one holder at a time, held while the result lives; the store
-  // must outlive it. First ends idle loaders of other datasets, whose memory counts too. Empty if
-  // cancelled while waiting.
+  // The lock for Dataset::in_turn(), with one holder at a time, until the result is destroyed; the
+  // store must outlive it. First ends idle loaders of other datasets, because their memory counts
+  // too. Empty if cancelled while waiting.
   using Turn = std::shared_ptr<const void>;
   [[nodiscard]] Turn take_turn(const Dataset& dataset, const CancelToken& cancel = {});
   // Reserves so many bytes of working memory in the limit while the result lives. Errors:

@@ -1,4 +1,4 @@
-// The order in which threads read a source.
+// Determines the order in which threads read a source.
 #pragma once
 
 #include <chrono>
@@ -28,7 +28,7 @@ class Turnstile {
     }
     free_.notify_all();
   }
-  // Enters if no reader is inside, waiting, or was inside within that time.
+  // Enters unless another reader is inside, waits, or was inside within that time.
   bool enter_if_idle(double idle_s) {
     const std::lock_guard lock(mutex_);
     const std::chrono::duration<double> rest = Clock::now() - used_at_;

@@ -9,7 +9,7 @@ namespace windsplat::data {
 
 namespace {
 
-// Files whose modification times are read in one scan; the newest of a longer series.
+// Number of files whose modification times are read in one scan; for a longer series, the newest.
 constexpr std::size_t files_watched_max = 64;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Which files a dataset was opened from, and whether they have changed since.
+// The files from which a dataset was opened, and whether they have changed since.
 #pragma once
 
 #include <optional>
@@ -13,11 +13,11 @@ namespace windsplat::data {
 
 // The combined state of the watched files of a dataset.
 FileStamp stamp_of_all(const Location& location, const std::vector<Companion>& companions);
-// States at the time of opening: members as `before`, companions as read by the source.
+// States at the time of opening: members from `before`, companions as recorded by the source.
 std::string stamp_as_opened(FileStamp before, const std::vector<Companion>& companions);
-// Rescans a series whose folder has changed. False: no scan was needed.
+// Matches a series again if its folder has changed. False: not necessary.
 bool match_again(std::optional<Location>& location, std::string& listed);
-// Same text, same files.
+// Same text: same files in the same state.
 std::string key_of(const Location& location);
 
 }  // namespace windsplat::data

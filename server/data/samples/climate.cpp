@@ -1,25 +1,25 @@
 // The sample "climate": an analytic snapshot of the general circulation in January, of the size of
 // the global model in Crawfis & Max (320 x 160 x 19, winds and percent cloudiness).
-// Position and time -> a few horizontal maps -> times one vertical profile each.
+// Position and time -> a few horizontal maps, each multiplied by a vertical profile.
 //
 // phi latitude, lambda longitude, p pressure in hPa, time in hours. bump(x) = exp(-x^2).
-// Jets: u = U(lambda) bump((phi - phi_j) / width) bump(ln(p / 200) / depth), the axis meandering,
+// Jets: u = U(lambda) bump((phi - phi_j) / width) bump(ln(p / 200) / depth) about a meandering axis
 //   phi_j = phi_0 + A sin(m (lambda - c t) + phase), and v = u dphi_j/dlambda / cos(phi_0), so that
 //   the wind follows the meander; m and c are those of the cyclones below.
-// Threads: all horizontal wind is uneven by some tens of per cent, in streaks along the flow.
+// Streaks: the horizontal wind varies by some tens of per cent, in streaks along the flow.
 // Trades and Hadley cell: easterlies at +-13 degrees and flow to the equator below 750 hPa, flow to
 //   the poles near 200 hPa; polar easterlies near the ground; a stratospheric jet at 65 N.
-// Cyclones: m on each hemisphere, drifting east; local distances d = (dlon cos phi_c, dlat), r =
-// |d|:
-//   v_theta = V (r / R) exp((1 - r^2 / R^2) / 2), fastest at r = R; counter-clockwise in the north,
-//   clockwise in the south; anticyclones between them turn the other way. Aloft they lie further
-//   west (baroclinic tilt), near the ground friction turns the wind towards the low.
-// Fronts: a log-spiral arm, angle(r) = a - b ln(r / R), from the tail on the equatorward west round
-//   the east into the centre: the comma cloud. Ascent along the arm, descent behind it.
-// Cloud: comma arms, the storm tracks, the intertropical convergence zone (an undulating line
-//   somewhat into the summer hemisphere), marine stratus, each a coverage map; a map's texture is
-//   fractal noise that drifts with the flow and is wound up by the cyclones; where coverage +
-//   noise exceeds a threshold that rises towards a cloud's top and base there is cloud.
+// Cyclones: m in each hemisphere, drifting east; with local distances d = (dlon cos phi_c, dlat)
+//   and r = |d|, v_theta = V (r / R) exp((1 - r^2 / R^2) / 2), fastest at r = R;
+//   counter-clockwise in the north, clockwise in the south; anticyclones between them rotate the
+//   other way. Aloft they are further west (baroclinic tilt); near the ground friction turns the
+//   wind towards the low.
+// Fronts: a log-spiral arm, angle(r) = a - b ln(r / R), from the tail on the equatorward west
+//   around the east into the centre (the comma cloud). Ascent along the arm, descent behind it.
+// Cloud: comma arms, storm tracks, the intertropical convergence zone (an undulating line in the
+//   summer hemisphere) and marine stratus, each with a map of coverage. Its texture is fractal
+//   noise that drifts with the flow and is wound up by the cyclones. There is cloud where
+//   coverage + noise exceeds a threshold, which increases towards the top and base of a cloud.
 #include "server/data/samples/climate.hpp"
 
 #include <algorithm>
@@ -38,14 +38,15 @@ namespace {
 constexpr int climate_version = 1;
 constexpr int step_hours = 6;
 constexpr double jet_level_hpa = 200;
-constexpr float cloud_rate = 2.2F;  // cloud fraction gained a unit of coverage past the threshold
+constexpr float cloud_rate = 2.2F;  // increase of cloud fraction per unit of coverage beyond the
+                                    // threshold
 constexpr std::array<double, 19> levels_hpa = {1000, 925, 850, 775, 700, 600, 500, 400, 300, 250,
                                                200,  150, 125, 100, 70,  50,  30,  20,  10};
 
 double bump(double x) { return std::exp(-x * x); }
 
-// `count` pressures from 1000 to 10 hPa; for other counts than the sample's own 19 the list is
-// read between its entries, evenly in its index and by log p.
+// `count` pressures from 1000 to 10 hPa: the list of the sample's own 19 levels, interpolated
+// linearly in its index and in log p.
 std::vector<double> pressure_levels(int count) {
   std::vector<double> levels(static_cast<std::size_t>(count));
   if (count == 1) return {500.0};
@@ -72,18 +73,19 @@ std::string iso_time(int hours) {
   return text.data();
 }
 
-// What a level multiplies the wind maps by.
+// Factors of a level by which the maps of the wind are multiplied.
 struct WindProfile {
   double jet, low, high;
   double friction_cosine, friction_sine;
-  double w;  // m/s at full lift
+  double w;  // m/s at maximum lift
 };
 
 WindProfile wind_profile(double pressure_hpa) {
   const double depth = std::log(pressure_hpa / jet_level_hpa);
   const double low = smooth_step(380, 750, pressure_hpa);
   const double friction = 0.45 * smooth_step(820, 1000, pressure_hpa);  // radians
-  // Rising air is fastest in mid-troposphere and still at the ground and in the stratosphere.
+  // The updraft is fastest in the middle troposphere, and zero at the ground and in the
+  // stratosphere.
   const double rise = smooth_step(1000, 600, pressure_hpa) * smooth_step(110, 350, pressure_hpa);
   const double reach = depth > 0 ? 0.50 : 0.45;  // scale depth below and above the jets
   return {bump(depth / reach),
@@ -94,7 +96,7 @@ WindProfile wind_profile(double pressure_hpa) {
           0.12 * rise};
 }
 
-// The part of the wind that is the same along a latitude circle, m/s.
+// The zonal mean of the wind, m/s.
 std::array<double, 2> zonal_wind(double latitude, double pressure_hpa) {
   const double poleward = std::abs(latitude);
   const double ground = smooth_step(650, 850, pressure_hpa);
@@ -113,8 +115,8 @@ std::array<double, 2> zonal_wind(double latitude, double pressure_hpa) {
 
 enum CloudLayer : std::size_t { low_layer, middle_layer, high_layer, deep_layer, layer_count };
 
-// What coverage a column needs for cloud at this level: least at the layer's middle, more towards
-// its base and top. The tropics' clouds reach higher.
+// The coverage above which a column has cloud at this level: least in the middle of the layer, more
+// towards its base and top. Tropical clouds reach higher.
 std::array<double, layer_count> cloud_thresholds(double latitude, double pressure_hpa) {
   const double tropics = bump(latitude / 30.0);
   const double top = std::log(270.0 - 130.0 * tropics);
@@ -186,7 +188,8 @@ void Climate::fill_wind(double hours, Volume& volume) const {
       const std::array<double, 2> zonal = zonal_wind(latitude, pressure);
       const auto zonal_u = static_cast<float>(zonal[0]);
       const auto zonal_v = static_cast<float>(zonal[1]);
-      // Friction turns the wind to the left in the north, to the right in the south.
+      // Friction turns the wind to the left in the northern hemisphere, to the right in the
+      // southern.
       const auto across =
           static_cast<float>(profile.low * profile.friction_sine * std::tanh(latitude / 5.0));
       for (std::size_t n = j * row; n < (j + 1) * row; ++n) {

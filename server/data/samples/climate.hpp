@@ -1,5 +1,5 @@
-// The horizontal maps that the sample "climate" is made of: one value a column of the grid, at one
-// time. Longitude varies fastest. sample_climate.cpp multiplies them by vertical profiles.
+// Horizontal maps of which the sample "climate" is composed: one value per column of the grid, at
+// one time. Longitude varies fastest. climate.cpp multiplies them by vertical profiles.
 #pragma once
 
 #include <array>
@@ -16,33 +16,33 @@ struct Columns {
   [[nodiscard]] std::size_t count() const { return longitudes.size() * latitudes.size(); }
 };
 
-// A round low or high that drifts with the mean flow.
+// A round low or high, which drifts with the mean flow.
 struct Vortex {
-  double longitude;  // degrees, of its centre
+  double longitude;  // degrees, of the centre
   double latitude;
-  double radius;      // degrees of arc to the fastest wind
-  double speed;       // m/s there
+  double radius;      // degrees of arc from the centre to the fastest wind
+  double speed;       // m/s, the fastest wind
   double spin;        // +1 counter-clockwise seen from above, -1 clockwise
   double hemisphere;  // +1 north, -1 south
   bool cyclone;       // a low: carries fronts
 };
 
-// Cyclones and the anticyclones between them, at a time in hours.
+// The cyclones and the anticyclones between them, at a time in hours.
 std::vector<Vortex> vortices(double hours);
 
-// m/s, except lift: -1..1, times the profile of w.
+// m/s, except lift: -1..1, a factor of the profile of w.
 struct WindMaps {
   Map jet_u, jet_v;    // at the level of the jets
   Map low_u, low_v;    // vortices near the ground, without friction
   Map high_u, high_v;  // vortices aloft
   Map lift;
-  // About 1: the wind's unevenness, in threads along the flow; one level takes the first, the next
-  // the second, and so on in turn.
+  // About 1: small-scale variation of the wind, as streaks along the flow. Levels alternate between
+  // the two maps.
   std::array<Map, 3> threads;
 };
 WindMaps wind_maps(const Columns& columns, double hours);
 
-// Coverage with texture: there is cloud where it exceeds the profile's threshold.
+// Coverage including texture: there is cloud where it exceeds the threshold of the profile.
 struct CloudMaps {
   Map low, middle, high, deep;
 };

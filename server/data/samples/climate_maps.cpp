@@ -1,4 +1,4 @@
-// Columns and time -> the horizontal maps of the sample "climate"; formulas: sample_climate.cpp.
+// Columns and time -> the horizontal maps of the sample "climate"; the formulas are in climate.cpp.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,29 +18,29 @@ double bump(double x) { return std::exp(-x * x); }
 
 double wrap_degrees(double angle) { return angle - 360.0 * std::floor((angle + 180.0) / 360.0); }
 
-// What a hemisphere's storm track looks like.
+// Parameters of the storm track of a hemisphere.
 struct Track {
   double hemisphere;
-  int waves;             // cyclones round the globe
-  double longitude;      // of the first one at time 0
-  double latitude;       // of the track, towards its pole
-  double drift;          // degrees east an hour
-  double jet_latitude;   // towards its pole
+  int waves;             // number of cyclones around the globe
+  double longitude;      // longitude of the first one at time 0
+  double latitude;       // latitude of the track, towards the pole
+  double drift;          // degrees east per hour
+  double jet_latitude;   // towards the pole
   double jet_speed;      // m/s
   double jet_width;      // degrees
   double meander;        // degrees, with the cyclones
   double long_meander;   // degrees, with three stationary waves
-  double jet_variation;  // of its speed along the latitude circle
+  double jet_variation;  // relative variation of its speed along the latitude circle
 };
 constexpr std::array<Track, 2> tracks = {
     {{1.0, 6, -164.0, 49.0, 0.42, 34.0, 34.0, 9.0, 5.0, 4.0, 0.45},
      {-1.0, 7, -171.0, 52.0, 0.50, 40.0, 31.0, 9.0, 4.5, 3.0, 0.35}}};
 
 constexpr double thread_strength = 0.70;
-constexpr double tilt_degrees = 9.0;  // lows aloft lie this far west of those at the ground
+constexpr double tilt_degrees = 9.0;  // lows aloft are this far west of those at the ground
 constexpr double spread_aloft = 1.35;
 
-// Calls body(index, dx, dy) for every column within `reach` radii of a vortex; dx, dy in radii.
+// Calls body(index, dx, dy) for every column within `reach` radii of a vortex; dx, dy are in radii.
 template <class Body>
 void near_vortex(const Columns& columns, const Vortex& vortex, double reach, const Body& body) {
   const double cosine = std::cos(vortex.latitude * degree);
@@ -64,8 +64,8 @@ void add_swirl(const Columns& columns, const Vortex& vortex, Map& u, Map& v) {
   });
 }
 
-// How much a column lies on a cyclone's front, 0..1: a log spiral with a sharp edge behind it and
-// a diffuse one ahead.
+// Proximity of a column to the front of a cyclone, 0..1: a log spiral with a sharp rear edge and a
+// diffuse leading edge.
 double front(double dx, double dy_poleward) {
   constexpr double angle_at_radius = 0.45;  // a
   constexpr double winding = 2.1;           // b
@@ -78,12 +78,12 @@ double front(double dx, double dy_poleward) {
   return bump(across) * smooth_step(4.2, 2.2, r) * smooth_step(-0.1, 0.3, r);
 }
 
-// Two maps of one displacement, degrees.
+// A displacement of columns as two maps, degrees.
 struct Displacement {
   Map longitude, latitude;
 };
 
-// The cyclones' fronts, 0..1; `ragged` moves each column before the spiral is asked.
+// The fronts of the cyclones, 0..1; `ragged` displaces each column before the spiral is evaluated.
 Map front_map(const Columns& columns, const std::vector<Vortex>& all, const Displacement* ragged) {
   Map map(columns.count(), 0.0F);
   for (const Vortex& vortex : all) {
@@ -105,8 +105,8 @@ double convergence_latitude(double longitude, double hours) {
          1.6 * std::sin((5.0 * longitude + 1.5 * hours) * degree);
 }
 
-// The flow's own displacement of the texture: each cyclone has wound up the air round its centre;
-// where the air of a column came from, relative to it.
+// Displacement of the texture by the flow: each cyclone winds up the air around its centre; gives
+// the origin of the air of a column, relative to the column.
 Displacement winding(const Columns& columns, const std::vector<Vortex>& all) {
   Displacement map{Map(columns.count(), 0.0F), Map(columns.count(), 0.0F)};
   for (const Vortex& vortex : all) {
@@ -123,12 +123,12 @@ Displacement winding(const Columns& columns, const std::vector<Vortex>& all) {
   return map;
 }
 
-// A texture: its cell is `longitude_cell` x `latitude_cell` degrees, it drifts east and slowly
-// changes.
+// A texture with cells of `longitude_cell` x `latitude_cell` degrees, which drifts east and changes
+// slowly.
 struct Texture {
   int cells_around;
   double latitude_cell;
-  double drift;  // degrees an hour
+  double drift;  // degrees per hour
   int octaves;
   std::uint32_t seed;
 };
@@ -145,7 +145,7 @@ double texture_at(const Texture& texture, double longitude, double latitude, dou
                        texture.octaves, texture.seed);
 }
 
-// Fronts and the convergence zone are no smooth curves: noise moves them by some degrees.
+// Fronts and the convergence zone are irregular: noise displaces them by some degrees.
 Displacement ragged_edges(const Columns& columns, double hours) {
   constexpr double reach_degrees = 3.5;
   Displacement map{Map(columns.count()), Map(columns.count())};
@@ -163,7 +163,7 @@ Displacement ragged_edges(const Columns& columns, double hours) {
   return map;
 }
 
-// What does not depend on longitude.
+// Quantities that do not depend on longitude.
 struct CloudRow {
   double storm_track, trades, stratus, polar;
 };
@@ -180,7 +180,7 @@ std::vector<Vortex> vortices(double hours) {
   std::vector<Vortex> all;
   for (const Track& track : tracks) {
     for (int n = 0; n < track.waves; ++n) {
-      // No two lows are alike: incommensurate sines, from -1 to 1.
+      // Incommensurate sines, from -1 to 1, so that no two lows are equal.
       const double a = std::sin(2.4 * n + 1.1 * track.hemisphere);
       const double b = std::sin(3.9 * n + 0.7);
       const double centre = track.longitude + 360.0 * n / track.waves + track.drift * hours;
@@ -219,7 +219,8 @@ WindMaps wind_maps(const Columns& columns, double hours) {
       const double longitude = columns.longitudes[i];
       const double phase =
           track.waves * (longitude - track.longitude - track.drift * hours + tilt_degrees) * degree;
-      // The axis dips to the equator over the troughs aloft; both signs are towards the pole.
+      // The axis of the jet is displaced to the equator above the troughs; positive values are
+      // towards the pole in both hemispheres.
       const double stands = 3.0 * (longitude - 20.0) * degree;
       const double axis = track.jet_latitude - track.meander * std::cos(phase) +
                           track.long_meander * std::sin(stands);
@@ -232,7 +233,7 @@ WindMaps wind_maps(const Columns& columns, double hours) {
       const std::size_t index = j * row + i;
       maps.jet_u[index] = static_cast<float>(u);
       maps.jet_v[index] = static_cast<float>(u * slope * track.hemisphere);
-      // Threads lie along the jets and are wound up by the cyclones.
+      // Streaks are along the jets and wound up by the cyclones.
       const double across =
           poleward - axis + track.hemisphere * static_cast<double>(from.latitude[index]);
       const double along = longitude + static_cast<double>(from.longitude[index]);

@@ -1,22 +1,24 @@
-// The sample "efield": the electric field in and about a small metal cabin with a window, excited
-// by a plane wave; an approximate analytic model, not a solution of Maxwell's equations for the
-// whole. Surface sums over the front wall and the window -> phasor E -> Re(E exp(-i w t)) at each
-// step.
+// The sample "efield": the electric field in and around a small metal cabin with a window, excited
+// by a plane wave; an approximate analytic model, not a solution of Maxwell's equations. Surface
+// sums over the front wall and the window -> phasor E -> Re(E exp(-i w t)) at each step.
 //
-// Metres; the wave runs towards +x and is polarised along z, 600 MHz, 100 V/m. k = w / c.
+// Lengths are in metres; the wave travels towards +x and is polarised along z, 600 MHz, 100 V/m.
+// k = w / c.
 // Outside: incident wave + physical optics. The front wall W carries the current of an infinite
 //   mirror, J = 2 n x H; with P_S = Int_S exp(ikR) / (2 pi R) dS, R^2 = r^2 + (half a wall)^2,
-//     E_W = (i / k) (k^2 P_W z + grad dP_W/dz),    an infinite wall would give -z exp(ik|x|)
-//   which makes the standing wave in front and the shadow behind. The window's part E_A of that
-//   current is taken out in front of the wall, and fades back in along the cabin's sides.
+//     E_W = (i / k) (k^2 P_W z + grad dP_W/dz),    for an infinite wall -z exp(ik|x|),
+//   which yields the standing wave in front and the shadow behind. The part E_A due to the current
+//   in the window is subtracted in front of the wall, and faded in again along the sides of the
+//   cabin.
 // Inside: the field of an aperture A in a conducting plane with the incident field in it (Smythe's
 //   form of Kirchhoff's integral), F = Int_A exp(ikR) / (2 pi R) dS:
 //     E = curl(0, -F, 0) = (dF/dz, 0, -dF/dx),     free of divergence, tangential E = 0 beside A
-//   plus its mirror images in the side, floor, ceiling and back walls (one bounce each, F odd in y,
-//   even in z and x as a conductor asks), each bounce weakened by lossy lining. The static part of
-//   F's gradient is the window's solid angle and logarithms in closed form; the rest is a sum.
-// In the walls both fields decay as exp(-depth / skin): evanescent.
-// Energy: (epsilon_0 / 2) |E|^2 at the step's instant.
+//   plus its mirror images in the side, floor, ceiling and back walls (one reflection each, F odd
+//   in y, even in z and x, as required at a conductor), each attenuated by a lossy lining. The
+//   static part of grad F has a closed form, the solid angle of the window and logarithms; the
+//   rest is summed numerically.
+// In the walls both fields are evanescent: they decay as exp(-depth / skin).
+// Energy: (epsilon_0 / 2) |E|^2 at the time of the step.
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -39,17 +41,17 @@ constexpr double epsilon_0 = 8.8541878128e-12;  // F/m
 constexpr double frequency_hz = 600e6;
 constexpr double wave_number = 2.0 * pi * frequency_hz / light_speed;
 constexpr double amplitude = 100.0;  // V/m
-constexpr double bounce = 0.8;       // amplitude kept at a reflection inside
+constexpr double bounce = 0.8;       // amplitude retained at a reflection inside
 constexpr double wall_m = 0.07;
 constexpr double skin_m = 0.015;
-constexpr double element_m = 0.0625;  // of the sums: an eighth of the wavelength
+constexpr double element_m = 0.0625;  // step of the sums: an eighth of the wavelength
 
 struct Rectangle {
   double y0, y1, z0, z1;
 };
 
-// The cabin's inner faces; its walls lie outside them. The front wall's current and the window lie
-// in its outer face.
+// The inner faces of the cabin; the walls are outside them. The current of the front wall and the
+// window are in its outer face.
 constexpr double front_x = -0.45;
 constexpr double back_x = 0.75;
 constexpr double face_x = front_x - wall_m;
@@ -61,7 +63,7 @@ constexpr Rectangle front_wall = {-side_y - wall_m, side_y + wall_m, -side_z - w
 
 struct Element {
   double y, z;
-  double weight;  // area, or length on an edge
+  double weight;  // area, or length for an edge
 };
 
 std::vector<Element> surface_elements(const Rectangle& r) {
@@ -87,7 +89,7 @@ std::vector<Element> edge_elements(const Rectangle& r) {
   return elements;
 }
 
-// A function of R, tabulated: lookups are linear, good to 1e-5 of it at this spacing.
+// A tabulated function of R, interpolated linearly with a relative error of 1e-5 at this spacing.
 class RadialTable {
  public:
   template <class Function>
@@ -109,7 +111,7 @@ class RadialTable {
   std::vector<Complex> values_;
 };
 
-constexpr double reach_m = 8.0;  // farther than any point from any image of the window
+constexpr double reach_m = 8.0;  // beyond the largest distance from any image of the window
 
 Complex wave(double r) { return {std::cos(wave_number * r), std::sin(wave_number * r)}; }
 
@@ -119,7 +121,7 @@ struct Tables {
   RadialTable green_slope{
       reach_m,
       [](double r) { return wave(r) * Complex(-1.0, wave_number * r) / (2.0 * pi * r * r * r); }};
-  // g = (exp(ikR) - 1) / (2 pi R): g'(R) / R, bounded but for 1 / R at the origin.
+  // g = (exp(ikR) - 1) / (2 pi R): g'(R) / R, bounded except for 1 / R at the origin.
   RadialTable remainder_slope{reach_m, [](double r) {
                                 const Complex e = wave(r);
                                 return (Complex(0, wave_number * r) * e - (e - 1.0)) /
@@ -134,7 +136,8 @@ struct Plate {
   explicit Plate(const Rectangle& r) : surface(surface_elements(r)), edges(edge_elements(r)) {}
 };
 
-// E of the mirror current on a plate, for an incident wave of 1 at the plate. x from the plate.
+// E of the mirror current on a plate, for an incident wave of 1 at the plate. x is measured from
+// the plate.
 Vector plate_field(const Plate& plate, const Tables& tables, double x, double y, double z) {
   constexpr double soft2 = 0.25 * wall_m * wall_m;
   Complex potential = 0;
@@ -169,7 +172,8 @@ std::array<Complex, 2> window_gradient(const Rectangle& r, const std::vector<Ele
     along_x += slope * x;
     along_z += slope * dz;
   }
-  // -dF/dx at rest is the solid angle over 2 pi; dF/dz the two edges' potentials of 1 / R.
+  // The static part of -dF/dx is the solid angle over 2 pi, that of dF/dz the difference of the
+  // potentials of the two edges.
   const auto angle = [&](double u, double v) {
     return std::atan2(u * v, x * std::sqrt(u * u + v * v + x * x));
   };
@@ -224,7 +228,7 @@ Vector cabin_field(const std::vector<WindowImage>& images, const Tables& tables,
   return field;
 }
 
-// Distance outside the box about the cabin's inner faces widened by `margin`; negative inside.
+// Distance outside the box of the inner faces of the cabin widened by `margin`; negative inside.
 double outside_m(double x, double y, double z, double margin) {
   return std::max({front_x - margin - x, x - back_x - margin, std::abs(y) - side_y - margin,
                    std::abs(z) - side_z - margin});
@@ -239,7 +243,7 @@ class CabinField {
  public:
   CabinField() : images_(window_images()) {}
 
-  // The phasor at a point, in units of the incident wave's amplitude.
+  // The phasor at a point, in units of the amplitude of the incident wave.
   [[nodiscard]] Vector at(double x, double y, double z) const {
     const double beyond_inner = outside_m(x, y, z, 0);
     if (beyond_inner <= 0 || in_window_opening(x, y, z)) return inside(x, y, z);
@@ -320,8 +324,9 @@ class ElectricField final : public SampleSource {
     }
   }
 
-  // The phasor is the costly part and serves every step of both fields. Cabin, window and wave are
-  // the same on both sides of y = 0, so half of it is a mirror image with E_y turned about.
+  // The phasor is expensive to compute, and the same for every step of both fields. Cabin, window
+  // and wave are symmetric about y = 0, so one half is the mirror image of the other with the sign
+  // of E_y reversed.
   void fill_phasor() {
     const CabinField cabin;
     const auto& axes = info_.grid.axes;
@@ -360,7 +365,7 @@ class ElectricField final : public SampleSource {
     }
   }
 
-  std::vector<std::complex<float>> phasor_;  // x, y, z components as whole arrays
+  std::vector<std::complex<float>> phasor_;  // x, y, z components as consecutive arrays
 };
 
 }  // namespace

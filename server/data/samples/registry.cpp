@@ -1,4 +1,4 @@
-// Sample's name and size -> Source: the one list of built-in samples.
+// Name and size of a sample -> Source; the list of built-in samples.
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace windsplat::data {
 namespace {
 
 constexpr int dim_max = 4096;
-constexpr std::int64_t samples_max = std::int64_t{1} << 28;  // 3 GiB a vector field
+constexpr std::int64_t samples_max = std::int64_t{1} << 28;  // 3 GiB per vector field
 constexpr int steps_max = 100000;
 
 struct Sample {
@@ -34,7 +34,7 @@ Result<SampleSize> chosen_size(const SampleSize& own, std::array<int, 3> dims, i
   std::int64_t total = 1;
   for (std::size_t a = 0; a < 3; ++a) {
     if (dims[a] < 0 || dims[a] > dim_max) {
-      return make_error(ErrorKind::invalid, "a sample's dimensions are 1 to " +
+      return make_error(ErrorKind::invalid, "the dimensions of a sample must be 1 to " +
                                                 std::to_string(dim_max) + ", not " +
                                                 std::to_string(dims[a]));
     }
@@ -46,14 +46,14 @@ Result<SampleSize> chosen_size(const SampleSize& own, std::array<int, 3> dims, i
                                                 " grid points, not " + std::to_string(total));
   }
   if (steps < 0 || steps > steps_max) {
-    return make_error(ErrorKind::invalid, "a sample's steps are 1 to " + std::to_string(steps_max) +
-                                              ", not " + std::to_string(steps));
+    return make_error(ErrorKind::invalid, "a sample must have 1 to " + std::to_string(steps_max) +
+                                              " steps, not " + std::to_string(steps));
   }
   size.steps = steps == 0 ? own.steps : steps;
   return size;
 }
 
-// "64x32x16", or "64" for a cube; empty: not of that form.
+// "64x32x16", or "64" for a cube; nullopt if malformed.
 std::optional<std::array<int, 3>> parse_dims(std::string_view text) {
   std::array<int, 3> dims{};
   std::size_t count = 0;

@@ -12,14 +12,14 @@
 
 namespace windsplat::data {
 
-// Built-in samples, made on the spot and deterministic. name: tornado, climate or efield.
-// dims {0,0,0} and steps 0 mean the sample's own size.
+// Built-in samples: computed on request and deterministic. name: tornado, climate or efield. dims
+// {0,0,0} and steps 0 select the default size.
 Result<std::unique_ptr<Source>> open_sample(const std::string& name,
                                             std::array<int, 3> dims = {0, 0, 0}, int steps = 0);
 std::vector<std::string> sample_names();
 
-// A sample's name with a size of its own: "tornado:256" is a cube, "climate:640x320x38" a box, the
-// bare name {0,0,0}. Empty: no sample is called so.
+// The name of a sample with an optional size: "tornado:256" is a cube, "climate:640x320x38" a box;
+// without size {0,0,0}. nullopt: no sample has this name.
 struct SizedSample {
   std::string name;
   std::array<int, 3> dims{};

@@ -1,4 +1,4 @@
-// Common frame of all built-in samples, and the noise that gives them texture.
+// Base class of all built-in samples, and the noise for their texture.
 #include "server/data/samples/source.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace windsplat::data {
 namespace {
 
 // Integer mixing by two multiply-xorshift rounds over a running state; every bit of the inputs
-// reaches every bit of the result.
+// affects every bit of the result.
 std::uint32_t mix(std::uint32_t state, std::uint32_t value) {
   state ^= value + 0x9e3779b9U + (state << 6U) + (state >> 2U);
   state ^= state >> 16U;
@@ -23,8 +23,8 @@ std::uint32_t mix(std::uint32_t state, std::uint32_t value) {
   return state;
 }
 
-// Dot product of the hashed gradient at one lattice point with the offset from it. The gradient's
-// components are three 10-bit fields of the hash, each in [-1, 1].
+// Dot product of the hashed gradient at one lattice point with the offset from it. The components
+// of the gradient are three 10-bit fields of the hash, each mapped to [-1, 1].
 double corner(std::uint32_t hash, double dx, double dy, double dz) {
   constexpr double unit = 2.0 / 1023.0;
   const double gx = static_cast<double>(hash & 1023U) * unit - 1.0;
@@ -171,7 +171,7 @@ double fractal_noise(double x, double y, double z, std::int64_t period_x, int oc
     period_x *= 2;
     strength *= 0.5;
   }
-  // One octave's typical swing is about 0.5 and the strengths add up to at most 2.
+  // The typical amplitude of one octave is about 0.5, and the strengths add up to at most 2.
   return sum * 1.25;
 }
 

@@ -1,5 +1,5 @@
-// What the built-in samples share: their size, the frame of a Source that computes its numbers, and
-// the small functions their formulas are made of. Formula -> SampleSource::fill -> Volume.
+// Common parts of the built-in samples: sizes, the base class of a Source that computes its
+// numbers, and the functions used by their formulas. Formula -> SampleSource::fill -> Volume.
 #pragma once
 
 #include <array>
@@ -28,18 +28,19 @@ std::unique_ptr<Source> make_tornado(const SampleSize& size);
 std::unique_ptr<Source> make_climate(const SampleSize& size);
 std::unique_ptr<Source> make_efield(const SampleSize& size);
 
-// A source whose fields are computed on request, independently of each other.
+// A source whose fields are computed on request, independent of each other.
 class SampleSource : public Source {
  public:
   [[nodiscard]] const DatasetInfo& info() const override { return info_; }
   Result<Volume> read(std::size_t field, std::size_t step) override;
 
  protected:
-  // `formula_version` is part of the digest: raise it whenever a formula changes.
+  // `formula_version` is part of the digest: increment it whenever a formula changes.
   SampleSource(const std::string& name, const std::string& title, const SampleSize& size,
                int formula_version, std::string time_units);
 
-  // `volume` has its dims, components and zeroed values; finish_volume is called afterwards.
+  // `volume` has its dimensions and components set and its values zeroed; finish_volume() is called
+  // afterwards.
   virtual void fill(std::size_t field, std::size_t step, Volume& volume) = 0;
 
   DatasetInfo info_;
@@ -48,11 +49,11 @@ class SampleSource : public Source {
 Axis sample_axis(std::string name, std::string standard_name, std::string units, AxisKind kind,
                  std::vector<double> coordinates);
 
-// x, y, z in metres, each an even axis of cell centres.
+// x, y, z in metres, each a uniform axis of cell centres.
 std::array<Axis, 3> sample_box(const std::array<int, 3>& dims, const std::array<double, 3>& low_m,
                                const std::array<double, 3>& high_m);
 
-// A float32 field. `standard_name` is CF's name of a scalar, empty if there is none.
+// A float32 field. `standard_name` is the CF name of a scalar, empty if there is none.
 FieldInfo sample_scalar(const std::string& name, const std::string& units,
                         const std::string& standard_name, const std::string& long_name);
 FieldInfo sample_vector(const std::string& name, std::vector<std::string> components,
@@ -61,17 +62,18 @@ FieldInfo sample_vector(const std::string& name, std::vector<std::string> compon
 // Centres of `count` equal cells that fill [low, high].
 std::vector<double> cell_centres(double low, double high, int count);
 
-// 0 below `low`, 1 above `high`, a cubic with level ends between.
+// 0 below `low`, 1 above `high`, between them a cubic with zero slope at both ends.
 double smooth_step(double low, double high, double value);
 
-double clamp_unit(double value);  // into [0, 1]
+double clamp_unit(double value);  // clamps to [0, 1]
 
-// Gradient noise (after Perlin 1985, 2002) on the integer lattice; x repeats after `period_x`. Zero
-// at lattice points, continuous with its first two derivatives, about [-0.7, 0.7]. Deterministic:
-// the gradients are a hash of (lattice point, seed).
+// Gradient noise (after Perlin 1985, 2002) on the integer lattice; periodic in x with `period_x`.
+// Zero at lattice points, continuous with its first two derivatives, about [-0.7, 0.7].
+// Deterministic: the gradients are a hash of (lattice point, seed).
 double gradient_noise(double x, double y, double z, std::int64_t period_x, std::uint32_t seed);
 
-// `octaves` of gradient noise, each twice as fine and half as strong, scaled to about [-1, 1].
+// `octaves` of gradient noise, each at twice the frequency and half the amplitude, scaled to about
+// [-1, 1].
 double fractal_noise(double x, double y, double z, std::int64_t period_x, int octaves,
                      std::uint32_t seed);
 

@@ -1,23 +1,22 @@
-// The sample "tornado": after the test function of Crawfis & Max, a swirl about an axis that
-// wanders with height and time, with an updraft; here built so that mass is conserved and the
-// funnel is where moist air must condense.
+// The sample "tornado": after the test function of Crawfis & Max, a swirl with an updraft about an
+// axis that moves with height and time; here the flow conserves mass, and the funnel is where moist
+// air condenses.
 //
-// Domain 1500 m x 1500 m x 1500 m, metres, step = 10 s. With the axis at c(z, t), s = r / r_u the
-// distance from it over the updraft's radius, q = r / r_c(z) over the core's radius:
-//   swirl     v_theta = 2 V q / (1 + q^2)            V at the core's edge, counter-clockwise
+// Domain 1500 m x 1500 m x 1500 m, metres, step = 10 s. The axis is at c(z, t); s = r / r_u is the
+// distance from it over the radius of the updraft, q = r / r_c(z) that over the radius of the core:
+//   swirl     v_theta = 2 V q / (1 + q^2)            V at the edge of the core, counter-clockwise
 //   updraft   w = W(z) exp(-s^2)                     W(z) = W_top (1 - exp(-z / h))
 //   inflow    v_r = -W'(z) r_u^2 / (2 r) (1 - exp(-s^2))          from continuity
-//   tilt      w dc/dz is added to the horizontal wind, so that the air follows the leaning axis
+//   tilt      w dc/dz is added to the horizontal wind, so that the air follows the tilted axis
 // Each part is free of divergence: the swirl because v_theta does not depend on the angle, updraft
-// and inflow by construction, the tilt because shifting levels against each other keeps volumes.
+// and inflow by construction, the tilt because shifting levels horizontally preserves volume.
 //   vorticity on the axis (untilted) = 4 V / r_c
 //   pressure deficit by cyclostrophic balance, dp/dr = density v_theta^2 / r:
 //     p(inf) - p = density 2 V^2 / (1 + q^2)
-// Air at height z that feels this deficit has cooled as if lifted by deficit / (density g). Where
-// that brings it above the condensation level, which rises outwards as the air gets drier, there is
-// cloud:
-//   cloud = step((z + 2 V^2 / (g (1 + q^2)) - z_base - d s^2) / width), ragged by noise that turns
-//   with the swirl.
+// Air at height z with this deficit has cooled as if lifted by deficit / (density g). There is
+// cloud where this lifts it above the condensation level, which rises outwards with drier air:
+//   cloud = step((z + 2 V^2 / (g (1 + q^2)) - z_base - d s^2) / width), with an edge made irregular
+//   by noise that rotates with the swirl.
 #include <cmath>
 #include <numbers>
 
@@ -37,7 +36,7 @@ constexpr double updraft_radius_m = 300;
 constexpr double condensation_base_m = 1250;
 constexpr double dry_rise_m = 180;  // d
 
-// What does not depend on x and y.
+// Quantities that do not depend on x and y.
 struct Level {
   double height_m;
   double axis_x, axis_y;    // c(z, t), m
@@ -52,7 +51,7 @@ Level level_at(double height_m, double time_s) {
   const double z = height_m / extent_m;
   Level level{};
   level.height_m = height_m;
-  // Two slow turns with height that drift with time, and a walk of the whole funnel.
+  // The axis turns slowly with height, drifts with time, and the whole funnel moves.
   const double phase_x = 5.0 * z + 0.045 * time_s;
   const double phase_y = 3.6 * z + 0.035 * time_s + 1.0;
   const double reach = 40.0 + 110.0 * z;
@@ -131,8 +130,8 @@ class Tornado final : public SampleSource {
         condensation_base_m + dry_rise_m * r2 / (updraft_radius_m * updraft_radius_m);
     const double above_m = level.height_m + lift_m - base_m;
     if (above_m < -260.0) return 0.0F;
-    // The noise lives in (angle, log radius, height) and turns with the air's own rate there,
-    // so that its threads wind up the funnel. Its period is the full turn.
+    // The noise is defined in (angle, log radius, height) and rotates with the air, so that its
+    // streaks wind around the funnel. Its period is a full turn.
     const double turns = std::atan2(dy, dx) / (2.0 * std::numbers::pi);
     const double around = 5.0 * (turns + 1.0 - 0.012 * time_s + level.height_m / 900.0);
     const double rough =

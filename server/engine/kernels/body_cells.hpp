@@ -84,9 +84,9 @@ inline void fill_curved_cell(const Pass& pass, const Rows& rows, int i, Cells& c
 void fill_cells(const Camera& camera, const Pass& pass, const Rows& rows, Cells& cells) {
   cells.solid = 0;
   for (int i = 0; i < pair_kernels; ++i) {
-    const float* place = pass.places + 3 * offset_of(rows, i);
+    const float* position = pass.places + 3 * offset_of(rows, i);
     for (int c = 0; c < 3; ++c) {
-      cells.from_eye[c][i] = static_cast<float>(static_cast<double>(place[c]) - camera.eye[c]);
+      cells.from_eye[c][i] = static_cast<float>(static_cast<double>(position[c]) - camera.eye[c]);
     }
     fill_curved_cell(pass, rows, i, cells);
   }

@@ -36,7 +36,7 @@ struct Light {
   Pixel most = hn::Zero(PixelTag());
 
   KERNEL_INLINE void see(Pixel transmittance) { see_positive(hn::Abs(transmittance)); }
-  // For all compositing methods but forward Euler.
+  // Valid for all compositing methods except forward Euler.
   KERNEL_INLINE void see_positive(Pixel transmittance) {
     most = pixel_lanes == block_pixels ? transmittance : hn::Max(most, transmittance);
   }
@@ -73,13 +73,13 @@ KERNEL_INLINE void see_light(Pixel transmittance, Light& light) {
   }
 }
 
-// Transmittance of the medium in front of a line at relative position `place` in the cell.
+// Transmittance of the medium in front of a line at the fraction x_line of the depth of the cell.
 template <int Compositing>
-KERNEL_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel place) {
+KERNEL_INLINE Pixel light_before(const Attenuation<Pixel>& medium, Pixel tau, Pixel x_line) {
   if (Compositing == compositing_simple) return medium.transmitted;
   // tau is finite (the plan bounds extinctions), so that 0 * tau is 0.
-  if (Compositing == compositing_analytic) return attenuation(tau * place).transmitted;
-  return hn::NegMulAdd(place, medium.absorbed, all<Pixel>(1.0F));
+  if (Compositing == compositing_analytic) return attenuation(tau * x_line).transmitted;
+  return hn::NegMulAdd(x_line, medium.absorbed, all<Pixel>(1.0F));
 }
 
 inline float* block_at(const Tile& tile, int row, int column) {
@@ -189,19 +189,19 @@ KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
 // The first form of [CM92]: the front part of the medium, the line and the back part composited one
 // over the other where the ray meets the line.
 KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const RibbonLane& line,
-                                const Attenuation<Pixel>& medium, Pixel place, const Channels& to,
+                                const Attenuation<Pixel>& medium, Pixel x_line, const Channels& to,
                                 int l) {
   const Pixel one = all<Pixel>(1.0F);
-  const Pixel met = hn::IfThenElse(hn::Gt(line.opacity, hn::Zero(PixelTag())), place, one);
-  const Pixel front = met * medium.absorbed;
-  const Pixel back = (one - met) * medium.absorbed;
-  const Pixel own = (one - front) * line.opacity;
+  const Pixel split = hn::IfThenElse(hn::Gt(line.opacity, hn::Zero(PixelTag())), x_line, one);
+  const Pixel front = split * medium.absorbed;
+  const Pixel back = (one - split) * medium.absorbed;
+  const Pixel line_weight = (one - front) * line.opacity;
   const Pixel rest = (one - front) * (one - line.opacity);
   const Pixel absorbed = front + rest * back;
   const Pixel t = load<Pixel>(to.transmittance + l);
   for (int c = 0; c < 3; ++c) {
     const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
-    add_product(to.rgb[c] + l, t, hn::MulAdd(own, color, s.color[c] * absorbed));
+    add_product(to.rgb[c] + l, t, hn::MulAdd(line_weight, color, s.color[c] * absorbed));
   }
   return t * (rest * (one - back));
 }
@@ -223,18 +223,18 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
     const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
     const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
     const Attenuation<Pixel> medium = attenuation_by<Compositing>(lane.tau);
-    const Pixel past = hn::MulAdd(line.f, depth_rise, depth) - lane.behind;
-    const Pixel place = clamped(hn::MulAdd(past, lane.cells, all<Pixel>(0.5F)), 0.0F, 1.0F);
+    const Pixel from_centre = hn::MulAdd(line.f, depth_rise, depth) - lane.behind;
+    const Pixel x_line = clamped(hn::MulAdd(from_centre, lane.cells, all<Pixel>(0.5F)), 0.0F, 1.0F);
     Pixel left;
     if (Compositing == compositing_cd_naive) {
-      left = naive_block(r, s, line, medium, place, to, l);
+      left = naive_block(r, s, line, medium, x_line, to, l);
     } else {
       const Pixel t = load<Pixel>(to.transmittance + l);
       const Pixel a = hn::MulAdd(line.opacity, medium.transmitted, medium.absorbed);
-      const Pixel own = line.opacity * light_before<Compositing>(medium, lane.tau, place);
+      const Pixel line_weight = line.opacity * light_before<Compositing>(medium, lane.tau, x_line);
       for (int c = 0; c < 3; ++c) {
         const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
-        add_product(to.rgb[c] + l, t, hn::MulAdd(own, color - s.color[c], s.color[c] * a));
+        add_product(to.rgb[c] + l, t, hn::MulAdd(line_weight, color - s.color[c], s.color[c] * a));
       }
       left = t * (medium.transmitted * (all<Pixel>(1.0F) - line.opacity));
     }
@@ -286,7 +286,7 @@ struct Compositor {
   LineFunction line;
   SplatFunction splat[from_count];
   BothFunction both[from_count];
-  int splat_exponentials;  // per pixel
+  int splat_exponentials;  // number of exponentials per pixel
   int both_exponentials;
 };
 

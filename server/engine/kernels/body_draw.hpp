@@ -284,7 +284,7 @@ KERNEL_INLINE void draw_position(const Prepared& p, const Compositor& with, int 
   }
 }
 
-// For each subset of a row: the indices of its members, one per byte, ascending.
+// Holds, for each subset of a row, the indices of its members, one per byte, ascending.
 struct RowIndices {
   std::uint64_t of[256];
 };

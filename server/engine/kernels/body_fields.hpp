@@ -11,7 +11,7 @@ constexpr float magnitude_least = 1.17549435e-38F;  // denormal vectors count as
 
 // The vectors at kernel positions.
 struct Vectors {
-  Kernel magnitude;         // of the raw data; negative: no line
+  Kernel magnitude;         // magnitude of the raw data; negative: no line
   Three<Kernel> direction;  // a unit vector along the axes of the cell
 };
 
@@ -29,7 +29,7 @@ KERNEL_INLINE Norm norm_of(const Three<Kernel>& v) {
   if (HWY_LIKELY(hn::AllTrue(KernelTag(), hn::Or(moderate, nothing)))) {
     const Kernel square = dot3(v, v);
     const Kernel inverse = inverse_root(hn::Max(square, all<Kernel>(1e-30F)));
-    // One more Newton step: a vector whose length equals a tolerance must not fall below it.
+    // A further Newton step: a vector whose length equals a tolerance must not fall below it.
     const Kernel length = square * inverse;
     const Kernel rest = hn::NegMulAdd(length, length, square);
     return {hn::MulAdd(rest, all<Kernel>(0.5F) * inverse, length), inverse};
@@ -90,7 +90,7 @@ KERNEL_INLINE Kernel cell_longest(const Rows& rows, int i) {
 }
 
 struct Extinctions {
-  Kernel rho;           // per world unit, sum of all layers
+  Kernel rho;           // extinction per world unit, sum of all layers
   MaskOf<Kernel> kept;  // optical depth reaches the tolerance in at least one view direction
 };
 
@@ -134,9 +134,9 @@ void color_density(const Pass& pass, std::int64_t offset, float* color) {
     if (is_masked(value)) continue;
     const float rho = extinction_at(layer.extinction, value);
     if (rho <= 0) continue;
-    float own[3];
-    look_up(layer.color, value, own);
-    for (int c = 0; c < 3; ++c) color[c] += rho * own[c];
+    float layer_color[3];
+    look_up(layer.color, value, layer_color);
+    for (int c = 0; c < 3; ++c) color[c] += rho * layer_color[c];
     total += rho;
   }
   const float inverse = 1.0F / total;

@@ -157,8 +157,8 @@ KERNEL_INLINE void find_splat_columns(const Outline& outline, const Ranges& acro
   for (int k = 0; k <= most; ++k) {
     const Kernel top = from_middle + all<Kernel>(static_cast<float>(k * block_side));
     const Extent here = oval_between(outline.oval, top, top + all<Kernel>(block_side - 1));
-    const auto met = range_masks(blocks_between(x + here.low, x + here.high, columns));
-    const auto kept = hn::IfThenElse(hn::RebindMask(masks, outline.oval.known), box & met, box);
+    const auto touched = range_masks(blocks_between(x + here.low, x + here.high, columns));
+    const auto kept = hn::IfThenElse(hn::RebindMask(masks, outline.oval.known), box & touched, box);
     const auto ends = hn::Gt(hn::Set(KernelIntegers(), k), tall);
     const auto shifted = hn::IfThenZeroElse(hn::RebindMask(masks, ends), hn::Shr(kept, column));
     if (k < window_side / 2) {

@@ -15,10 +15,11 @@ struct PartialRows {
 
 KERNEL_INLINE PartialRows partial_rows_at(Pixel r2) {
   constexpr float rows_per_t2 = static_cast<float>(partial_rows - 1) / (footprint_t * footprint_t);
-  const Pixel place = hn::Min(r2 * all<Pixel>(rows_per_t2), all<Pixel>(partial_rows - 1.001F));
-  const SignedOf<Pixel> row = truncated(place);
+  const Pixel row_position =
+      hn::Min(r2 * all<Pixel>(rows_per_t2), all<Pixel>(partial_rows - 1.001F));
+  const SignedOf<Pixel> row = truncated(row_position);
   const hn::RebindToSigned<PixelTag> integers;
-  return {row * hn::Set(integers, partial_columns - 1), place - from_integer<Pixel>(row)};
+  return {row * hn::Set(integers, partial_columns - 1), row_position - from_integer<Pixel>(row)};
 }
 
 // Interpolates between the two values of a table entry.
@@ -39,9 +40,10 @@ KERNEL_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const P
   // The face lies entirely before or behind the splat on all rays.
   if (hn::AllTrue(PixelTag(), hn::Le(v, hn::Neg(one)))) return hn::Zero(PixelTag());
   if (hn::AllTrue(PixelTag(), hn::Ge(v, one))) return all<Pixel>(partial_one);
-  const Pixel place = (v + one) * all<Pixel>(0.5F * (partial_columns - 1));
-  const SignedOf<Pixel> column = hn::Min(truncated(place), hn::Set(integers, partial_columns - 2));
-  const Pixel part = place - from_integer<Pixel>(column);
+  const Pixel column_position = (v + one) * all<Pixel>(0.5F * (partial_columns - 1));
+  const SignedOf<Pixel> column =
+      hn::Min(truncated(column_position), hn::Set(integers, partial_columns - 2));
+  const Pixel part = column_position - from_integer<Pixel>(column);
   const SignedOf<Pixel> at = rows.at + column;
   const Pixel upper = between_columns(hn::GatherIndex(integers, partial, at), part);
   const Pixel lower =
@@ -74,7 +76,7 @@ KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_REST
                                const Faces& faces, const Tile& tile, int row, int column) {
   constexpr float t2 = footprint_t * footprint_t;
   const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
-  std::uint32_t met = 0;
+  std::uint32_t changed = 0;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
     const Pixel px = all<Pixel>(left_of(tile, column)) + load<Pixel>(lane_x + l);
     const Pixel py = all<Pixel>(top_of(tile, row)) + load<Pixel>(lane_y + l);
@@ -95,14 +97,14 @@ KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_REST
       const Pixel tau = whole * hn::Max(after - before, hn::Zero(PixelTag()));
       before = after;
       if (hn::AllFalse(PixelTag(), hn::Gt(tau, hn::Zero(PixelTag())))) continue;
-      met |= std::uint32_t{1} << static_cast<unsigned>(n);
+      changed |= std::uint32_t{1} << static_cast<unsigned>(n);
       float* gathered = touch(*faces.slab[n], row, column) + l;
       add_to(gathered, tau);
       for (int c = 0; c < 3; ++c)
         add_product(gathered + static_cast<std::ptrdiff_t>(1 + c) * block_pixels, tau, s.color[c]);
     }
   }
-  return __builtin_popcount(met);
+  return __builtin_popcount(changed);
 }
 
 // The part before the near plane is ignored.
@@ -130,8 +132,9 @@ void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int
     while (left != 0) {
       const int column = __builtin_ctz(left);
       left &= left - 1U;
-      const int met = gather_block<Perspective>(lanes, record.partial, faces, tile, row, column);
-      tile.counters.pixel_updates += std::int64_t{met} * block_pixels;
+      const int changed =
+          gather_block<Perspective>(lanes, record.partial, faces, tile, row, column);
+      tile.counters.pixel_updates += std::int64_t{changed} * block_pixels;
     }
   }
 }

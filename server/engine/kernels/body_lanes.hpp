@@ -1,4 +1,4 @@
-// Part of the kernel body: what a vector of pixels sees of one line and of one splat.
+// Part of the kernel body: contributions of one line and of one splat to a vector of pixels.
 #pragma once
 
 #include "server/engine/kernels/body_math.hpp"
@@ -113,8 +113,8 @@ KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   if (Style == style_moving) {
     // W(frac(q + 1/2 - phase)), W(p) = 1 - |2 p - 1|.
     const Pixel one = all<Pixel>(1.0F);
-    const Pixel place = hn::MulAdd(f, r.phase_rise, r.phase);
-    const Pixel p = hn::IfThenElse(hn::Ge(place, one), place - one, place);
+    const Pixel shifted = hn::MulAdd(f, r.phase_rise, r.phase);
+    const Pixel p = hn::IfThenElse(hn::Ge(shifted, one), shifted - one, shifted);
     return {cover * (one - hn::Abs(hn::MulSub(all<Pixel>(2.0F), p, one))), f};
   }
   return {cover, f};
@@ -144,7 +144,7 @@ KERNEL_INLINE SplatLanes spread(const Splat& s) {
 struct SplatLane {
   Pixel r2;      // squared distance from the centre, cells
   Pixel tau;     // optical depth of the whole splat
-  Pixel cells;   // per unit of view depth along the ray
+  Pixel cells;   // ray length in cells per unit of view depth
   Pixel behind;  // view depth of the point closest to the centre minus that of the centre
 };
 

@@ -1,4 +1,4 @@
-// Part of the kernel body: the slab method's lines are recorded for the blocks that they pass.
+// Part of the kernel body: records the lines of the slab method for the blocks they cross.
 #pragma once
 
 #include "server/engine/kernels/body_gather.hpp"
@@ -20,7 +20,8 @@ struct DepthRange {
 
 template <bool Perspective>
 KERNEL_INLINE DepthRange row_depths(const Ribbon& r, float margin, Pixel x, float y) {
-  constexpr float farthest = 0.5F * (block_side - 1);  // of pixel centres from the block centre
+  constexpr float farthest = 0.5F * (block_side - 1);  // largest distance of pixel centres from the
+                                                       // block centre
   const auto depth_at = [&](Pixel along) {
     const Pixel w = clamped(along, 0.0F, 1.0F);
     const Pixel one = all<Pixel>(1.0F);

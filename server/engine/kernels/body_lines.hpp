@@ -8,11 +8,11 @@ namespace {
 
 // Lines before projection. q runs from -1/2 at the tail to 1/2 at the head; [low, high] is drawn.
 struct Segments {
-  Three<Kernel> offset;  // of the centre of the line from the kernel position, world units
+  Three<Kernel> offset;  // from the kernel position to the centre of the line, world units
   Three<Kernel> extent;  // tail to head, world units
   Kernel low, high;
-  Kernel lift;   // of the centre of the line from the kernel position along z, cells
-  Kernel phase;  // of the texture's motion
+  Kernel lift;   // from the kernel position to the centre of the line along z, cells
+  Kernel phase;  // phase of the moving texture
 };
 
 KERNEL_INLINE UnsignedOf<Kernel> hashed_sample(const Rows& rows, int a, int i, std::uint32_t key) {
@@ -239,7 +239,7 @@ KERNEL_INLINE void blend(const float* entry, float part, float* rgb) {
   }
 }
 
-// Colours of one line from that of its table in `tail`: dimmed, and desaturated by `grey` at the
+// Colours of one line from its table colour in `tail`: dimmed, and desaturated by `grey` at the
 // tail and a further `more` at the head.
 KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* rise) {
   const ColorTag tag;
@@ -254,7 +254,8 @@ KERNEL_INLINE void shade(float dim, float grey, float more, float* tail, float* 
 
 // Inputs of the colours of lines, computed for a vector of kernel positions at a time.
 struct Shades {
-  alignas(64) std::int32_t entry[brick_kernels];  // of the table; `part`: weight of the next entry
+  alignas(64) std::int32_t entry[brick_kernels];  // entry of the table; `part`: weight of the next
+                                                  // entry
   alignas(64) float part[brick_kernels];
   alignas(64) float dim[brick_kernels];
   alignas(64) float grey[brick_kernels];
@@ -279,11 +280,11 @@ KERNEL_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, co
   const auto masked = is_masked(value);
   const ColorTable& table = line.color;
   const Kernel known = hn::IfThenElse(masked, all<Kernel>(table.low), value);
-  const Kernel place = clamped((known - all<Kernel>(table.low)) * all<Kernel>(table.scale), 0.0F,
-                               static_cast<float>(table.entries - 1));
-  const SignedOf<Kernel> entry = truncated(place);
+  const Kernel position = clamped((known - all<Kernel>(table.low)) * all<Kernel>(table.scale), 0.0F,
+                                  static_cast<float>(table.entries - 1));
+  const SignedOf<Kernel> entry = truncated(position);
   hn::Store(entry, hn::RebindToSigned<KernelTag>(), shades.entry + l);
-  store(place - from_integer<Kernel>(entry), shades.part + l);
+  store(position - from_integer<Kernel>(entry), shades.part + l);
   store(dim, shades.dim + l);
   const Kernel desaturation = all<Kernel>(line.head_desaturation);
   store(desaturation * (s.low + all<Kernel>(0.5F)), shades.grey + l);

@@ -153,9 +153,9 @@ void attenuate(int count, const float* tau, float* absorbed, float* transmitted)
 // Linear interpolation between a table's entries, clamped at its ends.
 inline void look_up(const ColorTable& table, float value, float rgb[3]) {
   const float last = static_cast<float>(table.entries - 1);
-  const float place = limited((value - table.low) * table.scale, 0.0F, last);
-  const int whole = static_cast<int>(place);
-  const float part = place - static_cast<float>(whole);
+  const float position = limited((value - table.low) * table.scale, 0.0F, last);
+  const int whole = static_cast<int>(position);
+  const float part = position - static_cast<float>(whole);
   const float* a = table.rgb + color_floats * static_cast<std::ptrdiff_t>(whole);
   const float* b = a + color_floats;
   for (int c = 0; c < 3; ++c) rgb[c] = a[c] + part * (b[c] - a[c]);

@@ -22,7 +22,7 @@ struct Rows {
   alignas(64) std::int32_t sample[3][pair_kernels];
   std::int32_t group[3][pair_kernels];
   std::int64_t along_u[brick_side];
-  std::int64_t offset[2];  // of the first sample of each row in the fields
+  std::int64_t offset[2];  // offset of the first sample of each row in the fields
   int u_count, v_count, pairs;
   int there;        // number of valid rows of the pair
   int first[3];     // kernel position of the brick along each axis
@@ -153,9 +153,9 @@ inline double dot3(const double a[3], const double b[3]) {
 void place_curved_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows,
                        KernelPositions& positions) {
   for (int i = 0; i < pair_kernels; ++i) {
-    const float* place = pass.places + 3 * offset_of(rows, i);
+    const float* position = pass.places + 3 * offset_of(rows, i);
     double at[3];
-    for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(place[c]) - camera.eye[c];
+    for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(position[c]) - camera.eye[c];
     const double z = dot3(camera.world_forward, at);
     const int l = pair_kernels * pair + i;
     positions.x[l] = static_cast<float>(dot3(camera.world_right, at));
@@ -218,7 +218,7 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
   const float* const frame[3] = {camera.right, camera.down, camera.forward};
   for (int c = 0; c < 3; ++c) {
     float box = 0;    // half the kernel box along this camera axis
-    float shift = 0;  // of its centre
+    float shift = 0;  // offset of its centre
     float square = 0;
     for (int a = 0; a < 3; ++a) {
       box += pass.line.half_span * absolute(frame[c][a]) * cell[a];

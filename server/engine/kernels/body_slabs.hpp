@@ -1,5 +1,5 @@
-// Part of the kernel body: a slab's gathered medium and the lines in it are composited, block by
-// block.
+// Part of the kernel body: composites the accumulated medium of a slab and the lines in it, block
+// by block.
 #pragma once
 
 #include "server/engine/kernels/body_line_hits.hpp"
@@ -14,20 +14,21 @@ constexpr int compositing_no_medium = -1;
 struct Passage {
   Pixel tau;
   Attenuation<Pixel> medium;
-  Pixel color[3];  // of the medium
-  Pixel rgb[3];    // added by lines, minus that of the medium behind them
+  Pixel color[3];  // colour of the medium
+  Pixel rgb[3];    // light added by lines, minus that of the medium behind them
   Pixel through;   // product of 1 - opacity of the lines so far
   Pixel reached;   // cd-naive: relative position in the slab up to which light is composited
   Pixel left;      // cd-naive: transmittance up to there
 };
 
 // A line at the pixels of a block; opacity 0 where a pixel does not meet it.
-struct Meeting {
-  alignas(64) float place[block_pixels];  // through the slab, 0 to 1
+struct BlockHit {
+  alignas(64) float x_line[block_pixels];  // through the slab, 0 to 1
   alignas(64) float opacity[block_pixels];
   alignas(64) float color[3][block_pixels];
 };
-constexpr int meetings_max = 64;  // sorted together; exact if no line is displaced by over half
+constexpr int block_hits_max = 64;  // sorted together; exact if no line is displaced by more than
+                                    // half
 
 template <int Compositing>
 KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
@@ -46,15 +47,15 @@ KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
 }
 
 // A line at a vector of pixels within the slab.
-struct Met {
+struct LaneHit {
   MaskOf<Pixel> here;  // the line covers the pixel, in this slab
-  Pixel opacity;       // elsewhere 0
+  Pixel opacity;       // 0 elsewhere
   Pixel depth;
   Pixel f;
 };
 
 template <Depth Along, int Style>
-KERNEL_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
+KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
   const RibbonLanes r = spread(line.ribbon);
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel w =
@@ -72,49 +73,49 @@ KERNEL_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pix
 }
 
 template <bool Perspective>
-KERNEL_INLINE Met meet(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
+KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
   if (!Perspective) {
-    return line.moving != 0 ? meet<Depth::flat, style_moving>(line, slab, px, py)
-                            : meet<Depth::flat, style_head>(line, slab, px, py);
+    return line.moving != 0 ? hit_lanes<Depth::flat, style_moving>(line, slab, px, py)
+                            : hit_lanes<Depth::flat, style_head>(line, slab, px, py);
   }
   if (line.bent == 0) {
-    return line.moving != 0 ? meet<Depth::series, style_moving>(line, slab, px, py)
-                            : meet<Depth::series, style_head>(line, slab, px, py);
+    return line.moving != 0 ? hit_lanes<Depth::series, style_moving>(line, slab, px, py)
+                            : hit_lanes<Depth::series, style_head>(line, slab, px, py);
   }
-  return line.moving != 0 ? meet<Depth::exact, style_moving>(line, slab, px, py)
-                          : meet<Depth::exact, style_head>(line, slab, px, py);
+  return line.moving != 0 ? hit_lanes<Depth::exact, style_moving>(line, slab, px, py)
+                          : hit_lanes<Depth::exact, style_head>(line, slab, px, py);
 }
 
-KERNEL_INLINE Pixel place_in(const Slab& slab, Pixel depth) {
+KERNEL_INLINE Pixel fraction_in(const Slab& slab, Pixel depth) {
   const Pixel inverse = all<Pixel>(1.0F / (slab.back - slab.front));
   return clamped((depth - all<Pixel>(slab.front)) * inverse, 0.0F, 1.0F);
 }
 
 // Returns whether any pixel meets the line.
 template <bool Perspective>
-KERNEL_INLINE bool meet_line(const RibbonRecord& line, const Slab& slab, float x, float y,
-                             Meeting& m) {
-  bool met = false;
+KERNEL_INLINE bool hit_block(const RibbonRecord& line, const Slab& slab, float x, float y,
+                             BlockHit& m) {
+  bool any = false;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
     const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
     const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const Met at = meet<Perspective>(line, slab, px, py);
-    met = met || !hn::AllFalse(PixelTag(), at.here);
-    store(place_in(slab, at.depth), m.place + l);
+    const LaneHit at = hit_lanes<Perspective>(line, slab, px, py);
+    any = any || !hn::AllFalse(PixelTag(), at.here);
+    store(fraction_in(slab, at.depth), m.x_line + l);
     store(at.opacity, m.opacity + l);
     for (int c = 0; c < 3; ++c) {
       store(hn::MulAdd(at.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c])),
             m.color[c] + l);
     }
   }
-  return met;
+  return any;
 }
 
 // Sorts two neighbours per pixel. Returns whether any pixel swapped them.
-KERNEL_INLINE bool put_in_order(Meeting& first, Meeting& second) {
+KERNEL_INLINE bool put_in_order(BlockHit& first, BlockHit& second) {
   bool swapped = false;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const auto wrong = hn::Gt(load<Pixel>(first.place + l), load<Pixel>(second.place + l));
+    const auto wrong = hn::Gt(load<Pixel>(first.x_line + l), load<Pixel>(second.x_line + l));
     if (hn::AllFalse(PixelTag(), wrong)) continue;
     swapped = true;
     const auto exchange = [&](float* a, float* b) {
@@ -123,7 +124,7 @@ KERNEL_INLINE bool put_in_order(Meeting& first, Meeting& second) {
       store(hn::IfThenElse(wrong, q, p), a + l);
       store(hn::IfThenElse(wrong, p, q), b + l);
     };
-    exchange(first.place, second.place);
+    exchange(first.x_line, second.x_line);
     exchange(first.opacity, second.opacity);
     for (int c = 0; c < 3; ++c) exchange(first.color[c], second.color[c]);
   }
@@ -132,44 +133,44 @@ KERNEL_INLINE bool put_in_order(Meeting& first, Meeting& second) {
 
 // Insertion sort front to back in every pixel. The input is nearly sorted, by depth at the centre
 // of the block.
-inline void sort_meetings(Meeting* m, int count) {
+inline void sort_block_hits(BlockHit* m, int count) {
   for (int n = 1; n < count; ++n) {
     for (int k = n; k > 0 && put_in_order(m[k - 1], m[k]); --k) continue;
   }
 }
 
 template <int Compositing>
-KERNEL_INLINE void pass_line(Pixel opacity, Pixel place, const Pixel color[3], Passage& p) {
+KERNEL_INLINE void pass_line(Pixel opacity, Pixel x_line, const Pixel color[3], Passage& p) {
   const Pixel one = all<Pixel>(1.0F);
   if (Compositing == compositing_cd_naive) {
     // Composite the medium up to the line only in pixels that the line covers.
-    const Pixel next =
-        hn::IfThenElse(hn::Gt(opacity, hn::Zero(PixelTag())), hn::Max(place, p.reached), p.reached);
+    const Pixel next = hn::IfThenElse(hn::Gt(opacity, hn::Zero(PixelTag())),
+                                      hn::Max(x_line, p.reached), p.reached);
     const Pixel part = (next - p.reached) * p.medium.absorbed;
     const Pixel behind = p.left * (one - part);
     for (int c = 0; c < 3; ++c) {
-      const Pixel own = behind * opacity * color[c];
-      p.rgb[c] = p.rgb[c] + hn::MulAdd(p.left * part, p.color[c], own);
+      const Pixel line_weight = behind * opacity * color[c];
+      p.rgb[c] = p.rgb[c] + hn::MulAdd(p.left * part, p.color[c], line_weight);
     }
     p.left = behind * (one - opacity);
     p.reached = next;
     return;
   }
-  Pixel own = p.through * opacity;
+  Pixel line_weight = p.through * opacity;
   if (Compositing == compositing_no_medium) {
-    for (int c = 0; c < 3; ++c) p.rgb[c] = hn::MulAdd(own, color[c], p.rgb[c]);
+    for (int c = 0; c < 3; ++c) p.rgb[c] = hn::MulAdd(line_weight, color[c], p.rgb[c]);
   } else {
-    own = own * light_before<Compositing>(p.medium, p.tau, place);
-    for (int c = 0; c < 3; ++c) p.rgb[c] = hn::MulAdd(own, color[c] - p.color[c], p.rgb[c]);
+    line_weight = line_weight * light_before<Compositing>(p.medium, p.tau, x_line);
+    for (int c = 0; c < 3; ++c) p.rgb[c] = hn::MulAdd(line_weight, color[c] - p.color[c], p.rgb[c]);
   }
   p.through = p.through * (one - opacity);
 }
 
 template <int Compositing>
-KERNEL_INLINE void pass_line(const Meeting& m, int l, Passage& p) {
+KERNEL_INLINE void pass_line(const BlockHit& m, int l, Passage& p) {
   const Pixel color[3] = {load<Pixel>(m.color[0] + l), load<Pixel>(m.color[1] + l),
                           load<Pixel>(m.color[2] + l)};
-  pass_line<Compositing>(load<Pixel>(m.opacity + l), load<Pixel>(m.place + l), color, p);
+  pass_line<Compositing>(load<Pixel>(m.opacity + l), load<Pixel>(m.x_line + l), color, p);
 }
 
 // I = c_s (1 - P exp(-tau)) + sum_k prod_(j<k) (1 - a_j) a_k exp(-tau x_k) (c_k - c_s).
@@ -215,7 +216,7 @@ inline bool is_dark(const float* transmittance, const Passage* p, float stop) {
 }
 
 template <int Compositing>
-KERNEL_INLINE void pass_lines(const Meeting* m, int count, Passage* p) {
+KERNEL_INLINE void pass_lines(const BlockHit* m, int count, Passage* p) {
   for (int v = 0; v < block_vectors; ++v) {
     Passage passage = p[v];
     for (int n = 0; n < count; ++n) pass_line<Compositing>(m[n], v * pixel_lanes, passage);
@@ -231,7 +232,7 @@ struct Closing {
   int count;
   float x, y;  // the block's corner, pixels
   float stop;
-  const float* transmittance;  // before the slab
+  const float* transmittance;  // transmittance in front of the slab
 };
 
 // Stable rank sort of a few lines by depth: the number of predecessors is the index.
@@ -241,14 +242,14 @@ inline void sort_met(const MetLine* met, int count, MetLine* sorted) {
   for (; filled < count; ++filled) depth[filled] = met[filled].depth;
   for (; filled % pixel_lanes != 0; ++filled) depth[filled] = __builtin_inff();
   for (int n = 0; n < count; ++n) {
-    const Pixel own = all<Pixel>(met[n].depth);
-    const Pixel place = all<Pixel>(static_cast<float>(n));
+    const Pixel depth_n = all<Pixel>(met[n].depth);
+    const Pixel index = all<Pixel>(static_cast<float>(n));
     std::size_t before = 0;
     for (int l = 0; l < filled; l += pixel_lanes) {
       const Pixel other = load<Pixel>(depth + l);
-      const auto earlier = hn::Lt(hn::Iota(PixelTag(), l), place);
-      const auto equal = hn::And(hn::Eq(other, own), earlier);
-      before += hn::CountTrue(PixelTag(), hn::Or(hn::Lt(other, own), equal));
+      const auto earlier = hn::Lt(hn::Iota(PixelTag(), l), index);
+      const auto equal = hn::And(hn::Eq(other, depth_n), earlier);
+      before += hn::CountTrue(PixelTag(), hn::Or(hn::Lt(other, depth_n), equal));
     }
     sorted[before] = met[n];
   }
@@ -283,18 +284,18 @@ KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
       Pixel far = farthest[v];
       for (int h = from; h < to; ++h) {
         const RibbonRecord& line = with.lines[with.met[h].line];
-        const Met met = meet<Perspective>(line, with.slab, px, py);
-        if (hn::AllFalse(PixelTag(), met.here)) continue;
-        if (!hn::AllFalse(PixelTag(), hn::And(met.here, hn::Lt(met.depth, far)))) {
+        const LaneHit hit = hit_lanes<Perspective>(line, with.slab, px, py);
+        if (hn::AllFalse(PixelTag(), hit.here)) continue;
+        if (!hn::AllFalse(PixelTag(), hn::And(hit.here, hn::Lt(hit.depth, far)))) {
           return Outcome::out_of_order;
         }
-        far = hn::IfThenElse(met.here, met.depth, far);
+        far = hn::IfThenElse(hit.here, hit.depth, far);
         Pixel color[3];
         for (int c = 0; c < 3; ++c) {
           color[c] =
-              hn::MulAdd(met.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c]));
+              hn::MulAdd(hit.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c]));
         }
-        pass_line<Compositing>(met.opacity, place_in(with.slab, met.depth), color, p);
+        pass_line<Compositing>(hit.opacity, fraction_in(with.slab, hit.depth), color, p);
       }
       farthest[v] = far;
       passage[v] = p;
@@ -307,10 +308,10 @@ KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
   return Outcome::done;
 }
 
-inline float farthest_place(const Meeting& m) {
+inline float farthest_x(const BlockHit& m) {
   Pixel most = hn::Zero(PixelTag());
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    most = hn::Max(most, load<Pixel>(m.place + l));
+    most = hn::Max(most, load<Pixel>(m.x_line + l));
   }
   return largest_of(most);
 }
@@ -318,25 +319,25 @@ inline float farthest_place(const Meeting& m) {
 // The same after sorting the lines in every pixel.
 template <bool Perspective, int Compositing>
 Outcome pass_sorted(const Closing& with, Passage* passage) {
-  Meeting meetings[meetings_max];
+  BlockHit hits[block_hits_max];
   int held = 0;
   for (int h = 0; h < with.count; ++h) {
     const RibbonRecord& line = with.lines[with.met[h].line];
-    if (!meet_line<Perspective>(line, with.slab, with.x, with.y, meetings[held])) continue;
-    if (++held < meetings_max) continue;
+    if (!hit_block<Perspective>(line, with.slab, with.x, with.y, hits[held])) continue;
+    if (++held < block_hits_max) continue;
     // Composite the nearer half; later lines may still precede lines of the farther half.
-    sort_meetings(meetings, held);
-    held = meetings_max / 2;
-    pass_lines<Compositing>(meetings, held, passage);
-    const float depth = farthest_place(meetings[held - 1]) * (with.slab.back - with.slab.front);
-    for (int n = 0; n < held; ++n) meetings[n] = meetings[n + held];
+    sort_block_hits(hits, held);
+    held = block_hits_max / 2;
+    pass_lines<Compositing>(hits, held, passage);
+    const float depth = farthest_x(hits[held - 1]) * (with.slab.back - with.slab.front);
+    for (int n = 0; n < held; ++n) hits[n] = hits[n + held];
     if (is_dark(with.transmittance, passage, with.stop) &&
         rest_is_behind(with, h + 1, with.slab.front + depth)) {
       return Outcome::dark;
     }
   }
-  sort_meetings(meetings, held);
-  pass_lines<Compositing>(meetings, held, passage);
+  sort_block_hits(hits, held);
+  pass_lines<Compositing>(hits, held, passage);
   return Outcome::done;
 }
 

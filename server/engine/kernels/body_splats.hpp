@@ -1,4 +1,4 @@
-// Part of the kernel body: splats, from a row's extinctions to footprints on the screen.
+// Part of the kernel body: splats, from the extinctions of a row to footprints on the screen.
 #pragma once
 
 #include "server/engine/kernels/body_cells.hpp"
@@ -6,9 +6,9 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Half the silhouette's width along one screen axis and its middle, as coordinates at unit
-// distance, from M = v v^T - t^2 A A^T; unbounded when the splat reaches the eye's plane. The
-// discriminant M13^2 - M11 M33 is written out so that v's own squares never cancel.
+// Half the width of the silhouette along one screen axis and its centre, as coordinates at unit
+// distance, from M = v v^T - t^2 A A^T; unbounded if the splat reaches the plane of the eye. The
+// discriminant M13^2 - M11 M33 is expanded so that the squares of v never cancel.
 struct Extent {
   Kernel low, high;
 };
@@ -57,8 +57,8 @@ KERNEL_INLINE Facing face(const Camera& camera, const CellLanes<Curved>& cells) 
 }
 
 // An ellipse about the projected centre of a splat, in pixels: at distance y below its centre it
-// spans lean y +- sqrt(half_chord2 - narrowing y^2); its rightmost point lies half_width right of
-// and shear half_width below the centre. Not known where the outline is no ellipse, or too large.
+// spans lean y +- sqrt(half_chord2 - narrowing y^2); its rightmost point is half_width right of and
+// shear half_width below the centre. Undefined if the outline is not an ellipse or is too large.
 struct Oval {
   MaskOf<Kernel> known;
   Kernel x, y;

@@ -13,7 +13,7 @@ constexpr int tile_blocks = tile_side / block_side;    // blocks along a tile's 
 constexpr int block_channels = 4;                      // transmittance, red, green, blue
 constexpr int block_floats = block_channels * block_pixels;
 constexpr int window_side = 8;             // blocks; 8 x 8 blocks are the bits of one word
-constexpr double footprint_radius = 1.37;  // of a splat, cells
+constexpr double footprint_radius = 1.37;  // radius of the footprint of a splat, cells
 constexpr int brick_side = 8;              // kernel positions
 constexpr int brick_kernels = brick_side * brick_side;
 
@@ -42,13 +42,13 @@ struct ColorTable {
 struct LineStyle {
   const float* velocity[3];  // third null for a horizontal field
   float scale[3];
-  const float* rate_x;  // by sample index along y; null: components are not scaled
+  const float* rate_x;  // indexed by sample along y; null: components are not scaled
   float rate_y;
-  const float* rate_z;  // by sample index along z
+  const float* rate_z;  // indexed by sample along z
   float length;         // world units at full magnitude
   float inverse_full_magnitude;
   float min_magnitude;
-  float half_span;  // of the kernel box, in cells
+  float half_span;  // half the width of the kernel box, in cells
   float r1, r2;     // pixels
   float inverse_ramp;
   float opacity;
@@ -58,7 +58,7 @@ struct LineStyle {
   float cue_near, cue_scale, cue_strength;
   int color_by;  // scene::LineColor
   ColorTable color;
-  const float* color_values;  // of the field that determines the colour, or null
+  const float* color_values;  // values of the field that determines the colour, or null
   float rise_weight;
   float box_low_z, inverse_box_height;
   float jitter_center, jitter_stride;
@@ -98,22 +98,23 @@ struct Camera {
   float pixel;  // size at unit distance (perspective) or in the world
   float inverse_pixel;
   float near;
-  double world_right[3], world_down[3], world_forward[3];  // the same axes, unrounded
+  double world_right[3], world_down[3], world_forward[3];  // right, down and forward without
+                                                           // rounding to float
   double eye[3];
-  double depth_origin;  // view depth of the volume's middle, from which slabs count
+  double depth_origin;  // view depth of the middle of the volume, the origin of slabs
 };
 
 // Kernel positions of one stride, with their lines and media.
 struct Pass {
   Axis axis[3];
   int major, u, v;       // sheets are stacked along major; u is innermost
-  std::int64_t step[3];  // of a sample index along each axis, in samples
+  std::int64_t step[3];  // offset between neighbours along each axis, in samples
   int has_lines;
   int has_medium;
   LineStyle line;
   Medium medium;
   float cell_max[3];            // widest cell along each axis; curved: largest extent of a cell
-  int dims[3];                  // of the fields
+  int dims[3];                  // dimensions of the fields
   const float* places;          // curved lattices: 3 per sample, world units; otherwise null
   int compositing;              // scene::Compositing
   int by_depth;                 // depths of kernel positions are required
@@ -148,7 +149,7 @@ struct BrickSummary {
   int weak_lines;
   float weak_parts;
   float thin_medium;
-  float magnitude_max;  // of the lines that are drawn
+  float magnitude_max;  // largest magnitude of the lines that are drawn
   int lines;            // number of lines and splats that are drawn
   int splats;
 };
@@ -162,7 +163,7 @@ struct Counters {
 // Pixels of one tile as blocks of 4 x 4; see block_channels. Rays, for perspective media: the
 // length of the ray of each pixel at unit view depth.
 struct Tile {
-  int x, y;           // of its first pixel
+  int x, y;           // position of its first pixel
   int width, height;  // pixels inside the picture
   float* blocks;
   const float* rays;

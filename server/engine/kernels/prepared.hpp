@@ -25,7 +25,7 @@ struct KernelPositions {
 struct Ribbons {
   alignas(64) float x[brick_kernels];  // f = 0, pixels
   alignas(64) float y[brick_kernels];
-  alignas(64) float ux[brick_kernels];  // from f = 0 to 1, pixels
+  alignas(64) float ux[brick_kernels];  // vector from f = 0 to f = 1, pixels
   alignas(64) float uy[brick_kernels];
   alignas(64) float wx[brick_kernels];  // u / |u|^2
   alignas(64) float wy[brick_kernels];
@@ -43,7 +43,7 @@ struct Ribbons {
 };
 
 struct Densities {
-  alignas(64) float rho[brick_kernels];  // per world length
+  alignas(64) float rho[brick_kernels];  // extinction per world length
   float color[brick_kernels][color_floats];
 };
 
@@ -68,7 +68,8 @@ struct Splats {
   alignas(64) float d2_least[brick_kernels];  // |d|^2 is never less
   // Optical depth at the centre; perspective: times |d|.
   alignas(64) float strength[brick_kernels];
-  alignas(64) float half_depth[brick_kernels];  // of the silhouette along the view, world units
+  alignas(64) float half_depth[brick_kernels];  // half the depth of the silhouette along the view,
+                                                // world units
 };
 
 // Rows and columns of blocks of the tile that each line and splat may touch, both ends included;
@@ -146,7 +147,7 @@ struct SplatRecord {
 };
 
 struct RibbonRecord {
-  Ribbon ribbon;  // its depth from the camera's depth origin
+  Ribbon ribbon;  // depth of its centre from the camera's depth origin
   int moving;
   int bent;  // too much perspective for the series approximation of depth
 };

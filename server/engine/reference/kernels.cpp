@@ -1,4 +1,4 @@
-// Stops -> splats; the lists of a scene's ribbons and splats.
+// Kernel positions -> splats; the lists of ribbons and splats of a scene.
 #include "server/engine/reference/kernels.hpp"
 
 #include <algorithm>
@@ -55,10 +55,11 @@ Vec table_color(const ColorTable& table, double value) {
   return color;
 }
 
-Density make_density(const std::vector<const ScalarLayer*>& layers, const Stop& stop) {
+Density make_density(const std::vector<const ScalarLayer*>& layers,
+                     const KernelPosition& position) {
   Density density;
   for (const ScalarLayer* layer : layers) {
-    const auto value = static_cast<double>(layer->field->values[stop.index]);
+    const auto value = static_cast<double>(layer->field->values[position.index]);
     if (std::isnan(value)) continue;
     const double rho = extinction(*layer, value);
     if (rho <= 0) continue;
@@ -71,15 +72,15 @@ Density make_density(const std::vector<const ScalarLayer*>& layers, const Stop& 
 
 // M = v v^T - t^2 A A^T: the tangents of the silhouette are at (M13 +- sqrt(M13^2 - M11 M33)) /
 // M33.
-ScreenBox splat_box(const View& view, const Stop& stop) {
+ScreenBox splat_box(const View& view, const KernelPosition& position) {
   const auto s = [&](const Vec& p, const Vec& q) {
     double sum = 0;
-    for (const Vec& edge : stop.edge) sum += dot(p, edge) * dot(q, edge);
+    for (const Vec& edge : position.edge) sum += dot(p, edge) * dot(q, edge);
     return footprint_t * footprint_t * sum;
   };
   const double w = view.half_width;
   const double h = view.half_height;
-  const Vec& centre = stop.centre;
+  const Vec& centre = position.centre;
   if (!view.perspective) {
     const double x = w + centre[0] / view.pixel;
     const double y = h + centre[1] / view.pixel;
@@ -105,10 +106,10 @@ ScreenBox splat_box(const View& view, const Stop& stop) {
 KernelBounds kernel_bounds(const Scene& scene) {
   KernelBounds bounds;
   for (const LayerGroup& group : group_layers(scene)) {
-    std::uint64_t stops = 1;
-    for (const auto& axis : group.axis) stops *= axis.size();
-    if (group.lines != nullptr) bounds.ribbons += stops;
-    if (!group.media.empty()) bounds.splats += stops;
+    std::uint64_t positions = 1;
+    for (const auto& axis : group.axis) positions *= axis.size();
+    if (group.lines != nullptr) bounds.ribbons += positions;
+    if (!group.media.empty()) bounds.splats += positions;
   }
   return bounds;
 }
@@ -122,20 +123,21 @@ Kernels list_kernels(const Scene& scene, const View& view, const CancelToken& ca
 void list_kernels(const Scene& scene, const View& view, const CancelToken& cancel,
                   Kernels& kernels) {
   for (const LayerGroup& group : group_layers(scene)) {
-    for (const AxisStop& z : group.axis[2]) {
-      for (const AxisStop& y : group.axis[1]) {
+    for (const AxisPosition& z : group.axis[2]) {
+      for (const AxisPosition& y : group.axis[1]) {
         if (cancel.cancelled()) return;
-        for (const AxisStop& x : group.axis[0]) {
-          const Stop stop = make_stop(scene, view, {x, y, z});
-          if (!stop.has_cell || (view.perspective && stop.centre[2] < view.near)) continue;
+        for (const AxisPosition& x : group.axis[0]) {
+          const KernelPosition position = make_kernel_position(scene, view, {x, y, z});
+          if (!position.has_cell || (view.perspective && position.centre[2] < view.near)) continue;
           if (group.lines != nullptr) {
-            const auto ribbon = make_ribbon(scene, view, *group.lines, stop);
+            const auto ribbon = make_ribbon(scene, view, *group.lines, position);
             if (ribbon) kernels.ribbons.push_back(*ribbon);
           }
-          const Density density = make_density(group.media, stop);
+          const Density density = make_density(group.media, position);
           if (density.rho <= 0) continue;
-          kernels.splats.push_back({stop.from_eye, stop.inverse, density.rho, density.color});
-          kernels.splat_boxes.push_back(splat_box(view, stop));
+          kernels.splats.push_back(
+              {position.from_eye, position.inverse, density.rho, density.color});
+          kernels.splat_boxes.push_back(splat_box(view, position));
         }
       }
     }

@@ -50,31 +50,31 @@ inline Vec to_camera(const View& view, const Vec& v) {
 
 // A kernel position along one axis: it represents `samples` samples and lies at the middle one (the
 // lower of two). cell: sum of their spacings, world units. A slice has one position along its axis.
-struct AxisStop {
+struct AxisPosition {
   int sample = 0;
   int samples = 1;
   double cell = 0;
 };
-std::vector<AxisStop> axis_stops(const scene::Scene& scene, int axis, int stride);
+std::vector<AxisPosition> axis_positions(const scene::Scene& scene, int axis, int stride);
 
 // Layers of one stride share their kernel positions.
 struct LayerGroup {
   int stride = 1;
   const scene::VectorLayer* lines = nullptr;
   std::vector<const scene::ScalarLayer*> media;
-  std::array<std::vector<AxisStop>, 3> axis;
+  std::array<std::vector<AxisPosition>, 3> axis;
 };
 std::vector<LayerGroup> group_layers(const scene::Scene& scene);  // the one with lines first
 
 // A kernel position.
-struct Stop {
+struct KernelPosition {
   std::array<int, 3> sample{};
-  std::size_t index = 0;         // of its sample in a field
+  std::size_t index = 0;         // index of its sample in a field
   Vec from_eye{};                // world axes
-  Vec centre{};                  // the same along right, down, forward
-  std::array<Vec, 3> edge{};     // of its cell: the columns of A, world units
+  Vec centre{};                  // from_eye along right, down, forward
+  std::array<Vec, 3> edge{};     // edges of its cell: the columns of A, world units
   std::array<Vec, 3> inverse{};  // the rows of A^-1
-  Vec cell{};                    // of the uncurved lattice
+  Vec cell{};                    // widths of the uncurved cell
   bool has_cell = true;          // false if the cell has no volume (at the pole of a globe)
 
   [[nodiscard]] Vec to_cells(const Vec& v) const {
@@ -82,7 +82,8 @@ struct Stop {
   }
 };
 // A position without a cell has neither line nor splat.
-Stop make_stop(const scene::Scene& scene, const View& view, const std::array<AxisStop, 3>& stops);
+KernelPosition make_kernel_position(const scene::Scene& scene, const View& view,
+                                    const std::array<AxisPosition, 3>& positions);
 
 // A projected line: ends in camera space (right, down, forward) and in pixels, q at both ends (-1/2
 // at the tail of the unclipped line, 1/2 at its head), linear colour, not premultiplied.
@@ -139,17 +140,19 @@ RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
   return hit;
 }
 
-// Empty if masked, below min_magnitude, without direction, outside the kernel box or before the
-// near plane. On a curved lattice the components of a vector are along the edges of the cell.
+// The ribbon of a kernel position; empty if masked, below min_magnitude, without direction, outside
+// the kernel box or before the near plane. On a curved lattice the components of a vector are along
+// the edges of the cell.
 std::optional<Ribbon> make_ribbon(const scene::Scene& scene, const View& view,
-                                  const scene::VectorLayer& layer, const Stop& stop);
+                                  const scene::VectorLayer& layer, const KernelPosition& position);
 
 // rho per world unit and linear colour, not premultiplied, of all layers together; rho 0: no splat.
 struct Density {
   double rho = 0;
   Vec color{};
 };
-Density make_density(const std::vector<const scene::ScalarLayer*>& layers, const Stop& stop);
+Density make_density(const std::vector<const scene::ScalarLayer*>& layers,
+                     const KernelPosition& position);
 
 // The straight linear colour of a value.
 Vec table_color(const scene::ColorTable& table, double value);
@@ -160,7 +163,7 @@ struct ScreenBox {
 };
 // Bounding box of the silhouette of a splat, the ellipsoid of radius 1.37 cells; the whole screen
 // if it reaches the plane of the eye.
-ScreenBox splat_box(const View& view, const Stop& stop);
+ScreenBox splat_box(const View& view, const KernelPosition& position);
 ScreenBox ribbon_box(const Ribbon& line);
 
 // A splat in the form that rays are intersected with.

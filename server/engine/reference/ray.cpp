@@ -106,7 +106,7 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
   std::array<double, rule_nodes_max> seen{};  // transmittance down to each node
   double tau = 0;
   double densest = 0;
-  int thick = 0;  // the node whose colour is taken as that of the piece
+  int thick = 0;  // the node whose colour represents the piece
   for (int j = 0; j < rule.nodes; ++j) {
     tau += rule.weight[j] * samples.extinction[j];
     double front = 0;
@@ -154,7 +154,7 @@ PieceLight piece_light(const Rule& rule, double length, const Samples& samples) 
     // Errors of tau also change the transmittances under the integral.
     const double by_tau = spread * piece.alpha * std::min(tau_error, 1.0);
     const double by_rule = length * quadrature_error(rule, rest) + by_tau + spread * missed;
-    // Bound by the colours: where the nodes resolve the light, no mixture of them deviates more.
+    // Bound by the colours: if the nodes resolve the light, no mixture of them deviates more.
     const double by_color = (resolved ? 2.5 : 1) * spread * piece.alpha;
     piece.rgb[c] = color * piece.alpha + (resolved ? length * sum : 0);
     piece.error =

@@ -19,7 +19,7 @@ namespace {
 // ---- the medium along a ray ----
 
 struct Ray {
-  Vec origin{};     // from the eye
+  Vec origin{};     // position relative to the eye
   Vec direction{};  // forward component 1: the parameter is the view depth
   double length = 1;
 };
@@ -30,7 +30,7 @@ struct Stretch {
   double middle = 0;
   double cells2 = 0;  // cells per depth, squared
   double least2 = 0;
-  double rho = 0;  // per unit of depth, divided by the integral of the footprint
+  double rho = 0;  // extinction per unit of depth, divided by the integral of the footprint
   Vec color{};
 };
 
@@ -260,7 +260,7 @@ struct Painting::State {
   Profile profile;
   Frame frame;
   std::vector<Painter> painters;
-  std::vector<RayCount> counts;  // by worker
+  std::vector<RayCount> counts;  // per worker
 };
 
 Painting::Painting(std::unique_ptr<State> state) : state_(std::move(state)) {}

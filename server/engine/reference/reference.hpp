@@ -1,4 +1,4 @@
-// Scene -> reference picture, from which the errors of all methods are measured: the volume
+// Scene -> reference picture, relative to which the errors of all methods are measured: the volume
 // rendering integral per pixel in double precision. Independent of the number of threads.
 #pragma once
 
@@ -23,7 +23,7 @@ struct Picture {
   int height = 0;
   std::vector<double> rgba;      // linear premultiplied, row 0 on top
   std::int64_t pieces = 0;       // intervals of rays
-  std::int64_t evaluations = 0;  // of the medium at points of rays
+  std::int64_t evaluations = 0;  // evaluations of the medium at points of rays
 };
 
 // The medium is rho(x) = sum_i rho_i K(|A_i^-1 (x - x_i)|) / C, where the columns of A_i are the

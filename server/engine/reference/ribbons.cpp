@@ -1,4 +1,4 @@
-// A stop's vector -> its line as it is seen.
+// The vector at a kernel position -> its line on the screen.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -34,8 +34,8 @@ Hash pcg3d(Hash v) {
 double unit_interval(std::uint32_t bits) { return static_cast<double>(bits >> 8U) / 16777216.0; }
 
 struct Jitter {
-  Vec stride{};      // each in [-1/2, 1/2)
-  Vec centre{};      // each in [-1/2, 1/2)
+  Vec stride{};      // each component in [-1/2, 1/2)
+  Vec centre{};      // each component in [-1/2, 1/2)
   double phase = 0;  // in [0, 1)
 };
 
@@ -59,16 +59,16 @@ Jitter jitter_of(const VectorLayer& layer, const std::array<int, 3>& sample) {
 // The vector at a kernel position as drawn: `unit` along the axes of the cell (shorter than 1 if a
 // slice removed a component), `extent` from tail to head in world units.
 struct DrawnVector {
-  double magnitude = 0;  // of the data
+  double magnitude = 0;  // magnitude of the data
   Vec unit{};
   Vec extent{};
 };
 
 std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& layer,
-                                       const Stop& stop) {
+                                       const KernelPosition& position) {
   Vec data{};
   for (int c = 0; c < layer.field->components; ++c) {
-    data[c] = static_cast<double>(layer.field->component(c)[stop.index]);
+    data[c] = static_cast<double>(layer.field->component(c)[position.index]);
   }
   if (std::isnan(data[0])) return {};
   DrawnVector drawn;
@@ -77,9 +77,9 @@ std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& la
   Vec d{};
   for (int c = 0; c < 3; ++c) d[c] = data[c] / drawn.magnitude * layer.scale[c];
   if (!layer.rate_x.empty()) {
-    d[0] *= layer.rate_x[stop.sample[1]];
+    d[0] *= layer.rate_x[position.sample[1]];
     d[1] *= layer.rate_y;
-    d[2] *= layer.rate_z[stop.sample[2]];
+    d[2] *= layer.rate_z[position.sample[2]];
   }
   const double norm = length(d);
   if (norm == 0) return {};
@@ -93,7 +93,7 @@ std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& la
   }
   Vec along{};
   for (int a = 0; a < 3; ++a) {
-    along = plus(along, drawn.unit[a] / length(stop.edge[a]), stop.edge[a]);
+    along = plus(along, drawn.unit[a] / length(position.edge[a]), position.edge[a]);
   }
   // The edges of a curved cell need not be perpendicular; keep the length of `unit`.
   const double bent = length(along);
@@ -108,10 +108,11 @@ struct Part {
   double high = 0.5;
 };
 
-Part clip_to_box(const VectorLayer& layer, const Stop& stop, const Vec& in_box, const Vec& extent) {
+Part clip_to_box(const VectorLayer& layer, const KernelPosition& position, const Vec& in_box,
+                 const Vec& extent) {
   Part part;
   const double half = (layer.overlap ? layer.span : 1.0) / 2;
-  const Vec slope = stop.to_cells(extent);
+  const Vec slope = position.to_cells(extent);
   for (int a = 0; a < 3; ++a) {
     if (std::abs(slope[a]) > 1e-30) {
       const double p = (-half - in_box[a]) / slope[a];
@@ -125,7 +126,7 @@ Part clip_to_box(const VectorLayer& layer, const Stop& stop, const Vec& in_box, 
   return part;
 }
 
-// In [0, 360): 0 along +y, 90 along +x.
+// The bearing in [0, 360): 0 along +y, 90 along +x.
 double bearing(const Vec& v) {
   const double degrees = std::atan2(v[0] + 0.0, v[1] + 0.0) * 180 / std::numbers::pi;
   const double turned = degrees < 0 ? degrees + 360 : degrees;
@@ -137,7 +138,7 @@ struct Seen {
   double distance = 0;  // view depth of the middle of the line
 };
 
-Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const Stop& stop,
+Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const KernelPosition& position,
                    const DrawnVector& drawn, const Seen& seen) {
   const auto [low, high] = scene::height_range(scene.lattice);
   switch (layer.color_by) {
@@ -155,7 +156,7 @@ Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const Stop& sto
     case LineColor::direction:
       return table_color(layer.color, bearing(drawn.unit));
     case LineColor::scalar: {
-      const auto value = static_cast<double>(layer.color_field->values[stop.index]);
+      const auto value = static_cast<double>(layer.color_field->values[position.index]);
       return std::isnan(value) ? Vec{0.5, 0.5, 0.5} : table_color(layer.color, value);
     }
     case LineColor::constant:
@@ -186,18 +187,18 @@ bool clip_to_near(const View& view, const Vec& p, const Vec& v, Part& part) {
 }  // namespace
 
 std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const VectorLayer& layer,
-                                  const Stop& stop) {
-  const auto drawn = read_vector(scene, layer, stop);
+                                  const KernelPosition& position) {
+  const auto drawn = read_vector(scene, layer, position);
   if (!drawn) return {};
-  const Jitter jitter = jitter_of(layer, stop.sample);
+  const Jitter jitter = jitter_of(layer, position.sample);
   Vec in_box{};  // centre of the line in its kernel box, cells
   Vec offset{};  // centre of the line from the kernel position, world units
   for (int a = 0; a < 3; ++a) {
     in_box[a] = layer.jitter_center * jitter.centre[a];
-    offset = plus(offset, in_box[a] + layer.jitter_stride * jitter.stride[a], stop.edge[a]);
+    offset = plus(offset, in_box[a] + layer.jitter_stride * jitter.stride[a], position.edge[a]);
   }
-  Part part = clip_to_box(layer, stop, in_box, drawn->extent);
-  const Vec p = to_camera(view, plus(stop.from_eye, 1, offset));
+  Part part = clip_to_box(layer, position, in_box, drawn->extent);
+  const Vec p = to_camera(view, plus(position.from_eye, 1, offset));
   const Vec v = to_camera(view, drawn->extent);
   if (!clip_to_near(view, p, v, part)) return {};
   Ribbon line;
@@ -218,12 +219,12 @@ std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const Ve
   line.perspective = view.perspective;
   line.moving = layer.moving;
   const double lift = in_box[2] + layer.jitter_stride * jitter.stride[2];
-  const Seen seen{scene.lattice.positions[2][stop.sample[2]] + lift * stop.cell[2], p[2]};
+  const Seen seen{scene.lattice.positions[2][position.sample[2]] + lift * position.cell[2], p[2]};
   const double strong = ramp(drawn->magnitude, layer.magnitude_range[0], layer.magnitude_range[1]);
   const double far = ramp(p[2], scene.depth_cue.near, scene.depth_cue.far);
   const double dim =
       (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
-  line.color = scaled(undimmed_color(scene, layer, stop, *drawn, seen), dim);
+  line.color = scaled(undimmed_color(scene, layer, position, *drawn, seen), dim);
   if (layer.moving) {
     const double full = layer.magnitude_range[1];
     const double speed = full > 0 ? std::min(drawn->magnitude / full, 1.0) : 1.0;

@@ -23,7 +23,7 @@ std::size_t tiles_along(int pixels) {
 
 }  // namespace
 
-// Half-open ranges; empty: all 0.
+// Half-open ranges of tiles; all 0 if empty.
 struct ScreenGrid::Tiles {
   std::size_t x0 = 0, x1 = 0, y0 = 0, y1 = 0;
 };

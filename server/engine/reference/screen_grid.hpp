@@ -20,8 +20,8 @@ class ScreenGrid {
 
   ScreenGrid(int width, int height);
 
-  // Both return false if cancelled. First step: computes the lengths of the lists for the ids below
-  // `boxes`.
+  // Both functions return false if cancelled. The first step computes the lengths of the lists for
+  // the ids below `boxes`.
   bool count(std::size_t boxes, const BoxOf& box_of, const CancelToken& cancel);
   // Second step: fills the lists with the same boxes.
   bool fill(std::size_t boxes, const BoxOf& box_of, const CancelToken& cancel);
@@ -38,7 +38,7 @@ class ScreenGrid {
 
   int width_, height_;
   std::size_t columns_, rows_;
-  std::vector<std::uint64_t> starts_;  // of the list of each tile in ids_, then the end
+  std::vector<std::uint64_t> starts_;  // start of the list of each tile in ids_, then the end
   std::unique_ptr<std::uint32_t[]> ids_;
   std::uint64_t total_ = 0;
   std::size_t longest_ = 0;

@@ -12,7 +12,7 @@ namespace {
 constexpr Micros correction_life_us = 4'000'000;
 constexpr double newest_weight = 0.5;
 constexpr double own_share = 0.3;
-// A slower setting must also fit this share of the budget.
+// A slower setting must also fit this fraction of the budget.
 constexpr double headroom_to_change = 0.92;
 }  // namespace
 
@@ -70,7 +70,7 @@ quality::Choice Chooser::best(const protocol::View& view, const quality::Forecas
 std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts& forecasts,
                             const quality::Aim& aim, double pixels_most, Micros now) {
   const quality::Choice wanted = best(view, forecasts, aim, pixels_most, now);
-  // Hysteresis avoids flicker during motion; after a rest the choice starts anew.
+  // Hysteresis avoids flicker during motion; after a rest the choice starts again.
   constexpr Micros rest = 1'000'000;
   if (now - chosen_at_ > rest) chosen_.reset();
   chosen_at_ = now;
@@ -97,7 +97,7 @@ std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts
   return *chosen_;
 }
 
-// Whether the current setting violates a limit that the wanted one meets.
+// Whether the current setting violates a limit that the desired one meets.
 bool Chooser::is_wrong(std::size_t wanted, const quality::Forecasts& forecasts,
                        const quality::Aim& aim, Micros now) const {
   const std::size_t here = *chosen_;
@@ -124,7 +124,7 @@ std::size_t Chooser::patient(const quality::Choice& calm, const quality::Forecas
   if (is_sure(wanted, forecasts, now)) return wanted;
   if (tried_at_ && now - *tried_at_ < try_after_) return here;
   tried_at_ = now;
-  // Guess: the next finer resolution of the same kind.
+  // Without calibration: the next finer resolution of the same kind.
   const quality::Setting& own = quality::settings[here];
   std::optional<std::size_t> next;
   for (std::size_t i = 0; i < quality::settings_count; ++i) {

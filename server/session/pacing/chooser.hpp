@@ -16,11 +16,11 @@ namespace windsplat::session {
 
 using Micros = std::int64_t;  // microseconds of a monotonic clock
 
-// Predict, then correct. A forecast's time is multiplied by the recent ratio of measured to
-// forecast times, common to all settings and additionally per setting. A slower setting is taken
-// only after `slack_frames` consecutive frames that would have allowed it, a faster one at once, to
-// avoid flicker. Without calibrated times the next finer resolution is tried, rarely if it did not
-// fit before.
+// Predict, then correct. The forecast time of a setting is multiplied by the recent ratio of
+// measured to forecast times, common to all settings and additionally per setting. A slower setting
+// is taken only after `slack_frames` consecutive frames that would have allowed it, a faster one at
+// once, to avoid flicker. Without calibrated times the next finer resolution is tried, rarely if it
+// did not fit before.
 class Chooser {
  public:
   static constexpr int slack_frames = 5;
@@ -40,7 +40,7 @@ class Chooser {
                                 Micros now) const;
 
   // The allowed setting with the least error among those expected to cost at most `budget`, without
-  // hysteresis; none if there is none.
+  // hysteresis; nullopt if there is none.
   [[nodiscard]] std::optional<std::size_t> least_error(const protocol::View& view,
                                                        const quality::Forecasts& forecasts,
                                                        Micros budget, Micros now) const;
@@ -61,11 +61,11 @@ class Chooser {
   [[nodiscard]] std::size_t patient(const quality::Choice& calm,
                                     const quality::Forecasts& forecasts, Micros now);
 
-  double log_ratio_ = 0;  // of times measured over forecast
+  double log_ratio_ = 0;  // logarithm of measured over forecast times
   bool measured_ = false;
-  bool timed_ = false;  // log_ratio_ is of a calibrated scene signature
+  bool timed_ = false;  // whether log_ratio_ belongs to a calibrated scene signature
   std::array<Correction, quality::settings_count> corrections_{};
-  std::optional<std::size_t> chosen_;  // for the newest frame; reset after a rest
+  std::optional<std::size_t> chosen_;  // setting of the newest frame; reset after a rest
   Micros chosen_at_ = 0;
   int slack_ = 0;  // consecutive frames that would have allowed a slower setting
   std::optional<Micros> tried_at_;

@@ -1,4 +1,4 @@
-// What the client displays: the version of the frame sent last, and the views it stands for.
+// What the client displays: the version of the last frame sent, and the views that it shows.
 #pragma once
 
 #include <cstdint>
@@ -19,24 +19,27 @@ class DisplayedFrame {
  public:
   [[nodiscard]] std::uint64_t version() const { return version_; }
   [[nodiscard]] bool is_final() const { return final_; }
-  [[nodiscard]] double error() const { return error_; }  // if known, else 0 or 1
+  [[nodiscard]] double error() const {
+    return error_;
+  }  // the number of samples if known,
+     // otherwise 0 or 1
 
   // A frame of that version was sent, which is not final.
   void sent(std::uint64_t version, double error);
   // A final frame of the view was sent.
   void sent_final(const ViewState& of, std::uint32_t seq, double error, bool blank);
-  // Its frame has the same content as the final one displayed, but does not prove that.
+  // The new frame has the same content as the final one displayed, but without its measured error.
   void withheld(std::uint64_t version);
-  // It cannot be drawn: wait for a change.
+  // The view cannot be drawn: wait for a change.
   void failed(std::uint64_t version);
 
   // Frames displayed are invalid: the dataset was reopened.
   void forget() { standing_.reset(); }
-  // Whether the final frame displayed is valid for the view: it is equivalent, or it is as blank
-  // as that was, and differs in the camera alone.
+  // Whether the final frame displayed is valid for the view: it is equivalent, or both scenes are
+  // blank and the views differ in the camera only.
   [[nodiscard]] bool equals(const protocol::View& view) const;
   [[nodiscard]] bool equals_blank(const protocol::View& view) const;
-  // Marks it valid for the current view, and answers its patch.
+  // Marks the final frame valid for the current view, and returns the response to its patch.
   std::optional<protocol::UnchangedMessage> stand_for(ViewState& of);
 
  private:

@@ -1,4 +1,4 @@
-// When the next frame may be started: credit, the frame being written, and the link.
+// Decides when the next frame may be started, by credit, the frame being written, and the link.
 #pragma once
 
 #include <cstddef>
@@ -24,12 +24,12 @@ class FlowControl {
     std::size_t bytes = 0;  // including preceding texts
     Micros begun = 0;       // start of its render
     bool moving = false;
-    bool final = false;  // drawn as such
+    bool final = false;  // drawn as a final frame
   };
   // The frame of next_seq() is sent.
   void sent(const Sent& frame, Micros now);
   void written(Micros now);
-  void heard(std::uint32_t seq, Micros now) { link_.heard(seq, now); }
+  void answered(std::uint32_t seq, Micros now) { link_.answered(seq, now); }
   // Error: that frame was never sent.
   Result<void> acked(const protocol::AckMessage& message, Micros now);
 
@@ -37,7 +37,7 @@ class FlowControl {
   std::uint32_t sent_seq_ = 0;
   std::uint32_t acked_seq_ = 0;
   bool writing_ = false;
-  double final_bytes_ = 0;  // of the last final frame
+  double final_bytes_ = 0;  // size of the last final frame
   Link link_;
 };
 

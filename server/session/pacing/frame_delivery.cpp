@@ -73,7 +73,7 @@ void count_sent(SessionState& state, const Render& render, const Drawn& drawn, M
   if (moves) state.quality.learn_bytes(render, drawn, frame_bytes, text_bytes);
 }
 
-// A frame of the stream, not a still, was sent.
+// Call after a frame of the stream (not a still) was sent.
 void after_frame(SessionState& state, const Render& render, std::uint32_t seq, double error,
                  bool final, bool blank) {
   state.stills.moving_frame_sent();
@@ -88,7 +88,7 @@ void after_frame(SessionState& state, const Render& render, std::uint32_t seq, d
   }
 }
 
-// Sends the frame with the messages that go with it.
+// Sends the frame with its accompanying messages.
 void send_frame(SessionState& state, const Render& render, Drawn drawn, Micros now) {
   const bool still = render.purpose == Purpose::still;
   const bool final = render.purpose == Purpose::final &&

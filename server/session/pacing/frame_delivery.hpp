@@ -1,4 +1,4 @@
-// What becomes of a render: a frame with its messages, `unchanged`, or an error.
+// Delivers the result of a render: a frame with its messages, `unchanged`, or an error.
 #pragma once
 
 #include "server/base/error.hpp"
@@ -11,7 +11,7 @@ namespace windsplat::session {
 
 // The render has ended.
 void deliver(SessionState& state, const Render& render, Result<Drawn> drawn, Micros now);
-// Answers by `unchanged` if the final frame displayed is valid for the current view, unless a
+// Responds with `unchanged` if the final frame displayed is valid for the current view, unless a
 // pending frame would be shown after it.
 void confirm_unchanged(SessionState& state);
 

@@ -86,7 +86,7 @@ void start_due_render(SessionState& state, Micros now) {
   } else if (moving) {
     const bool quiet = now - state.view.changed_at() >= state.flow.rest(state.options);
     const bool cheap = state.quality.final_is_cheap(state.view.view(), now);
-    // A client that stopped while out of credit can skip intermediate frames.
+    // A client that stopped while it had no credit can skip intermediate frames.
     if (quiet && cheap && !state.player.running()) {
       start_final(state, now);
     } else {

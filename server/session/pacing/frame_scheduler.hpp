@@ -8,7 +8,8 @@
 
 namespace windsplat::session {
 
-// When the next render starts in the current state; none if there is nothing to draw or no credit.
+// Time when the next render starts in the current state; nullopt if there is nothing to draw or no
+// credit.
 std::optional<Micros> next_render_at(const SessionState& state);
 void start_due_render(SessionState& state, Micros now);
 

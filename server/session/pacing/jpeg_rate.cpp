@@ -12,13 +12,13 @@ constexpr double head_bytes = 620;  // JPEG tables
 constexpr double pixels_power = 0.8;
 constexpr double scale_power = 0.47;
 constexpr int quality_step = 5;
-constexpr double to_rise = 0.8;      // share of the limit that a better quality may take
+constexpr double to_rise = 0.8;      // fraction of the limit that a better quality may use
 constexpr double to_coarsen = 1.25;  // tolerated factor above the maximum of pixels
 constexpr int slack_frames = 4;
 constexpr int level_max = 4;
-constexpr int edge_min = 64;  // pixels; no level makes an edge shorter than this
+constexpr int edge_min = 64;  // pixels; levels that make an edge shorter than this are not used
 
-// Of libjpeg's tables, 1 at quality 50.
+// Scale of libjpeg's tables, 1 at quality 50.
 double scale_of(int quality) { return quality < 50 ? 50.0 / quality : 2 - quality / 50.0; }
 
 double relative(int quality) { return std::pow(scale_of(quality), -scale_power); }
@@ -39,7 +39,7 @@ double JpegRate::predicted_bytes(double pixels, int quality) const {
 
 int JpegRate::choose(double pixels, const Link& link, Micros budget) {
   if (!link.known()) return quality_;
-  const auto share = [&](int quality) {  // share of the time available
+  const auto share = [&](int quality) {  // fraction of the time available
     const double limit = static_cast<double>(quality > quality_usual ? budget / 4 : budget);
     const double bytes = text_bytes_ + predicted_bytes(pixels, quality);
     return static_cast<double>(link.transfer(bytes)) / std::max(limit, 1.0);

@@ -7,35 +7,37 @@
 
 namespace windsplat::session {
 
-// Bytes of a frame with 4:2:0 chroma as head + c pixels^0.8 s(quality)^-0.47, where s is the scale
-// of libjpeg's quantisation tables. The exponents were fitted to pictures of climate and tornado
-// from 160x90 to 1280x720 at qualities 40 to 85 (within a third); c follows the frames sent.
+// Models the bytes of a frame with 4:2:0 chroma as head + c pixels^0.8 s(quality)^-0.47, where s is
+// the scale of libjpeg's quantisation tables. The exponents were fitted to pictures of climate and
+// tornado from 160x90 to 1280x720 at qualities 40 to 85 (within a third); c follows the frames
+// sent.
 class JpegRate {
  public:
   static constexpr int quality_least = 40;
-  static constexpr int quality_usual = 75;           // also while the link is unknown
-  static constexpr int quality_most = 85;            // on a fast link
-  static constexpr Micros moving_most_us = 125'000;  // a moving frame's time on the link
+  static constexpr int quality_usual = 75;           // quality also used while the link is unknown
+  static constexpr int quality_most = 85;            // quality on a fast link
+  static constexpr Micros moving_most_us = 125'000;  // time of a moving frame on the link
 
-  // A moving frame with that many pixels had that many bytes; `text_bytes` precede each frame.
+  // Records that a moving frame with that many pixels had that many bytes; `text_bytes` precede
+  // each frame.
   void learn(double pixels, int quality, std::size_t bytes, std::size_t text_bytes);
 
   [[nodiscard]] double predicted_bytes(double pixels, int quality) const;
 
-  // For the next moving frame: the best quality within `budget`, above quality_usual within a
-  // quarter of it; rises by at most one step per call.
+  // Chooses for the next moving frame the best quality within `budget`, above quality_usual within
+  // a quarter of it; rises by at most one step per call.
   [[nodiscard]] int choose(double pixels, const Link& link, Micros budget);
 
-  // Maximum of pixels whose frame at quality_least takes at most `budget`, or moving_most_us if
+  // Number of pixels whose frame at quality_least takes at most `budget`, or moving_most_us if
   // longer, on the link. Infinite while the rate is unknown.
   [[nodiscard]] double pixels_max(const Link& link, Micros budget) const;
 
-  // For the next moving frame: the least level (each halves width and height) within pixels_max.
-  // Tolerates deviations of a quarter, and gets finer only after a few frames.
+  // Chooses for the next moving frame the least level (each halves width and height) within
+  // pixels_max. Tolerates deviations of a quarter, and becomes finer only after a few frames.
   [[nodiscard]] int least_level(int width, int height, const Link& link, Micros budget);
 
  private:
-  double factor_ = 0.72;  // c; initial value of climate
+  double factor_ = 0.72;  // c; the initial value is that of climate
   double text_bytes_ = 0;
   int quality_ = quality_usual;
   int level_ = 0;

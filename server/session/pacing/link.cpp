@@ -14,7 +14,7 @@ constexpr Micros least_took_us = 500;
 // A small excess over the round trip proves that the link is fast, not that it became slow: such
 // samples are application-limited.
 constexpr Micros clear_took_us = 5'000;
-// A long one counts as several samples: stop flooding a slower link before the usual number of
+// A long excess counts as several samples: stop flooding a slower link before the usual number of
 // frames has confirmed it.
 constexpr Micros long_took_us = 100'000;
 constexpr Micros counts_most = 4;
@@ -61,7 +61,7 @@ void Link::sent(const Sent& frame, Micros now) {
   smooth(moving_bytes_, static_cast<double>(frame.bytes));
 }
 
-void Link::heard(std::uint32_t seq, Micros now) {
+void Link::answered(std::uint32_t seq, Micros now) {
   for (const Flight& flight : flights_) {
     if (flight.frame.seq == seq) trip_.add(now - flight.at, now);
   }
@@ -81,10 +81,11 @@ void Link::acked(std::uint32_t seq, double decode_ms, Micros now) {
     flights_.pop_front();
   }
   if (newest.frame.bytes == 0) return;
-  const auto said = static_cast<Micros>(1000 * std::clamp(decode_ms, 0.0, 1e6));
-  const Micros decode = std::min(said, now - newest.at);
+  const auto reported = static_cast<Micros>(1000 * std::clamp(decode_ms, 0.0, 1e6));
+  const Micros decode = std::min(reported, now - newest.at);
   smooth(decode_us_, static_cast<double>(decode));
-  const Micros arrived = now - decode;  // and its acknowledgement returned
+  const Micros arrived = now - decode;  // time at which the acknowledgement of an instantly decoded
+                                        // frame would arrive
   trip_.add(arrived - newest.at, now);
   const Micros alone = arrived - newest.at - round_trip();
   const Micros in_row = arrived - newest.row_since - round_trip();

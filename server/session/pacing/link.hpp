@@ -21,7 +21,7 @@ class WindowedLeast {
  private:
   Micros window_us_;
   Micros since_ = 0;
-  Micros current_ = 0;  // since then
+  Micros current_ = 0;  // minimum from since_ on
   Micros least_ = 0;    // including the previous window
   int count_ = 0;
 };
@@ -45,19 +45,20 @@ class Link {
 
   // Records a frame that is sent now, directly after a ping.
   void sent(const Sent& frame, Micros now);
-  // The pong of that ping. Without pongs the round trip is that of the fastest frame.
-  void heard(std::uint32_t seq, Micros now);
-  // The kernel has accepted the newest frame completely.
+  // Records the pong of that ping. Without pongs the round trip is that of the fastest frame.
+  void answered(std::uint32_t seq, Micros now);
+  // Records that the kernel has accepted the newest frame completely.
   void written(Micros now);
-  // Every frame up to that one has been shown.
+  // Records that every frame up to that one has been shown.
   void acked(std::uint32_t seq, double decode_ms, Micros now);
 
   [[nodiscard]] bool known() const { return bytes_per_s() > 0; }
   [[nodiscard]] double bytes_per_s() const;                          // 0 while unknown
   [[nodiscard]] Micros round_trip() const { return trip_.value(); }  // 0 while unknown
   [[nodiscard]] std::size_t bytes_in_flight() const;
-  [[nodiscard]] Micros transfer(double bytes) const;  // without queueing; 0 while unknown
-  // When the data in flight has passed the bottleneck; in the past if there is none.
+  [[nodiscard]] Micros transfer(double bytes) const;  // transfer time without queueing; 0 while
+                                                      // unknown
+  // Time when the data in flight have passed the bottleneck; in the past if there are none.
   [[nodiscard]] Micros free_at() const;
 
   // Earliest time to start the next frame such that it finds the link free and the client ready,
@@ -68,7 +69,7 @@ class Link {
  private:
   struct Flight {
     Sent frame;
-    Micros at = 0;  // sent
+    Micros at = 0;  // time of sending
     // Together with the previous frame, if that was in flight.
     Micros row_since = 0;
     double row_bytes = 0;
@@ -85,7 +86,7 @@ class Link {
   std::array<double, rates_kept> rates_{};  // bytes/s of the last frames
   std::size_t newest_rate_ = 0;
   double decode_us_ = 0;
-  double draw_us_ = 0;  // of a moving frame: from start to send
+  double draw_us_ = 0;  // time of a moving frame from start to send
   double moving_bytes_ = 0;
 };
 

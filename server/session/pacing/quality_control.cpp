@@ -36,8 +36,8 @@ Encoding full_quality(bool png, int jpeg_quality) {
 quality::Aim QualityControl::aim(const protocol::View& view) const {
   quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
   if (aim.budget_ms || aim.max_error) return aim;
-  // When sessions compete for the renderer, shorten everyone's frames to raise the rate: for n
-  // similar sessions by the root of n.
+  // When sessions compete for the renderer, shorten the frames of all of them to raise the rate:
+  // for n similar sessions by the root of n.
   const double waited = 1e-3 * queue_us_;
   aim.budget_ms = std::max(budget_ms_least,
                            budget_ms_default * budget_ms_default / (budget_ms_default + waited));

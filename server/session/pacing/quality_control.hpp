@@ -1,5 +1,5 @@
-// Setting and encoding of each frame: the view's aims, the measured times and the link in, how to
-// render out.
+// Chooses setting and encoding of each frame from the limits of the view, the measured times and
+// the link.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@ class QualityControl {
 
   [[nodiscard]] FramePlan moving(const protocol::View& view, const Link& link, Micros now);
   // Refinement before the final frame: at most half of `shown_error`, that of the frame displayed,
-  // at a fraction of the final time. None: go on with the final frame.
+  // at a fraction of the final time. nullopt: draw the final frame next.
   [[nodiscard]] std::optional<FramePlan> refining(const protocol::View& view, const Link& link,
                                                   double shown_error, Micros now) const;
   // The view as specified; with thinner slabs if its error would exceed maxError.
@@ -39,23 +39,23 @@ class QualityControl {
 
   // Whether a final frame is expected within the budget of a moving one.
   [[nodiscard]] bool final_is_cheap(const protocol::View& view, Micros now) const;
-  // That of the last moving frame.
+  // Encoding of the last moving frame.
   [[nodiscard]] const quality::Setting& moving_setting() const { return moving_setting_; }
 
   void on_view_changed(bool other_dataset);
-  // Learns times from frames drawn without loading only.
+  // Learns times only from frames drawn without loading.
   void learn(const Render& render, const Drawn& drawn, const ViewState& state, Micros now);
-  // A moving frame is sent; `text_bytes` precede it.
+  // Records that a moving frame is sent; `text_bytes` precede it.
   void learn_bytes(const Render& render, const Drawn& drawn, std::size_t frame_bytes,
                    std::size_t text_bytes);
   // Whether a frame drawn as final exceeds maxError and thinner slabs are possible: the next one
-  // has them.
+  // then has thinner slabs.
   [[nodiscard]] bool needs_thinner_slabs(const Render& render, const Drawn& drawn,
                                          const ViewState& state);
 
  private:
   [[nodiscard]] quality::Aim aim(const protocol::View& view) const;
-  // Expected time of a final frame, including the finer slab run that measures its error.
+  // Expected time of a final frame, including the finer slab rendering that measures its error.
   [[nodiscard]] Micros final_cost(const protocol::View& view, const quality::Forecasts& known,
                                   Micros now) const;
   [[nodiscard]] quality::Setting final_setting(const protocol::View& view) const;
@@ -63,8 +63,9 @@ class QualityControl {
   ViewForecast forecast_;
   Chooser chooser_;
   JpegRate jpeg_;
-  std::optional<double> final_factor_;  // time of the last final frame over that of its setting
-  quality::Setting moving_setting_;     // the last one chosen
+  std::optional<double> final_factor_;  // time of the last final frame relative to that of its
+                                        // setting
+  quality::Setting moving_setting_;     // the last setting chosen
   double queue_us_ = 0;                 // recent waiting time of moving frames for the renderer
   int thinner_ = 0;           // number of halvings of the final frame's slabs for maxError
   double thicker_error_ = 0;  // measured before the last halving

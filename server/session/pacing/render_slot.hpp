@@ -26,7 +26,7 @@ struct Render {
   quality::Setting setting;
   Encoding encoding;
   std::uint32_t still_id = 0;
-  bool unwanted = false;  // do not send its frame
+  bool unwanted = false;  // true: its frame will not be sent
   bool played = false;    // the first one of a step reached by playback
 };
 
@@ -38,16 +38,16 @@ class RenderSlot {
   // Whether a frame of the stream is being drawn and will be sent.
   [[nodiscard]] bool draws_stream() const;
 
-  // Numbers the render and requests it.
+  // Assigns a ticket to the render and requests it.
   void start(Render render, const protocol::View& view, Effects& effects);
-  // The render has ended. None: the ticket is of no render in progress.
+  // Ends the render. nullopt: the ticket is not that of a render in progress.
   std::optional<Render> take(std::uint64_t ticket);
 
   // Cancels the render, unless it is a still.
   void abandon(Effects& effects);
   // Cancels the render of a view at rest.
   void abandon_rest(Effects& effects);
-  // Cancels it, whatever it is.
+  // Cancels the render, even a still.
   void cancel(Effects& effects);
 
  private:

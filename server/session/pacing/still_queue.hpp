@@ -13,7 +13,7 @@ namespace windsplat::session {
 
 struct Still {
   protocol::StillMessage message;
-  protocol::View view;  // its image as large as the still
+  protocol::View view;  // the view with the picture size of the still
   std::uint32_t rev = 0;
   double t = 0;
 };
@@ -24,12 +24,12 @@ class StillQueue {
   static constexpr std::size_t waiting_max = 2;
 
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
-  // Sets the size of the picture: the message's, else the view's, times its scale. Errors: too
-  // many wait, or it is too large.
+  // Sets the size of the picture: that of the message or else of the view, times the scale of the
+  // message. Errors: too many stills wait, or it is too large.
   Result<void> add(Still still);
   Still take();
 
-  // A moving frame was sent.
+  // Call after a moving frame was sent.
   void moving_frame_sent();
   // Whether the next still precedes the next moving frame.
   [[nodiscard]] bool has_turn() const { return turn_; }

@@ -17,14 +17,14 @@ class ViewForecast {
   explicit ViewForecast(Forecaster forecaster) : forecaster_(std::move(forecaster)) {}
 
   [[nodiscard]] quality::Forecasts of(const protocol::View& view) const;
-  // The view was drawn.
+  // Call after the view was drawn.
   void learn(const protocol::View& view, const Drawn& drawn);
-  void forget() { drawn_key_.clear(); }  // another dataset
+  void forget() { drawn_key_.clear(); }  // call for another dataset
 
  private:
   Forecaster forecaster_;
-  std::string drawn_key_;              // of the view drawn last, before completion
-  quality::SceneSignature signature_;  // after completion
+  std::string drawn_key_;              // key of the view drawn last, before completion
+  quality::SceneSignature signature_;  // known after completion
   quality::Viewpoint viewpoint_;
 };
 

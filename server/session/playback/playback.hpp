@@ -1,4 +1,4 @@
-// Playback within a session: moves the view to the step that is due, and reports the rate.
+// Playback within a session: advances the view to the step that is due, and reports the rate.
 #pragma once
 
 #include <optional>
@@ -9,11 +9,11 @@
 
 namespace windsplat::session {
 
-// When the next step is due; none if playback rests or waits for a frame.
+// Time when the next step is due; nullopt if playback is stopped or waits for a frame.
 std::optional<Micros> next_step_at(const SessionState& state);
 void advance_playback(SessionState& state, Micros now);
-// The render's frame was sent. Sends the playback rate about once a second, with the number of
-// steps delayed by loading.
+// Call after the frame of the render was sent. Sends the playback rate about once a second, with
+// the number of steps delayed by loading.
 void count_played(SessionState& state, const Render& render, bool loaded, Micros now);
 
 }  // namespace windsplat::session

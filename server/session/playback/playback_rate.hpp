@@ -1,4 +1,4 @@
-// Measures how many steps a second playback shows.
+// Measures how many steps per second playback shows.
 #pragma once
 
 #include <optional>
@@ -9,14 +9,14 @@ namespace windsplat::session {
 
 class PlaybackRate {
  public:
-  // Playback stopped or starts anew.
+  // Call when playback stops or starts again.
   void reset() { since_.reset(); }
-  // A step was shown: the steps a second, about once a second.
+  // Records that a step was shown; returns the steps per second about once a second.
   std::optional<double> shown(Micros now);
 
  private:
-  std::optional<Micros> since_;  // from the first step shown
-  int steps_ = 0;                // shown since then
+  std::optional<Micros> since_;  // time of the first step shown
+  int steps_ = 0;                // number of steps shown since then
 };
 
 }  // namespace windsplat::session

@@ -1,4 +1,4 @@
-// The due step follows from the time of the next one; late calls skip steps or wait.
+// Derives the due step from the due time of the next one; late calls skip steps or wait.
 #include "server/session/playback/player.hpp"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ int Player::step_of(std::int64_t place) const {
 }
 
 void Player::start(const protocol::PlayMessage& message, int step, Micros now) {
-  const Micros before = due_ - period_us_;  // when the current step began
+  const Micros before = due_ - period_us_;  // start of the current step
   message_ = message;
   period_us_ = std::max<Micros>(1, std::llround(1e6 / message.fps));
   step_ = contains(step) ? step : message.from;

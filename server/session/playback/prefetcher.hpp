@@ -1,4 +1,4 @@
-// Which steps a session will probably need soon.
+// Predicts which steps a session will need soon.
 #pragma once
 
 #include <optional>
@@ -21,12 +21,12 @@ class Prefetcher {
   struct Situation {
     const protocol::View& view;
     const Player& player;
-    bool may_load = false;     // the client sees the view, and nothing more urgent is being opened
-    bool final_shown = false;  // the final frame of the view
-    quality::Setting moving_setting;  // of the moving frame drawn last
+    bool may_load = false;            // the client sees the view, and no dataset is being opened
+    bool final_shown = false;         // call for the final frame of the view
+    quality::Setting moving_setting;  // setting of the last moving frame
   };
 
-  // The request to make; none if it stays as it is.
+  // The request to make; nullopt if it is unchanged.
   std::optional<Prefetch> update(const Situation& now, const Check& check);
   // Steps requested before must be requested again: the dataset was reopened.
   void forget() { requested_ = {}; }

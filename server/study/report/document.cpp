@@ -46,10 +46,10 @@ protocol::StudyCalibration document_of(const Calibration& calibration) {
   protocol::StudyCalibration out;
   out.width = calibration.plan.width;
   out.height = calibration.plan.height;
-  out.surveyed = calibration.plan.surveyed;
+  out.surveyed = calibration.plan.calibrated;
   out.held_out = calibration.plan.held_out;
   out.seconds = calibration.seconds;
-  out.looks = calibration.looks;
+  out.looks = calibration.variants;
   const auto add = [&](const Agreement& of, std::string name) {
     if (of.count > 0) out.agreement.push_back(document_of(of, std::move(name)));
   };
@@ -61,9 +61,9 @@ protocol::StudyCalibration document_of(const Calibration& calibration) {
                   }),
         name_of(kind));
   }
-  for (std::size_t look = 0; look < calibration.looks.size(); ++look) {
-    add(agreement(calibration, [look](const Compared& one) { return one.look == look; }),
-        calibration.looks[look]);
+  for (std::size_t variant = 0; variant < calibration.variants.size(); ++variant) {
+    add(agreement(calibration, [variant](const Compared& one) { return one.variant == variant; }),
+        calibration.variants[variant]);
   }
   add(agreement_of_priors(calibration), "prior");
   add(agreement_of_measured(calibration), "measured");
@@ -73,18 +73,18 @@ protocol::StudyCalibration document_of(const Calibration& calibration) {
                         aimed.possible, aimed.possible_kept});
   }
   for (const TruthCheck& check : calibration.checks) {
-    out.checks.push_back({calibration.looks[check.look], check.apart, check.estimate});
+    out.checks.push_back({calibration.variants[check.variant], check.apart, check.estimate});
   }
   for (const Compared& one : calibration.compared) {
     const quality::Setting& setting = quality::settings[one.setting];
-    out.points.push_back({calibration.looks[one.look], one.view, name_of(class_of(setting)),
+    out.points.push_back({calibration.variants[one.variant], one.view, name_of(class_of(setting)),
                           method_name(setting.method), setting.half_level, setting.coarser,
                           setting.thinner, one.error, one.forecast.error, one.forecast.spread,
                           one.prior.error});
   }
   for (const MeasuredFrame& one : calibration.measured) {
     out.measured.push_back(
-        {calibration.looks[one.look], one.slab ? "slab" : "kernel", one.error, one.measured});
+        {calibration.variants[one.variant], one.slab ? "slab" : "kernel", one.error, one.measured});
   }
   return out;
 }

@@ -12,10 +12,10 @@ namespace windsplat::study {
 inline constexpr std::array<Knob, 5> report_knobs{Knob::stride, Knob::span, Knob::slab_thickness,
                                                   Knob::stop_transmittance, Knob::width};
 
-// Whether the setting's method and the scene have the knob.
+// Whether the parameter applies to the method of the setting and to the scene.
 bool has_knob(const SceneReport& scene, const Setting& setting, Knob knob);
 
-// Without pictures.
+// The document without pictures.
 protocol::StudyDocument document_of(const Report& report);
 
 // Errors: internal.

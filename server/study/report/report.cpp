@@ -1,4 +1,4 @@
-// Report -> study.json, study.csv and the page, and these into their folder.
+// Report -> study.json, study.csv and the page, written into a folder.
 #include "server/study/report/report.hpp"
 
 #include <array>
@@ -23,7 +23,7 @@ std::string report_csv(const Report& report) {
       "rmse,max,psnr,flip,ms,msMin,msMax,pareto,stable\n";
   for (const SceneReport& scene : report.scenes) {
     for (const Point& point : scene.points) {
-      // A name with a comma or a quote in it is quoted (RFC 4180).
+      // A name that contains a comma or a quote is quoted (RFC 4180).
       std::string name = scene.name;
       if (name.find_first_of(",\"") != std::string::npos) {
         std::string quoted(1, '"');
@@ -65,7 +65,8 @@ Result<std::string> report_page(const Report& report) {
   const std::size_t at = page.find(marker);
   WINDSPLAT_CHECK(at != std::string_view::npos);
   std::string text(page.substr(0, at));
-  // In JSON '<' occurs only within strings. Escaped, no text can end the script element.
+  // In JSON '<' occurs only within strings. It is escaped, so that no text can end the script
+  // element.
   for (const char c : protocol::encode_study(document, true)) {
     if (c == '<') {
       text += "\\u003c";

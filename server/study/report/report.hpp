@@ -1,4 +1,4 @@
-// Report -> the files that people and programs read.
+// Report -> files for people and programs.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 namespace windsplat::study {
 
 std::string report_json(const Report& report);  // protocol/study.schema.json
-std::string report_csv(const Report& report);   // one line for each point
+std::string report_csv(const Report& report);   // one line per point
 
 // A self-contained HTML page: the document of report_json and the pictures as JSON, and the script
 // of web/report that draws its figures and tables. Errors: internal.

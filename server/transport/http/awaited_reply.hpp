@@ -1,4 +1,4 @@
-// The reply to a request that is being worked on, brought back to the io thread.
+// The reply to a request in progress, posted back to the io thread.
 #pragma once
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// Whether a request may be served: its form, host and target, then its access.
+// Decides whether a request may be served, by its form, host and target, then by its access rights.
 #pragma once
 
 #include <boost/beast/core/string_type.hpp>
@@ -10,10 +10,11 @@
 
 namespace windsplat::transport {
 
-// Parses the target into the request. `version`: as of Beast, 11 for HTTP/1.1. A refusal, or none.
+// Parses the target into the request. `version`: as in Beast, 11 for HTTP/1.1. Returns a refusal,
+// or nullopt.
 std::optional<http::Response> check_form(const api::ServerOptions& options, http::Request& request,
                                          boost::beast::string_view target, unsigned version);
-// Token, origin and login attempts. `upgrade`: to a stream. A refusal, or none.
+// Checks token, origin and login attempts. `upgrade`: to a stream. Returns a refusal, or nullopt.
 std::optional<http::Response> check_access(const api::ServerOptions& options,
                                            access::Admission& admission,
                                            const http::Request& request, bool upgrade, bool secure);

@@ -1,4 +1,4 @@
-// An HTTP session as seen by its parts and by the reply to its request.
+// The interface of an HTTP session to its parts and to the reply to its request.
 #pragma once
 
 #include <memory>
@@ -19,8 +19,8 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
 
   [[nodiscard]] virtual const std::string& request_id() const = 0;
   virtual void on_reply(http::Response response) = 0;
-  virtual void abort() = 0;  // end now
-  virtual void close() = 0;  // the connection's time is over, or it has failed
+  virtual void abort() = 0;  // end immediately
+  virtual void close() = 0;  // the deadline has passed, or the connection has failed
 
   // A completion handler that keeps the session alive.
   template <class Body>

@@ -1,5 +1,5 @@
 // HTTP over TCP or TLS. The header of a request is read completely, checked as bytes, parsed, and
-// refused if necessary before any of the body is read. Bodies need a Content-Length.
+// the request refused if necessary before any of the body is read. Bodies need a Content-Length.
 #include "server/transport/http/http_session.hpp"
 
 #include <array>
@@ -36,8 +36,8 @@ namespace limits = protocol::limits;
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* hsts = "max-age=15552000";  // 180 days; sent over TLS only
-constexpr std::chrono::seconds first_timeout{5};  // for a connection's first byte
-constexpr std::chrono::seconds idle_timeout{60};  // for the next request of a connection
+constexpr std::chrono::seconds first_timeout{5};  // deadline for the first byte of a connection
+constexpr std::chrono::seconds idle_timeout{60};  // deadline for the next request of a connection
 constexpr std::chrono::seconds drain_idle_timeout{2};
 constexpr std::chrono::milliseconds leave_look{40};
 
@@ -94,7 +94,7 @@ class HttpSession final : public Connection, public HttpOwner {
     if (phase_ == Phase::idle) phase_ = Phase::reading;
     leave_timer_.cancel();
     wire_.close();
-    visitor_.place.reset();  // free the place at once
+    visitor_.place.reset();  // free the slot at once
   }
 
   void on_reply(http::Response response) override {
@@ -115,7 +115,7 @@ class HttpSession final : public Connection, public HttpOwner {
   [[nodiscard]] const std::string& request_id() const override { return current_.request.id; }
 
  private:
-  // reading: the request; also before and after a response, and when closing.
+  // reading: the request, and idle times before and after a request; also closing.
   enum class Phase { reading, idle, answering, sending };
 
   void add(bool late) {
@@ -157,7 +157,7 @@ class HttpSession final : public Connection, public HttpOwner {
     wire_.read_some(input_, [this](ErrorCode fault) {
       if (fault) return on_end();
       if (phase_ == Phase::idle) return begin_header();
-      // Otherwise the client's next request stays in the buffer.
+      // Otherwise the next request of the client stays in the buffer.
       if (phase_ == Phase::reading) find_header_end();
     });
   }
@@ -260,8 +260,8 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   // While a picture is drawn, detect a peer that disconnects. The read continues after the
-  // response, since a TLS record must not be abandoned; the data is the next request. Skipped if
-  // the next request is already buffered.
+  // response, since a TLS record must not be abandoned; the data belong to the next request.
+  // Skipped if the next request is already buffered.
   void watch_for_leaving() {
     if (!input_.has_input()) read_some();
     look_for_leaving();
@@ -302,7 +302,8 @@ class HttpSession final : public Connection, public HttpOwner {
                           !services_.draining && !visitor_.reserve;
     if (request.id.empty()) request.id = services_.request_ids.next();  // refused before parsing
     http::name_request(response, request.id);
-    // Applies to every port of the host, and other programs listen on this machine's loopback.
+    // Would apply to every port of the host, and other programs listen on the loopback interface of
+    // this machine.
     if (const std::string host = request.header("Host");
         wire_.secure() && !host.empty() && !http::names_loopback(host)) {
       response.headers.emplace_back("Strict-Transport-Security", hsts);

@@ -10,8 +10,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds reserve_timeout{2};  // for each phase of a connection of the reserve
-constexpr std::chrono::seconds linger_timeout{2};   // for discarding a refused body
+constexpr std::chrono::seconds reserve_timeout{2};  // deadline of each phase of a connection of the
+                                                    // reserve
+constexpr std::chrono::seconds linger_timeout{2};   // deadline for discarding a refused body
 
 }  // namespace
 

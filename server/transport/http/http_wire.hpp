@@ -1,5 +1,5 @@
-// The socket of an HTTP session: its deadline, the end of its peer, and a close that loses no
-// response.
+// The socket of an HTTP session: its deadline, detection of its peer's close, and a close that
+// loses no response.
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
@@ -21,8 +21,8 @@ class HttpWire {
   // Whether the peer has closed its side, even behind unread data.
   [[nodiscard]] bool peer_has_left();
 
-  // Sets the deadline of the current operation, after which the connection is closed, until the
-  // next call or the one below.
+  // Sets the deadline after which the connection is closed. It applies until the next call of this
+  // function or the following one.
   void within(std::chrono::milliseconds time);
   void with_no_deadline();
 

@@ -18,13 +18,13 @@ class RequestParser {
  public:
   using Parser = beast::http::request_parser<beast::http::string_body>;
 
-  void begin();  // the next request; bytes received stay
+  void begin();  // prepares for the next request; received bytes are kept
   [[nodiscard]] Parser& parser() { return *parser_; }
   [[nodiscard]] beast::flat_buffer& buffer() { return buffer_; }
   [[nodiscard]] bool has_input() const { return buffer_.size() > 0; }
-  // Room for the next read.
+  // Space for the next read.
   asio::mutable_buffer prepare();
-  // Room for bytes that are discarded, as is what was received.
+  // Space for bytes that are discarded; discards what was received.
   asio::mutable_buffer prepare_discarded();
 
   struct Header {
@@ -33,10 +33,11 @@ class RequestParser {
   };
   // Parses the header if it has arrived.
   Header parse_header();
-  // The parsed header's method and fields.
+  // Method and fields of the parsed header.
   void copy_header(http::Request& request) const;
 
-  // Whether the error is in the request's text, not in the connection; and its answer.
+  // Whether the error is in the text of the request rather than in the connection; and the response
+  // to it.
   static bool is_fault_of_text(ErrorCode fault);
   static http::Response refusal_of(ErrorCode fault);
 

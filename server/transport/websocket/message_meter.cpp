@@ -9,8 +9,8 @@ namespace {
 
 // Bytes on the wire for one message: text and frame headers.
 constexpr std::size_t wire_bytes_max = 2 * protocol::limits::message_bytes_max;
-constexpr int controls_max = 10000;                  // pings and pongs between two checks
-constexpr std::chrono::seconds message_timeout{10};  // from the first byte
+constexpr int controls_max = 10000;                  // pings and pongs allowed between two checks
+constexpr std::chrono::seconds message_timeout{10};  // deadline, measured from the first byte
 
 }  // namespace
 

@@ -27,7 +27,7 @@ class SessionDriver final : public StreamEvents {
   void drain();
   void on_changed(const std::string& dataset);
   void stop();   // cancels its work
-  void abort();  // nothing more can be written, either
+  void abort();  // nothing more can be written either
   [[nodiscard]] const WriteQueue& queue() const { return writer_.queue(); }
 
   void on_text(const std::string& text) override;
@@ -49,7 +49,7 @@ class SessionDriver final : public StreamEvents {
   boost::asio::steady_timer timer_;
   std::uint64_t counted_dropped_ = 0;
   std::uint64_t counted_cancelled_ = 0;
-  bool counted_ = false;  // counted as a session
+  bool counted_ = false;  // whether it is counted as a session
 };
 
 }  // namespace windsplat::transport

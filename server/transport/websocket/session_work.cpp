@@ -77,7 +77,7 @@ void SessionWork::start(const session::Describe& effect) {
 }
 
 void SessionWork::cancel(std::uint64_t ticket) {
-  if (throttled_ && throttled_->ticket == ticket) begin_throttled();  // to be answered
+  if (throttled_ && throttled_->ticket == ticket) begin_throttled();  // waiting for a reply
   viewer_.cancel(ticket);
 }
 

@@ -1,5 +1,5 @@
-// Renders and loads that a session requests: throttled by its address's quota, and their results
-// brought back to the io thread.
+// Renders and loads requested by a session: throttles them by the quota of its address, and posts
+// their results to the io thread.
 #pragma once
 
 #include <atomic>
@@ -24,7 +24,7 @@ class SessionWork {
               work::Backend& backend, access::Admission& admission, const std::string& address,
               work::DrawnReply on_rendered, work::DescribedReply on_described);
 
-  // A throttled address gets its frames later; a long delay closes the session.
+  // A throttled address receives its frames later; a long delay closes the session.
   void start(const session::StartRender& effect);
   void start(const session::Describe& effect);
   void start(const session::Prefetch& effect) { viewer_.start(effect); }

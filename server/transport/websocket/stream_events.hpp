@@ -1,4 +1,4 @@
-// What happens on the WebSocket of a session, apart from its end.
+// Events on the WebSocket of a session, except its end.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ class StreamEvents {
   virtual void on_binary() = 0;
   virtual void on_pong(std::string_view payload) = 0;
   virtual void on_frame_written() = 0;
-  // A result of the session's work could not be posted: the session would wait forever.
+  // A result could not be posted; without this the session would wait forever.
   [[nodiscard]] virtual bool has_lost_reply() const = 0;
 };
 

@@ -1,4 +1,4 @@
-// A WebSocket session as seen by its parts, which live no longer than it does.
+// The interface of a WebSocket session to its parts, which do not outlive it.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@ class StreamOwner : public std::enable_shared_from_this<StreamOwner> {
   [[nodiscard]] bool is_open() const { return open_; }
   [[nodiscard]] bool has_ended() const { return ended_; }
 
-  // Closes with a time limit; queued texts are dropped.
+  // Closes within a time limit; queued texts are dropped.
   virtual void close(int code, const std::string& reason) = 0;
-  virtual void abort() = 0;  // end now
+  virtual void abort() = 0;  // end immediately
   virtual void on_disconnected() = 0;
   virtual void on_text_written() = 0;
 

@@ -17,14 +17,14 @@ namespace windsplat::transport {
 
 class WebSocketReader {
  public:
-  // Messages are charged to `address`. While the queue is backlogged, nothing is read.
+  // Messages are charged to `address`. Nothing is read while the write queue is backlogged.
   WebSocketReader(StreamOwner& owner, WebSocketStream& socket, access::Admission& admission,
                   const std::string& address, const WriteQueue& queue, StreamEvents& events);
 
-  // Before the socket is accepted: limits the size of messages and listens to pings.
+  // Call before the socket is accepted: limits the size of messages and handles pings.
   void prepare();
   void start();
-  void resume();  // the queue has become shorter
+  void resume();  // call when the queue has become shorter
   void stop();    // ends the timers
 
  private:
@@ -43,7 +43,7 @@ class WebSocketReader {
   beast::flat_buffer buffer_;
   MessageMeter meter_;
   asio::steady_timer watch_timer_;
-  asio::steady_timer pause_timer_;  // until the message quota allows reading
+  asio::steady_timer pause_timer_;  // expires when the message quota allows reading
   bool reading_ = false;
   bool paused_ = false;
   bool watching_ = false;

@@ -98,7 +98,7 @@ class WebSocketSession final : public Connection, public StreamOwner {
         }));
     socket_.auto_fragment(false);  // one WebSocket frame per picture, without copying the payload
     reader_.prepare();
-    // The request is used while the response is composed, within this call.
+    // The request is used only while the response is composed, within this call.
     socket_.async_accept(request, handler([this, full](ErrorCode fault) {
                            if (fault) return abort();
                            on_open(full);
@@ -168,7 +168,7 @@ class WebSocketSession final : public Connection, public StreamOwner {
   api::Services& services_;
   Connections& connections_;
   const Guest guest_;
-  const std::shared_ptr<const access::Token> token_;  // token that authorised it
+  const std::shared_ptr<const access::Token> token_;  // digest of the token that authorised it
   asio::steady_timer close_timer_;
   SessionDriver driver_;
   WebSocketReader reader_;

@@ -10,7 +10,7 @@
 
 namespace windsplat::transport {
 
-// Client of the session: the address charged, and its places among connections and sessions.
+// Client of the session: the address charged, and its slots among connections and sessions.
 struct Guest {
   std::string address;
   access::Ticket connection;

@@ -24,7 +24,7 @@ class WebSocketWriter {
 
   [[nodiscard]] const WriteQueue& queue() const { return queue_; }
   void send(const protocol::ServerMessage& message);
-  // Written by the next pump() that finds no text waiting.
+  // Sent by the next pump() that finds no text waiting.
   void queue_frame(session::SendFrame effect);
   void ping(std::uint32_t seq);  // sent by the layer below before the next write
   void pump();

@@ -1,5 +1,5 @@
-// What a session has to send: texts in order, and at most one frame, which they precede. Its bytes
-// are counted by the metrics.
+// What a session has to send: texts in order, which precede frames, and at most one frame. The
+// metrics count its bytes.
 #pragma once
 
 #include <array>
@@ -32,13 +32,13 @@ class WriteQueue {
   WriteQueue& operator=(const WriteQueue&) = delete;
 
   void add(std::string text);
-  void set(QueuedFrame frame);  // the session provides the next one after the write
+  void set(QueuedFrame frame);  // the session provides the next frame after the write
   void pop_text();
   void pop_frame();
 
   [[nodiscard]] const std::deque<std::string>& texts() const { return texts_; }
   [[nodiscard]] const std::optional<QueuedFrame>& frame() const { return frame_; }
-  // More text waits for a slow peer than is allowed: read nothing more from it.
+  // More text is queued for a slow peer than allowed: stop reading from it.
   [[nodiscard]] bool is_backlogged() const;
 
  private:
@@ -48,7 +48,7 @@ class WriteQueue {
   std::deque<std::string> texts_;
   std::size_t text_bytes_ = 0;
   std::optional<QueuedFrame> frame_;
-  std::int64_t held_bytes_ = 0;  // of texts_ and frame_
+  std::int64_t held_bytes_ = 0;  // size of texts_ and frame_
 };
 
 }  // namespace windsplat::transport

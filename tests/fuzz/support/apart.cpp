@@ -1,5 +1,5 @@
-// fork, with coverage counters returned to the parent; the sanitizer report decides whose fault a
-// crash was.
+// Runs work in a fork and returns its coverage counters to the parent; the sanitizer report shows
+// whether a library caused a crash.
 #include "tests/fuzz/support/apart.hpp"
 
 #include <sys/mman.h>
@@ -24,7 +24,7 @@ extern "C" std::uint8_t __start___sancov_cntrs[];
 extern "C" std::uint8_t __stop___sancov_cntrs[];
 extern "C" void __sanitizer_set_death_callback(void (*callback)());
 
-// An assertion of a library is a crash like any other: with a stack.
+// An assertion of a library is treated as a crash: it prints a stack.
 extern "C" const char* __asan_default_options() {
   return "handle_abort=2:allocator_may_return_null=1:max_allocation_size_mb=2048";
 }
@@ -51,7 +51,7 @@ Counts& counts() {
 }
 
 void tell_counts() {
-  std::fprintf(stderr, "apart: %llu runs, %llu ended by a fault of a library, %llu late\n",
+  std::fprintf(stderr, "apart: %llu runs, %llu ended by a crash in a library, %llu timed out\n",
                static_cast<unsigned long long>(counts().runs),
                static_cast<unsigned long long>(counts().library_faults),
                static_cast<unsigned long long>(counts().late));
@@ -125,7 +125,7 @@ void apart(const std::function<void()>& work, unsigned seconds) {
     ++counts().library_faults;
   } else {
     std::fwrite(told.data(), 1, told.size(), stderr);
-    expect(false, "work apart ends calmly", "status " + std::to_string(status));
+    expect(false, "a child process must end normally", "status " + std::to_string(status));
   }
 }
 

@@ -1,4 +1,4 @@
-// Properties of a target besides "no crash".
+// Properties checked by a target besides the absence of crashes.
 #pragma once
 
 #include <cstddef>

@@ -37,7 +37,7 @@ transport::Server& server() {
   static transport::Server* const the_one = [] {
     log::configure(log::Format::text, log::Level::off);
     auto store = std::make_shared<data::Store>(std::uint64_t{512} << 20);
-    expect(store->add("climate:8x6x4").has_value(), "a sample is there");
+    expect(store->add("climate:8x6x4").has_value(), "the sample exists");
     api::ServerOptions options;
     options.port = 0;
     options.local_hosts_only = true;
@@ -46,14 +46,15 @@ transport::Server& server() {
     expect(made->listen().has_value(), "a free port");
     std::thread([made] {
       made->run();
-      expect(false, "the server serves to the end");
+      expect(false, "the server must run until the end");
     }).detach();
     return made;
   }();
   return *the_one;
 }
 
-// A separate source address for each, from 127.0.0.2: no address tuple is reused soon.
+// A separate source address for each connection, from 127.0.0.2, so that no address tuple is reused
+// soon.
 sockaddr_in next_source() {
   static std::uint32_t count = 0;
   sockaddr_in source{};
@@ -97,7 +98,7 @@ struct Head {
 Head read_head(std::string_view head) {
   Head out;
   expect(head.size() >= 13 && head.starts_with("HTTP/1.1 ") && head[12] == ' ',
-         "an answer begins with its status", head);
+         "a response begins with its status", head);
   const auto read = std::from_chars(head.data() + 9, head.data() + 12, out.status);
   expect(read.ec == std::errc() && out.status >= 100 && out.status < 600,
          "a status has three digits", head);
@@ -108,14 +109,14 @@ Head read_head(std::string_view head) {
     const std::string_view line = rest.substr(0, end);
     const std::size_t colon = line.find(": ");
     expect(colon != std::string_view::npos && is_token(line.substr(0, colon)),
-           "a field of an answer has a name", line);
+           "a header field has a name", line);
     const std::string_view name = line.substr(0, colon);
     const std::string_view value = line.substr(colon + 2);
     expect(std::none_of(value.begin(), value.end(),
                         [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }),
-           "a field of an answer has no control characters", line);
+           "a header field has no control characters", line);
     if (name == "Content-Length") {
-      expect(!out.has_length, "an answer has one length", head);
+      expect(!out.has_length, "a response has one Content-Length", head);
       out.has_length = true;
       std::from_chars(value.data(), value.data() + value.size(), out.length);
     }
@@ -126,13 +127,13 @@ Head read_head(std::string_view head) {
 }
 
 void expect_problem(const Head& head, std::string_view body, std::string_view all) {
-  expect(head.status != 500, "nothing that is asked is a fault of the server's", all);
+  expect(head.status != 500, "no request may cause an internal error", all);
   if (head.status < 400 || head.type == "text/plain") return;
-  expect(head.type == "application/problem+json", "a refusal says why", all);
+  expect(head.type == "application/problem+json", "a refusal has a problem document", all);
   if (body.empty()) return;  // response to HEAD
   expect(body.front() == '{' && body.back() == '}' &&
              body.find("\"status\":" + std::to_string(head.status)) != std::string_view::npos,
-         "a refusal is an object that repeats its status", all);
+         "a problem document is an object that repeats the status", all);
 }
 
 }  // namespace
@@ -152,7 +153,7 @@ Peer::Peer() {
   expect(::bind(socket_, reinterpret_cast<const sockaddr*>(&from), sizeof from) == 0,
          "an address of loopback");
   const int failed = connect_to(socket_, to);
-  expect(failed == 0, "the server can be connected to", std::to_string(failed));
+  expect(failed == 0, "the server accepts connections", std::to_string(failed));
 }
 
 Peer::~Peer() { ::close(socket_); }
@@ -187,19 +188,19 @@ std::size_t expect_answers(std::string_view heard, bool whole) {
   while (!heard.empty()) {
     const std::size_t end = heard.find("\r\n\r\n");
     if (end == std::string_view::npos) {
-      expect(!whole, "an answer's header has an end", heard);
+      expect(!whole, "a response header is complete", heard);
       return count;
     }
     const Head head = read_head(heard.substr(0, end));
     ++count;
     std::string_view body = heard.substr(end + 4);
     const bool has_body = head.status >= 200 && head.status != 204 && head.status != 304;
-    expect(!has_body || head.has_length, "an answer with a body tells its length", heard);
+    expect(!has_body || head.has_length, "a response with a body has a Content-Length", heard);
     // Responses to HEAD have none.
     const bool left_out = body.empty() || body.starts_with("HTTP/1.1 ");
     const std::size_t length = has_body && !left_out ? head.length : 0;
     if (length > body.size()) {
-      expect(!whole, "an answer's body has its length", heard.substr(0, end));
+      expect(!whole, "a response body has the declared length", heard.substr(0, end));
       return count;
     }
     expect_problem(head, body.substr(0, length), heard.substr(0, end + 4 + length));
@@ -212,7 +213,7 @@ void expect_alive() {
   Peer peer;
   peer.talk("GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", end_of_life,
             [](const std::string&) { return false; });
-  expect(peer.heard().starts_with("HTTP/1.1 200 "), "the server lives", peer.heard());
+  expect(peer.heard().starts_with("HTTP/1.1 200 "), "the server is alive", peer.heard());
 }
 
 }  // namespace fuzz

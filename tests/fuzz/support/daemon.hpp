@@ -9,7 +9,7 @@
 
 namespace fuzz {
 
-// A connection to the single server of this process, which the first connection starts.
+// A connection to the single server of this process, which is started by the first connection.
 class Peer {
  public:
   Peer();
@@ -37,7 +37,7 @@ class Peer {
 // the last one is complete. Returns their number.
 std::size_t expect_answers(std::string_view heard, bool whole);
 
-// Time until the server answers a health check; it must.
+// Time until the server answers a health check, which it must.
 void expect_alive();
 
 }  // namespace fuzz

@@ -33,7 +33,7 @@ constexpr std::size_t floats_max = std::size_t{1} << 20;
 // Larger grids are not rendered.
 constexpr std::size_t drawn_samples_max = std::size_t{1} << 15;
 
-// The file name of a process with separate work: named by the parent, so that the next child
+// The file name of a process with separate work: chosen by the parent, so that the next child
 // overwrites the remains of a crashed one.
 std::string name_on_disk() {
   return (std::filesystem::temp_directory_path() / "windsplat-fuzz-").string() +
@@ -55,7 +55,7 @@ class MemoryFiles : public Files {
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
     const auto found = files_.find(name);
     if (found == files_.end()) {
-      return make_error(ErrorKind::not_found, in_quotes(name) + " is not there");
+      return make_error(ErrorKind::not_found, in_quotes(name) + " does not exist");
     }
     const int descriptor =
         on_disk_ ? ::open(name_on_disk().c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)
@@ -63,7 +63,7 @@ class MemoryFiles : public Files {
     expect(descriptor >= 0, "a file to be read");
     const std::string_view bytes = found->second;
     expect(::write(descriptor, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
-           "a file holds its bytes");
+           "a file contains its bytes");
     count_opened(name, bytes.size());
     return InputFile::adopt(descriptor, name.substr(name.find_last_of('/') + 1));
   }
@@ -78,7 +78,7 @@ class MemoryFiles : public Files {
       out.push_back(slash == std::string::npos ? rest : rest.substr(0, slash + 1));
     }
     out.erase(std::unique(out.begin(), out.end()), out.end());
-    if (out.empty()) return make_error(ErrorKind::not_found, in_quotes(folder) + " is not there");
+    if (out.empty()) return make_error(ErrorKind::not_found, in_quotes(folder) + " does not exist");
     return out;
   }
 
@@ -109,9 +109,9 @@ void expect_whole(const Volume& volume, const DatasetInfo& info, const FieldInfo
   const std::size_t components = field.components.size();
   expect(volume.values.size() == volume.samples() * components, "a volume has all its values");
   Volume again = volume;
-  expect(measure_volume(again), "a volume's masks are common and nothing in it is infinite");
+  expect(measure_volume(again), "a volume has common masks and no infinite values");
   expect(again.masked == volume.masked && again.range == volume.range,
-         "a volume's range and masks are those that were told");
+         "a volume has the reported range and masks");
 }
 
 void expect_premultiplied(const engine::Image& image) {
@@ -155,7 +155,7 @@ void draw(std::unique_ptr<FileSource> source) {
     if (done) {
       expect_premultiplied(workspace.space.image());
     } else {
-      expect(done.error().kind != ErrorKind::internal, "no file is a fault of ours",
+      expect(done.error().kind != ErrorKind::internal, "no file may cause an internal error",
              done.error().message);
     }
   }
@@ -196,14 +196,14 @@ void read_dataset(const std::shared_ptr<Files>& files) {
   auto source = open_dataset(files);
   if (!source) {
     expect(!source.error().message.empty(), "a refusal has a reason");
-    expect(source.error().kind != ErrorKind::internal, "no file is a fault of ours",
+    expect(source.error().kind != ErrorKind::internal, "no file may cause an internal error",
            source.error().message);
     return;
   }
   const DatasetInfo& info = (*source)->info();
   const std::string told = loader::encode_info(info);
   const auto believed = loader::decode_info(told);
-  expect(believed.has_value(), "what a reader gives is believed of a loader",
+  expect(believed.has_value(), "results of a reader pass the checks for loader messages",
          believed ? "" : believed.error().message);
   const std::size_t last_field = info.fields.size() - 1;
   const std::size_t last_step = info.steps.size() - 1;
@@ -216,7 +216,7 @@ void read_dataset(const std::shared_ptr<Files>& files) {
     if (volume) {
       expect_whole(*volume, info, about);
     } else {
-      expect(volume.error().kind != ErrorKind::internal, "no file is a fault of ours",
+      expect(volume.error().kind != ErrorKind::internal, "no file may cause an internal error",
              volume.error().message);
     }
   }

@@ -16,8 +16,8 @@ inline constexpr std::string_view file_mark = "#!file ";
 
 enum class Kept {
   in_memory,
-  folder,   // the same, and all files are behind marks, those of a folder
-  on_disk,  // under a name, one at a time: HDF5 resolves the links of what it opens
+  folder,   // the same files as a folder, all with marks
+  on_disk,  // given names, one at a time: HDF5 resolves the links of what it opens
 };
 
 // `main`: the name of the first file.

@@ -37,9 +37,9 @@ bool is_clean(const std::string& text) {
 void expect_entries(const Config& config) {
   for (std::size_t i = 0; i < config.entries.size(); ++i) {
     const ConfigEntry& entry = config.entries[i];
-    expect(i == 0 || config.entries[i - 1].key < entry.key, "keys come in order, each once");
+    expect(i == 0 || config.entries[i - 1].key < entry.key, "keys are sorted and unique");
     expect(entry.kind == ConfigEntry::Kind::list || entry.words.size() == 1,
-           "what is no list is one word", entry.key);
+           "a value other than a list is one word", entry.key);
     expect(std::all_of(entry.words.begin(), entry.words.end(), is_clean),
            "a word has no control characters", entry.key);
   }
@@ -62,13 +62,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   if (!keys_are_clean || text.size() > 60'000) return 0;
   const auto again = windsplat::protocol::parse_config(text + '}');
-  expect(again.has_value(), "what was read is read again", text);
-  expect(again->entries.size() == config->entries.size(), "nothing is lost", text);
+  expect(again.has_value(), "written entries can be read", text);
+  expect(again->entries.size() == config->entries.size(), "written entries are complete", text);
   for (std::size_t i = 0; i < again->entries.size(); ++i) {
     expect(again->entries[i].key == config->entries[i].key &&
                again->entries[i].kind == config->entries[i].kind &&
                again->entries[i].words == config->entries[i].words,
-           "what was read stays as it is", text);
+           "written entries are unchanged", text);
   }
   return 0;
 }

@@ -17,8 +17,8 @@ using std::chrono::milliseconds;
 
 constexpr std::string_view last_name = "the-last-one";
 
-// Number of bytes missing in the body of the first request: they are added, so that a request
-// follows. An estimate: errors only cost time.
+// Number of bytes missing in the body of the first request: they are added, so that another request
+// can follow. An estimate: errors only cost time.
 std::size_t lacking(std::string_view input) {
   const std::size_t end = input.find("\r\n\r\n");
   const std::size_t at = input.find("Content-Length: ");
@@ -50,10 +50,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     peer.talk(bytes, milliseconds(20), [](const std::string&) { return true; });
     peer.half_close();
     peer.talk({}, milliseconds(10'000), [](const std::string&) { return false; });
-    fuzz::expect(peer.ended(), "who says no more is not waited for");
+    fuzz::expect(peer.ended(), "the server must not wait for a client that has shut down");
   }
   const std::size_t answers = fuzz::expect_answers(peer.heard(), peer.ended());
-  if (peer.ended() && has_end) fuzz::expect(answers > 0, "what has a header is answered");
+  if (peer.ended() && has_end)
+    fuzz::expect(answers > 0, "a request with a complete header gets a response");
   if (++runs % 256 == 0) fuzz::expect_alive();
   return 0;
 }

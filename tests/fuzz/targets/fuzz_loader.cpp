@@ -36,8 +36,8 @@ void expect_info(const DatasetInfo& info) {
   // Texts are printable after the first round.
   const std::string once = loader::encode_info(info);
   const auto again = loader::decode_info(once);
-  expect(again.has_value(), "what was believed is believed again");
-  expect(loader::encode_info(*again) == once, "what was believed stays as it is");
+  expect(again.has_value(), "accepted info is accepted again");
+  expect(loader::encode_info(*again) == once, "accepted info is unchanged");
 }
 
 void decode(std::string_view payload) {
@@ -47,12 +47,12 @@ void decode(std::string_view payload) {
   expect(windsplat::printable(error.message, 4000) == error.message, "a message is printable",
          error.message);
   if (const auto names = loader::decode_names(payload)) {
-    expect(loader::encode_names(*names) == payload, "names stay as they are");
+    expect(loader::encode_names(*names) == payload, "names are unchanged");
   }
   if (const auto task = loader::decode_task(payload)) {
     const auto again = loader::decode_task(loader::encode_task(*task));
     expect(again && loader::encode_task(*again) == loader::encode_task(*task),
-           "a task stays as it is");
+           "a task is unchanged");
   }
 }
 
@@ -74,7 +74,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view sent = bytes.substr(0, std::size_t{64} * 1024);
   expect(::send(theirs.number(), sent.data(), sent.size(), MSG_NOSIGNAL) ==
              static_cast<ssize_t>(sent.size()),
-         "what is sent fits");
+         "the input fits the socket buffer");
   theirs.reset();
   const loader::Deadline deadline = loader::Clock::now() + std::chrono::seconds(5);
   for (int i = 0; i < 64; ++i) {
@@ -82,7 +82,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto fate = loader::receive_message(ours.number(), message, loader::question_bytes_max,
                                               loader::Descriptors::refused, deadline);
     if (fate != loader::Fate::done) {
-      expect(fate != loader::Fate::late, "a closed socket is not waited for");
+      expect(fate != loader::Fate::late, "a closed socket must not be waited for");
       break;
     }
     expect(message.payload.size() <= loader::question_bytes_max, "a message is within its limit");

@@ -51,7 +51,7 @@ void expect_whole(const Volume& volume, const DatasetInfo& info, std::size_t fie
          "a volume has all its values");
   Volume again = volume;
   expect(measure_volume(again) && again.masked == volume.masked && again.range == volume.range,
-         "a volume's masks and range are true");
+         "a volume has correct masks and range");
 }
 
 }  // namespace
@@ -64,14 +64,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   limits.read_time = std::chrono::milliseconds(5000);
   limits.opens_max = 64;
   auto location = locate(stage.file);
-  expect(location.has_value(), "the file is there");
+  expect(location.has_value(), "the file exists");
   const auto source = loader::open(*location, limits);
   if (!source) {
     expect(!source.error().message.empty(), "an error has a message");
     return 0;
   }
   const DatasetInfo& info = (*source)->info();
-  expect(loader::decode_info(loader::encode_info(info)).has_value(), "what is believed is sound");
+  expect(loader::decode_info(loader::encode_info(info)).has_value(),
+         "accepted info satisfies the invariants");
   for (const std::size_t field : {std::size_t{0}, info.fields.size() - 1}) {
     if (info.grid.samples() * info.fields[field].components.size() > floats_max) continue;
     const auto volume = (*source)->read(field, info.steps.size() - 1);

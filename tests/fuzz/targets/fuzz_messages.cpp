@@ -21,14 +21,14 @@ namespace limits = protocol::limits;
 
 constexpr int steps = 5;
 
-// Every request of the session is answered: a frame of one byte, or no dataset.
+// Every request of the session gets a result: a frame of one byte, or an unknown dataset.
 class Viewer {
  public:
   Viewer()
       : session_(session::Options{},
                  {[](const protocol::View& view) -> Result<int> {
                     if (view.dataset.empty() || view.dataset == "none") {
-                      return make_error_at(ErrorKind::not_found, "/dataset", "is not there");
+                      return make_error_at(ErrorKind::not_found, "/dataset", "does not exist");
                     }
                     return steps;
                   },
@@ -45,10 +45,11 @@ class Viewer {
       return;
     }
     expect(!message.error().message.empty(), "a refusal has a reason");
-    expect(message.error().at.size() <= limits::problem_errors_max, "a refusal names a few places");
+    expect(message.error().at.size() <= limits::problem_errors_max,
+           "a refusal has a limited number of pointers");
     const std::size_t told = texts_;
     carry_out(session_.on_refused(message.error(), tag, now_));
-    expect(texts_ > told || closed_, "what is no message is answered");
+    expect(texts_ > told || closed_, "an invalid message gets a response");
   }
 
   void pass_time() {
@@ -63,7 +64,7 @@ class Viewer {
  private:
   void carry_out(const session::Effects& effects) {
     for (const session::Effect& effect : effects) {
-      expect(!closed_, "nothing comes after the end");
+      expect(!closed_, "there are no effects after a close");
       std::visit([this](const auto& body) { act(body); }, effect);
     }
     answer();
@@ -81,7 +82,7 @@ class Viewer {
     written_ = true;
   }
   void act(const session::StartRender& effect) {
-    expect(effect.view.step >= 0 && effect.view.step < steps, "a step that is there is drawn");
+    expect(effect.view.step >= 0 && effect.view.step < steps, "the drawn step exists");
     expect(std::int64_t{effect.view.image.width} * effect.view.image.height <=
                limits::image_pixels_max,
            "no picture is larger than the limit");

@@ -48,13 +48,13 @@ void read_target(std::string_view target) {
   http::Request request;
   const auto ok = http::parse_target(target, "/base/", request);
   if (!ok) {
-    expect(ok.error().kind == ErrorKind::malformed, "a target is understood or malformed");
+    expect(ok.error().kind == ErrorKind::malformed, "a target is parsed or malformed");
     return;
   }
   std::size_t bytes = 0;
   for (const std::string& segment : request.path) bytes += segment.size() + 1;
   for (const auto& [key, value] : request.query) bytes += key.size() + value.size() + 1;
-  expect(bytes <= target.size() + 1, "what is decoded is no longer than what was written", target);
+  expect(bytes <= target.size() + 1, "decoded text is not longer than the encoded text", target);
   read_parameters(request);
 }
 
@@ -62,12 +62,12 @@ void read_header(std::string_view value) {
   static constexpr std::array<std::string_view, 3> offers{"image/jpeg", "image/png",
                                                           "application/x-npy"};
   const auto chosen = http::choose_type(value, offers);
-  expect(!chosen || *chosen < offers.size(), "what is chosen was offered");
+  expect(!chosen || *chosen < offers.size(), "the choice is one of the offers");
   (void)http::accepts_gzip(value);
   const bool matches = http::matches_etag(value, "\"tag\"");
   expect(!matches || value.find('*') != std::string_view::npos ||
              value.find("\"tag\"") != std::string_view::npos,
-         "a tag that matches is there", value);
+         "a matching tag is in the list", value);
   (void)http::allows_change(value, "\"tag\"");
   expect(!http::origin_allowed(value, "good.example", {}) ||
              value.find("good.example") != std::string_view::npos,
@@ -76,7 +76,7 @@ void read_header(std::string_view value) {
   (void)http::normal_base_path(value);
 }
 
-// Line ends would start another field.
+// Line ends would start another header field.
 std::string one_line(std::string_view text) {
   std::string out(text);
   std::replace(out.begin(), out.end(), '\r', ' ');
@@ -103,7 +103,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   peer.talk(request + "Connection: close\r\n\r\n", std::chrono::milliseconds(500),
             [](const std::string&) { return false; });
   const std::size_t answers = fuzz::expect_answers(peer.heard(), peer.ended());
-  if (peer.ended()) expect(answers == 1, "a request has one answer", peer.heard());
+  if (peer.ended()) expect(answers == 1, "a request has one response", peer.heard());
   if (++runs % 256 == 0) fuzz::expect_alive();
   return 0;
 }

@@ -1,4 +1,4 @@
-// NRRD files, their headers apart or not, and the files that those name.
+// NRRD files with attached or detached headers, and the files that those name.
 #include <cstdint>
 #include <string_view>
 

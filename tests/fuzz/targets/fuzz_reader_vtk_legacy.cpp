@@ -1,4 +1,4 @@
-// VTK's legacy files, as text and binary.
+// Legacy VTK files, as text and binary.
 #include <cstdint>
 #include <string_view>
 

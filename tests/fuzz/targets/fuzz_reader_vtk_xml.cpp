@@ -1,4 +1,4 @@
-// VTK's XML files: image data, rectilinear and structured grids, unstructured meshes, collections.
+// XML files of VTK: image data, rectilinear and structured grids, unstructured meshes, collections.
 #include <cstdint>
 #include <string_view>
 

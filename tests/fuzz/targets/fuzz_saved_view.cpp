@@ -16,11 +16,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   expect(protocol::is_view_id(saved->id), "an id has its form", saved->id);
   const std::string file = protocol::encode_view_file(*saved);
   const auto again = protocol::parse_view_file(file);
-  expect(again.has_value(), "what was written is read", file);
+  expect(again.has_value(), "a written view can be read", file);
   expect(again->id == saved->id && again->created == saved->created &&
              again->view.canonical() == saved->view.canonical() &&
              protocol::encode_view_file(*again) == file,
-         "what was written is what is read", file);
-  expect(!protocol::encode_saved_view(*saved, "disk").empty(), "what is kept can be told");
+         "a written view is unchanged", file);
+  expect(!protocol::encode_saved_view(*saved, "disk").empty(), "a stored view can be encoded");
   return 0;
 }

@@ -39,12 +39,12 @@ Surroundings& surroundings() {
 void expect_same_again(const ViewDocument& document) {
   const auto again = ViewDocument::parse(document.canonical());
   expect(again.has_value(), "a canonical view is accepted again", document.canonical());
-  expect(again->canonical() == document.canonical(), "a canonical view stays as it is",
+  expect(again->canonical() == document.canonical(), "a canonical view is unchanged",
          document.canonical());
   const std::string full = encode_view(document.view());
   const auto complete = ViewDocument::parse(full);
   expect(complete.has_value(), "a view written in full is accepted", full);
-  expect(encode_view(complete->view()) == full, "a view written in full stays as it is", full);
+  expect(encode_view(complete->view()) == full, "a view written in full is unchanged", full);
 }
 
 void expect_within_limits(const windsplat::protocol::View& view) {
@@ -79,7 +79,7 @@ void draw(windsplat::protocol::View view) {
     expect(!frame->bytes.empty(), "a picture has bytes");
   } else {
     const auto kind = frame.error().kind;
-    expect(kind != windsplat::ErrorKind::internal, "no view is a fault of the server's",
+    expect(kind != windsplat::ErrorKind::internal, "no view may cause an internal error",
            frame.error().message);
     expect(!frame.error().message.empty(), "a refusal has a reason");
   }
@@ -103,7 +103,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!patched) return 0;
     const auto twice = patched->patched(patch);
     expect(twice.has_value() && twice->canonical() == patched->canonical(),
-           "a patch applied twice is a patch applied once", patched->canonical());
+           "applying a patch twice equals applying it once", patched->canonical());
     expect_same_again(*patched);
     document = *patched;
   }

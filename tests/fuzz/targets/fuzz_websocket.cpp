@@ -47,13 +47,13 @@ std::string wire_of(std::string_view input) {
 
 void expect_close(std::string_view payload) {
   if (payload.empty()) return;
-  expect(payload.size() >= 2, "a close has a code");
+  expect(payload.size() >= 2, "a close frame has a code");
   const int code =
       (static_cast<unsigned char>(payload[0]) << 8) | static_cast<unsigned char>(payload[1]);
-  // RFC 6455 does not define codes from 5000 on; the server returns them.
+  // RFC 6455 does not define codes from 5000 on; the server returns them unchanged.
   const bool sendable =
       (code >= 1000 && code <= 1003) || (code >= 1007 && code <= 1013) || code >= 3000;
-  expect(sendable, "a close has a code that may be sent", std::to_string(code));
+  expect(sendable, "a close frame has a code that may be sent", std::to_string(code));
 }
 
 // Checks frames of a server (RFC 6455, 5.2). Returns whether one is a close.
@@ -63,16 +63,18 @@ bool expect_frames(std::string_view heard) {
     expect(!closed, "nothing follows a close");
     const auto byte = [heard](std::size_t i) { return static_cast<unsigned char>(heard[i]); };
     const int opcode = byte(0) & 0x0f;
-    expect((byte(0) & 0x70) == 0 && (byte(0) & 0x80) != 0, "a frame is whole and has no extension");
-    expect(opcode == 1 || opcode == 2 || (opcode >= 8 && opcode <= 10), "a frame's kind is known");
-    expect((byte(1) & 0x80) == 0, "a server masks nothing");
+    expect((byte(0) & 0x70) == 0 && (byte(0) & 0x80) != 0,
+           "a frame is complete and has no extension");
+    expect(opcode == 1 || opcode == 2 || (opcode >= 8 && opcode <= 10),
+           "the opcode of a frame is known");
+    expect((byte(1) & 0x80) == 0, "frames of a server are not masked");
     std::uint64_t length = byte(1) & 0x7f;
     const std::size_t more = length < 126 ? 0 : length == 126 ? 2 : 8;
     expect(opcode < 8 || more == 0, "a control frame is short");
     if (heard.size() < 2 + more) return closed;
     if (more > 0) length = 0;
     for (std::size_t i = 0; i < more; ++i) length = (length << 8) | byte(2 + i);
-    if (heard.size() - 2 - more < length) return closed;  // cut off by the end
+    if (heard.size() - 2 - more < length) return closed;  // truncated by the end
     const std::string_view payload = heard.substr(2 + more, length);
     if (opcode == 1) {
       expect(payload.size() > 2 && payload.front() == '{' && payload.back() == '}',
@@ -108,13 +110,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   peer.talk(wire + frame_of(0x88, {}), milliseconds(20), [](const std::string&) { return true; });
   peer.half_close();
-  // A server may wait two seconds for the client's close: not here.
+  // A server may wait two seconds for the client's close, but not here.
   bool closed = false;
   peer.talk({}, milliseconds(10'000), [&closed, head](const std::string& heard) {
     closed = expect_frames(std::string_view(heard).substr(head + 4));
     return closed;
   });
-  expect(peer.ended() || closed, "who says no more is not waited for");
+  expect(peer.ended() || closed, "the server must not wait for a client that has shut down");
   if (++runs % 256 == 0) fuzz::expect_alive();
   return 0;
 }

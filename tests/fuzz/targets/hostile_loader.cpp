@@ -35,7 +35,7 @@ bool send_all(const void* data, std::size_t size) {
   return true;
 }
 
-// Reads a message to its end; returns the descriptor received with it, or -1. False: the daemon has
+// Reads a whole message; returns the descriptor received with it, or -1. False: the daemon has
 // disconnected.
 bool hear(int& descriptor) {
   Frame frame;
@@ -61,7 +61,7 @@ bool hear(int& descriptor) {
   return true;
 }
 
-// Repeats the first bytes of the turn in the memory to fill.
+// Fills the memory by repeating the first bytes of the turn.
 void fill(int memory, std::string_view turn) {
   struct stat status {};
   std::array<char, 64> pattern{};

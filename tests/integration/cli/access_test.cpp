@@ -281,7 +281,7 @@ TEST_F(CliAccess, SighupReloadsTheCertificateAndAnInvalidOneChangesNothing) {
   give_certificate("second");
   daemon.send(SIGHUP);
   EXPECT_TRUE(eventually([&] { return name() == "second"; }));
-  write_file(folder.file("cert.pem"), server_test::make_certificate("third").chain);  // not its key
+  write_file(folder.file("cert.pem"), server_test::make_certificate("third").chain);  // another key
   daemon.send(SIGHUP);
   EXPECT_TRUE(says(daemon, "configuration is unchanged"));
   EXPECT_EQ(name(), "second");
@@ -383,7 +383,7 @@ TEST_F(CliAccess, CoreDumpsHoldNoSecrets) {
   EXPECT_THAT(limit(in_tls), testing::ContainsRegex("size +[01] +[01] +bytes"));
 }
 
-// DNS rebinding: a page's name can resolve to this machine, and the browser treats it as
+// DNS rebinding: the name of a page can resolve to this machine, which the browser then treats as
 // same-origin.
 TEST_F(CliAccess, NonLoopbackWithoutTokenAnswersOnlyKnownHostNames) {
   const auto status_for = [](std::uint16_t port, const std::string& host) {

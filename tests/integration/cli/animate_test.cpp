@@ -35,7 +35,7 @@ TEST(CliAnimate, EveryFrameEqualsRenderOfItsStep) {
   ASSERT_EQ(run({"synth", "climate", "--dims", "24x12x6", "--steps", "4", "-o", path}).code, 0);
   const Outcome made = run_with({"animate", path, "-o", folder.file("f_%03d.png")}, {});
   EXPECT_EQ(made.code, 0);
-  EXPECT_EQ(made.out + made.err, "") << "no progress bar where stderr is no terminal";
+  EXPECT_EQ(made.out + made.err, "") << "no progress bar if stderr is not a terminal";
   EXPECT_EQ(files_like(folder, ".png"), 4U);
   std::set<std::string> pictures;
   for (const char* step : {"0", "1", "2", "3"}) {
@@ -78,7 +78,7 @@ TEST(CliAnimate, FramesBetweenStepsHaveTheirTimes) {
   EXPECT_EQ(read_file(folder.file("f_7.png")), read_file(one));
 }
 
-// Between rendered steps time increases evenly, by the stride, from the time of the view.
+// Between rendered steps time increases uniformly, by the stride, from the time of the view.
 TEST(CliAnimate, TimesContinueFromTheViewsTimeAcrossAStride) {
   const Folder folder;
   const std::string path = folder.file("four.nc");

@@ -85,15 +85,15 @@ TEST(CliFiles, InspectReportsWithoutMemoryWhenRangesExceedTheLimit) {
   EXPECT_THAT(told.out, HasSubstr("not read"));
   EXPECT_THAT(told.out, HasSubstr("ranges are not read: "));
   EXPECT_THAT(told.out, Not(HasSubstr("(ranges over")));
-  // The text's lines are wrapped.
+  // The lines of the text are wrapped.
   const Outcome whole = run({"inspect", "--json", "tornado:400", "--memory-limit", "192M"});
   EXPECT_THAT(whole.out,
               HasSubstr("needs 732.4 MiB; --memory-limit 192M leaves 68.0 MiB for data"));
-  EXPECT_THAT(whole.out, HasSubstr("--memory-limit 901M would do"));
+  EXPECT_THAT(whole.out, HasSubstr("--memory-limit 901M would suffice"));
   const Outcome asked =
       run({"inspect", "tornado:400", "--memory-limit", "192M", "--ranges", "first"});
   EXPECT_EQ(asked.code, 1);
-  EXPECT_THAT(asked.err, HasSubstr("--memory-limit 901M would do"));
+  EXPECT_THAT(asked.err, HasSubstr("--memory-limit 901M would suffice"));
 }
 
 TEST(CliFiles, BuiltInSampleNeedsNoFile) {
@@ -309,7 +309,7 @@ TEST(CliFiles, FullDiskIsReportedAndNoPartialFileLeft) {
   const Outcome outcome = run({"render", path, "--size", "8x8", "-o", full});
   EXPECT_EQ(outcome.code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("full.png"));
-  EXPECT_TRUE(std::filesystem::is_symlink(full)) << "a file that is not regular is kept";
+  EXPECT_TRUE(std::filesystem::is_symlink(full)) << "special files are never removed";
 }
 
 TEST(CliFiles, ControlCharactersInNamesAreEscaped) {

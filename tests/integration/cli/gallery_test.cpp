@@ -1,4 +1,4 @@
-// docs/gallery: its view files rendered small, and consistency of its script, pictures and text.
+// docs/gallery: renders its view files at a small size, and compares its script, pictures and text.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ constexpr int shrink = 8;
 fs::path root() { return WINDSPLAT_SOURCE_DIR; }
 fs::path gallery() { return root() / "docs" / "gallery"; }
 
-// Names, without the extension, of the gallery's files that have it.
+// Names, without the extension, of files of the gallery with this extension.
 std::set<std::string> names(const std::string& extension) {
   std::set<std::string> found;
   for (const auto& entry : fs::directory_iterator(gallery())) {
@@ -41,7 +41,7 @@ struct Entry {
   int quality;
 };
 
-// The script's list: lines of the form "name dataset quality".
+// The list in the script: lines of the form "name dataset quality".
 std::vector<Entry> script_entries() {
   const std::string script = read_file((root() / "scripts" / "gallery").string());
   const std::regex line(R"re(\n *"([a-z0-9-]+) ([a-z]+) ([0-9]+)")re");
@@ -52,8 +52,8 @@ std::vector<Entry> script_entries() {
   return entries;
 }
 
-// Share of pixels with a coverage of at least 0.1, from a picture as .npy: little-endian float32,
-// [height, width, 4], after a header that ends in a line feed.
+// Fraction of pixels with a coverage of at least 0.1, from a picture as .npy: little-endian
+// float32, [height, width, 4], after a header that ends in a line feed.
 double covered(const std::string& npy, int width, int height) {
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const std::size_t bytes = pixels * 4 * sizeof(float);
@@ -65,7 +65,7 @@ double covered(const std::string& npy, int width, int height) {
   return static_cast<double>(count) / static_cast<double>(pixels);
 }
 
-// A gallery's picture fills its frame: at least a quarter of it is not background.
+// A picture of the gallery fills its frame: at least a quarter of it is not background.
 TEST(Gallery, EveryViewIsValidAndFillsItsPicture) {
   const Folder folder;
   for (const std::string& name : names(".json")) {
@@ -111,7 +111,7 @@ TEST(Gallery, PicturesAreSmallAndReferencedFilesExist) {
   }
 }
 
-// The commands of the text are those of the script.
+// The commands in the text are those of the script.
 TEST(Gallery, TextQuotesTheCommandsOfTheScript) {
   const std::string text = read_file((gallery() / "README.md").string());
   for (const Entry& entry : script_entries()) {

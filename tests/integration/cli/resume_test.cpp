@@ -28,7 +28,7 @@ class Viewer : public server_test::StreamClient {
   void patch(std::uint32_t rev, const Json& patch) {
     say(Json{{"type", "patch"}, {"rev", rev}, {"t", 10.5 * rev}, {"patch", patch}}.dump());
   }
-  // The final frame of that rev; the seq of every frame is added to `seqs`.
+  // Returns the final frame of that rev; appends the seq of every frame to `seqs`.
   std::optional<Frame> final_frame(std::uint32_t rev) {
     while (const auto bytes = next_frame()) {
       const auto header = protocol::parse_frame_header(
@@ -45,7 +45,7 @@ class Viewer : public server_test::StreamClient {
   std::vector<std::uint32_t> seqs;
 };
 
-// Changes of a user in order.
+// Changes made by a user, in order.
 const std::vector<Json>& deeds() {
   static const std::vector<Json> all{
       Json::parse(R"({"dataset":"climate-small","image":{"width":160,"height":120}})"),
@@ -93,7 +93,7 @@ TEST(Resume, ViewSentToARestartedDaemonGivesTheSamePicture) {
   EXPECT_EQ(frame->payload, picture);
   EXPECT_EQ(frame->header.step, 1U);
   EXPECT_EQ(frame->header.t, 10.5 * 41);
-  EXPECT_EQ(viewer.seqs.front(), 1U) << "a new session starts a new count";
+  EXPECT_EQ(viewer.seqs.front(), 1U) << "a new session counts from 1";
   EXPECT_EQ(viewer.seqs.back(), viewer.seqs.size());
 }
 

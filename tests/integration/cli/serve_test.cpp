@@ -49,7 +49,7 @@ class CliServe : public testing::Test {
  protected:
   void SetUp() override { dataset = synth(folder, "tornado", "8x8x8"); }
 
-  // The URL line's text without its line feed.
+  // The text of the URL line without its line feed.
   static std::string url_of(Process& daemon) {
     std::string line = daemon.read_until('\n');
     EXPECT_FALSE(line.empty()) << daemon.messages();
@@ -144,7 +144,7 @@ TEST_F(CliServe, SigtermDoesNotWaitForAHangingLoader) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
-#ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
+#ifndef WINDSPLAT_SANITIZED  // its shadow memory counts
 // The first value of --memory-limit that a message suggests.
 std::string limit_told(const std::string& message) {
   const std::string before = ": --memory-limit ";
@@ -163,13 +163,13 @@ TEST_F(CliServe, DatasetWithoutAFittingStepIsRefusedWithTheRequiredLimit) {
   EXPECT_THAT(refused.err, HasSubstr("windsplat: 'wind' needs 91.6 MiB at a step; "
                                      "--memory-limit 192M leaves 68.0 MiB for data; 'wind' and "
                                      "'cloud' need 122.1 MiB together: --memory-limit 250M would "
-                                     "do\n"));
+                                     "suffice\n"));
   Process daemon({"serve", "--listen", "127.0.0.1:0", "--memory-limit", "192M", large, dataset});
   const auto port = port_of(url_of(daemon));
   EXPECT_THAT(server_test::get(port, "/v1/datasets").body, HasSubstr("91.6 MiB"));
   const auto picture = server_test::get(port, "/v1/datasets/" + large + "/frame.png?width=32");
   EXPECT_EQ(picture.status, 404);
-  EXPECT_THAT(picture.body, HasSubstr("--memory-limit 250M would do"));
+  EXPECT_THAT(picture.body, HasSubstr("--memory-limit 250M would suffice"));
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0);
 
@@ -199,7 +199,7 @@ TEST_F(CliServe, DatasetAboveTheMemoryLimitIsReportedWithTheOption) {
   const std::string url = url_of(daemon);
   const auto port = port_of(url);
   const std::string of = "/v1/datasets/" + large + '/';
-  // Small pictures use averages, which need memory in turn.
+  // Small pictures use averages, which also need memory.
   const auto picture = server_test::get(port, of + "frame.png?width=512&height=512");
   ASSERT_EQ(picture.status, 507);
   EXPECT_THAT(picture.body, HasSubstr("dataset '" + large + "'"));
@@ -259,7 +259,7 @@ TEST_F(CliServe, PortInUseIsReported) {
 
 TEST_F(CliServe, DatasetThatFailsToOpenIsListedAsFailed) {
   const std::string bad = folder.file("bad.nc");
-  write_file(bad, "nothing of use");
+  write_file(bad, "not a data file");
   Process daemon({"serve", "--listen", "127.0.0.1:0", bad, folder.file("absent.nc"), dataset});
   const std::uint16_t port = port_of(daemon);
   const std::string list = server_test::get(port, "/v1/datasets").body;
@@ -279,7 +279,7 @@ TEST_F(CliServe, DatasetThatFailsToOpenIsListedAsFailed) {
 TEST_F(CliServe, FailedDatasetRecoversWithItsFileOrIsRemoved) {
   const std::string mended = folder.file("mended.nc");
   const std::string bad = folder.file("bad.nc");
-  write_file(bad, "nothing of use");
+  write_file(bad, "not a data file");
   Process daemon({"serve", "--listen", "127.0.0.1:0", bad, mended, dataset});
   const std::uint16_t port = port_of(daemon);
   const auto status_of = [&](const char* id) {
@@ -303,7 +303,7 @@ TEST_F(CliServe, FailedDatasetRecoversWithItsFileOrIsRemoved) {
 
 TEST_F(CliServe, WithoutAnyUsableDatasetStartupFails) {
   const std::string bad = folder.file("bad.nc");
-  write_file(bad, "nothing of use");
+  write_file(bad, "not a data file");
   const Outcome outcome = run({"serve", "--listen", ":0", folder.file("absent.nc"), bad});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_EQ(outcome.out, "");

@@ -1,4 +1,5 @@
-// windsplat study on the command line: a report, a second run without measurements, an interrupt.
+// windsplat study on the command line: a report, a second run without measurements, an interrupted
+// run.
 #include <gmock/gmock.h>
 
 #include <filesystem>

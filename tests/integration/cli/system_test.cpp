@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
 
-// `command` in a shell, where $W is the program; stdout, stderr and the exit code in one text.
+// Runs `command` in a shell, where $W is the program; returns stdout, stderr and the exit code as
+// one text.
 std::string shell(const std::string& command) {
   const std::string line = "W='" WINDSPLAT_PROGRAM "'; { " + command + "; echo \"exit $?\"; } 2>&1";
   FILE* pipe = popen(line.c_str(), "r");
@@ -148,8 +149,8 @@ TEST(CliSystem, SynthDoesNotReplaceAPipe) {
   EXPECT_TRUE(fs::is_fifo(pipe));
 }
 
-#ifndef WINDSPLAT_SANITIZED  // whose shadow memory needs terabytes of address space
-// 512 threads need more than is left, whatever the libraries take.
+#ifndef WINDSPLAT_SANITIZED  // its shadow memory needs terabytes of address space
+// 512 threads need more than remains, whatever the libraries use.
 TEST(CliSystem, InsufficientAddressSpaceIsReported) {
   const std::string text =
       shell("ulimit -v 300000; timeout 30 $W serve --threads 512 --listen 127.0.0.1:0 tornado:8");

@@ -153,7 +153,7 @@ TEST(CliUsage, MessagesEscapeControlCharactersOfArguments) {
   EXPECT_THAT(run({"paint"}).err, HasSubstr("unknown command 'paint'"));
 }
 
-// A flag without effect must be refused.
+// A flag without effect must be rejected.
 TEST(CliUsage, MissingDataRootIsRefused) {
   const Outcome outcome = run({"serve", "--data-root", "x"});
   EXPECT_EQ(outcome.code, 2);

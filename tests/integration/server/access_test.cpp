@@ -107,7 +107,7 @@ TEST_F(Guarded, WebSocketIsAuthenticatedBeforeTheUpgrade) {
   EXPECT_EQ(status(bearer), 101);
   EXPECT_EQ(status(bearer + Headers{{"Origin", "https://evil.example"}}), 403);
   EXPECT_EQ(status(bearer + Headers{{"Origin", "https://friend.example"}}), 101);
-  EXPECT_EQ(status(with_cookie()), 403) << "a browser says its page's origin";
+  EXPECT_EQ(status(with_cookie()), 403) << "browsers send the origin of their page";
   EXPECT_EQ(status(with_cookie() + Headers{{"Origin", "http://evil.example"}}), 403);
   EXPECT_EQ(status(with_cookie() + Headers{{"Origin", origin()}}), 101);
   StreamClient viewer(port(), offer);

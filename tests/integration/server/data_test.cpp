@@ -29,7 +29,7 @@ api::ServerOptions with_root(const fs::path& root) {
 
 fs::path folder_of_small() { return fs::path(small_file()).parent_path(); }
 
-// The id of the job.
+// Returns the id of the job.
 std::string post_file(std::uint16_t port, const std::string& path) {
   const Answer answer =
       request(port, "POST", "/v1/datasets", {{"Content-Type", "application/json"}},
@@ -67,7 +67,7 @@ TEST(OpenedDatasets, DatasetsOfTheCommandLineAreKeptWhenPostedAgain) {
   EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
 }
 
-// Files are opened when the gate is open.
+// Files are opened once the gate is open.
 class SharedDataset : public testing::Test {
  protected:
   void SetUp() override {
@@ -185,7 +185,7 @@ TEST(ForgottenDatasets, WaitingPictureReportsTheRemoval) {
   fs::remove_all(name);
 }
 
-// Files that differ only in their folder: name, size and time are equal.
+// Files that differ in their folder only: name, size and time are equal.
 TEST(KnownRanges, AreNotReusedForAnotherFileOfEqualSizeAndTime) {
   std::string name = (fs::temp_directory_path() / "windsplat-twins-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
@@ -243,7 +243,7 @@ TEST(Loads, HangingDatasetDoesNotBlockOthers) {
                          " HTTP/1.1\r\nHost: x\r\n\r\n");
   }
   ASSERT_TRUE(gate->wait_for(1));
-  // More of them than threads are queued before any of these.
+  // More jobs than threads are queued before any of these.
   EXPECT_EQ(get(server.port(), "/v1/datasets/small/probe?x=0&y=0&z=500&step=0").status, 200);
   EXPECT_EQ(get(server.port(), "/v1/datasets/small/frame.png?width=32&height=32").status, 200);
   EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
@@ -278,7 +278,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
   other_ran.get_future().wait();
   note(0);
   gate.open();
-  last_ran.get_future().wait();  // end() cancels waiting jobs, and cancelled ones keep no order
+  last_ran.get_future().wait();  // end() cancels waiting jobs, and cancelled jobs run in any order
   loads.end();
   EXPECT_THAT(order, testing::ElementsAre(0, 1, 2, 3));
 }
@@ -300,7 +300,7 @@ TEST(Loads, EveryDatasetHasItsOwnQueue) {
   gate.open();
 }
 
-// Views without ranges of their fields, so that their completion reads the shown field; all but one
+// Views without ranges of their fields, so that completing them reads the shown field; all but one
 // are superseded.
 TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
@@ -344,7 +344,7 @@ TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
                      std::int64_t /*queue_us*/, work::Loading loading) {
     told.set_value(loading == work::Loading::allowed ? "drawn" : "drawn without loading");
   };
-  // While it loads, as many others come as may wait.
+  // While it loads, the maximum number of requests waits.
   drawing.prepare = [&](data::Dataset& dataset,
                         work::Loading loading) -> Result<work::PreparedPtr> {
     if (loading == work::Loading::none) return make_error(ErrorKind::not_resident, "not loaded");

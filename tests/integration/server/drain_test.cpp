@@ -66,7 +66,7 @@ TEST(Drain, IsNotDelayedByRepeatedRequests) {
   const auto begin = std::chrono::steady_clock::now();
   server.stop();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5))
-      << "connections are ended after 8 s; nothing here takes long";
+      << "connections are ended after 8 s; nothing here takes that long";
   for (std::thread& client : clients) client.join();
 }
 
@@ -100,7 +100,7 @@ TEST(Drain, RunningPictureIsAnsweredWhileReadinessFails) {
   drawing.send(
       "GET /v1/datasets/small/frame.png?width=1200&height=1200 HTTP/1.1\r\n"
       "Host: x\r\n\r\n");
-  // A stream that does not answer its close keeps the server draining for a moment.
+  // A stream that does not answer its close delays the end of the drain for a moment.
   StreamClient stream(server.port());
   ASSERT_TRUE(stream.next_text("hello"));
   server.server().drain();

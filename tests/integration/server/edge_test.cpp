@@ -13,7 +13,7 @@ class Edge : public testing::Test {
   void TearDown() override { EXPECT_EQ(get(port(), "/livez").status, 200); }
   [[nodiscard]] std::uint16_t port() const { return server_.port(); }
 
-  // Refused as a problem, and the connection is closed.
+  // Expects that a request is refused with a problem and the connection is closed.
   void expect_refused(std::string_view bytes, int status) const {
     Socket socket(port());
     socket.send(bytes);
@@ -35,8 +35,8 @@ TEST_F(Edge, AmbiguousRequestsAreRefused) {
     int status;
   };
   for (const Case& c : {
-           Case{get + "\r\n", 400},                                 // no Host
-           Case{get + "Host: a\r\nHost: b\r\n\r\n", 400},           // two
+           Case{get + "\r\n", 400},                                 // missing Host
+           Case{get + "Host: a\r\nHost: b\r\n\r\n", 400},           // two Hosts
            Case{get + "Host: a\r\nX: 1\r\n folded\r\n\r\n", 400},   // obs-fold
            Case{get + "Host: a\r\nX: 1\r\n\tfolded\r\n\r\n", 400},  //
            Case{get + "Host: a\nX: 1\r\n\r\n", 400},                // bare LF
@@ -97,7 +97,7 @@ TEST_F(Edge, BodyOf100MbSentWithoutWaitingGets413) {
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
   const std::string megabyte(1 << 20, 'x');
   for (int n = 0; n < 100; ++n) {
-    if (!socket.send(megabyte)) break;  // the server has refused the rest
+    if (!socket.send(megabyte)) break;  // the server refused the rest
   }
   EXPECT_EQ(read_answer(socket).status, 413);
 }

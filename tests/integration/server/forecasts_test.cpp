@@ -96,7 +96,7 @@ TEST_F(Forecasts, LargerBudgetNeverChoosesALargerError) {
     different += error < last ? 1U : 0U;
     last = error;
   }
-  EXPECT_GT(different, 1U) << "otherwise this test shows nothing";
+  EXPECT_GT(different, 1U) << "otherwise this test proves nothing";
 }
 
 TEST_F(Forecasts, AreEmptyBeforeLoadingAndLoadNothing) {
@@ -112,8 +112,8 @@ TEST_F(Forecasts, AreEmptyBeforeLoadingAndLoadNothing) {
   EXPECT_EQ(server_.loads(), loads);
 }
 
-// A session at rest starts a calibration run of its view: afterwards errors are measured ones, and
-// times are milliseconds of this machine.
+// A session at rest starts a calibration run of its view: afterwards errors are measured, and times
+// are milliseconds of this machine.
 TEST_F(Forecasts, AreMeasuredAfterASession) {
   const Json view = view_of(320, 240);
   draw(view);
@@ -140,7 +140,7 @@ TEST_F(Forecasts, AreMeasuredAfterASession) {
     if (!frame) --seq;
   }
   EXPECT_EQ(share_measured("timed", true), 1);
-  // From another viewpoint the scene is the same.
+  // From another viewpoint the scene signature is the same.
   Json elsewhere = view;
   elsewhere["camera"] = {{"eye", {0, 0.1, 4}}, {"target", {0, 0, 0}}, {"up", {0, 1, 0}}};
   const Json told = json_of(post(elsewhere));

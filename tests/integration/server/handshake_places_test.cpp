@@ -1,5 +1,5 @@
-// Eviction of pending handshakes, and release of ended ones: connections as the listener passes
-// them on, in an io loop that the test advances, so that no deadline interferes.
+// Eviction of pending handshakes, and release of ended ones: connections as passed on by the
+// listener, in an io loop that the test advances, so that no deadline interferes.
 #include <gmock/gmock.h>
 #include <openssl/ssl.h>
 #include <poll.h>
@@ -38,7 +38,7 @@ using Tcp = boost::asio::ip::tcp;
 
 class HandshakePlaces : public testing::Test {
  protected:
-  // The server's order of destruction (server.cpp).
+  // The order of destruction as in server.cpp.
   ~HandshakePlaces() override {
     connections.each([](windsplat::transport::Connection& one) { one.abort(); });
     gate_.set_value();
@@ -53,7 +53,7 @@ class HandshakePlaces : public testing::Test {
     return options;
   }
 
-  // The client's end of a connection from that address.
+  // The client end of a connection from that address.
   Tcp::socket& come(const std::string& address, bool known = false) {
     Tcp::socket& client = clients.emplace_back(io);
     client.connect(acceptor.local_endpoint());
@@ -67,7 +67,7 @@ class HandshakePlaces : public testing::Test {
     io.poll();
   }
 
-  // Until the thread has received the waiting steps of that address.
+  // Waits until the thread has received the waiting steps of that address.
   void wait_for_steps(const std::string& address) {
     std::promise<void> done;
     thread.submit(address, [&done] { done.set_value(); });
@@ -178,7 +178,7 @@ TEST_F(HandshakePlaces, AreChargedForComputationBeforeTheClose) {
   const auto took = [&] { return services.metrics.text({}); };
   const std::string nothing = "windsplat_tls_handshake_seconds_total 0\n";
   EXPECT_THAT(took(), HasSubstr(nothing));
-  // The clock of the thread may be coarse, so that some seem to take no time.
+  // The clock of the thread may be coarse, so that some steps seem to take no time.
   for (int n = 0; n < 1000 && took().find(nothing) != std::string::npos; ++n) {
     Tcp::socket& client = come("192.0.2.1");
     boost::asio::write(client, boost::asio::buffer(hello));

@@ -72,7 +72,7 @@ class Client {
   [[nodiscard]] bool shaken() const { return shaken_; }
   [[nodiscard]] SSL* ssl() const { return ssl_.get(); }
 
-  // The response to a GET, and with TLS 1.3 the tickets before it.
+  // Reads the response to a GET, and with TLS 1.3 the tickets before it.
   std::string get(const std::string& target, const std::string& fields = "") {
     const std::string ask =
         "GET " + target + " HTTP/1.1\r\nHost: x\r\nConnection: close\r\n" + fields + "\r\n";
@@ -104,7 +104,7 @@ TEST(TlsGroups, ThatAreExpensiveAreRefused) {
   for (const char* groups : {"X25519", "P-256", "ffdhe2048:P-256", "P-384:X25519"}) {
     EXPECT_TRUE(Client(server.port(), offering(groups)).shaken()) << groups;
   }
-  // The certificate's own group, P-256, must be among them.
+  // The group of the certificate, P-256, must be among them.
   for (const char* groups : {"X25519:P-256", "P-256", "P-384:P-256"}) {
     EXPECT_TRUE(Client(server.port(), offering(groups, TLS1_2_VERSION)).shaken()) << groups;
   }
@@ -186,7 +186,7 @@ TEST(TlsHandshakes, OfOtherAddressesLeaveTimeForLocalHealthChecks) {
   const std::string log = testing::internal::GetCapturedStderr();
   EXPECT_LT(shaken, 5000);
   EXPECT_EQ(healthy, 5);
-  EXPECT_LT(others, 5) << "they wait for the debt of the first address";
+  EXPECT_LT(others, 5) << "they wait until the first address is within its limit";
   EXPECT_THAT(log, HasSubstr("exceeded their processor time"));
   EXPECT_THAT(log, HasSubstr("connections=1 seconds=0 address=127.0.0.2"));
 }
@@ -210,12 +210,12 @@ TEST(TlsHandshakes, OfAuthenticatedAddressesDoNotCompeteWithOthers) {
   EXPECT_TRUE(from("127.0.0.2")->shaken());
   int others = 0;
   for (int n = 0; n < 5; ++n) others += from("127.0.0.4")->shaken() ? 1 : 0;
-  EXPECT_LT(others, 5) << "they wait for the debt of the first address";
+  EXPECT_LT(others, 5) << "they wait until the first address is within its limit";
 }
 
 TEST(PlainHttp, AtTheTlsPortIsChargedToItsAddress) {
   Limits limits;
-  limits.bytes_per_address = 1;  // ten at once
+  limits.bytes_per_address = 1;  // burst of ten
   TestServer server(over_tls(limits));
   EXPECT_EQ(raw(server.port(), "GET /livez HTTP/1.1\r\nHost: x\r\n\r\n").status, 400);
   const Answer picture =

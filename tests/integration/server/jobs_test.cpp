@@ -1,4 +1,4 @@
-// Jobs: states, limits, cancellation, and that an error of the work fails only its job.
+// Jobs: states, limits, cancellation; an error of the work fails only its job.
 #include "server/work/jobs.hpp"
 
 #include <gmock/gmock.h>
@@ -69,7 +69,7 @@ TEST(Jobs, ResultErrorAndExceptionEachEndTheirJobOnly) {
   Jobs jobs(8, 2);
   const auto good = submitted(jobs, [](const Jobs::Handle&) { return Result<std::string>("gcm"); });
   const auto bad = submitted(jobs, [](const Jobs::Handle&) -> Result<std::string> {
-    return make_error(ErrorKind::bad_data, "not a file of ours");
+    return make_error(ErrorKind::bad_data, "not a supported file");
   });
   const auto thrown = submitted(jobs, [](const Jobs::Handle&) -> Result<std::string> {
     throw std::runtime_error("at somebody/source.cpp:7");
@@ -85,7 +85,7 @@ TEST(Jobs, ResultErrorAndExceptionEachEndTheirJobOnly) {
   EXPECT_EQ(failed.state, "failed");
   ASSERT_TRUE(failed.problem);
   EXPECT_EQ(failed.problem->status, 422);
-  EXPECT_EQ(failed.problem->detail, "not a file of ours");
+  EXPECT_EQ(failed.problem->detail, "not a supported file");
   EXPECT_FALSE(failed.result);
   EXPECT_EQ(finished(jobs, thrown).problem->status, 500);
   EXPECT_THAT(finished(jobs, thrown).problem->detail,
@@ -164,7 +164,7 @@ TEST(Jobs, WaitingAndRunningJobsCanBeCancelled) {
   const auto last = submitted(jobs, [](const Jobs::Handle&) { return Result<std::string>("x"); });
   EXPECT_EQ(finished(jobs, last).state, "done");
   EXPECT_TRUE(jobs.cancel(last));
-  EXPECT_EQ(jobs.find(last)->state, "done") << "a finished job stays finished";
+  EXPECT_EQ(jobs.find(last)->state, "done") << "a finished job is unchanged";
   EXPECT_FALSE(second_ran);
 }
 

@@ -1,5 +1,5 @@
-// Limits over real sockets: excess is refused with the limit and a retry time, health is still
-// served, and resources are released.
+// Limits over real sockets: excess is refused with the limit and a retry time, health requests are
+// still served, and resources are released.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -26,7 +26,7 @@ void expect_limit(const Answer& answer, int status, const std::string& words) {
   EXPECT_GE(std::atoi(answer.header("retry-after").c_str()), 1);
 }
 
-// The client reads the head only of an upgrade.
+// The client reads only the head of an upgrade response.
 void expect_no_upgrade(const StreamClient& viewer, int status) {
   EXPECT_EQ(viewer.handshake().status, status);
   EXPECT_GE(std::atoi(viewer.handshake().header("retry-after").c_str()), 1);
@@ -45,7 +45,7 @@ bool comes_true(const std::function<bool()>& holds) {
   return false;
 }
 
-// Connections that have been accepted; `busy`: with the start of a request.
+// Connections that have been accepted; `busy`: with the start of a request sent.
 std::vector<std::unique_ptr<Socket>> hold(std::uint16_t port, int count, bool busy = true) {
   std::vector<std::unique_ptr<Socket>> held;
   for (int n = 0; n < count; ++n) {
@@ -100,7 +100,7 @@ TEST(Limits, SilentConnectionIsClosedSoon) {
 
 TEST(Limits, ConnectionsAboveTheirRateAreClosed) {
   ServerOptions options;
-  options.limits.arrivals_per_address = 0.5;  // 5 at once
+  options.limits.arrivals_per_address = 0.5;  // burst of 5
   TestServer server(options);
   const auto answered = [&] { return get(server.port(), "/livez").status == 200; };
   int taken = 0;
@@ -110,10 +110,10 @@ TEST(Limits, ConnectionsAboveTheirRateAreClosed) {
   EXPECT_TRUE(comes_true(answered));
 }
 
-// Malformed requests count, too.
+// Malformed requests are counted too.
 TEST(Limits, MalformedInputIsChargedLikeRequests) {
   ServerOptions options;
-  options.limits.requests_per_address = 1;  // 10 at once
+  options.limits.requests_per_address = 1;  // burst of 10
   TestServer server(options);
   for (int n = 0; n < 20; ++n) EXPECT_EQ(raw(server.port(), "nonsense\r\n\r\n").status, 400) << n;
   expect_limit(get(server.port(), "/v1"), 429, "1 requests a second");
@@ -121,7 +121,7 @@ TEST(Limits, MalformedInputIsChargedLikeRequests) {
 
 TEST(Limits, StreamWithTooManyMessagesIsThrottled) {
   ServerOptions options;
-  options.limits.messages_per_address = 20;  // 40 at once
+  options.limits.messages_per_address = 20;  // burst of 40
   TestServer server(options);
   StreamClient viewer(server.port());
   const auto since = std::chrono::steady_clock::now();
@@ -173,7 +173,7 @@ TEST(Limits, SessionsOfOneAddressAreLimited) {
 
 TEST(Limits, RequestsAboveTheirRateAreRefusedExceptHealth) {
   ServerOptions options;
-  options.limits.requests_per_address = 2;  // 20 at once
+  options.limits.requests_per_address = 2;  // burst of 20
   TestServer server(options);
   int answered = 0;
   Answer last;
@@ -192,7 +192,7 @@ TEST(Limits, RenderingIsChargedAndItsDebtDelaysRequests) {
   options.limits.render_s_per_address = 0.0001;
   TestServer server(options);
   const std::string frame = "/v1/datasets/small/frame.jpg?width=64&height=48";
-  EXPECT_EQ(get(server.port(), frame).status, 200) << "the first may go into debt";
+  EXPECT_EQ(get(server.port(), frame).status, 200) << "the first may exceed the limit";
   std::this_thread::sleep_for(std::chrono::milliseconds(200));  // it is charged once it is answered
   const Answer second = get(server.port(), frame);
   expect_limit(second, 429, "seconds of rendering a minute");
@@ -222,7 +222,7 @@ TEST(Limits, StreamAboveItsQuotaIsClosed) {
 
 TEST(Limits, BytesSentAreCharged) {
   ServerOptions options;
-  options.limits.bytes_per_address = 1;  // 10 at once
+  options.limits.bytes_per_address = 1;  // burst of 10
   TestServer server(options);
   EXPECT_EQ(get(server.port(), "/v1").status, 200);
   EXPECT_TRUE(comes_true([&] {
@@ -233,7 +233,7 @@ TEST(Limits, BytesSentAreCharged) {
 
 TEST(Limits, ClientsBehindATrustedProxyAreDistinguished) {
   ServerOptions options;
-  options.limits.requests_per_address = 0.1;  // one, and no more for ten seconds
+  options.limits.requests_per_address = 0.1;  // one, and no other within ten seconds
   options.limits.trusted_proxies = {"127.0.0.1"};
   TestServer server(options);
   const auto ask = [&](const std::string& hops) {
@@ -321,7 +321,7 @@ TEST(Limits, EveryResponseHasSecurityHeaders) {
   }
 }
 
-// The number of series is constant for any request.
+// The number of series is constant for all requests.
 TEST(Limits, PathsMethodsAndRefusalsCreateNoMetricSeries) {
   ServerOptions options;
   options.limits.sessions_per_address = 1;
@@ -344,7 +344,7 @@ TEST(Limits, PathsMethodsAndRefusalsCreateNoMetricSeries) {
   EXPECT_EQ(series(), before);
 }
 
-// Pictures whose data are not resident wait in the load queue, which is bounded, too.
+// Pictures whose data are not resident wait in the load queue, which is bounded too.
 TEST(Limits, PicturesWaitingForASlowDiskAreBounded) {
   namespace data = windsplat::data;
   const auto gate = std::make_shared<Gate>();
@@ -372,12 +372,12 @@ TEST(Limits, PicturesWaitingForASlowDiskAreBounded) {
     if (answer.status != 200) expect_limit(answer, 429, "try again");
     served += answer.status == 200 ? 1 : 0;
   }
-  EXPECT_GE(served, 8);  // half of the slots: all are from one address
+  EXPECT_GE(served, 8);  // half of the slots: all requests are from one address
   EXPECT_LE(served, 12);
 }
 
-// The renderer is free soon after the client of an expensive picture disconnects, also with a byte
-// of another request before the close, and for a stream. The requirement is 100 ms; machines that
+// The renderer is free soon after the client of an expensive picture disconnects, even if a byte of
+// another request precedes the close, and for a stream. The requirement is 100 ms; machines that
 // run many tests at once get thirty times that.
 TEST(Cancel, DisconnectCancelsTheRendering) {
   TestServer server;

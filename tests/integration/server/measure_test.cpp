@@ -1,4 +1,4 @@
-// Queries of values over REST against the numbers in the file; datasets opened by POST.
+// Queries of values over REST compared with the numbers in the file; datasets opened by POST.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -114,7 +114,7 @@ TEST_F(Measures, HistogramCountsEverySampleOnce) {
   }
 }
 
-// A share of 0.1 omits as many whole values at either end as a tenth of all contains.
+// A fraction of 0.1 excludes as many whole values at either end as a tenth of all contains.
 TEST_F(Measures, HistogramClipOmitsBothEnds) {
   const std::string name = field(windsplat::data::FieldKind::scalar).name;
   const auto there = volume(name, 2);
@@ -125,7 +125,7 @@ TEST_F(Measures, HistogramClipOmitsBothEnds) {
   const Json h = ask("fields/" + name + "/histogram?step=2&clip=0.1");
   EXPECT_EQ(h["range"][0].get<float>(), values[dropped]);
   EXPECT_EQ(h["range"][1].get<float>(), values[values.size() - 1 - dropped]);
-  EXPECT_LT(values.front(), values[dropped]) << "otherwise this test shows nothing";
+  EXPECT_LT(values.front(), values[dropped]) << "otherwise this test proves nothing";
 }
 
 TEST_F(Measures, InvalidHistogramsAreRefused) {
@@ -207,7 +207,7 @@ TEST_F(Measures, RangeOfAllStepsIsTheUnionOfTheSteps) {
     EXPECT_EQ(all["range"][1].get<float>(), range[1]) << info.name;
     wider_than_the_first += range != first ? 1 : 0;
   }
-  EXPECT_GT(wider_than_the_first, 0) << "otherwise this test shows nothing";
+  EXPECT_GT(wider_than_the_first, 0) << "otherwise this test proves nothing";
 }
 
 TEST_F(Measures, EvictionKeepsDatasetsAndOnlyPostedOnesCanBeRemoved) {
@@ -295,7 +295,7 @@ TEST_F(DataRoot, LinksOmittedFromAPatternAreListed) {
   ASSERT_EQ(job["state"], "done") << job;
   const Json told = json_of(get(port(), "/v1/datasets/" + job["result"].get<std::string>()));
   EXPECT_EQ(told["state"], "ready");
-  EXPECT_THAT(told["notes"].dump(), HasSubstr("1 of 2 names that the pattern matches is a link"));
+  EXPECT_THAT(told["notes"].dump(), HasSubstr("1 of 2 names that match the pattern is omitted"));
 }
 
 TEST_F(DataRoot, UnreadableFileIsAFailedJob) {

@@ -1,4 +1,4 @@
-// Metrics scraped over a socket: format, counters, and that clients cannot create series.
+// Metrics scraped over a socket: their format, counters, and that clients cannot create series.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -130,10 +130,10 @@ TEST_F(MetricsTest, FramesOfASessionAreCountedByPurpose) {
   EXPECT_EQ(gone.value("windsplat_sessions_opened_total"), 1);
 }
 
-// One frame waits for such peers at any time, and a second one after they read; the rest are kernel
-// buffers of a few hundred kilobytes.
+// One frame is queued for each such peer at any time, and a second one after they read; the rest is
+// in kernel buffers of a few hundred kilobytes.
 TEST_F(MetricsTest, PeersThatNeverReadHoldOneFrameEach) {
-  constexpr int peers = 5;  // a frame each before the first is given up as too slow
+  constexpr int peers = 5;  // one frame each before the first peer is disconnected as too slow
   const std::string image = R"("image":{"width":2000,"height":1500})";
   const Answer picture = request(port(), "POST", "/v1/frames",
                                  {{"Content-Type", "application/json"}, {"Accept", "image/png"}},

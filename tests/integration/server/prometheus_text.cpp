@@ -1,4 +1,4 @@
-// Line by line, then the invariants of histograms.
+// Checks every line, then the invariants of histograms.
 #include "tests/integration/server/prometheus_text.hpp"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ std::optional<double> number_of(const std::string& text) {
 class Reader {
  public:
   Exposition read(const std::string& text) {
-    if (text.empty() || text.back() != '\n') fault("the last line has no end");
+    if (text.empty() || text.back() != '\n') fault("the last line has no line feed");
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) read_line(line);
     for (const auto& [series, buckets] : buckets_) check_buckets(series, buckets);
@@ -63,10 +63,10 @@ class Reader {
                                  ") (counter|gauge|histogram)");
     std::smatch found;
     if (std::regex_match(line, found, help)) {
-      if (!helped_.insert(found[1]).second) fault("told twice: " + line);
+      if (!helped_.insert(found[1]).second) fault("duplicate: " + line);
     } else if (std::regex_match(line, found, type)) {
       if (helped_.count(found[1]) == 0) fault("no HELP: " + line);
-      if (!out_.types.emplace(found[1], found[2]).second) fault("told twice: " + line);
+      if (!out_.types.emplace(found[1], found[2]).second) fault("duplicate: " + line);
       family_ = found[1];
     } else {
       read_sample(line);
@@ -82,12 +82,12 @@ class Reader {
     const std::string name = found[1];
     const std::string labels = found[2];
     const auto family = family_of(out_, name);
-    if (!family) return fault("of no family: " + line);
-    if (*family != family_) fault("not below its family: " + line);
+    if (!family) return fault("without family: " + line);
+    if (*family != family_) fault("not after its family: " + line);
     const auto value = number_of(found[3]);
     if (!value) return fault("no number: " + line);
     if (out_.types[*family] != "gauge" && !(*value >= 0)) fault("below 0: " + line);
-    if (!out_.samples.emplace(name + labels, *value).second) fault("told twice: " + line);
+    if (!out_.samples.emplace(name + labels, *value).second) fault("duplicate: " + line);
     if (name == *family + "_bucket") note_bucket(*family, labels, *value, line);
   }
 
@@ -97,7 +97,7 @@ class Reader {
     std::smatch found;
     if (!std::regex_search(labels, found, bound)) return fault("no le: " + line);
     const auto le = number_of(found[1]);
-    if (!le) return fault("no bound: " + line);
+    if (!le) return fault("no upper bound: " + line);
     std::string rest = found.prefix().str() + found.suffix().str();
     if (rest == "{}") rest.clear();
     Buckets& buckets = buckets_[family + rest];

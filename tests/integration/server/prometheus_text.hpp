@@ -1,4 +1,4 @@
-// Strict parser of Prometheus' text format: deviations from its specification are failures.
+// Strict parser of the text format of Prometheus: deviations from its specification are failures.
 #pragma once
 
 #include <map>
@@ -11,12 +11,12 @@ namespace server_test {
 
 struct Exposition {
   std::map<std::string, std::string> types;  // family -> counter, gauge or histogram
-  std::map<std::string, double> samples;     // "name{a="b"}" as it is written -> value
-  std::vector<std::string> faults;           // what is wrong, with its line
+  std::map<std::string, double> samples;     // "name{a="b"}" as written -> value
+  std::vector<std::string> faults;           // faults, with their lines
 
   // 0 with a test failure if there is none.
   [[nodiscard]] double value(const std::string& sample) const;
-  // Of a histogram, by its labels: "" or {a="b"}.
+  // A histogram, by its labels: "" or {a="b"}.
   [[nodiscard]] double count(const std::string& family, const std::string& labels) const {
     return value(family + "_count" + labels);
   }

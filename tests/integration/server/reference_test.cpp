@@ -1,4 +1,4 @@
-// References over real sockets: drawn by a job, identical to those of `windsplat render`, bounded,
+// References over real sockets: drawn by a job, identical to those of `windsplat render`, limited,
 // cancellable, and not delaying other work.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using windsplat::CancelToken;
 using windsplat::work::References;
 
 const std::string reference_view = R"({"dataset":"small","image":{"width":96,"height":64}})";
-// Takes seconds at least.
+// Takes at least some seconds.
 const std::string large_view = R"({"dataset":"small","image":{"width":1600,"height":1200}})";
 
 Answer post_reference(std::uint16_t port, const std::string& view) {
@@ -35,7 +35,7 @@ std::string begun(std::uint16_t port, const std::string& view) {
 
 bool is_over(const Json& job) { return job["state"] != "queued" && job["state"] != "running"; }
 
-// The first state of the job that satisfies `enough`, or its last.
+// The first state of the job for which `enough` returns true, or its last state.
 template <class Enough>
 Json job_when(std::uint16_t port, const std::string& path, const Enough& enough) {
   Json job;
@@ -138,7 +138,7 @@ TEST(References, OtherRequestsAreServedMeanwhileAndNoWorkIsLost) {
   }
   EXPECT_EQ(json_of(get(server.port(), job_path))["state"], "running");
   EXPECT_GT(json_of(get(server.port(), job_path))["etaMs"].get<double>(), 0);
-}  // and the server ends, whatever is still drawn
+}  // and the server ends while it is being drawn
 
 TEST(References, DeletedJobStopsAndFreesItsSlot) {
   TestServer server;
@@ -155,7 +155,7 @@ TEST(References, DeletedJobStopsAndFreesItsSlot) {
   EXPECT_EQ(cancelled["result"], nullptr);
 }
 
-// At 1920 x 1080 the values alone are 32 MiB.
+// At 1920 x 1080 the pixel values alone are 32 MiB.
 TEST(References, InsufficientMemoryIsReported) {
   TestServer server({}, {}, std::uint64_t{24} << 20);
   const std::string view = R"({"dataset":"small","image":{"width":1920,"height":1080}})";
@@ -204,7 +204,7 @@ TEST(ReferenceTickets, OnePerAddressAndFourInTotal) {
   const auto c = references.admit("c", {});
   const auto d = references.admit("d", {});
   ASSERT_TRUE(b && c && d);
-  EXPECT_FALSE(references.admit("e", {})) << "four wait";
+  EXPECT_FALSE(references.admit("e", {})) << "four are waiting";
   b->reset();
   const auto e = references.admit("e", {});
   EXPECT_TRUE(e) << "one has ended";

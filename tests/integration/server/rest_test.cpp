@@ -19,12 +19,12 @@ using testing::StartsWith;
 
 class Rest : public testing::Test {
  protected:
-  // Releases what a test loaded or saved.
+  // Removes what a test loaded or saved.
   void TearDown() override {
     Answer good;
     for (int turns = 0; turns < 600; ++turns) {
       good = get(port(), "/v1/datasets/small/frame.jpg?width=32&height=32");
-      if (good.status != 429) break;  // busy is a valid answer for a moment
+      if (good.status != 429) break;  // for a moment busy is a valid response
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     EXPECT_EQ(good.status, 200) << good.body;
@@ -77,7 +77,7 @@ TEST_F(Rest, DatasetsAreListedBeforeAndDescribedAfterReading) {
   EXPECT_EQ(dataset["dims"], Json({{"x", 32}, {"y", 16}, {"z", 6}}));
   EXPECT_EQ(dataset["steps"]["count"], small_steps);
   EXPECT_EQ(dataset["defaultView"]["dataset"], "small");
-  // The default view shows two fields: others are not loaded and have no known range.
+  // The default view shows two fields: the others are not loaded, so their ranges are unknown.
   for (const Json& field : dataset["fields"]) {
     const bool shown = field["name"] == "wind" || field["name"] == "cloud";
     EXPECT_EQ(field["range"].is_array(), shown) << field;
@@ -195,7 +195,7 @@ TEST_F(Rest, SameViewHasTheSameTagAndBytesAndGets304) {
   EXPECT_THAT(etag, StartsWith("\""));
   const Answer second = post_view(port(), R"({"image":{"height":30,"width":40},"dataset":"small",
                                               "step":0})");
-  EXPECT_EQ(second.header("etag"), etag) << "the same view in another spelling";
+  EXPECT_EQ(second.header("etag"), etag) << "the same view written differently";
   EXPECT_EQ(second.body, first.body);
   const Answer third = post_view(port(), view, {{"If-None-Match", "\"other\", " + etag}});
   EXPECT_EQ(third.status, 304);
@@ -238,7 +238,7 @@ TEST_F(Rest, PictureReportsItsErrorAndMeetsErrorAndBudget) {
   EXPECT_GT(quick["error"]["value"], exact["error"]["value"]);
 }
 
-// --- bad input ----------------------------------------------------------------------------------
+// --- invalid input ------------------------------------------------------------------------------
 
 TEST_F(Rest, InvalidViewsAreRefusedWithThePointer) {
   struct Case {
@@ -334,7 +334,7 @@ TEST_F(Rest, HeadIsGetWithoutTheBody) {
 TEST_F(Rest, FullQueueGets429AtOnce) {
   // Resident, so that no admitted request has to load first.
   ASSERT_EQ(get(port(), "/v1/datasets/small/frame.jpg?width=16&height=16").status, 200);
-  // More pictures than the queue holds, requested before the first is done.
+  // More pictures than the queue can hold, requested before the first is done.
   const std::string slow =
       "GET /v1/datasets/small/frame.png?width=4096&height=4096 HTTP/1.1\r\nHost: x\r\n\r\n";
   std::vector<std::unique_ptr<Socket>> sockets;
@@ -342,7 +342,7 @@ TEST_F(Rest, FullQueueGets429AtOnce) {
     sockets.push_back(std::make_unique<Socket>(port()));
     sockets.back()->send(slow);
   }
-  // The last were refused while the first was still rendering.
+  // The last requests were refused while the first was still rendering.
   const Answer refused = read_answer(*sockets.back());
   expect_problem(refused, 429);
   EXPECT_FALSE(refused.header("retry-after").empty());
@@ -356,7 +356,7 @@ TEST_F(Rest, FullQueueGets429AtOnce) {
     std::this_thread::sleep_for(std::chrono::milliseconds(25));
     status = picture();
   }
-  EXPECT_EQ(status, 200) << "the queue empties";
+  EXPECT_EQ(status, 200) << "the queue becomes empty";
 }
 
 // --- the page -----------------------------------------------------------------------------------
@@ -397,7 +397,7 @@ TEST_F(Rest, PageIsServedWithSecurityAndCacheHeaders) {
 TEST(RestFrames, APostedViewIsCompletedOnceThoughItsDataHadToBeLoaded) {
   const TestServer server;
   const std::uint64_t before = windsplat::scene::completions();
-  // States its ranges, so that it can be completed before its fields are loaded.
+  // A view with ranges, so that it can be completed before its fields are loaded.
   const std::string view = R"({"dataset":"small","image":{"width":40,"height":30},"scalars":[],
     "vector":{"magnitudeRange":[0,30],"minMagnitude":0,"color":{"range":[0,30]}}})";
   EXPECT_EQ(post_view(server.port(), view).status, 200);

@@ -48,7 +48,7 @@ class Gate {
   int arrived_ = 0;
 };
 
-// Another source behind a gate; ignores cancel(), like a hanging disk.
+// Wraps a source with a gate; ignores cancel(), like a disk that does not respond.
 class SlowSource : public windsplat::data::Source {
  public:
   SlowSource(std::unique_ptr<windsplat::data::Source> source, std::shared_ptr<Gate> gate)

@@ -153,7 +153,7 @@ TEST_F(Stream, NoThirdFrameBeforeAnAck) {
   // The error reply proves that all of them were received.
   viewer.say(R"({"type":"nonsense"})");
   ASSERT_TRUE(viewer.next_text("error"));
-  EXPECT_FALSE(viewer.next_frame(400)) << "credit is two";
+  EXPECT_FALSE(viewer.next_frame(400)) << "the credit is two frames";
   viewer.ack(2);
   const auto third = parse_frame(viewer.next_frame());
   ASSERT_TRUE(third);
@@ -258,7 +258,7 @@ TEST_F(Stream, TwoSessionsShareLoadedDataAndKeepTheirViews) {
   EXPECT_EQ(server_.loads(), loads) << "each volume was read once";
 }
 
-// --- bad input ----------------------------------------------------------------------------------
+// --- invalid input ------------------------------------------------------------------------------
 
 TEST_F(Stream, InvalidMessagesAreAnsweredAndTheConnectionStays) {
   Viewer viewer(port());
@@ -298,7 +298,7 @@ TEST_F(Stream, InvalidMessagesAreAnsweredAndTheConnectionStays) {
 TEST_F(Stream, ProtocolViolationsCloseWithTheirCode) {
   {
     StreamClient client(port());
-    client.send_frame(Opcode::binary, "frames come from the server");
+    client.send_frame(Opcode::binary, "only the server sends frames");
     EXPECT_EQ(client.close_code(), 4400);
   }
   {
@@ -312,7 +312,7 @@ TEST_F(Stream, ProtocolViolationsCloseWithTheirCode) {
     EXPECT_EQ(client.close_code(), 1009);
   }
   {
-    // Empty fragments: none is too large, and they never end.
+    // Empty fragments: none is too large, but the message never ends.
     StreamClient client(port());
     client.send_frame(Opcode::text, "", false);
     for (int n = 0; n < 60000; ++n) {
@@ -333,7 +333,7 @@ TEST_F(Stream, EndlessMessageTimesOutDespitePings) {
   ASSERT_TRUE(client.next_text("hello"));
   client.send_frame(Opcode::text, "", false);
   bool cut = false;
-  // A message may take 10 s; this would take three times as long.
+  // A message may take 10 s; this one would take three times as long.
   for (int n = 0; n < 60 && !cut; ++n) {
     client.send_frame(Opcode::ping, "x");
     client.send_frame(Opcode::more, "", false);
@@ -354,13 +354,13 @@ TEST_F(Stream, PeerThatClosedIsNotWaitedFor) {
   StreamClient client(port());
   ASSERT_TRUE(client.next_text("hello"));
   const auto begin = std::chrono::steady_clock::now();
-  // At once: the server finds the close when it has begun its own.
+  // Sent at once: the server finds the close after it has begun its own.
   const std::string mask(4, '\0');
   client.socket.send("\x82\x81" + mask + "x" + "\x88\x82" + mask + "\x03\xe8");
   EXPECT_EQ(client.close_code(), 4400);
   EXPECT_TRUE(client.socket.closed_by_peer());
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(1500))
-      << "a silent client is waited for 2 s";
+      << "the server waits 2 s for a silent client";
 }
 
 TEST_F(Stream, MessageAtTheLimitIsRead) {
@@ -427,7 +427,7 @@ TEST_F(Stream, PeerThatNeverReadsIsSentAtMostTwoFrames) {
              std::to_string(rev % small_steps) + "}}");
   }
   ASSERT_TRUE(viewer.final_frame(1)) << "others are served meanwhile";
-  // Now it reads: what is on its way is two frames, and no more come without an ack.
+  // Now the client reads: two frames are in flight, and no more come without an ack.
   int frames = 0;
   while (deaf.next_frame(3000)) ++frames;
   EXPECT_GE(frames, 1);

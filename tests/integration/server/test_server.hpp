@@ -26,7 +26,7 @@ inline Json json_of(const Answer& answer) { return Json::parse(answer.body, null
 
 inline constexpr int small_steps = 3;
 
-// A file for the lifetime of the tests.
+// A file that exists during the tests.
 inline const std::string& small_file() {
   struct Made {
     std::filesystem::path folder;
@@ -52,7 +52,7 @@ inline const std::string& small_file() {
 
 class TestServer {
  public:
-  // `open`: how files are opened, other than in this process.
+  // `open`: opens files; by default in this process.
   explicit TestServer(windsplat::api::ServerOptions options = {},
                       decltype(windsplat::data::StoreOptions::open) open = {},
                       std::uint64_t bytes_max = std::uint64_t{1} << 30) {
@@ -93,7 +93,7 @@ struct Picture {
   int height = 0;
   std::vector<unsigned char> rgb;
 
-  // How many pixels differ from the first one by more than JPEG's noise.
+  // Number of pixels that differ from the first one by more than JPEG noise.
   [[nodiscard]] std::size_t distinct() const {
     std::size_t count = 0;
     for (std::size_t i = 0; i + 2 < rgb.size(); i += 3) {

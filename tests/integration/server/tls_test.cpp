@@ -42,7 +42,8 @@ TEST_F(Tls, RequestsAreAnsweredWithStrictTransportSecurity) {
   EXPECT_THAT(server_.server().url(), testing::StartsWith("https://127.0.0.1:"));
   const Answer live = get(place(), "/livez");
   EXPECT_EQ(live.status, 200);
-  EXPECT_EQ(live.header("strict-transport-security"), "") << "loopback is shared with other users";
+  EXPECT_EQ(live.header("strict-transport-security"), "")
+      << "loopback is shared with other programs";
   Socket by_name(place());
   by_name.send("GET /livez HTTP/1.1\r\nHost: winds.example\r\n\r\n");
   EXPECT_EQ(read_answer(by_name).header("strict-transport-security"), "max-age=15552000");
@@ -88,7 +89,7 @@ TEST_F(Tls, ConnectionCarriesManyRequestsEvenPipelined) {
   EXPECT_TRUE(socket.closed_by_peer());
 }
 
-// Frames of every size arrive complete: small ones share a record, large ones take many.
+// Frames of every size arrive complete: small ones share a record, large ones take several.
 TEST_F(Tls, StreamSendsFrames) {
   StreamClient viewer(place(), {{"Sec-WebSocket-Protocol", "windsplat.v1"}});
   ASSERT_EQ(viewer.handshake().status, 101);
@@ -169,7 +170,7 @@ TEST_F(Tls, DisconnectCancelsTheRendering) {
   EXPECT_GE(std::stoi(metrics.substr(at + left.size())), 6) << "those with close_notify";
 }
 
-// TLS records are not always a request or a close.
+// Not every TLS record is a request or a close.
 TEST_F(Tls, KeyUpdateDuringAPictureIsNoDisconnect) {
   Socket socket(place());
   socket.send(
@@ -190,7 +191,7 @@ TEST_F(Tls, KeyUpdateDuringAStreamIsNoDisconnect) {
   EXPECT_TRUE(viewer.next_text("opened"));
 }
 
-// A client that sends a refused body still gets its response.
+// A client that sends a refused body still receives its response.
 TEST_F(Tls, OversizeBodyGets413) {
   Socket socket(place());
   socket.send("POST /v1/frames HTTP/1.1\r\nHost: x\r\nContent-Length: 104857600\r\n\r\n");
@@ -217,7 +218,7 @@ TEST_F(Tls, SessionThatNeverReadsIsClosed) {
     if (get(place(), "/metrics").body.find("windsplat_sessions 0") != std::string::npos) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
-  FAIL() << "it still holds its session";
+  FAIL() << "the client still holds its session";
 }
 
 TEST_F(Tls, NewCertificateIsUsedForNewConnections) {

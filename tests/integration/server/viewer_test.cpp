@@ -1,4 +1,4 @@
-// Times reported by a session's render jobs, and sharing of scarce memory.
+// Times reported by the render jobs of a session, and sharing of scarce memory.
 #include "server/work/viewer.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ namespace {
 
 using namespace windsplat;  // NOLINT(google-build-using-namespace)
 
-// Whether data was prepared for the frame, which the next of its kind need not do again.
+// Whether data were prepared for the frame, so that the next one of its kind is faster.
 bool prepared(work::Viewer& viewer, std::uint64_t ticket, const protocol::View& view,
               const quality::Setting& setting = {}) {
   std::promise<bool> told;
@@ -60,8 +60,8 @@ TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   EXPECT_FALSE(prepared(viewer, 4, view));
 }
 
-// The first frame has to wait for its fields, the second is drawn at another setting, and the view
-// is calibrated besides.
+// The first frame waits for its fields, the second one is drawn at another setting, and the view is
+// calibrated too.
 TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
@@ -82,7 +82,7 @@ TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
   EXPECT_EQ(scene::completions() - before, 2U) << "another view";
 }
 
-// Data of one step and a half fit: every frame has to wait until those before it are drawn.
+// The data of one and a half steps fit: every frame waits until the previous ones are drawn.
 TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   constexpr std::uint64_t sample_bytes = 4 * sizeof(float);  // a wind and a cloud
   constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * sample_bytes;
@@ -162,7 +162,7 @@ TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
   }
   auto fault = fault_of(viewer, view_);
   EXPECT_EQ(fault.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
-  others = make_error(ErrorKind::internal, "let go of");
+  others = make_error(ErrorKind::internal, "released");
   EXPECT_EQ(fault.get(), "");
 }
 
@@ -184,7 +184,7 @@ TEST_F(LargePictures, ThatNeverFitAreRefusedAtOnce) {
   work::Viewer viewer(services_->backend, 1, "192.0.2.1");
   view_.image.height = 2048;
   const std::string fault = fault_of(viewer, view_).get();
-  EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: what is beside the fields"),
+  EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: memory other than fields"),
             0U)
       << fault;
 }

@@ -100,7 +100,7 @@ TEST_F(Views, EtagIdentifiesTheCurrentView) {
   EXPECT_EQ(read(id, {{"If-None-Match", first}}).status, 200);
   EXPECT_EQ(read(id).header("etag"), changed.header("etag"));
   EXPECT_NE(read(saved(R"({"step":2})")).header("etag"), changed.header("etag")) << "another's";
-  EXPECT_EQ(ask("PUT", id, R"({"step":1})").header("etag"), first) << "as it was";
+  EXPECT_EQ(ask("PUT", id, R"({"step":1})").header("etag"), first) << "unchanged";
 }
 
 TEST_F(Views, PutReplacesAndPatchMerges) {
@@ -252,7 +252,7 @@ TEST_F(Views, OnlyAnIdNamesAView) {
   }
 }
 
-// --- bounds and disk ----------------------------------------------------------------------------
+// --- limits and disk ----------------------------------------------------------------------------
 
 class Folder {
  public:
@@ -309,7 +309,7 @@ TEST(ViewsOfAServer, WithAStateFolderTheySurviveARestart) {
   EXPECT_TRUE(fs::is_empty(folder.path / "views"));
 }
 
-// A saved view is valid for POST /v1/frames and gives the same picture.
+// A saved view is valid for POST /v1/frames and yields the same picture.
 TEST(ViewsOfAServer, SavedViewRendersTheSamePicture) {
   const TestServer server;
   const std::string view = R"({"step":1,"dataset":"small","image":{"height":48,"width":64}})";

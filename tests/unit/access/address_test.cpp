@@ -1,4 +1,4 @@
-// Address keys of the quotas, and trusted proxies.
+// Addresses as keyed by the quotas, and trusted proxies.
 #include "server/access/address.hpp"
 
 #include <gtest/gtest.h>

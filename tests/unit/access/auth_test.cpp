@@ -1,5 +1,5 @@
-// Authentication by tokens, cookies and origins, and the responses to refused clients. Needs no
-// server.
+// Authentication by tokens, cookies and origins, and the responses to unauthenticated clients.
+// Needs no server.
 #include "server/access/auth.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Estimated cost of views before data is read, and refusals by the limits.
+// Estimated cost of views before data are read, and refusals by the limits.
 #include "server/frame/cost.hpp"
 
 #include <gtest/gtest.h>

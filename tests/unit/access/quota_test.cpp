@@ -234,7 +234,7 @@ TEST(Quota, UnauthenticatedClientsExhaustTheirOwnHandshakeTimeOnly) {
   EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "authenticated";
   EXPECT_FALSE(quota.arrive(there, true, true, 0)) << "a proxy's";
   quota.handshake_took(here, false, 2 * second, 0);
-  EXPECT_TRUE(quota.arrive(here, false, true, 0)) << "authenticated addresses have a limit, too";
+  EXPECT_TRUE(quota.arrive(here, false, true, 0)) << "authenticated addresses also have a limit";
   EXPECT_FALSE(quota.arrive(there, false, true, second));
 }
 
@@ -250,13 +250,13 @@ TEST(Quota, RemoteClientsDoNotExhaustLocalHandshakeTime) {
     ASSERT_TRUE(quota.arrive(address, false, true, 0)) << address;
   }
   EXPECT_TRUE(quota.arrive("127.0.0.2", false, true, 0))
-      << "an unauthenticated address like others";
+      << "treated like any unauthenticated address";
   for (const std::string own : {"127.0.0.1", "::/64"}) {
     ASSERT_EQ(quota.connect(own, false, 0).place, Quota::Slot::ordinary);
     EXPECT_FALSE(quota.arrive(own, false, true, 0)) << own;
     quota.handshake_took(own, false, second, 0);
     const auto refused = quota.arrive(own, false, true, 0);
-    ASSERT_TRUE(refused) << "it has its own allowance only";
+    ASSERT_TRUE(refused) << "only its own limit applies";
     EXPECT_EQ(refused->limit, 50);
   }
   EXPECT_FALSE(quota.arrive("127.0.0.2", false, true, 11 * second))
@@ -266,7 +266,7 @@ TEST(Quota, RemoteClientsDoNotExhaustLocalHandshakeTime) {
   Quota without(limits);
   ASSERT_EQ(without.connect("127.0.0.1", false, 0).place, Quota::Slot::ordinary);
   without.handshake_took("127.0.0.1", false, 2 * second, 0);
-  EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is bounded nevertheless";
+  EXPECT_TRUE(without.arrive("127.0.0.1", false, true, 0)) << "it is limited nevertheless";
 }
 
 TEST(Quota, MessagesAreChargedBeforeMoreIsRead) {
@@ -337,12 +337,12 @@ TEST(Quota, UnauthenticatedClientsDoNotEvictAuthenticatedAddresses) {
   for (std::size_t n = 0; n < 2 * Quota::addresses_max; ++n) {
     quota.authenticated("2001:db8:1:" + std::to_string(n) + "::/64", 3);
   }
-  EXPECT_EQ(quota.known(), Quota::addresses_max) << "authenticated addresses are bounded, too";
+  EXPECT_EQ(quota.known(), Quota::addresses_max) << "authenticated addresses are also limited";
 }
 
 TEST(Admission, LogsRefusedHandshakesOncePerMinute) {
   Limits limits = none();
-  limits.handshake_ms_per_address = 0.1;  // one at once
+  limits.handshake_ms_per_address = 0.1;  // one by one
   metrics::Metrics metrics;
   Quota::Micros now = 0;
   Admission admission(limits, metrics, [&now] { return now; });
@@ -398,7 +398,7 @@ TEST(Admission, RefusesWithTheLimitAndARetryTime) {
   const std::string text(refused->body.bytes.begin(), refused->body.bytes.end());
   EXPECT_NE(text.find("0.1 requests a second (--max-requests-per-address)"), std::string::npos)
       << text;
-  // In the reserve only health is answered, and refusals are server errors.
+  // In the reserve only health requests are served, and refusals are server errors.
   const auto late = admission.connect(there);
   EXPECT_EQ(admission.request(*late, request, false)->status, 503);
   EXPECT_FALSE(admission.request(*late, request, true));
@@ -413,7 +413,7 @@ TEST(Admission, ChargesRefusedUnreadBodies) {
   EXPECT_TRUE(admission.count_malformed(*visitor, {}));
   EXPECT_FALSE(admission.count_malformed(*visitor, {})) << "not logged yet";
   http::Request request;
-  EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same allowance";
+  EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same limit";
 }
 
 TEST(Admission, RefusesExpensiveRequests) {

@@ -27,7 +27,7 @@ TEST_P(EveryPoolSize, RunsEachIndexOnce) {
   }
 }
 
-// A worker number may index scratch memory: no two threads may have the same one at a time.
+// A worker number may index scratch memory: no two threads may have the same number at a time.
 TEST_P(EveryPoolSize, WorkerNumbersAreSmallAndExclusive) {
   std::vector<std::atomic<int>> holders(GetParam());
   std::atomic<bool> shared = false;
@@ -85,7 +85,7 @@ TEST_P(EveryPoolSize, IndicesStopSoonAfterAnException) {
                           throw std::runtime_error("first");
                         }),
                std::runtime_error);
-  EXPECT_LE(visits, GetParam());  // each thread can have taken one at most
+  EXPECT_LE(visits, GetParam());  // each thread can have run at most one index
 }
 
 TEST_P(EveryPoolSize, NestedLoopIsRefusedInsteadOfDeadlocking) {

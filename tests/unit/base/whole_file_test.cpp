@@ -1,4 +1,4 @@
-// Files are written whole or not at all, and files that are not regular are kept.
+// Files are written completely or not at all, and special files are never replaced.
 #include "server/base/whole_file.hpp"
 
 #include <fcntl.h>
@@ -99,7 +99,7 @@ TEST_F(WholeFile, MissingLinkTargetIsCreated) {
   EXPECT_TRUE(fs::is_symlink(folder_ / "round.png"));
 }
 
-// Like /dev/stdout redirected to a file: others write there before and after.
+// Like /dev/stdout redirected to a file: others write to it before and after.
 TEST_F(WholeFile, DescriptorPathIsWrittenAtItsPosition) {
   const fs::path path = folder_ / "log";
   const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);

@@ -43,7 +43,7 @@ void write_steps(const std::string& path, std::size_t steps_of_a_chunk) {
   file.chunk(u, {steps_of_a_chunk, 64, 64});
 }
 
-// Together 34 MiB as floats: within the limit, which twice as much exceeds.
+// Together 34 MiB as floats, within the limit; twice as much exceeds it.
 TEST(Inspect, CountsWhatIsDecodedOnce) {
   const Folder folder;
   const std::string path = folder.file("a.nc");

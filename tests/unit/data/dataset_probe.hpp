@@ -23,7 +23,7 @@ inline std::unique_ptr<Source> opened(const std::string& path) {
   return source ? std::move(*source) : nullptr;
 }
 
-// Why a file is refused.
+// The reason why a file is refused.
 inline std::string refusal(const std::string& path) {
   const auto source = open_file(path);
   EXPECT_FALSE(source) << path << " was opened";

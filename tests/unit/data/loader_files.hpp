@@ -33,7 +33,7 @@ inline void write_wind(const std::string& path, int mode) {
   }
 }
 
-// A scalar of 5 MiB whose samples differ.
+// A scalar of 5 MiB with different samples.
 inline void write_large(const std::string& path) {
   NetcdfMaker file(path, 0);
   const int z = file.dimension("z", 20);

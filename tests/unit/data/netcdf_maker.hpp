@@ -59,7 +59,7 @@ class NetcdfMaker {
     return dimension;
   }
 
-  // values: in the file's own order; empty leaves the variable unwritten.
+  // values: in the order of the file; empty leaves the variable unwritten.
   int variable(const std::string& name, nc_type type, const std::vector<int>& dimensions,
                std::vector<double> values = {}) {
     int variable = -1;
@@ -118,7 +118,7 @@ class NetcdfMaker {
  private:
   static void check(int status) { EXPECT_EQ(status, NC_NOERR) << nc_strerror(status); }
 
-  // An unlimited first dimension takes as many records as there are values.
+  // An unlimited first dimension gets as many records as there are values.
   void put(int variable, const std::vector<double>& values) const {
     int rank = 0;
     std::vector<int> dims(NC_MAX_VAR_DIMS);
@@ -148,7 +148,7 @@ inline std::string bytes_of(const std::string& path) {
 }
 
 inline void write_bytes(const std::string& path, const std::string& bytes) {
-  // A new file: some file systems flush to disk when an old one is overwritten.
+  // Creates a new file: some file systems flush to disk when an existing one is overwritten.
   std::filesystem::remove(path);
   std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
 }

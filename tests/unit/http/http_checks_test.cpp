@@ -1,4 +1,4 @@
-// Requests that HTTP allows and this server refuses, by their header only.
+// Requests that HTTP allows and this server refuses, judged by their header only.
 #include "server/http/http_checks.hpp"
 
 #include <gtest/gtest.h>
@@ -114,7 +114,7 @@ TEST(Upgrade, OtherVersionGetsTheSupportedOne) {
   }
 }
 
-// Path and query of a target, joined; empty if it is refused.
+// Path and query of a target, joined; empty if the target is refused.
 std::string told(std::string_view target, const char* host) {
   Request request = request_with({{"Host", host}});
   if (!parse_target(target, "/", request)) return "";

@@ -1,4 +1,4 @@
-// Errors as answers.
+// Errors as HTTP responses.
 #include "server/http/problem.hpp"
 
 #include <gtest/gtest.h>

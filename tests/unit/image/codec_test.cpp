@@ -34,7 +34,7 @@ Picture smooth_picture(int width, int height) {
   return picture;
 }
 
-// No two neighbours are equal: any misplaced pixel is visible.
+// No two neighbours are equal: any misplaced pixel is detected.
 Picture busy_picture(int width, int height) {
   Picture picture{width, height, -1, {}};
   std::uint32_t state = 12345;

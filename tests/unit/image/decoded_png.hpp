@@ -1,4 +1,4 @@
-// A PNG decoded again by libpng's reader of whole pictures.
+// Decodes a PNG by the simplified API of libpng.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -149,7 +149,7 @@ TEST_F(Produce, AnyThreadCountGivesTheSameBytes) {
   EXPECT_EQ(alone->bytes, shared->bytes);
 }
 
-// The two paths from the engine to bytes: JPEG tile by tile, PNG from an image.
+// The two ways from the engine to bytes: JPEG tile by tile, PNG from an image.
 TEST_F(Produce, JpegShowsWhatPngShows) {
   view.image.background = "#305070";
   for (const auto& [width, height] : {std::pair{96, 64}, {131, 67}, {1, 1}, {3, 70}}) {
@@ -173,7 +173,8 @@ TEST_F(Produce, JpegShowsWhatPngShows) {
   }
 }
 
-// A workspace used for other frames gives the same as a new one, as does a frame rendered in steps.
+// A workspace that was used for other frames gives the same result as a new one, as does a frame
+// rendered in steps.
 TEST_F(Produce, WorkspaceKeepsNoStateBetweenPictures) {
   Workspace used;
   ThreadPool one(1);
@@ -224,7 +225,7 @@ TEST_F(Produce, ReferenceIsRenderedOnlyWhereAllowed) {
   EXPECT_EQ(dataset->loads(), 0U);
 }
 
-// Fields of colour and of heights are listed, each once.
+// The fields of colour and of heights are listed, without duplicates.
 TEST(ProduceFields, OfColorAndHeightAreListedOnce) {
   auto source = std::make_unique<scene::FakeSource>(
       scene::atmosphere_grid(),
@@ -254,7 +255,7 @@ TEST(ProduceFields, OfColorAndHeightAreListedOnce) {
   EXPECT_EQ(fields(), (Names{"wind", "z"}));
 }
 
-// The source is asked for the shown fields only, for every method.
+// Only the shown fields are requested from the source, for every method.
 TEST(ProduceFields, UnusedFieldsAreNeverRead) {
   using Reads = scene::FakeSource::Reads;
   for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {

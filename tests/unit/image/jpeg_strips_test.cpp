@@ -20,7 +20,7 @@ struct Destroy {
 };
 using Handle = std::unique_ptr<void, Destroy>;
 
-// Waves and noise: no two MCUs alike.
+// Waves and noise: no two MCUs are equal.
 YccPicture waves(int width, int height, Subsampling subsampling) {
   YccPicture picture;
   picture.reset(width, height, subsampling, {0.1F, 0.2F, 0.3F});
@@ -76,7 +76,7 @@ Bytes decode(const Bytes& jpeg, int width, int height, int subsampling) {
   return rgb;
 }
 
-// What a reader finds: the DRI interval (0 without), and the restart markers in order.
+// Restart data of a JPEG: the DRI interval (0 without), and the restart markers in order.
 struct Restarts {
   int interval = 0;
   std::vector<int> markers;
@@ -102,7 +102,7 @@ Restarts restarts_of(const Bytes& jpeg) {
     scan = scan || code == 0xDA;
     at += 2 + std::size_t{jpeg[at + 2]} * 256 + jpeg[at + 3];
   }
-  ADD_FAILURE() << "the file has no end";
+  ADD_FAILURE() << "the file has no end marker";
   return found;
 }
 
@@ -128,8 +128,8 @@ TEST(JpegStrips, DecodeLikeOnePiece) {
   }
 }
 
-// Every interval but the last is complete, markers count modulo 8, and large pictures have enough
-// strips for many threads.
+// Every interval except the last is complete, markers are numbered modulo 8, and large pictures
+// have enough strips for many threads.
 TEST(JpegStrips, RestartMarkersMarkTheEndsOfStrips) {
   ThreadPool pool(1);
   JpegEncoder encoder;
@@ -224,7 +224,7 @@ TEST(JpegStrips, SupportTheLongestEdgeOfTheFormat) {
   }
 }
 
-// A decoder reads all strips with the tables of the first.
+// A decoder reads all strips with the tables of the first one.
 TEST(JpegStitch, RefusesStripsWithOtherTables) {
   ThreadPool pool(1);
   JpegEncoder encoder;
@@ -259,7 +259,7 @@ TEST(JpegStitch, RefusesStripsOfAnotherShape) {
   for (std::size_t size = 0; size + 1 < strip.size(); ++size) {
     Bytes cut(strip.begin(), strip.begin() + static_cast<std::ptrdiff_t>(size));
     ASSERT_STREQ(kind_of(cut), "internal") << size;
-    if (size >= 2 && size < 600) {  // with an end, but of a header that was cut
+    if (size >= 2 && size < 600) {  // with an end marker, but with a truncated header
       cut[size - 2] = 0xFF;
       cut[size - 1] = 0xD9;
       ASSERT_STREQ(kind_of(cut), "internal") << size;

@@ -1,5 +1,5 @@
-// frame::ReferenceDrawing: rendering in interrupted pieces equals one pass; and the error of the
-// view's own picture.
+// frame::ReferenceDrawing: rendering in interrupted pieces equals one pass; the error of the
+// picture of the view.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -25,7 +25,7 @@ class Drawing : public testing::Test {
     ASSERT_TRUE(source) << source.error().message;
     dataset = std::make_unique<data::Dataset>(std::move(*source), "climate", 1ULL << 30);
     view.dataset = "climate";
-    view.image.width = 75;  // no multiple of a piece
+    view.image.width = 75;  // not a multiple of a piece
     view.image.height = 40;
   }
 
@@ -110,13 +110,13 @@ TEST_F(Drawing, ItsErrorIsTheDifferenceOfTheTwoPictures) {
     most = std::max(most, std::abs(static_cast<double>(own[i]) - truth[i]));
   }
   const double rmse = std::sqrt(squares / static_cast<double>(own.size()));
-  EXPECT_GT(rmse, 1e-4) << "kernels err";
+  EXPECT_GT(rmse, 1e-4) << "kernels have an error";
   EXPECT_NEAR(found->rmse, rmse, 1e-6 * rmse);
   EXPECT_NEAR(found->max, most, 1e-6 * most);
   EXPECT_NEAR(found->psnr, 10 * std::log10(1 / (rmse * rmse)), 1e-6);
 }
 
-// Lines 128 pixels wide cover 256 tiles at least, where they are not at the picture's edge.
+// Lines 128 pixels wide cover at least 256 tiles, except at the edge of the picture.
 TEST_F(Drawing, MemoryOfListsIsCountedAndRefusedByPictureSize) {
   view.image.width = 640;
   view.image.height = 480;
@@ -129,7 +129,7 @@ TEST_F(Drawing, MemoryOfListsIsCountedAndRefusedByPictureSize) {
   const std::uint64_t wide = reserved;
   EXPECT_GT(wide, narrow + 4 * 100 * 200) << "at least 100 lines in the middle";
   limit = wide;
-  EXPECT_TRUE(begin()) << "that much suffices";
+  EXPECT_TRUE(begin()) << "this limit suffices";
   limit = wide - 1;
   const auto refused = begin();
   ASSERT_FALSE(refused);

@@ -1,4 +1,4 @@
-// The display transfer against the formula of IEC 61966-2-1, and pictures over a background.
+// The display transfer compared with the formula of IEC 61966-2-1, and pictures over a background.
 #include "server/image/tone_map.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ std::uint8_t code_of(float linear) {
   return code;
 }
 
-// The curve as the standard writes it, and its inverse.
+// The curve as given by the standard, and its inverse.
 double formula(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
@@ -32,7 +32,7 @@ TEST(ToneMap, KnownValuesOfTheStandard) {
   EXPECT_EQ(code_of(0.5F), 188);          // 255 * 0.735357 = 187.516
   EXPECT_EQ(code_of(0.2158605F), 128);    // #808080
   EXPECT_EQ(code_of(0.0512695F), 64);     // #404040
-  EXPECT_EQ(code_of(1.0F / 3294.6F), 1);  // 12.92 * 255 codes a unit on the straight part
+  EXPECT_EQ(code_of(1.0F / 3294.6F), 1);  // 12.92 * 255 codes per unit on the linear part
 }
 
 TEST(ToneMap, EveryCodeSurvivesARoundTrip) {
@@ -82,8 +82,8 @@ TEST(ToneMap, ValuesOutsideTheRangeAreClamped) {
 
 TEST(ToneMap, PremultipliedPixelsAreCompositedOverTheBackground) {
   const std::array<float, 3> background{0.2F, 0.0F, 1.0F};
-  const std::vector<float> rgba{0.0F, 0.0F, 0.0F, 0.0F,   // nothing: the background
-                                0.3F, 0.4F, 0.5F, 1.0F,   // opaque: itself
+  const std::vector<float> rgba{0.0F, 0.0F, 0.0F, 0.0F,   // transparent: the background
+                                0.3F, 0.4F, 0.5F, 1.0F,   // opaque: unchanged
                                 0.1F, 0.2F, 0.0F, 0.5F};  // half of each
   const Bytes rgb = tone_map(rgba, 3, 1, background);
   const std::vector<double> linear{0.2, 0.0, 1.0, 0.3, 0.4, 0.5, 0.2, 0.2, 0.5};

@@ -1,4 +1,4 @@
-// Planes of YCbCr against the formulas of IEC 61966-2-1 and ITU-T T.871, pixel by pixel.
+// Planes of YCbCr compared with the formulas of IEC 61966-2-1 and ITU-T T.871, pixel by pixel.
 #include "server/image/ycc.hpp"
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ Pixels busy(int width, int height, unsigned seed) {
   return pixels;
 }
 
-// As the engine does: tiles of 64 x 64 from separate buffers.
+// As delivered by the engine: tiles of 64 x 64 from separate buffers.
 void put_tiles(const Pixels& pixels, YccPicture& picture) {
   constexpr int side = 64;
   std::vector<float> tile(std::size_t{4} * side * side);
@@ -72,7 +72,7 @@ std::array<double, 3> formula(const float* rgba, const Colour& background) {
   return {luma, 128 + (rgb[2] - luma) / 1.772, 128 + (rgb[0] - luma) / 1.402};
 }
 
-// The value of a plane sample, beyond the edges, too.
+// The value of a plane sample, including padding.
 double expected(const Pixels& pixels, const Colour& background, Subsampling subsampling, int plane,
                 int x, int y) {
   const int side = plane > 0 && subsampling == Subsampling::s420 ? 2 : 1;
@@ -128,7 +128,8 @@ TEST(Ycc, MatchesTheFormulaAtEverySizeAndBeyondTheEdges) {
   }
 }
 
-// At any multiple of chroma samples: the last part may start within the last MCU or long before.
+// Parts may begin at any multiple of chroma samples: the last one may start within the last MCU or
+// long before.
 TEST(Ycc, PartsMayBeSplitWithinAnMcu) {
   const Colour background{0.02F, 0.3F, 0.9F};
   YccPicture picture;
@@ -226,8 +227,8 @@ Bytes samples_of(const YccPicture& picture) {
   return samples;
 }
 
-// Every instruction set of this processor; those with a fused multiply-add (on x86 AVX2 and what is
-// above it, of lower bits) agree to the bit.
+// Every instruction set of this processor; those with fused multiply-add (on x86 AVX2 and above,
+// which have lower bits) agree exactly.
 TEST(Ycc, InstructionSetsAgree) {
   const Pixels pixels = busy(200, 131, 7);
   const Colour background{0.02F, 0.3F, 0.9F};
@@ -273,7 +274,7 @@ TEST(Ycc, DecodedPictureEqualsTheRgbPath) {
   YccPicture picture;
   for (int width = 1; width <= 67; width += 3) {
     const int height = 68 - width;
-    // Smooth: at quality 100 an encoder keeps what neighbours share, on either path.
+    // Smooth: at quality 100 an encoder preserves what neighbours share, in both ways.
     Pixels pixels{width, height, {}};
     for (int i = 0; i < width * height; ++i) {
       const float x = 0.05F * static_cast<float>(i % width);
@@ -294,8 +295,8 @@ TEST(Ycc, DecodedPictureEqualsTheRgbPath) {
       ASSERT_TRUE(a && b);
       double sum = 0;
       for (std::size_t i = 0; i < a->size(); ++i) {
-        // Rounding in different places and in the transforms: at most two codes of luma and chroma,
-        // and blue has chroma weighted by 1.77.
+        // Rounding in different places and in the transforms: at most two codes of luma and chroma;
+        // in blue, chroma has the weight 1.77.
         ASSERT_NEAR((*a)[i], (*b)[i], 5) << width;
         sum += std::abs((*a)[i] - (*b)[i]);
       }

@@ -24,8 +24,8 @@ namespace {
 
 std::atomic<std::int64_t> blocks{0};
 std::atomic<std::int64_t> bytes{0};
-std::atomic<std::int64_t> held{0};  // bytes not yet given back
-thread_local int good_left = -1;    // allocations before one that fails; -1: none does
+std::atomic<std::int64_t> held{0};  // bytes not yet freed
+thread_local int good_left = -1;    // number of allocations before one that fails; -1: none fails
 
 void fail_if_due() {
   if (good_left >= 0 && good_left-- == 0) throw std::bad_alloc();
@@ -60,7 +60,7 @@ void* counted(std::size_t size, std::align_val_t alignment) {
 
 }  // namespace
 
-// Array and nothrow forms would use these, but not under every sanitizer.
+// Array and nothrow forms call these by default, but not under every sanitizer.
 void* operator new[](std::size_t size) { return counted(size); }
 void operator delete[](void* at) noexcept { give_up(at); }
 void operator delete[](void* at, std::size_t /*size*/) noexcept { give_up(at); }
@@ -99,7 +99,7 @@ Spent spent_by(const Run& run) {
 
 enum class Look { kernel, slab, globe, winds, clouds };
 
-constexpr int turns = 6;  // of a camera about the data
+constexpr int turns = 6;  // directions of a camera around the data
 
 std::vector<scene::Scene> orbit(Look look, std::array<int, 3> dims, int width, int height,
                                 double offset = 0) {
@@ -210,7 +210,7 @@ TEST(SteadyStateItself, JpegAllocatesItsOwnBytesOnly) {
   }
 }
 
-// Half as many pixels again as are kept.
+// One and a half times as many pixels as are kept.
 constexpr int huge_width = 2048;
 constexpr int huge_height = 1536;
 constexpr std::int64_t huge_pixels = std::int64_t{huge_width} * huge_height;
@@ -265,7 +265,7 @@ TEST(HugePicture, PlanesAndStripsAreReleasedByTheNextSmallerPicture) {
     EXPECT_LE(held, without_planes - 4 * huge_pixels) << "strips";
     jpeg = image::Bytes();
     EXPECT_LE(held, small + 65536);
-    // Memory for common picture sizes is kept whatever is rendered in between.
+    // Memory for common picture sizes is kept, whatever is rendered in between.
     encode(1920, 1080);
     const std::int64_t common = held;
     encode(960, 540);
@@ -273,7 +273,7 @@ TEST(HugePicture, PlanesAndStripsAreReleasedByTheNextSmallerPicture) {
   }
 }
 
-// Shutdown of a daemon without memory, and the destructors of its sessions.
+// Shutdown of a daemon without free memory, and the destructors of its sessions.
 TEST(WithoutMemory, PrefetchRequestsAreWithdrawnAndAStoreIsDestroyed) {
   data::Store store(std::uint64_t{1} << 30U);
   const auto dataset = store.add("climate:16x16x8").value();

@@ -22,7 +22,7 @@ class Curve : public testing::Test {
     view.image.height = 1080;
     view.quality.max_error = 0.5;  // so that slabs are allowed
     for (std::size_t i = 0; i < forecasts.size(); ++i) {
-      // In no order, all different.
+      // Unsorted and all different.
       forecasts[i].ms = 1 + std::fmod(20 + 37.0 * static_cast<double>(i), 53.0);
       forecasts[i].error = 1e-3 * (1 + std::fmod(29.0 * static_cast<double>(i), 61.0));
       forecasts[i].spread = 0.1 + 0.01 * static_cast<double>(i);
@@ -57,7 +57,7 @@ TEST_F(Curve, IsSortedByTimeAndContainsEveryAllowedSetting) {
 
 // The definition, applied to every pair of points.
 TEST_F(Curve, FrontContainsTheUndominatedPoints) {
-  forecasts[3] = forecasts[7] = {0.05, 0.1, 0.5, true};  // of two alike one is enough
+  forecasts[3] = forecasts[7] = {0.05, 0.1, 0.5, true};  // of two equal points one suffices
   const ForecastDescription out = curve(view, forecasts);
   int on_front = 0;
   for (std::size_t i = 0; i < out.points.size(); ++i) {
@@ -98,7 +98,7 @@ TEST_F(Curve, PointContainsItsSetting) {
   EXPECT_TRUE(points[1].timed);
 }
 
-// ln(error) is normally distributed: 1.645 standard deviations leave 5 % at either end.
+// ln(error) is normally distributed: 5 % are beyond 1.645 standard deviations on either side.
 TEST_F(Curve, BoundsAreThoseOfALogNormalErrorWithinPossibleErrors) {
   for (Forecast& forecast : forecasts) forecast = {0.01, 0.4, 1, true};
   for (const ForecastPoint& point : curve(view, forecasts).points) {
@@ -139,7 +139,7 @@ TEST(Measured, IsReportedForErrorsOfNearbyViewpointsOnly) {
   behind.direction = {0, -1, 0};
   EXPECT_FALSE(table.forecast(0, viewpoint).measured);
   table.add(0, viewpoint, {{}, 3.0});
-  EXPECT_FALSE(table.forecast(0, viewpoint).measured) << "only its time was";
+  EXPECT_FALSE(table.forecast(0, viewpoint).measured) << "only its time was measured";
   table.add(0, viewpoint, {0.01, {}});
   EXPECT_TRUE(table.forecast(0, viewpoint).measured);
   EXPECT_TRUE(table.forecast(0, beside).measured);

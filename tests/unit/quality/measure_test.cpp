@@ -1,4 +1,4 @@
-// frame::survey and frame::measured_error on a small sample, against the integral.
+// frame::calibrate and frame::measured_error on a small sample, compared with the integral.
 #include "server/frame/measure.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ class Measure : public testing::Test {
 
   scene::CompletedView completed() { return scene::complete(view, *dataset).value(); }
 
-  std::map<std::size_t, quality::Measured> surveyed() {
+  std::map<std::size_t, quality::Measured> calibrated() {
     std::map<std::size_t, quality::Measured> found;
     const auto done = calibrate(
         completed(), *dataset, pool, cancel, workspace, [&](const CalibrationSample& one) {
@@ -59,7 +59,7 @@ class Measure : public testing::Test {
     return frame ? std::move(*frame) : Frame();
   }
 
-  // Error of the decoded pixels of a frame against the integral.
+  // Error of the decoded pixels of a frame relative to the integral.
   double true_error(const Frame& npy) {
     if (integral.empty()) {
       const auto scene = scene::build_scene(view, *dataset);
@@ -97,7 +97,7 @@ TEST_F(Measure, MeasuredFrameErrorIsItsErrorAgainstTheIntegral) {
 // Errors that thinner slabs reduce less or not at all: compositing rule and early termination.
 TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
   const protocol::MethodView usual = view.method;
-  true_error(drawn(protocol::MethodName::slab, Format::npy));  // keeps the integral
+  true_error(drawn(protocol::MethodName::slab, Format::npy));  // preserves the integral
   for (const auto& [compositing, stop] : {std::pair{protocol::Compositing::simple, 1.5e-4},
                                           std::pair{protocol::Compositing::cd_euler, 1.5e-4},
                                           std::pair{protocol::Compositing::analytic, 0.3}}) {
@@ -108,7 +108,7 @@ TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
     ASSERT_TRUE(frame.error);
     const double truth = true_error(frame);
     EXPECT_NEAR(*frame.error / truth, 1, 0.4) << truth;
-    const auto found = surveyed();
+    const auto found = calibrated();
     const auto error_of = [&](int thinner) {
       const quality::Setting setting{protocol::MethodName::slab, 0, 0, thinner};
       return found.at(quality::index_of(setting).value()).error.value();
@@ -155,7 +155,7 @@ TEST_F(Measure, OnlyFullSizePicturesAreMeasured) {
 }
 
 TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
-  const auto found = surveyed();
+  const auto found = calibrated();
   for (std::size_t i = 0; i < quality::settings_count; ++i) {
     EXPECT_EQ(found.count(i), quality::is_allowed(quality::settings[i], view) ? 1U : 0U) << i;
   }
@@ -167,7 +167,7 @@ TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
 
 // Two estimates of the same error: a calibration run uses another reference than a frame.
 TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
-  auto found = surveyed();
+  auto found = calibrated();
   const auto error_of = [&](const quality::Setting& setting) {
     return found.at(quality::index_of(setting).value()).error.value();
   };
@@ -180,11 +180,11 @@ TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
               4, 1e-3);
 }
 
-// Seen from far away the view averages its data: slabs of any thickness err alike then.
+// From far away the view averages its data: slabs of any thickness then have equal errors.
 TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   scene::orbit(view, completed().lattice(), 20, 30, 0.05);
   EXPECT_LT(viewpoint_of(completed()).detail, 1);
-  auto found = surveyed();
+  auto found = calibrated();
   const auto error_of = [&](int thinner) {
     return found.at(quality::index_of({protocol::MethodName::slab, 0, 0, thinner}).value())
         .error.value();
@@ -192,7 +192,7 @@ TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   EXPECT_NEAR(error_of(4) / error_of(1), 1, 0.1);
 }
 
-// What is told of the detail is what scenes are built by.
+// The reported detail is that by which scenes are built.
 TEST_F(Measure, ViewUsesAveragesWhereItsDetailIsBelowOne) {
   const scene::CompletedView first = completed();
   int averaged = 0;

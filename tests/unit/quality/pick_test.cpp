@@ -1,4 +1,4 @@
-// Synthetic forecasts, a budget, an error -> the chosen setting.
+// Synthetic forecasts, a budget, an error limit -> the chosen setting.
 #include "server/quality/pick.hpp"
 
 #include <gtest/gtest.h>

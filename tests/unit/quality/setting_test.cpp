@@ -1,4 +1,4 @@
-// Settings: picture sizes, their effect on a view, and where they are allowed.
+// Settings: picture sizes, their effect on a view, and when they are allowed.
 #include "server/quality/setting.hpp"
 
 #include <gtest/gtest.h>

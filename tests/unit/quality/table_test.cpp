@@ -1,4 +1,4 @@
-// Measurements of one scene -> forecasts, against closed forms.
+// Measurements of one scene -> forecasts, compared with closed forms.
 #include "server/quality/table.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ constexpr std::size_t kernel = 0;
 constexpr std::size_t half = 2;  // half the width
 const Kind kind{true, true, 0.16, 1.4, 1, 1};
 
-// A viewpoint at that distance from all others: only heights differ.
+// A viewpoint at that distance from all others: only the height differs.
 Viewpoint sight_at(double steps) {
   Viewpoint viewpoint{std::exp(0.5 * steps), {0, 1, 0}, 640, 480};
   return viewpoint;
@@ -73,7 +73,7 @@ TEST(Table, NonFiniteMeasurementsAreIgnored) {
   EXPECT_FALSE(table.forecast(half, sight_at(0)).timed);
 }
 
-// One measurement: E = c / (c(0) + noise^2) of its logarithm over the prior's, where c is the
+// One measurement: E = c / (c(0) + noise^2) of its logarithm relative to the prior, where c is the
 // correlated variance at that distance.
 TEST(Table, MeasurementsAreWeightedByTheirShareOfTheVariance) {
   const Scatter scatter = expected_error(kind, settings[half], sight_at(0)).scatter;
@@ -177,8 +177,8 @@ TEST(Table, SpeedOfTheMachineAppliesToEverySetting) {
   EXPECT_NEAR(told[other].ms / prior(kind, settings[other], sight_at(0)).ms, 10, 0.5);
 }
 
-// Where cells are smaller than the resolution, data are averaged, with another error law:
-// measurements on one side do not apply to the other.
+// Where cells are smaller than the resolution, data are averaged and follow another error law:
+// measurements of one regime do not apply to the other.
 TEST(Table, AveragesAreLearnedSeparatelyFromFullDetail) {
   Table table(kind);
   Viewpoint near = sight_at(0);
@@ -242,7 +242,7 @@ TEST(Encoding, FollowsMeasurements) {
   EXPECT_NEAR(table.encoding_error(60, true, sight_at(0)) / before, 3, 1e-9);
   for (int i = 0; i < 20; ++i) table.add_encoding(90, sight_at(0), 2 * measured);
   EXPECT_NEAR(table.encoding_error(90, true, sight_at(0)) / measured, 2, 1e-4)
-      << "the newest have the largest weight";
+      << "the newest measurements have the largest weight";
 }
 
 TEST(Encoding, CloserViewpointsNeedMoreBytes) {

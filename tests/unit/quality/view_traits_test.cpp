@@ -53,7 +53,7 @@ TEST(Viewpoint, DetailIsScaledFromTheOther) {
   EXPECT_NEAR(viewpoint_of(view, known).detail, 1, 1e-12);
   view.image.height = 960;
   EXPECT_NEAR(viewpoint_of(view, known).detail, 2, 1e-12);
-  EXPECT_EQ(viewpoint_of(view).detail, 0) << "not known";
+  EXPECT_EQ(viewpoint_of(view).detail, 0) << "unknown";
 }
 
 TEST(SceneSignature, DoesNotDependOnCameraAndStep) {

@@ -1,4 +1,4 @@
-// Sample positions on a globe, on a curvilinear map and along terrain, against closed forms.
+// Sample positions on a globe, on a curvilinear map and along terrain, compared with closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ void expect_near(const glm::dvec3& got, const glm::dvec3& wanted, const char* wh
       << what << ": " << got.x << ' ' << got.y << ' ' << got.z;
 }
 
-// Three even cells of log p in a shell from 1 / 1.15 to 1.
+// Three equal cells of log p in a shell from 1 / 1.15 to 1.
 double radius(int level, double scale = 1) {
   const double inner = 1 / (1 + 0.15 * scale);
   return inner + (level + 0.5) / 3 * (1 - inner);
@@ -91,7 +91,7 @@ TEST(Sphere, RectilinearLatticeHasTheMeanCellsOfTheCurvedOne) {
     EXPECT_NEAR(lattice->spacing[2][at], (1 - inner) / 3, 1e-12);
     EXPECT_NEAR(lattice->positions[2][at], radius(k) - middle, 1e-12);
   }
-  // Half the chord over two steps inside, a whole chord over one step at the poles.
+  // Inside, half the chord over two steps; at the poles, a whole chord over one step.
   EXPECT_NEAR(lattice->spacing[1][3], middle * std::sin(30 * degree), tolerance);
   EXPECT_NEAR(lattice->spacing[1][0], middle * 2 * std::sin(15 * degree), tolerance);
   EXPECT_NEAR(lattice->positions[1][3], 0, tolerance);
@@ -158,7 +158,7 @@ TEST(Sphere, IsFramedFromEveryDirection) {
   }
 }
 
-// A view starts above the part of the globe covered by the data.
+// A default view is from above the part of the globe covered by the data.
 TEST(Sphere, PartIsViewedFromAboveItself) {
   data::Grid grid = globe();
   grid.axes[0].coordinates = steps(120, 5, 7);
@@ -250,7 +250,7 @@ GeometryView with_heights(GeometryMapping mapping = GeometryMapping::flat) {
   return geometry;
 }
 
-// Heights in metres over axes in metres keep their proportion: a slope of 1 stays one.
+// Heights in metres over axes in metres keep their proportion: a slope of 1 remains 1.
 TEST(HeightField, TerrainKeepsItsSlope) {
   auto dataset = terrain(metres(), "m", [](std::size_t n) {
     const auto i = static_cast<double>(n % 4);
@@ -332,7 +332,7 @@ TEST(HeightField, OtherQuantitiesAreRefused) {
   EXPECT_EQ(refusal(*masked, "z"), at);
 }
 
-// Of the first step, loaded once, and only by a view that names it.
+// Heights of the first step, loaded once, and only by a view that names them.
 TEST(HeightField, IsLoadedOnceAndOnlyIfNamed) {
   auto reads = std::make_shared<FakeSource::Reads>();
   auto dataset = terrain(
@@ -348,7 +348,7 @@ TEST(HeightField, IsLoadedOnceAndOnlyIfNamed) {
   EXPECT_TRUE(scene->lattice.places);
   EXPECT_EQ((*reads)["z@0"], 1);
   EXPECT_EQ(reads->count("z@1"), 0U);
-  // The next frame has the same places, not others like them.
+  // The next frame uses the same positions object, not an equal copy.
   const auto again = build_scene(*complete(view, *dataset), *dataset);
   EXPECT_EQ(again->lattice.places, scene->lattice.places);
   view.geometry.scale = {1, 1, 2};
@@ -356,7 +356,8 @@ TEST(HeightField, IsLoadedOnceAndOnlyIfNamed) {
   EXPECT_NE(taller->lattice.places, scene->lattice.places);
 }
 
-// A metre has the same length anywhere on a globe: the middle radius of the shell over the Earth's.
+// A metre has the same length anywhere on a globe: the middle radius of the shell over the radius
+// of the Earth.
 TEST(WorldRates, OnTheGlobeAreLengthsPerMeter) {
   auto dataset = dataset_of(
       std::make_unique<FakeSource>(globe(), std::vector<data::FieldInfo>{wind_info()}, 1));

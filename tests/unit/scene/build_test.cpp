@@ -39,7 +39,7 @@ TEST(BuildScene, LoadsOnlyWhatIsShown) {
   Scene scene = built(view, *dataset);
   EXPECT_TRUE(scene.vector);
   EXPECT_EQ(scene.scalars.size(), 1U);
-  // Ranges are those of step 0, the picture of step 2; the temperature is not used.
+  // Ranges are those of step 0, the picture is that of step 2; the temperature is not used.
   EXPECT_EQ(*reads, (Reads{{"wind@0", 1}, {"wind@2", 1}, {"cloud@0", 1}, {"cloud@2", 1}}));
 
   reads = std::make_shared<Reads>();
@@ -178,7 +178,7 @@ TEST(WorldRates, OmegaRisesWherePressureFalls) {
   }
 }
 
-// Low pressure is at the top of the picture for any source of the line direction.
+// Low pressure is at the top of the picture, whichever attribute gives the direction.
 TEST(BuildScene, ComponentsPointUpWhereAirRises) {
   View view;
   view.vector.scale = {1, 2, 3};
@@ -191,7 +191,7 @@ TEST(BuildScene, ComponentsPointUpWhereAirRises) {
   }
 }
 
-// Level 1 may be the highest or the lowest: then omega is used unchanged.
+// Level 1 may be the highest or the lowest, so omega is used unchanged.
 TEST(BuildScene, OmegaOnNumberedLevelsIsNotTurned) {
   data::Grid grid = atmosphere_grid();
   grid.axes[2] = axis(data::AxisKind::level, "", {1, 2, 3});

@@ -70,7 +70,7 @@ std::array<double, 3> oklab(const std::array<float, 3>& c) {
 
 TEST(ColorMap, EqualValueDifferencesAreEqualColorDifferences) {
   for (const ColorMap& map : color_maps()) {
-    if (map.kind == "cyclic") continue;  // its quarters are the compass quarters
+    if (map.kind == "cyclic") continue;  // its quarters are the quarters of the compass
     const auto entries = color_map_linear(map.name, 257);
     std::vector<double> steps;
     for (std::size_t n = 8; n < entries.size(); n += 8) {
@@ -79,7 +79,7 @@ TEST(ColorMap, EqualValueDifferencesAreEqualColorDifferences) {
       steps.push_back(std::hypot(after[0] - before[0], after[1] - before[1], after[2] - before[2]));
     }
     const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
-    // Published maps were made uniform in another measure (CAM02-UCS).
+    // Published maps are uniform in another colour space (CAM02-UCS).
     const bool published =
         std::set<std::string>{"viridis", "magma", "inferno", "plasma", "cividis"}.count(map.name) !=
         0;

@@ -33,7 +33,7 @@ View completed(const View& view, data::Dataset& dataset) {
   return full->view();
 }
 
-// Every optional of a view as text, for comparison.
+// Every optional member of a view as text, for comparison.
 std::string told(const View& view) {
   const auto vec = [](const protocol::Vec3& v) {
     return std::to_string(v[0]) + " " + std::to_string(v[1]) + " " + std::to_string(v[2]) + ";";
@@ -99,7 +99,7 @@ TEST(CompleteView, KeepsGivenValues) {
   protocol::ScalarView scalar;
   scalar.field = "temperature";
   scalar.color.map = "ice";
-  scalar.color.range = protocol::Range{300, 200};  // reversed on purpose
+  scalar.color.range = protocol::Range{300, 200};  // reversed intentionally
   scalar.extinction = {{200, 0}, {300, 5}};
   view.scalars = {scalar};
   const View full = completed(view, *dataset);
@@ -111,7 +111,7 @@ TEST(CompleteView, KeepsGivenValues) {
   ASSERT_EQ(full.scalars->size(), 1U);
   EXPECT_EQ((*full.scalars)[0].color.range, (protocol::Range{300, 200}));
   EXPECT_EQ((*full.scalars)[0].color.map, "ice");
-  EXPECT_EQ(dataset->loads(), 0U);  // every range was given
+  EXPECT_EQ(dataset->loads(), 0U);  // all ranges were given
 }
 
 TEST(CompleteView, RangesComeFromTheFirstStep) {

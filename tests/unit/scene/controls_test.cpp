@@ -85,7 +85,7 @@ TEST(Slice, CountsItsOwnLinesOnly) {
                axis(data::AxisKind::cartesian, "m", {0, 1})};
   auto source =
       std::make_unique<FakeSource>(std::move(grid), std::vector<data::FieldInfo>{wind_info()}, 1);
-  // Magnitudes of the lower layer are uniform up to 1, of the upper up to 100.
+  // Magnitudes are uniform up to 1 in the lower layer and up to 100 in the upper layer.
   source->values = [](const std::string&, std::size_t n) {
     const bool upper = n >= std::size_t{900} * 900;
     const double share = std::fmod(static_cast<double>(n) * 0.7548776662466927, 1.0);
@@ -115,8 +115,8 @@ TEST(Slice, LinesAndMediumAreScaledToTheLayer) {
   const Scene slice = built(view, *dataset);
   // One of three equal layers: dense parts are as opaque through it as through all three.
   const auto top = [](const Scene& scene) { return scene.scalars.at(0).extinction.back()[1]; };
-  EXPECT_NEAR(top(slice) / top(whole), 3, 0.6);  // both are rounded up to nice numbers
-  // Across x, lines are as long as y is coarse: 5 cells of 10 degrees on a scale of 40 to 2.
+  EXPECT_NEAR(top(slice) / top(whole), 3, 0.6);  // both are rounded up to readable numbers
+  // Across x, the length of lines is the spacing of y: 5 cells of 10 degrees on a scale of 40 to 2.
   view.geometry.slice = SliceView{GridAxis::x, 0};
   EXPECT_NEAR(built(view, *dataset).vector->length, 5 * 0.5, 0.05);
 }

@@ -59,7 +59,7 @@ TEST(ChooseLevel, HalvesWhileACellIsSmallerThanAPixel) {
 }
 
 TEST(ChooseLevel, RisesByOneWhenTheDistanceDoubles) {
-  const Lattice lattice = cube(160);  // 1.25 pixels a cell at distance 8
+  const Lattice lattice = cube(160);  // 1.25 pixels per cell at distance 8
   for (int doubled = 0; doubled < 6; ++doubled) {
     Camera camera = before(8);
     camera.eye.y = -1 - 8 * std::exp2(doubled);
@@ -145,18 +145,18 @@ TEST(CoarsenLattice, KeepsTheBoxAndCentersMergedCells) {
 }
 
 TEST(MergeLines, AddUpTheirOpacityAndThenTheirWidth) {
-  const Lattice lattice = cube(200);  // at 50 pixels a unit half a pixel a cell
+  const Lattice lattice = cube(200);  // at 50 pixels per unit half a pixel per cell
   VectorLayer layer;
   layer.opacity = 0.1;
   layer.r1 = 0.5;
   layer.r2 = 1.5;
   VectorLayer merged = layer;
   merge_lines(lattice, {1, 1, 0}, 50, merged);
-  EXPECT_DOUBLE_EQ(merged.opacity, 0.4);  // four lines in one
+  EXPECT_DOUBLE_EQ(merged.opacity, 0.4);  // one line represents four
   EXPECT_EQ(merged.r1, layer.r1);
   EXPECT_EQ(merged.r2, layer.r2);
 
-  // Eight times 0.15 are 1.2 lines: a fifth wider than r1 + r2 = 2.
+  // Eight times 0.15 is 1.2 lines: one line, a fifth wider than r1 + r2 = 2.
   merged = layer;
   merged.opacity = 0.15;
   merge_lines(lattice, {1, 1, 1}, 50, merged);
@@ -314,7 +314,7 @@ TEST(LevelOfRates, AreMeansOfMergedRowsAndLayers) {
   view.vector.space = protocol::VectorSpace::world;
   view.image.width = view.image.height = 50;
   const Scene coarse = build_scene(*complete(view, *dataset), *dataset).value();
-  ASSERT_EQ(coarse.level, (Level{1, 1, 0})) << "three layers stay three";
+  ASSERT_EQ(coarse.level, (Level{1, 1, 0})) << "three layers remain three";
   view.method.detail = protocol::Detail::full;
   const Scene full = build_scene(*complete(view, *dataset), *dataset).value();
   ASSERT_EQ(coarse.vector->rate_x.size(), 32U);

@@ -59,7 +59,7 @@ TEST(Lattice, SingleLayerIsPlacedAtAnyCoordinate) {
 
 TEST(Lattice, PressuresWithEqualLogarithmsAreRefused) {
   data::Grid grid = metres({0, 1, 2}, {0, 1, 2}, {});
-  // 16 units in the last place apart, of which the logarithm leaves one or none.
+  // 16 units in the last place apart; after the logarithm one or none remains.
   grid.axes[2] = axis(AxisKind::pressure, "Pa", {1e5 + 4.4e-10, 1e5 + 2.2e-10, 1e5});
   const auto lattice = place_lattice(grid, GeometryView{});
   ASSERT_FALSE(lattice);
@@ -69,7 +69,7 @@ TEST(Lattice, PressuresWithEqualLogarithmsAreRefused) {
 TEST(Lattice, PressureIsPlacedByLogarithmWithLowPressureHigh) {
   const auto lattice = place_lattice(atmosphere_grid(), GeometryView{});
   ASSERT_TRUE(lattice);
-  // ln 2 apart each: three even cells, in a box of 0.15 of the longest horizontal edge.
+  // ln 2 apart each: three equal cells, in a box of 0.15 of the longest horizontal edge.
   EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 0.15 * 2.0, 1e-14);
   EXPECT_NEAR(lattice->positions[2][0], -0.1, 1e-14);
   EXPECT_NEAR(lattice->positions[2][1], 0.0, 1e-14);
@@ -81,7 +81,7 @@ TEST(Lattice, VerticalPlacementIsConfigurable) {
   geometry.vertical = VerticalPlacement::linear;
   auto lattice = place_lattice(atmosphere_grid(), geometry);
   ASSERT_TRUE(lattice);
-  // By pressure itself: cells of 500, 375, 250 hPa, 1125 in all, in 0.3.
+  // With pressure itself as coordinate: cells of 500, 375, 250 hPa, 1125 in total, in 0.3.
   EXPECT_NEAR(lattice->spacing[2][0], 0.3 * 500 / 1125, 1e-14);
   EXPECT_NEAR(lattice->spacing[2][1], 0.3 * 375 / 1125, 1e-14);
   EXPECT_NEAR(lattice->positions[2][1] - lattice->positions[2][0], 0.3 * 500 / 1125, 1e-14);
@@ -105,7 +105,7 @@ TEST(Lattice, LogPressureNeedsPressures) {
   data::Grid vacuum = atmosphere_grid();
   vacuum.axes[2].coordinates = {1000, 500, 0};
   EXPECT_FALSE(place_lattice(vacuum, geometry));
-  EXPECT_TRUE(place_lattice(vacuum, GeometryView{}));  // auto: log p does not reach zero
+  EXPECT_TRUE(place_lattice(vacuum, GeometryView{}));  // auto: log p cannot represent zero
 }
 
 TEST(Lattice, DepthGrowsDownwards) {
@@ -127,7 +127,7 @@ TEST(Lattice, LongitudeAndLatitudeShareTheirUnit) {
 TEST(Lattice, DimensionOfOneIsOneCellThick) {
   auto lattice = place_lattice(metres({0, 1, 3, 7}, {0, 2}, {5}), GeometryView{});
   ASSERT_TRUE(lattice);
-  // The smallest cell of the others is 1 m of 9.5 m.
+  // The smallest cell of the other axes is 1 m of 9.5 m.
   EXPECT_NEAR(lattice->spacing[2].at(0), 1.0 * 2.0 / 9.5, 1e-14);
   EXPECT_NEAR(lattice->positions[2].at(0), 0.0, 1e-14);
   EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 2.0 / 9.5, 1e-14);
@@ -143,7 +143,7 @@ TEST(Lattice, ScaleMultipliesBeforeTheLongestEdgeIsSetToTwo) {
   geometry.scale = {1, 1, 10};
   const auto lattice = place_lattice(atmosphere_grid(), geometry);
   ASSERT_TRUE(lattice);
-  // 2 x 1.5 x 0.3 becomes 2 x 1.5 x 3, then everything shrinks by 2 / 3.
+  // 2 x 1.5 x 0.3 becomes 2 x 1.5 x 3, then everything is scaled by 2 / 3.
   EXPECT_NEAR(lattice->box_max.x - lattice->box_min.x, 2.0 * 2.0 / 3.0, 1e-12);
   EXPECT_NEAR(lattice->box_max.y - lattice->box_min.y, 1.5 * 2.0 / 3.0, 1e-12);
   EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 2.0, 1e-12);

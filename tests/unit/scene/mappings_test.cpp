@@ -30,7 +30,7 @@ std::shared_ptr<data::Dataset> opened(const std::string& path) {
   return dataset ? *dataset : nullptr;
 }
 
-// 2-D longitudes and latitudes of three rows and four columns, rotated against the compass.
+// 2-D longitudes and latitudes of three rows and four columns, rotated relative to the compass.
 void write_curvilinear(const std::string& path, double gap_or_one) {
   NetcdfMaker file(path);
   const int y = file.dimension("eta", 3);
@@ -57,7 +57,7 @@ void write_axes(const std::string& path, const std::array<const char*, 2>& names
   file.variable("f", NC_FLOAT, {y, x}, counting(12));
 }
 
-// The list, checked against the placement of the grid for every entry.
+// Compares the list with the placement of the grid for every entry.
 Words mappings(data::Dataset& dataset) {
   Words out = describe(dataset, RangesOf::none)->mappings;
   for (const auto& [mapping, name] :

@@ -1,5 +1,5 @@
-// The chooser: times correct forecasts; finer settings are chosen with hysteresis, coarser ones at
-// once.
+// The chooser: measured times correct forecasts; finer settings are chosen with hysteresis, coarser
+// ones at once.
 #include "server/session/pacing/chooser.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ constexpr Micros frame_us = 33'000;
 const quality::Viewpoint viewpoint{1, {0, 1, 0}, 1280, 720};
 
 // Pixels decide the time, the prior decides the error.
-Forecasts surveyed(double full_ms) {
+Forecasts calibrated(double full_ms) {
   Forecasts out = quality::Table(quality::Kind{}).forecasts(viewpoint);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const double slabs = settings[i].method == protocol::MethodName::slab ? 4 : 1;
@@ -55,7 +55,7 @@ double always(int /*frame*/) { return 1; }
 
 TEST(Chooser, CorrectsForecastsByMeasuredFrames) {
   Drag drag;
-  const Forecasts known = surveyed(100);
+  const Forecasts known = calibrated(100);
   const auto drawn = drag.run(known, {50.0, std::nullopt}, 30, [](int) { return 3.0; });
   for (std::size_t n = 2; n < drawn.size(); ++n) EXPECT_LE(3 * known[drawn[n]].ms, 50) << n;
   const double expected =
@@ -65,7 +65,7 @@ TEST(Chooser, CorrectsForecastsByMeasuredFrames) {
 
 TEST(Chooser, CoarsensAtOnceAndRefinesWithHysteresis) {
   Drag drag;
-  const Forecasts known = surveyed(100);
+  const Forecasts known = calibrated(100);
   const quality::Aim aim{30.0, std::nullopt};
   const auto calm = drag.run(known, aim, 20, always);
   const auto busy = drag.run(known, aim, 60, [](int) { return 8.0; });
@@ -78,7 +78,7 @@ TEST(Chooser, CoarsensAtOnceAndRefinesWithHysteresis) {
 
 TEST(Chooser, DoesNotOscillateWhenCostsVary) {
   Drag drag;
-  const Forecasts known = surveyed(100);
+  const Forecasts known = calibrated(100);
   const auto drawn = drag.run(known, {40.0, std::nullopt}, 400, [](int n) {
     return n % 3 == 0 ? 1.12 : n % 3 == 1 ? 0.88 : 1.0;
   });
@@ -88,7 +88,7 @@ TEST(Chooser, DoesNotOscillateWhenCostsVary) {
 }
 
 TEST(Chooser, FastestSettingWithinTheErrorIsChosen) {
-  const Forecasts known = surveyed(100);
+  const Forecasts known = calibrated(100);
   for (const double most : {0.2, 0.08, 0.03, 0.005}) {
     Drag drag;
     const std::size_t chosen = drag.run(known, {std::nullopt, most}, 30, always).back();
@@ -106,7 +106,7 @@ TEST(Chooser, WithoutACalibrationRunFinerPicturesAreTriedOneByOne) {
   Drag drag;
   const Forecasts guessed = quality::Table(quality::Kind{}).forecasts(viewpoint);
   const quality::Aim aim{30.0, std::nullopt};
-  // Ten times as slow as estimated, then a tenth of it.
+  // First ten times as slow as estimated, then a tenth of the estimate.
   const auto slow = drag.run(guessed, aim, 20, [](int) { return 10.0; });
   std::vector<std::size_t> fast;
   for (int n = 0; n < 20; ++n) {
@@ -121,7 +121,7 @@ TEST(Chooser, WithoutACalibrationRunFinerPicturesAreTriedOneByOne) {
 
 TEST(Chooser, ExcludesPicturesTheLinkCannotCarry) {
   Chooser chooser;
-  const Forecasts known = surveyed(10);
+  const Forecasts known = calibrated(10);
   const protocol::View view;
   const std::size_t chosen = chooser.choose(view, known, {100.0, std::nullopt}, 100'000, 0);
   EXPECT_LE(quality::pixels_at(view, settings[chosen]), 100'000);

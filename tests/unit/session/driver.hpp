@@ -24,8 +24,8 @@ namespace quality = windsplat::quality;
 
 inline constexpr Micros ms = 1000;
 inline constexpr int steps = 10;
-inline constexpr double beyond = 1000;  // an eye so far away sees nothing
-inline constexpr double faint = 500;    // nor this one in a moving frame
+inline constexpr double beyond = 1000;  // from such a distance nothing is visible
+inline constexpr double faint = 500;    // nor in a moving frame
 
 inline protocol::PlayMessage play(int from, int to, double fps, bool loop, bool drop) {
   return {from, to, fps, loop, drop};
@@ -45,7 +45,7 @@ class Driver {
                return dataset == "wind" ? reading : std::nullopt;
              },
              [this](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
-               return surveyed.value_or(quality::Table(signature.kind).forecasts(viewpoint));
+               return calibrated.value_or(quality::Table(signature.kind).forecasts(viewpoint));
              }},
             now_) {}
 
@@ -70,7 +70,7 @@ class Driver {
     for (int turns = 0;; ++turns) {
       const auto wake = session_.wake_at();
       if (!wake || *wake > end) break;
-      ASSERT_LT(turns, 100000) << "the session never sleeps";
+      ASSERT_LT(turns, 100000) << "the session requests calls without end";
       now_ = std::max(now_, *wake);
       take(session_.on_time(now_));
     }
@@ -113,7 +113,7 @@ class Driver {
     FAIL() << "the session does not become idle";
   }
 
-  // --- what came out ----------------------------------------------------------------------------
+  // --- results ----------------------------------------------------------------------------------
 
   std::vector<protocol::ErrorMessage> errors() const { return texts_of<protocol::ErrorMessage>(); }
   template <class T>
@@ -139,17 +139,18 @@ class Driver {
   std::vector<Describe> describes;
   std::vector<Prefetch> requests;
   std::optional<StartRender> render;  // being drawn
-  bool cancelled = false;             // it was given up
+  bool cancelled = false;             // the render was cancelled
   int renders = 0;
   std::optional<Close> closed;
   bool write_at_once = true;
   int step_count = steps;
-  Micros queue = 0;                // simulated waiting time of a frame for the renderer
+  Micros queue = 0;                // simulated time that a frame waits for the renderer
   std::optional<Reading> reading;  // of the dataset "wind"
   std::vector<Calibrate> calibrations;
-  std::optional<quality::Forecasts> surveyed;  // what is known; empty: the prior
-  bool averaged = false;  // data: what final frames err does not come from their slabs
-  std::optional<double> measured_error;  // of final frames drawn by the view's own slabs
+  std::optional<quality::Forecasts> calibrated;  // forecasts known; empty: the prior
+  bool averaged = false;  // averaged data: errors of final frames do not depend on their slabs
+  std::optional<double> measured_error;  // error of final frames drawn by slabs of the view's own
+                                         // thickness
 
  private:
   static Result<int> check(const View& view, int step_count) {
@@ -172,8 +173,8 @@ class Driver {
       const int by = averaged ? 1 : done.setting.thinner * done.setting.thinner;
       out.info.error_value = *measured_error / by;
       out.info.error_kind = "measured";
-    } else if (const auto index = quality::index_of(done.setting); index && surveyed) {
-      out.info.error_value = (*surveyed)[*index].error;
+    } else if (const auto index = quality::index_of(done.setting); index && calibrated) {
+      out.info.error_value = (*calibrated)[*index].error;
       out.info.error_kind = "estimated";
     }
     out.info.tiles = 1;

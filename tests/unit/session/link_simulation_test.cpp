@@ -1,13 +1,8 @@
-// Pacing on simulated links: age of frames on arrival, frame rate, queueing. The age of a frame is
-// its arrival less t of the newest patch it shows, on the client's clock. Link time is the
-// transmission of that patch and of the frame: 2 delay, plus the bytes of the frame and its texts
-// over the rate. A render interval is the median time between starts of renders of moving frames.
-// Then p99(age - link time) <= 2 render intervals.
-//
-// Of a frame, `age` is its arrival less t of the newest patch it shows, on the viewer's clock. The
-// link's time is the way of that patch there and of the frame back, 2 delay, with the bytes of the
-// frame and its texts over the rate. A render interval is the median time from the beginning of one
-// render of a moving frame to the next. Then p99(age - link's time) <= 2 render intervals.
+// Pacing on simulated links: age of frames on arrival, frame rate, queueing.
+//  The age of a frame is its arrival less t of the newest patch it shows, on the client's clock.
+//  Link time is the transmission time of that patch and of the frame: 2 delay, plus the bytes of
+//  the frame and its texts over the rate. A render interval is the median time between the starts
+//  of consecutive renders of moving frames. Then p99(age - link time) <= 2 render intervals.
 #include <gtest/gtest.h>
 
 #include "simulation.hpp"
@@ -30,9 +25,9 @@ Micros quantile(std::vector<Micros> values, double share) {
 struct Told {
   std::vector<Shown> moving;
   Micros interval = 0;
-  std::vector<Micros> beyond;  // age - link's time
-  std::vector<Micros> waited;  // from the arrival of the patch shown to the beginning of the render
-  double mean_link_us = 0;     // a frame's bytes over the rate
+  std::vector<Micros> beyond;  // age - link time
+  std::vector<Micros> waited;  // from the arrival of the patch shown to the start of the render
+  double mean_link_us = 0;     // bytes of a frame over the rate
 };
 
 Told tell(const Viewer& viewer, const LinkOptions& link) {
@@ -109,7 +104,7 @@ TEST(Simulated, FramesAreRecentAndAsManyAsTheLinkAllows) {
     EXPECT_LE(quantile(told.beyond, 0.99), 2 * told.interval);
     EXPECT_LE(*std::max_element(told.waited.begin(), told.waited.end()), Viewer::patch_every)
         << "every render is of the newest view";
-    // What limits the rate: patches, drawing, the link, the viewer, or two frames in one cycle.
+    // The limit of the rate: patches, drawing, the link, the client, or two frames per cycle.
     const auto drawing = static_cast<double>(drawing_time(told, c.full));
     const double delay = static_cast<double>(c.link.delay);
     const double decode = static_cast<double>(c.link.decode);

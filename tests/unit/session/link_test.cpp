@@ -23,7 +23,7 @@ struct Known {
   }
   void send(Link& link, std::size_t bytes, bool pong = true, Micros late = 0) {
     link.sent({++seq, bytes, now - 10 * milli, true}, now);
-    if (pong) link.heard(seq, now + trip);
+    if (pong) link.answered(seq, now + trip);
     now += trip + carries(bytes) + decode + late;
     link.acked(seq, 1e-3 * static_cast<double>(decode), now);
   }
@@ -113,9 +113,9 @@ TEST(Link, ConsecutiveFramesRevealTheRateHiddenByTheSecond) {
   Link link;
   Micros now = 1'000'000;
   link.sent({1, 50'000, now, true}, now);
-  link.heard(1, now + trip);
+  link.answered(1, now + trip);
   link.sent({2, 50'000, now, true}, now);
-  link.acked(2, 0, now + trip + 100 * milli);  // stands for both
+  link.acked(2, 0, now + trip + 100 * milli);  // acknowledges both
   EXPECT_NEAR(link.bytes_per_s(), rate, 0.001 * rate);
 }
 
@@ -141,8 +141,8 @@ TEST(Link, NextFrameStartsSoThatTheClientIsFree) {
   for (int n = 0; n < 12; ++n) known.send(link, 20'000);
   const Micros sent = known.now;
   link.sent({++known.seq, 20'000, sent - 10 * milli, true}, sent);
-  // It arrives 20 ms later and takes 200 ms to decode; the next takes 10 ms to render, 20 to
-  // arrive.
+  // It arrives 20 ms later and takes 200 ms to decode; the next one takes 10 ms to render and 20 ms
+  // to arrive.
   EXPECT_NEAR(static_cast<double>(link.may_start_at()),
               static_cast<double>(sent + (20 + 200 - 20 - 10) * milli), 1.0 * milli);
 }
@@ -202,7 +202,7 @@ TEST(JpegRate, QualityFollowsTheLinkRate) {
       EXPECT_EQ(quality, 40);
     }
     if (rate == 4e6) {
-      EXPECT_EQ(quality, 75) << "it would fit at 80, but not in a quarter";
+      EXPECT_EQ(quality, 75) << "it would fit at 80, but not in a quarter of the time";
     }
     if (rate == 1e8) {
       EXPECT_EQ(quality, 85);
@@ -245,7 +245,7 @@ TEST(JpegRate, LevelChangesWhenTheLowestQualityIsTooLarge) {
 }
 
 TEST(JpegRate, SmallVariationsOfPicturesKeepTheLevel) {
-  // However near the rate is to a change of level.
+  // However close the rate is to a change of level.
   for (double rate = 1e5; rate < 3e5; rate *= 1.03) {
     JpegRate jpeg;
     const Link link = link_of(rate);

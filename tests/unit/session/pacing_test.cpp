@@ -122,7 +122,7 @@ TEST(Pacing, NoThirdFrameBeforeAnAcknowledgement) {
   EXPECT_EQ(driver.frames.size(), 2U);
   EXPECT_FALSE(driver.render) << "a frame without credit would be outdated when sent";
 
-  driver.ack(2);  // stands for frame 1 too
+  driver.ack(2);  // acknowledges frame 1 too
   driver.finish_render();
   EXPECT_EQ(driver.frames.size(), 3U);
   EXPECT_EQ(driver.frames[2].header.rev, 19U) << "the newest view, not the next one";
@@ -149,7 +149,7 @@ TEST(Pacing, SteadyPatchesStarveNoSession) {
   driver.settle();
   const std::size_t before = driver.frames.size();
   std::uint32_t rev = 1;
-  // A hundred patches a second for two seconds; a frame takes 35 ms and is acknowledged at once.
+  // A hundred patches per second for two seconds; a frame takes 35 ms and is acknowledged at once.
   Micros busy = 0;
   for (int n = 0; n < 200; ++n) {
     driver.patch(++rev, azimuth(n));
@@ -239,7 +239,7 @@ TEST(Pacing, HiddenClientGetsNothingUntilVisible) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
 }
 
-// --- what changes nothing ------------------------------------------------------------------------
+// --- unchanged pictures --------------------------------------------------------------------------
 
 using Revs = std::vector<std::uint32_t>;
 
@@ -258,7 +258,7 @@ TEST(Unchanged, EquivalentPatchIsAnsweredWithoutAFrame) {
   const std::size_t frames = driver.frames.size();
   const int renders = driver.renders;
   driver.patch(2, R"({"camera":{"eye":[1,2,3]}})");
-  driver.patch(3, R"({"step":0})");  // its default, said
+  driver.patch(3, R"({"step":0})");  // its default, stated explicitly
   driver.patch(4, "{}");
   EXPECT_EQ(unchanged_revs(driver), (Revs{2, 3, 4}));
   EXPECT_EQ(driver.texts_of<protocol::UnchangedMessage>().back().seq,
@@ -355,7 +355,7 @@ TEST(Unchanged, EmptyMovingFrameDoesNotStandForTheFinalOne) {
   EXPECT_FALSE(driver.render->encoding.full_chroma) << "a moving frame is sent first";
   driver.finish_render(10 * ms);
   EXPECT_EQ(driver.frames.size(), frames);
-  EXPECT_TRUE(unchanged_revs(driver).empty()) << "not known yet";
+  EXPECT_TRUE(unchanged_revs(driver).empty()) << "not yet known";
   driver.settle(200 * ms);
   ASSERT_EQ(driver.frames.size(), frames + 1);
   EXPECT_EQ(driver.frames.back().header.rev, 2U);
@@ -374,9 +374,9 @@ TEST(Unchanged, RepeatedRevIsAnsweredAgain) {
   driver.patch(1, azimuth(1));
   driver.settle();
   EXPECT_GT(driver.frames.size(), frames);
-  EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "this one by frames";
+  EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "this one is answered by frames";
   driver.wait(3000 * ms);
-  EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "no patch, no answer";
+  EXPECT_EQ(unchanged_revs(driver), (Revs{1, 1})) << "without a patch there is no response";
 }
 
 TEST(Unchanged, ReturnAfterARefusalAnswersOpenPatchesOnly) {

@@ -1,4 +1,4 @@
-// Playback: order, rate, changes meanwhile, statistics, and prefetch requests.
+// Playback: order, rate, changes during playback, statistics, and prefetch requests.
 #include <gmock/gmock.h>
 
 #include <numeric>
@@ -59,7 +59,7 @@ TEST(Reverse, WithoutLoopEndsAtTheFirstStepAndMakesItFinal) {
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 0U));
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
   driver.frames.clear();
-  driver.say(play(9, 0, 10, false, true));  // from where nothing follows it begins anew
+  driver.say(play(9, 0, 10, false, true));  // at the end of the range it starts again
   run_and_acknowledge(driver, 150 * ms, 10 * ms);
   EXPECT_THAT(driver.steps_shown(), ElementsAre(9U, 8U));
 }
@@ -183,7 +183,7 @@ TEST(Hidden, StepsWaitUntilVisible) {
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 210 * ms, 5 * ms);
   driver.say(protocol::VisibilityMessage{true});
-  driver.wait(3370 * ms);  // no whole number of loops
+  driver.wait(3370 * ms);  // not a whole number of loops
   driver.say(protocol::VisibilityMessage{false});
   driver.frames.clear();
   run_and_acknowledge(driver, 250 * ms, 5 * ms);
@@ -226,8 +226,8 @@ TEST(PlayStats, ShownAndDroppedStepsAddUp) {
     driver.say(protocol::PauseMessage{});
     driver.settle();
     const auto stats = driver.texts_of<protocol::StatsMessage>().back();
-    EXPECT_FALSE(stats.play_fps) << "nothing runs any more";
-    // 20 steps a second for 4 s, and those of the last frame's time.
+    EXPECT_FALSE(stats.play_fps) << "nothing is running";
+    // 20 steps per second for 4 s, and those during the last frame.
     const std::int64_t by = shown + static_cast<std::int64_t>(stats.steps_dropped);
     EXPECT_GE(by, 79);
     EXPECT_LE(by, 81 + cost / (50 * ms));
@@ -246,7 +246,7 @@ TEST(PlayStats, CountStepsThatWaitedForLoading) {
   driver.say(play(0, 9, 10, true, true));
   run_and_acknowledge(driver, 305 * ms, 5 * ms, true);
   EXPECT_THAT(moving_steps(driver), ElementsAre(1U, 2U, 3U));
-  driver.patch(2, R"({"camera":{"fovY":20}})");  // its frame is not the first of the step
+  driver.patch(2, R"({"camera":{"fovY":20}})");  // its frame is not the first one of the step
   run_and_acknowledge(driver, 20 * ms, 5 * ms, true);
   driver.say(protocol::PauseMessage{});
   driver.settle();
@@ -269,7 +269,7 @@ TEST(PrefetchRequest, AtRestCoversTheNeighbors) {
     driver.finish_render();
     EXPECT_THAT(driver.requests, IsEmpty()) << "not before the final frame";
     driver.settle();
-    ASSERT_EQ(driver.requests.size(), 1U) << "once, however often the session is woken";
+    ASSERT_EQ(driver.requests.size(), 1U) << "once, however often on_time() is called";
     EXPECT_EQ(driver.requests[0].steps, wanted);
     EXPECT_EQ(driver.requests[0].view.dataset, "wind");
     EXPECT_EQ(driver.requests[0].view.step, step);
@@ -314,7 +314,8 @@ TEST(PrefetchRequest, DuringPlaybackCoversFollowingStepsInOrder) {
   EXPECT_EQ(driver.requests[1].view.step, 7);
   driver.say(play(9, 0, 10, false, true));
   ASSERT_EQ(driver.requests.size(), 3U);
-  EXPECT_THAT(driver.requests[2].steps, ElementsAre(6, 5, 4, 3, 2, 1, 0)) << "no loop: no further";
+  EXPECT_THAT(driver.requests[2].steps, ElementsAre(6, 5, 4, 3, 2, 1, 0))
+      << "without loop there are no more";
 }
 
 TEST(PrefetchRequest, EndsWithPlaybackAndReturnsAtRest) {
@@ -355,7 +356,7 @@ TEST(PrefetchRequest, IsWithdrawnWithTheDataset) {
   EXPECT_EQ(driver.requests.back().view.dataset, "sea");
 }
 
-// Sixteen at most: asked of the player itself, with more steps than the driver's datasets have.
+// At most sixteen: tested with the player itself, with more steps than the driver's datasets have.
 TEST(PrefetchRequest, CoversSixteenStepsAhead) {
   Player player;
   player.start(play(0, 239, 24, true, true), 230, 0);

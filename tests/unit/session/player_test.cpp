@@ -1,4 +1,4 @@
-// Times of steps by the clock only: late steps are dropped or delayed.
+// Times of steps determined by the clock only: late steps are dropped or delayed.
 #include "server/session/playback/player.hpp"
 
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@ namespace {
 
 constexpr Micros ms = 1000;
 
-// From step 0 at time 0 through 100 steps, ten a second.
+// From step 0 at time 0 through 100 steps, ten per second.
 Player playing(bool drop) {
   Player player;
   player.start({0, 99, 10, true, drop}, 0, 0);

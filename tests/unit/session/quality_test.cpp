@@ -12,7 +12,7 @@ namespace {
 
 // Results of a calibration run where a full kernel picture takes `full_ms`: time is proportional to
 // pixels and samples, slabs take four times as long.
-quality::Forecasts surveyed(double full_ms) {
+quality::Forecasts calibrated(double full_ms) {
   quality::Forecasts out = quality::Table(quality::Kind{}).forecasts({1, {0, 1, 0}, 1280, 720});
   for (std::size_t i = 0; i < out.size(); ++i) {
     const quality::Setting& setting = quality::settings[i];
@@ -39,7 +39,7 @@ std::vector<quality::Setting> drag(Driver& driver, int count, std::uint32_t& rev
   return drawn;
 }
 
-// Time of a setting on a machine `slower` than the calibrated one.
+// Time of a setting on a machine that is `slower` times as slow as the calibrated one.
 std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& known,
                                                      double slower = 1) {
   return [known, slower](const quality::Setting& setting) {
@@ -49,10 +49,10 @@ std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& k
 
 TEST(Setting, IsReportedInTheHeaderAndTheFinalFrameIsFull) {
   Driver driver;
-  driver.surveyed = surveyed(400);
+  driver.calibrated = calibrated(400);
   driver.patch(1, R"({"dataset":"wind","image":{"width":800,"height":600}})");
   std::uint32_t rev = 1;
-  const auto drawn = drag(driver, 10, rev, costs(*driver.surveyed));
+  const auto drawn = drag(driver, 10, rev, costs(*driver.calibrated));
   const auto moving = driver.frames.back().header;
   ASSERT_GT(drawn.back().half_level, 0);
   EXPECT_EQ(moving.level, drawn.back().half_level / 2);
@@ -60,7 +60,7 @@ TEST(Setting, IsReportedInTheHeaderAndTheFinalFrameIsFull) {
   EXPECT_EQ(moving.flags, protocol::flag_error_estimated);
   EXPECT_FLOAT_EQ(
       moving.error,
-      static_cast<float>((*driver.surveyed)[quality::index_of(drawn.back()).value()].error));
+      static_cast<float>((*driver.calibrated)[quality::index_of(drawn.back()).value()].error));
   driver.measured_error = 3e-4;
   driver.settle(400 * ms);
   const auto final = driver.frames.back().header;
@@ -74,10 +74,10 @@ TEST(Setting, IsReportedInTheHeaderAndTheFinalFrameIsFull) {
 TEST(Setting, KeepsTheBudgetOnASlowedMachine) {
   for (const double budget : {16.0, 33.0, 66.0, 100.0}) {
     Driver driver;
-    driver.surveyed = surveyed(120);
+    driver.calibrated = calibrated(120);
     driver.patch(1, R"({"dataset":"wind","quality":{"budgetMs":)" + std::to_string(budget) + "}}");
     std::uint32_t rev = 1;
-    const auto cost = costs(*driver.surveyed, 2.5);
+    const auto cost = costs(*driver.calibrated, 2.5);
     driver.finish_render(cost(driver.render->setting));
     driver.ack(1);
     const auto drawn = drag(driver, 60, rev, cost);
@@ -85,9 +85,9 @@ TEST(Setting, KeepsTheBudgetOnASlowedMachine) {
     for (std::size_t n = 10; n < drawn.size(); ++n) {
       EXPECT_LE(cost(drawn[n]), 1000 * budget) << "frame " << n << " at " << budget << " ms";
     }
-    // Of the settings well within the budget none has a smaller error.
+    // Among the settings well within the budget none has a smaller error.
     const auto error = [&](const quality::Setting& setting) {
-      return (*driver.surveyed)[quality::index_of(setting).value()].error;
+      return (*driver.calibrated)[quality::index_of(setting).value()].error;
     };
     for (const quality::Setting& setting : quality::settings) {
       if (!quality::is_allowed(setting, driver.render ? driver.render->view : View{})) continue;
@@ -125,11 +125,11 @@ TEST(Setting, RecoversWhenTheSceneBecomesCheap) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
-  const quality::Forecasts dear = surveyed(400);
+  const quality::Forecasts dear = calibrated(400);
   const auto coarse = drag(driver, 20, rev, costs(dear));
   ASSERT_NE(coarse.back(), quality::settings[0]) << "which would take 400 ms";
   driver.wait(5000 * ms);
-  const quality::Forecasts cheap = surveyed(16);
+  const quality::Forecasts cheap = calibrated(16);
   const auto fine = drag(driver, 1000, rev, costs(cheap));
   EXPECT_EQ(fine.back().half_level, 0);
   EXPECT_EQ(fine.back().coarser, 0);
@@ -137,26 +137,27 @@ TEST(Setting, RecoversWhenTheSceneBecomesCheap) {
 
 TEST(Setting, RequestedErrorReplacesTheBudget) {
   Driver driver;
-  driver.surveyed = surveyed(120);
+  driver.calibrated = calibrated(120);
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.005}})");
   std::uint32_t rev = 1;
-  driver.finish_render(costs(*driver.surveyed)(driver.render->setting));
+  driver.finish_render(costs(*driver.calibrated)(driver.render->setting));
   driver.ack(1);
-  const auto drawn = drag(driver, 20, rev, costs(*driver.surveyed));
+  const auto drawn = drag(driver, 20, rev, costs(*driver.calibrated));
   EXPECT_EQ(drawn.back().method, protocol::MethodName::slab) << "at any cost";
   driver.patch(++rev, R"({"quality":{"budgetMs":16}})");
-  const auto late = drag(driver, 20, rev, costs(*driver.surveyed));
+  const auto late = drag(driver, 20, rev, costs(*driver.calibrated));
   EXPECT_EQ(late.back().method, protocol::MethodName::kernel) << "a budget has precedence";
 }
 
-// Sixteen equal sessions: each waits for fifteen frames of the others, and all shrink their frames.
+// Sixteen equal sessions: each waits for fifteen frames of the others, and all shorten their
+// frames.
 TEST(Setting, FramesBecomeCheaperWhenManyWaitForTheRenderer) {
   Driver driver;
-  driver.surveyed = surveyed(33);
+  driver.calibrated = calibrated(33);
   driver.patch(1, R"({"dataset":"wind"})");
   driver.settle();
   std::uint32_t rev = 1;
-  const auto cost = costs(*driver.surveyed);
+  const auto cost = costs(*driver.calibrated);
   drag(driver, 20, rev, cost);
   Micros own = cost(driver.render ? driver.render->setting : quality::settings[0]);
   EXPECT_GT(own, 16 * ms);
@@ -172,11 +173,11 @@ TEST(Setting, FramesBecomeCheaperWhenManyWaitForTheRenderer) {
 
 TEST(Refining, LongFinalFrameIsPrecededByABetterOne) {
   Driver driver;
-  driver.surveyed = surveyed(200);
+  driver.calibrated = calibrated(200);
   driver.measured_error = 5e-4;
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
-  const auto cost = costs(*driver.surveyed);
+  const auto cost = costs(*driver.calibrated);
   drag(driver, 20, rev, cost);
   if (driver.render) driver.finish_render(cost(driver.render->setting));  // of the last patch
   driver.ack(driver.frames.back().header.seq);
@@ -201,10 +202,10 @@ TEST(Refining, LongFinalFrameIsPrecededByABetterOne) {
 
 TEST(Refining, IsCancelledByTheNextChange) {
   Driver driver;
-  driver.surveyed = surveyed(200);
+  driver.calibrated = calibrated(200);
   driver.patch(1, R"({"dataset":"wind"})");
   std::uint32_t rev = 1;
-  const auto cost = costs(*driver.surveyed);
+  const auto cost = costs(*driver.calibrated);
   drag(driver, 10, rev, cost);
   if (driver.render) driver.finish_render(cost(driver.render->setting));
   driver.ack(driver.frames.back().header.seq);
@@ -242,7 +243,7 @@ TEST(Refining, EndsWhereThinnerSlabsDoNotHelp) {
 TEST(Setting, LateFrameOfAnotherDatasetIsIgnored) {
   const auto first_of_sea = [](Micros late) {
     Driver driver;
-    driver.surveyed = surveyed(10);
+    driver.calibrated = calibrated(10);
     driver.patch(1, R"({"dataset":"wind"})");
     driver.patch(2, R"({"dataset":"sea"})");
     driver.finish_render(late);
@@ -260,7 +261,7 @@ TEST(Refining, EndsWhereNoSlabIsThinEnough) {
   driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.000001}})");
   driver.settle();
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
-  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "reports that the error is not met";
+  EXPECT_GT(driver.frames.back().header.error, 1e-6F) << "reports that the error limit is not met";
 }
 
 TEST(Refining, LosslessFinalFrameIsAPng) {

@@ -1,4 +1,4 @@
-// Replies of a session: opening, rejected patches, playback, closing.
+// Responses of a session: opening, rejected patches, playback, closing.
 #include <gmock/gmock.h>
 
 #include "driver.hpp"
@@ -22,7 +22,7 @@ TEST(Open, DescribesTheDatasetAndRendersIt) {
   driver.say(protocol::OpenMessage{5, "wind"});
   ASSERT_EQ(driver.describes.size(), 1U);
   EXPECT_EQ(driver.describes[0].dataset, "wind");
-  EXPECT_FALSE(driver.render) << "the client's own view may still come";
+  EXPECT_FALSE(driver.render) << "the client may still send a view";
   driver.patch(1, R"({"image":{"width":640,"height":480}})");
   driver.described(5, description("wind"));
   const auto opened = driver.texts_of<protocol::OpenedMessage>();
@@ -34,7 +34,7 @@ TEST(Open, DescribesTheDatasetAndRendersIt) {
   EXPECT_EQ(driver.render->view.image.width, 640);
 }
 
-// Of several refusals a viewer may see the last alone.
+// If several requests are refused, a client may show only the last error.
 TEST(Open, FailureExplainsWhyThereIsNothingToPlay) {
   const auto why = make_error(ErrorKind::out_of_memory, "the field needs 9 MiB");
   const auto play = [](Driver& driver) {
@@ -43,7 +43,7 @@ TEST(Open, FailureExplainsWhyThereIsNothingToPlay) {
     return driver.texts_of<protocol::ErrorMessage>().at(0).problem;
   };
   Driver described;
-  EXPECT_EQ(play(described).status, 404) << "nothing was asked for";
+  EXPECT_EQ(play(described).status, 404) << "nothing was requested";
   described.say(protocol::OpenMessage{5, "wind"});
   described.described(5, why);
   EXPECT_EQ(play(described).status, 507);
@@ -53,7 +53,7 @@ TEST(Open, FailureExplainsWhyThereIsNothingToPlay) {
   drawn.fail_render(why);
   EXPECT_EQ(play(drawn).status, 507);
 
-  // Once another one was there, what failed before it is no reason any more.
+  // After another dataset was opened, an earlier failure is no longer reported.
   described.say(protocol::OpenMessage{6, "sea"});
   described.described(6, description("sea"));
   described.patch(1, R"({"dataset":null})");
@@ -110,7 +110,7 @@ TEST(Changed, DatasetIsDescribedAndRenderedAgain) {
   ASSERT_EQ(driver.describes.size(), 1U);
   EXPECT_EQ(driver.describes[0].id, 5U);
   driver.changed("wind");
-  EXPECT_EQ(driver.describes.size(), 1U) << "is on its way";
+  EXPECT_EQ(driver.describes.size(), 1U) << "is being opened";
   driver.described(5, description("wind"));
   EXPECT_EQ(driver.texts_of<protocol::OpenedMessage>().size(), 1U);
   driver.settle();
@@ -169,7 +169,7 @@ TEST(Open, UnreadableDataKeepTheOldView) {
   driver.patch(1, R"({"dataset":"wind","step":2})");
   driver.settle();
   driver.say(protocol::OpenMessage{3, "sea"});
-  driver.described(3, make_error(ErrorKind::bad_data, "the file is torn"));
+  driver.described(3, make_error(ErrorKind::bad_data, "the file is damaged"));
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].id, 3U);
   driver.settle();
@@ -217,16 +217,16 @@ TEST(Patch, UnreadableDataDiscardThatPatchOnly) {
   driver.settle();
   driver.patch(2, R"({"step":3})");
   driver.patch(3, R"({"camera":{"fovY":20}})");
-  driver.fail_render(make_error(ErrorKind::bad_data, "step 3 is torn"));
+  driver.fail_render(make_error(ErrorKind::bad_data, "step 3 is damaged"));
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].rev, 2U);
-  EXPECT_THAT(driver.errors()[0].problem.detail, HasSubstr("torn"));
+  EXPECT_THAT(driver.errors()[0].problem.detail, HasSubstr("damaged"));
   driver.settle();
   EXPECT_EQ(driver.frames.back().header.step, 2U);
   EXPECT_EQ(driver.frames.back().header.rev, 3U);
 }
 
-// The step that cannot be read is hidden under a later patch before any frame is drawn of it.
+// A later patch hides the unreadable step before any frame of it is drawn.
 TEST(Patch, FailedPatchBelowLaterOnesIsFoundAndTheStreamContinues) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind","step":2})");
@@ -237,7 +237,7 @@ TEST(Patch, FailedPatchBelowLaterOnesIsFoundAndTheStreamContinues) {
   driver.finish_render();
   const auto fail_step_3 = [&] {
     for (int turns = 0; turns < 10 && driver.render && driver.render->view.step == 3; ++turns) {
-      driver.fail_render(make_error(ErrorKind::bad_data, "step 3 is torn"));
+      driver.fail_render(make_error(ErrorKind::bad_data, "step 3 is damaged"));
     }
   };
   fail_step_3();
@@ -246,7 +246,7 @@ TEST(Patch, FailedPatchBelowLaterOnesIsFoundAndTheStreamContinues) {
   driver.patch(5, R"({"camera":{"fovY":25}})");
   fail_step_3();
   driver.settle();
-  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "an innocent patch is followed";
+  EXPECT_EQ(driver.frames.back().header.rev, 5U) << "a valid patch is applied";
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
   bool named = false;
   for (const auto& error : driver.errors()) {
@@ -279,7 +279,7 @@ TEST(Patch, FailureKeepsTheFinalFrame) {
   driver.patch(2, R"({"step":5})");
   driver.fail_render(make_error(ErrorKind::out_of_memory, "no room"));
   driver.wait(3000 * ms);
-  EXPECT_EQ(driver.renders, renders + 1) << "what the viewer sees is the old view, sharp";
+  EXPECT_EQ(driver.renders, renders + 1) << "the client displays the final frame of the old view";
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].rev, 2U);
   EXPECT_TRUE(driver.texts_of<protocol::UnchangedMessage>().empty()) << "no patch is answered";
@@ -320,10 +320,10 @@ TEST(Ack, MayBeRepeatedOrLate) {
   driver.patch(4, R"({"step":3})");
   driver.finish_render();
   driver.patch(5, R"({"step":4})");
-  EXPECT_FALSE(driver.render) << "two are out, however often old ones were acknowledged";
+  EXPECT_FALSE(driver.render) << "two are unacknowledged, however often old ones were acknowledged";
 }
 
-// --- steps that run -----------------------------------------------------------------------------
+// --- playback -----------------------------------------------------------------------------------
 
 // Draws each frame in `cost` and acknowledges it, for `duration`.
 void run_for(Driver& driver, Micros duration, Micros cost) {
@@ -354,15 +354,15 @@ TEST(Play, WithDropSkipsLateSteps) {
   driver.settle();
   driver.frames.clear();
   driver.say(play(0, 9, 20, false, true));
-  run_for(driver, 700 * ms, 120 * ms);  // 50 ms a step, 120 ms a frame
+  run_for(driver, 700 * ms, 120 * ms);  // 50 ms per step, 120 ms per frame
   std::vector<std::uint32_t> shown;
   for (const SendFrame& frame : driver.frames) {
     if (!Driver::is_final(frame)) shown.push_back(frame.header.step);
   }
   ASSERT_GE(shown.size(), 3U);
   for (std::size_t n = 1; n < shown.size(); ++n) EXPECT_GT(shown[n], shown[n - 1]);
-  EXPECT_LT(shown.size(), 7U) << "some must be left out";
-  EXPECT_EQ(shown.back(), 9U) << "the last is where it ends, and on time";
+  EXPECT_LT(shown.size(), 7U) << "some must be skipped";
+  EXPECT_EQ(shown.back(), 9U) << "the last step is the end of the range, and on time";
 }
 
 TEST(Play, WithoutDropShowsEveryStep) {
@@ -394,7 +394,7 @@ TEST(Play, PauseStopsAtTheShownStepAndMakesItFinal) {
   EXPECT_TRUE(Driver::is_final(driver.frames.back()));
   driver.patch(2, R"({"camera":{"fovY":20}})");
   ASSERT_TRUE(driver.render);
-  EXPECT_EQ(driver.render->view.step, 3) << "the view keeps the step that time has reached";
+  EXPECT_EQ(driver.render->view.step, 3) << "the view keeps the step reached by the clock";
 }
 
 TEST(Play, ContinuesFromASelectedStep) {
@@ -423,14 +423,14 @@ TEST(Play, UnreadableStepStopsIt) {
   driver.settle();
   driver.say(play(0, 9, 10, true, true));
   driver.wait(110 * ms);
-  driver.fail_render(make_error(ErrorKind::bad_data, "torn"));
+  driver.fail_render(make_error(ErrorKind::bad_data, "damaged"));
   driver.settle();
   driver.wait(1000 * ms);
   EXPECT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.frames.back().header.step, 0U);
 }
 
-// --- ends ---------------------------------------------------------------------------------------
+// --- closing ------------------------------------------------------------------------------------
 
 TEST(End, BinaryMessageClosesWith4400) {
   Driver driver;

@@ -67,7 +67,8 @@ class Renderer {
   int renders = 0;
 
  private:
-  // Deliberately not the session's model: another power law, and pictures vary.
+  // Differs deliberately from the model of the session: another power law, and sizes vary between
+  // pictures.
   std::size_t bytes(double pixels, const StartRender& wanted) {
     const int quality = wanted.encoding.quality;
     const double scale = quality < 50 ? 50.0 / quality : 2 - quality / 50.0;
@@ -78,14 +79,14 @@ class Renderer {
   }
 
   Clock& clock_;
-  Micros full_us_;  // of 1280x720
+  Micros full_us_;  // bytes of 1280x720
   Micros free_at_ = 0;
 };
 
 struct LinkOptions {
   double bytes_per_s = 1e6;
   Micros delay = 1000;   // decoding of frames in the client, one at a time
-  Micros decode = 2000;  // of a frame in the viewer, one after the other
+  Micros decode = 2000;  // time to decode a frame in the client, one after the other
 };
 
 struct Shown {
@@ -93,8 +94,8 @@ struct Shown {
   bool final = false;
   int quality = 0;
   double pixels = 0;
-  double wire_bytes = 0;  // with its texts of the newest patch at its start
-  Micros t = 0;           // of the newest patch when it was begun
+  double wire_bytes = 0;  // with its texts; t of the newest patch at the start
+  Micros t = 0;           // t of the newest patch when the render was started
   Micros arrived = 0;
   Micros shown = 0;  // decoded
 };
@@ -110,7 +111,7 @@ class Viewer {
         session_({}, {[](const protocol::View&) { return windsplat::Result<int>(10); }, {}, {}},
                  clock.now()) {}
 
-  // Moves the camera 60 times a second until `end`.
+  // Moves the camera 60 times per second until `end`.
   void drag(Micros end) {
     if (rev_ == 0) patch(R"({"dataset":"wind","image":{"width":1280,"height":720}})");
     for (Micros time = clock_.now() + patch_every; time < end; time += patch_every) {
@@ -122,7 +123,7 @@ class Viewer {
     clock_.at(clock_.now() + options_.delay,
               [this, message] { take(session_.on_message(message, clock_.now())); });
   }
-  // Answered by an error at once; the time of its arrival.
+  // A message answered by an error at once; returns the time of arrival of the error.
   void ask(std::function<void(Micros)> answered) {
     clock_.at(clock_.now() + options_.delay, [this, answered = std::move(answered)] {
       answers_.push_back(answered);
@@ -251,7 +252,7 @@ class Viewer {
   bool writing_ = false;
   bool rendering_ = false;
   std::size_t unacked_ = 0;
-  Micros free_at_ = 0;  // of the bottleneck link
+  Micros free_at_ = 0;  // rate of the bottleneck link
   Micros decoder_free_ = 0;
   std::uint64_t wakes_ = 0;
   std::deque<std::function<void(Micros)>> answers_;

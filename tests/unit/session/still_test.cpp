@@ -1,4 +1,4 @@
-// Stills: their size, their turn between moving frames, and their errors.
+// Stills: their size, their order among moving frames, and their errors.
 #include <gmock/gmock.h>
 
 #include "driver.hpp"
@@ -65,7 +65,7 @@ TEST(Still, ReleasedDataDuringLoadingAreReported) {
   driver.fail_render(make_error(ErrorKind::not_resident, "its memory was released; try again"));
   ASSERT_EQ(driver.errors().size(), 1U);
   EXPECT_EQ(driver.errors()[0].id, 77U);
-  EXPECT_FALSE(driver.render) << "whoever still wants it asks again";
+  EXPECT_FALSE(driver.render) << "a client that still needs it requests it again";
 }
 
 TEST(Still, OversizeExcessOrEmptyStillIsAnError) {

@@ -1,4 +1,4 @@
-// What the store does when the files of its datasets change.
+// Behaviour of the store when the files of its datasets change.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -37,7 +37,7 @@ TEST(Store, ChangedFileIsReopenedUnderItsName) {
 
   std::ofstream(folder / "rain.nc", std::ios::trunc) << "no longer a netCDF file";
   EXPECT_TRUE(store.look_for_changes(0).empty());
-  EXPECT_EQ(store.find("rain").value(), after) << "the old data stay";
+  EXPECT_EQ(store.find("rain").value(), after) << "the old data are kept";
   EXPECT_NE(store.problem("rain").find("changed"), std::string::npos);
   EXPECT_EQ(after->volume("f", 0).value()->values[3], 53.0F);
 }
@@ -58,7 +58,7 @@ TEST(Store, SeriesGrowsAndShrinksWithItsFolder) {
   Store store(1 << 20);
   const std::string id = store.add(folder / "f*.nc").value()->info().id;
   EXPECT_TRUE(store.look_for_changes(0).empty());
-  std::ofstream(folder / "notes.txt") << "nothing of the series";
+  std::ofstream(folder / "notes.txt") << "not part of the series";
   EXPECT_TRUE(store.look_for_changes(0).empty());
   ASSERT_EQ(store.find(id).value()->info().steps.size(), 2U);
 
@@ -89,7 +89,7 @@ TEST(Store, OmittedFilesOfASeriesAreNoted) {
   EXPECT_EQ(store.note(id), "");
 }
 
-// Like the output of a running model: the same file of the same size.
+// Like the output of a running model: the same file with the same size.
 TEST(Store, FileOverwrittenInPlaceIsReopened) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
@@ -154,7 +154,7 @@ TEST(Store, DatasetThatFailsTheCheckDoesNotReplaceAValidOne) {
   replace(50);
   for (int look = 0; look < 3; ++look) EXPECT_TRUE(store.look_for_changes(0).empty());
   EXPECT_EQ(opened, 2) << "at first, and once for the change";
-  EXPECT_EQ(store.find("rain").value(), before) << "the old data stay";
+  EXPECT_EQ(store.find("rain").value(), before) << "the old data are kept";
   EXPECT_NE(store.problem("rain").find("it needs 9 GiB"), std::string::npos);
   is_too_large = false;
   replace(60);

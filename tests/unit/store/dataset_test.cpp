@@ -1,4 +1,5 @@
-// A dataset's volumes: read once per field and step, within a budget; what is held stays valid.
+// Volumes of a dataset: read once per field and step, within a budget; referenced volumes stay
+// valid.
 #include "server/data/resident/dataset.hpp"
 
 #include <gtest/gtest.h>
@@ -110,14 +111,14 @@ TEST(Dataset, LoadAboveTheLimitIsRefusedWithFigures) {
   const auto dataset = make_dataset(3);
   auto a = dataset->volume("a", 0);
   auto b = dataset->volume("b", 0);
-  ASSERT_TRUE(dataset->volume("c", 0));  // resident, held by nobody
+  ASSERT_TRUE(dataset->volume("c", 0));  // resident, without references
   const auto vector = dataset->volume("v", 0);
   ASSERT_FALSE(vector);
   EXPECT_EQ(vector.error().kind, ErrorKind::out_of_memory);
   EXPECT_NE(vector.error().message.find("limit"), std::string::npos);
   EXPECT_NE(vector.error().message.find("MiB"), std::string::npos);
   EXPECT_EQ(dataset->loads(), 3U);                         // refused before it was read
-  EXPECT_EQ(dataset->resident_bytes(), 3 * kVolumeBytes);  // c was not given up in vain
+  EXPECT_EQ(dataset->resident_bytes(), 3 * kVolumeBytes);  // c was not evicted in vain
   *a = nullptr;
   *b = nullptr;
   EXPECT_TRUE(dataset->volume("v", 0));
@@ -138,7 +139,7 @@ TEST(Dataset, FailureReachesAllWaitersAndIsRetriedLater) {
   ASSERT_FALSE(first);
   EXPECT_EQ(first.error().message, "read failed");
   EXPECT_EQ(dataset.resident_bytes(), 0U);
-  EXPECT_TRUE(dataset.volume("a", 0));  // its reservation was given back
+  EXPECT_TRUE(dataset.volume("a", 0));  // its reservation was released
   EXPECT_EQ(dataset.loads(), 2U);
 }
 
@@ -167,7 +168,7 @@ TEST(Dataset, ManyThreadsWithASmallBudget) {
         const std::size_t step = (state >> 16) % 20;
         const auto volume = dataset->volume("b", step);
         if (!volume) {
-          ++refused;  // only possible if others hold everything
+          ++refused;  // only possible if others reference everything
         } else if ((*volume)->values[500] != static_cast<float>(1000 + step)) {
           ++wrong;
         }
@@ -178,7 +179,7 @@ TEST(Dataset, ManyThreadsWithASmallBudget) {
     thread.join();
   }
   EXPECT_EQ(wrong, 0);
-  EXPECT_EQ(refused, 0);  // four threads hold at most four of six
+  EXPECT_EQ(refused, 0);  // four threads reference at most four of six
   EXPECT_LE(dataset->resident_bytes(), 6 * kVolumeBytes);
 }
 

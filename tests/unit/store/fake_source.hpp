@@ -1,4 +1,4 @@
-// A source in memory whose reads can be held up and made to fail.
+// A source in memory whose reads can be blocked and made to fail.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -17,8 +17,8 @@
 
 namespace windsplat::data {
 
-// A source of 10 x 10 x 10 volumes whose every sample tells field and step. It can be made to wait
-// at a gate, and to fail.
+// A source of 10 x 10 x 10 volumes in which every sample encodes field and step. It can be made to
+// wait at a gate, and to fail.
 class FakeSource : public Source {
  public:
   FakeSource() {
@@ -66,7 +66,7 @@ class FakeSource : public Source {
     return volume;
   }
 
-  // Holds readers until it is opened.
+  // Blocks readers until it is opened.
   class Gate {
    public:
     void wait() {

@@ -195,7 +195,7 @@ TEST(Resident, PrefetchStaysWithinTheLimitAndKeepsRequestedVolumes) {
   EXPECT_TRUE(f.is_resident(3));
 }
 
-// Least-recently-used alone would evict the oldest.
+// Plain least-recently-used order would evict the oldest.
 TEST(Resident, UnrequestedVolumesAreEvictedBeforeOlderRequests) {
   Fixture f(3);
   for (const std::size_t step : {1, 2, 3}) ASSERT_TRUE(f.dataset->volume("f", step));
@@ -243,7 +243,7 @@ TEST(Resident, RemovedDatasetIsNoLongerLoaded) {
 }
 
 // A series larger than memory, played in a loop with prefetch: every step is resident when shown,
-// though least-recently-used alone would evict each before its next use.
+// although plain least-recently-used order would evict each before its next use.
 TEST(Resident, SeriesLargerThanMemoryPlaysEveryStep) {
   Fixture f(8);
   constexpr std::size_t steps = 20;

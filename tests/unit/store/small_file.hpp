@@ -7,7 +7,7 @@
 
 namespace windsplat::data::test {
 
-// A field `f` of 2 x 2 values: `first` and the three that follow it.
+// A field `f` of 2 x 2 values: `first` and the three following numbers.
 inline void write_small(const std::string& path, double first) {
   NetcdfMaker file(path);
   const int y = file.axis("lat", {0, 1}, "degrees_north");

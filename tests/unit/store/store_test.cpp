@@ -1,4 +1,4 @@
-// Guarantees of the store: one load per field and step, one budget for all, held volumes stay
+// Guarantees of the store: one load per field and step, one budget for all, referenced volumes stay
 // valid.
 
 #include "server/data/resident/store.hpp"
@@ -207,7 +207,7 @@ TEST(Store, MetadataOfADatasetCountsInTheLimit) {
   EXPECT_EQ(store.counts().bytes, 0U);
 }
 
-// A model writes its newest file.
+// A model is writing its newest file.
 TEST(Store, ChangeOfTheLastFileOfALongSeriesIsDetected) {
   const Folder folder;
   for (int i = 100; i < 200; ++i) std::ofstream(folder / numbered(i)) << "a step";

@@ -1,4 +1,4 @@
-// Loads in turn wait until memory referenced by others is released, and only where that helps.
+// Loads in turn wait until memory referenced by others is released, and only if that helps.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -18,7 +18,7 @@ using TurnClock = std::chrono::steady_clock;
 constexpr std::size_t side = 10;
 constexpr std::uint64_t plain_bytes = side * side * side * sizeof(float);
 
-// Fields a and b of 10 x 10 x 10 samples, 20 steps; every sample is its step.
+// Fields a and b of 10 x 10 x 10 samples, 20 steps; the value of every sample is its step.
 class PlainSource : public Source {
  public:
   PlainSource() {
@@ -194,7 +194,7 @@ TEST(Budget, LoadThatFitsBesideALoadInTurnDoesNotWait) {
   EXPECT_TRUE(get(2, 3, Urgency::demand)) << "5 and 3 are less than 10";
   EXPECT_FALSE(get(3, 3, Urgency::demand)) << "5, 3 and 3 are more";
   EXPECT_EQ(next.wait_for(std::chrono::milliseconds(20)), std::future_status::timeout);
-  held = make_error(ErrorKind::internal, "let go of");
+  held = make_error(ErrorKind::internal, "released");
   EXPECT_TRUE(next.get());
 }
 
@@ -212,7 +212,7 @@ TEST_F(Turn, ShutdownEndsAllWaits) {
   EXPECT_LT(TurnClock::now() - begin, Budget::patience / 2);
 }
 
-// A source whose reads need as much memory again.
+// A source whose reads need as much memory as the volume.
 class HungrySource : public PlainSource {
  public:
   explicit HungrySource(std::shared_ptr<Budget> budget) : work_(std::move(budget)) {}

@@ -14,9 +14,9 @@
 namespace windsplat::study {
 namespace {
 
-Compared compared(double told, double truth, std::size_t setting = 0, std::size_t look = 0) {
+Compared compared(double told, double truth, std::size_t setting = 0, std::size_t variant = 0) {
   Compared one;
-  one.look = look;
+  one.variant = variant;
   one.setting = setting;
   one.error = truth;
   one.forecast = {told, std::log(2.0) / 1.65, 1, true};  // bounded by twice the estimate
@@ -27,7 +27,7 @@ Compared compared(double told, double truth, std::size_t setting = 0, std::size_
 Calibration made_up() {
   Calibration calibration;
   calibration.plan = {64, 48, 1, 1};
-  calibration.looks = {"unchanged", "lines only"};
+  calibration.variants = {"unchanged", "lines only"};
   const std::size_t slab = quality::index_of({protocol::MethodName::slab, 0, 0}).value();
   calibration.compared = {compared(0.01, 0.01), compared(0.019, 0.01), compared(0.01, 0.019, slab),
                           compared(0.01, 0.021, slab, 1)};
@@ -41,8 +41,8 @@ Calibration made_up() {
 TEST(Looks, MatchTheContentOfTheSubject) {
   const auto names_of = [](const char* scene) {
     std::set<std::string> names;
-    for (const Look& look : looks_of(standard_subject(scene, true).value())) {
-      EXPECT_TRUE(names.insert(look.name).second);
+    for (const Variant& variant : variants_of(standard_subject(scene, true).value())) {
+      EXPECT_TRUE(names.insert(variant.name).second);
     }
     return names;
   };
@@ -53,13 +53,13 @@ TEST(Looks, MatchTheContentOfTheSubject) {
 
 TEST(Looks, DifferInTheNamedProperties) {
   const Subject subject = standard_subject("soft", true).value();
-  for (const Look& look : looks_of(subject)) {
-    const bool lines = look.view.vector.field.kind == protocol::FieldChoice::Kind::named;
-    EXPECT_EQ(lines, look.name != "medium only");
-    EXPECT_EQ(look.view.scalars->empty(), look.name == "lines only");
-    if (look.name != "ten times as dense") continue;
+  for (const Variant& variant : variants_of(subject)) {
+    const bool lines = variant.view.vector.field.kind == protocol::FieldChoice::Kind::named;
+    EXPECT_EQ(lines, variant.name != "medium only");
+    EXPECT_EQ(variant.view.scalars->empty(), variant.name == "lines only");
+    if (variant.name != "ten times as dense") continue;
     const auto& own = *subject.view.scalars->front().extinction;
-    const auto& dense = *look.view.scalars->front().extinction;
+    const auto& dense = *variant.view.scalars->front().extinction;
     EXPECT_NEAR(dense.back()[1], 10 * own.back()[1], 1e-9 * own.back()[1]);
   }
 }
@@ -83,7 +83,8 @@ TEST(Agreement, CountsSharesAndTheMedianRatio) {
   EXPECT_DOUBLE_EQ(all.within_two, 0.75);
   EXPECT_DOUBLE_EQ(all.bounded, 0.75);
   EXPECT_NEAR(all.median, 0.5 * (1 + 0.01 / 0.019), 1e-12);
-  const Agreement first = agreement(calibration, [](const Compared& one) { return one.look == 0; });
+  const Agreement first =
+      agreement(calibration, [](const Compared& one) { return one.variant == 0; });
   EXPECT_DOUBLE_EQ(first.within_two, 1);
   EXPECT_DOUBLE_EQ(agreement_of_priors(calibration).within_two, 0);
   EXPECT_DOUBLE_EQ(agreement_of_priors(calibration).bounded, 1);
@@ -114,7 +115,7 @@ TEST(Calibrate, ComparesEverySettingOfEveryHeldOutView) {
         EXPECT_EQ(n, ++views);
       }).value();
   EXPECT_EQ(views, 2 * 3);
-  EXPECT_EQ(made.looks.size(), 2U);
+  EXPECT_EQ(made.variants.size(), 2U);
   protocol::View view = subject.view;
   view.image.width = 100;
   view.image.height = 80;
@@ -165,7 +166,7 @@ TEST(CalibrationReport, IsInTheJson) {
   }
   EXPECT_EQ(json.at("aims").at(0).at("promisedKept"), 2);
   EXPECT_EQ(json.at("checks").at(0).at("apart"), 2e-6);
-  const std::string first = scene.calibration->looks[0];
+  const std::string first = scene.calibration->variants[0];
   const Json frame{{"look", first}, {"method", "slab"}, {"error", 0.25}, {"measured", 0.5}};
   EXPECT_EQ(json.at("measured").back(), frame);
 }

@@ -63,7 +63,7 @@ TEST(Keys, ChangeWithEveryInputOfAPoint) {
   EXPECT_EQ(keys.size(), 10U);
 }
 
-// Independent of inputs that affect only the time.
+// Independent of inputs that affect the time only.
 TEST(Keys, OfAReferenceChangeWithToleranceAndProgramOnly) {
   const Subject subject = standard_subject("vectors", true).value();
   const Machine machine = this_machine(2).value();

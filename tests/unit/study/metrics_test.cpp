@@ -1,4 +1,4 @@
-// Errors in linear light against manual sums, and FLIP by its known properties.
+// Errors in linear light compared with manual sums, and FLIP by its known properties.
 #include "server/study/metrics.hpp"
 
 #include <gtest/gtest.h>
@@ -91,8 +91,8 @@ TEST(Flip, EqualPicturesGiveZero) {
   EXPECT_EQ(flip(picture, picture), 0);
 }
 
-// |dL*| = 100; the largest difference there is, green to blue after Hunt, is 203.7:
-// 0.95 + 0.05 (100^.7 - .4 m) / (.6 m) with m = 203.7^.7.
+// |dL*| = 100; the largest possible difference, green to blue after Hunt, is 203.7: 0.95 + 0.05
+// (100^.7 - .4 m) / (.6 m) with m = 203.7^.7.
 TEST(Flip, BlackAndWhiteGiveNearlyOne) {
   const double m = std::pow(203.7, 0.7);
   const double expected = 0.95 + 0.05 * (std::pow(100, 0.7) - 0.4 * m) / (0.6 * m);
@@ -123,8 +123,8 @@ TEST(Flip, OneCodeIsSmallAndGrowsWithNoise) {
   }
 }
 
-// The eye blurs fine patterns: a checkerboard of single pixels is closer to its mean light than one
-// of coarse squares.
+// The eye blurs fine patterns: a checkerboard of single pixels is closer to its mean colour than
+// one of coarse squares.
 TEST(Flip, IgnoresInvisiblyFineDetail) {
   const auto checker = [](int cell) {
     Rgb rgb;
@@ -140,8 +140,8 @@ TEST(Flip, IgnoresInvisiblyFineDetail) {
   EXPECT_LT(flip(mean, checker(1)), 0.5 * flip(mean, checker(12)));
 }
 
-// Stripes differ from a uniform background in as many pixels as one brighter half, and blurring
-// (about a pixel) changes little at 8 pixels per stripe; but they have more edges.
+// As many pixels of stripes differ from a uniform background as of one brighter half, and blurring
+// (about a pixel) changes little at 8 pixels per stripe; but stripes have more edges.
 TEST(Flip, WeightsDifferencesAtEdges) {
   const auto stripes = [](int wide) {
     Rgb rgb;

@@ -50,8 +50,8 @@ TEST(Stability, CorrectedAndAnalyticStayWithinTheUnitInterval) {
 }
 
 // exp(-tau x) and its chord 1 - x (1 - exp(-tau)) differ by at most tau^2 / 8, and by less than 1;
-// times the line's opacity 0.6 and the largest distance of its colour from the medium's, 0.7. The
-// error grows with tau: the bound is not met by being exact.
+// times the opacity 0.6 of the line and the largest distance 0.7 of its colour from that of the
+// medium. The error grows with tau, so that exact results do not satisfy the test.
 TEST(Stability, ChordOfCorrectedDeviatesByAtMostAnEighthOfTheSquare) {
   for (const Stiffness& s : sweep_of(Compositing::cd)) {
     const double most = 0.6 * 0.7 * std::min(1.0, s.tau * s.tau / 8);
@@ -62,8 +62,8 @@ TEST(Stability, ChordOfCorrectedDeviatesByAtMostAnEighthOfTheSquare) {
   }
 }
 
-// The transmittance of n layers is (1 - tau)^n: beyond 1 the first layer leaves [0, 1], below 2
-// later layers correct that, from 2 on they make it no better or worse.
+// The transmittance of n layers is (1 - tau)^n: above tau = 1 the first layer leaves [0, 1], below
+// 2 later layers correct that, from 2 on they do not.
 TEST(Stability, EulerLeavesTheUnitIntervalAboveOneAndDivergesFromTwo) {
   for (const Stiffness& s : sweep_of(Compositing::cd_euler)) {
     EXPECT_EQ(s.bounded, s.tau <= 1) << s.tau;

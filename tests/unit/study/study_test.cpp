@@ -35,7 +35,7 @@ std::string read(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-// A uniform grey picture; counts its evaluations.
+// A uniform grey picture that counts its evaluations.
 Truth grey(int& asked) {
   return [&asked](const scene::Scene& scene) -> Result<Picture> {
     ++asked;
@@ -144,7 +144,7 @@ TEST(Study, UnknownValuesAreNull) {
   EXPECT_TRUE(reference.at("tolerance").is_null());
 }
 
-// The view's thickness is not the default; the kernel method has none.
+// The slab thickness of the view is not the default; the kernel method has none.
 TEST(Report, MarksPointsWithTheViewsOwnSettings) {
   Report report;
   SceneReport scene;

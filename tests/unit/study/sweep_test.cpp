@@ -1,4 +1,5 @@
-// The swept settings, the error of a point against a reference, and the error floor of splats.
+// The settings of the sweep, the error of a point relative to a reference, and the error floor of
+// splats.
 #include "server/study/sweep.hpp"
 
 #include <gtest/gtest.h>
@@ -87,7 +88,7 @@ TEST(Scene, AppliesItsParametersAndScalesLinesWithThePicture) {
   EXPECT_EQ(scene.camera.eye, whole.camera.eye);
 }
 
-// soft and dense are named for the optical depth of their deepest row of samples.
+// soft and dense are named after the optical depth of their deepest row of samples.
 TEST(Scene, HasTheNamedOpticalDepth) {
   for (const auto& [name, depth] : {std::pair{"soft", 1.0}, std::pair{"dense", 10.0}}) {
     const Subject subject = standard_subject(name, true).value();
@@ -108,7 +109,7 @@ TEST(Scene, HasTheNamedOpticalDepth) {
   }
 }
 
-// A reference equal to the setting's own picture except for a known amount in one channel.
+// A reference equal to the picture of the setting except for a known amount in one channel.
 TEST(Measure, IsTheDistanceFromTheGivenReference) {
   const Subject subject = standard_subject("soft", true).value();
   const Setting setting{Method::kernel, Compositing::analytic, own_knobs(subject)};
@@ -143,8 +144,8 @@ TEST(Measure, SmallerPictureIsComparedAtTheReferenceSize) {
               frame::difference_of(larger, truth.rgba).rmse, 1e-12);
 }
 
-// Overlapping footprints ripple by 1 % peak to peak on axis to 4 % at 45 degrees, of tau = 1: an
-// error of alpha below 4 % / e, and above zero.
+// The ripple of overlapping footprints is 1 % peak to peak on axis to 4 % at 45 degrees, of tau =
+// 1: an error of alpha below 4 % / e, and above zero.
 TEST(Ripple, IsBetweenZeroAndTheRippleOfTheFootprint) {
   ThreadPool pool(1);
   const double floor =
@@ -165,7 +166,7 @@ TEST(Ripple, IsAbsentForCurvedLatticesAndSlices) {
   EXPECT_TRUE(std::isnan(reconstruction_ripple(slice, pool, CancelToken()).value()));
 }
 
-// Heights bend the lattice and its box; the orbit of the study views that box.
+// Heights bend the lattice and change its box; the orbit of the study views the changed box.
 TEST(Scene, FramesHeightsUnlessTheViewSetsItsFrame) {
   const auto terrain = [] {
     auto source = std::make_unique<scene::FakeSource>(

@@ -112,7 +112,7 @@ TEST(HandshakeTask, EndedTaskDoesNotWaitForATurn) {
   Held held;
   const auto task = std::make_shared<Task>(held.thread);
   task->submit([] {});
-  EXPECT_EQ(task.use_count(), 2) << "the waiting step keeps it";
+  EXPECT_EQ(task.use_count(), 2) << "the waiting step keeps it alive";
   task->end();
   EXPECT_EQ(task.use_count(), 1);
   const auto kept = std::make_shared<int>(0);

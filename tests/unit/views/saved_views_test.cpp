@@ -79,7 +79,7 @@ TEST(SavedViewsInMemory, AreFoundByTheirIds) {
     EXPECT_EQ(views->find(saved->id)->created, time_of_all);
   }
   EXPECT_EQ(ids.size(), 100U);
-  // A poor random generator would omit letters: 1000 ids miss one of 32 once in 10^12 runs.
+  // A biased random generator would omit letters: 1000 ids miss one of 32 once in 10^12 runs.
   std::set<char> letters;
   for (const std::string& id : ids) letters.insert(id.begin(), id.end());
   EXPECT_EQ(letters.size(), 32U);
@@ -136,7 +136,7 @@ TEST(SavedViewsInMemory, ConditionalChangeIsMadeOnlyWhenItsConditionHolds) {
   const std::string id = views->add(view_of_step(1), time_of_all)->id;
   const auto never = [](const SavedView&) { return false; };
   const auto kept = views->replace(id, never, [](const ViewDocument&) -> Result<ViewDocument> {
-    ADD_FAILURE() << "requested though it may not change";
+    ADD_FAILURE() << "requested although it may not change";
     return view_of_step(2);
   });
   ASSERT_TRUE(kept);
@@ -158,7 +158,7 @@ TEST(SavedViewsInMemory, ManyThreadsAddChangeAndReadConcurrently) {
       for (int i = 0; i < 200; ++i) {
         const auto own = views->add(view_of_step(i), time_of_all);
         if (!own || views->find(own->id)->view.view().step != i) ++bad;
-        // Each adds one to the value it finds: no increment may be lost.
+        // Each call adds one to the current value: no increment may be lost.
         const auto add = [](const ViewDocument& now) { return view_of_step(now.view().step + 1); };
         if (!views->replace(shared, always, add)) ++bad;
         if (i % 2 == 0 && !views->remove(own->id, always)) ++bad;
@@ -265,7 +265,7 @@ TEST_F(SavedViewsOnDisk, TruncatedAndForeignFilesAreIgnoredAndKept) {
     std::string out = text;
     return out.replace(out.find(good), good.size(), id);
   };
-  write("0000000000.json", renamed("0000000000").substr(0, text.size() / 2));  // torn
+  write("0000000000.json", renamed("0000000000").substr(0, text.size() / 2));  // truncated
   write("1111111111.json", "");
   write("2222222222.json", renamed("bbbbbbbbbb"));  // id of another view
   write("3333333333.json", renamed("3333333333") + std::string(70000, ' '));

@@ -1,4 +1,4 @@
-// Costs of pictures, learnt from those that were drawn.
+// Costs of pictures, learned from those that were drawn.
 #include "server/work/cost_history.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ constexpr auto kernel = protocol::MethodName::kernel;
 
 TEST(RenderCosts, UseTypicalCostsForUnknownOnes) {
   const RenderCosts costs(2);
-  EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 3) << "6 ns of a thread's time";
+  EXPECT_DOUBLE_EQ(costs.estimate_ms("a", slab, 1e6), 3) << "6 ns of one thread";
   EXPECT_DOUBLE_EQ(RenderCosts(6).estimate_ms("a", slab, 1e6), 1);
 }
 
@@ -34,7 +34,7 @@ TEST(RenderCosts, AreAboveMostMeasuredCosts) {
   RenderCosts costs(2);
   int above = 0;
   for (int i = 0; i < 1000; ++i) {
-    const std::int64_t took_us = 1000 + 100 * (i * 7 % 41);  // 1 to 5 ms, evenly
+    const std::int64_t took_us = 1000 + 100 * (i * 7 % 41);  // 1 to 5 ms, uniformly distributed
     if (costs.estimate_ms("a", slab, 1e6) * 1000 >= static_cast<double>(took_us)) ++above;
     costs.learn("a", slab, 1e6, took_us);
   }
@@ -42,7 +42,7 @@ TEST(RenderCosts, AreAboveMostMeasuredCosts) {
   EXPECT_LT(above, 950);
 }
 
-// A machine that slept in the middle of a picture has none refused for good.
+// A suspension of the machine during a picture must not cause pictures to be refused permanently.
 TEST(RenderCosts, IgnoreOutliers) {
   RenderCosts costs(2);
   costs.learn("a", slab, 1e6, 3'600'000'000);

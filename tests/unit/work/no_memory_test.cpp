@@ -83,7 +83,7 @@ TEST(NoMemory, JobThatCannotBeQueuedChangesNothing) {
       queue.done(10);
       EXPECT_TRUE(queue.empty());
       EXPECT_FALSE(queue.pop()) << count;
-      // A failed job still counts as its owner's turn.
+      // A failed job still counts as a turn of its owner.
       queue.push(job_of(kind, 2), 0);
       ASSERT_TRUE(queue.pop());
       queue.done(10);
@@ -236,7 +236,7 @@ TEST(NoMemory, LoaderEndsWithItsObject) {
 TEST(NoMemory, LostConnectionDoesNotStopTheListener) {
   namespace asio = boost::asio;
   asio::io_context io;
-  const auto more = asio::make_work_guard(io);  // a server has its timers
+  const auto more = asio::make_work_guard(io);  // a server has timers
   asio::io_context clients;
   int accepted = 0;
   transport::Listener listener(

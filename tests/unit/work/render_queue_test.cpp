@@ -10,7 +10,7 @@
 namespace windsplat::work {
 namespace {
 
-// Owners that always have something to do: each gives its next job as soon as one was begun.
+// Owners that always have work: each submits its next job as soon as one was started.
 class Renderer {
  public:
   RenderJob job(RenderKind kind, std::uint64_t owner) {
@@ -83,7 +83,7 @@ TEST(RenderQueue, ShortPauseDoesNotResetTheShareOfAnOwner) {
   Renderer renderer;
   for (std::uint64_t owner = 1; owner <= 3; ++owner) renderer.ask(RenderKind::stream, owner);
   const std::map<std::uint64_t, std::int64_t> costs{{1, 1000}, {2, 10}, {3, 10}};
-  EXPECT_EQ(renderer.run(costs, false), 1U) << "the first of equals is the one that came first";
+  EXPECT_EQ(renderer.run(costs, false), 1U) << "among equals the first to arrive";
   renderer.ask(RenderKind::stream, 1);
   for (int i = 0; i < 198; ++i) EXPECT_NE(renderer.run(costs), 1U);
 }
@@ -132,7 +132,7 @@ TEST(RenderQueue, RunningBackgroundJobIsCancelledByOtherJobsOnly) {
     queue.done(1);
     const auto next = queue.pop();
     ASSERT_TRUE(next);
-    EXPECT_EQ(next->job.owner, 2U) << "and it is not run again";
+    EXPECT_EQ(next->job.owner, 2U) << "it is not run again";
     EXPECT_FALSE(next->job.cancel.cancelled());
     queue.done(1);
     EXPECT_TRUE(queue.empty());

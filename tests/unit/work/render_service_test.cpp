@@ -1,4 +1,4 @@
-// The render thread: refusals, shares of time and what is charged. Times are simulated.
+// The render thread: refusals, shares of time and charged time. Times are simulated.
 #include "server/work/render_service.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace windsplat::work {
 namespace {
 
-// A service whose thread is held in a job of a stream's until release() or the end.
+// A service whose thread is blocked in a job of a stream until release() or its destruction.
 class HeldService {
  public:
   explicit HeldService(RenderService::Options options = {}) : service_(std::move(options)) {
@@ -47,12 +47,12 @@ class HeldService {
   std::promise<void> held_;
   std::promise<void> gate_;
   bool released_ = false;
-  RenderService service_;  // last: its thread uses the above
+  RenderService service_;  // last member: its thread uses the above
 };
 
 TEST(RenderService, RefusesRequestsAboveItsEstimateOfWaitingWork) {
   HeldService held({16, 10'000, {}});
-  EXPECT_TRUE(held.request(60'000)) << "one alone is let in, whatever it costs";
+  EXPECT_TRUE(held.request(60'000)) << "a single request is admitted, whatever its cost";
   const auto refused = held.request(1);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::busy);
@@ -67,7 +67,7 @@ TEST(RenderService, EstimatesWhenWaitingWorkWillBeDone) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().retry_after_s, 8) << "7.2 s, in whole seconds";
   EXPECT_NE(refused.error().message.find("8 s"), std::string::npos) << refused.error().message;
-  EXPECT_TRUE(held.request(2'000)) << "a smaller one has room";
+  EXPECT_TRUE(held.request(2'000)) << "a smaller one is admitted";
 }
 
 TEST(RenderService, LimitsTheNumberOfJobsOfUnknownCost) {
@@ -139,8 +139,9 @@ TEST(RenderService, CancelsABackgroundJobForAFrame) {
   drawn.get_future().wait();
 }
 
-// A request is refused while another address's picture is drawn and one waits, unless its own cost
-// exceeds what is before it; waiting for one's own pictures is no reason for a refusal.
+// A request is refused while the picture of another address is drawn and another one waits, unless
+// its own cost exceeds the cost before it; waiting for pictures of the same address is no reason
+// for a refusal.
 TEST(RenderService, BoundsTheWaitForOthers) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;
@@ -172,7 +173,7 @@ TEST(RenderService, BoundsTheWaitForOthers) {
     EXPECT_TRUE(service.submit(std::move(first)));
     begun.get_future().wait();
     EXPECT_TRUE(ask("b", 90)) << "no other request waits";
-    EXPECT_FALSE(ask("c", 90)) << "90 of the one that runs and 90 of b's";
+    EXPECT_FALSE(ask("c", 90)) << "90 of the running one and 90 of b";
     EXPECT_TRUE(ask("b", 90)) << "its own";
     EXPECT_TRUE(ask("c", 300)) << "a long one";
     EXPECT_FALSE(ask("c", 90));
@@ -184,7 +185,7 @@ TEST(RenderService, BoundsTheWaitForOthers) {
   EXPECT_EQ(charged["a"], 40'000 + 90'000);
 }
 
-// Where many are refused the next one comes soon: a request is let in when what runs is nearly
+// When many are refused, new requests arrive soon: one is admitted when the running job is nearly
 // done.
 TEST(RenderService, UnderOverloadNoJobWaitsForAWholePicture) {
   std::atomic<std::int64_t> now_us{0};
@@ -213,10 +214,10 @@ TEST(RenderService, UnderOverloadNoJobWaitsForAWholePicture) {
   gone.cost_ms = 100;
   gone.payer = "w";
   gone.run = [](std::int64_t /*queue_us*/) {};
-  EXPECT_TRUE(service.submit(gone)) << "one waits for the one that runs";
+  EXPECT_TRUE(service.submit(gone)) << "one waits for the running one";
   for (int n = 0; n < 20; ++n) EXPECT_FALSE(ask("p" + std::to_string(n)));
   gone.cancel.cancel();
-  EXPECT_FALSE(ask("x")) << "100 ms of the one that runs";
+  EXPECT_FALSE(ask("x")) << "100 ms of the running one";
   now_us = 60'000;
   EXPECT_TRUE(ask("x")) << "40 ms";
   now_us = 5'000'000;
@@ -245,7 +246,7 @@ TEST(RenderService, OnePayerMayUseHalfOfTheSlots) {
   for (int n = 0; n < 3; ++n) EXPECT_TRUE(ask("a")) << n;
   EXPECT_FALSE(ask("a"));
   for (int n = 0; n < 3; ++n) EXPECT_TRUE(ask("b")) << n;
-  EXPECT_FALSE(ask("c")) << "so many in all";
+  EXPECT_FALSE(ask("c")) << "this many in total";
   let_go.set_value();
 }
 

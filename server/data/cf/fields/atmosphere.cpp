@@ -1,4 +1,4 @@
-// Layers of constant lapse rate, from the ground up.
+// Layers of constant lapse rate, from the ground upwards.
 #include "server/data/cf/fields/atmosphere.hpp"
 
 #include <array>
@@ -10,13 +10,13 @@ namespace windsplat::data::cf {
 
 namespace {
 
-constexpr double layer_gas_constant = 287.05287;  // value of the standard
+constexpr double layer_gas_constant = 287.05287;  // name in the standard
 
 struct Layer {
-  double height;       // of its base, geopotential metres
-  double temperature;  // there, K
+  double height;       // height of the base, geopotential metres
+  double temperature;  // at the base, K
   double lapse;        // K per metre upwards
-  double pressure;     // there, Pa
+  double pressure;     // at the base, Pa
 };
 
 constexpr double sea_level_pressure = 101325.0;

@@ -20,16 +20,16 @@ namespace windsplat::data::cf {
 
 struct DerivedField {
   enum class Rule {
-    pressure,         // of every sample, in the units of the surface pressure
+    pressure,         // pressure of every sample, in the units of the surface pressure
     height,           // inputs[0] times scale, in metres
     standard_height,  // height of the pressure of the sample in the standard atmosphere
     rise,             // inputs: u, v, omega: w = -omega R T / (p g) as the third component
   };
   Rule rule = Rule::pressure;
   FieldInfo info;
-  std::vector<int> inputs;  // variables
-  double scale = 1;         // of inputs[0] (height), of omega to Pa/s (rise)
-  int temperature = -1;     // variable; -1: that of the standard atmosphere
+  std::vector<int> inputs;  // indices of variables
+  double scale = 1;         // factor to metres for height (inputs[0]), to Pa/s for rise (omega)
+  int temperature = -1;     // temperature variable; -1: standard atmosphere
   double celsius = 0;       // added to temperatures
 };
 

@@ -1,4 +1,4 @@
-// Three ways to recognise the components of a vector, the most reliable first.
+// Recognises the components of a vector in three ways, the most reliable first.
 #include "server/data/cf/fields/fields.hpp"
 
 #include <algorithm>
@@ -141,7 +141,7 @@ class FieldFinder {
     plans_.push_back(std::move(plan));
   }
 
-  // By the attribute of the netCDF writer: "<name> <index>".
+  // Identifies components by the attribute of the netCDF writer: "<name> <index>".
   void by_mark() {
     for (const int v : variables_) {
       const std::string& mark = variable(v).vector_mark;
@@ -166,7 +166,7 @@ class FieldFinder {
     return up >= 0 ? up : standing_for(like, std::string(omega_name));
   }
 
-  // By pairs of standard_name: eastward_Q/northward_Q, x_Q/y_Q, Q_x_R/Q_y_R.
+  // Identifies components by pairs of standard_name: eastward_Q/northward_Q, x_Q/y_Q, Q_x_R/Q_y_R.
   void by_standard_name() {
     for (const int v : variables_) {
       const std::string& name = variable(v).standard_name;

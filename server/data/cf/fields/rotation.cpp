@@ -1,4 +1,4 @@
-// Tangents as differences of positions on the unit sphere, expressed along local east and north.
+// Tangents are differences of positions on the unit sphere, expressed along local east and north.
 #include "server/data/cf/fields/rotation.hpp"
 
 #include <array>
@@ -18,7 +18,7 @@ class Tangents {
  public:
   explicit Tangents(const Columns& columns) : columns_(columns) {}
 
-  // From one column to another, as seen from a third.
+  // Direction from one column to another, in the tangent plane at a third.
   [[nodiscard]] Plane between(std::size_t from, std::size_t to, std::size_t seen_from) const {
     const auto a = place(from);
     const auto b = place(to);

@@ -1,5 +1,5 @@
-// Rotates vectors given by east and north to the axes of the grid, from the longitudes and
-// latitudes of its columns.
+// Rotates vectors with components along east and north to the axes of the grid, computed from
+// longitudes and latitudes of its columns.
 #pragma once
 
 #include <cstddef>

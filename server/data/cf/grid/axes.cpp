@@ -171,7 +171,7 @@ Evidence by_name(std::string_view full_name, std::string_view units, bool has_co
   Evidence found;
   found.role = exact == Role::unknown ? role_of_name(name) : exact;
   if (!has_coordinates) {
-    return found;  // coordinates by index have no kind
+    return found;  // coordinates placed by index have no kind
   }
   if (found.role == Role::x && name.find("lon") != std::string_view::npos && is_angle(units)) {
     found.kind = AxisKind::longitude;
@@ -188,7 +188,7 @@ Evidence by_name(std::string_view full_name, std::string_view units, bool has_co
     } else if (name.starts_with("height") || name.starts_with("alt")) {
       found = {Role::z, AxisKind::height, true, false};
     } else if (name != "z" && name != "zc" && name != "zt" && name != "zdim" && !is_length(units)) {
-      // Sigma is 1 at the ground, and hybrid levels are counted from the top.
+      // Sigma is 1 at the ground, and hybrid levels are numbered from the top.
       const bool from_top = name == "sigma" || name == "hybrid";
       found = {Role::z, AxisKind::level, true, from_top};
     }
@@ -258,7 +258,7 @@ int coordinate_of(const FileContents& contents, int dimension) {
       return static_cast<int>(v);
     }
     const std::string units = lower(variable.units);
-    // "minutes since ..." of XTIME of WRF, but not the reference time of a forecast.
+    // WRF's XTIME ("minutes since ...") qualifies, but the reference time of a forecast does not.
     const bool tells_time =
         variable.standard_name.empty() && units.find(" since ") != std::string::npos;
     const bool says_axis = !variable.axis.empty() || is_east(units) || is_north(units) ||

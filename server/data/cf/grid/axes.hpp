@@ -24,14 +24,15 @@ struct DimensionRole {
   int coordinate = -1;         // the 1-D variable that gives its coordinates; -1: none
 };
 
-// One entry per dimension of the file. Evidence in order of reliability: the `axis` attribute,
-// standard_name, units, `positive`, then the names of coordinate variable and dimension.
+// Classifies dimensions; the result has one entry per dimension of the file. Evidence in order of
+// reliability: the `axis` attribute, standard_name, units, `positive`, then the names of coordinate
+// variable and dimension.
 std::vector<DimensionRole> classify_dimensions(const FileContents& contents);
 
 // Whether lower-case units are one of CF's spellings of degrees_east.
 bool is_east(std::string_view units);
 
-// Whether units in any case are radians.
+// Whether units are radians, in upper or lower case.
 bool is_radian(std::string_view units);
 
 // Whether a variable contains longitudes or latitudes, of any rank.

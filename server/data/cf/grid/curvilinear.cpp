@@ -109,7 +109,7 @@ void unwrap(std::vector<double>& longitude, std::size_t width) {
   }
 }
 
-// Null where a longitude or latitude is missing.
+// Returns null if a longitude or latitude is missing.
 std::shared_ptr<const Columns> columns_of(std::array<Table, 2> tables, int x,
                                           std::array<std::size_t, 2> lengths,
                                           const std::array<bool, 2>& turned) {
@@ -136,8 +136,9 @@ Result<Bearing> find_bearing(const ArrayFile& file, const std::vector<DimensionR
       roles.at(static_cast<std::size_t>(y)).coordinate >= 0) {
     return bearing;
   }
-  std::array<Table, 2> tables;        // of longitude, of latitude
-  std::array<Change, 2> along_x_y{};  // of longitude, of latitude: fast is along x, slow along y
+  std::array<Table, 2> tables;        // values of longitude and latitude
+  std::array<Change, 2> along_x_y{};  // changes of longitude and latitude: fast is along x, slow
+                                      // along y
   for (const bool longitude : {true, false}) {
     const int v = position_on(contents, x, y, longitude);
     if (v < 0) {

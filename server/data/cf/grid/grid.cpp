@@ -109,8 +109,8 @@ std::string misplaced(const FileContents& contents, const FileVariable& variable
 // Error text for a file without fields, explained by the variable with most dimensions.
 std::string nothing_to_show(const FileContents& contents, const std::vector<LeftOut>& left_out) {
   std::string text =
-      "there is no numeric variable with two or three spatial dimensions; cells or stations in a "
-      "list are not read";
+      "there is no numeric variable with two or three spatial dimensions; cells and stations in a "
+      "list are not supported";
   const FileVariable* most = nullptr;
   for (const FileVariable& variable : contents.variables) {
     if (!variable.unread.empty() && variable.dims.size() >= 2) {
@@ -153,7 +153,7 @@ void add_to_group(const FileContents& contents, std::vector<Group>& groups, Cand
   at->members.push_back(std::move(candidate));
 }
 
-// "another grid (lev 14, lat 64, lon 128)"
+// For example "another grid (lev 14, lat 64, lon 128)".
 std::string grid_text(const FileContents& contents, const std::array<int, 3>& space) {
   std::string text = "on another grid (";
   const char* separator = "";
@@ -213,14 +213,14 @@ Result<GridChoice> choose_grid(const FileContents& contents,
         add_to_group(contents, groups, std::move(candidate));
       }
     }
-    // Coordinate variables are used, so they are not listed as omitted.
+    // Coordinate variables are in use, so they are not listed as omitted.
     if (!reason.empty() && reason != coordinate_variable) {
       choice.left_out.push_back({variable.name, std::move(reason)});
     }
   }
   choice.left_out.insert(choice.left_out.end(), contents.left_out.begin(), contents.left_out.end());
   for (const std::string& group : contents.groups) {
-    choice.left_out.push_back({group, "group: to see it, name it behind the file's name and '#'"});
+    choice.left_out.push_back({group, "group: to open it, append '#' and its name to the file's"});
   }
   if (groups.empty()) {
     return make_error(ErrorKind::bad_data, nothing_to_show(contents, choice.left_out));

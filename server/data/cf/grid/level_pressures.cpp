@@ -22,8 +22,8 @@ Result<void> place_by_pressure(const ArrayFile& file, HybridLevels hybrid, Place
   const Levels all{0, grid.length[2]};
   const double bytes = decoded_step_bytes(file, grid, hybrid.surface, all);
   if (auto fine = file.charge(hybrid.surface, bytes); !fine) {
-    info.notes.push_back("levels follow the ground, but their pressures are not known (" +
-                         fine.error().message + "): the file's own coordinate is kept");
+    info.notes.push_back("terrain-following levels of unknown pressure (" + fine.error().message +
+                         "): the coordinate of the file is used");
     return {};
   }
   std::vector<float> surface(grid.layer());
@@ -43,7 +43,7 @@ Result<void> place_by_pressure(const ArrayFile& file, HybridLevels hybrid, Place
   const auto mean = [&](std::size_t k) {
     return hybrid.a[k] / hybrid.unit_pa + hybrid.b[k] * sum / count;
   };
-  // Levels may be counted from the top without the file saying so.
+  // Levels may be numbered from the top without an attribute that says so.
   if (count > 0 && mean(0) < mean(axis.coordinates.size() - 1)) {
     std::reverse(hybrid.a.begin(), hybrid.a.end());
     std::reverse(hybrid.b.begin(), hybrid.b.end());
@@ -58,8 +58,8 @@ Result<void> place_by_pressure(const ArrayFile& file, HybridLevels hybrid, Place
   if (!falls) {
     grid.turned[2] = turned;
     info.notes.emplace_back(
-        "levels follow the ground, but their mean pressures do not fall from level to level: "
-        "the file's own coordinate is kept");
+        "terrain-following levels whose mean pressures do not decrease from level to level: "
+        "the coordinate of the file is used");
     return {};
   }
   axis.kind = AxisKind::pressure;
@@ -101,8 +101,8 @@ Result<PressureLevels> find_pressures(const ArrayFile& file, int coordinate, Pla
     const int surface = find_surface_pressure(file.contents(), grid);
     if (surface >= 0) {
       info.notes.push_back(in_quotes(variable_name(file, surface)) +
-                           " is the surface pressure: what lies below it is shown as the file "
-                           "has it, unless it is marked as missing");
+                           " is the surface pressure: values below the surface are shown as "
+                           "stored unless marked as missing");
     }
   }
   return pressures;

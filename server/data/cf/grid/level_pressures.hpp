@@ -1,4 +1,4 @@
-// The pressure of every level of a grid, and the vertical axis that follows from it.
+// The pressure of every level of a grid, and the resulting vertical axis.
 #pragma once
 
 #include <optional>
@@ -14,11 +14,11 @@ namespace windsplat::data::cf {
 
 // Source of the pressure of a sample, in Pa: fixed levels, or hybrid with surface pressure.
 struct PressureLevels {
-  std::vector<double> level;  // Pa, from below; empty where `hybrid` applies
+  std::vector<double> level;  // Pa, from the lowest level; empty where `hybrid` applies
   std::optional<HybridLevels> hybrid;
 };
 
-// Where levels follow the ground the vertical axis becomes that of mean pressures. coordinate: the
+// For terrain-following levels, replaces the vertical axis by mean pressures. coordinate: the
 // vertical coordinate variable, -1 if there is none. Errors: bad_data.
 Result<PressureLevels> find_pressures(const ArrayFile& file, int coordinate, Placement& grid,
                                       DatasetInfo& info);

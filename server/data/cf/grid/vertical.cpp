@@ -17,7 +17,7 @@ namespace windsplat::data::cf {
 namespace {
 
 constexpr double usual_reference_pa = 100000.0;
-constexpr double fraction_max = 2.0;  // larger coefficients are not fractions of a pressure
+constexpr double fraction_max = 2.0;  // coefficients above this are not fractions of a pressure
 
 int term_variable(const FileContents& contents, std::string_view name) {
   return name.empty() ? -1 : variable_named(contents, name);
@@ -83,7 +83,7 @@ bool on_columns(const FileContents& contents, const Placement& grid, int variabl
   return found.numeric && horizontal == wanted;
 }
 
-// One value per level, from below; empty if the variable has other dimensions.
+// Reads one value per level, lowest level first; empty if the variable has other dimensions.
 Result<std::vector<double>> on_levels(const ArrayFile& file, const Placement& grid,
                                       const std::string& name) {
   const int v = term_variable(file.contents(), name);
@@ -103,7 +103,7 @@ struct Single {
   std::optional<double> unit_pa;
 };
 
-// Empty if the file has no such number.
+// Reads a single pressure; empty if the file has no such number.
 Result<std::optional<Single>> single_pressure(const ArrayFile& file, const std::string& name) {
   using Found = std::optional<Single>;
   const int v = term_variable(file.contents(), name);
@@ -118,7 +118,7 @@ Result<std::optional<Single>> single_pressure(const ArrayFile& file, const std::
   return Found({values->front(), pascals_in(variable.units)});
 }
 
-// In Pa; 1000 hPa if it is not in the file.
+// The reference pressure in Pa; 1000 hPa if it is not in the file.
 Result<double> reference_pressure(const ArrayFile& file, const std::string& name,
                                   std::string& note) {
   const auto found = single_pressure(file, name);
@@ -132,13 +132,14 @@ Result<double> reference_pressure(const ArrayFile& file, const std::string& name
   return usual_reference_pa;
 }
 
-// In Pa; 0 if it is not in the file. Without a unit, that of the surface pressure is assumed.
+// The pressure at the top in Pa; 0 if it is not in the file. Without units, those of the surface
+// pressure are assumed.
 Result<double> top_pressure(const ArrayFile& file, const std::string& name, int surface,
                             std::string& note) {
   const auto found = single_pressure(file, name);
   if (!found) return found.error();
   if (!*found) {
-    note += name.empty() ? "; the formula names no pressure at the top"
+    note += name.empty() ? "; formula_terms has no pressure at the top"
                          : "; the pressure at the top, " + in_quotes(name) + ", is not in the file";
     note += ": using 0";
     return 0.0;
@@ -236,7 +237,7 @@ Result<std::optional<HybridLevels>> find_hybrid(const ArrayFile& file, const Pla
   if (!unit) return Found();
   out.unit_pa = *unit;
   std::string note =
-      "levels follow the terrain: the vertical axis has their pressures for the mean of ";
+      "terrain-following levels: the vertical axis has their pressures for the mean of ";
   note += in_quotes(surface.name) + " at the first step" + out.note;
   if (!by_formula) note += "; without formula_terms, identified by common names";
   out.note = std::move(note);

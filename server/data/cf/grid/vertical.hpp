@@ -14,22 +14,24 @@
 namespace windsplat::data::cf {
 
 struct HybridLevels {
-  std::vector<double> a;  // Pa, one per level, from below
+  std::vector<double> a;  // Pa, one per level, lowest first
   std::vector<double> b;  // factors of the surface pressure
   int surface = -1;       // variable of the surface pressure
-  std::string units;      // of the surface pressure
+  std::string units;      // units of the surface pressure
   double unit_pa = 1;
   std::vector<int> coefficients;  // variables of a and b
   std::string note;               // assumptions made
 };
 
-// From formula_terms, otherwise from common names of coefficients (A_var, hyam, ...). coordinate:
-// the vertical coordinate variable, -1 if there is none. Empty if the levels are of another kind or
-// their surface pressure is not in the file. Errors: bad_data if a variable cannot be read.
+// Finds hybrid levels from formula_terms, otherwise from common names of coefficients (A_var, hyam,
+// ...). coordinate: the vertical coordinate variable, -1 if there is none. Empty if the levels are
+// of another kind or their surface pressure is not in the file. Errors: bad_data if a variable
+// cannot be read.
 Result<std::optional<HybridLevels>> find_hybrid(const ArrayFile& file, const Placement& grid,
                                                 int coordinate);
 
-// By standard name, otherwise by common names and units; of any dimensions.
+// Identifies a surface pressure by standard name, otherwise by common names and units; of any
+// dimensions.
 bool is_surface_pressure(const FileVariable& variable);
 
 // A surface pressure on the columns of the grid; -1 if there is none.

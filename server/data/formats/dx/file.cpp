@@ -75,7 +75,7 @@ class Opener {
 
   void leave_out(const std::string& name, const Error& why) {
     if (!refused_) refused_ = why;
-    file_->add_note(in_quotes(name) + " is left out: " + why.message);
+    file_->add_note(in_quotes(name) + " is omitted: " + why.message);
   }
 
   void add_sequence(const Found& found, const std::string& name) {
@@ -151,7 +151,7 @@ class Opener {
     const auto connections = component(field, "connections");
     if (!connections) return connections.error();
     if (connections->object->kind != Class::grid_connections) {
-      return fault("on an irregular mesh: only gridconnections are read");
+      return fault("on an irregular mesh: only gridconnections are supported");
     }
     auto place = library_.place(*data);
     if (!place) return place.error();
@@ -164,7 +164,7 @@ class Opener {
     const auto samples = bytes::product(counts);
     if (!samples || *samples != data->object->items) {
       return fault("with " + std::to_string(data->object->items) + " values on " +
-                   (samples ? std::to_string(*samples) : std::string("too many")) + " places");
+                   (samples ? std::to_string(*samples) : std::string("too many")) + " positions");
     }
     return append(out, std::move(*grid), *data->object, std::move(*place), cells,
                   fault("whose members differ in grid or type"),

@@ -55,7 +55,7 @@ class Builder {
 
  private:
   [[nodiscard]] Error fault(const std::string& what) const {
-    return positions_.module->file->fault("has positions that are refused: " + what);
+    return positions_.module->file->fault("has unsupported positions: " + what);
   }
 
   Result<void> add(const Found& term) {
@@ -90,7 +90,7 @@ class Builder {
                        object.deltas.size() == rank &&
                        std::all_of(object.deltas.begin(), object.deltas.end(),
                                    [&](const auto& delta) { return delta.size() == dimension; });
-    if (!whole) return fault("counts, origin and deltas do not fit each other");
+    if (!whole) return fault("counts, origin and deltas are inconsistent");
     for (std::size_t d = 0; d < rank; ++d) {
       const auto& delta = object.deltas[d];
       // Cells are fewer than positions: by half in each of three dimensions at most.
@@ -98,7 +98,7 @@ class Builder {
       if (left_ == 0 && object.counts[d] <= axis_max) return fault("more than there are values");
       if (object.counts[d] < 1 || object.counts[d] > axis_max) {
         return fault("a dimension of " + std::to_string(object.counts[d]) + "; 1 to " +
-                     std::to_string(axis_max) + " are read");
+                     std::to_string(axis_max) + " are supported");
       }
       const auto most = std::max_element(
           delta.begin(), delta.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
@@ -124,7 +124,7 @@ class Builder {
   Result<void> add_listed(const Found& term) {
     const Object& object = *term.object;
     if (term.object == positions_.object) {
-      return fault("they are listed one by one; regular grids and products of lines are read");
+      return fault("they are listed one by one; regular grids and products of lines are supported");
     }
     const std::uint64_t width = object.shape.size() == 1 ? object.shape[0] : 0;
     if (width < 1 || width > space_max || object.items < 1 || object.items > axis_max) {

@@ -13,7 +13,7 @@ namespace windsplat::data::dx {
 
 struct GridAxis {
   std::size_t place = 0;            // component of positions that varies: 0 x, 1 y, 2 z
-  std::vector<double> coordinates;  // of that component
+  std::vector<double> coordinates;  // coordinates of that component
   bool operator==(const GridAxis&) const = default;
 };
 

@@ -84,7 +84,7 @@ Result<bytes::Placement> Library::place(const Found& array) {
                     (object.text ? bytes::can_hold(bytes::Encoding::text, size - at, *total)
                                  : *total <= size - at);
   if (!fits) {
-    return (*file)->fault("is cut short: the array " + in_quotes(object.name) + " of " +
+    return (*file)->fault("is truncated: the array " + in_quotes(object.name) + " of " +
                           std::to_string(object.items) + " items does not fit into the " +
                           std::to_string(size - at) + " bytes from byte " + std::to_string(at) +
                           " on");

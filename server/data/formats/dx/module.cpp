@@ -28,7 +28,7 @@ struct Word {
   [[nodiscard]] bool is(std::string_view wanted) const { return !quoted && lower(text) == wanted; }
 };
 
-// Words of the file, read through a buffer.
+// Reads words of the file through a buffer.
 class Words {
  public:
   explicit Words(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
@@ -373,9 +373,9 @@ class Parser {
     const std::uint64_t from = object.text ? words_.at() : words_.next_line();
     object.data_at = from;
     const std::uint64_t left = out_.file->size() - from;
-    if (!object.numbers) return complain("text in place of numbers is not read");
+    if (!object.numbers) return complain("text instead of numbers is not supported");
     if (!size || *size > left) {
-      return complain("is cut short: the array has more numbers than the file has bytes");
+      return complain("is truncated: the array has more numbers than the file has bytes");
     }
     if (!object.text) return words_.jump(from + *size);
     const auto end = bytes::end_of_text(out_.file, from, *size);

@@ -21,7 +21,7 @@ struct Reference {
 };
 
 struct Member {
-  std::string name;     // of a component or of a member of a group
+  std::string name;     // name of a component or of a member of a group
   double position = 0;  // in a series
   Reference value;
 };

@@ -209,7 +209,7 @@ std::optional<std::string> expand(std::string_view name, const Clock& clock, std
                                   std::string& problem) {
   const auto now = date_of(clock, step);
   if (!now) {
-    problem = "the time runs beyond the year " + std::to_string(year_max);
+    problem = "the time extends beyond the year " + std::to_string(year_max);
     return std::nullopt;
   }
   std::string out;

@@ -75,7 +75,7 @@ class Parser {
 
   void complain(const Line& line, const std::string& what) {
     if (!problem_.empty()) return;
-    problem_ = "is refused: line " + std::to_string(line.number) + " (";
+    problem_ = "is invalid: line " + std::to_string(line.number) + " (";
     problem_ += printable(line.key, 40);
     problem_ += "): " + what;
   }
@@ -163,9 +163,9 @@ class Parser {
       complain(line, "data of type " + in_quotes(rest(line, 1)) +
                          " are not raw numbers; name that file itself, not its descriptor");
     } else if (line.key == "pdef") {
-      complain(line, "a grid on a map projection is not read");
+      complain(line, "a grid on a map projection is not supported");
     } else if (line.key == "edef") {
-      if (integer(line, 1, 1, axis_max) != 1) complain(line, "an ensemble is not read");
+      if (integer(line, 1, 1, axis_max) != 1) complain(line, "an ensemble is not supported");
     } else if (line.key == "stnmap" || line.key == "chsub" || line.key == "unpack") {
       complain(line, line.key + " is not supported");
     } else if (line.key != "vectorpairs" && line.key != "cachesize" && line.key != "endvars" &&
@@ -371,7 +371,7 @@ class Parser {
         if (lower(name) == lower(variable.name)) variable.units = units;
       }
       if (problem_.empty() && variable.levels > out_.z.count) {
-        problem_ = "is refused: the variable " + in_quotes(variable.name) + " has ";
+        problem_ = "is invalid: the variable " + in_quotes(variable.name) + " has ";
         problem_ +=
             std::to_string(variable.levels) + " levels, zdef has " + std::to_string(out_.z.count);
       }

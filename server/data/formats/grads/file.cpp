@@ -65,19 +65,19 @@ class Opener {
     for (const Variable& variable : ctl_.variables) {
       const auto size = bytes::product({grids_of(variable), record_of(variable), ctl_.times});
       if (!size || *size > (std::uint64_t{1} << 60) / ctl_.variables.size()) {
-        return input_->fault("claims more than 2^60 bytes");
+        return input_->fault("declares more than 2^60 bytes");
       }
       time_bytes_ += grids_of(variable) * record_of(variable);
       times_inside = times_inside || variable.times_inside;
       times_outside = times_outside || !variable.times_inside;
     }
     if (!bytes::product({time_bytes_, ctl_.times})) {
-      return input_->fault("claims more than 2^62 bytes");
+      return input_->fault("declares more than 2^62 bytes");
     }
     const bool headed = ctl_.time_header + ctl_.time_trailer > 0;
     if (times_inside && (times_outside || headed || ctl_.is_template)) {
       return input_->fault(
-          "is refused: the order -1,20 is read where all variables have it, in one file, without "
+          "is not supported: the order -1,20 must apply to all variables, in one file, without "
           "headers of times");
     }
     return {};
@@ -88,7 +88,7 @@ class Opener {
       const std::shared_ptr<const InputFile>& file, std::size_t times) const {
     const std::uint64_t needed = ctl_.file_header + times * time_bytes_;
     if (file->size() < needed) {
-      return file->fault("is cut short: it has " + std::to_string(file->size()) + " bytes, " +
+      return file->fault("is truncated: it has " + std::to_string(file->size()) + " bytes, " +
                          in_quotes(input_->name()) + " requires " + std::to_string(needed));
     }
     if (ctl_.sequential) {
@@ -147,7 +147,7 @@ class Opener {
     std::string problem;
     for (std::size_t step = 0; step < ctl_.times; ++step) {
       auto name = expand(ctl_.dset, ctl_.clock, static_cast<std::int64_t>(step), problem);
-      if (!name) return input_->fault("is refused: " + problem);
+      if (!name) return input_->fault("is invalid: " + problem);
       if (!parts.empty() && parts.back().first == *name) {
         ++parts.back().second;
       } else {
@@ -253,7 +253,7 @@ class Opener {
     const double scale = ctl_.clock.unit == 'n' ? 1 : ctl_.clock.unit == 'h' ? 60 : 1440;
     for (std::size_t step = 0; step < out.size(); ++step) {
       const auto date = date_of(ctl_.clock, static_cast<std::int64_t>(step));
-      if (!date) return input_->fault("is refused: its time runs beyond the year 9999");
+      if (!date) return input_->fault("is invalid: its time extends beyond the year 9999");
       out[step] = static_cast<double>(minutes_since_first(ctl_.clock, *date)) / scale;
     }
     return out;

@@ -224,7 +224,7 @@ Result<Grid> read_grid(const std::vector<unsigned char>& bytes) {
   constexpr auto known_types = std::to_array<const char*>(
       {"regular_ll", "regular_gg", "lambert", "polar_stereographic", "mercator"});
   if (std::find(known_types.begin(), known_types.end(), grid.type) == known_types.end()) {
-    grid.problem = "on a grid of the type " + in_quotes(grid.type) + ", which is not read";
+    grid.problem = "on a grid of the type " + in_quotes(grid.type) + ", which is not supported";
     return grid;
   }
   const bool latitudes = grid.type == "regular_ll" || grid.type == "regular_gg";

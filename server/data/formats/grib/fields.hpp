@@ -17,7 +17,7 @@ struct Grid {
   std::size_t columns = 0;
   std::size_t rows = 0;
   bool projected = false;     // true: longitude and latitude per point; false: per axis
-  bool columns_fall = false;  // of a projected grid: scanned toward smaller i
+  bool columns_fall = false;  // for a projected grid: scanned toward smaller i
   bool rows_fall = false;     // toward smaller j
   std::vector<double> longitude;
   std::vector<double> latitude;
@@ -30,7 +30,7 @@ struct Header {
   std::string units;
   std::string level_type;
   double level = 0;
-  double hours = 0;  // of validity, since 1970-01-01
+  double hours = 0;  // time of validity, since 1970-01-01
   bool relative_to_grid = false;
   std::string grid_key;  // equal for fields whose grid definitions have the same bytes
 };
@@ -38,7 +38,8 @@ struct Header {
 // Errors: bad_data; the message is a predicate without subject.
 Result<Header> read_header(const std::vector<unsigned char>& message);
 Result<Grid> read_grid(const std::vector<unsigned char>& message);
-// rows x columns, columns fastest, in the order of the coordinates of the grid; NaN if missing.
+// values of rows x columns, columns fastest, in the order of the coordinates of the grid; NaN if
+// missing
 Result<std::vector<float>> read_values(const std::vector<unsigned char>& message, const Grid& grid);
 
 }  // namespace windsplat::data::grib

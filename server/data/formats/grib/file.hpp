@@ -35,7 +35,7 @@ class File final : public cf::ArrayFile {
  private:
   // The fields of one quantity, kind of level and grid, by time and level.
   struct Group {
-    Header header;  // of its first field
+    Header header;  // header of its first field
     std::size_t grid = 0;
     std::map<std::pair<double, double>, std::size_t> fields;
     std::size_t repeated = 0;
@@ -66,7 +66,7 @@ class File final : public cf::ArrayFile {
   std::vector<FieldPlace> places_;
   std::vector<Grid> grids_;
   std::map<std::string, std::size_t>
-      grid_keys_;  // by the bytes of the grid definition; several keys may describe one grid
+      grid_keys_;  // keyed by the bytes of the grid definition; several keys may describe one grid
   std::vector<Group> groups_;
   std::map<std::size_t, std::vector<int>> grid_dims_;
   std::vector<Content> held_;  // parallel to the variables

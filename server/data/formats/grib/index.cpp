@@ -47,12 +47,12 @@ Result<void> split(const InputFile& input, const Part& message, std::vector<Fiel
   const std::uint64_t end = message.offset + message.bytes - 4;
   while (at < end) {
     std::array<unsigned char, 5> head{};
-    if (end - at < head.size()) return input.fault("has a broken section of a GRIB message");
+    if (end - at < head.size()) return input.fault("has a malformed section of a GRIB message");
     if (auto done = input.read(at, head.data(), head.size()); !done) return done;
     const std::uint64_t bytes = big_endian(head.data(), 4);
     const std::size_t number = head[4];
     if (bytes < head.size() || bytes > end - at || number < 1 || number > 7) {
-      return input.fault("has a broken section of a GRIB message at byte " + std::to_string(at));
+      return input.fault("has a malformed section of a GRIB message at byte " + std::to_string(at));
     }
     known.at(number) = {at, bytes};
     at += bytes;
@@ -75,7 +75,7 @@ bool is_grib(const InputFile& input) {
   const auto head = input.head(heading_max + 8);
   if (!head) return false;
   const auto at = head->find("GRIB");
-  if (at >= heading_max || at + 8 > head->size()) return false;  // so is npos
+  if (at >= heading_max || at + 8 > head->size()) return false;  // npos is also beyond these limits
   const bool is_heading = std::all_of(
       head->begin(), head->begin() + static_cast<long>(at),
       [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == 1 || c == 3; });
@@ -90,25 +90,25 @@ Result<std::vector<FieldPlace>> find_fields(const InputFile& input) {
     if (!start) return start.error();
     if (*start == input.size()) break;
     std::array<unsigned char, 16> head{};
-    if (input.size() - *start < head.size()) return input.fault("is cut short in a GRIB message");
+    if (input.size() - *start < head.size()) return input.fault("is truncated in a GRIB message");
     if (auto done = input.read(*start, head.data(), head.size()); !done) return done.error();
     const int edition = head[7];
     if (edition != 1 && edition != 2) {
       return input.fault("has a GRIB message of edition " + std::to_string(edition) +
-                         "; 1 and 2 are read");
+                         "; 1 and 2 are supported");
     }
     const std::uint64_t bytes =
         edition == 1 ? big_endian(head.data() + 4, 3) : big_endian(head.data() + 8, 8);
     if (edition == 1 && bytes >= 0x800000) {
-      return input.fault("has a GRIB 1 message of more than 8 MiB, which is not read");
+      return input.fault("has a GRIB 1 message of more than 8 MiB, which is not supported");
     }
     const std::string place = " at byte " + std::to_string(*start);
     if (bytes < 24 || bytes > message_bytes_max) {
       return input.fault("has a GRIB message" + place + " of " + std::to_string(bytes) +
-                         " bytes; 24 to " + std::to_string(message_bytes_max) + " are read");
+                         " bytes; 24 to " + std::to_string(message_bytes_max) + " are supported");
     }
     std::array<char, 4> tail{};
-    if (bytes > input.size() - *start) return input.fault("is cut short in the message" + place);
+    if (bytes > input.size() - *start) return input.fault("is truncated in the message" + place);
     if (auto done = input.read(*start + bytes - 4, tail.data(), 4); !done) return done.error();
     if (std::memcmp(tail.data(), "7777", 4) != 0) {
       return input.fault("has a GRIB message" + place + " without its end marker");

@@ -22,7 +22,7 @@ void name_steps_of_bare_arrays(FileContents& contents) {
   auto& dimensions = contents.dimensions;
   if (!std::all_of(dimensions.begin(), dimensions.end(), is_bare)) return;
   const auto at = [](int index) { return static_cast<std::size_t>(index); };
-  std::map<std::size_t, int> times;  // by length
+  std::map<std::size_t, int> times;  // keyed by length
   for (FileVariable& variable : contents.variables) {
     if (!variable.numeric || variable.dims.size() != 4) continue;
     const bool grows = std::any_of(variable.dims.begin(), variable.dims.end(),

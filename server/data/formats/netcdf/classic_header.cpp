@@ -36,7 +36,7 @@ std::uint64_t type_bytes(std::uint64_t type, int version) {
 
 struct VariableExtent {
   bool is_record = false;
-  std::uint64_t bytes = 0;  // of the variable, or of one of its records; without padding
+  std::uint64_t bytes = 0;  // size of the variable, or of one of its records; without padding
   std::uint64_t begin = 0;
 };
 
@@ -60,7 +60,8 @@ class Header {
       return broken(fault_);
     }
     if (records == streaming) {
-      return broken("leaves its number of records open (written as a stream), which is not read");
+      return broken(
+          "does not state its number of records (written as a stream), which is not supported");
     }
     return end_of_data(records);
   }

@@ -151,11 +151,10 @@ Result<void> File::look_before_opening() {
   if (!classic_) {
     if (has_hdf5_signature(*input_)) return {};
     constexpr std::array<unsigned char, 4> hdf4{0x0e, 0x03, 0x13, 0x01};
-    return magic == hdf4
-               ? fault("is HDF4, which is not read; h4toh5 makes HDF5 of it")
-               : fault(
-                     "is not a netCDF file, nor of another format that is read here: its first "
-                     "bytes are none that is known");
+    return magic == hdf4 ? fault("is HDF4, which is not supported; convert it by h4toh5")
+                         : fault(
+                               "is not a netCDF file, nor of another supported format: its first "
+                               "bytes are no known signature");
   }
   Window window(*input_);
   const auto expected =
@@ -163,11 +162,11 @@ Result<void> File::look_before_opening() {
                                  unsigned char* out) { return window.read(offset, count, out); },
                              input_->size());
   if (!expected) {
-    return fault("is broken: " + expected.error().message);
+    return fault("is malformed: " + expected.error().message);
   }
   if (*expected > input_->size()) {
-    return fault("is cut short: it has " + std::to_string(input_->size()) +
-                 " bytes, its header says " + std::to_string(*expected));
+    return fault("is truncated: it has " + std::to_string(input_->size()) +
+                 " bytes, its header requires " + std::to_string(*expected));
   }
   return {};
 }
@@ -180,14 +179,14 @@ Result<void> File::open_library() {
                       "the file requests an HDF5 plugin, which is not allowed");
   }
   if (!classic_) {
-    auto storage = survey_storage(*input_);
+    auto storage = scan_storage(*input_);
     if (!storage) return storage.error();
     storage_ = std::move(*storage);
   }
   const int status = nc_open(input_->library_path().c_str(), NC_NOWRITE, &ncid_);
   if (status != NC_NOERR) {
     ncid_ = -1;
-    return fault(std::string("cannot be read as netCDF: it is cut short or damaged (") +
+    return fault(std::string("cannot be read as netCDF: it is truncated or damaged (") +
                  nc_strerror(status) + ")");
   }
   if (!classic_) {

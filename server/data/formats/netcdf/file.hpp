@@ -97,7 +97,7 @@ class File final : public cf::ArrayFile {
   std::vector<int> dimension_ids_;
   std::vector<Place> places_;                      // parallel to contents_.variables
   Handle hdf5_;                                    // in addition to that of the netCDF library
-  std::map<std::string, DatasetStorage> storage_;  // of HDF5, by path
+  std::map<std::string, DatasetStorage> storage_;  // HDF5 datasets, keyed by path
   std::vector<std::string> paths_;                 // parallel to contents_.variables
   // Under the LibraryLock: absent chunks by object, and the variables whose chunks the library
   // caches with their cache sizes, most recently read first.

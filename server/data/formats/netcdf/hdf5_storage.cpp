@@ -15,7 +15,7 @@ namespace windsplat::data::netcdf {
 
 namespace {
 
-constexpr std::size_t nesting_max = 64;  // of groups within groups
+constexpr std::size_t nesting_max = 64;  // limit of groups within groups
 
 // Largest number of objects of a file by its size: the smallest object has about 300 bytes, but a
 // link only about 20, and the netCDF library uses some kB for each.
@@ -29,7 +29,7 @@ std::string virtual_problem(hid_t plan) {
   if (H5Pget_virtual_filename(plan, 0, source.data(), source.size()) > 0) {
     text += " ('" + printable(source.data()) + "')";
   }
-  return text + ", which is not read";
+  return text + ", which is not supported";
 }
 
 std::string external_problem(hid_t plan) {
@@ -40,7 +40,7 @@ std::string external_problem(hid_t plan) {
   if (H5Pget_external(plan, 0, name.size() - 1, name.data(), &offset, &size) >= 0) {
     text += " ('" + printable(name.data()) + "')";
   }
-  return text + ", which is not read";
+  return text + ", which is not supported";
 }
 
 // The first filter that this build of the library cannot decode; empty if there is none.
@@ -120,14 +120,14 @@ DatasetStorage storage_of(hid_t dataset) {
 }
 
 // Depth first, like the netCDF library: an object is visited once per link.
-class Survey {
+class StorageScan {
  public:
-  explicit Survey(const InputFile& input) : input_(input), objects_left_(objects_max(input)) {}
+  explicit StorageScan(const InputFile& input) : input_(input), objects_left_(objects_max(input)) {}
 
   Result<std::map<std::string, DatasetStorage>> take() {
     const Handle file = open_hdf5(input_);
     if (!file) {
-      return input_.fault("cannot be read as HDF5: it is cut short or damaged");
+      return input_.fault("cannot be read as HDF5: it is truncated or damaged");
     }
     const Handle root(H5Gopen2(file.id(), "/", H5P_DEFAULT), H5Gclose);
     const bool listed = root && visit_group(root.id(), "");
@@ -140,11 +140,11 @@ class Survey {
 
  private:
   static herr_t on_link(hid_t group, const char* name, const H5L_info_t* about, void* self) {
-    auto& survey = *static_cast<Survey*>(self);
+    auto& scan = *static_cast<StorageScan*>(self);
     try {
-      return survey.visit_link(group, name, *about) ? 0 : -1;
+      return scan.visit_link(group, name, *about) ? 0 : -1;
     } catch (const std::exception&) {  // must not pass the library's frames, which are C
-      survey.out_of_memory_ = true;
+      scan.out_of_memory_ = true;
       return -1;
     }
   }
@@ -166,7 +166,7 @@ class Survey {
     above_.push_back(about.addr);
     const std::string outer = std::exchange(path_, path);
     const bool done =
-        H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, nullptr, &Survey::on_link, this) >= 0;
+        H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, nullptr, &StorageScan::on_link, this) >= 0;
     path_ = outer;
     above_.pop_back();
     return done;
@@ -224,7 +224,7 @@ class Survey {
   std::size_t objects_left_;
   std::string fault_;
   bool out_of_memory_ = false;
-  std::string path_;            // of the current group
+  std::string path_;            // path of the current group
   std::vector<haddr_t> above_;  // the current group and its parents
   std::unordered_map<haddr_t, DatasetStorage> by_address_;
   std::map<std::string, DatasetStorage> found_;
@@ -267,8 +267,8 @@ Handle::~Handle() {
   if (id_ >= 0) close_(id_);
 }
 
-Result<std::map<std::string, DatasetStorage>> survey_storage(const InputFile& input) {
-  return Survey(input).take();
+Result<std::map<std::string, DatasetStorage>> scan_storage(const InputFile& input) {
+  return StorageScan(input).take();
 }
 
 // Uses the same close degree as the netCDF library; HDF5 rejects opening a file with different

@@ -49,7 +49,7 @@ struct DatasetStorage {
 // The datasets of an HDF5 file by path ("/group/name"), without decoding. Errors: bad_data for
 // files on which the netCDF library would fail without a reason or not terminate: external and
 // dangling links, cyclic groups, more objects than the file can contain. Requires the LibraryLock.
-Result<std::map<std::string, DatasetStorage>> survey_storage(const InputFile& input);
+Result<std::map<std::string, DatasetStorage>> scan_storage(const InputFile& input);
 
 // A block of a dataset: one start and count per dimension.
 struct Block {

@@ -24,7 +24,7 @@ constexpr std::size_t text_max = 4096;      // bytes of a text attribute; the re
 constexpr std::size_t numbers_max = 65536;  // values of a numeric attribute
 constexpr int variables_max = 8192;
 constexpr std::size_t groups_max = 1024;
-constexpr int depth_max = 64;  // of groups within groups
+constexpr int depth_max = 64;  // limit of groups within groups
 
 struct TypeName {
   nc_type type;
@@ -85,14 +85,15 @@ std::vector<std::string> groups_below(int root, const std::string& root_path) {
 
 // "but '/a', '/b'": lists the groups present where the requested one is absent.
 std::string there_is(const std::vector<std::string>& groups) {
-  constexpr std::size_t told_max = 20;
+  constexpr std::size_t listed_max = 20;
   if (groups.empty()) return "nor any other";
   std::string out = "but ";
-  for (std::size_t n = 0; n < std::min(groups.size(), told_max); ++n) {
+  for (std::size_t n = 0; n < std::min(groups.size(), listed_max); ++n) {
     if (n > 0) out += ", ";
     out += in_quotes(groups[n]);
   }
-  if (groups.size() > told_max) out += " and " + std::to_string(groups.size() - told_max) + " more";
+  if (groups.size() > listed_max)
+    out += " and " + std::to_string(groups.size() - listed_max) + " more";
   return out;
 }
 

@@ -34,7 +34,7 @@ constexpr float fill_value = NC_FILL_FLOAT;
 struct OutVariable {
   std::string name;
   std::size_t field = 0;      // index of the field whose volume contains it
-  std::size_t component = 0;  // which array of that volume
+  std::size_t component = 0;  // index of its array within that volume
   int id = -1;
 };
 

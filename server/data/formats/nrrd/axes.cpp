@@ -85,8 +85,8 @@ class Placer {
     return {};
   }
 
-  // Without kinds: a fastest axis of length 2 or 3 before the space axes has the components of a
-  // vector, and a surplus slowest axis is time.
+  // Infers roles without kinds: a fastest axis of length 2 or 3 before the space axes has the
+  // components of a vector, and a surplus slowest axis is time.
   void guess_uses(const std::vector<bool>& known) {
     const bool directed = has_directions();
     const auto is_free = [&](std::size_t a) {
@@ -119,7 +119,7 @@ class Placer {
       const std::uint64_t size = header_.axes[a].size;
       const Use use = out_.axes[a].use;
       if (use == Use::components && size > 3) {
-        return bad("has vectors of " + std::to_string(size) + " components; 1 to 3 are drawn");
+        return bad("has vectors of " + std::to_string(size) + " components; 1 to 3 are supported");
       }
       if (use == Use::single && size != 1) {
         return bad("has an axis of kind " + in_quotes(header_.axes[a].kind) + " and size " +
@@ -127,7 +127,7 @@ class Placer {
       }
       if (size > axis_max) {
         return bad("has an axis of " + std::to_string(size) + "; at most " +
-                   std::to_string(axis_max) + " are read");
+                   std::to_string(axis_max) + " are supported");
       }
     }
     return {};
@@ -149,7 +149,7 @@ class Placer {
       }
     }
     if (out_.turned[0] || out_.turned[1] || out_.turned[2]) {
-      out_.notes.push_back("turned from " + header_.space +
+      out_.notes.push_back("converted from " + header_.space +
                            ": x runs left to right, y to anterior, z to superior, and vectors' "
                            "components with them");
     } else if (header_.space.find("left-handed") != std::string::npos) {

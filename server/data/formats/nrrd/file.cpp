@@ -29,7 +29,7 @@ Result<std::uint64_t> skip_lines(const InputFile& file, std::uint64_t at, std::i
   while (lines > 0) {
     const std::uint64_t some =
         std::min<std::uint64_t>(block.size(), file.size() - std::min(at, file.size()));
-    if (some == 0) return file.fault("is cut short: it has fewer lines than 'line skip'");
+    if (some == 0) return file.fault("is truncated: it has fewer lines than 'line skip'");
     if (auto done = file.read(at, block.data(), some); !done) return done.error();
     std::uint64_t used = 0;
     while (used < some && lines > 0) lines -= block[used++] == '\n' ? 1 : 0;
@@ -64,7 +64,7 @@ class Part {
     }
     const std::uint64_t there = file->size() - std::min(start, file->size());
     if (skip > (std::uint64_t{1} << 62) || !bytes::can_hold(encoding, there, bytes_ + skip)) {
-      return file->fault("is cut short: its " + std::to_string(there) + " bytes of " +
+      return file->fault("is truncated: its " + std::to_string(there) + " bytes of " +
                          header_.encoding + " data cannot hold " + std::to_string(bytes_) +
                          " bytes of samples");
     }
@@ -83,7 +83,7 @@ class Part {
       start = from + std::min(size, static_cast<std::uint64_t>(header_.byte_skip));
     }
     if (start < from || start > size || size - start < bytes_) {
-      return file->fault("is cut short: it has " + std::to_string(size - std::min(from, size)) +
+      return file->fault("is truncated: it has " + std::to_string(size - std::min(from, size)) +
                          " bytes of data; its header requires " + std::to_string(bytes_) +
                          (header_.byte_skip > 0
                               ? " after " + std::to_string(header_.byte_skip) + " skipped ones"
@@ -135,7 +135,7 @@ class Opener {
     std::vector<std::uint64_t> factors{bytes::size_of(stored())};
     for (const HeaderAxis& axis : header_.axes) factors.push_back(axis.size);
     const auto total = bytes::product(factors);
-    if (!total) return input_->fault("claims more than 2^62 bytes of samples");
+    if (!total) return input_->fault("declares more than 2^62 bytes of samples");
     if (header_.data_files.empty()) return Part(header_, header_.end, *total).in(input_, rest_);
     return find_parts(*total);
   }

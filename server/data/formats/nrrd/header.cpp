@@ -193,7 +193,7 @@ class Parser {
     }
   }
 
-  // One word per axis.
+  // Splits a line into one word per axis.
   std::vector<std::string_view> one_each(const Line& line) {
     auto words = bytes::words_of(line.value);
     if (words.size() != header_.axes.size()) {
@@ -351,7 +351,7 @@ class Parser {
     if (at != type_names.end()) {
       header_.type = at->type;
     } else if (name == "block") {
-      complain(line, "blocks of bytes are not numbers");
+      complain(line, "elements of type block are not numbers");
     } else {
       complain(line, in_quotes(name) + " is not a NRRD type");
     }
@@ -366,7 +366,7 @@ class Parser {
     } else if (name == "gzip" || name == "gz") {
       header_.encoding = "gzip";
     } else if (name == "bzip2" || name == "bz2") {
-      complain(line, "bzip2 is not read; save it with encoding gzip or raw");
+      complain(line, "bzip2 is not supported; save it with encoding gzip or raw");
     } else {
       complain(line, in_quotes(name) + " is not a NRRD encoding");
     }
@@ -404,7 +404,7 @@ class Parser {
     return count.value_or(0);
   }
 
-  // One name, or a pattern with the first number, the last and the step.
+  // The value is one file name, or a pattern with the first number, the last and the step.
   void set_data_file(const Line& line) {
     const auto words = bytes::words_of(line.value);
     const bool pattern =
@@ -426,7 +426,7 @@ class Parser {
          n += *step) {
       add_file(line, *bytes::numbered_name(words[0], n));
     }
-    if (header_.data_files.empty()) complain(line, "the pattern counts no file");
+    if (header_.data_files.empty()) complain(line, "the pattern matches no file");
     if (words.size() == 5) file_dimension(line, words[4]);
   }
 

@@ -41,7 +41,7 @@ struct Header {
   bool measurement_frame = false;
   std::int64_t line_skip = 0;
   std::int64_t byte_skip = 0;
-  std::vector<std::string> data_files;  // of a detached header
+  std::vector<std::string> data_files;  // data files of a detached header
   std::size_t file_dimension = 0;       // dimensions of a data file; 0: default
   std::uint64_t end = 0;                // offset of the data after an attached header
   std::vector<std::string> notes;

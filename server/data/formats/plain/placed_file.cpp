@@ -1,4 +1,4 @@
-// Blocks of an array -> runs of bytes with constant stride -> numbers.
+// Converts blocks of an array to runs of bytes with constant stride, and these to numbers.
 #include "server/data/formats/plain/placed_file.hpp"
 
 #include <algorithm>
@@ -52,7 +52,7 @@ void PlacedFile::add_array(FileVariable variable, Placement placement,
 cf::Numbers PlacedFile::numbers(int variable, const char* attribute) const {
   const Entry& entry = entries_.at(static_cast<std::size_t>(variable));
   const std::string_view wanted = attribute;
-  // netCDF's default fill values have no meaning in these formats: NaN replaces them.
+  // The default fill values of netCDF do not apply to these formats: NaN replaces them.
   if (wanted == "_FillValue") return {{std::numeric_limits<double>::quiet_NaN()}, true};
   if (wanted == "missing_value" && entry.placement) {
     std::vector<double> values = entry.missing;

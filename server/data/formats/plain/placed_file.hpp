@@ -1,5 +1,5 @@
 // Arrays stored in bytes with constant strides: the common representation of NRRD, GrADS, OpenDX
-// and raw files. Their readers fill a PlacedFile; cf/source.hpp converts it to a dataset.
+// and raw files. Their readers fill a PlacedFile, which cf/source.hpp converts to a dataset.
 #pragma once
 
 #include <array>
@@ -24,13 +24,14 @@ struct Stored {
 // Location of the numbers of a variable. Variables may share a store.
 struct Placement {
   std::shared_ptr<ByteStore> store;
-  std::uint64_t offset = 0;  // of the number at the first stored indices
+  std::uint64_t offset = 0;  // offset of the number at the first stored indices
   Scalar type = Scalar::float32;
   bool big_endian = false;
   std::vector<std::uint64_t> strides;           // bytes between neighbours, one per dimension
   std::vector<Stored> present;                  // one per dimension; the rest is masked
-  bool negated = false;                         // vector components of reversed axes
-  std::optional<std::array<double, 2>> masked;  // stored numbers from the first to the second
+  bool negated = false;                         // components of vectors along reversed axes
+  std::optional<std::array<double, 2>> masked;  // range of stored numbers that are negated, from
+                                                // the first to the second
 };
 
 // Attributes of a coordinate.
@@ -69,7 +70,7 @@ class PlacedFile final : public cf::ArrayFile {
 
  private:
   struct Entry {
-    std::vector<double> values;  // of a coordinate
+    std::vector<double> values;  // values of a coordinate
     std::optional<Placement> placement;
     std::vector<double> missing;
   };

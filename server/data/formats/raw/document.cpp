@@ -64,7 +64,7 @@ class Object {
     if (!value.is_object()) refuse(pointer_, "must be an object");
     for (const auto& [key, member] : value.items()) {
       if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        refuse(below(printable(key, 40)), "this key is not known");
+        refuse(below(printable(key, 40)), "unknown key");
       }
     }
   }
@@ -73,7 +73,7 @@ class Object {
   [[nodiscard]] bool has(const char* key) const { return value_.contains(key); }
   [[nodiscard]] const json& at(const char* key) const {
     const auto found = value_.find(key);
-    if (found == value_.end()) refuse(below(key), "is needed");
+    if (found == value_.end()) refuse(below(key), "is required");
     return *found;
   }
 
@@ -231,7 +231,7 @@ AxisText axis_of(const json& value, const std::string& pointer, std::size_t coun
                                               std::to_string(listed.size()));
     }
     if (object.has("first") || object.has("spacing")) {
-      refuse(pointer, "has coordinates and first or spacing: give only one of them");
+      refuse(pointer, "coordinates exclude first and spacing");
     }
     return out;
   }
@@ -279,7 +279,7 @@ void set_steps(const Object& root, Document& out) {
     auto& listed = out.times.listed;
     listed = Object::numbers_of(steps.at("coordinates"), steps.below("coordinates"), count);
     if (listed.size() != count || steps.has("start") || steps.has("step")) {
-      refuse(steps.below("coordinates"), "must have count numbers, and excludes start and step");
+      refuse(steps.below("coordinates"), "must have count numbers and excludes start and step");
     }
     return;
   }
@@ -306,7 +306,7 @@ void set_fields(const Object& root, Document& out, const Field& defaults) {
       }
     }
     if (field.files.names.empty() && out.files.names.empty()) {
-      refuse(here + "/file", "is needed, for the document names no file");
+      refuse(here + "/file", "is required, because the document has no file");
     }
   }
 }
@@ -343,7 +343,7 @@ Document read(const json& value) {
 
 Result<Document> parse_document(const InputFile& file) {
   if (file.size() > document_max) {
-    return file.fault("is refused: a description has at most " + std::to_string(document_max) +
+    return file.fault("is invalid: a description has at most " + std::to_string(document_max) +
                       " bytes");
   }
   const auto text = file.head(document_max);
@@ -351,7 +351,7 @@ Result<Document> parse_document(const InputFile& file) {
   try {
     return read(json::parse(*text, Watch()));
   } catch (const Refused& refused) {
-    return file.fault("is refused: " + refused.what);
+    return file.fault("is invalid: " + refused.what);
   } catch (const json::exception& fault) {
     return file.fault("is not valid JSON: " + printable(fault.what()));
   }

@@ -47,7 +47,7 @@ struct Document {
   std::string order;  // "zyx": slowest first
   std::uint64_t offset = 0;
   bytes::Spaced times;     // one per step
-  std::string time_units;  // empty: steps are counted
+  std::string time_units;  // empty: steps are numbered
   std::string calendar;
   std::array<AxisText, 3> axes;
   std::vector<Field> fields;

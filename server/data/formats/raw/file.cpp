@@ -56,7 +56,7 @@ class Opener {
   struct Extent {
     std::uint64_t size = 0;
     std::uint64_t described = 0;                 // end of the last step, bytes
-    std::vector<std::uint64_t> step_bytes = {};  // of each group of fields in it
+    std::vector<std::uint64_t> step_bytes = {};  // per group of fields in the file
   };
 
   // Undescribed bytes indicate wrong dimensions, unless they are further steps.
@@ -126,7 +126,7 @@ class Opener {
     factors.insert(factors.end(), lengths_.begin(), lengths_.end());
     const auto total = bytes::product(factors);
     if (!total || *total > (std::uint64_t{1} << 60) / doc_.fields.size()) {
-      return input_->fault("is refused: /dims: together more than 2^60 bytes");
+      return input_->fault("is invalid: /dims: more than 2^60 bytes in total");
     }
     return *total / doc_.times.count;
   }
@@ -160,7 +160,7 @@ class Opener {
     if (per_file == 0) per_file = files.pattern ? 1 : steps / files.names.size();
     const std::size_t count = files.pattern && per_file > 0 ? steps / per_file : files.names.size();
     if (per_file == 0 || count * per_file != steps || count > pieces_max) {
-      return input_->fault("is refused: /file: " + std::to_string(steps) +
+      return input_->fault("is invalid: /file: " + std::to_string(steps) +
                            " steps cannot be divided among " + std::to_string(count) +
                            " files of " + std::to_string(per_file));
     }
@@ -172,7 +172,7 @@ class Opener {
       if (!file) return file.error();
       const std::uint64_t needed = skip + per_file * step_bytes;
       if ((*file)->size() < needed) {
-        return (*file)->fault("is cut short: it has " + std::to_string((*file)->size()) +
+        return (*file)->fault("is truncated: it has " + std::to_string((*file)->size()) +
                               " bytes; " + in_quotes(input_->name()) + " requires " +
                               std::to_string(needed));
       }
@@ -199,7 +199,7 @@ class Opener {
     const auto number = doc_.first_number + static_cast<std::int64_t>(index) * doc_.number_step;
     auto name = bytes::numbered_name(files.names.front(), number);
     if (!name) {
-      return input_->fault("is refused: /file: a pattern has one %d, %4d or %04d");
+      return input_->fault("is invalid: /file: a pattern has one %d, %4d or %04d");
     }
     return *name;
   }
@@ -244,7 +244,7 @@ class Opener {
   std::vector<int> space_;
   std::vector<std::uint64_t> lengths_;
   std::vector<Group> groups_;
-  std::map<std::string, Extent> extents_;  // by file name
+  std::map<std::string, Extent> extents_;  // keyed by file name
 };
 
 }  // namespace

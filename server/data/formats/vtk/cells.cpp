@@ -1,4 +1,4 @@
-// Inverts shape functions by Newton's method, or by simplices if that fails.
+// Inverts shape functions by Newton's method, or by division into simplices if that fails.
 #include "server/data/formats/vtk/cells.hpp"
 
 #include <algorithm>
@@ -47,7 +47,7 @@ std::span<const Simplex> split_of(Shape shape) {
   return {};
 }
 
-// Shape functions at r, s, t, and their derivatives by each.
+// Shape functions at r, s, t, and their partial derivatives.
 struct Basis {
   Weights value{};
   std::array<Weights, 3> slope{};
@@ -134,7 +134,7 @@ double determinant(const Point& a, const Point& b, const Point& c) {
          c[0] * (a[1] * b[2] - a[2] * b[1]);
 }
 
-// x a + y b + z c = right. False if the columns hardly span space.
+// Solves x a + y b + z c = right. False if the columns are nearly linearly dependent.
 bool solve(const std::array<Point, 3>& columns, const Point& right, Point& out) {
   const auto& [a, b, c] = columns;
   const double whole = determinant(a, b, c);
@@ -269,7 +269,7 @@ SlantedBox::SlantedBox(Shape shape, const Corners& corners)
   }
 }
 
-// A slab without a direction bounds no volume.
+// A slab without a direction is unbounded.
 std::array<std::size_t, 2> SlantedBox::along_row(const Point& from, double step,
                                                  std::size_t count) const {
   const Point place = minus(from, origin_);

@@ -36,14 +36,14 @@ class SlantedBox {
  public:
   SlantedBox(Shape shape, const Corners& corners);
 
-  // Half-open range of the i < count for which `from + (step * i, 0, 0)` lies within.
+  // The half-open range of the i < count for which `from + (step * i, 0, 0)` lies within.
   [[nodiscard]] std::array<std::size_t, 2> along_row(const Point& from, double step,
                                                      std::size_t count) const;
 
  private:
   struct Slab {
     Point normal{0, 0, 0};
-    double low = 0;  // of the product with the normal, relative to origin_
+    double low = 0;  // range of the product with the normal, relative to origin_
     double high = 0;
   };
   Point origin_;
@@ -51,7 +51,7 @@ class SlantedBox {
   std::size_t count_;  // number of dimensions of the shape
 };
 
-// One weight per corner; their sum is 1.
+// Weights of the corners, one per corner; their sum is 1.
 std::array<double, 8> corner_weights(Shape shape, const CellPlace& place);
 
 // Volume, or area in x and y, of the simplices of the cell; 0 if degenerate.

@@ -56,14 +56,14 @@ Result<RegularGrid> image_grid(const InputFile& file, const Snapshot& snapshot) 
       if (!(std::abs(std::abs(snapshot.direction.at(3 * w + a)) - wanted) < 1e-6) ||
           taken.at(world)) {
         return file.fault(
-            "has a Direction that turns its axes away from x, y and z, which is not "
-            "read; resample it onto an upright image first");
+            "has a Direction whose axes are not those of x, y and z, which is not "
+            "supported; resample it onto an axis-aligned image first");
       }
     }
     taken.at(world) = true;
     grid.world[a] = world;
     const double step = snapshot.spacing[a] * (along < 0 ? -1.0 : 1.0);
-    // Index 0 is at the origin even if the extent does not begin there; axes are independent.
+    // Index 0 is at the origin even if the extent begins at another index; axes are independent.
     for (std::int64_t i = 0; i < counts[a]; ++i) {
       by_index[a].push_back(snapshot.origin.at(world) +
                             step * static_cast<double>(snapshot.whole.first[a] + i));

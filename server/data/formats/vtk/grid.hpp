@@ -13,22 +13,22 @@
 namespace windsplat::data::vtk {
 
 struct RegularGrid {
-  // By world axis x, y, z; ascending.
+  // Coordinates along each world axis x, y, z; ascending.
   std::array<std::vector<double>, 3> coordinates;
-  // By index axis i, j, k: its world axis, and whether it is reversed.
+  // For each index axis i, j, k: its world axis, and whether it is reversed.
   std::array<std::size_t, 3> world{0, 1, 2};
   std::array<bool, 3> turned{false, false, false};
 
   bool operator==(const RegularGrid&) const = default;
 };
 
-// For an image or a rectilinear grid. Errors: bad_data, also for an image whose axes are not
-// parallel to those of the world.
+// The grid of an image or a rectilinear grid. Errors: bad_data, also for an image whose axes are
+// not parallel to those of the world.
 Result<RegularGrid> regular_grid(const std::shared_ptr<const InputFile>& file,
                                  const Snapshot& snapshot);
 
-// For a structured grid (points: x y z of each, i fastest) whose x, y and z depend on one index
-// each; nullopt if it is curved or sheared. counts: points along i, j, k.
+// The grid of a structured grid (points: x y z of each, i fastest) whose x, y and z depend on one
+// index each; nullopt if it is curved or sheared. counts: points along i, j, k.
 std::optional<RegularGrid> separable_grid(const std::vector<double>& points,
                                           const std::array<std::int64_t, 3>& counts);
 

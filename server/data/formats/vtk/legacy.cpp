@@ -63,7 +63,7 @@ class Reader {
     const auto word = needed_word();
     if (!word) return word.error();
     const auto value = bytes::to_integer(*word);
-    if (!value || *value < 0) return fault(in_quotes(*word) + " where a count is due");
+    if (!value || *value < 0) return fault(in_quotes(*word) + " instead of a count");
     return static_cast<std::uint64_t>(*value);
   }
 
@@ -73,7 +73,7 @@ class Reader {
       const auto word = needed_word();
       if (!word) return word.error();
       const auto value = bytes::to_sample(*word);
-      if (!value) return fault(in_quotes(*word) + " where a number is due");
+      if (!value) return fault(in_quotes(*word) + " instead of a number");
       number = *value;
     }
     return {};
@@ -114,9 +114,10 @@ class Reader {
       out_.kind = Kind::unstructured;
       out_.format = "VTK unstructured grid, legacy";
     } else {
-      return file_->fault("holds VTK data of the type " + in_quotes(*word) +
-                          "; read are STRUCTURED_POINTS, RECTILINEAR_GRID, STRUCTURED_GRID and "
-                          "UNSTRUCTURED_GRID");
+      return file_->fault(
+          "holds VTK data of the type " + in_quotes(*word) +
+          "; supported are STRUCTURED_POINTS, RECTILINEAR_GRID, STRUCTURED_GRID and "
+          "UNSTRUCTURED_GRID");
     }
     return {};
   }
@@ -140,7 +141,7 @@ class Reader {
     if (key == "z_coordinates") return read_coordinates(2);
     if (key == "cells") return read_cells();
     if (key == "cell_types") return read_cell_types();
-    return fault(in_quotes(key) + " where a section is due");
+    return fault(in_quotes(key) + " instead of a section");
   }
 
   // Skips the values after the line and records their location.
@@ -148,7 +149,7 @@ class Reader {
     array.coding = {.big_endian = true, .has_header = false};
     array.encoding = binary_ ? Encoding::raw : Encoding::text;
     if (array.tuples > cf::samples_max * 16 || array.components > 1024) {
-      return fault("an array beyond all limits");
+      return fault("an array that is too large");
     }
     const std::uint64_t values = array.values();
     if (!known_bits) value_bits = 8 * bytes::size_of(array.type);
@@ -169,14 +170,14 @@ class Reader {
     }
     if (lower(type) != "bit") {
       return file_->fault("has the array " + in_quotes(array.name) + " of the type " +
-                          in_quotes(type) + ", which is not read");
+                          in_quotes(type) + ", which is not supported");
     }
     if (auto done = take(array, true, 1); !done) return done.error();
-    out_.left_out.push_back({array.name, "its type bit is not read"});
+    out_.left_out.push_back({array.name, "its type bit is not supported"});
     return false;
   }
 
-  // The same where the type ends the line and no bits will do.
+  // The same for a type at the end of the line, where bit is not allowed.
   Result<void> take_numbers(StoredArray& array, std::string what) {
     const auto type = scan_.line();
     if (!type) return type.error();
@@ -200,7 +201,7 @@ class Reader {
   }
 
   Result<void> read_coordinates(std::size_t axis) {
-    if (out_.kind != Kind::rectilinear) return fault("coordinates of a grid that has none");
+    if (out_.kind != Kind::rectilinear) return fault("coordinates of a grid without coordinates");
     StoredArray array;
     array.name = std::string(1, static_cast<char>('x' + axis)) + " coordinates";
     const auto n = count();
@@ -270,34 +271,34 @@ class Reader {
   Result<void> read_attribute(const std::string& key) {
     const auto line = scan_.line();
     if (!line) return line.error();
-    std::vector<std::string> told;
+    std::vector<std::string> words;
     std::string_view rest = *line;
-    while (!(rest = trim(rest)).empty() && told.size() < 4) {
+    while (!(rest = trim(rest)).empty() && words.size() < 4) {
       const std::size_t end = std::min(rest.find_first_of(" \t"), rest.size());
-      told.emplace_back(rest.substr(0, end));
+      words.emplace_back(rest.substr(0, end));
       rest.remove_prefix(end);
     }
-    if (told.empty()) return fault("a section " + in_quotes(key) + " without a name");
+    if (words.empty()) return fault("a section " + in_quotes(key) + " without a name");
     StoredArray array;
-    array.name = decoded(told[0]);
+    array.name = decoded(words[0]);
     array.tuples = tuples_;
-    if (key == "lookup_table") return skip_table(told);
-    if (key == "color_scalars") return read_colors(std::move(array), told);
-    if (told.size() < 2) return fault("a section " + in_quotes(key) + " without a type");
-    std::string type = told[1];
+    if (key == "lookup_table") return skip_table(words);
+    if (key == "color_scalars") return read_colors(std::move(array), words);
+    if (words.size() < 2) return fault("a section " + in_quotes(key) + " without a type");
+    std::string type = words[1];
     if (key == "scalars") {
-      if (told.size() > 2) array.components = small(told[2]);
+      if (words.size() > 2) array.components = small(words[2]);
       if (auto done = skip_table_name(); !done) return done;
     } else if (key == "texture_coordinates") {
-      if (told.size() < 3) return fault("texture coordinates without a type");
-      array.components = small(told[1]);
-      type = told[2];
+      if (words.size() < 3) return fault("texture coordinates without a type");
+      array.components = small(words[1]);
+      type = words[2];
     } else if (key == "vectors" || key == "normals") {
       array.components = 3;
     } else if (key == "tensors" || key == "tensors6") {
       array.components = key == "tensors" ? 9 : 6;
     } else if (key != "global_ids" && key != "pedigree_ids") {
-      return fault(in_quotes(key) + " where a section is due");
+      return fault(in_quotes(key) + " instead of a section");
     }
     if (array.components < 1) return fault("a number of components that is not 1 to 9");
     const auto taken = take_typed(array, type);
@@ -330,9 +331,9 @@ class Reader {
   }
 
   // Colours of a look-up table: 4 bytes each, or 4 words.
-  Result<void> skip_table(const std::vector<std::string>& told) {
+  Result<void> skip_table(const std::vector<std::string>& words) {
     StoredArray array;
-    const auto n = told.size() > 1 ? bytes::to_integer(told[1]) : std::nullopt;
+    const auto n = words.size() > 1 ? bytes::to_integer(words[1]) : std::nullopt;
     if (!n || *n < 0) return fault("a look-up table without its size");
     array.tuples = static_cast<std::uint64_t>(*n);
     array.components = 4;
@@ -340,8 +341,8 @@ class Reader {
     return take(array);
   }
 
-  Result<void> read_colors(StoredArray array, const std::vector<std::string>& told) {
-    array.components = told.size() > 1 ? small(told[1]) : 0;
+  Result<void> read_colors(StoredArray array, const std::vector<std::string>& words) {
+    array.components = words.size() > 1 ? small(words[1]) : 0;
     if (array.components < 1) return fault("colours without their number of components");
     array.type = binary_ ? bytes::Scalar::uint8 : bytes::Scalar::float32;
     if (auto done = take(array); !done) return done;
@@ -382,7 +383,7 @@ class Reader {
     return {};
   }
 
-  // Of the field data of the file, only the time is used.
+  // The field data of the file are used for the time only.
   Result<void> take_time(const StoredArray& array) {
     const std::string name = lower(array.name);
     if ((name != "time" && name != "timevalue") || array.values() != 1) return {};

@@ -65,17 +65,17 @@ Result<void> Scanner::skip_words(std::uint64_t count) {
     }
     within = !blank;
   }
-  return seen == count ? Result<void>() : Result<void>(fault("fewer values than are due"));
+  return seen == count ? Result<void>() : Result<void>(fault("fewer values than declared"));
 }
 
 Result<void> Scanner::skip_bytes(std::uint64_t count) {
-  if (count > file_->size() - at_) return fault("fewer bytes than are due");
+  if (count > file_->size() - at_) return fault("fewer bytes than declared");
   at_ += count;
   return {};
 }
 
 Error Scanner::fault(const std::string& what) const {
-  return file_->fault("is broken: " + what + " at byte " + std::to_string(at_));
+  return file_->fault("is malformed: " + what + " at byte " + std::to_string(at_));
 }
 
 Result<char> Scanner::next() {

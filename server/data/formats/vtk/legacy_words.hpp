@@ -1,4 +1,4 @@
-// Words and lines of a legacy VTK file, and what its words mean.
+// Words and lines of a legacy VTK file, and the meaning of type names.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ class Scanner {
 
   // Reads to the end of the line and skips it. Errors: a line beyond the limit.
   Result<std::string> line();
-  // Empty at the end of the file.
+  // Returns an empty word at the end of the file.
   Result<std::string> word();
   Result<void> skip_words(std::uint64_t count);
   Result<void> skip_bytes(std::uint64_t count);
@@ -43,7 +43,7 @@ class Scanner {
 // The type of an array's values by its name in the file, in lower case.
 std::optional<bytes::Scalar> type_named(const std::string& name);
 
-// Decodes names with percent encoding.
+// Decodes percent-encoded names.
 std::string decoded(const std::string& name);
 
 }  // namespace windsplat::data::vtk

@@ -22,7 +22,7 @@ constexpr std::size_t block_values = std::size_t{1} << 16;
 struct CellType {
   Shape shape = Shape::none;
   std::uint64_t corners = 0;
-  bool swaps = false;  // pixel and voxel of VTK order their corners row by row
+  bool swaps = false;  // pixel and voxel of VTK have their corners row by row
 };
 
 CellType cell_type(int type) {
@@ -63,7 +63,7 @@ class Counts {
 
   Result<std::uint64_t> next() {
     if (used_ == block_.size()) {
-      if (left_ == 0) return file_->fault("is broken: its cells run past their array");
+      if (left_ == 0) return file_->fault("is malformed: its cells exceed their array");
       block_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(left_, block_values)));
       if (auto done = reader_->read(block_.data(), block_.size()); !done) return done.error();
       left_ -= block_.size();
@@ -71,7 +71,7 @@ class Counts {
     }
     const double value = block_[used_++];
     if (!(value >= 0 && value < 9e15)) {
-      return file_->fault("is broken: its cells have a number that is not an index");
+      return file_->fault("is malformed: its cells have a number that is not an index");
     }
     return static_cast<std::uint64_t>(value);
   }
@@ -167,7 +167,7 @@ class PieceCells {
       auto size = offsets ? offsets->next() : indices.next();
       if (!size) return size.error();
       if (offsets) {
-        if (*size < end) return file_->fault("is broken: its cells' offsets go back");
+        if (*size < end) return file_->fault("is malformed: the offsets of its cells decrease");
         *size -= std::exchange(end, *size);
       }
       const bool hidden = c < ghosts->size() && has_bit((*ghosts)[c], hidden_cell | refined_cell);
@@ -181,7 +181,7 @@ class PieceCells {
   }
 
  private:
-  // XML does not state the number of indices: the last offset does.
+  // XML does not state the number of indices: it is the last offset.
   Result<void> open_offsets(std::optional<Counts>& offsets) {
     StoredArray array = *piece_.offsets;
     offsets.emplace(file_, array);
@@ -213,8 +213,8 @@ class PieceCells {
       const auto index = indices.next();
       if (!index) return index.error();
       if (*index >= piece_.points) {
-        return file_->fault("is broken: a cell has a corner " + std::to_string(*index) +
-                            " where there are " + std::to_string(piece_.points) + " points");
+        return file_->fault("is malformed: a cell refers to point " + std::to_string(*index) +
+                            ", but there are " + std::to_string(piece_.points) + " points");
       }
       corners.at(i) = static_cast<std::uint32_t>(base_ + *index);
     }

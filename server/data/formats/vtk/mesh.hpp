@@ -39,7 +39,7 @@ struct Mesh {
 // Errors: bad_data.
 Result<Mesh> read_mesh(const std::shared_ptr<const InputFile>& file, const Snapshot& snapshot);
 
-// A digest of points and cells; call before forget_points().
+// A digest of points and cells; call it before forget_points().
 std::string digest_of_mesh(const Mesh& mesh);
 
 // The ghost array of the point or cell data of a piece; empty if absent.

@@ -9,8 +9,8 @@
 
 namespace windsplat::data::vtk {
 
-// Where the tuples of a piece go: offsets from the first sample, in the piece's order.
-// along[a]: how far neighbours along index axis a lie apart.
+// Sample indices of the tuples of a piece: offsets from the first sample, in the order of the
+// piece. along[a]: distance between neighbours along index axis a.
 struct Target {
   std::ptrdiff_t origin = 0;
   std::array<std::ptrdiff_t, 3> along{};
@@ -24,7 +24,8 @@ struct Target {
   }
 };
 
-// For a piece of `whole`. world: by index axis the axis of the volume; turned likewise.
+// The target of a piece of `whole`. world: for each index axis the axis of the volume; turned:
+// whether it is reversed.
 Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
                  const std::array<std::size_t, 3>& world, const std::array<bool, 3>& turned);
 

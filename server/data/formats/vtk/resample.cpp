@@ -11,11 +11,12 @@ namespace windsplat::data::vtk {
 namespace {
 
 // Limits of the work over all cells, in rows of samples within bounding boxes plus linear systems
-// solved; meshes with too many overlapping cells are rejected. Per sample that would lie in a cell
-// without overlap (typical simulation meshes need 3 to 12), so that small files cannot cause much
-// work; and in total (minutes).
+// solved; meshes with too many overlapping cells are rejected. One limit is per sample that would
+// lie in a cell without overlap (typical simulation meshes need 3 to 12), so that small files
+// cannot cause much work; the other is a total (minutes).
 constexpr double work_per_sample = 128;
-constexpr std::uint64_t visits_per_work = 32;  // of samples that already have a cell
+constexpr std::uint64_t visits_per_work = 32;  // limit of visits of samples that already have a
+                                               // cell
 constexpr std::uint64_t work_max = std::uint64_t{1} << 31;
 constexpr double samples_min_3d = 4096;
 constexpr double samples_min_2d = 1024;
@@ -77,14 +78,14 @@ class Resampler {
   struct Extents {
     std::uint64_t cells = 0;
     Box all;
-    Point across{0, 0, 0};               // of bounding boxes
-    std::array<Point, 3> along_index{};  // of hexahedra: edges along i, j, k
+    Point across{0, 0, 0};               // extents of bounding boxes
+    std::array<Point, 3> along_index{};  // for hexahedra: edges along i, j, k
   };
 
   static void add(Extents& to, const Corners& corners, std::size_t count) {
     const Box box = box_of(corners.data(), count);
     if (to.cells++ == 0) to.all = box;
-    constexpr std::array<std::size_t, 3> next{1, 3, 4};  // from corner 0 along i, j, k
+    constexpr std::array<std::size_t, 3> next{1, 3, 4};  // edges from corner 0 along i, j, k
     for (std::size_t d = 0; d < 3; ++d) {
       to.all.low[d] = std::min(to.all.low[d], box.low[d]);
       to.all.high[d] = std::max(to.all.high[d], box.high[d]);
@@ -151,7 +152,7 @@ class Resampler {
     return {};
   }
 
-  // For cells in a plane x, y or z = constant, puts the axes of the plane first.
+  // If the cells are in a plane x, y or z = constant, puts the axes of the plane first.
   Result<void> find_plane() {
     std::size_t flat = 0;
     double longest = 0;
@@ -206,7 +207,7 @@ class Resampler {
     const double exponent = 1.0 / static_cast<double>(rank_);
     Point out{};
     if (high < even_ratio * low) {
-      // One spacing that divides the longest side.
+      // A common spacing that divides the longest side.
       const double spacing = std::pow(room, exponent);
       out.fill(longest / std::max(1.0, std::round(longest / spacing)));
       return out;
@@ -239,7 +240,8 @@ class Resampler {
       for (std::size_t i = 0; i < dims_[d]; ++i) {
         axis.push_back(first_[d] + spacing_[d] * static_cast<double>(i));
       }
-      if (!(axis[1] > axis[0])) return refuse("has cells too small for their distance from 0");
+      if (!(axis[1] > axis[0]))
+        return refuse("has cells too small for their distance from the origin");
     }
     std::array<std::size_t, 3> by_axis{1, 1, 1};
     for (std::size_t d = 0; d < 3; ++d) by_axis.at(order_[d]) = dims_[d];
@@ -249,7 +251,7 @@ class Resampler {
     return {};
   }
 
-  // Half-open range of the samples from `low` to `high` along one axis.
+  // The half-open range of the samples from `low` to `high` along one axis.
   [[nodiscard]] std::array<std::size_t, 2> range(std::size_t d, double low, double high) const {
     if (d >= rank_) return {0, 1};
     constexpr double slack = 1e-6;
@@ -320,7 +322,7 @@ class Resampler {
   Point cell_{0, 0, 0};  // mean extents
   Point first_{0, 0, 0};
   Point spacing_{1, 1, 1};
-  std::array<std::size_t, 3> dims_{1, 1, 1};  // in that order
+  std::array<std::size_t, 3> dims_{1, 1, 1};  // in the order of order_
   std::array<std::size_t, 3> stride_{};
   std::uint64_t work_ = 0;
 };

@@ -37,8 +37,8 @@ inline constexpr std::uint32_t no_cell = 0xffffffffU;
 // the same spacing. Errors: bad_data, without the file name in the message.
 Result<Resampling> resample(const Mesh& mesh);
 
-// One component on the lattice; samples outside all cells are NaN. values: one per point, which are
-// interpolated, or one per cell.
+// Computes one component on the lattice; samples outside all cells are NaN. values: one per point,
+// which are interpolated, or one per cell.
 void gather_points(const Mesh& mesh, const Resampling& where, const float* values, float* out);
 void gather_cells(const Resampling& where, const float* values, float* out);
 

@@ -1,4 +1,4 @@
-// Validation of both kinds of headers: extents within limits, arrays within the file.
+// Validates both kinds of headers: extents within limits, arrays within the file.
 #include "server/data/formats/vtk/snapshot.hpp"
 
 #include <algorithm>
@@ -82,8 +82,7 @@ Result<void> check_data(const std::shared_ptr<const InputFile>& file, Snapshot& 
       snapshot.left_out.push_back({array.name, "a second array of this name"});
     } else if (array.tuples != tuples) {
       snapshot.left_out.push_back({array.name, "has " + std::to_string(array.tuples) +
-                                                   " tuples where " + std::to_string(tuples) +
-                                                   " are due"});
+                                                   " tuples instead of " + std::to_string(tuples)});
     } else {
       if (auto reader = ArrayReader::open(file, array); !reader) return reader.error();
       kept.push_back(std::move(array));
@@ -144,7 +143,7 @@ bool Extent::holds(const Extent& other) const {
 }
 
 Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapshot& snapshot) {
-  if (snapshot.pieces.empty()) return file->fault("has no piece, so no data");
+  if (snapshot.pieces.empty()) return file->fault("has no piece and so no data");
   if (snapshot.kind != Kind::unstructured) {
     if (auto done = check_extents(*file, snapshot); !done) return done;
   }
@@ -157,7 +156,7 @@ Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapsh
     if (auto done = check_data(file, snapshot, piece.cell_data, piece.cells); !done) return done;
     // Without arrays there is no evidence that the extents match the file.
     if (piece.point_data.empty() && piece.cell_data.empty()) {
-      return file->fault("has a piece without an array of as many tuples as points or cells");
+      return file->fault("has a piece with no array whose tuples match its points or cells");
     }
   }
   return {};

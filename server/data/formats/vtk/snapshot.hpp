@@ -25,7 +25,7 @@ struct Extent {
   std::array<std::int64_t, 3> last{0, 0, 0};
 
   [[nodiscard]] std::array<std::int64_t, 3> points() const;  // along each, at least 1
-  // Along each; one layer of cells if there is one point.
+  // Cells along each axis; one layer of cells if there is one point.
   [[nodiscard]] std::array<std::int64_t, 3> cells() const;
   [[nodiscard]] bool holds(const Extent& other) const;
   bool operator==(const Extent&) const = default;

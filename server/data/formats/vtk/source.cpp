@@ -162,7 +162,7 @@ class VtkSource final : public FileSource {
     const std::uint64_t count = uncovered(snapshot, of_cells_);
     if (count == 0) return;
     info_.notes.push_back(std::to_string(count) + (of_cells_ ? " cells" : " points") +
-                          " of the whole extent are in no piece and masked");
+                          " of the whole extent are in no piece: masked");
   }
 
   [[nodiscard]] const std::vector<StoredArray>& data_of(const Piece& piece) const {
@@ -178,8 +178,9 @@ class VtkSource final : public FileSource {
     of_cells_ = fields(piece.cell_data) > fields(piece.point_data);
     for (const StoredArray& array : of_cells_ ? piece.point_data : piece.cell_data) {
       if (array.name == ghost_name) continue;
-      info_.left_out.push_back({array.name, of_cells_ ? "is at points, and more fields at cells"
-                                                      : "is at cells, and no fewer at points"});
+      info_.left_out.push_back(
+          {array.name, of_cells_ ? "is at points, while more fields are at cells"
+                                 : "is at cells, while no fewer fields are at points"});
     }
   }
 
@@ -206,7 +207,7 @@ class VtkSource final : public FileSource {
     const bool turned = grid.world != std::array<std::size_t, 3>{0, 1, 2};
     if (turned) info_.notes.push_back("the file's axes are those of the world in another order");
     if (of_cells_) {
-      info_.notes.push_back("values of cells are shown at the cells' centres");
+      info_.notes.push_back("values of cells are shown at cell centres");
       grid = cell_centres(grid);
     }
     grid_ = std::move(grid);
@@ -250,15 +251,15 @@ class VtkSource final : public FileSource {
     }
     for (const auto& [type, count] : mesh_->unread) {
       info_.notes.push_back(std::to_string(count) + " cells of type " + std::to_string(type) +
-                            " left out");
+                            " omitted");
     }
     if (resampling_.other_rank > 0) {
       info_.notes.push_back(std::to_string(resampling_.other_rank) +
-                            " flat cells left out, as there are solid ones");
+                            " flat cells omitted, because there are solid ones");
     }
     if (resampling_.broken > 0) {
       info_.notes.push_back(std::to_string(resampling_.broken) +
-                            " cells left out that have no volume, or points hidden or not finite");
+                            " cells without volume, or with hidden or non-finite points, omitted");
     }
     return {};
   }
@@ -268,7 +269,7 @@ class VtkSource final : public FileSource {
       if (array.name == ghost_name) continue;
       if (!is_field(array)) {
         info_.left_out.push_back({array.name, "has " + std::to_string(array.components) +
-                                                  " components; shown are 1, 2 or 3"});
+                                                  " components; 1, 2 or 3 are supported"});
         continue;
       }
       const auto components = static_cast<std::size_t>(array.components);
@@ -302,7 +303,7 @@ class VtkSource final : public FileSource {
                    static_cast<std::size_t>(array->components) == field.components.size();
           });
       if (!common) {
-        info_.left_out.push_back({field.name, "is missing or of another kind in a piece of " +
+        info_.left_out.push_back({field.name, "is missing, or has another type, in a piece of " +
                                                   in_quotes(file_->name())});
       }
       return !common;
@@ -317,13 +318,13 @@ class VtkSource final : public FileSource {
       if (!grid) return grid.error();
       same = *grid == points_grid_;
     }
-    if (!same) return step_fault(step, "has another grid than the first step");
+    if (!same) return step_fault(step, "has a grid that differs from that of the first step");
     note_time(step, snapshot);
     keep_common_fields(snapshot);
     return {};
   }
 
-  // Uses the times of the files if all have one and they ascend; otherwise counts steps.
+  // Uses the times of the files if all have one and they ascend; otherwise numbers the steps.
   void set_times() {
     bool timed = true;
     for (std::size_t s = 0; s < steps_.size(); ++s) {
@@ -331,7 +332,7 @@ class VtkSource final : public FileSource {
           timed && steps_[s].time.has_value() && (s == 0 || *steps_[s].time > *steps_[s - 1].time);
     }
     if (!timed && steps_.front().time) {
-      info_.notes.push_back("times are missing or do not ascend: steps are counted");
+      info_.notes.push_back("times are missing or do not ascend: steps are numbered");
     }
     for (std::size_t s = 0; s < steps_.size(); ++s) {
       const double value = timed ? *steps_[s].time : static_cast<double>(s);
@@ -371,7 +372,7 @@ class VtkSource final : public FileSource {
     const std::size_t samples = info_.grid.samples();
     const std::size_t components = info_.fields[field].components.size();
     if (!(snapshot.whole == whole_))
-      return file_->fault("has another grid than when it was opened");
+      return file_->fault("has a grid that changed since it was opened");
     std::fill_n(out, samples * components, std::numeric_limits<float>::quiet_NaN());
     for (const Piece& piece : snapshot.pieces) {
       const auto array = array_of(piece, field);
@@ -401,7 +402,7 @@ class VtkSource final : public FileSource {
       const auto mesh = read_mesh(file_, snapshot);
       if (!mesh) return mesh.error();
       if (digest_of_mesh(*mesh) != mesh_digest_) {
-        return step_fault(step, "has another mesh than the first step");
+        return step_fault(step, "has a mesh that differs from that of the first step");
       }
     }
     const std::size_t samples = info_.grid.samples();
@@ -413,7 +414,7 @@ class VtkSource final : public FileSource {
       const auto array = array_of(piece, field);
       if (!array) return array.error();
       if (kind_ == Kind::unstructured && (*array)->tuples > count - base) {
-        return file_->fault("has another mesh than when it was opened");
+        return file_->fault("has a mesh that changed since it was opened");
       }
       const Target target = kind_ == Kind::structured
                                 ? target_of(whole_, piece.extent, of_cells_, {0, 1, 2}, {})
@@ -443,7 +444,7 @@ class VtkSource final : public FileSource {
   }
 
   std::shared_ptr<Files> files_;
-  FilePtr file_;  // of the last step read
+  FilePtr file_;  // file of the last step read
   std::vector<StepFile> steps_;
   DatasetInfo info_;
   Kind kind_ = Kind::image;
@@ -451,7 +452,7 @@ class VtkSource final : public FileSource {
   std::optional<double> time_;
   bool of_cells_ = false;
   RegularGrid points_grid_;
-  RegularGrid grid_;          // of the shown data, unless resampled
+  RegularGrid grid_;          // grid of the shown data, unless resampled
   std::optional<Mesh> mesh_;  // if resampled, without its points
   Resampling resampling_;
   std::string mesh_digest_;

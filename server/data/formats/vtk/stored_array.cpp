@@ -102,10 +102,11 @@ class ArrayReader::Stream {
     if (array_.offset > file_->size() || array_.room > file_->size() - array_.offset) {
       return fault("begins beyond the end of the file");
     }
-    if (left_ > (std::uint64_t{1} << 56)) return fault("has a size beyond all limits");
+    if (left_ > (std::uint64_t{1} << 56)) return fault("is too large");
     if (array_.encoding == Encoding::text) {
-      return array_.room + 1 >= 2 * left_ ? Result<void>()
-                                          : fault("has more values than the file has text for");
+      return array_.room + 1 >= 2 * left_
+                 ? Result<void>()
+                 : fault("has more values than the text of the file can hold");
     }
     const std::uint64_t wanted = left_ * value_bytes_;
     if (!array_.coding.has_header) {
@@ -133,7 +134,7 @@ class ArrayReader::Stream {
 
  private:
   [[nodiscard]] Error fault(const std::string& what) const {
-    return file_->fault("is broken: the array " + in_quotes(array_.name) + " " + what);
+    return file_->fault("is malformed: the array " + in_quotes(array_.name) + " " + what);
   }
 
   // Number of bytes available after base64 decoding.
@@ -156,8 +157,8 @@ class ArrayReader::Stream {
     const auto claimed = header_number();
     if (!claimed) return claimed.error();
     if (*claimed != wanted) {
-      return fault("has " + std::to_string(*claimed) + " bytes where " + std::to_string(wanted) +
-                   " are due");
+      return fault("has " + std::to_string(*claimed) + " bytes instead of " +
+                   std::to_string(wanted));
     }
     const auto header = static_cast<std::uint64_t>(array_.coding.header_bytes);
     if (wanted > capacity() || wanted + header > capacity()) {
@@ -178,7 +179,7 @@ class ArrayReader::Stream {
     if (count == 0) return wanted == 0 ? Result<void>() : fault("has no blocks");
     const auto width = static_cast<std::uint64_t>(array_.coding.header_bytes);
     if (count > capacity() / width || size > block_bytes_max || last > size || size == 0) {
-      return fault("has a table of blocks that is beyond the file or the limit of 256 MiB a block");
+      return fault("has a table of blocks that exceeds the file or the limit of 256 MiB per block");
     }
     if ((count - (last != 0 ? 1 : 0)) * size + last != wanted) {
       return fault("has blocks of another size than its values");
@@ -197,7 +198,7 @@ class ArrayReader::Stream {
     return {};
   }
 
-  // Reads stored bytes after base64 decoding. Padding ends a unit; another may follow.
+  // Reads stored bytes after base64 decoding. Padding ends a unit; another unit may follow.
   Result<void> stored(unsigned char* out, std::size_t count) {
     if (array_.encoding == Encoding::raw) return bytes_.read(out, count);
     while (count > 0) {
@@ -269,7 +270,7 @@ class ArrayReader::Stream {
           static_cast<int>(packed_.size()), static_cast<int>(block_.size()));
       whole = size >= 0 && static_cast<std::uint64_t>(size) == plain_bytes;
     }
-    if (!whole) return fault("has a compressed block that cannot be undone");
+    if (!whole) return fault("has a block that cannot be decompressed");
     return {};
   }
 
@@ -285,13 +286,13 @@ class ArrayReader::Stream {
           if (length > 0 || byte < 0) break;
           continue;
         }
-        if (length == token.size()) return fault("has a word where a number is due");
+        if (length == token.size()) return fault("has a word instead of a number");
         token.at(length++) = static_cast<char>(byte);
       }
       const std::string_view word(token.data(), length);
-      if (word.empty()) return fault("has fewer values than are due");
+      if (word.empty()) return fault("has fewer values than declared");
       const auto value = bytes::to_sample(word);
-      if (!value) return fault("has " + in_quotes(word) + " where a number is due");
+      if (!value) return fault("has " + in_quotes(word) + " instead of a number");
       out[i] = *value;
     }
     return {};

@@ -23,8 +23,7 @@ constexpr std::size_t attributes_max = 4'000'000;
 constexpr std::size_t block_bytes = std::size_t{4} << 20;
 constexpr std::string_view appended_tag = "<AppendedData";
 
-// Without normalisation of line ends, so that offsets and lengths in memory equal those in the
-// file.
+// Line ends are not normalised, so that offsets and lengths in memory equal those in the file.
 constexpr unsigned parse_flags =
     pugi::parse_escapes | pugi::parse_wconv_attribute | pugi::parse_cdata;
 
@@ -101,7 +100,7 @@ std::optional<bytes::Scalar> xml_type(std::string_view name) {
   return static_cast<bytes::Scalar>(at - names.begin());
 }
 
-// Reads one document, whose text has the same lifetime as this object.
+// Parses one document; its text must outlive this object.
 class Document {
  public:
   explicit Document(std::shared_ptr<const InputFile> file) : file_(std::move(file)) {}
@@ -116,12 +115,12 @@ class Document {
     }
     // The text before appended data lacks the end tag of the root.
     if (text_.has_appended) text_.text += "</VTKFile>";
-    // In place, so that offsets are those of the file.
+    // Parsed in place, so that offsets are those of the file.
     const auto parsed = document_.load_buffer_inplace(text_.text.data(), text_.text.size(),
                                                       parse_flags, pugi::encoding_utf8);
     if (!parsed) {
-      return file_->fault("is not whole XML: " + std::string(parsed.description()) + " at byte " +
-                          std::to_string(parsed.offset));
+      return file_->fault("is not well-formed XML: " + std::string(parsed.description()) +
+                          " at byte " + std::to_string(parsed.offset));
     }
     root_ = document_.child("VTKFile");
     if (!root_) return file_->fault("has no VTKFile element");
@@ -147,7 +146,7 @@ class Document {
       out.format = "VTK unstructured grid";
     } else {
       return file_->fault("holds VTK data of the type " + in_quotes(type) +
-                          "; read are ImageData, RectilinearGrid, StructuredGrid, "
+                          "; supported are ImageData, RectilinearGrid, StructuredGrid, "
                           "UnstructuredGrid and Collection");
     }
     const xml_node set = root_.child(type.c_str());
@@ -189,7 +188,7 @@ class Document {
     if (auto done = file_->read(tag_at, tag.data(), tag.size()); !done) return done;
     const std::size_t end = tag.find('>');
     const std::size_t mark = end == std::string::npos ? end : tag.find('_', end);
-    if (mark == std::string::npos) return file_->fault("has appended data without a beginning");
+    if (mark == std::string::npos) return file_->fault("has appended data without a first '_'");
     appended_base64_ = tag.substr(0, end).find("base64") != std::string::npos;
     appended_at_ = tag_at + mark + 1;
     return {};
@@ -213,7 +212,7 @@ class Document {
       coding_.compressor = Compressor::lz4;
     } else if (!compressor.empty()) {
       return file_->fault("is compressed with " + in_quotes(compressor) +
-                          "; read are vtkZLibDataCompressor and vtkLZ4DataCompressor");
+                          "; supported are vtkZLibDataCompressor and vtkLZ4DataCompressor");
     }
     return {};
   }
@@ -241,13 +240,13 @@ class Document {
     const std::string type_name = node.attribute("type").value();
     const auto type = xml_type(type_name);
     if (!type) {
-      out.left_out.push_back({array.name, "its type " + in_quotes(type_name) + " is not numbers"});
+      out.left_out.push_back({array.name, "its type " + in_quotes(type_name) + " is not numeric"});
       return std::optional<StoredArray>();
     }
     array.type = *type;
     const auto components = bytes::to_integer(node.attribute("NumberOfComponents").as_string("1"));
     if (!components || *components < 1 || *components > 1024) {
-      return file_->fault("is broken: the array " + in_quotes(array.name) +
+      return file_->fault("is malformed: the array " + in_quotes(array.name) +
                           " has a number of components that is not 1 to 1024");
     }
     array.components = static_cast<int>(*components);
@@ -270,8 +269,8 @@ class Document {
       const auto offset = bytes::to_integer(node.attribute("offset").value());
       if (!text_.has_appended || !offset || *offset < 0 ||
           static_cast<std::uint64_t>(*offset) > file_->size() - appended_at_) {
-        return file_->fault("is broken: the array " + in_quotes(array.name) +
-                            " has no place within the appended data");
+        return file_->fault("is malformed: the array " + in_quotes(array.name) +
+                            " lies outside the appended data");
       }
       array.encoding = appended_base64_ ? Encoding::base64 : Encoding::raw;
       array.offset = appended_at_ + static_cast<std::uint64_t>(*offset);
@@ -279,7 +278,7 @@ class Document {
       return {};
     }
     if (format != "ascii" && format != "binary") {
-      return file_->fault("is broken: the array " + in_quotes(array.name) + " has the format " +
+      return file_->fault("is malformed: the array " + in_quotes(array.name) + " has the format " +
                           in_quotes(format));
     }
     array.encoding = format == "ascii" ? Encoding::text : Encoding::base64;
@@ -339,7 +338,7 @@ class Document {
     return {};
   }
 
-  // Invalid extents yield a wrong number here and are rejected by check_snapshot.
+  // Invalid extents yield a wrong number here and are rejected by check_snapshot().
   static std::uint64_t size_of(const std::array<std::int64_t, 3>& counts) {
     std::uint64_t all = 1;
     for (const std::int64_t count : counts) all *= static_cast<std::uint64_t>(count);
@@ -361,7 +360,8 @@ class Document {
     std::vector<StoredArray> arrays;
     if (auto done = read_arrays(group, piece.cells, out, arrays); !done) return done;
     for (StoredArray& array : arrays) {
-      if (array.components != 1) return file_->fault("has cells whose arrays have components");
+      if (array.components != 1)
+        return file_->fault("has cells whose arrays have several components");
       if (array.name == "connectivity")
         piece.connectivity = std::move(array);
       else if (array.name == "offsets")
@@ -432,7 +432,7 @@ Result<std::optional<Collection>> read_collection(const std::shared_ptr<const In
   for (std::size_t i = 1; i < out.members.size(); ++i) {
     if (out.members[i].time == out.members[i - 1].time) {
       return file->fault("has a timestep of several parts (" + in_quotes(out.members[i].file) +
-                         "); only one file a timestep is read");
+                         "); only one file per timestep is supported");
     }
   }
   return std::optional(std::move(out));

@@ -16,7 +16,7 @@ namespace windsplat::data::zarr {
 
 namespace {
 
-// Cache limits: the first always, the second for the chunks of one block.
+// Cache limits: the first one in general, the second one for the chunks of a single block.
 constexpr std::size_t kept_bytes_least = std::size_t{64} << 20;
 constexpr std::size_t kept_bytes_most = std::size_t{512} << 20;
 constexpr std::size_t bookkeeping_bytes = 256;  // overhead of a cached chunk

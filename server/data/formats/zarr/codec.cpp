@@ -24,7 +24,7 @@ using Bytes = std::vector<unsigned char>;
 Error broken_chunk(const std::string& what) { return make_error(ErrorKind::bad_data, what); }
 
 Error wrong_size(std::size_t found, std::size_t expected) {
-  return broken_chunk("has " + std::to_string(found) + " bytes where its array has " +
+  return broken_chunk("has " + std::to_string(found) + " bytes; its array requires " +
                       std::to_string(expected));
 }
 
@@ -88,7 +88,7 @@ Result<Bytes> decompress(Compressor compressor, Bytes stored, std::size_t bytes)
                         : inflate_all(stored, compressor == Compressor::gzip, bytes, out);
   if (!done) {
     return broken_chunk("does not decompress to the " + std::to_string(bytes) +
-                        " bytes that its array has");
+                        " bytes of its array");
   }
   return out;
 }

@@ -66,7 +66,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
  private:
   struct Open {
     Json value;
-    std::string key;  // of the member being read
+    std::string key;  // key of the member being read
   };
 
   bool put_number(double value, bool is_integer, std::int64_t integer) {
@@ -110,7 +110,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   std::string fault_ = "it is not valid JSON";
 };
 
-// Quotes the three unquoted words.
+// Quotes NaN, Infinity and -Infinity where they are unquoted.
 std::string quote_bare_words(std::string_view text) {
   std::string out;
   out.reserve(text.size() + 64);

@@ -14,7 +14,7 @@ namespace windsplat::data::zarr {
 struct Json {
   enum class Kind { null, boolean, number, text, list, object };
   Kind kind = Kind::null;
-  double number = 0;        // of a boolean 0 or 1
+  double number = 0;        // for a boolean 0 or 1
   bool is_integer = false;  // a number written without fraction that fits `integer`
   std::int64_t integer = 0;
   std::string text;

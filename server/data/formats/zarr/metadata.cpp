@@ -68,9 +68,9 @@ std::string why_no_number(const Json* json) {
   const char kind = text.size() > 1 ? text[1] : ' ';
   if (kind == 'S' || kind == 'U' || kind == 'O') return "text or objects, not numbers";
   if (kind == 'M' || kind == 'm') {
-    return "of the type " + in_quotes(text) + ": times are read as numbers with units";
+    return "of the type " + in_quotes(text) + ": only times as numbers with units are supported";
   }
-  return "of the type " + in_quotes(text) + ", which is not read";
+  return "of the type " + in_quotes(text) + ", which is not supported";
 }
 
 std::string id_of(const Json& json) {
@@ -92,7 +92,7 @@ void parse_compressor(const Json* json, ArrayMetadata& out) {
       return;
     }
   }
-  out.problem = "compressed with " + in_quotes(id) + ", which is not read";
+  out.problem = "compressed with " + in_quotes(id) + ", which is not supported";
 }
 
 bool same(const Dtype& a, const Dtype& b) {
@@ -155,7 +155,7 @@ void parse_filters(const Json* json, ArrayMetadata& out) {
     const bool typed = parse_filter(entry, filter);
     // The output type of a filter must be the input type of the next.
     if (!typed || (filter.kind != Filter::Kind::shuffle && !same(filter.decoded, now))) {
-      out.problem = "encoded with the filter " + in_quotes(id_of(entry)) + " in a way not read";
+      out.problem = "encoded with the filter " + in_quotes(id_of(entry)) + " in an unsupported way";
       return;
     }
     if (filter.kind != Filter::Kind::shuffle) now = filter.encoded;

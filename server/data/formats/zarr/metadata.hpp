@@ -13,7 +13,7 @@ namespace windsplat::data::zarr {
 
 struct Dtype {
   char kind = 'f';        // b, i, u, f as in NumPy
-  std::size_t bytes = 4;  // of one item
+  std::size_t bytes = 4;  // size of one item
   bool big_endian = false;
 };
 
@@ -32,7 +32,7 @@ struct Filter {
 
 struct ArrayMetadata {
   std::vector<std::size_t> shape;
-  std::vector<std::size_t> chunks;  // of the same rank, each at least 1
+  std::vector<std::size_t> chunks;  // same rank as shape, each at least 1
   Dtype dtype;
   bool column_major = false;
   char separator = '.';

@@ -30,7 +30,8 @@ class Store final : public cf::ArrayFile {
   [[nodiscard]] const FileContents& contents() const override { return contents_; }
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] std::string format() const override { return "Zarr v2"; }
-  // By the metadata and all chunks, or 4096 evenly distributed ones if there are more.
+  // The identity covers the metadata and all chunks, or 4096 evenly distributed ones if there are
+  // more.
   [[nodiscard]] std::string identity() const override { return identity_; }
 
   [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
@@ -53,7 +54,7 @@ class Store final : public cf::ArrayFile {
     Json attributes;
     ArrayMetadata metadata;
     std::vector<std::string> dimensions;
-    bool named_dimensions = false;  // by _ARRAY_DIMENSIONS
+    bool named_dimensions = false;  // whether _ARRAY_DIMENSIONS is present
   };
   // A decoded chunk; without bytes if absent.
   struct Chunk {

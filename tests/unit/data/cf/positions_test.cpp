@@ -111,7 +111,7 @@ void PrintTo(const Turned& turned, std::ostream* out) {
   *out << turned.drawn[0] << ',' << turned.drawn[1];
 }
 
-// The wind's east and north are 10 steps.i + 1 steps.j, in steps of unit length.
+// The eastward and northward components are 10 steps.i + 1 steps.j, in steps of unit length.
 class TurnedAxes : public testing::TestWithParam<Turned> {};
 
 TEST_P(TurnedAxes, VectorsAlongRowsAndColumnsAreRotatedWithThem) {
@@ -154,7 +154,8 @@ TEST_P(TurnedAxes, HorizontalPartOfDerivedMotionIsRotated) {
   const Volume wind = volume_of(**source, "wind_m");
   EXPECT_EQ(wind.component(0)[5], drawn[0]);
   EXPECT_EQ(wind.component(1)[5], drawn[1]);
-  EXPECT_LT(wind.component(2)[5], 0);  // falling pressure tendency is rising, growing is sinking
+  EXPECT_LT(wind.component(2)[5], 0);  // a decreasing pressure tendency is upward, an increasing
+                                       // one downward
 }
 
 TEST_P(TurnedAxes, VectorsByEastAndNorthStay) {
@@ -165,15 +166,15 @@ TEST_P(TurnedAxes, VectorsByEastAndNorthStay) {
   const Volume wind = volume_of(**source, "wind");
   EXPECT_NEAR(wind.component(0)[5], 10, 0.05);
   EXPECT_NEAR(wind.component(1)[5], 1, 0.05);
-  EXPECT_FALSE(has_note((*source)->info(), "rows and columns: its components"));
+  EXPECT_FALSE(has_note((*source)->info(), "along rows and columns"));
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Positions, TurnedAxes,
-    testing::Values(Turned{{{0, 0.01}, {-0.01, 0}}, {-1, 10}, "exchanged and turned"},
-                    Turned{{{-0.01, 0}, {0, -0.01}}, {-10, -1}, "components are turned"},
-                    Turned{{{0, -0.01}, {0.01, 0}}, {1, -10}, "exchanged and turned"},
-                    Turned{{{0.01, 0}, {0, -0.01}}, {10, -1}, "components are turned"},
+    testing::Values(Turned{{{0, 0.01}, {-0.01, 0}}, {-1, 10}, "exchanged and reversed"},
+                    Turned{{{-0.01, 0}, {0, -0.01}}, {-10, -1}, "they are reversed"},
+                    Turned{{{0, -0.01}, {0.01, 0}}, {1, -10}, "exchanged and reversed"},
+                    Turned{{{0.01, 0}, {0, -0.01}}, {10, -1}, "they are reversed"},
                     Turned{{{0, 0.01}, {0.01, 0}}, {1, 10}, "exchanged with the axes"}));
 
 using Vector = std::array<double, 3>;
@@ -211,7 +212,7 @@ void write_pole(const std::string& path, const char* mapping, double north_longi
   file.text(text_variable(file, "va", {y, x}, v, "m s-1", "northward_wind"), "grid_mapping", "rp");
 }
 
-// The frame of the rotated grid: its pole, the direction of its longitude of the true pole, and the
+// Axes of the rotated grid: its pole, the direction of its longitude of the true pole, and the
 // direction perpendicular to both.
 TEST(Positions, RotatedPoleColumnsAndWindsFollowTheirFrame) {
   for (const double north : {0.0, 25.0}) {
@@ -251,7 +252,7 @@ TEST(Positions, RotatedPoleColumnsAndWindsFollowTheirFrame) {
       }
     }
     EXPECT_TRUE(has_note((*source)->info(), "computed from the rotated pole of 'rp'"));
-    EXPECT_TRUE(has_note((*source)->info(), "'wind' is given by east and north: turned"));
+    EXPECT_TRUE(has_note((*source)->info(), "'wind' has components along east and north: rotated"));
   }
 }
 

@@ -26,8 +26,8 @@ constexpr double parallel = 45 * degree;
 constexpr double meridian = 10;  // degrees
 
 struct Lambert {
-  double turn = 0;     // of the rows, from the projection's x axis, radians
-  bool south = false;  // rows are stored from the far side
+  double turn = 0;     // angle of the rows from the x axis of the projection, radians
+  bool south = false;  // rows are stored from north to south
   std::vector<double> longitude;
   std::vector<double> latitude;
   std::vector<double> gamma;
@@ -43,7 +43,7 @@ Lambert make_lambert(double turn, bool south) {
   for (std::size_t row = 0; row < height; ++row) {
     const std::size_t j = south ? height - 1 - row : row;
     for (std::size_t i = 0; i < width; ++i) {
-      const double a = (static_cast<double>(i) + 3) * 60.0 / 6371;  // well east of the meridian
+      const double a = (static_cast<double>(i) + 3) * 60.0 / 6371;  // far east of the meridian
       const double b = (static_cast<double>(j) - 3) * 60.0 / 6371;
       const double x = a * std::cos(turn) - b * std::sin(turn);
       const double y = a * std::sin(turn) + b * std::cos(turn);
@@ -95,11 +95,11 @@ TEST(Rotation, EastNorthWindsAreRotatedToTheGridAxes) {
         ASSERT_TRUE(source) << source.error().message;
         const DatasetInfo& info = (*source)->info();
         ASSERT_NE(info.grid.columns, nullptr);
-        EXPECT_TRUE(has_note(info, "'wind' is given by east and north: turned"));
+        EXPECT_TRUE(has_note(info, "'wind' has components along east and north: rotated"));
         const Volume wind = volume_of(**source, "wind");
         for (std::size_t row = 0; row < height; ++row) {
           for (std::size_t i = 0; i < width; ++i) {
-            // Volumes run north for any direction of the file.
+            // Volumes are ordered northward for any order of the file.
             const std::size_t n = row * width + i;
             const std::size_t stored = (south ? height - 1 - row : row) * width + i;
             EXPECT_NEAR(info.grid.columns->latitude[n], grid.latitude[stored], 1e-9);
@@ -113,7 +113,7 @@ TEST(Rotation, EastNorthWindsAreRotatedToTheGridAxes) {
             EXPECT_NEAR(std::hypot(wind.component(0)[n], wind.component(1)[n]), 5, 1e-5);
           }
         }
-        // The component variables keep their meaning.
+        // The component variables keep their values.
         EXPECT_EQ(volume_of(**source, "u").range, (std::array<float, 2>{3, 3}));
       }
     }
@@ -122,8 +122,8 @@ TEST(Rotation, EastNorthWindsAreRotatedToTheGridAxes) {
 
 // The rendered direction of the components: their sum along the unit vectors of the map's rows and
 // columns. A map of degrees is not conformal: rows at an angle a from east have the direction (cos
-// a / cos phi, sin a) on it, columns (-sin a / cos phi, cos a); normalising both leaves an eastward
-// wind about 4 degrees off at 45 N.
+// a / cos phi, sin a) on it, columns (-sin a / cos phi, cos a); normalising both turns an eastward
+// wind by about 4 degrees at 45 N.
 TEST(Rotation, EastWindPointsEastOnALatitudeLongitudeMap) {
   const Lambert lambert = make_lambert(25 * degree, false);
   const Columns columns{lambert.longitude, lambert.latitude};
@@ -152,7 +152,7 @@ TEST(Rotation, EastWindPointsEastOnALatitudeLongitudeMap) {
                    (std::cos(a) * std::cos(a) * row + std::sin(a) * std::sin(a) * column) / shrink);
     EXPECT_NEAR(std::atan2(north, east) / degree, off / degree, 0.05);
     EXPECT_LT(std::abs(off) / degree, 4.5);
-    // Without rotation it would be off by the bearing of the rows.
+    // Without rotation the direction would deviate by the bearing of the rows.
     EXPECT_GT(std::abs(std::atan2(x[1], x[0])) / degree, 10);
   }
 }

@@ -73,7 +73,7 @@ TEST(Series, RepeatedTimesWithinAFileAreCounted) {
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().steps.size(), 3U);
   EXPECT_TRUE(has_note((*source)->info(), "2 times are repeated within one file"));
-  EXPECT_TRUE(has_note((*source)->info(), "1 time lies in more than one file"));
+  EXPECT_TRUE(has_note((*source)->info(), "1 time occurs in more than one file"));
   EXPECT_EQ(first_sample(**source, 1), 2000);
 }
 
@@ -87,7 +87,7 @@ TEST(Series, StepsAreOrderedByTimeForAnyFileEpochsAndNames) {
   EXPECT_EQ(texts((*source)->info()),
             (std::vector<std::string>{"2001-01-01T00:00", "2001-01-01T06:00", "2001-01-02T12:00",
                                       "2001-01-03T00:00", "2001-01-03T06:00"}));
-  EXPECT_EQ((*source)->info().time_units, "hours since 2001-01-03");  // the first file's
+  EXPECT_EQ((*source)->info().time_units, "hours since 2001-01-03");  // that of the first file
   EXPECT_EQ((*source)->info().steps[0].value, -48);
   const std::vector<float> expected{1000, 1100, 2000, 3000, 3100};
   for (std::size_t step : {4U, 0U, 2U, 1U, 3U}) {
@@ -135,7 +135,7 @@ TEST(Series, LaterOfTwoFilesWithOneTimeIsUsed) {
   EXPECT_EQ(first_sample(**source, 1), 1100);
   EXPECT_EQ(first_sample(**source, 2), 5000);  // 12:00 of f2, not 1200 of f1
   EXPECT_EQ(first_sample(**source, 3), 5100);
-  EXPECT_TRUE(has_note((*source)->info(), "1 time lies in more than one file"));
+  EXPECT_TRUE(has_note((*source)->info(), "1 time occurs in more than one file"));
 }
 
 TEST(Series, IncompatibleMembersAreReportedWithTheDifference) {
@@ -186,8 +186,8 @@ TEST(Series, VariablesMissingInSomeFilesAreOmittedWithTheReason) {
   auto source = open_file(folder / "s*.nc");
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().find("g"), nullptr);
-  EXPECT_EQ(reason_of((*source)->info(), "g"), "only some files have it: 's2.nc' does not");
-  // The other way round, with different units.
+  EXPECT_EQ(reason_of((*source)->info(), "g"), "not in all files: 's2.nc' lacks it");
+  // The reverse order, with different units.
   with.kelvin = "C";
   with.times = {6};
   write_part(folder / "u1.nc", {{0}, "hours since 2001-01-01"});
@@ -198,7 +198,7 @@ TEST(Series, VariablesMissingInSomeFilesAreOmittedWithTheReason) {
   write_part(folder / "u2.nc", with);
   other = open_file(folder / "u*.nc");
   ASSERT_TRUE(other) << other.error().message;
-  EXPECT_EQ(reason_of((*other)->info(), "g"), "only some files have it: 'u1.nc' does not");
+  EXPECT_EQ(reason_of((*other)->info(), "g"), "not in all files: 'u1.nc' lacks it");
 }
 
 // Each file has its own scale and offset, as reanalyses do.
@@ -239,7 +239,7 @@ TEST(Series, FilesWithoutATimeDimensionAreOneStepEach) {
       file.text(file.variable("time", NC_DOUBLE, {}, {hour}), "units", "hours since 2001-01-01");
     file.variable("f", NC_FLOAT, {z, y, x}, counting(12, base));
   };
-  // In natural order where no member has times.
+  // In natural order if no member has times.
   write("snap10.nc", 300, -1);
   write("snap2.nc", 200, -1);
   write("snap1.nc", 100, -1);
@@ -327,7 +327,7 @@ TEST(Series, FewFilesAreOpenAtATimeAndAChangedOneIsDetected) {
   for (std::size_t v = 0; v < (*series)->contents().variables.size(); ++v) {
     if ((*series)->contents().variables[v].name == "f") f = static_cast<int>(v);
   }
-  // All steps in one block, twice over.
+  // All steps in one block, read twice.
   std::vector<float> values(members * 2);
   for (int pass = 0; pass < 2; ++pass) {
     ASSERT_TRUE((*series)->read(f, {0, 0, 0, 0}, {members, 2, 1, 1}, values.data()));

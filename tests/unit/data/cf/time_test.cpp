@@ -1,4 +1,4 @@
-// CF calendars against dates that can be checked by hand or in an almanac.
+// CF calendars compared with dates that can be verified by hand or in an almanac.
 #include "server/data/cf/time.hpp"
 
 #include <gtest/gtest.h>
@@ -121,7 +121,7 @@ TEST(CfTime, MonthsAndYearsFollowTheCalendar) {
   EXPECT_EQ(text_of(1, "months since 2001-01-31", "noleap"), "2001-02-28T00:00:00Z");
   EXPECT_EQ(text_of(1, "months since 2001-01-30", "360_day"), "2001-02-30T00:00:00Z");
   EXPECT_EQ(text_of(3, "years since 2001-02-28 12:00", ""), "2004-02-28T12:00:00Z");
-  // A fraction is a share of its month: half of February's 28 days; half a year is six months.
+  // A fraction is that of its month: half of February's 28 days; half a year is six months.
   EXPECT_EQ(text_of(1.5, "months since 2001-01-01", ""), "2001-02-15T00:00:00Z");
   EXPECT_EQ(text_of(0.5, "years since 2001-01-01", ""), "2001-07-01T00:00:00Z");
   EXPECT_NE(reason_of(1e300, "months since 2001-01-01"), "");
@@ -129,7 +129,8 @@ TEST(CfTime, MonthsAndYearsFollowTheCalendar) {
 
 TEST(CfTime, TimesInOtherUnits) {
   using Times = std::optional<std::vector<double>>;
-  // 6 hours after 3 January is 2.25 days after the 1st; the 2 hours east of UTC come off.
+  // 6 hours after 3 January is 2.25 days after the 1st; the offset of 2 hours east of UTC is
+  // subtracted.
   EXPECT_EQ(convert_times({6, 30}, {"hours since 2001-01-03", ""}, {"days since 2001-01-01", ""}),
             (Times{{2.25, 3.25}}));
   EXPECT_EQ(convert_times({6}, {"hours since 2001-01-03 00:00 +2", ""},

@@ -54,14 +54,15 @@ TEST(HybridLevels, Vinth2pHasThePressuresOfItsFormula) {
   EXPECT_NEAR(z.coordinates[0], 95886.22888248185, 0.01);
   EXPECT_NEAR(z.coordinates[1], 93757.4667948502, 0.01);
   EXPECT_NEAR(z.coordinates[17], 480.9299949556589, 1e-4);
-  EXPECT_TRUE(has_note(info, "using 1000 hPa"));  // P0 is named, but not in the file
+  EXPECT_TRUE(has_note(info, "using 1000 hPa"));  // P0 is named, but missing in the file
   EXPECT_EQ(reason_of(info, "PS"), "surface pressure: gives the pressure of the levels");
   EXPECT_EQ(reason_of(info, "hyam"), "coefficient of the levels' pressure");
   ASSERT_NE(info.find("pressure"), nullptr);
   EXPECT_EQ(info.find("pressure")->units, "Pa");
   EXPECT_TRUE(info.find("pressure")->derived);
   const Volume pressure = volume_of(**source, "pressure", 1);
-  // p[lev 17, lat 10, lon 20], p[9, 40, 100], p[0, 0, 0] of the file's own order: levels run down.
+  // p[lev 17, lat 10, lon 20], p[9, 40, 100], p[0, 0, 0] in the order of the file, whose levels run
+  // downward.
   const auto at = [](std::size_t x, std::size_t y, std::size_t z_up) {
     return x + 128 * (y + 64 * z_up);
   };
@@ -117,7 +118,8 @@ TEST(HybridLevels, FormsOfTheFormulaGiveTheSamePressures) {
       {"a: A b: B p0: P0 ps: PS", {0.1, 0}, "", true, true},
       {"ap: A b: B ps: PS", {100, 0}, "hPa", true, true},
       {"ap: A b: B ps: PS", {10000, 0}, "Pa", false, true},
-      {"a: A  b: B\tp0: P0 ps: PS", {0.1, 0}, "", true, false},  // nothing says down
+      {"a: A  b: B\tp0: P0 ps: PS", {0.1, 0}, "", true, false},  // no attribute says that the
+                                                                 // levels run downward
       {"a: A b: B p0: P0 ps: PS", {0.1, 0}, "", true, true, 100, "kPa"}};
   for (const Levels& levels : cases) {
     const Folder folder;
@@ -171,13 +173,13 @@ TEST(HybridLevels, MissingTopIsNotedAndATopWithoutUnitUsesThatOfTheSurface) {
     double half;  // Pa
     const char* note;
   };
-  for (const Case& c : {Case{"sigma: sigma ps: ps ptop: absent", "Pa", 2000, "Pa", 50000,
-                             "the pressure at the top, 'absent', is not in the file: using 0"},
-                        Case{"sigma: sigma ps: ps", "Pa", 2000, "Pa", 50000,
-                             "names no pressure at the top: using 0"},
-                        Case{"sigma: sigma ps: ps ptop: PTOP", "Pa", 1000, "Pa", 50500, ""},
-                        Case{"sigma: sigma ps: ps ptop: PTOP", "", 1000, "Pa", 50500, ""},
-                        Case{"sigma: sigma ps: ps ptop: PTOP", "", 10, "hPa", 50500, ""}}) {
+  for (const Case& c :
+       {Case{"sigma: sigma ps: ps ptop: absent", "Pa", 2000, "Pa", 50000,
+             "the pressure at the top, 'absent', is not in the file: using 0"},
+        Case{"sigma: sigma ps: ps", "Pa", 2000, "Pa", 50000, "has no pressure at the top: using 0"},
+        Case{"sigma: sigma ps: ps ptop: PTOP", "Pa", 1000, "Pa", 50500, ""},
+        Case{"sigma: sigma ps: ps ptop: PTOP", "", 1000, "Pa", 50500, ""},
+        Case{"sigma: sigma ps: ps ptop: PTOP", "", 10, "hPa", 50500, ""}}) {
     const Folder folder;
     {
       NetcdfMaker file(folder / "s.nc");
@@ -238,7 +240,7 @@ TEST(HybridLevels, WithOversizeSurfacePressureLevelsStayLevels) {
   auto source = open_file(folder / "h.nc");
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().grid.axes[2].kind, AxisKind::level);
-  EXPECT_TRUE(has_note((*source)->info(), "their pressures are not known"));
+  EXPECT_TRUE(has_note((*source)->info(), "terrain-following levels of unknown pressure"));
   EXPECT_TRUE(has_note((*source)->info(), "'PS' is too large"));
   EXPECT_EQ(volume_of(**source, "f").masked, 0);
 }
@@ -276,11 +278,12 @@ TEST(Omega, BecomesMetersPerSecondByTheTemperatureOfTheFile) {
     ASSERT_TRUE(source) << source.error().message;
     const DatasetInfo& info = (*source)->info();
     ASSERT_NE(info.find("wind_m"), nullptr);
-    EXPECT_EQ(info.first(FieldKind::vector)->name, "wind");  // the file's own comes first
+    EXPECT_EQ(info.first(FieldKind::vector)->name, "wind");  // the vector of the file precedes the
+                                                             // derived one
     EXPECT_EQ(info.find("wind_m")->component_units,
               (std::vector<std::string>{"m s-1", "m s-1", "m s-1"}));
     const Volume wind = volume_of(**source, "wind_m");
-    // w = -omega R T / (p g) with R = 287.05, T = 250, g = 9.80665; levels run up.
+    // w = -omega R T / (p g) with R = 287.05, T = 250, g = 9.80665; levels are numbered upward.
     EXPECT_NEAR(wind.component(2)[0], 2 * 287.05 * 250 / (100000 * 9.80665), 1e-6);
     EXPECT_NEAR(wind.component(2)[4], -1 * 287.05 * 250 / (50000 * 9.80665), 1e-6);
     EXPECT_EQ(wind.component(0)[0], 4);
@@ -296,7 +299,7 @@ TEST(Omega, BecomesMetersPerSecondByTheTemperatureOfTheFile) {
   }
 }
 
-// A missing unit follows from the standard name, Pa s-1. A picture converts by the unit.
+// A missing unit follows from the standard name: Pa s-1. Rendering converts by the unit.
 TEST(Omega, StaysWhenReadingTheTemperatureExceedsTheLimit) {
   const Folder folder;
   {
@@ -373,8 +376,9 @@ TEST(Heights, FromGeopotentialAndFromTheStandardAtmosphere) {
 }
 
 TEST(Heights, MissingLevelsOfARealFileAreMasked) {
-  // contour.cdf: valid_range and fill hide 8988 samples of Z at the first step, 224 of the lowest
-  // three levels each and all 33 x 36 = 1188 of those above but for none; netCDF4's masks.
+  // contour.cdf: valid_range and fill value mask 8988 samples of Z at the first step: 224 on each
+  // of the lowest three levels, and all 33 x 36 = 1188 on each higher level except one (by
+  // netCDF4's masks).
   auto source = open_file(real_file("contour.cdf"));
   ASSERT_TRUE(source) << source.error().message;
   const Volume z = volume_of(**source, "Z", 0);

@@ -136,7 +136,7 @@ TEST_F(LocateBeneath, PathsOutsideTheRootAreRefused) {
   }
   const auto inside = locate_beneath(root_.native(), (root_ / "a.nc").native());
   ASSERT_FALSE(inside);
-  EXPECT_EQ(inside.error().kind, ErrorKind::invalid) << "absolute, though inside";
+  EXPECT_EQ(inside.error().kind, ErrorKind::invalid) << "absolute, although inside";
 }
 
 TEST_F(LocateBeneath, InvalidFileNamesAreRefused) {
@@ -153,7 +153,7 @@ TEST_F(LocateBeneath, InvalidFileNamesAreRefused) {
 
 TEST_F(LocateBeneath, PipeIsRefusedWithoutBlocking) {
   EXPECT_EQ(refusal("pipe.nc"), ErrorKind::invalid);
-  EXPECT_EQ(refusal("pipe*"), ErrorKind::not_found) << "a series is of files";
+  EXPECT_EQ(refusal("pipe*"), ErrorKind::not_found) << "a series consists of files";
 }
 
 // A folder is accessed whenever its files are read, long after it was located.
@@ -183,7 +183,8 @@ TEST_F(LocateBeneath, PatternIsMatchedAgainWithinTheSameRoot) {
   fs::create_symlink("nowhere.nc", root_ / "runs/f5.nc");
   fs::create_symlink("f6.nc", root_ / "runs/f6.nc");
   const auto beside_links = locate_again(series);
-  ASSERT_TRUE(beside_links) << "links that lead nowhere or out are not part of the series";
+  ASSERT_TRUE(beside_links)
+      << "dangling links and links out of the root are not part of the series";
   EXPECT_EQ(beside_links->members.size(), 3U);
 }
 
@@ -192,15 +193,15 @@ TEST_F(LocateBeneath, LinksOmittedFromASeriesAreReported) {
   EXPECT_EQ(links_left_out(located("runs/f*.nc")), "") << "a link to a file is that file";
   EXPECT_EQ(links_left_out(located("runs/f2.nc")), "");
   fs::create_symlink("../../secret.nc", root_ / "runs/f3.nc");
-  EXPECT_EQ(links_left_out(located("runs/f*.nc")),
-            "1 of 4 names that the pattern matches is a link that leads out of the data root or to "
-            "no file, and is left out");
+  EXPECT_EQ(
+      links_left_out(located("runs/f*.nc")),
+      "1 of 4 names that match the pattern is omitted: links that are dangling or lead out of "
+      "the data root");
   fs::create_symlink("nowhere.nc", root_ / "runs/f4.nc");
   fs::create_symlink("nowhere.nc", root_ / "runs/g4.nc");
   EXPECT_THAT(links_left_out(located("runs/f*.nc")), HasSubstr("2 of 5 names"));
   EXPECT_EQ(links_left_out(locate((root_ / "runs/f*.nc").native()).value()),
-            "1 of 5 names that the pattern matches is a link that leads to no file, and is left "
-            "out");
+            "1 of 5 names that match the pattern is omitted: links that are dangling");
 }
 
 TEST_F(LocateBeneath, LookupReadsNothing) {

@@ -1,8 +1,8 @@
 // OpenDX: small files made here, and the storm of Debian's package dxsamples (25 x 14 x 8), whose
-// expected figures come from a script that reads the tail of each file with Python's struct module:
+// expected values come from a script that reads the tail of each file with Python's struct module:
 //   v = struct.unpack(">8400f", open("wind.dx", "rb").read()[-33600:])
-//   v[((i * 14 + j) * 8 + k) * 3 + c]
-// i running along x, j along z, k along y, which is up: the updraft (c = 1) vanishes at k = 0.
+//   v[((i * 14 + j) * 8 + k) * 3 + c] i runs along x, j along z, k along y, which is up: the
+//   updraft (c = 1) vanishes at k = 0.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ std::string text_of(const Doubles& values) {
   return out + "\n";
 }
 
-// x fastest out of z fastest.
+// Reorders from z fastest to x fastest.
 Doubles turned(const Doubles& values) {
   Doubles out;
   for (std::size_t z = 0; z < 2; ++z) {
@@ -125,7 +125,7 @@ TEST(Dx, SeriesAreStepsAndGroupsAreFields) {
   ASSERT_TRUE(source);
   ASSERT_EQ(source->info().steps.size(), 3U);
   EXPECT_EQ(source->info().steps[1].value, 7.5);
-  EXPECT_EQ(source->info().steps[2].value, 9);  // behind the value
+  EXPECT_EQ(source->info().steps[2].value, 9);  // after the value
   const Volume v = volume_of(*source, "s", 2);
   EXPECT_EQ(v.components, 3);
   EXPECT_EQ(v.component(1)[1], 3 * (3 * 6 + 1));  // x 1: the seventh item
@@ -140,7 +140,7 @@ TEST(Dx, SeriesAreStepsAndGroupsAreFields) {
   EXPECT_EQ(source->info().steps.size(), 1U);
   EXPECT_NE(source->info().find("a"), nullptr);
   EXPECT_EQ(values_of(*source, "b"), floats(turned(counted(12))));
-  EXPECT_THAT(source->info().notes, Contains(HasSubstr("'c' is left out")));
+  EXPECT_THAT(source->info().notes, Contains(HasSubstr("'c' is omitted")));
 }
 
 TEST(Dx, ProductsOfLinesAndValuesOfCells) {
@@ -186,7 +186,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         BadDxCase{"short", with_array("items 12 lsb ieee data 0"), "does not fit"},
         BadDxCase{"follows", with_array("items 12 data follows 1 2 3"), "is not a number"},
-        BadDxCase{"huge", with_array("items 4294967295 lsb ieee data follows 1 2 3"), "cut short"},
+        BadDxCase{"huge", with_array("items 4294967295 lsb ieee data follows 1 2 3"), "truncated"},
         BadDxCase{"overflow",
                   with_array("rank 2 shape 9223372036854775807 9223372036854775807 items "
                              "9223372036854775807 lsb ieee data 0"),
@@ -194,11 +194,12 @@ INSTANTIATE_TEST_SUITE_P(
         BadDxCase{"offset", with_array("items 12 lsb ieee data 9223372036854775807"),
                   "does not fit"},
         BadDxCase{"negative", with_array("items -12 lsb ieee data 0"), "negative"},
-        BadDxCase{"count", with_array("items 2 data follows 1 2"), "with 2 values on 12 places"},
+        BadDxCase{"count", with_array("items 2 data follows 1 2"), "with 2 values on 12 positions"},
         BadDxCase{"tensor",
                   with_array("rank 1 shape 9 items 12 data follows " + text_of(counted(108))),
                   "of a shape that is not drawn"},
-        BadDxCase{"strings", with_array("type string items 12 data follows \"a\""), "not read"},
+        BadDxCase{"strings", with_array("type string items 12 data follows \"a\""),
+                  "not supported"},
         BadDxCase{"outside", with_array("items 12 data file \"../x\",0"),
                   "outside the dataset's folder"},
         BadDxCase{"no_object", grid + field("4", "99"), "has no object '99'"},
@@ -218,7 +219,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadDxCase{"word", grid + "surprise 4\n", "'surprise' is not understood"}),
     [](const auto& test) { return std::string(test.param.name); });
 
-// A product or series that contains itself must end.
+// Parsing a product or series that contains itself must end.
 TEST(DxRefusal, CyclesAreRefused) {
   const Folder folder;
   write_file(folder / "c.dx",

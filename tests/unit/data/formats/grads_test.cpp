@@ -1,7 +1,7 @@
 // GrADS descriptors: small ones with data made here, and model.ctl of Debian's package grads, whose
-// expected figures come from a script that reads model.dat with Python's struct module:
-//   v = struct.unpack("<596160f", open("model.dat", "rb").read())
-// a time being PS, seven levels each of U V Z T, five of Q, TS and P, 46 x 72 samples each.
+// expected values come from a script that reads model.dat with Python's struct module:
+//   v = struct.unpack("<596160f", open("model.dat", "rb").read()) A time consists of PS, seven
+//   levels each of U V Z T, five of Q, TS and P, 46 x 72 samples each.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -64,7 +64,7 @@ TEST(Grads, RecordsAreOrderedByTimeVariableAndLevel) {
   EXPECT_EQ(info.find("u")->units, "m/s");
   EXPECT_EQ(info.find("t")->units, "K");
   EXPECT_THAT(info.left_out,
-              Contains(testing::Field(&LeftOut::name, "ps")));  // no level: another grid
+              Contains(testing::Field(&LeftOut::name, "ps")));  // not on a level: another grid
   Doubles second = counted(12);
   for (double& value : second) value += 24 + 6;
   EXPECT_EQ(values_of(*source, "u", 1), floats(second));
@@ -87,7 +87,7 @@ TEST(Grads, UndefIsMasked) {
   EXPECT_EQ(test::volume_of(*source, "u", 1).masked, 0);
 }
 
-// GrADS masks a hundred thousandth of the value to both sides.
+// GrADS masks values within a hundred thousandth of undef on both sides.
 TEST(Grads, RoundedUndefIsMasked) {
   const Folder folder;
   Doubles values = counted(24);
@@ -130,9 +130,9 @@ TEST(Grads, ByteOrdersAndHeaders) {
                           values.begin() + static_cast<std::ptrdiff_t>(from) + 6},
                          big);
   };
-  // Fortran's records of 24 bytes.
+  // Fortran records of 24 bytes.
   std::string sequential;
-  std::string records;  // the header of a time is one, that of a grid lies within its record
+  std::string records;  // the header of a time is a record, that of a grid is within its record
   std::string headed = "file";
   for (std::size_t r = 0; r < 4; ++r) {
     const std::string count = packed<std::int32_t>({24}, true);
@@ -195,9 +195,9 @@ TEST(Grads, MissingFileIsReportedWithItsReference) {
   ASSERT_FALSE(plain);
   ASSERT_FALSE(counted_on);
   EXPECT_EQ(plain.error().kind, ErrorKind::not_found);
-  EXPECT_THAT(plain.error().message, HasSubstr("'d.dat', which 'd.ctl' names, is not there"));
+  EXPECT_THAT(plain.error().message, HasSubstr("'d.dat', referred to by 'd.ctl', is missing"));
   EXPECT_THAT(counted_on.error().message,
-              HasSubstr("'t28.dat', which 't.ctl' names, is not there"));
+              HasSubstr("'t28.dat', referred to by 't.ctl', is missing"));
 }
 
 TEST(Grads, OtherByteOrdersAndIntegers) {
@@ -216,7 +216,7 @@ TEST(Grads, OtherByteOrdersAndIntegers) {
   ASSERT_TRUE(source);
   EXPECT_EQ(values_of(*source, "u")[1], 2);
   EXPECT_EQ(values_of(*source, "u")[3], 1);
-  // Numbers of 1, 2 and 4 bytes side by side.
+  // Numbers of 1, 2 and 4 bytes in sequence.
   const auto values = [](double first) {
     Doubles out = counted(12);
     for (double& value : out) value += first;
@@ -236,7 +236,8 @@ TEST(Grads, OtherByteOrdersAndIntegers) {
   EXPECT_EQ(values_of(*source, "d"), floats(values(-100000)));
 }
 
-// One file of daily steps per month, from 28 days after the 31st of January: one day, then two.
+// One file of daily steps per month: steps every 28 days from the 31st of January, so one day in
+// the first file, then two.
 TEST(Grads, TemplatesJoinFilesOfUnequalLength) {
   const Folder folder;
   write_file(folder / "d.ctl", descriptor("tdef 4 linear 31jan1999 1dy\noptions template", one_u,

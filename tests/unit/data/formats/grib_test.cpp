@@ -238,7 +238,7 @@ TEST_F(Grib, GaussianLatitudesFromEitherPole) {
     maker.set("bitsPerValue", 24L);
     std::vector<double> list;
     for (int row = 0; row < 64; ++row) {
-      // Latitudes are nearly even, 180 / 64.5 degrees apart.
+      // Latitudes are nearly evenly spaced, 180 / 64.5 degrees apart.
       const double about = (north ? 1 : -1) * (row - 31.5) * 180 / 64.5;
       list.insert(list.end(), 128, about);
     }
@@ -392,8 +392,8 @@ TEST_F(Grib, ReducedGridsAreRefusedByName) {
 TEST_F(Grib, BrokenMessagesAreErrors) {
   const std::string good = message(2, "t", 500, 0);
   EXPECT_EQ(fault(good), "");
-  EXPECT_THAT(fault(good.substr(0, good.size() - 1)), HasSubstr("cut short"));
-  EXPECT_THAT(fault(good.substr(0, 12)), HasSubstr("cut short"));
+  EXPECT_THAT(fault(good.substr(0, good.size() - 1)), HasSubstr("truncated"));
+  EXPECT_THAT(fault(good.substr(0, 12)), HasSubstr("truncated"));
   std::string without_end = good;
   without_end.back() = '8';
   EXPECT_THAT(fault(without_end), HasSubstr("end marker"));
@@ -402,7 +402,7 @@ TEST_F(Grib, BrokenMessagesAreErrors) {
   EXPECT_THAT(fault(huge), HasSubstr("1073741824"));
   std::string section = good;
   section[16] = '\x7f';
-  EXPECT_THAT(fault(section), HasSubstr("broken section"));
+  EXPECT_THAT(fault(section), HasSubstr("malformed section"));
   std::string edition = good;
   edition += good;
   edition[good.size() + 7] = 9;

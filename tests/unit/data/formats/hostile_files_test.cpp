@@ -1,4 +1,4 @@
-// Files that unfold far beyond their size: `inspect` stays small and quick.
+// Files that decode to far more than their size: `inspect` stays small and fast.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -21,12 +21,12 @@
 #include "tests/unit/data/loader_files.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"
 
-extern char** environ;  // POSIX leaves its declaration to the program
+extern char** environ;  // POSIX requires programs to declare it
 
 namespace windsplat::data::test {
 namespace {
 
-// What a process and its loader took: processor time and the larger one's memory.
+// Resources used by a process and its loader: processor time, and the memory of the larger one.
 struct Cost {
   double cpu_s = 0;
   long resident_kib = 0;
@@ -43,7 +43,7 @@ Cost inspect(const std::string& path) {
   for (const int out : {1, 2}) {
     posix_spawn_file_actions_addopen(&actions, out, "/dev/null", O_WRONLY, 0);
   }
-  // A child counts this process's peak as its own until it runs another program.
+  // A child counts this process's peak as its own until it executes another program.
   ::malloc_trim(0);
   const int peak = ::open("/proc/self/clear_refs", O_WRONLY | O_CLOEXEC);
   EXPECT_EQ(::write(peak, "5", 1), 1);
@@ -62,7 +62,7 @@ Cost inspect(const std::string& path) {
           WIFEXITED(status) && WEXITSTATUS(status) == 0};
 }
 
-// Bytes that allow more to be decoded.
+// Padding bytes, which allow more to be decoded.
 void pad(const Hdf5Maker& file) {
   file.set(
       "padding", {200000}, [](hid_t) {},
@@ -87,7 +87,7 @@ std::uintmax_t stored_bytes(const std::string& path) {
   return bytes;
 }
 
-// Named by what each amplifies.
+// Named by what each file amplifies.
 const std::map<std::string, std::function<void(const std::string&)>>& hostile_files() {
   static const std::map<std::string, std::function<void(const std::string&)>> all{
       {"files_of_one_value", write_empty_store},
@@ -173,18 +173,18 @@ TEST_P(HostileFiles, InspectIsFastAndSmall) {
   hostile_files().at(GetParam())(path);
   ASSERT_LT(stored_bytes(path), 1U << 20);
   const Cost cost = inspect(path);
-  // Beyond what opening may take: an axis of 2^24, coordinates of 3000 x 3000, more objects than a
-  // file of that size can hold. The others are described.
+  // Beyond the limits of opening: an axis of 2^24, coordinates of 3000 x 3000, more objects than a
+  // file of that size can hold. The other files are described.
   const std::set<std::string> refused{"groups_of_groups", "links_to_one_variable", "long_axis",
                                       "positions"};
   EXPECT_EQ(cost.is_read, refused.count(GetParam()) == 0);
-#ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
+#ifndef WINDSPLAT_SANITIZED  // its shadow memory counts
   EXPECT_LT(cost.cpu_s, 1);
   EXPECT_LT(cost.resident_kib, 200 * 1000);
 #endif
 }
 
-// Two arrays of 32 MB in less than one, as regional models write them.
+// Two arrays of 32 MB in less than 1 MB, as written by regional models.
 TEST(Storage, CompressedPositionsAreReadWithLittleMemory) {
   const Folder folder;
   write_positions(folder / "a.nc", 2000);

@@ -114,7 +114,7 @@ TEST(Nrrd, EncodingsHoldTheSameSamples) {
   }
 }
 
-// Bytes of the file, independent of their meaning; lines first.
+// Bytes are skipped independently of their meaning; lines are skipped first.
 TEST(Nrrd, LinesAndBytesBeforeEncodedDataAreSkipped) {
   const Folder folder;
   for (const auto& [encoding, data] :
@@ -139,11 +139,11 @@ TEST(Nrrd, NanIsMasked) {
   EXPECT_EQ(test::volume_of(*source, "m").masked, 2);
 }
 
-// A long series in one gzip stream: steps in any order with the right values.
+// A long series in one gzip stream: steps read in any order have the right values.
 TEST(Nrrd, StepsOfAGzipStreamAreReadInAnyOrder) {
   const Folder folder;
   constexpr std::size_t steps = 20;
-  constexpr std::size_t cube = 64 * 64 * 64;  // 1 MiB of float a step
+  constexpr std::size_t cube = 64 * 64 * 64;  // 1 MiB of floats per step
   std::string raw;
   for (std::size_t step = 0; step < steps; ++step) {
     raw += packed<float>(counted(cube, static_cast<double>(step)));
@@ -176,7 +176,7 @@ TEST(Nrrd, SpacingsAndBoundsPlaceSamples) {
   const auto& [x, y, z] = source->info().grid.axes;
   EXPECT_EQ(x.coordinates, (Doubles{0, 2}));
   EXPECT_EQ(y.coordinates, (Doubles{15, 25, 35}));  // three cells between 10 and 40
-  EXPECT_EQ(z.coordinates, (Doubles{-0.5, 0}));     // turned to rise
+  EXPECT_EQ(z.coordinates, (Doubles{-0.5, 0}));     // reversed to ascend
   EXPECT_EQ(x.units, "mm");
   EXPECT_EQ(z.units, "km");
   EXPECT_EQ(values_of(*source, "p")[0], 6);
@@ -222,7 +222,7 @@ TEST(Nrrd, DirectionsIdentifyAxes) {
   EXPECT_EQ(source->info().grid.dims(), (std::array<int, 3>{3, 4, 2}));
   EXPECT_EQ(source->info().grid.axes[1].coordinates, (Doubles{6, 7, 8, 9}));
   const auto values = values_of(*source, "d");
-  EXPECT_EQ(values[0], 18);      // x 0, y 6 (the file's last), z 0
+  EXPECT_EQ(values[0], 18);      // x 0, y 6 (the last in the file), z 0
   EXPECT_EQ(values[1], 20);      // x 5
   EXPECT_EQ(values[3 * 4], 19);  // z 2
 }
@@ -325,7 +325,7 @@ TEST(Nrrd, BytesAfterTheSamplesAreReported) {
   const auto absent = open_file(folder / "c.nhdr");
   ASSERT_FALSE(absent);
   EXPECT_EQ(absent.error().kind, ErrorKind::not_found);
-  EXPECT_THAT(absent.error().message, HasSubstr("'c', which 'c.nhdr' names, is not there"));
+  EXPECT_THAT(absent.error().message, HasSubstr("'c', referred to by 'c.nhdr', is missing"));
 }
 
 TEST(Nrrd, ChangedDataFilesAreDetected) {
@@ -389,8 +389,8 @@ INSTANTIATE_TEST_SUITE_P(
                     "abcdefgh", "no field 'endian'"},
         BadNrrdCase{"block",
                     "dimension: 2\nsizes: 2 2\ntype: block\nblock size: 3\nencoding: raw\n", "abcd",
-                    "blocks"},
-        BadNrrdCase{"bzip2", small + "encoding: bzip2\n", "abcd", "bzip2 is not read"},
+                    "type block"},
+        BadNrrdCase{"bzip2", small + "encoding: bzip2\n", "abcd", "bzip2 is not supported"},
         BadNrrdCase{"colors",
                     "dimension: 3\nsizes: 3 2 2\nkinds: RGB-color domain domain\ntype: uint8\n"
                     "encoding: raw\n",
@@ -400,7 +400,7 @@ INSTANTIATE_TEST_SUITE_P(
                     "type: uint8\nencoding: raw\n",
                     std::string(48, 't'), "neither space, time nor"},
         BadNrrdCase{"byte_skip", small + "byte skip: 9223372036854775807\nencoding: raw\n", "abcd",
-                    "cut short"},
+                    "truncated"},
         BadNrrdCase{"line_skip", small + "line skip: 9223372036854775807\nencoding: raw\n",
                     "ab\ncd", "fewer lines"},
         BadNrrdCase{"no_direction",
@@ -425,12 +425,12 @@ TEST(NrrdRefusal, BrokenDataAreDetectedWhenRead) {
            {"hex", std::string(95, '0') + "g"}}) {
     write_file(folder / "b.nrrd", header(plain_2x3x2 + "encoding: " + encoding + "\n\n") + data);
     auto source = open_file(folder / "b.nrrd");
-    if (!source) continue;  // fewer bytes than possible
+    if (!source) continue;  // fewer bytes than required
     const auto volume = (*source)->read(0, 0);
     ASSERT_FALSE(volume) << encoding << ' ' << data;
     EXPECT_EQ(volume.error().kind, ErrorKind::bad_data);
     EXPECT_THAT(volume.error().message,
-                testing::AnyOf(HasSubstr("cut short"), HasSubstr("damaged")));
+                testing::AnyOf(HasSubstr("truncated"), HasSubstr("damaged")));
   }
 }
 

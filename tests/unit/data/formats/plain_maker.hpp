@@ -1,4 +1,4 @@
-// Small files of plain formats for the tests, byte by byte.
+// Small files of plain formats for the tests, written byte by byte.
 #pragma once
 
 #include <gtest/gtest.h>

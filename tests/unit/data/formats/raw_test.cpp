@@ -143,7 +143,7 @@ TEST(Raw, ExtraBytesAreWholeStepsOrRefused) {
   EXPECT_THAT(message, HasSubstr("not a whole step of 48 bytes"));
 }
 
-// Two fields of one file, each given by its offset, describe it together.
+// Two fields of one file, each given by its offset, describe the file together.
 TEST(Raw, FieldsOfOneFileDescribeItTogether) {
   const Folder folder;
   write_file(folder / "a.json", document(R"("fields": [{"name": "a", "file": "a.raw"},
@@ -177,7 +177,7 @@ TEST(Raw, MissingFileIsReportedWithItsReference) {
   ASSERT_FALSE(source);
   EXPECT_EQ(source.error().kind, ErrorKind::not_found);
   EXPECT_EQ(source.error().message,
-            "'none_000.bin', which 'a.json' names, is not there: it is looked for in the folder of "
+            "'none_000.bin', referred to by 'a.json', is missing; expected in the folder of "
             "'a.json'");
 }
 
@@ -218,9 +218,9 @@ INSTANTIATE_TEST_SUITE_P(
         BadRawCase{"deep", with(R"("steps": )" + std::string(100000, '[') + ", "),
                    "nested deeper than 8"},
         BadRawCase{"twice", with(R"("type": "uint8", )"), "'type' occurs twice"},
-        BadRawCase{"unknown", with(R"("colour": 1, )"), "/colour: this key is not known"},
+        BadRawCase{"unknown", with(R"("colour": 1, )"), "/colour: unknown key"},
         BadRawCase{"unknown_below", with("", R"([{"name": "p", "unit": "m"}])"),
-                   "/fields/0/unit: this key is not known"},
+                   "/fields/0/unit: unknown key"},
         BadRawCase{"wrap",
                    R"({"windsplat": "raw", "file": "a.raw", "dims": {"x": 4294967297, "y": 1},
             "type": "uint8", "fields": [{"name": "p"}]})",
@@ -243,7 +243,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadRawCase{"negative", with(R"("offset": -1, )"), "/offset"},
         BadRawCase{"endian", R"({"windsplat": "raw", "file": "a.raw", "dims": {"x": 2, "y": 1},
             "type": "int16", "fields": [{"name": "p"}]})",
-                   "/endian: is needed"},
+                   "/endian: is required"},
         BadRawCase{"order", with(R"("order": "zzx", )"), "/order"},
         BadRawCase{"axis", with(R"("axes": {"x": {"coordinates": [1, 2, 3]}}, )"),
                    "/axes/x/coordinates"},

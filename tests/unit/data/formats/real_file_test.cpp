@@ -1,9 +1,10 @@
-// A file that nobody here made: NCL's nc4uvt.nc (Debian package libncarg-data), fetched by
-// scripts/fetch-test-data. The expected figures were read with other programs; each can be checked:
+// A file that was not made for these tests: NCL's nc4uvt.nc (Debian package libncarg-data), fetched
+// by scripts/fetch-test-data. The expected values were read by other programs; each can be
+// verified:
 //   ncdump -h nc4uvt.nc                    dimensions, units, fill
 //   ncdump -p 9 -v lev,lat,lon nc4uvt.nc   coordinates
 //   python3 -c 'import netCDF4; d = netCDF4.Dataset("nc4uvt.nc"); print(d["U"][0, 7, 42, 114])'
-// (indices in the file are time, lev from the ground up, lat from the south, lon from -180).
+//   (indices in the file are time, lev from the ground up, lat from the south, lon from -180).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -85,11 +86,11 @@ TEST_F(RealFile, NamesAndUnits) {
   EXPECT_EQ(info().first(FieldKind::vector), info().find("wind"));
   EXPECT_EQ(info().find("wind")->components, (std::vector<std::string>{"U", "V"}));
   EXPECT_EQ(info().find("wind")->units, "m/s");
-  // The file declares C although the numbers are Kelvin: the declared unit is shown.
+  // The file declares C although the numbers are in kelvin: the declared unit is shown.
   EXPECT_EQ(info().find("T")->units, "C");
   EXPECT_EQ(info().find("U")->dtype, "float32");
   EXPECT_EQ(info().steps.size(), 1U);
-  EXPECT_EQ(info().steps[0].text, "0");  // "Month" is no CF time
+  EXPECT_EQ(info().steps[0].text, "0");  // "Month" is not a CF time unit
   EXPECT_EQ(info().time_units, "Month");
 }
 
@@ -128,8 +129,8 @@ TEST_F(RealFile, JetBlowsEastWithItsMaximumAtTheKnownSample) {
   // d["U"][0].argmax() is (7, 44, 119): 200 hPa, 34.9 N, 154.7 E.
   const Volume u = volume("U");
   EXPECT_EQ(at(info(), u, 0, 154.6875, 34.882523, 200), 81.63902F);
-  // The polar night aloft is colder than the tropics at the ground: the vertical direction is
-  // right.
+  // The polar night at high altitude is colder than the tropics at the ground: the vertical
+  // direction is right.
   const Volume temperature = volume("T");
   EXPECT_GT(at(info(), temperature, 0, 0, 0, 1000), at(info(), temperature, 0, 0, 0, 100) + 80);
 }

@@ -47,7 +47,7 @@ std::string array_json(const std::string& shape, const std::string& chunks,
          compressor + more + "}";
 }
 
-// A store with one array f[y=2, x=3], its axes unnamed, and the additions of a test.
+// A store with one array f[y=2, x=3] without named axes, and the additions of a test.
 class Store {
  public:
   explicit Store(const std::string& name = "s.zarr") : root_(folder_ / name) {
@@ -81,7 +81,7 @@ class Store {
     return {volume->values.begin(), volume->values.end()};
   }
 
-  // The error of opening, or else of reading the first field.
+  // The error of opening, or of reading the first field.
   [[nodiscard]] std::string fault() const {
     auto source = open_file(path());
     if (!source) return source.error().message;
@@ -126,7 +126,7 @@ std::string zstd_frame(const std::string& plain) {
   return out;
 }
 
-// numcodecs' way: the length in four bytes, then the block.
+// Format of numcodecs: the length in four bytes, then the block.
 std::string lz4_block(const std::string& plain) {
   const auto size = static_cast<int>(plain.size());
   std::string out(4 + static_cast<std::size_t>(LZ4_compressBound(size)), '\0');
@@ -146,7 +146,7 @@ std::string blosc_buffer(const std::string& plain, const char* codec, int shuffl
   return out;
 }
 
-// 24 x 40 floats that compress, in one chunk.
+// 24 x 40 compressible floats, in one chunk.
 std::vector<float> ramp() {
   std::vector<float> out(24 * 40);
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<float>(i % 40) * 0.25F;
@@ -166,7 +166,7 @@ void expect_decoded(const std::string& compressor, const std::string& stored) {
             array_json("[24,40]", "[24,40]", "<f4", "null", compressor_json(compressor)));
   store.put("f/0.0", stored);
   expect_same(store.values(), ramp());
-  // The same bytes truncated, and longer than the array needs, are errors.
+  // The same bytes truncated, or longer than the array requires, cause errors.
   store.put("f/0.0", stored.substr(0, stored.size() / 2));
   EXPECT_THAT(store.fault(), HasSubstr("'f/0.0' ")) << compressor;
   store.put("f/.zarray",
@@ -238,10 +238,11 @@ TEST(Zarr, MissingChunkIsTheFillValueAndNeverZeroByChance) {
   const std::string named = R"({"_ARRAY_DIMENSIONS":["y","x"]})";
   expect_same(without_second("<i2", "-9", "{}"), {7, 0, kMasked, kMasked});
   expect_same(without_second("<i2", "null", "{}"), {7, 0, kMasked, kMasked});
-  // In xarray 0 then means missing; without its dimension names it is Zarr's default fill value.
+  // In stores of xarray 0 then means missing; in one without dimension names it is Zarr's default
+  // fill value.
   expect_same(without_second("<i2", "0", named), {7, kMasked, kMasked, kMasked});
   expect_same(without_second("<i2", "0", "{}"), {7, 0, 0, 0});
-  // Default fill values of netCDF have no meaning here: -32767 is that of a short.
+  // Default fill values of netCDF do not apply here: -32767 is that of a short.
   const Store store;
   store.put("f/.zarray", array_json("[1,2]", "[1,2]", "<i2"));
   store.put("f/0.0", bytes_of_items<std::int16_t>({-32767, 1}));
@@ -254,7 +255,7 @@ TEST(Zarr, DanglingChunkLinkIsAnErrorNotAMissingChunk) {
   store.put("f/.zarray", array_json("[1,4]", "[1,2]", "<i2", "-9"));
   store.put("f/0.0", bytes_of_items<std::int16_t>({7, 0}));
   fs::create_symlink("moved", store.path() + "/f/0.1");
-  EXPECT_THAT(store.fault(), HasSubstr("'f/0.1': is a link that leads nowhere"));
+  EXPECT_THAT(store.fault(), HasSubstr("'f/0.1': dangling link"));
   store.put("f/moved", bytes_of_items<std::int16_t>({1, 2}));
   expect_same(store.values(), {7, 0, 1, 2});
 
@@ -263,7 +264,7 @@ TEST(Zarr, DanglingChunkLinkIsAnErrorNotAMissingChunk) {
              array_json("[2,2]", "[1,2]", "<i2", "-9", "null", R"(,"dimension_separator":"/")"));
   nested.put("f/0/0", bytes_of_items<std::int16_t>({7, 0}));
   fs::create_symlink("moved", nested.path() + "/f/1");
-  EXPECT_THAT(nested.fault(), HasSubstr("is a link that leads nowhere"));
+  EXPECT_THAT(nested.fault(), HasSubstr("dangling link"));
   fs::create_directory(nested.path() + "/f/moved");
   expect_same(nested.values(), {7, 0, kMasked, kMasked});
 }
@@ -343,7 +344,7 @@ TEST(Zarr, UnsupportedArraysAreReportedWithReason) {
   EXPECT_THAT(reason_of("k", array_json("[40000,40000]", "[40000,40000]", "<f4")),
               HasSubstr("1073741824 bytes"));
   store.put("sub/.zgroup", R"({"zarr_format":2})");
-  EXPECT_THAT(reason_of("sub", ""), HasSubstr("group: to see it, name its folder"));
+  EXPECT_THAT(reason_of("sub", ""), HasSubstr("group: to see it, open its folder"));
 }
 
 TEST(Zarr, BrokenMetadataIsRefused) {

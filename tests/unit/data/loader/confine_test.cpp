@@ -75,7 +75,7 @@ const std::vector<Attempt> on_names{
 
 const std::vector<Attempt> on_the_given_file{
     // The given file.
-    {"open the given file again, from its begin", 0,
+    {"open the given file again, from its beginning", 0,
      [](int file) -> long {
        char name[64];
        own_name(file, name, sizeof name);
@@ -119,7 +119,7 @@ const std::vector<Attempt> on_the_world{
     {"fork", EPERM, [](int) -> long { return ::syscall(SYS_clone, SIGCHLD, 0, 0, 0, 0); }},
     {"clone3", EPERM, [](int) -> long { return ::syscall(SYS_clone3, nullptr, 0); }},
     {"kill the parent", EPERM, [](int) -> long { return ::kill(::getppid(), 0); }},
-    {"kill oneself", EPERM, [](int) -> long { return ::kill(::getpid(), 0); }},
+    {"kill itself", EPERM, [](int) -> long { return ::kill(::getpid(), 0); }},
     {"signal another's thread", EPERM, [](int) -> long { return ::syscall(SYS_tgkill, 1, 1, 0); }},
     {"signal by an owner", EPERM, [](int file) -> long { return ::fcntl(file, F_SETOWN, 1); }},
     {"ptrace", EPERM, [](int) -> long { return ::ptrace(PTRACE_ATTACH, 1, nullptr, nullptr); }},
@@ -139,7 +139,7 @@ const std::vector<Attempt> on_the_world{
 
 const std::vector<Attempt> on_memory{
     // Memory.
-    {"memory of its own", EPERM, [](int) -> long { return ::memfd_create("x", 0); }},
+    {"private memory", EPERM, [](int) -> long { return ::memfd_create("x", 0); }},
     {"code", EPERM,
      [](int) -> long {
        return ::mmap(nullptr, 4096, PROT_READ | PROT_EXEC, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) ==
@@ -147,7 +147,7 @@ const std::vector<Attempt> on_memory{
                   ? -1
                   : 0;
      }},
-    {"memory that grows by itself", EPERM,
+    {"memory that grows automatically", EPERM,
      [](int) -> long {
        return ::mmap(nullptr, 4096, PROT_READ | PROT_WRITE,
                      MAP_PRIVATE | MAP_ANONYMOUS | MAP_GROWSDOWN, -1, 0) == MAP_FAILED
@@ -161,7 +161,7 @@ const std::vector<Attempt> on_memory{
                   ? -1
                   : 0;
      }},
-    {"data made code", EPERM,
+    {"executable data", EPERM,
      [](int) -> long {
        void* page =
            ::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);

@@ -1,5 +1,5 @@
-// Faulty or compromised loaders: scripts that speak the protocol on descriptor 3. For any messages
-// the daemon gets an error or values that satisfy the invariants.
+// Faulty or compromised loaders: scripts that implement the protocol on descriptor 3. For any
+// messages the daemon gets an error or values that satisfy the invariants.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -184,14 +184,14 @@ TEST_F(FaultyLoader, MalformedMessagesAreRefused) {
   expect_not_opened(message);
 }
 
-// A small expected amount limits the memory taken.
+// A small expected amount limits the memory that is allocated.
 TEST_F(FaultyLoader, TooManyMessagesAreRefused) {
   respond_with("send_info()\nsend('progress', b'x' * 100000)\nreceive()\n");
   expect_not_read(
       "the loader of 'some.nc' violated the protocol and was ended while reading 'wind'");
 }
 
-// Memory written by a loader and not reused is released with it.
+// Memory written by a loader and not reused is freed with it.
 TEST_F(FaultyLoader, FailingToFillMuchMemoryIsTerminated) {
   describe_much();
   respond_with("fd = send_info()\nos.pwrite(fd, b'x' * 1000, 0)\nfail('no')\nreceive()\n");
@@ -253,7 +253,7 @@ TEST_F(FaultyLoader, RequestsForOtherFilesAreRefused) {
 
 TEST_F(FaultyLoader, InvalidDatasetsAreRefused) {
   respond_with("send('opened', info[:-1])\nreceive()\n");
-  expect_not_opened("the loader sent a description that cannot be read");
+  expect_not_opened("the loader sent a malformed description");
 }
 
 TEST_F(FaultyLoader, KeptMemoryCannotChangeTheVolume) {
@@ -332,7 +332,7 @@ TEST_F(FaultyLoader, ResizedMemoryIsRefused) {
 
 TEST_F(FaultyLoader, InfinitiesAndIncompleteVectorsAreRefused) {
   const std::string message =
-      "the loader of 'sample.nc' left numbers unmasked while reading 'wind'";
+      "the loader of 'sample.nc' did not mask all invalid numbers while reading 'wind'";
   for (const char* values : {"[inf] + [0] * 15", "[0] * 15 + [-inf]", "[nan] + [0] * 15",
                              "[0] * 12 + [nan] + [0] * 3"}) {
     std::string script = "fd = send_info()\nos.pwrite(fd, floats(*(";

@@ -1,4 +1,4 @@
-// The memory of loaders counts in the budget and has its limits.
+// The memory of loaders counts in the budget and is limited.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -40,11 +40,12 @@ TEST_F(Loader, ExceedingTheBudgetWhileOpeningIsAnError) {
   const std::string path = folder_ / "a.nc";
   test::write_positions(path, 1500);  // 36 MB of coordinates
   Limits limits;
-  // Memory of an idle loader, and little more.
+  // Memory of an idle loader, with a small margin.
   limits.budget = std::make_shared<Budget>((std::uint64_t{8} << 20) + (std::uint64_t{64} << 10));
   for (int n = 0; n < 3; ++n) {
     const auto source = open_path(path, limits);
-    // Between two looks it may have opened the file: the loader is gone, and what it found is good.
+    // The loader may have opened the file between two measurements: then it has ended, and its
+    // result is valid.
     if (source) {
       EXPECT_EQ((*source)->process(), -1);
       EXPECT_GT((*source)->info().stored_bytes, 0U);
@@ -55,7 +56,7 @@ TEST_F(Loader, ExceedingTheBudgetWhileOpeningIsAnError) {
   }
 }
 
-#ifndef WINDSPLAT_SANITIZED  // whose shadow counts as memory
+#ifndef WINDSPLAT_SANITIZED  // its shadow memory counts
 TEST_F(Loader, VolumeIsTheSameWhenTransferMemoryIsNotKept) {
   const std::string path = folder_ / "a.nc";
   test::write_large(path);

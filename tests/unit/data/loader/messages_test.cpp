@@ -148,12 +148,12 @@ TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
   const std::vector<std::pair<const char*, void (*)(DatasetInfo&)>> lies{
       {"no steps", [](DatasetInfo& i) { i.steps.clear(); }},
       {"no fields", [](DatasetInfo& i) { i.fields.clear(); }},
-      {"a step at no time", [](DatasetInfo& i) { i.steps[1].value = std::nan(""); }},
+      {"a step without a time", [](DatasetInfo& i) { i.steps[1].value = std::nan(""); }},
       {"an axis without coordinates", [](DatasetInfo& i) { i.grid.axes[2].coordinates.clear(); }},
-      {"the same place twice", [](DatasetInfo& i) { i.grid.axes[2].coordinates[1] = 1000; }},
-      {"a turn back", [](DatasetInfo& i) { i.grid.axes[2].coordinates[3] = 2000; }},
-      {"a place at infinity", [](DatasetInfo& i) { i.grid.axes[0].coordinates[2] = infinity; }},
-      {"steps too small to see",
+      {"equal coordinates", [](DatasetInfo& i) { i.grid.axes[2].coordinates[1] = 1000; }},
+      {"a change of direction", [](DatasetInfo& i) { i.grid.axes[2].coordinates[3] = 2000; }},
+      {"an infinite coordinate", [](DatasetInfo& i) { i.grid.axes[0].coordinates[2] = infinity; }},
+      {"steps below the resolution",
        [](DatasetInfo& i) {
          i.grid.axes[0].coordinates = {0, 5e-324, 1e-323};
        }},
@@ -161,29 +161,29 @@ TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
        [](DatasetInfo& i) {
          i.grid.axes[0].coordinates = {20, 0, -10};
        }},
-      {"an axis of no kind", [](DatasetInfo& i) { i.grid.axes[0].kind = AxisKind(7); }},
-      {"a scalar of two", [](DatasetInfo& i) { i.fields[0].kind = FieldKind::scalar; }},
-      {"a vector of one", [](DatasetInfo& i) { i.fields[1].kind = FieldKind::vector; }},
-      {"a vector of four",
+      {"an axis of unknown kind", [](DatasetInfo& i) { i.grid.axes[0].kind = AxisKind(7); }},
+      {"a scalar of two components", [](DatasetInfo& i) { i.fields[0].kind = FieldKind::scalar; }},
+      {"a vector of one component", [](DatasetInfo& i) { i.fields[1].kind = FieldKind::vector; }},
+      {"a vector of four components",
        [](DatasetInfo& i) {
          i.fields[0].components.emplace_back("t");
          i.fields[0].component_units.emplace_back("s");
        }},
-      {"a unit too few", [](DatasetInfo& i) { i.fields[0].component_units.pop_back(); }},
+      {"a missing unit", [](DatasetInfo& i) { i.fields[0].component_units.pop_back(); }},
       {"a field without a name", [](DatasetInfo& i) { i.fields[0].name.clear(); }},
-      {"a column nowhere",
+      {"a column without a position",
        [](DatasetInfo& i) {
          auto columns = std::make_shared<Columns>(*i.grid.columns);
          columns->latitude[3] = std::nan("");
          i.grid.columns = columns;
        }},
-      {"a column too few",
+      {"a missing column",
        [](DatasetInfo& i) {
          auto columns = std::make_shared<Columns>(*i.grid.columns);
          columns->longitude.pop_back();
          i.grid.columns = columns;
        }},
-      {"more samples than there may be",
+      {"more samples than allowed",
        [](DatasetInfo& i) {
          for (Axis& a : i.grid.axes) {
            a.coordinates.resize(1300);
@@ -259,14 +259,14 @@ TEST(LoaderMessages, NoMutationOfAnInfoViolatesItsInvariants) {
     expect_sound(*out);
     if (HasFatalFailure()) FAIL() << "round " << round;
   }
-  EXPECT_GT(accepted, 1000);  // changed letters and digits do not matter
+  EXPECT_GT(accepted, 1000);  // changed letters and digits are valid
 }
 
 TEST(LoaderMessages, OnlyKindAndMessageOfErrorsPass) {
   const Error wrong = make_error(ErrorKind::out_of_memory, "no memory");
   EXPECT_EQ(decode_error(encode_error(wrong)).kind, ErrorKind::out_of_memory);
   EXPECT_EQ(decode_error(encode_error(wrong)).message, "no memory");
-  // A loader must not be able to report that the server drains, for instance.
+  // For example, a loader must not be able to report that the server is shutting down.
   EXPECT_EQ(decode_error(encode_error(make_error(ErrorKind::draining, "x"))).kind,
             ErrorKind::bad_data);
   EXPECT_EQ(decode_error(encode_error(make_error(ErrorKind::bad_data, "a\nb"))).message, "a\\x0ab");

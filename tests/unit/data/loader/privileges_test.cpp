@@ -1,4 +1,4 @@
-// Capabilities of a running loader as the kernel reports them: none, whichever user started it.
+// Capabilities of a running loader as reported by the kernel: none, whichever user started it.
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <sys/mount.h>

@@ -1,5 +1,5 @@
-// The process of a loader: whatever happens to it is an error of the call, and nothing of it is
-// left behind.
+// The process of a loader: whatever happens to it is an error of the call, and it leaves nothing
+// behind.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/prctl.h>
@@ -32,7 +32,7 @@ TEST_F(Loader, CrashIsAnErrorAndTheNextReadStartsAnother) {
   ASSERT_TRUE(first);
   const pid_t id = source->process();
   ASSERT_GT(id, 0);
-  ASSERT_EQ(::kill(id, SIGSTOP), 0);  // so that it dies while it should read
+  ASSERT_EQ(::kill(id, SIGSTOP), 0);  // so that it ends while it should read
   std::thread killer([id] {
     std::this_thread::sleep_for(milliseconds(100));
     ::kill(id, SIGKILL);
@@ -104,9 +104,9 @@ TEST_F(Loader, StoppedLoaderIsEndedWhileOthersAreRead) {
               "the loader of 'a.nc' made no progress for 3.0 s and was ended while reading 'wind'");
   });
   EXPECT_TRUE(other->read(0, 0));
-  EXPECT_FALSE(over) << "the other is read while this one hangs";
+  EXPECT_FALSE(over) << "the other one is read while this one hangs";
   reader.join();
-  EXPECT_EQ(::kill(id, 0), -1) << "it is gone";
+  EXPECT_EQ(::kill(id, 0), -1) << "it has ended";
   const auto again = source->read(0, 0);
   EXPECT_TRUE(again) << again.error().message;
   EXPECT_NE(source->process(), id);
@@ -117,7 +117,7 @@ TEST_F(Loader, ReadCanBeCancelledFromAnotherThread) {
   test::write_wind(path, NC_NETCDF4);
   const auto source = opened(path);
   ASSERT_TRUE(source);
-  source->cancel();  // of nothing
+  source->cancel();  // of no data
   ASSERT_TRUE(source->read(0, 0));
   const pid_t id = source->process();
   ::kill(id, SIGSTOP);
@@ -186,7 +186,8 @@ TEST_F(Loader, TwoHundredLoadersLeaveNothingBehind) {
 TEST_F(Loader, NoneOutlivesTheDaemonEvenWhileBusy) {
   const std::string path = folder_ / "a.nc";
   test::write_wind(path, 0);
-  ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0), 0);  // orphans come to us
+  ASSERT_EQ(::prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0), 0);  // orphans become children of this
+                                                              // process
   int ends[2];
   ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
   const pid_t daemon = ::fork();
@@ -201,7 +202,7 @@ TEST_F(Loader, NoneOutlivesTheDaemonEvenWhileBusy) {
   ::close(ends[0]);
   ::close(ends[1]);
   ASSERT_GT(id, 0);
-  ::kill(id, SIGSTOP);  // it cannot look at its socket
+  ::kill(id, SIGSTOP);  // it cannot read from its socket
   ::kill(daemon, SIGKILL);
   ASSERT_EQ(::waitpid(daemon, nullptr, 0), daemon);
   ::kill(id, SIGCONT);

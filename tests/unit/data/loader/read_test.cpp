@@ -1,4 +1,4 @@
-// Reading in a process apart: the same numbers and the same errors as in this one.
+// Reading in a separate process yields the same numbers and the same errors as in this one.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/types.h>
@@ -55,8 +55,8 @@ TEST_F(Loader, Netcdf4FilesReadAsInThisProcess) {
   expect_same_as_here(path);
 }
 
-// Chunks that were never written, in a file that says not to fill them in: HDF5 leaves alone what
-// it should read into, and the memory between the two had another field's numbers. They are masked.
+// Chunks that were never written, in a file that disables filling: HDF5 leaves the memory
+// unchanged, which contained the numbers of another field. They must be masked.
 TEST_F(Loader, UnwrittenSamplesHoldNothingOfAnEarlierVolume) {
   const std::string path = folder_ / "unfilled.nc";
   {
@@ -77,7 +77,7 @@ TEST_F(Loader, UnwrittenSamplesHoldNothingOfAnEarlierVolume) {
   EXPECT_EQ(b->masked, 6);
 }
 
-// How many descriptors this process has to the memory of volumes.
+// Number of descriptors of this process that refer to the memory of volumes.
 std::size_t transfers_kept() {
   std::size_t count = 0;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -88,7 +88,8 @@ std::size_t transfers_kept() {
   return count;
 }
 
-// MiB of shared memory that another process has mapped and that takes room, where the system tells.
+// MiB of shared memory that another process has mapped and that is resident, if the system reports
+// it.
 double shared_by(pid_t id) {
   std::ifstream file("/proc/" + std::to_string(id) + "/status");
   for (std::string line; std::getline(file, line);) {
@@ -97,8 +98,8 @@ double shared_by(pid_t id) {
   return 0;
 }
 
-// The memory between the two is used again for the scalar, and made anew for the vector, which is
-// too large for it to be kept.
+// The transfer memory is reused for the scalar, and allocated anew for the vector, which is too
+// large to be kept.
 TEST_F(Loader, SmallAndLargeVolumesReadAsInThisProcess) {
   std::ofstream(folder_ / "large.json")
       << R"({"windsplat": "raw", "file": "large.raw", "type": "float32", "endian": "little",
@@ -119,12 +120,12 @@ TEST_F(Loader, SmallAndLargeVolumesReadAsInThisProcess) {
     const bool is_cloud = source->info().fields[field].name == "cloud";
     EXPECT_EQ(volume->values[0], static_cast<float>(((is_cloud ? 4 : 5) * samples) % 1000003));
     EXPECT_EQ(transfers_kept(), is_cloud ? 1U : 0U);
-    // No room remains of 35 MiB beside the copy.
+    // No room remains of 35 MiB in addition to the copy.
     EXPECT_LT(shared_by(source->process()), is_cloud ? 13 : 1);
   }
 }
 
-// What a header refers to is part of the dataset.
+// Files that a header refers to are part of the dataset.
 TEST_F(Loader, ChangedCompanionFileIsDetected) {
   std::ofstream(folder_ / "c.json")
       << R"({"windsplat": "raw", "file": "c.raw", "type": "float32", "endian": "little",
@@ -202,7 +203,7 @@ TEST_F(Loader, NamedGroupIsRead) {
     EXPECT_EQ(volume->range, (std::array<float, 2>{first, first + 5}));
     EXPECT_TRUE(source->info().notes.empty()) << source->info().notes.front();
     expect_same_as_here(path + group);
-    source->release();  // and so by the loader that comes next
+    source->release();  // and so does the next loader
     const auto again = source->read(0, 0);
     ASSERT_TRUE(again) << again.error().message;
     expect_same(*volume, *again);
@@ -215,7 +216,7 @@ TEST_F(Loader, NamedGroupIsRead) {
 
 TEST_F(Loader, InvalidFileGivesTheSameErrorAsInThisProcess) {
   const std::string path = folder_ / "text.nc";
-  std::ofstream(path) << "no dataset, whatever its name says";
+  std::ofstream(path) << "not a dataset, despite its name";
   const auto here = open_file(path);
   const auto there = open_path(path);
   ASSERT_FALSE(here);

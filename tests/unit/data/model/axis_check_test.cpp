@@ -1,4 +1,4 @@
-// Axes whose coordinates are strictly monotonic and yet leave no room for cells are refused.
+// Axes whose coordinates are strictly monotonic but leave no room for cells are refused.
 #include "server/data/model/axis_check.hpp"
 
 #include <gmock/gmock.h>
@@ -48,7 +48,7 @@ TEST(AxisCheck, AxesWithoutRoomForCellsAreRefused) {
       {{0, 5e-324, 1e-323}, "steps below"},
       {{0, 1e-20, 1}, "steps below"},
       {{-1.7e308, 1.7e308}, "beyond 1e290"},
-      {{1e16, 1e16 + 2, 1e16 + 4}, "lost in the rounding"}};
+      {{1e16, 1e16 + 2, 1e16 + 4}, "below the rounding error"}};
   for (const auto& [axis, fault] : axes) EXPECT_THAT(axis_fault(axis), HasSubstr(fault));
 }
 

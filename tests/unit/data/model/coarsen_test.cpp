@@ -82,7 +82,7 @@ TEST(Coarsen, WeightsNeighborsByTheirCells) {
   const Volume coarse = coarsen(fine, {{1, 0, 0}, {std::vector<double>{3, 1, 2}, {}, {}}});
   EXPECT_EQ(coarse.dims, (std::array{2, 1, 1}));
   EXPECT_FLOAT_EQ(coarse.values[0], 2);  // (3 * 1 + 1 * 5) / 4
-  EXPECT_FLOAT_EQ(coarse.values[1], 7);  // the odd one alone
+  EXPECT_FLOAT_EQ(coarse.values[1], 7);  // the last group has one sample
   EXPECT_FLOAT_EQ(coarse.range[0], 2);
   EXPECT_FLOAT_EQ(coarse.range[1], 7);
 }

@@ -73,7 +73,7 @@ TEST(FinishVolume, HugeComponentsDoNotOverflowTheMagnitude) {
   // 3e38 squared is beyond float32, and the length of (max, max) beyond its largest value.
   EXPECT_FLOAT_EQ(make_volume({1, 1, 1}, 2, {1.8e38F, 2.4e38F}).range[1], 3e38F);
   EXPECT_EQ(make_volume({1, 1, 1}, 2, {kMax, kMax}).range[1], kMax);
-  // Tiny components do not vanish: (3e-30, 4e-30) has length 5e-30 though its square underflows.
+  // Tiny components do not vanish: (3e-30, 4e-30) has length 5e-30, although its square underflows.
   EXPECT_FLOAT_EQ(make_volume({1, 1, 1}, 2, {3e-30F, 4e-30F}).range[1], 5e-30F);
 }
 

@@ -1,4 +1,4 @@
-// Histograms, percentiles and ranges against closed forms.
+// Histograms, percentiles and ranges compared with closed forms.
 #include "server/data/model/measure.hpp"
 
 #include <gmock/gmock.h>
@@ -80,7 +80,7 @@ TEST(Histogram, VectorsAreCountedByMagnitude) {
   EXPECT_EQ(h.masked, 1);
 }
 
-// Of n values a share c omits floor(c n) at either end.
+// Of n values, a fraction c excludes floor(c n) at either end.
 TEST(Histogram, ClippingOmitsTheShareAtEitherEnd) {
   const Volume volume = ramp(10'000);
   for (const auto& [clip, dropped] :
@@ -130,7 +130,7 @@ TEST(Histogram, LogarithmicBinsOfAGeometricSeriesAreEven) {
   EXPECT_EQ(h.below, 2) << "0 and -1 have no logarithm";
   EXPECT_EQ(h.masked, 1);
   const Histogram own = made(volume_of(values), {.bins = 3, .logarithmic = true});
-  EXPECT_THAT(*own.range, ElementsAre(1, 32768)) << "of the values above zero";
+  EXPECT_THAT(*own.range, ElementsAre(1, 32768)) << "of the positive values";
   EXPECT_THAT(own.counts, ElementsAre(5, 5, 6));
 }
 

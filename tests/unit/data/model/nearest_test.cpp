@@ -21,7 +21,7 @@ Axis axis_of(AxisKind kind, std::vector<double> coordinates, std::string units =
   return axis;
 }
 
-// A quarter of the globe, descending latitudes, uneven pressures that descend upwards.
+// A quarter of the globe, descending latitudes, non-uniform pressures that descend upwards.
 Grid model_grid() {
   Grid grid;
   grid.axes[0] =

@@ -122,7 +122,7 @@ TEST(Tornado, AirTurnsCounterClockwiseAndRisesEverywhere) {
         }
       }
     }
-    // Circulation round a square of four cells about it is positive: counter-clockwise.
+    // The circulation around a square of four cells about it is positive: counter-clockwise.
     double circulation = 0;
     for (int s = -2; s < 2; ++s) {
       circulation += at(wind, 0, ai + s, aj - 2, k) - at(wind, 0, ai + s, aj + 2, k);
@@ -254,8 +254,8 @@ TEST(Climate, TradesBlowFromTheEastTowardsTheEquator) {
   EXPECT_GT(zonal_mean(wind, 1, south, ground), 0.5);
 }
 
-// Mean relative vorticity, 1/s, of a level about (lon, lat) within a square of +-4 degrees, by the
-// circulation round it (Stokes).
+// Mean relative vorticity, 1/s, of a level in a square of +-4 degrees about (lon, lat), from the
+// circulation around it (Stokes).
 double circulation_vorticity(const Volume& wind, const std::array<Axis, 3>& axes, double lon,
                              double lat, int k) {
   const int half = 4;
@@ -384,7 +384,7 @@ TEST(ElectricField, IncidentWaveIsTransverseAndStandsBeforeTheWall) {
     loudest = std::max(loudest, peak);
     quietest = std::min(quietest, peak);
   }
-  EXPECT_GT(across, 110.0);  // more than the incident 100 V/m: reflection adds
+  EXPECT_GT(across, 110.0);  // more than the incident 100 V/m, because of reflection
   EXPECT_LT(along, 0.25 * across);
   EXPECT_LT(quietest, 0.75 * loudest);  // nodes and antinodes
 }
@@ -430,7 +430,7 @@ TEST(ElectricField, CabinShadesAndItsWallsExcludeTheField) {
   };
   EXPECT_GT(peak(-0.40, 0, 0), 40.0);                    // just behind the window
   EXPECT_LT(peak(0.80, 0, 0), 0.5 * peak(-0.40, 0, 0));  // in the back wall
-  // In the cabin's shadow, away from its axis where the edges' waves meet.
+  // In the shadow of the cabin, away from its axis, where waves from the edges interfere.
   EXPECT_LT((peak(0.95, 0.3, 0.2) + peak(0.95, -0.3, -0.2) + peak(0.95, 0.2, -0.3)) / 3, 60.0);
   const Volume walls = read(*source, "walls");
   EXPECT_EQ(at(walls, 0, nearest(axes[0], 0.79), 13, 16), 1.0);

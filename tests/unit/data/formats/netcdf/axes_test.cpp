@@ -152,9 +152,9 @@ TEST(NetcdfAxes, TimesOutOfOrderAreNoted) {
     std::string note;
   };
   for (const Case& c :
-       {Case{{0, 6, 12}, ""}, Case{{12, 0, 6}, "'time' goes back once: "},
-        Case{{0, 6, 6, 6}, "'time' does not advance 2 times: "},
-        Case{{0, 0, 6, 1, 0}, "'time' goes back 2 times and does not advance once: "}}) {
+       {Case{{0, 6, 12}, ""}, Case{{12, 0, 6}, "'time' decreases once: "},
+        Case{{0, 6, 6, 6}, "'time' does not increase 2 times: "},
+        Case{{0, 0, 6, 1, 0}, "'time' decreases 2 times and does not increase once: "}}) {
     const Folder folder;
     {
       NetcdfMaker file(folder / "t.nc");
@@ -177,7 +177,7 @@ TEST(NetcdfAxes, RecognizesAxesByTheAxisAttributeAgainstTheNames) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "a.nc");
-    const int a = file.axis("y", {5, 6, 7}, "m");  // named y, but the attribute says X
+    const int a = file.axis("y", {5, 6, 7}, "m");  // named y, although the attribute says X
     const int b = file.axis("x", {1, 2}, "m");
     file.text(file.variable_id("y"), "axis", "X");
     file.text(file.variable_id("x"), "axis", "Y");
@@ -302,7 +302,7 @@ TEST(NetcdfAxes, TimeWithGapsIsCounted) {
   EXPECT_EQ(source->info().steps.at(2).text, "2");
   EXPECT_TRUE(std::any_of(source->info().left_out.begin(), source->info().left_out.end(),
                           [](const LeftOut& left) {
-                            return left.reason == "time has missing values: steps are counted";
+                            return left.reason == "time has missing values: steps are numbered";
                           }));
 }
 
@@ -349,10 +349,12 @@ TEST(NetcdfAxes, CurvilinearCoordinatesDecideDimensionDirections) {
   EXPECT_EQ(info.grid.axes[0].name, "a");
   auto volume = source->read(0, 0);
   ASSERT_TRUE(volume);
-  // South-west corner: i = 0, j = 3; then eastwards by i, northwards by falling j.
+  // South-west corner: i = 0, j = 3; then eastwards with increasing i, northwards with decreasing
+  // j.
   EXPECT_EQ(volume->values, (std::vector<float>{3, 7, 11, 2, 6, 10, 1, 5, 9, 0, 4, 8}));
   EXPECT_NE(reason_of(info, "longs").find("more than one dimension"), std::string::npos);
-  // Every column stands where the file says, in the volume's order; the date line is no jump.
+  // Every column is at the position given by the file, in the order of volumes; the date line
+  // causes no jump.
   ASSERT_NE(info.grid.columns, nullptr);
   const Columns& columns = *info.grid.columns;
   ASSERT_EQ(columns.longitude.size(), 12U);

@@ -58,7 +58,7 @@ std::vector<Found> vectors(const std::vector<FileVariable>& variables,
       ++scalars;
     }
   }
-  EXPECT_EQ(scalars, variables.size());  // components can be shown alone too
+  EXPECT_EQ(scalars, variables.size());  // components can also be shown individually
   return out;
 }
 
@@ -126,7 +126,7 @@ TEST(NetcdfFields, OtherVectorsByTheirStem) {
 
 TEST(NetcdfFields, OtherVariablesFormNoVector) {
   EXPECT_EQ(vectors({variable("u"), variable("w")}), Expected{});
-  EXPECT_EQ(vectors({variable("u", "m/s"), variable("v", "V")}), Expected{});  // v: a voltage
+  EXPECT_EQ(vectors({variable("u", "m/s"), variable("v", "V")}), Expected{});  // v is a voltage
   EXPECT_EQ(vectors({variable("max", "K"), variable("min", "K")}), Expected{});
   std::vector<FileVariable> elsewhere{variable("u"), variable("v")};
   elsewhere[1].dims = {3, 1, 2};
@@ -171,13 +171,13 @@ TEST(NetcdfFields, VectorInfoReplacesThatOfItsComponents) {
   auto volume = (*source)->read(0, 0);
   ASSERT_TRUE(volume) << volume.error().message;
   ASSERT_EQ(volume->components, 3);
-  // u and omega lie in the file as z, y, x; v as y, z, x. At z 1, y 0, x 2 that is number 8 of the
-  // former and 5 of the latter.
+  // In the file, u and omega are ordered z, y, x; v is ordered y, z, x. z 1, y 0, x 2 is number 8
+  // of the former and 5 of the latter.
   const std::size_t i = 2 + 3 * (0 + 2 * 1);
   EXPECT_EQ(volume->component(0)[i], 8.0F);
   EXPECT_EQ(volume->component(1)[i], 105.0F);
   EXPECT_EQ(volume->component(2)[i], 0.25F * 2);
-  // Where u is missing (z 0, y 1, x 0), the whole vector is; v alone is not.
+  // Where u is missing (z 0, y 1, x 0), the whole vector is masked, but not v alone.
   EXPECT_EQ(volume->masked, 1);
   EXPECT_TRUE(std::isnan(volume->component(1)[3]));
   auto alone = (*source)->read(static_cast<std::size_t>(info.find("v") - info.fields.data()), 0);
@@ -230,9 +230,9 @@ TEST(NetcdfFields, LargestGridIsUsedAndTheRestIsExplained) {
   EXPECT_EQ(reasons["hyam"], "fewer than two spatial dimensions");
   EXPECT_EQ(reasons["spread"], "its dimension 'member' is neither space nor time");
   EXPECT_EQ(reasons["empty"], "its dimension 'obs' has length 0");
-  EXPECT_EQ(reasons["/inner"], "group: to see it, name it behind the file's name and '#'");
+  EXPECT_EQ(reasons["/inner"], "group: to open it, append '#' and its name to the file's");
   EXPECT_EQ(reasons.count("cloud"), 0U);
-  // What does not depend on time is the same at each.
+  // Fields that do not depend on time are equal at all steps.
   auto first = (*source)->read(1, 0);
   auto second = (*source)->read(1, 1);
   ASSERT_TRUE(first);

@@ -1,4 +1,4 @@
-// Groups of netCDF-4 and plain HDF5 files: by name, or the first that has a field.
+// Groups of netCDF-4 and plain HDF5 files: selected by name, or the first one that has a field.
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
@@ -35,7 +35,7 @@ void put(int group, const char* name, const std::vector<int>& dims,
   ASSERT_EQ(nc_put_var_float(group, variable, values.data()), NC_NOERR);
 }
 
-// Axes in the root; fields in /a/deep (2 x 3 from 100) and /b (3 x 2 of its own, from 200).
+// Axes in the root; fields in /a/deep (2 x 3, from 100) and /b (3 x 2 with its own axes, from 200).
 void write_groups(const std::string& path, bool root_field) {
   NetcdfMaker file(path);
   const int y = file.axis("lat", {10, 0}, "degrees_north");
@@ -58,8 +58,8 @@ TEST(Groups, GroupIsNamedAfterTheFile) {
     auto source = open_file(folder / name);
     ASSERT_TRUE(source) << source.error().message;
     const DatasetInfo& info = (*source)->info();
-    EXPECT_EQ(info.find("r"), nullptr);  // a field of the root is not the group's
-    // Its axes are the root's; latitude is turned to run north.
+    EXPECT_EQ(info.find("r"), nullptr);  // a field of the root is not in the group
+    // The axes are those of the root; latitude is reversed to run north.
     EXPECT_EQ(info.grid.axes[0].coordinates, (std::vector<double>{0, 5, 10}));
     EXPECT_EQ(info.grid.axes[1].coordinates, (std::vector<double>{0, 10}));
     EXPECT_EQ(volume_of(**source, "f").values[0], 103);
@@ -132,9 +132,9 @@ TEST(Groups, PositionsAndSurfacePressureOfParentGroupsApply) {
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
   ASSERT_NE(info.grid.columns, nullptr);
-  EXPECT_TRUE(has_note(info, "'wind' is given by east and north: turned"));
-  // Rows run north-east, so that a wind from due west is half along the rows, half against the
-  // columns.
+  EXPECT_TRUE(has_note(info, "'wind' has components along east and north: rotated"));
+  // Rows run north-east, so that half of a wind from due west is along the rows and half against
+  // the columns.
   const Volume wind = volume_of(**source, "wind");
   EXPECT_NEAR(wind.component(0)[1], 10 * std::sqrt(0.5), 0.05);
   EXPECT_NEAR(wind.component(1)[1], -10 * std::sqrt(0.5), 0.05);
@@ -257,7 +257,7 @@ TEST(Groups, MeepArraysVaryFastestAlongX) {
   EXPECT_TRUE(has_note((*source)->info(), "meep"));
   Volume field = volume_of(**source, "e");
   ASSERT_EQ(field.dims, (std::array<int, 3>{2, 3, 4}));
-  EXPECT_EQ(field.component(0)[1], 100);                     // x fastest here
+  EXPECT_EQ(field.component(0)[1], 100);                     // x fastest in the volume
   EXPECT_EQ(field.component(1)[1 + 2 * (2 + 3 * 3)], 1123);  // x 1, y 2, z 3
   write_like_meep(folder / "t.h5", {"hx", "hy", "hz"}, {2, 3, 4, 5});
   source = open_file(folder / "t.h5");

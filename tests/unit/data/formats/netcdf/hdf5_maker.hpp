@@ -1,4 +1,4 @@
-// Files written by the HDF5 library itself.
+// Creates files by the HDF5 library itself.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace windsplat::data::test {
 
 using Lengths = std::vector<hsize_t>;
 
-// A file written by HDF5 itself; sets are float32.
+// A file written by HDF5 itself; datasets are float32.
 class Hdf5Maker {
  public:
   explicit Hdf5Maker(const std::string& path)
@@ -27,7 +27,7 @@ class Hdf5Maker {
   [[nodiscard]] hid_t id() const { return id_; }
 
   using Plan = std::function<void(hid_t)>;
-  // `use` is given the open dataset.
+  // Calls `use` with the open dataset.
   void set(const std::string& name, const Lengths& dims, const Plan& plan, const Plan& use) const {
     const hid_t space = H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr);
     const hid_t how = H5Pcreate(H5P_DATASET_CREATE);
@@ -85,7 +85,7 @@ inline void deflated_set(const Hdf5Maker& file, const std::string& name, const L
       name, dims,
       [&](hid_t plan) {
         H5Pset_chunk(plan, static_cast<int>(chunk.size()), chunk.data());
-        H5Pset_shuffle(plan);  // which changes no zeros, but takes memory
+        H5Pset_shuffle(plan);  // leaves the zeros unchanged, but takes memory
         H5Pset_deflate(plan, 9);
       },
       [&](hid_t set) {

@@ -38,7 +38,7 @@ TEST(NetcdfRefusals, MissingAndIrregularFiles) {
   expect_refused(folder / "no/folder.nc", ErrorKind::not_found, "no such file");
   expect_refused("", ErrorKind::not_found, "no file name");
   std::filesystem::create_directory(folder / "dir.nc");
-  expect_refused(folder / "dir.nc", ErrorKind::bad_data, "is a directory, and not a Zarr store");
+  expect_refused(folder / "dir.nc", ErrorKind::bad_data, "is a directory, but not a Zarr store");
   ASSERT_EQ(::mkfifo((folder / "pipe.nc").c_str(), 0600), 0);
   expect_refused(folder / "pipe.nc", ErrorKind::bad_data, "not a regular file");
   expect_refused("/dev/null", ErrorKind::bad_data, "not a regular file");
@@ -56,8 +56,8 @@ TEST(NetcdfRefusals, OtherFormats) {
   expect_refused(folder / "cdf4.nc", ErrorKind::bad_data, "not a netCDF file");
   write_bytes(folder / "hdf4.nc", std::string("\x0e\x03\x13\x01 and more"));
   expect_refused(folder / "hdf4.nc", ErrorKind::bad_data, "is HDF4");
-  write_bytes(folder / "hdf.nc", "\x89HDF\r\n\x1a\n and nothing of use behind it");
-  expect_refused(folder / "hdf.nc", ErrorKind::bad_data, "cut short or damaged");
+  write_bytes(folder / "hdf.nc", "\x89HDF\r\n\x1a\n and nothing useful after it");
+  expect_refused(folder / "hdf.nc", ErrorKind::bad_data, "truncated or damaged");
 }
 
 TEST(NetcdfRefusals, UrlsAndLibraryDirectives) {
@@ -67,7 +67,8 @@ TEST(NetcdfRefusals, UrlsAndLibraryDirectives) {
   expect_refused("[mode=bytes]https://127.0.0.1:9/a.nc", ErrorKind::bad_data, "URL");
   write_good(folder / "a.nc", 0);
   expect_refused((folder / "a.nc") + "#mode=zarr", ErrorKind::not_found, "no such file");
-  // The library never sees a file name: one that resembles its directives is a plain file.
+  // The library never sees a file name: a name that resembles its directives is that of an ordinary
+  // file.
   std::filesystem::copy_file(folder / "a.nc", folder / "a.nc#mode=zarr");
   std::filesystem::create_symlink(folder / "a.nc#mode=zarr", folder / "innocent.nc");
   for (const char* name : {"a.nc#mode=zarr", "innocent.nc"}) {
@@ -95,7 +96,7 @@ TEST(NetcdfRefusals, FilesWithoutFields) {
 TEST(NetcdfRefusals, OversizeGridsAreRefusedBeforeAllocation) {
   const Folder folder;
   {
-    NetcdfMaker file(folder / "vast.nc");  // 10^12 samples that were never written: a small file
+    NetcdfMaker file(folder / "vast.nc");  // 10^12 samples that were never written, in a small file
     const int z = file.dimension("z", 10000);
     const int y = file.dimension("y", 10000);
     const int x = file.dimension("x", 10000);
@@ -183,7 +184,7 @@ TEST(NetcdfRefusals, HeaderSizeMatchesFilesOfEveryShape) {
     nc_type type;
     std::size_t columns;
     int variables;
-    std::size_t slack;  // bytes at the file's end behind the last value
+    std::size_t slack;  // bytes at the end of the file, after the last value
   };
   const std::vector<Case> cases{{NC_SHORT, 3, 1, 0}, {NC_BYTE, 5, 1, 0},   {NC_SHORT, 3, 2, 2},
                                 {NC_BYTE, 5, 2, 3},  {NC_DOUBLE, 2, 3, 0}, {NC_FLOAT, 7, 2, 0}};
@@ -217,7 +218,7 @@ TEST(NetcdfRefusals, HeaderSizeMatchesFilesOfEveryShape) {
 }
 
 TEST(NetcdfRefusals, CorruptClassicHeaderNeverCrashes) {
-  // Every header byte set to each of four values; whatever opens must be readable or refused.
+  // Sets every header byte to each of four values; a file that opens must be readable or refused.
   const Folder folder;
   write_good(folder / "good.nc", 0);
   const std::string good = bytes_of(folder / "good.nc");
@@ -267,7 +268,7 @@ TEST(NetcdfRefusals, ReplacedFileStillGivesItsOldValues) {
     std::filesystem::rename(folder / "new.nc", folder / "f.nc");
     auto volume = (*source)->read(0, 1);
     ASSERT_TRUE(volume) << volume.error().message;
-    // The last record's first value in the file is 61; its first level is the bottom.
+    // The first value of the last record in the file is 61; its first level is the bottom.
     EXPECT_EQ(volume->values[0], 61.0F);
   }
 }

@@ -1,5 +1,5 @@
-// HDF5 whose data are elsewhere, were never written, or are far larger than the file: each is
-// refused or masked by name.
+// HDF5 files whose data are in other files, were never written, or are far larger than the file:
+// each is refused or masked by name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -114,7 +114,7 @@ TEST(Storage, UnwrittenDataAreMasked) {
     EXPECT_EQ(std::isfinite(some.values[n]), written) << n;
   }
   EXPECT_TRUE(has_note((*source)->info(),
-                       "masked where nothing was ever written, whatever the fill value: "
+                       "chunks that were never written are masked: "
                        "'nothing' (all of it), 'some' (7 of 8 chunks)"));
   EXPECT_FALSE(has_note((*source)->info(), "'all'"));
 }
@@ -134,7 +134,7 @@ TEST(Storage, LookupOfManyChunksIsPartial) {
   EXPECT_EQ(volume_of(**source, "v").masked, 0);
 }
 
-// Two chunks with one number would be taken for each other: present or absent.
+// Two chunks with the same number could not be distinguished as present or absent.
 TEST(Storage, MoreChunksThanValuesAreRefused) {
   const Folder folder;
   {
@@ -162,7 +162,7 @@ TEST(Storage, OnlyNetcdfIsCalledNetcdf) {
     NetcdfMaker file(folder / "a.nc");
     file.variable("u", NC_FLOAT, {file.dimension("y", 4), file.dimension("x", 4)}, counting(16));
   }
-  // What versions before 4.4 wrote has no properties.
+  // Files written by versions before 4.4 have no _NCProperties.
   std::filesystem::copy_file(folder / "a.nc", folder / "old.nc");
   {
     const hid_t file = H5Fopen((folder / "old.nc").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
@@ -177,8 +177,8 @@ TEST(Storage, OnlyNetcdfIsCalledNetcdf) {
   }
 }
 
-// The library says of an absent chunk that it is there once it was read: of the second block, too,
-// it is masked.
+// The library reports an absent chunk as present once it was read: it must also be masked in the
+// second block.
 TEST(Storage, MissingChunkIsMaskedInEveryBlock) {
   const Folder folder;
   {
@@ -190,7 +190,7 @@ TEST(Storage, MissingChunkIsMaskedInEveryBlock) {
   EXPECT_EQ(volume_of(**source, "u").masked, 5 * 1024 * 1024);
 }
 
-// Bytes have no default fill value in CF: those beyond what was written read as -127.
+// Bytes have no default fill value in CF: unwritten ones are read as -127.
 TEST(Storage, VariableShorterThanTheUnlimitedDimensionIsMasked) {
   const Folder folder;
   {
@@ -217,7 +217,7 @@ TEST(Storage, ChunksAboveTheLimitAreRefused) {
   expect_refused(folder / "a.h5", "'u' is its chunks have more than 1073741824 bytes");
 }
 
-// A chunk that many blocks need is decoded once: what is read is right, too.
+// A chunk needed by many blocks is decoded once, and its values are right.
 TEST(Storage, ChunkLargerThanTheLibraryCacheIsReadWhole) {
   const Folder folder;
   {
@@ -231,7 +231,8 @@ TEST(Storage, ChunkLargerThanTheLibraryCacheIsReadWhole) {
   EXPECT_EQ(volume.range[1], 0);
 }
 
-// Chunks of several steps are kept for the next step, of all variables as far as they fit together.
+// Chunks with several steps are cached for the next step, for all variables as far as they fit
+// together.
 TEST(Storage, MetadataOfAllVariablesShareOneLimit) {
   const Folder folder;
   const Lengths chunk{2, 4, 1024, 1024};  // 32 MiB

@@ -88,7 +88,7 @@ TEST(NetcdfValues, ValidRangeIsInStoredNumbers) {
   });
   expect_values(one_sided, {kNan, -1, 5});
   const Volume other_side = read_row(NC_FLOAT, {-2, 0.3F, 0.4F}, [](NetcdfMaker& file, int f) {
-    file.number(f, "valid_max", NC_DOUBLE, {0.3});  // wider than the packed data
+    file.number(f, "valid_max", NC_DOUBLE, {0.3});  // wider than the type of the packed data
   });
   expect_values(other_side, {-2, 0.3F, kNan});
 }
@@ -113,13 +113,15 @@ TEST(NetcdfValues, TheValidRangeIsReported) {
   auto source = open_file(folder / "v.nc");
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().notes,
-            (std::vector<std::string>{"masked beyond what the file calls valid: 'packed' (-40 to "
-                                      "10), 'low' (from 0.3), 'high' (up to 7.5)"}));
+            (std::vector<std::string>{
+                "values outside the valid range of the file are masked: 'packed' (-40 to "
+                "10), 'low' (from 0.3), 'high' (up to 7.5)"}));
 }
 
 TEST(NetcdfValues, FillMissingNanAndInfinityAreMasked) {
   const auto describe = [](NetcdfMaker& file, int f) {
-    file.number(f, "missing_value", NC_DOUBLE, {-1e10, 1e30});  // wider than a float variable
+    file.number(f, "missing_value", NC_DOUBLE, {-1e10, 1e30});  // wider than the type of a float
+                                                                // variable
   };
   expect_values(read_row(NC_FLOAT, {1, NC_FILL_FLOAT, kNan, -1e10, 1e30, 2}, describe),
                 {1, kNan, kNan, kNan, kNan, 2});
@@ -244,7 +246,8 @@ TEST(NetcdfValues, EveryFormatHoldsTheSameValues) {
 }
 
 // Without chunks a read is smaller: 13 x 150 x 200 doubles take several, split between levels. With
-// chunks the library cache of a field is released, and the field is read repeatedly.
+// chunks, the library's cache for a field is released between reads, and the field is read
+// repeatedly.
 TEST(NetcdfValues, BlocksAndStepsReadAgainAreTheSame) {
   const Folder folder;
   const std::array<std::size_t, 4> lengths{2, 13, 150, 200};

@@ -1,4 +1,4 @@
-// Vertical axes of files the tests wrote: pressure, height, depth or levels, and which way is up.
+// Vertical axes of generated files: pressure, height, depth or levels, and their direction.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -132,7 +132,8 @@ TEST(NetcdfAxes, OceanPressureIsNotAirPressure) {
   }
   auto source = opened(folder / "o.nc");
   ASSERT_NE(source, nullptr);
-  EXPECT_EQ(source->info().fields.size(), 1U);  // no height of the standard atmosphere
+  EXPECT_EQ(source->info().fields.size(), 1U);  // heights cannot be derived from the standard
+                                                // atmosphere
   EXPECT_EQ(source->info().grid.axes[2].coordinates, (std::vector<double>{1000, 10, 0}));
 }
 

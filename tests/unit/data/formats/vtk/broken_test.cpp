@@ -1,5 +1,5 @@
-// Truncated or inconsistent VTK files: each is an error, and none makes the reader allocate memory
-// for data the file cannot contain.
+// Truncated or inconsistent VTK files: each causes an error, and none makes the reader allocate
+// memory for data that the file cannot contain.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -42,7 +42,7 @@ TEST(VtkBroken, EveryTruncationIsAnError) {
   }
 }
 
-// Any changed byte gives an error or values, never a crash.
+// Any changed byte causes an error or yields values, never a crash.
 TEST(VtkBroken, AnyByteMayBeCorrupt) {
   const VtkFolder folder;
   for (const char* format : {"ascii", "appended-raw"}) {
@@ -100,11 +100,11 @@ TEST(VtkBroken, HugeSizesAreRefusedBeforeAllocation) {
   const std::string legacy = "# vtk DataFile Version 3.0\nt\nBINARY\nDATASET ";
   EXPECT_THAT(
       refusal(folder.write("a.vtk", legacy + "UNSTRUCTURED_GRID\nPOINTS 999999999999 float\n")),
-      HasSubstr("broken"));
+      HasSubstr("malformed"));
   EXPECT_THAT(
       refusal(folder.write("a.vtk", legacy + "STRUCTURED_POINTS\nDIMENSIONS 4000 4000 4000\n"
                                              "POINT_DATA 64000000000\nSCALARS a float\n")),
-      HasSubstr("broken"));
+      HasSubstr("malformed"));
   EXPECT_LT(peak_kilobytes() - before, 64 * 1024);
 }
 
@@ -139,7 +139,7 @@ TEST(VtkBroken, PiecesThatCannotFillTheWholeAreRefusedBeforeAllocation) {
   const std::string empty = "<Piece Extent=\"0 16777216 0 1 0 0\"/>";
   EXPECT_THAT(refusal(folder.write(
                   "a.vti", xml.file("ImageData", "WholeExtent=\"0 16777216 0 1 0 0\"", empty))),
-              HasSubstr("without an array"));
+              HasSubstr("with no array"));
   EXPECT_LT(peak_kilobytes() - before, 64 * 1024);
 }
 

@@ -1,4 +1,4 @@
-// The oblique box around a cell, against the cell itself: everything in the cell is in the box.
+// The oblique box of a cell compared with the cell itself: the box contains the whole cell.
 #include "server/data/formats/vtk/cells.hpp"
 
 #include <gtest/gtest.h>
@@ -118,8 +118,8 @@ TEST(VtkCells, PointsFoundInACellAreInItsObliqueBox) {
   EXPECT_GT(left_out, 20'000U);
 }
 
-// A plate along the diagonal of x and z, a hundredth thick: of a row along x everything is omitted
-// but that thickness times the square root of two.
+// A plate along the diagonal of x and z, a hundredth thick: of a row along x the box contains only
+// that thickness times the square root of two.
 TEST(VtkCells, ObliquePlateLeavesTheRestEmpty) {
   const double t = 0.01 / std::numbers::sqrt2;
   Corners corners{};

@@ -1,5 +1,5 @@
-// Files that nobody here made: those of Debian's package mayavi2, fetched by
-// scripts/fetch-test-data. The expected figures were read with VTK itself, which can be repeated:
+// Files that were not made for these tests: those of Debian's package mayavi2, fetched by
+// scripts/fetch-test-data. The expected values were read by VTK itself, which can be repeated:
 // vtkDataSetReader, vtkXMLUnstructuredGridReader (Debian: python3-vtk9) and vtkProbeFilter.
 #include <gmock/gmock.h>
 
@@ -27,7 +27,7 @@ double at(const DatasetInfo& info, const Volume& volume, std::array<std::size_t,
   return volume.component(component)[row * static_cast<std::size_t>(dims[0]) + index[0]];
 }
 
-// The sample's coordinates.
+// The coordinates of a sample.
 std::array<double, 3> place(const DatasetInfo& info, std::array<std::size_t, 3> index) {
   const auto& axes = info.grid.axes;
   return {axes[0].coordinates[index[0]], axes[1].coordinates[index[1]],
@@ -70,7 +70,7 @@ TEST(VtkRealFile, ImageWithDifferentSpacings) {
   EXPECT_EQ(sum, 832283);
 }
 
-// The bounding box holds 36, the cells 35.5475.
+// The volume of the bounding box is 36, that of the cells 35.5475.
 TEST(VtkRealFile, UnstructuredGridOfHexahedra) {
   const auto source = real("fire_ug.vtu");
   ASSERT_TRUE(source);

@@ -1,5 +1,6 @@
-// Meshes resampled on an even lattice: linear fields are reproduced, the share of inside samples is
-// the mesh's share of its box, smooth fields converge with the square of the cell size.
+// Meshes resampled on a uniform lattice: linear fields are reproduced, the fraction of samples
+// inside is the fraction of the box inside the mesh, and for smooth fields the error decreases with
+// the square of the cell size.
 #include <gmock/gmock.h>
 
 #include <numbers>
@@ -93,7 +94,7 @@ TEST_F(VtkResampling, CurvedStructuredGridIsResampledWithoutHiddenCells) {
 
 TEST_F(VtkResampling, FlatMeshIsAPlane) {
   TestMesh mesh;
-  // y = 5; both cells are as high as long.
+  // y = 5; the height of both cells equals their length.
   mesh.points = {0, 5, 0, 2, 5, 0, 2, 5, 2, 0, 5, 2, 4, 5, 0};
   mesh.cell(9, {0, 1, 2, 3});
   mesh.cell(5, {1, 4, 2});
@@ -138,8 +139,8 @@ TEST_F(VtkResampling, CellDataAreThoseOfTheContainingCell) {
   }
 }
 
-// Tetrahedra along the diagonal, whose boxes contain all samples and which contain few: those with
-// nonnegative barycentric coordinates. The boxes contain 600 times the samples.
+// Tetrahedra along the diagonal, whose boxes contain all samples and which contain only few: those
+// with nonnegative barycentric coordinates. In total the boxes contain 600 times the samples.
 TestMesh slivers(double width, int count) {
   TestMesh mesh;
   mesh.points = {0, 0, 0, width, 0, 0, 0, width, 0, 1, 1, 1};
@@ -174,8 +175,8 @@ TEST_F(VtkResampling, SliversUseTheirBarycentricCoordinates) {
   EXPECT_GT(inside, 50);
 }
 
-// Wedges that lie one upon the other in half of a cube: samples of the other half are sought in
-// every one of them. A few kilobytes must not make a minute of work.
+// Wedges one on top of the other in half of a cube: samples of the other half are searched for in
+// each of them. A few kilobytes must not cause a minute of work.
 TEST_F(VtkResampling, CellsWithExcessiveWorkForTheirFileAreRefused) {
   for (const int count : {20, 200}) {
     TestMesh mesh;
@@ -187,7 +188,7 @@ TEST_F(VtkResampling, CellsWithExcessiveWorkForTheirFileAreRefused) {
     EXPECT_EQ(said.find("too thin and oblique to be resampled") != std::string::npos, count == 200)
         << said;
   }
-  // So thin that the lattice has the maximum number of samples, whose rows are in every box.
+  // So thin that the lattice has the maximum number of samples, whose rows intersect every box.
   const TestMesh thin = slivers(1e-4, 60);
   VtkXml xml;
   const auto data = xml.array("Float64", "a", 1, at_points(thin, linear));
@@ -195,7 +196,7 @@ TEST_F(VtkResampling, CellsWithExcessiveWorkForTheirFileAreRefused) {
               HasSubstr("too thin and oblique to be resampled"));
 }
 
-// The most overlap of a valid file: a cell repeated a thousand times.
+// The largest overlap of a valid file: a cell repeated a thousand times.
 TEST_F(VtkResampling, OverlappingCellsWithinThatBoundAreRead) {
   TestMesh mesh = boxes(
       1, [](const Place& p) { return p; }, as_hexahedron);
@@ -205,7 +206,7 @@ TEST_F(VtkResampling, OverlappingCellsWithinThatBoundAreRead) {
   EXPECT_LT(out.worst, 1e-5);
 }
 
-// Every piece numbers its points and cells from 0. A cell's value is the number of its piece.
+// Every piece numbers its points and cells from 0. The value of a cell is the number of its piece.
 TEST_F(VtkResampling, PiecesOfOneMeshAreOne) {
   const auto at_x = [](double from) {
     return [from](const Place& p) { return Place{from + p[0], p[1], p[2]}; };
@@ -224,7 +225,7 @@ TEST_F(VtkResampling, PiecesOfOneMeshAreOne) {
     }
     const auto source = opened(folder_.write("p.vtu", xml.file("UnstructuredGrid", "", inner)));
     ASSERT_TRUE(source);
-    // Samples on a shared face belong to the cells that come first.
+    // Samples on a shared face belong to the first cell.
     const Outcome got = compare(*source, [&](const Place& p) {
       return of_cells ? (p[0] < 1 + 1e-6 ? 1.0 : 2.0) : linear(p);
     });
@@ -280,10 +281,10 @@ TEST_F(VtkResampling, DegenerateCellsAreCountedAndTheOthersShown) {
   EXPECT_LT(out.worst, 1e-5);
   EXPECT_EQ(out.inside, 1);
   EXPECT_THAT(out.notes, HasSubstr("27 cells"));
-  EXPECT_THAT(out.notes, HasSubstr("1 cells of type 42 left out"));
-  EXPECT_THAT(out.notes, HasSubstr("1 cells of type 25 left out"));
+  EXPECT_THAT(out.notes, HasSubstr("1 cells of type 42 omitted"));
+  EXPECT_THAT(out.notes, HasSubstr("1 cells of type 25 omitted"));
   EXPECT_THAT(out.notes, HasSubstr("1 flat cells"));
-  EXPECT_THAT(out.notes, HasSubstr("2 cells left out that have no volume"));
+  EXPECT_THAT(out.notes, HasSubstr("2 cells without volume"));
 }
 
 TEST_F(VtkResampling, BrokenCellsAreErrors) {
@@ -295,11 +296,12 @@ TEST_F(VtkResampling, BrokenCellsAreErrors) {
     return refusal(folder_.write("a.vtu", vtu(mesh, data, "", xml)));
   };
   EXPECT_EQ(file([](TestMesh&) {}), "");
-  EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = 27; }), HasSubstr("corner 27"));
+  EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = 27; }), HasSubstr("point 27"));
   EXPECT_THAT(file([](TestMesh& m) { m.connectivity[5] = -1; }), HasSubstr("not an index"));
-  EXPECT_THAT(file([](TestMesh& m) { m.offsets[3] = 2; }), HasSubstr("offsets go back"));
-  EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 72; }), HasSubstr("bytes where"));
-  EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 2e9; }), HasSubstr("bytes where"));
+  EXPECT_THAT(file([](TestMesh& m) { m.offsets[3] = 2; }),
+              HasSubstr("offsets of its cells decrease"));
+  EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 72; }), HasSubstr("bytes instead of"));
+  EXPECT_THAT(file([](TestMesh& m) { m.offsets[7] = 2e9; }), HasSubstr("bytes instead of"));
   EXPECT_THAT(file([](TestMesh& m) { std::fill(m.types.begin(), m.types.end(), 3); }),
               HasSubstr("no cells of a supported kind"));
   EXPECT_THAT(file([](TestMesh& m) {

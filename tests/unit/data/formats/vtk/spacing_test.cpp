@@ -10,7 +10,8 @@ namespace {
 
 using testing::HasSubstr;
 
-// A model's grid: `n` levels that follow a hill from the ground to a lid, over 24 x 20 columns.
+// The grid of an atmospheric model: `n` levels that follow a hill from the ground to the top, over
+// 24 x 20 columns.
 struct Terrain {
   static constexpr int columns = 24;
   static constexpr int rows = 20;
@@ -42,8 +43,9 @@ std::string terrain_vts(const Terrain& terrain, VtkXml& xml) {
   return xml.file("StructuredGrid", "WholeExtent=\"" + extent + "\"", inner);
 }
 
-// 460 km long and 15 km high: a spacing of the same length along all axes has three samples above
-// each other. Half the points and cells are about as many samples as cells, so as many layers.
+// 460 km long and 15 km high: with the same spacing along all axes, three samples would be above
+// each other. Half as many samples as points and cells is about one sample per cell, hence as many
+// layers.
 TEST_F(VtkResampling, LayersOfAShallowGridStayResolved) {
   const Terrain terrain{30};
   VtkXml xml({"appended-raw", "", false, 8});
@@ -71,7 +73,8 @@ TEST_F(VtkResampling, MoreLayersThanSamplesAreNoted) {
               HasSubstr("along z fewer samples than cells: 256 for about 399"));
 }
 
-// Layers 0.1 thick that rise by 0.5 from column to column: boxes around the cells are 0.6 high.
+// Layers 0.1 thick that rise by 0.5 from column to column: bounding boxes of the cells are 0.6
+// high.
 TEST_F(VtkResampling, SlopesDoNotThickenLayers) {
   constexpr int n = 16;
   std::vector<double> points;
@@ -100,7 +103,7 @@ TEST_F(VtkResampling, SlopesDoNotThickenLayers) {
   EXPECT_LT(compare(*source, linear).worst, 1e-5);
 }
 
-// The same of wedges without indices: what is known is their boxes.
+// The same grid as wedges without indices: only their bounding boxes are known.
 TEST_F(VtkResampling, SpacingFollowsTheCellsOfAMesh) {
   const Map flat = [](const Place& p) { return Place{1000 * p[0], 400 * p[1], 10 * p[2]}; };
   const TestMesh mesh = boxes(16, flat, as_wedges);

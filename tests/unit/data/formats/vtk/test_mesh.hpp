@@ -1,4 +1,4 @@
-// Meshes made of cells of every shape, as files, and how their samples differ from the field.
+// Meshes of cells of every shape, as files, and the difference of their samples from the field.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ struct TestMesh {
   }
 };
 
-// The unit cube in n^3 boxes, moved by `map`, each cut into what `cut` makes of its corners.
+// The unit cube as n^3 boxes, mapped by `map`, each divided by `cut`, which receives its corners.
 inline TestMesh boxes(int n, const Map& map,
                       const std::function<void(TestMesh&, const std::array<int, 8>&)>& cut) {
   TestMesh mesh;
@@ -104,9 +104,9 @@ inline std::vector<double> at_points(const TestMesh& mesh, const Function& f) {
 }
 
 struct Outcome {
-  double worst = 0;   // difference from the field itself, over the samples inside
-  double inside = 0;  // their share, those at the ends of an axis counted half
-  double volume = 0;  // what they stand for
+  double worst = 0;   // difference from the exact field, over the samples inside
+  double inside = 0;  // fraction of them; samples at the ends of an axis count half
+  double volume = 0;  // the fraction that they represent
   std::string notes;
 };
 

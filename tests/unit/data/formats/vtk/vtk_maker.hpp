@@ -86,7 +86,7 @@ inline std::string base64(const std::string& bytes) {
   return out;
 }
 
-// How a VTK XML file is written.
+// Encoding of a VTK XML file.
 struct VtkCoding {
   std::string format = "ascii";  // ascii, base64 (inline), appended-raw, appended-base64
   std::string compressor;        // "", "ZLib", "LZ4"
@@ -159,7 +159,8 @@ class VtkXml {
       const std::string all = number(bytes.size()) + bytes;
       return as_text ? base64(all) : all;
     }
-    constexpr std::size_t block = 96;  // few, so that arrays have several and a shorter last one
+    constexpr std::size_t block = 96;  // few bytes, so that arrays have several blocks and a
+                                       // shorter last one
     std::string header =
         number((bytes.size() + block - 1) / block) + number(block) + number(bytes.size() % block);
     std::string data;
@@ -211,7 +212,7 @@ inline std::unique_ptr<Source> opened(const std::string& path) {
   return std::move(*source);
 }
 
-// The message of the expected error of opening, or of reading the first field.
+// The error message of opening, or of reading the first field.
 inline std::string refusal(const std::string& path) {
   auto source = open_file(path);
   if (!source) return source.error().message;

@@ -161,7 +161,7 @@ TEST(VtkXmlFile, PiecesAreAssembledAndGapsMasked) {
   EXPECT_THAT(all_notes(source->info()), HasSubstr("4 points of the whole extent are in no piece"));
 }
 
-// Pieces of 0..2 and 3..4 along x have all points between them, but not the cells from 2 to 3.
+// Pieces of 0..2 and 3..4 along x contain all points together, but not the cells from 2 to 3.
 TEST(VtkXmlFile, CellsBetweenPiecesAreMaskedAndNoted) {
   const VtkFolder folder;
   for (const bool of_cells : {false, true}) {
@@ -221,7 +221,7 @@ TEST(VtkXmlFile, HiddenPointsAndNanAreMasked) {
   values[7] = std::nan("");
   std::vector<double> ghosts(samples, 0);
   ghosts[9] = 2;   // hidden
-  ghosts[11] = 1;  // a duplicate, which is as good as the original
+  ghosts[11] = 1;  // a duplicate with the same value as the original
   const auto source =
       opened(folder.write("a.vti", xml.image(xml_dims, "",
                                              xml.array("Float64", "a", 1, values) +

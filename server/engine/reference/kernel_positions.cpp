@@ -1,4 +1,4 @@
-// Scene -> where kernels stop, and the cells there.
+// Scene -> kernel positions and their cells.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -39,7 +39,8 @@ Vec any_normal(const Vec& v) {
 }
 
 // Edges of a curved cell; those along axes of one sample are perpendicular to the others.
-std::array<Vec, 3> curved_edges(const scene::Lattice& lattice, const std::array<AxisStop, 3>& s) {
+std::array<Vec, 3> curved_edges(const scene::Lattice& lattice,
+                                const std::array<AxisPosition, 3>& s) {
   const std::array<int, 3> sample{s[0].sample, s[1].sample, s[2].sample};
   std::array<Vec, 3> edge{};
   std::array<bool, 3> known{};
@@ -104,21 +105,21 @@ View make_view(const scene::Camera& camera) {
   return view;
 }
 
-std::vector<AxisStop> axis_stops(const Scene& scene, int axis, int stride) {
+std::vector<AxisPosition> axis_positions(const Scene& scene, int axis, int stride) {
   const auto& spacing = scene.lattice.spacing[axis];
   if (scene.slice && scene.slice->axis == axis) {
     const int sample = scene.slice->sample;
     return {{sample, 1, spacing[sample]}};
   }
   const int dim = scene.lattice.dims[axis];
-  std::vector<AxisStop> stops;
+  std::vector<AxisPosition> positions;
   for (int done = 0; done < dim;) {
     const int samples = std::min(stride, dim - done);
-    AxisStop stop{done + (samples - 1) / 2, samples, 0};
-    for (int n = 0; n < samples; ++n) stop.cell += spacing[done++];
-    stops.push_back(stop);
+    AxisPosition position{done + (samples - 1) / 2, samples, 0};
+    for (int n = 0; n < samples; ++n) position.cell += spacing[done++];
+    positions.push_back(position);
   }
-  return stops;
+  return positions;
 }
 
 std::vector<LayerGroup> group_layers(const Scene& scene) {
@@ -131,34 +132,35 @@ std::vector<LayerGroup> group_layers(const Scene& scene) {
     same->media.push_back(&layer);
   }
   for (LayerGroup& group : groups) {
-    for (int a = 0; a < 3; ++a) group.axis[a] = axis_stops(scene, a, group.stride);
+    for (int a = 0; a < 3; ++a) group.axis[a] = axis_positions(scene, a, group.stride);
   }
   return groups;
 }
 
-Stop make_stop(const Scene& scene, const View& view, const std::array<AxisStop, 3>& stops) {
-  Stop stop;
+KernelPosition make_kernel_position(const Scene& scene, const View& view,
+                                    const std::array<AxisPosition, 3>& positions) {
+  KernelPosition position;
   Vec world{};
   for (int a = 0; a < 3; ++a) {
-    stop.sample[a] = stops[a].sample;
-    stop.cell[a] = stops[a].cell;
-    world[a] = scene.lattice.positions[a][stops[a].sample];
+    position.sample[a] = positions[a].sample;
+    position.cell[a] = positions[a].cell;
+    world[a] = scene.lattice.positions[a][positions[a].sample];
   }
-  stop.index = sample_index(scene.lattice, stop.sample);
+  position.index = sample_index(scene.lattice, position.sample);
   if (scene.lattice.places) {
-    world = position_of(scene.lattice, stop.sample);
-    stop.edge = curved_edges(scene.lattice, stops);
-    stop.has_cell = spans_volume(stop.edge);
-    if (stop.has_cell) stop.inverse = inverse_of(stop.edge);
+    world = position_of(scene.lattice, position.sample);
+    position.edge = curved_edges(scene.lattice, positions);
+    position.has_cell = spans_volume(position.edge);
+    if (position.has_cell) position.inverse = inverse_of(position.edge);
   } else {
     for (int a = 0; a < 3; ++a) {
-      stop.edge[a][a] = stops[a].cell;
-      stop.inverse[a][a] = 1 / stops[a].cell;
+      position.edge[a][a] = positions[a].cell;
+      position.inverse[a][a] = 1 / positions[a].cell;
     }
   }
-  stop.from_eye = plus(world, -1, view.eye);
-  stop.centre = to_camera(view, stop.from_eye);
-  return stop;
+  position.from_eye = plus(world, -1, view.eye);
+  position.centre = to_camera(view, position.from_eye);
+  return position;
 }
 
 }  // namespace windsplat::engine::reference
