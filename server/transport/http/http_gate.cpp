@@ -54,4 +54,13 @@ std::optional<Response> check_access(const ServerOptions& options, Admission& ad
   return std::nullopt;
 }
 
+std::optional<Response> answer_login(const ServerOptions& options, Admission& admission,
+                                     const Request& request, bool secure) {
+  if (options.token == nullptr || !is_login(request)) return std::nullopt;
+  if (auto over = admission.may_try_login(request.address)) return over;
+  Response answer = log_in(request, *options.token, options.base_path, secure, std::time(nullptr));
+  if (answer.status == 401) admission.failed_login(request.address);
+  return answer;
+}
+
 }  // namespace windsplat::net

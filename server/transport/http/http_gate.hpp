@@ -1,4 +1,4 @@
-// Whether a request may be served: its form, host and target, then its access.
+// Whether a request may be served: its form, host and target, then its access; and logins.
 #pragma once
 
 #include <boost/beast/core/string_type.hpp>
@@ -16,5 +16,8 @@ std::optional<Response> check_form(const ServerOptions& options, Request& reques
 // Token, origin and login attempts. `upgrade`: to a stream. A refusal, or none.
 std::optional<Response> check_access(const ServerOptions& options, Admission& admission,
                                      const Request& request, bool upgrade, bool secure);
+// The answer to a login; none: the request is another.
+std::optional<Response> answer_login(const ServerOptions& options, Admission& admission,
+                                     const Request& request, bool secure);
 
 }  // namespace windsplat::net
