@@ -35,12 +35,12 @@ std::optional<Refusal> Quota::arrive(const std::string& address, bool trusted, b
   const Micros own_wait =
       trusted ? 0 : own.wait_for(own_rate, std::min(cost, own_rate.at_once), now);
   if (own_wait > 0) {
-    return Refusal{LimitKind::arrivals, limits_.arrivals_per_address, retry_after_s(own_wait)};
+    return Refusal{LimitKind::arrivals, limits_.arrivals_per_address, whole_seconds(own_wait)};
   }
   const Micros wait = arrivals_.wait_for(rate, std::min(cost, rate.at_once), now);
   const bool often = trusted || own_rate.a_second <= 0 || own.taken > own_rate.a_second;
   if (wait > 0 && often) {
-    return Refusal{LimitKind::arrivals, limits_.arrivals, retry_after_s(wait)};
+    return Refusal{LimitKind::arrivals, limits_.arrivals, whole_seconds(wait)};
   }
   if (own_rate.a_second > 0 && !trusted) own.taken += cost;
   if (rate.a_second > 0) arrivals_.taken = std::min(arrivals_.taken + cost, rate.at_once);
@@ -120,9 +120,9 @@ std::optional<Refusal> Quota::picture(const std::string& address, Micros now) {
   const Micros render = here.render.wait_for(addresses_.render_rate(), 0, now);
   if (bytes == 0 && render == 0) return std::nullopt;
   if (bytes > render) {
-    return Refusal{LimitKind::bytes, limits_.bytes_per_address, retry_after_s(bytes)};
+    return Refusal{LimitKind::bytes, limits_.bytes_per_address, whole_seconds(bytes)};
   }
-  return Refusal{LimitKind::render, limits_.render_s_per_address, retry_after_s(render)};
+  return Refusal{LimitKind::render, limits_.render_s_per_address, whole_seconds(render)};
 }
 
 Quota::Micros Quota::throttle_delay(const std::string& address, Micros now) {
@@ -146,7 +146,7 @@ void Quota::rendered(const std::string& address, Micros took, Micros now) {
 std::optional<Refusal> Quota::may_try_login(const std::string& address, Micros now) {
   const Micros wait = addresses_.entry(address, now).logins.wait_for(login_rate(limits_), 1, now);
   if (wait == 0) return std::nullopt;
-  return Refusal{LimitKind::logins, limits_.failed_logins_per_address, retry_after_s(wait)};
+  return Refusal{LimitKind::logins, limits_.failed_logins_per_address, whole_seconds(wait)};
 }
 
 Quota::Micros Quota::message_received(const std::string& address, std::size_t bytes, Micros now) {

@@ -38,12 +38,12 @@ std::optional<Refusal> TokenBucket::take_one(const Rate& rate, LimitKind kind, d
                                              Micros now) {
   if (rate.a_second <= 0) return std::nullopt;
   const Micros wait = wait_for(rate, 1, now);
-  if (wait > 0) return Refusal{kind, limit, retry_after_s(wait)};
+  if (wait > 0) return Refusal{kind, limit, whole_seconds(wait)};
   taken += 1;
   return std::nullopt;
 }
 
-int retry_after_s(TokenBucket::Micros wait) {
+int whole_seconds(TokenBucket::Micros wait) {
   const double seconds = std::ceil(static_cast<double>(wait) / bucket_us_per_s);
   return static_cast<int>(std::clamp(seconds, 1.0, double{retry_s_max}));
 }

@@ -29,6 +29,6 @@ struct TokenBucket {
 };
 
 // For Refusal::retry_after_s.
-int retry_after_s(TokenBucket::Micros wait);
+int whole_seconds(TokenBucket::Micros wait);
 
 }  // namespace windsplat::net
