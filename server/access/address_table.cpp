@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 constexpr TokenBucket::Micros forget_after = 600'000'000;
@@ -74,4 +74,4 @@ void AddressTable::make_room() {
   if (oldest != entries_.end()) forget(oldest);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

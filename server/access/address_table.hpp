@@ -9,7 +9,7 @@
 #include "server/access/limits.hpp"
 #include "server/access/token_bucket.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 struct AddressUsage {
   std::string address;
@@ -54,4 +54,4 @@ class AddressTable {
   std::unordered_map<std::string, Entries::iterator> by_address_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -1,6 +1,6 @@
 #include "server/access/handshake_quota.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 constexpr double handshake_us_per_ms = 1e3;
@@ -15,12 +15,13 @@ bool is_own_machine(const std::string& address) {
 std::optional<Refusal> HandshakeQuota::may_begin(AddressUsage& usage, bool trusted, Micros now) {
   const auto own_rate = TokenBucket::rate_for_ten_seconds(own_ms_);
   const Micros own_wait = trusted ? 0 : usage.handshakes.wait_for(own_rate, 0, now);
-  if (own_wait > 0) return Refusal{LimitKind::handshakes, own_ms_, whole_seconds(own_wait)};
+  if (own_wait > 0)
+    return Refusal{metrics::LimitKind::handshakes, own_ms_, whole_seconds(own_wait)};
   TokenBucket* const bucket = shared(&usage, trusted);
   if (bucket == nullptr) return std::nullopt;
   const Micros wait = bucket->wait_for(TokenBucket::rate_for_ten_seconds(all_ms_), 0, now);
   if (wait == 0) return std::nullopt;
-  return Refusal{LimitKind::handshakes, all_ms_, whole_seconds(wait)};
+  return Refusal{metrics::LimitKind::handshakes, all_ms_, whole_seconds(wait)};
 }
 
 void HandshakeQuota::took(AddressUsage* usage, bool trusted, Micros took, Micros now) {
@@ -42,4 +43,4 @@ TokenBucket* HandshakeQuota::shared(const AddressUsage* usage, bool trusted) {
   return usage->authenticated ? &known_ : &strangers_;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

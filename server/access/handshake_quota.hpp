@@ -5,7 +5,7 @@
 
 #include "server/access/address_table.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 class HandshakeQuota {
  public:
@@ -29,4 +29,4 @@ class HandshakeQuota {
   TokenBucket strangers_, known_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

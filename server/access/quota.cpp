@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 using Rate = TokenBucket::Rate;
@@ -35,12 +35,13 @@ std::optional<Refusal> Quota::arrive(const std::string& address, bool trusted, b
   const Micros own_wait =
       trusted ? 0 : own.wait_for(own_rate, std::min(cost, own_rate.at_once), now);
   if (own_wait > 0) {
-    return Refusal{LimitKind::arrivals, limits_.arrivals_per_address, whole_seconds(own_wait)};
+    return Refusal{metrics::LimitKind::arrivals, limits_.arrivals_per_address,
+                   whole_seconds(own_wait)};
   }
   const Micros wait = arrivals_.wait_for(rate, std::min(cost, rate.at_once), now);
   const bool often = trusted || own_rate.a_second <= 0 || own.taken > own_rate.a_second;
   if (wait > 0 && often) {
-    return Refusal{LimitKind::arrivals, limits_.arrivals, whole_seconds(wait)};
+    return Refusal{metrics::LimitKind::arrivals, limits_.arrivals, whole_seconds(wait)};
   }
   if (own_rate.a_second > 0 && !trusted) own.taken += cost;
   if (rate.a_second > 0) arrivals_.taken = std::min(arrivals_.taken + cost, rate.at_once);
@@ -60,9 +61,9 @@ Quota::Arrival Quota::connect(const std::string& address, bool trusted, Micros n
   const bool known = trusted || here.authenticated;
   std::optional<Refusal> reason;
   if (reached(connections_, limits_.connections)) {
-    reason = Refusal{LimitKind::connections, static_cast<double>(limits_.connections)};
+    reason = Refusal{metrics::LimitKind::connections, static_cast<double>(limits_.connections)};
   } else if (!trusted && reached(here.connections, limits_.connections_per_address)) {
-    reason = Refusal{LimitKind::address_connections,
+    reason = Refusal{metrics::LimitKind::address_connections,
                      static_cast<double>(limits_.connections_per_address)};
   }
   if (!reason) {
@@ -97,7 +98,8 @@ void Quota::disconnect(const std::string& address, Slot place) {
 std::optional<Refusal> Quota::open_session(const std::string& address, Micros now) {
   AddressUsage& here = addresses_.entry(address, now);
   if (reached(here.sessions, limits_.sessions_per_address)) {
-    return Refusal{LimitKind::address_sessions, static_cast<double>(limits_.sessions_per_address)};
+    return Refusal{metrics::LimitKind::address_sessions,
+                   static_cast<double>(limits_.sessions_per_address)};
   }
   ++here.sessions;
   return std::nullopt;
@@ -111,7 +113,7 @@ std::optional<Refusal> Quota::request(const std::string& address, bool health, M
   AddressUsage& here = addresses_.entry(address, now);
   TokenBucket& bucket = health ? here.health : here.requests;
   return bucket.take_one(TokenBucket::rate_for_ten_seconds(limits_.requests_per_address),
-                         LimitKind::requests, limits_.requests_per_address, now);
+                         metrics::LimitKind::requests, limits_.requests_per_address, now);
 }
 
 std::optional<Refusal> Quota::picture(const std::string& address, Micros now) {
@@ -120,9 +122,9 @@ std::optional<Refusal> Quota::picture(const std::string& address, Micros now) {
   const Micros render = here.render.wait_for(addresses_.render_rate(), 0, now);
   if (bytes == 0 && render == 0) return std::nullopt;
   if (bytes > render) {
-    return Refusal{LimitKind::bytes, limits_.bytes_per_address, whole_seconds(bytes)};
+    return Refusal{metrics::LimitKind::bytes, limits_.bytes_per_address, whole_seconds(bytes)};
   }
-  return Refusal{LimitKind::render, limits_.render_s_per_address, whole_seconds(render)};
+  return Refusal{metrics::LimitKind::render, limits_.render_s_per_address, whole_seconds(render)};
 }
 
 Quota::Micros Quota::throttle_delay(const std::string& address, Micros now) {
@@ -146,7 +148,8 @@ void Quota::rendered(const std::string& address, Micros took, Micros now) {
 std::optional<Refusal> Quota::may_try_login(const std::string& address, Micros now) {
   const Micros wait = addresses_.entry(address, now).logins.wait_for(login_rate(limits_), 1, now);
   if (wait == 0) return std::nullopt;
-  return Refusal{LimitKind::logins, limits_.failed_logins_per_address, whole_seconds(wait)};
+  return Refusal{metrics::LimitKind::logins, limits_.failed_logins_per_address,
+                 whole_seconds(wait)};
 }
 
 Quota::Micros Quota::message_received(const std::string& address, std::size_t bytes, Micros now) {
@@ -163,8 +166,8 @@ Quota::Micros Quota::message_received(const std::string& address, std::size_t by
 
 std::optional<Refusal> Quota::failed_login(const std::string& address, Micros now) {
   return addresses_.entry(address, now)
-      .logins.take_one(login_rate(limits_), LimitKind::logins, limits_.failed_logins_per_address,
-                       now);
+      .logins.take_one(login_rate(limits_), metrics::LimitKind::logins,
+                       limits_.failed_logins_per_address, now);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

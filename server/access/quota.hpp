@@ -12,7 +12,7 @@
 #include "server/access/refusal.hpp"
 #include "server/access/token_bucket.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 class Quota {
  public:
@@ -78,4 +78,4 @@ class Quota {
   std::size_t reserved_ = 0;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

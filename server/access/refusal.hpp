@@ -3,12 +3,12 @@
 
 #include "server/metrics/limit_kind.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 struct Refusal {
-  LimitKind kind = LimitKind::connections;
+  metrics::LimitKind kind = metrics::LimitKind::connections;
   double limit = 0;       // as in Limits
   int retry_after_s = 1;  // estimated time until admission
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 constexpr double bucket_us_per_s = 1e6;
@@ -34,8 +34,8 @@ TokenBucket::Micros TokenBucket::wait_for(const Rate& rate, double tokens, Micro
   return static_cast<Micros>(std::ceil(over / rate.a_second * bucket_us_per_s));
 }
 
-std::optional<Refusal> TokenBucket::take_one(const Rate& rate, LimitKind kind, double limit,
-                                             Micros now) {
+std::optional<Refusal> TokenBucket::take_one(const Rate& rate, metrics::LimitKind kind,
+                                             double limit, Micros now) {
   if (rate.a_second <= 0) return std::nullopt;
   const Micros wait = wait_for(rate, 1, now);
   if (wait > 0) return Refusal{kind, limit, whole_seconds(wait)};
@@ -48,4 +48,4 @@ int whole_seconds(TokenBucket::Micros wait) {
   return static_cast<int>(std::clamp(seconds, 1.0, double{retry_s_max}));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -6,7 +6,7 @@
 
 #include "server/access/refusal.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 struct TokenBucket {
   using Micros = std::int64_t;  // of a monotonic clock
@@ -22,7 +22,8 @@ struct TokenBucket {
   // Time until so many tokens are there.
   Micros wait_for(const Rate& rate, double tokens, Micros now);
   // Takes one if it is there.
-  std::optional<Refusal> take_one(const Rate& rate, LimitKind kind, double limit, Micros now);
+  std::optional<Refusal> take_one(const Rate& rate, metrics::LimitKind kind, double limit,
+                                  Micros now);
 
   double taken = 0;  // net of refill; 0 is full
   Micros at = 0;
@@ -31,4 +32,4 @@ struct TokenBucket {
 // For Refusal::retry_after_s.
 int whole_seconds(TokenBucket::Micros wait);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -11,7 +11,7 @@
 
 #include "protocol/view.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Thread-safe.
 class RenderCosts {
@@ -44,4 +44,4 @@ class RenderCosts {
   std::uint64_t uses_ = 0;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -14,7 +14,7 @@
 
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 namespace {
 
@@ -232,4 +232,4 @@ void Jobs::cancel_all() {
   for (const auto& job : state_->jobs) State::cancel(*job);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

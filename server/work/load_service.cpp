@@ -14,7 +14,7 @@
 
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 struct LoadService::State {
   using Clock = std::chrono::steady_clock;
@@ -158,4 +158,4 @@ void LoadService::end() {
   }
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

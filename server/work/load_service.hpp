@@ -13,7 +13,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 class LoadService {
  public:
@@ -52,4 +52,4 @@ class LoadService {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -6,11 +6,11 @@
 #include "server/api/routes.hpp"
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 struct CurrentRequest {
-  Request request;
-  const char* route = route_other;
+  http::Request request;
+  const char* route = api::route_other;
   std::chrono::steady_clock::time_point began;  // first byte of the request
   bool charged = false;                         // the request was charged to its address
   bool quiet = false;                           // do not log the request
@@ -18,4 +18,4 @@ struct CurrentRequest {
   bool keep_alive = false;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -9,7 +9,7 @@
 #include "server/transport/guarded.hpp"
 #include "server/transport/stream.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
  public:
@@ -21,11 +21,11 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
   [[nodiscard]] virtual const std::string& request_id() const = 0;
   virtual void on_header() = 0;   // of a request, without its body
   virtual void on_request() = 0;  // complete
-  virtual void on_reply(Response response) = 0;
+  virtual void on_reply(http::Response response) = 0;
   virtual void on_written(ErrorCode fault) = 0;  // the response
   virtual void on_end() = 0;                     // end of stream or a connection error
   // Sends a response after which the connection is closed.
-  virtual void refuse(Response response) = 0;
+  virtual void refuse(http::Response response) = 0;
   virtual void abort() = 0;  // end now
   virtual void close() = 0;  // the connection's time is over, or it has failed
 
@@ -36,4 +36,4 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
   }
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

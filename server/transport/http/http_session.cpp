@@ -20,17 +20,17 @@
 #include "server/transport/websocket/websocket_session.hpp"
 #include "server/transport/wire.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 class HttpSession final : public Connection, public HttpOwner {
  public:
-  HttpSession(Wire wire, Services& services, Connections& connections, Visitor visitor)
+  HttpSession(Wire wire, api::Services& services, Connections& connections, access::Visitor visitor)
       : services_(services),
         connections_(connections),
         id_(connections.next_id()),
         visitor_(std::move(visitor)),
-        current_{blank_request(), route_other, std::chrono::steady_clock::now()},
+        current_{blank_request(), api::route_other, std::chrono::steady_clock::now()},
         wire_(*this, std::move(wire), visitor_.reserve.has_value()),
         reader_(*this, wire_, current_),
         writer_(*this, wire_, services.metrics, services.admission, services.draining, current_),
@@ -41,7 +41,7 @@ class HttpSession final : public Connection, public HttpOwner {
 
   // The drain waits only for requests already in progress: otherwise a busy client could delay it.
   // `refusal`: of all its requests.
-  void start(bool late, std::optional<Response> refusal) {
+  void start(bool late, std::optional<http::Response> refusal) {
     connections_.add(id_, std::static_pointer_cast<HttpSession>(shared_from_this()), false, late);
     refusal ? refuse(std::move(*refusal)) : next_request();
   }
@@ -63,19 +63,20 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   void on_header() override {
-    Request& request = current_.request;
-    std::string id = request.header(request_id_header);
-    request.id = is_request_id(id) ? std::move(id) : services_.request_ids.next();
+    http::Request& request = current_.request;
+    std::string id = request.header(http::request_id_header);
+    request.id = http::is_request_id(id) ? std::move(id) : services_.request_ids.next();
     const auto& message = reader_.input().parser().get();
     if (auto fault = check_form(services_.options, request, message.target(), message.version())) {
       return refuse(std::move(*fault));
     }
     current_.charged = true;
-    if (auto refusal = services_.admission.request(visitor_, request, names_health(request))) {
+    if (auto refusal = services_.admission.request(visitor_, request, api::names_health(request))) {
       return refuse(std::move(*refusal));
     }
-    const bool upgrade = asks_for_websocket(request, message.version()) && names_stream(request);
-    if (upgrade) current_.route = route_stream;
+    const bool upgrade =
+        http::asks_for_websocket(request, message.version()) && api::names_stream(request);
+    if (upgrade) current_.route = api::route_stream;
     if (auto refusal = check_access(services_.options, services_.admission, request, upgrade,
                                     wire_.secure())) {
       return refuse(std::move(*refusal));
@@ -86,20 +87,20 @@ class HttpSession final : public Connection, public HttpOwner {
   void on_request() override {
     if (auto answer = answer_login(services_.options, services_.admission, current_.request,
                                    wire_.secure())) {
-      current_.route = route_login;
+      current_.route = api::route_login;
       return writer_.send(std::move(*answer));
     }
     reader_.watch();
     work_.start(services_, current_);
   }
 
-  void on_reply(Response response) override {
+  void on_reply(http::Response response) override {
     if (work_.finish()) writer_.send(std::move(response));
   }
 
   // The rest of the stream cannot be parsed.
-  void refuse(Response response) override {
-    Request& request = current_.request;
+  void refuse(http::Response response) override {
+    http::Request& request = current_.request;
     response.close = true;
     // Requests refused before parsing are charged as well.
     if (!current_.charged) {
@@ -134,28 +135,28 @@ class HttpSession final : public Connection, public HttpOwner {
 
  private:
   // Charged to the peer until the client address is known.
-  [[nodiscard]] Request blank_request() const {
-    Request request;
+  [[nodiscard]] http::Request blank_request() const {
+    http::Request request;
     request.peer = id_;
-    request.address = counted_address(visitor_.peer);
+    request.address = access::counted_address(visitor_.peer);
     return request;
   }
 
   void next_request() {
-    current_ = {blank_request(), route_other, current_.began};
+    current_ = {blank_request(), api::route_other, current_.began};
     reader_.next(services_.draining);
   }
 
   void begin_stream() {
-    const Request& request = current_.request;
+    const http::Request& request = current_.request;
     RequestParser& input = reader_.input();
     if (!input.parser().is_done() || input.has_input()) {
-      return refuse(problem_response(400, "Bad Request", "an upgrade has no body"));
+      return refuse(http::problem_response(400, "Bad Request", "an upgrade has no body"));
     }
-    if (auto fault = check_upgrade(request)) return refuse(std::move(*fault));
+    if (auto fault = http::check_upgrade(request)) return refuse(std::move(*fault));
     if (services_.draining) {
       return refuse(
-          problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
+          http::problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
     }
     auto seat = services_.admission.open_session(request.address);
     if (seat.refusal) return refuse(std::move(*seat.refusal));
@@ -169,10 +170,10 @@ class HttpSession final : public Connection, public HttpOwner {
                             {request.address, std::move(visitor_.place), std::move(seat.place)});
   }
 
-  Services& services_;
+  api::Services& services_;
   Connections& connections_;
   const std::uint64_t id_;
-  Visitor visitor_;
+  access::Visitor visitor_;
   CurrentRequest current_;
   HttpWire wire_;
   RequestReader reader_;
@@ -182,16 +183,17 @@ class HttpSession final : public Connection, public HttpOwner {
 
 }  // namespace
 
-void start_http_session(Wire wire, Services& services, Connections& connections, Visitor visitor,
-                        bool late) {
+void start_http_session(Wire wire, api::Services& services, Connections& connections,
+                        access::Visitor visitor, bool late) {
   std::make_shared<HttpSession>(std::move(wire), services, connections, std::move(visitor))
       ->start(late, std::nullopt);
 }
 
-void refuse_plain_http(Wire wire, Services& services, Connections& connections, Visitor visitor,
-                       bool late) {
+void refuse_plain_http(Wire wire, api::Services& services, Connections& connections,
+                       access::Visitor visitor, bool late) {
   std::make_shared<HttpSession>(std::move(wire), services, connections, std::move(visitor))
-      ->start(late, problem_response(400, "Bad Request", "this port requires TLS: use https://"));
+      ->start(late,
+              http::problem_response(400, "Bad Request", "this port requires TLS: use https://"));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -10,10 +10,9 @@
 #include "protocol/limits.hpp"
 #include "server/http/http_checks.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
-namespace http = beast::http;
 namespace limits = protocol::limits;
 using Clock = std::chrono::steady_clock;
 
@@ -70,7 +69,7 @@ void RequestReader::read_body() {
   wire_.within(std::chrono::seconds(limits::http_body_timeout_s));
   // Ignored in HTTP/1.0 (RFC 9110, 10.1.1).
   const bool expects = input_.parser().get().version() == 11 &&
-                       equal_without_case(current_.request.header("Expect"), "100-continue");
+                       http::equal_without_case(current_.request.header("Expect"), "100-continue");
   if (!expects) return read_rest();
   static constexpr std::string_view go_on = "HTTP/1.1 100 Continue\r\n\r\n";
   asio::async_write(wire_.wire(), asio::buffer(go_on),
@@ -81,14 +80,16 @@ void RequestReader::read_body() {
 }
 
 void RequestReader::read_rest() {
-  http::async_read(wire_.wire(), input_.buffer(), input_.parser(),
-                   owner_.handler([this](ErrorCode fault, std::size_t) {
-                     if (fault == http::error::body_limit) return owner_.refuse(body_too_large());
-                     // Other errors are those of the connection, or its deadline.
-                     if (fault && !RequestParser::is_fault_of_text(fault)) return owner_.close();
-                     if (fault) return owner_.refuse(RequestParser::refusal_of(fault));
-                     complete();
-                   }));
+  beast::http::async_read(wire_.wire(), input_.buffer(), input_.parser(),
+                          owner_.handler([this](ErrorCode fault, std::size_t) {
+                            if (fault == beast::http::error::body_limit)
+                              return owner_.refuse(http::body_too_large());
+                            // Other errors are those of the connection, or its deadline.
+                            if (fault && !RequestParser::is_fault_of_text(fault))
+                              return owner_.close();
+                            if (fault) return owner_.refuse(RequestParser::refusal_of(fault));
+                            complete();
+                          }));
 }
 
 void RequestReader::complete() {
@@ -108,4 +109,4 @@ void RequestReader::stop() {
   in_header_ = false;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

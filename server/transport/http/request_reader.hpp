@@ -10,7 +10,7 @@
 #include "server/transport/http/http_wire.hpp"
 #include "server/transport/http/request_parser.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class RequestReader {
  public:
@@ -50,4 +50,4 @@ class RequestReader {
   bool ended_ = false;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -5,7 +5,7 @@
 
 #include "server/transport/http/awaited_reply.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 constexpr std::chrono::milliseconds look_interval{40};
@@ -15,13 +15,14 @@ constexpr std::chrono::milliseconds look_interval{40};
 RequestWork::RequestWork(HttpOwner& owner, HttpWire& wire)
     : owner_(owner), wire_(wire), timer_(wire.wire().get_executor()) {}
 
-void RequestWork::start(Services& services, CurrentRequest& current) {
+void RequestWork::start(api::Services& services, CurrentRequest& current) {
   awaited_ = true;
   look();
   const auto awaited =
       std::make_shared<AwaitedReply>(owner_, wire_.wire().get_executor(), reply_lost_);
-  current.route = route(services, current.request,
-                        [awaited](Response response) { awaited->answer(std::move(response)); });
+  current.route = route(services, current.request, [awaited](http::Response response) {
+    awaited->answer(std::move(response));
+  });
 }
 
 bool RequestWork::finish() {
@@ -42,4 +43,4 @@ void RequestWork::look() {
   }));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -10,14 +10,14 @@
 #include "server/transport/http/http_owner.hpp"
 #include "server/transport/http/http_wire.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class RequestWork {
  public:
   RequestWork(HttpOwner& owner, HttpWire& wire);
 
   // Ends in HttpOwner::on_reply(), or in on_end() if the client has left.
-  void start(Services& services, CurrentRequest& current);
+  void start(api::Services& services, CurrentRequest& current);
   // The reply has arrived, or is awaited no longer. False: none is awaited.
   bool finish();
   void stop() { timer_.cancel(); }
@@ -33,4 +33,4 @@ class RequestWork {
   const std::shared_ptr<std::atomic<bool>> reply_lost_ = std::make_shared<std::atomic<bool>>(false);
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -12,7 +12,7 @@
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 namespace limits = protocol::limits;
@@ -26,8 +26,8 @@ std::int64_t micros_since(Clock::time_point since) {
 
 }  // namespace
 
-ResponseWriter::ResponseWriter(HttpOwner& owner, HttpWire& wire, Metrics& metrics,
-                               Admission& admission, const std::atomic<bool>& draining,
+ResponseWriter::ResponseWriter(HttpOwner& owner, HttpWire& wire, metrics::Metrics& metrics,
+                               access::Admission& admission, const std::atomic<bool>& draining,
                                CurrentRequest& current)
     : owner_(owner),
       wire_(wire),
@@ -36,19 +36,19 @@ ResponseWriter::ResponseWriter(HttpOwner& owner, HttpWire& wire, Metrics& metric
       draining_(draining),
       current_(current) {}
 
-void ResponseWriter::send(Response response) {
-  const Request& request = current_.request;
+void ResponseWriter::send(http::Response response) {
+  const http::Request& request = current_.request;
   current_.keep_alive =
       current_.keep_alive && !response.close && !draining_ && !wire_.is_of_reserve();
-  name_request(response, request.id);
+  http::name_request(response, request.id);
   // Applies to every port of the host, and other programs listen on this machine's loopback.
   if (const std::string host = request.header("Host");
-      wire_.secure() && !host.empty() && !names_loopback(host)) {
+      wire_.secure() && !host.empty() && !http::names_loopback(host)) {
     response.headers.emplace_back("Strict-Transport-Security", hsts);
   }
   metrics_.answered(current_.route, response.status);
   response_ = std::move(response);
-  head_ = response_head(response_, current_.keep_alive);
+  head_ = http::response_head(response_, current_.keep_alive);
   const auto body = current_.is_head ? std::span<const std::uint8_t>{} : response_.body.bytes;
   wire_.within(write_deadline(body.size(), limits::write_timeout_s));
   sending_ = true;
@@ -59,7 +59,7 @@ void ResponseWriter::send(Response response) {
       owner_.handler([this, written_since = Clock::now()](ErrorCode fault, std::size_t bytes) {
         sending_ = false;
         on_sent(bytes, written_since);
-        response_ = Response{};
+        response_ = http::Response{};
         owner_.on_written(fault);
       }));
 }
@@ -71,10 +71,10 @@ void ResponseWriter::send_nothing() {
 }
 
 void ResponseWriter::on_sent(std::size_t bytes, Clock::time_point since) {
-  metrics_.bytes_sent(Metrics::Over::http, bytes);
+  metrics_.bytes_sent(metrics::Metrics::Over::http, bytes);
   admission_.sent(current_.request.address, bytes);
   if (response_.content_type.starts_with("image/")) {
-    metrics_.stage_took(Metrics::Stage::write, micros_since(since));
+    metrics_.stage_took(metrics::Metrics::Stage::write, micros_since(since));
   }
   log_access(response_.status, bytes);
 }
@@ -84,7 +84,7 @@ void ResponseWriter::log_access(int status, std::size_t bytes) const {
   if (current_.quiet) return;
   const std::string_view route = current_.route;
   const bool often =
-      route == "/livez" || route == "/readyz" || route == "/metrics" || route == route_page;
+      route == "/livez" || route == "/readyz" || route == "/metrics" || route == api::route_page;
   log::write(often ? log::Level::debug : log::Level::info, "request",
              {{"request", current_.request.id},
               {"method", current_.request.method},
@@ -94,4 +94,4 @@ void ResponseWriter::log_access(int status, std::size_t bytes) const {
               {"ms", static_cast<double>(micros_since(current_.began)) / 1000}});
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

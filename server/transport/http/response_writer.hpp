@@ -12,16 +12,17 @@
 #include "server/transport/http/http_owner.hpp"
 #include "server/transport/http/http_wire.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class ResponseWriter {
  public:
   // Responds to `current`, whose address is charged with the bytes sent.
-  ResponseWriter(HttpOwner& owner, HttpWire& wire, Metrics& metrics, Admission& admission,
-                 const std::atomic<bool>& draining, CurrentRequest& current);
+  ResponseWriter(HttpOwner& owner, HttpWire& wire, metrics::Metrics& metrics,
+                 access::Admission& admission, const std::atomic<bool>& draining,
+                 CurrentRequest& current);
 
   // Ends in HttpOwner::on_written(). Decides whether the connection is kept alive.
-  void send(Response response);
+  void send(http::Response response);
   // The client has left before the response: counts and logs the request.
   void send_nothing();
   [[nodiscard]] bool is_sending() const { return sending_; }
@@ -32,13 +33,13 @@ class ResponseWriter {
 
   HttpOwner& owner_;
   HttpWire& wire_;
-  Metrics& metrics_;
-  Admission& admission_;
+  metrics::Metrics& metrics_;
+  access::Admission& admission_;
   const std::atomic<bool>& draining_;
   CurrentRequest& current_;
-  Response response_;
+  http::Response response_;
   std::string head_;
   bool sending_ = false;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

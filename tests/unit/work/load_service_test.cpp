@@ -8,7 +8,7 @@
 #include <future>
 #include <thread>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 TEST(LoadService, LimitsWaitingJobsPerDatasetAndInTotal) {
@@ -108,4 +108,4 @@ TEST(LoadService, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work
