@@ -57,4 +57,15 @@ std::optional<http::Response> check_access(const api::ServerOptions& options,
   return std::nullopt;
 }
 
+std::optional<http::Response> answer_login(const api::ServerOptions& options,
+                                           access::Admission& admission,
+                                           const http::Request& request, bool secure) {
+  if (options.token == nullptr || !access::is_login(request)) return std::nullopt;
+  if (auto over = admission.may_try_login(request.address)) return over;
+  http::Response answer =
+      access::log_in(request, *options.token, options.base_path, secure, std::time(nullptr));
+  if (answer.status == 401) admission.failed_login(request.address);
+  return answer;
+}
+
 }  // namespace windsplat::transport

@@ -1,4 +1,4 @@
-// Whether a request may be served: its form, host and target, then its access.
+// Whether a request may be served: its form, host and target, then its access; and logins.
 #pragma once
 
 #include <boost/beast/core/string_type.hpp>
@@ -17,5 +17,9 @@ std::optional<http::Response> check_form(const api::ServerOptions& options, http
 std::optional<http::Response> check_access(const api::ServerOptions& options,
                                            access::Admission& admission,
                                            const http::Request& request, bool upgrade, bool secure);
+// The answer to a login; none: the request is another.
+std::optional<http::Response> answer_login(const api::ServerOptions& options,
+                                           access::Admission& admission,
+                                           const http::Request& request, bool secure);
 
 }  // namespace windsplat::transport
