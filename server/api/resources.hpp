@@ -22,7 +22,7 @@ Response get_metrics(const Services& services);
 
 // Runs `make` on a thread of the service and replies with its value or error. `what` names the work
 // in the log; `of`: the dataset that it reads, if any.
-void run_later(LoadService& service, const Request& request, Reply reply, const char* what,
+void run_later(TaskExecutor& service, const Request& request, Reply reply, const char* what,
                const data::Dataset* of, std::function<Response()> make);
 bool is_json(std::string_view content_type);
 bool is_merge_patch(std::string_view content_type);

@@ -44,7 +44,7 @@ bool is_merge_patch(std::string_view content_type) {
   return equal_without_case(split_list(content_type, ';')[0], "application/merge-patch+json");
 }
 
-void run_later(LoadService& service, const Request& request, Reply reply, const char* what,
+void run_later(TaskExecutor& service, const Request& request, Reply reply, const char* what,
                const data::Dataset* of, std::function<Response()> make) {
   const auto answer = std::make_shared<const Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;

@@ -29,9 +29,9 @@ struct Services {
   RequestIds request_ids;  // used by the io thread only
   std::atomic<bool> draining{false};
   Backend backend;
-  LoadService locator;     // resolves posted names: a slow disk delays no other service
-  LoadService view_io;     // changes saved views, also on disk
-  LoadService file_watch;  // checks files for changes and reopens them
+  TaskExecutor locator;     // resolves posted names: a slow disk delays no other service
+  TaskExecutor view_io;     // changes saved views, also on disk
+  TaskExecutor file_watch;  // checks files for changes and reopens them
 };
 
 }  // namespace windsplat::net

@@ -15,9 +15,9 @@
 #include "server/work/cost_history.hpp"
 #include "server/work/jobs.hpp"
 #include "server/work/known_ranges.hpp"
-#include "server/work/load_service.hpp"
 #include "server/work/references.hpp"
 #include "server/work/render_service.hpp"
+#include "server/work/task_executor.hpp"
 
 namespace windsplat::net {
 
@@ -54,7 +54,7 @@ struct Backend {
   References references;
   Jobs jobs;               // use the catalogue and the renderer: ended before them
   RenderService renderer;  // uses the members above
-  LoadService loads;       // use the members above, including the renderer: ended first
+  TaskExecutor loads;      // use the members above, including the renderer: ended first
 
  private:
   std::function<Result<void>(const frame::Cost& cost)> check_cost_;

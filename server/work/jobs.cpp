@@ -1,4 +1,4 @@
-// The list of jobs; their threads and their order are those of the load service.
+// The list of jobs; a task executor has their threads and their order.
 #include "server/work/jobs.hpp"
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 #include <optional>
 #include <utility>
 
-#include "server/work/load_service.hpp"
 #include "server/work/run_guarded.hpp"
+#include "server/work/task_executor.hpp"
 
 namespace windsplat::net {
 
@@ -142,8 +142,8 @@ struct Jobs::State {
   mutable std::mutex mutex;
   std::list<Shared> jobs;
   std::uint64_t next_id = 1;
-  const std::shared_ptr<const void> one_slow = std::make_shared<int>(0);  // their dataset
-  LoadService threads;  // last: its threads use the members above
+  const std::shared_ptr<const void> one_slow = std::make_shared<int>(0);  // their key
+  TaskExecutor threads;  // last: its threads use the members above
 };
 
 Jobs::Jobs(std::size_t known_max, std::size_t running_max)
