@@ -178,8 +178,9 @@ Result<Response> draw(Services& services, const Picture& picture, const Prepared
     // Settings chosen by the server reduce the work below the estimate; the scene of a picture that
     // waited for data was built elsewhere.
     if (loading == Loading::none) {
-      services.backend.costs.learn(drawn->view.dataset, drawn->view.method.name,
-                                   picture.cost.kernels, drawn->render_us + drawn->encode_us);
+      services.backend.request_times.learn(drawn->view.dataset, drawn->view.method.name,
+                                           picture.cost.kernels,
+                                           drawn->render_us + drawn->encode_us);
     }
   }
   response.content_type = media_type(picture.encoding.format);
@@ -201,7 +202,7 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
     reply(std::move(*refusal));
     return;
   }
-  const double estimate_ms = services.backend.costs.estimate_ms(
+  const double estimate_ms = services.backend.request_times.estimate_ms(
       asked.view.dataset, asked.view.method.name, asked.cost.kernels);
   if (const auto fits = services.admission.check_estimate(asked.cost, estimate_ms); !fits) {
     reply(problem_response(fits.error()));
