@@ -180,8 +180,9 @@ Result<http::Response> draw(Services& services, const Picture& picture,
     // Settings chosen by the server reduce the work below the estimate; the scene of a picture that
     // waited for data was built elsewhere.
     if (loading == work::Loading::none) {
-      services.backend.costs.learn(drawn->view.dataset, drawn->view.method.name,
-                                   picture.cost.kernels, drawn->render_us + drawn->encode_us);
+      services.backend.request_times.learn(drawn->view.dataset, drawn->view.method.name,
+                                           picture.cost.kernels,
+                                           drawn->render_us + drawn->encode_us);
     }
   }
   response.content_type = media_type(picture.encoding.format);
@@ -203,7 +204,7 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
     reply(std::move(*refusal));
     return;
   }
-  const double estimate_ms = services.backend.costs.estimate_ms(
+  const double estimate_ms = services.backend.request_times.estimate_ms(
       asked.view.dataset, asked.view.method.name, asked.cost.kernels);
   if (const auto fits = services.admission.check_estimate(asked.cost, estimate_ms); !fits) {
     reply(http::problem_response(fits.error()));

@@ -22,7 +22,7 @@ http::Response get_metrics(const Services& services);
 
 // Runs `make` on a thread of the service and replies with its value or error. `what` names the work
 // in the log; `of`: the dataset that it reads, if any.
-void run_later(work::LoadService& service, const http::Request& request, http::Reply reply,
+void run_later(work::TaskExecutor& service, const http::Request& request, http::Reply reply,
                const char* what, const data::Dataset* of, std::function<http::Response()> make);
 bool is_json(std::string_view content_type);
 bool is_merge_patch(std::string_view content_type);

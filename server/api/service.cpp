@@ -45,7 +45,7 @@ bool is_merge_patch(std::string_view content_type) {
                                   "application/merge-patch+json");
 }
 
-void run_later(work::LoadService& service, const http::Request& request, http::Reply reply,
+void run_later(work::TaskExecutor& service, const http::Request& request, http::Reply reply,
                const char* what, const data::Dataset* of, std::function<http::Response()> make) {
   const auto answer = std::make_shared<const http::Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;

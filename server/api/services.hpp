@@ -29,9 +29,9 @@ struct Services {
   http::RequestIds request_ids;  // used by the io thread only
   std::atomic<bool> draining{false};
   work::Backend backend;
-  work::LoadService locator;     // resolves posted names: a slow disk delays no other service
-  work::LoadService view_io;     // changes saved views, also on disk
-  work::LoadService file_watch;  // checks files for changes and reopens them
+  work::TaskExecutor locator;     // resolves posted names: a slow disk delays no other service
+  work::TaskExecutor view_io;     // changes saved views, also on disk
+  work::TaskExecutor file_watch;  // checks files for changes and reopens them
 };
 
 }  // namespace windsplat::api

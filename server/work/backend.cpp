@@ -18,7 +18,7 @@ Backend::Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool>
     : catalogue(std::move(store)),
       metrics(metrics_of_server),
       pool(std::move(threads)),
-      costs(pool->size()),
+      request_times(pool->size()),
       jobs(static_cast<std::size_t>(protocol::limits::jobs_max),
            static_cast<std::size_t>(protocol::limits::jobs_running_max)),
       renderer({requests_waiting_max,

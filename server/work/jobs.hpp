@@ -27,7 +27,7 @@ class Jobs {
   using Work = std::function<Result<protocol::JobResult>(const Handle&)>;
   struct Terms {
     CancelToken cancel = {};  // raised to cancel the job
-    bool slow = false;        // slow jobs leave one thread to the others
+    bool slow = false;        // slow jobs run one at a time
   };
 
   // `known_max`: limit of listed jobs; a new one replaces the oldest finished one.

@@ -1,5 +1,5 @@
 // Owners in turn, the earliest request of each first; failed requests wait for new ones.
-#include "server/data/resident/prefetcher.hpp"
+#include "server/data/resident/prefetch_thread.hpp"
 
 #include <algorithm>
 #include <condition_variable>
@@ -15,7 +15,7 @@
 
 namespace windsplat::data {
 
-struct Prefetcher::State {
+struct PrefetchThread::State {
   explicit State(std::shared_ptr<Budget> shared)
       : budget(std::move(shared)), thread([this] { work(); }) {}
 
@@ -88,10 +88,10 @@ struct Prefetcher::State {
   std::thread thread;  // last: it uses all of the above
 };
 
-Prefetcher::Prefetcher(std::shared_ptr<Budget> budget)
+PrefetchThread::PrefetchThread(std::shared_ptr<Budget> budget)
     : state_(std::make_unique<State>(std::move(budget))) {}
 
-Prefetcher::~Prefetcher() {
+PrefetchThread::~PrefetchThread() {
   {
     const std::lock_guard lock(state_->mutex);
     state_->stopping = true;
@@ -100,7 +100,7 @@ Prefetcher::~Prefetcher() {
   state_->thread.join();
 }
 
-void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
+void PrefetchThread::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
   if (requests.empty()) {  // as destructors say it: without memory, which an empty deque has
     state_->budget->request_prefetch(owner, {});
     const std::lock_guard lock(state_->mutex);
@@ -128,7 +128,7 @@ void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchReque
   state_->wake.notify_one();
 }
 
-void Prefetcher::forget(const DatasetInfo& info) {
+void PrefetchThread::forget(const DatasetInfo& info) {
   const std::lock_guard lock(state_->mutex);
   for (auto at = state_->queues.begin(); at != state_->queues.end();) {
     auto& queue = at->second.requests;

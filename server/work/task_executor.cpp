@@ -1,5 +1,5 @@
-// One queue and a few threads, each of which takes the first job whose dataset is not in use.
-#include "server/work/load_service.hpp"
+// One queue and a few threads, each of which takes the first task whose key is not in use.
+#include "server/work/task_executor.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -16,52 +16,51 @@
 
 namespace windsplat::work {
 
-struct LoadService::State {
+struct TaskExecutor::State {
   using Clock = std::chrono::steady_clock;
 
   State(std::size_t at_a_time, std::size_t most, const char* name, std::function<void()> told)
-      : places(at_a_time), jobs_max(most), what(name), refused(std::move(told)) {}
+      : places(at_a_time), tasks_max(most), what(name), refused(std::move(told)) {}
 
   // Cannot throw: its bookkeeping was allocated before.
-
   void work() {
     std::unique_lock lock(mutex);
     for (;;) {
-      const auto next = next_job(lock);
-      if (next == jobs.end()) return;
-      std::optional<Job> job(std::move(*next));
-      jobs.erase(next);
-      // A cancelled job needs no free dataset.
-      const std::shared_ptr<const void> dataset =
-          job->cancel.cancelled() ? nullptr : std::move(job->dataset);
-      if (dataset) busy.push_back(dataset);
+      const auto next = next_task(lock);
+      if (next == tasks.end()) return;
+      std::optional<Task> task(std::move(*next));
+      tasks.erase(next);
+      // A cancelled task needs no free key.
+      const std::shared_ptr<const void> key =
+          task->cancel.cancelled() ? nullptr : std::move(task->key);
+      if (key) busy.push_back(key);
       const Clock::time_point begun = Clock::now();
       running.push_back(begun);
       lock.unlock();
       try {
-        job->run();
+        task->run();
       } catch (const std::exception& fault) {
-        log_fault("a load job failed", fault);
+        log_fault("a task failed", fault, what);
       }
-      job.reset();  // release what the job holds before locking
+      task.reset();  // release what the task holds before locking
       lock.lock();
-      if (dataset) busy.erase(std::find(busy.begin(), busy.end(), dataset));
+      if (key) busy.erase(std::find(busy.begin(), busy.end(), key));
       running.erase(std::find(running.begin(), running.end(), begun));
       wake.notify_all();
     }
   }
 
-  // Waits for a job that may start; none at shutdown.
-  std::deque<Job>::iterator next_job(std::unique_lock<std::mutex>& lock) {
+  // Waits for a task that may start; none at shutdown.
+  std::deque<Task>::iterator next_task(std::unique_lock<std::mutex>& lock) {
     for (;;) {
       const auto next = first_free();
-      if (next == jobs.end()) {
-        if (ending && jobs.empty()) return next;
+      if (next == tasks.end()) {
+        if (ending && tasks.empty()) return next;
         wake.wait(lock);
       } else if (running.size() < places) {
         return next;
       } else {
-        // The most recent jobs are limited to the number of places until one has run for
+        // The most recent tasks are limited to the number of places until one has run for
         // `long_run`.
         const Clock::time_point at = running[running.size() - places] + long_run;
         if (at <= Clock::now()) return next;
@@ -71,46 +70,46 @@ struct LoadService::State {
   }
 
   // Requires the mutex.
-  [[nodiscard]] std::deque<Job>::iterator first_free() {
-    return std::find_if(jobs.begin(), jobs.end(), [this](const Job& job) {
-      return !job.dataset || job.cancel.cancelled() ||
-             std::find(busy.begin(), busy.end(), job.dataset) == busy.end();
+  [[nodiscard]] std::deque<Task>::iterator first_free() {
+    return std::find_if(tasks.begin(), tasks.end(), [this](const Task& task) {
+      return !task.key || task.cancel.cancelled() ||
+             std::find(busy.begin(), busy.end(), task.key) == busy.end();
     });
   }
 
   // Requires the mutex.
-  [[nodiscard]] bool has_room(const Job& job) const {
-    if (job.admitted) return true;
+  [[nodiscard]] bool has_room(const Task& task) const {
+    if (task.admitted) return true;
     Count all;
     Count same;
-    for (const Job& known : jobs) {
+    for (const Task& known : tasks) {
       if (known.admitted || known.cancel.cancelled()) continue;
-      const bool own = !job.payer.empty() && known.payer == job.payer;
+      const bool own = !task.payer.empty() && known.payer == task.payer;
       all.add(own);
-      if (known.dataset == job.dataset) same.add(own);
+      if (known.key == task.key) same.add(own);
     }
-    return same.has_room(jobs_max) && all.has_room(datasets_full * jobs_max);
+    return same.has_room(tasks_max) && all.has_room(keys_full * tasks_max);
   }
 
   struct Count {
-    std::size_t jobs = 0;
-    std::size_t own = 0;  // waiting jobs of this payer
+    std::size_t tasks = 0;
+    std::size_t own = 0;  // waiting tasks of this payer
     void add(bool is_own) {
-      ++jobs;
+      ++tasks;
       own += is_own ? 1U : 0U;
     }
     [[nodiscard]] bool has_room(std::size_t most) const {
-      return jobs < most && own < std::max<std::size_t>(most / 2, 1);
+      return tasks < most && own < std::max<std::size_t>(most / 2, 1);
     }
   };
 
   const std::size_t places;
-  const std::size_t jobs_max;
+  const std::size_t tasks_max;
   const char* const what;
   const std::function<void()> refused;
   std::mutex mutex;
   std::condition_variable wake;
-  std::deque<Job> jobs;
+  std::deque<Task> tasks;
   // Reserved for one entry per thread:
   std::vector<std::shared_ptr<const void>> busy;
   std::vector<Clock::time_point> running;  // start times, oldest first
@@ -118,9 +117,9 @@ struct LoadService::State {
   std::vector<std::thread> threads;
 };
 
-LoadService::LoadService(std::size_t threads, std::size_t jobs_max, const char* what,
-                         std::function<void()> refused, std::size_t spare)
-    : state_(std::make_unique<State>(threads, jobs_max, what, std::move(refused))) {
+TaskExecutor::TaskExecutor(std::size_t threads, std::size_t tasks_max, const char* what,
+                           std::function<void()> refused, std::size_t spare)
+    : state_(std::make_unique<State>(threads, tasks_max, what, std::move(refused))) {
   state_->busy.reserve(threads + spare);
   state_->running.reserve(threads + spare);
   for (std::size_t i = 0; i < threads + spare; ++i) {
@@ -128,29 +127,29 @@ LoadService::LoadService(std::size_t threads, std::size_t jobs_max, const char* 
   }
 }
 
-LoadService::~LoadService() { end(); }
+TaskExecutor::~TaskExecutor() { end(); }
 
-Result<void> LoadService::submit(Job job) {
+Result<void> TaskExecutor::submit(Task task) {
   {
     const std::lock_guard lock(state_->mutex);
     if (state_->ending) return make_error(ErrorKind::draining, "the server is shutting down");
-    if (!state_->has_room(job)) {
+    if (!state_->has_room(task)) {
       if (state_->refused) state_->refused();
       return make_error(ErrorKind::busy,
                         std::string("too many ") + state_->what +
                             " are waiting, for this address or in total; try again");
     }
-    state_->jobs.push_back(std::move(job));
+    state_->tasks.push_back(std::move(task));
   }
   state_->wake.notify_all();  // every waiting thread checks for a free place
   return {};
 }
 
-void LoadService::end() {
+void TaskExecutor::end() {
   {
     const std::lock_guard lock(state_->mutex);
     state_->ending = true;
-    for (const Job& job : state_->jobs) job.cancel.cancel();
+    for (const Task& task : state_->tasks) task.cancel.cancel();
   }
   state_->wake.notify_all();
   for (std::thread& thread : state_->threads) {
