@@ -171,11 +171,10 @@ struct Registrar {
 }  // namespace
 
 struct Metrics::State {
-  explicit State(const std::vector<const char*>& routes) {
+  State() {
     add.gauge("windsplat_build_info", "1, labelled with the version.",
               {{"version", WINDSPLAT_VERSION}})
         .Set(1);
-    for (const char* route : routes) count_requests_of(route);
     count_requests_of(route_other);
     for (std::size_t i = 0; i < limit_names.size(); ++i) limits[i] = &add.limit(limit_names[i]);
   }
@@ -215,9 +214,12 @@ struct Metrics::State {
   std::array<Counter*, limit_names.size()> limits{};
 };
 
-Metrics::Metrics(const std::vector<const char*>& routes)
-    : state_(std::make_unique<State>(routes)) {}
+Metrics::Metrics() : state_(std::make_unique<State>()) {}
 Metrics::~Metrics() = default;
+
+void Metrics::count_routes(const std::vector<const char*>& routes) {
+  for (const char* route : routes) state_->count_requests_of(route);
+}
 
 void Metrics::stage_took(Stage stage, std::int64_t us) {
   state_->stages[static_cast<std::size_t>(stage)]->Observe(static_cast<double>(us) / us_per_s);

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "server/access/address.hpp"
-#include "server/api/services.hpp"
 #include "server/http/http_checks.hpp"
 #include "server/http/problem.hpp"
 #include "server/transport/http/current_request.hpp"
@@ -25,24 +24,24 @@ namespace {
 
 class HttpSession final : public Connection, public HttpOwner {
  public:
-  HttpSession(Wire wire, api::Services& services, Connections& connections, access::Visitor visitor)
-      : services_(services),
-        connections_(connections),
-        id_(connections.next_id()),
+  HttpSession(const HttpContext& context, Wire wire, access::Visitor visitor)
+      : context_(context),
+        id_(context.connections.next_id()),
         visitor_(std::move(visitor)),
         current_{blank_request(), api::route_other, std::chrono::steady_clock::now()},
         wire_(*this, std::move(wire), visitor_.reserve.has_value()),
         reader_(*this, wire_, current_),
-        writer_(*this, wire_, services.metrics, services.admission, services.draining, current_),
+        writer_(*this, wire_, context.metrics, context.admission, context.draining, current_),
         work_(*this, wire_) {}
-  ~HttpSession() override { connections_.remove(id_); }
+  ~HttpSession() override { context_.connections.remove(id_); }
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
 
   // The drain waits only for requests already in progress: otherwise a busy client could delay it.
   // `refusal`: of all its requests.
   void start(bool late, std::optional<http::Response> refusal) {
-    connections_.add(id_, std::static_pointer_cast<HttpSession>(shared_from_this()), false, late);
+    context_.connections.add(id_, std::static_pointer_cast<HttpSession>(shared_from_this()), false,
+                             late);
     refusal ? refuse(std::move(*refusal)) : next_request();
   }
 
@@ -65,19 +64,20 @@ class HttpSession final : public Connection, public HttpOwner {
   void on_header() override {
     http::Request& request = current_.request;
     std::string id = request.header(http::request_id_header);
-    request.id = http::is_request_id(id) ? std::move(id) : services_.request_ids.next();
+    request.id = http::is_request_id(id) ? std::move(id) : context_.request_ids.next();
     const auto& message = reader_.input().parser().get();
-    if (auto fault = check_form(services_.options, request, message.target(), message.version())) {
+    if (auto fault = check_form(context_.options, request, message.target(), message.version())) {
       return refuse(std::move(*fault));
     }
     current_.charged = true;
-    if (auto refusal = services_.admission.request(visitor_, request, api::names_health(request))) {
+    const bool health = context_.router.names_health(request);
+    if (auto refusal = context_.admission.request(visitor_, request, health)) {
       return refuse(std::move(*refusal));
     }
     const bool upgrade =
         http::asks_for_websocket(request, message.version()) && api::names_stream(request);
     if (upgrade) current_.route = api::route_stream;
-    if (auto refusal = check_access(services_.options, services_.admission, request, upgrade,
+    if (auto refusal = check_access(context_.options, context_.admission, request, health, upgrade,
                                     wire_.secure())) {
       return refuse(std::move(*refusal));
     }
@@ -85,13 +85,13 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   void on_request() override {
-    if (auto answer = answer_login(services_.options, services_.admission, current_.request,
-                                   wire_.secure())) {
+    if (auto answer =
+            answer_login(context_.options, context_.admission, current_.request, wire_.secure())) {
       current_.route = api::route_login;
       return writer_.send(std::move(*answer));
     }
     reader_.watch();
-    work_.start(services_, current_);
+    work_.start(context_.router, current_);
   }
 
   void on_reply(http::Response response) override {
@@ -104,16 +104,16 @@ class HttpSession final : public Connection, public HttpOwner {
     response.close = true;
     // Requests refused before parsing are charged as well.
     if (!current_.charged) {
-      current_.quiet = !services_.admission.count_malformed(visitor_, request);
+      current_.quiet = !context_.admission.count_malformed(visitor_, request);
     }
-    if (request.id.empty()) request.id = services_.request_ids.next();  // refused before parsing
+    if (request.id.empty()) request.id = context_.request_ids.next();  // refused before parsing
     writer_.send(std::move(response));
   }
 
   // End of stream is reported once: another read would hang.
   void on_written(ErrorCode fault) override {
     if (fault || reader_.has_ended()) return close();
-    current_.keep_alive && !services_.draining ? next_request() : wire_.linger(reader_.input());
+    current_.keep_alive && !context_.draining ? next_request() : wire_.linger(reader_.input());
   }
 
   void on_end() override {
@@ -144,7 +144,7 @@ class HttpSession final : public Connection, public HttpOwner {
 
   void next_request() {
     current_ = {blank_request(), api::route_other, current_.began};
-    reader_.next(services_.draining);
+    reader_.next(context_.draining);
   }
 
   void begin_stream() {
@@ -154,11 +154,11 @@ class HttpSession final : public Connection, public HttpOwner {
       return refuse(http::problem_response(400, "Bad Request", "an upgrade has no body"));
     }
     if (auto fault = http::check_upgrade(request)) return refuse(std::move(*fault));
-    if (services_.draining) {
+    if (context_.draining) {
       return refuse(
           http::problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
     }
-    auto seat = services_.admission.open_session(request.address);
+    auto seat = context_.admission.open_session(request.address);
     if (seat.refusal) return refuse(std::move(*seat.refusal));
     wire_.with_no_deadline();
     UpgradeRequest message;
@@ -166,12 +166,11 @@ class HttpSession final : public Connection, public HttpOwner {
     // The library parses only the first line of a list header.
     message.set(beast::http::field::connection, "Upgrade");
     message.set(beast::http::field::upgrade, "websocket");
-    start_websocket_session(std::move(wire_.wire()), message, request.id, services_, connections_,
+    start_websocket_session(context_.streams, std::move(wire_.wire()), message, request.id,
                             {request.address, std::move(visitor_.place), std::move(seat.place)});
   }
 
-  api::Services& services_;
-  Connections& connections_;
+  const HttpContext& context_;
   const std::uint64_t id_;
   access::Visitor visitor_;
   CurrentRequest current_;
@@ -183,15 +182,13 @@ class HttpSession final : public Connection, public HttpOwner {
 
 }  // namespace
 
-void start_http_session(Wire wire, api::Services& services, Connections& connections,
-                        access::Visitor visitor, bool late) {
-  std::make_shared<HttpSession>(std::move(wire), services, connections, std::move(visitor))
+void start_http_session(const HttpContext& context, Wire wire, access::Visitor visitor, bool late) {
+  std::make_shared<HttpSession>(context, std::move(wire), std::move(visitor))
       ->start(late, std::nullopt);
 }
 
-void refuse_plain_http(Wire wire, api::Services& services, Connections& connections,
-                       access::Visitor visitor, bool late) {
-  std::make_shared<HttpSession>(std::move(wire), services, connections, std::move(visitor))
+void refuse_plain_http(const HttpContext& context, Wire wire, access::Visitor visitor, bool late) {
+  std::make_shared<HttpSession>(context, std::move(wire), std::move(visitor))
       ->start(late,
               http::problem_response(400, "Bad Request", "this port requires TLS: use https://"));
 }

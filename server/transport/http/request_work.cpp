@@ -15,12 +15,12 @@ constexpr std::chrono::milliseconds look_interval{40};
 RequestWork::RequestWork(HttpOwner& owner, HttpWire& wire)
     : owner_(owner), wire_(wire), timer_(wire.wire().get_executor()) {}
 
-void RequestWork::start(api::Services& services, CurrentRequest& current) {
+void RequestWork::start(const api::Router& router, CurrentRequest& current) {
   awaited_ = true;
   look();
   const auto awaited =
       std::make_shared<AwaitedReply>(owner_, wire_.wire().get_executor(), reply_lost_);
-  current.route = route(services, current.request, [awaited](http::Response response) {
+  current.route = router.route(current.request, [awaited](http::Response response) {
     awaited->answer(std::move(response));
   });
 }

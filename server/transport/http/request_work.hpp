@@ -17,7 +17,7 @@ class RequestWork {
   RequestWork(HttpOwner& owner, HttpWire& wire);
 
   // Ends in HttpOwner::on_reply(), or in on_end() if the client has left.
-  void start(api::Services& services, CurrentRequest& current);
+  void start(const api::Router& router, CurrentRequest& current);
   // The reply has arrived, or is awaited no longer. False: none is awaited.
   bool finish();
   void stop() { timer_.cancel(); }

@@ -1,22 +1,27 @@
 // Members are declared in order of dependency.
-#include "server/api/services.hpp"
+#include "server/transport/server_parts.hpp"
 
 #include <utility>
 
 #include "server/api/routes.hpp"
 #include "server/http/request_target.hpp"
 
-namespace windsplat::api {
+namespace windsplat::transport {
 namespace {
 
 constexpr std::size_t view_changes_waiting_max = 64;  // each may take one disk sync
 
+api::ServerOptions completed(api::ServerOptions options) {
+  options.base_path = http::normal_base_path(options.base_path);
+  if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
+  return options;
+}
+
 }  // namespace
 
-Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> store,
-                   std::shared_ptr<ThreadPool> threads)
-    : options(std::move(server_options)),
-      metrics(route_names()),
+ServerParts::ServerParts(api::ServerOptions server_options, std::shared_ptr<data::Store> store,
+                         std::shared_ptr<ThreadPool> threads)
+    : options(completed(std::move(server_options))),
       admission(options.limits, metrics),
       backend(
           std::move(store), std::move(threads), metrics,
@@ -25,16 +30,17 @@ Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> st
            [this](const frame::Cost& cost) { return admission.check(cost); }}),
       locator(1, work::Backend::requests_waiting_max, "files to open"),
       view_io(1, view_changes_waiting_max, "changes of saved views"),
-      file_watch(1, 1, "file checks") {
-  options.base_path = http::normal_base_path(options.base_path);
-  if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
+      file_watch(1, 1, "file checks"),
+      router(api::routes(options, draining, admission, backend, locator, view_io),
+             options.base_path, admission, draining) {
+  metrics.count_routes(router.route_names());
 }
 
-void Services::end() {
+void ServerParts::end() {
   locator.end();  // submits jobs
   backend.end();
   file_watch.end();
   view_io.end();
 }
 
-}  // namespace windsplat::api
+}  // namespace windsplat::transport
