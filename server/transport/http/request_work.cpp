@@ -20,7 +20,7 @@ void RequestWork::start(api::Services& services, CurrentRequest& current) {
   look();
   const auto awaited =
       std::make_shared<AwaitedReply>(owner_, wire_.wire().get_executor(), reply_lost_);
-  current.route = route(services, current.request, [awaited](http::Response response) {
+  current.route = api::route(services, current.request, [awaited](http::Response response) {
     awaited->answer(std::move(response));
   });
 }
