@@ -1,4 +1,4 @@
-# web/ -> files inside the binary: target windsplat_web defines net::web_assets() (gzipped), target
+# web/ -> files inside the binary: target windsplat_web defines api::web_assets() (gzipped), target
 # windsplat_report_template study::report_template().
 # Runs again only when a source of the pages changes; needs node (18 or later) and npm.
 find_program(WINDSPLAT_NODE NAMES node nodejs)

@@ -9,7 +9,7 @@
 
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 using Bytes = std::array<std::uint8_t, 16>;
@@ -97,7 +97,7 @@ bool is_trusted(std::string_view peer, const std::vector<Network>& trusted) {
 std::string client_address(const std::string& peer, std::string_view forwarded_for,
                            const std::vector<Network>& trusted) {
   if (!is_trusted(peer, trusted)) return peer;
-  const auto hops = split_list(forwarded_for, ',');
+  const auto hops = http::split_list(forwarded_for, ',');
   std::string client = peer;
   for (auto hop = hops.rbegin(); hop != hops.rend(); ++hop) {
     const std::string_view address = without_port(*hop);
@@ -108,4 +108,4 @@ std::string client_address(const std::string& peer, std::string_view forwarded_f
   return client;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

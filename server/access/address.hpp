@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 // Address as counted by quotas: IPv4 unchanged, also if mapped into IPv6; of IPv6 the network of 64
 // bits ("2001:db8:1:2::/64"), which one host may own entirely. Text that is not an address is
@@ -32,4 +32,4 @@ std::string client_address(const std::string& peer, std::string_view forwarded_f
                            const std::vector<Network>& trusted);
 bool is_trusted(std::string_view peer, const std::vector<Network>& trusted);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

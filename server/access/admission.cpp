@@ -12,7 +12,7 @@
 #include "server/base/log.hpp"
 #include "server/http/problem.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 std::int64_t steady_us() {
@@ -29,31 +29,31 @@ std::string number(double value) {
 std::string detail_of(const Refusal& refusal) {
   const std::string limit = number(refusal.limit);
   switch (refusal.kind) {
-    case LimitKind::connections:
+    case metrics::LimitKind::connections:
       return "the server has " + limit + " connections, the limit (--max-connections)";
-    case LimitKind::address_connections:
+    case metrics::LimitKind::address_connections:
       return "this address has " + limit +
              " connections, the limit (--max-connections-per-address)";
-    case LimitKind::sessions:
+    case metrics::LimitKind::sessions:
       return "the server has " + limit + " sessions, the limit (--max-sessions)";
-    case LimitKind::address_sessions:
+    case metrics::LimitKind::address_sessions:
       return "this address has " + limit + " sessions, the limit (--max-sessions-per-address)";
-    case LimitKind::requests:
+    case metrics::LimitKind::requests:
       return "this address may send " + limit + " requests a second (--max-requests-per-address)";
-    case LimitKind::bytes:
+    case metrics::LimitKind::bytes:
       return "this address may receive " + limit + " bytes a second (--max-bytes-per-address)";
-    case LimitKind::render:
+    case metrics::LimitKind::render:
       return "this address may have " + limit +
              " seconds of rendering a minute (--max-render-per-address)";
-    case LimitKind::logins:
+    case metrics::LimitKind::logins:
       return "this address may fail to log in " + limit +
              " times a minute (--max-failed-logins-per-address)";
-    case LimitKind::pixels:
-    case LimitKind::kernels:
-    case LimitKind::waiting:
-    case LimitKind::arrivals:
-    case LimitKind::estimate:
-    case LimitKind::handshakes:
+    case metrics::LimitKind::pixels:
+    case metrics::LimitKind::kernels:
+    case metrics::LimitKind::waiting:
+    case metrics::LimitKind::arrivals:
+    case metrics::LimitKind::estimate:
+    case metrics::LimitKind::handshakes:
       break;
   }
   return "the server is overloaded; try again";
@@ -146,20 +146,22 @@ class Admission::Slot {
   bool session_ = false;
 };
 
-Response refusal_response(const Refusal& refusal) {
-  const bool total = refusal.kind == LimitKind::connections || refusal.kind == LimitKind::sessions;
-  return problem_response(total ? 503 : 429, total ? "Service Unavailable" : "Too Many Requests",
-                          detail_of(refusal), refusal.retry_after_s);
+http::Response refusal_response(const Refusal& refusal) {
+  const bool total = refusal.kind == metrics::LimitKind::connections ||
+                     refusal.kind == metrics::LimitKind::sessions;
+  return http::problem_response(total ? 503 : 429,
+                                total ? "Service Unavailable" : "Too Many Requests",
+                                detail_of(refusal), refusal.retry_after_s);
 }
 
-Admission::Admission(const Limits& limits, Metrics& metrics, std::function<Micros()> now)
+Admission::Admission(const Limits& limits, metrics::Metrics& metrics, std::function<Micros()> now)
     : limits_(limits), metrics_(metrics), state_(std::make_shared<State>(limits, std::move(now))) {
   for (const std::string& text : limits.trusted_proxies) {
     if (const auto network = Network::parse(text)) trusted_.push_back(*network);
   }
 }
 
-std::optional<Response> Admission::answer(const std::optional<Refusal>& refusal) {
+std::optional<http::Response> Admission::answer(const std::optional<Refusal>& refusal) {
   if (!refusal) return std::nullopt;
   metrics_.refused(refusal->kind);
   return refusal_response(*refusal);
@@ -174,7 +176,7 @@ bool Admission::arrive(const std::string& peer, bool tls) {
     const std::lock_guard lock(state_->mutex);
     const Micros now = state_->now();
     refusal = state_->quota.arrive(address, proxy, tls, now);
-    if (refusal && refusal->kind == LimitKind::handshakes) {
+    if (refusal && refusal->kind == metrics::LimitKind::handshakes) {
       closed = state_->count_refused_handshake(address, now);
     }
   }
@@ -220,11 +222,12 @@ bool Admission::is_kept_out_by_others(const std::string& peer) {
   return state_->quota.is_kept_out_by_others(address, proxy, state_->now());
 }
 
-std::string Admission::client_of(const Visitor& visitor, const Request& request) const {
+std::string Admission::client_of(const Visitor& visitor, const http::Request& request) const {
   return counted_address(client_address(visitor.peer, request.header("X-Forwarded-For"), trusted_));
 }
 
-std::optional<Response> Admission::request(const Visitor& visitor, Request& request, bool health) {
+std::optional<http::Response> Admission::request(const Visitor& visitor, http::Request& request,
+                                                 bool health) {
   request.address = client_of(visitor, request);
   if (visitor.reserve && !health) return answer(visitor.reserve);
   std::optional<Refusal> refusal;
@@ -235,13 +238,13 @@ std::optional<Response> Admission::request(const Visitor& visitor, Request& requ
   return answer(refusal);
 }
 
-bool Admission::count_malformed(const Visitor& visitor, const Request& request) {
+bool Admission::count_malformed(const Visitor& visitor, const http::Request& request) {
   const std::string address = client_of(visitor, request);
   const std::lock_guard lock(state_->mutex);
   return !state_->quota.request(address, false, state_->now());
 }
 
-std::optional<Response> Admission::picture(const std::string& address) {
+std::optional<http::Response> Admission::picture(const std::string& address) {
   std::optional<Refusal> refusal;
   {
     const std::lock_guard lock(state_->mutex);
@@ -256,7 +259,7 @@ Admission::Seat Admission::open_session(const std::string& address) {
   return {place, std::nullopt};
 }
 
-std::optional<Response> Admission::may_try_login(const std::string& address) {
+std::optional<http::Response> Admission::may_try_login(const std::string& address) {
   std::optional<Refusal> refusal;
   {
     const std::lock_guard lock(state_->mutex);
@@ -265,7 +268,7 @@ std::optional<Response> Admission::may_try_login(const std::string& address) {
   return answer(refusal);
 }
 
-std::optional<Response> Admission::failed_login(const std::string& address) {
+std::optional<http::Response> Admission::failed_login(const std::string& address) {
   std::optional<Refusal> refusal;
   {
     const std::lock_guard lock(state_->mutex);
@@ -297,8 +300,8 @@ void Admission::rendered(const std::string& address, Micros took) {
 Result<void> Admission::check(const frame::Cost& cost) {
   auto fits = check_cost(cost, limits_);
   if (!fits) {
-    metrics_.refused(fits.error().kind == ErrorKind::too_large ? LimitKind::pixels
-                                                               : LimitKind::kernels);
+    metrics_.refused(fits.error().kind == ErrorKind::too_large ? metrics::LimitKind::pixels
+                                                               : metrics::LimitKind::kernels);
   }
   return fits;
 }
@@ -306,11 +309,11 @@ Result<void> Admission::check(const frame::Cost& cost) {
 Result<void> Admission::check_estimate(const frame::Cost& cost, double estimate_ms) {
   const double limit_s = limits_.render_s;
   if (limit_s <= 0 || estimate_ms <= 1000 * limit_s) return {};
-  metrics_.refused(LimitKind::estimate);
+  metrics_.refused(metrics::LimitKind::estimate);
   return make_error_at(ErrorKind::invalid, cost.dominant,
                        "dominates the cost of a picture with an estimated time of " +
                            number(std::ceil(estimate_ms / 1000)) + " s; the limit is " +
                            number(limit_s) + " s (--max-render)");
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -15,7 +15,7 @@
 #include "server/http/exchange.hpp"
 #include "server/metrics/metrics.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 // Holds a place among connections or sessions until the last copy is destroyed.
 using Ticket = std::shared_ptr<const void>;
@@ -30,7 +30,7 @@ struct Visitor {
 };
 
 // The server or the address is at its limit: 503 or 429 with Retry-After.
-Response refusal_response(const Refusal& refusal);
+http::Response refusal_response(const Refusal& refusal);
 
 // Thread-safe.
 class Admission {
@@ -38,7 +38,7 @@ class Admission {
   using Micros = Quota::Micros;
 
   // `now`: clock in microseconds; empty: a steady clock.
-  Admission(const Limits& limits, Metrics& metrics, std::function<Micros()> now = {});
+  Admission(const Limits& limits, metrics::Metrics& metrics, std::function<Micros()> now = {});
 
   // False: too many recent connections; close it without a response. Call before connect(). Excess
   // handshake time is logged at most once a minute.
@@ -57,22 +57,23 @@ class Admission {
   bool is_kept_out_by_others(const std::string& peer);
 
   // Sets request.address to the client's. A value: the request is refused with it.
-  std::optional<Response> request(const Visitor& visitor, Request& request, bool health);
+  std::optional<http::Response> request(const Visitor& visitor, http::Request& request,
+                                        bool health);
   // Counts a request refused before parsing. False: too many, do not log this one.
   // were too many, and this one is not worth a line in the log.
-  bool count_malformed(const Visitor& visitor, const Request& request);
+  bool count_malformed(const Visitor& visitor, const http::Request& request);
   // Whether the address may have a picture drawn.
-  std::optional<Response> picture(const std::string& address);
+  std::optional<http::Response> picture(const std::string& address);
   // A place for a stream, or the refusal.
   struct Seat {
     Ticket place;
-    std::optional<Response> refusal;
+    std::optional<http::Response> refusal;
   };
   Seat open_session(const std::string& address);
   // Whether a token may be compared: the number of recent failures is within the limit.
-  std::optional<Response> may_try_login(const std::string& address);
+  std::optional<http::Response> may_try_login(const std::string& address);
   // The response to a wrong token above the limit of failures; none: the usual one.
-  std::optional<Response> failed_login(const std::string& address);
+  std::optional<http::Response> failed_login(const std::string& address);
   // Counts a message of a stream; returns how long to pause reading.
   Micros message_received(const std::string& address, std::size_t bytes);
   // Delay of a stream's next frame until the address is within its quota.
@@ -88,13 +89,13 @@ class Admission {
  private:
   struct State;
   class Slot;
-  [[nodiscard]] std::string client_of(const Visitor& visitor, const Request& request) const;
-  std::optional<Response> answer(const std::optional<Refusal>& refusal);
+  [[nodiscard]] std::string client_of(const Visitor& visitor, const http::Request& request) const;
+  std::optional<http::Response> answer(const std::optional<Refusal>& refusal);
 
   const Limits limits_;
   std::vector<Network> trusted_;
-  Metrics& metrics_;
+  metrics::Metrics& metrics_;
   std::shared_ptr<State> state_;  // shared with tickets
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

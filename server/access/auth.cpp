@@ -13,7 +13,7 @@
 #include "server/base/check.hpp"
 #include "server/http/negotiate.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 using Digest = std::array<std::uint8_t, 32>;
@@ -85,18 +85,18 @@ std::optional<std::string> from_base64url(std::string_view text) {
 
 // "Bearer TOKEN"; scheme names are case-insensitive (RFC 9110, 11.1). None for other schemes, which
 // belong to a proxy.
-std::optional<std::string> bearer_of(const Request& request) {
+std::optional<std::string> bearer_of(const http::Request& request) {
   const std::string authorization = request.header("Authorization");
   const std::string_view text = authorization;
   const std::size_t space = text.find(' ');
-  if (!equal_without_case(text.substr(0, space), "Bearer")) return std::nullopt;
-  return std::string(space == std::string_view::npos ? "" : trimmed(text.substr(space)));
+  if (!http::equal_without_case(text.substr(0, space), "Bearer")) return std::nullopt;
+  return std::string(space == std::string_view::npos ? "" : http::trimmed(text.substr(space)));
 }
 
-std::optional<std::string> offered_token(const Request& request, bool upgrade) {
+std::optional<std::string> offered_token(const http::Request& request, bool upgrade) {
   if (!upgrade) return std::nullopt;
   const std::string offers = request.header("Sec-WebSocket-Protocol");
-  for (const std::string_view name : split_list(offers, ',')) {
+  for (const std::string_view name : http::split_list(offers, ',')) {
     if (!name.starts_with(bearer_protocol)) continue;
     return from_base64url(name.substr(bearer_protocol.size())).value_or("");
   }
@@ -104,11 +104,11 @@ std::optional<std::string> offered_token(const Request& request, bool upgrade) {
 }
 
 // A browser sends every cookie whose path matches.
-bool has_good_cookie(const Request& request, const Token& token, std::int64_t now_s) {
+bool has_good_cookie(const http::Request& request, const Token& token, std::int64_t now_s) {
   const std::string ours = cookie_name(request);
   for (const auto& [name, value] : request.headers) {
-    if (!equal_without_case(name, "Cookie")) continue;
-    for (const std::string_view pair : split_list(value, ';')) {
+    if (!http::equal_without_case(name, "Cookie")) continue;
+    for (const std::string_view pair : http::split_list(value, ';')) {
       const std::size_t equals = pair.find('=');
       if (equals == std::string_view::npos || pair.substr(0, equals) != ours) continue;
       if (token.admits(pair.substr(equals + 1), now_s)) return true;
@@ -120,7 +120,7 @@ bool has_good_cookie(const Request& request, const Token& token, std::int64_t no
 enum class Credential { none, wrong, token, cookie };
 
 // The first credential decides: a valid cookie does not make up for a wrong token.
-Credential credential_of(const Request& request, bool upgrade, const Token& token,
+Credential credential_of(const http::Request& request, bool upgrade, const Token& token,
                          std::int64_t now_s) {
   auto shown = bearer_of(request);
   if (!shown) shown = offered_token(request, upgrade);
@@ -128,14 +128,14 @@ Credential credential_of(const Request& request, bool upgrade, const Token& toke
   return has_good_cookie(request, token, now_s) ? Credential::cookie : Credential::none;
 }
 
-bool names_token(const Request& request) {
+bool names_token(const http::Request& request) {
   return std::any_of(request.query.begin(), request.query.end(), [](const auto& parameter) {
-    return equal_without_case(parameter.first, "token") ||
-           equal_without_case(parameter.first, "access_token");
+    return http::equal_without_case(parameter.first, "token") ||
+           http::equal_without_case(parameter.first, "access_token");
   });
 }
 
-bool is_health(const Request& request) {
+bool is_health(const http::Request& request) {
   return request.path.size() == 1 && (request.path[0] == "livez" || request.path[0] == "readyz");
 }
 
@@ -177,7 +177,7 @@ bool is_other_token(const Token* before, const Token* now) {
   return now != nullptr && (before == nullptr || *before != *now);
 }
 
-std::string cookie_name(const Request& request) {
+std::string cookie_name(const http::Request& request) {
   const std::string host = request.header("Host");
   const std::size_t colon = host.find(':', host.starts_with('[') ? host.find(']') : 0);
   std::string name = "windsplat";
@@ -206,16 +206,16 @@ bool Token::admits(std::string_view cookie, std::int64_t now_s) const {
   return CRYPTO_memcmp(given.data(), right.data(), right.size()) == 0 && now_s < ends_s;
 }
 
-bool is_login(const Request& request) {
+bool is_login(const http::Request& request) {
   return request.below_base && request.method == "POST" &&
          request.path == std::vector<std::string>{"login"};
 }
 
-bool shows_token(const Request& request, bool upgrade) {
+bool shows_token(const http::Request& request, bool upgrade) {
   return !is_health(request) && (bearer_of(request) || offered_token(request, upgrade));
 }
 
-Verdict judge(const Request& request, bool upgrade, const Token* token,
+Verdict judge(const http::Request& request, bool upgrade, const Token* token,
               const std::vector<std::string>& allowed_origins, std::int64_t now_s, bool tls) {
   if (names_token(request)) return Verdict::token_in_url;
   if (is_health(request)) return Verdict::allowed;
@@ -223,9 +223,9 @@ Verdict judge(const Request& request, bool upgrade, const Token* token,
   const bool reads = !upgrade && (request.method == "GET" || request.method == "HEAD" ||
                                   request.method == "OPTIONS");
   // Browsers send one or the other for requests of a page; programs send neither.
-  const bool own_page = origin.empty()
-                            ? request.header("Sec-Fetch-Site") == "same-origin"
-                            : origin_allowed(origin, request.header("Host"), allowed_origins, tls);
+  const bool own_page =
+      origin.empty() ? request.header("Sec-Fetch-Site") == "same-origin"
+                     : http::origin_allowed(origin, request.header("Host"), allowed_origins, tls);
   if (!reads && !origin.empty() && !own_page) return Verdict::wrong_origin;
   if (token == nullptr) return Verdict::allowed;
   if (is_login(request)) return own_page ? Verdict::allowed : Verdict::wrong_origin;
@@ -243,4 +243,4 @@ Verdict judge(const Request& request, bool upgrade, const Token* token,
   return Verdict::no_token;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

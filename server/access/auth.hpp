@@ -11,7 +11,7 @@
 #include "server/base/error.hpp"
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 // The shared secret. Comparisons take constant time.
 class Token {
@@ -48,7 +48,7 @@ bool is_other_token(const Token* before, const Token* now);
 
 // "windsplat" with the port of the request's Host: cookies are sent to every port of a host, and
 // two daemons would overwrite each other's.
-std::string cookie_name(const Request& request);
+std::string cookie_name(const http::Request& request);
 // WebSocket subprotocol for clients that cannot set headers: "bearer." and the token in base64url
 // (RFC 4648, 5) without padding.
 inline constexpr std::string_view bearer_protocol = "bearer.";
@@ -64,14 +64,14 @@ enum class Verdict {
 // `token` null: no authentication. `upgrade`: the request opens a WebSocket. `tls`: it uses TLS.
 // Exempt from the token: /livez and /readyz, and the login itself, which must come from a page of
 // this server.
-Verdict judge(const Request& request, bool upgrade, const Token* token,
+Verdict judge(const http::Request& request, bool upgrade, const Token* token,
               const std::vector<std::string>& allowed_origins, std::int64_t now_s,
               bool tls = false);
 
 // Whether judge() would compare a token of the request, which may be an attempt to guess it.
-bool shows_token(const Request& request, bool upgrade);
+bool shows_token(const http::Request& request, bool upgrade);
 
 // Whether it posts the login form; only if a token is set.
-bool is_login(const Request& request);
+bool is_login(const http::Request& request);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

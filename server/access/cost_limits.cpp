@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <string>
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 std::string in_short(double number) {
@@ -31,4 +31,4 @@ Result<void> check_cost(const frame::Cost& cost, const Limits& limits) {
   return {};
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -8,7 +8,7 @@
 
 #include "protocol/limits.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 // An address is an IPv4 address or an IPv6 network of 64 bits (address.hpp). The defaults are above
 // the usage of many people behind one address; docs/user/configuration.md describes the effect of
@@ -51,4 +51,4 @@ struct Limits {
   }
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -14,7 +14,7 @@
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 constexpr std::string_view style =
@@ -69,29 +69,29 @@ std::string page(const std::string& base_path, std::string_view message) {
   return html;
 }
 
-void add_challenge(Response& response, bool wrong) {
+void add_challenge(http::Response& response, bool wrong) {
   // RFC 6750, 3: no error code if the request has no credentials.
   response.headers.emplace_back(
       "WWW-Authenticate",
       wrong ? "Bearer realm=\"windsplat\", error=\"invalid_token\"" : "Bearer realm=\"windsplat\"");
 }
 
-Response login_page(const std::string& base_path, std::string_view message, bool wrong) {
-  Response response;
+http::Response login_page(const std::string& base_path, std::string_view message, bool wrong) {
+  http::Response response;
   response.status = 401;
   response.content_type = "text/html; charset=utf-8";
   response.headers = {{"Cache-Control", "no-store"},
                       {"Content-Security-Policy", policy()},
                       {"Cross-Origin-Opener-Policy", "same-origin"}};
   add_challenge(response, wrong);
-  response.body = Body::of(page(base_path, message));
+  response.body = http::Body::of(page(base_path, message));
   return response;
 }
 
-bool wants_page(const Request& request) {
+bool wants_page(const http::Request& request) {
   if (request.method != "GET" && request.method != "HEAD") return false;
   constexpr std::array<std::string_view, 2> offers{"application/problem+json", "text/html"};
-  return choose_type(request.header("Accept"), offers) == 1U;
+  return http::choose_type(request.header("Accept"), offers) == 1U;
 }
 
 std::optional<unsigned> hex_digit(char c) {
@@ -121,32 +121,34 @@ std::string form_text(std::string_view text) {
 
 // The form's only field, without spaces around pasted text.
 std::string posted_token(const std::string& body) {
-  for (const std::string_view pair : split_list(body, '&')) {
+  for (const std::string_view pair : http::split_list(body, '&')) {
     const std::size_t equals = pair.find('=');
     if (equals == std::string_view::npos || pair.substr(0, equals) != "token") continue;
     const std::string text = form_text(pair.substr(equals + 1));
-    return std::string(trimmed(text));
+    return std::string(http::trimmed(text));
   }
   return {};
 }
 
 }  // namespace
 
-Response turned_away(Verdict verdict, const Request& request, const std::string& base_path) {
+http::Response turned_away(Verdict verdict, const http::Request& request,
+                           const std::string& base_path) {
   switch (verdict) {
     case Verdict::token_in_url:
-      return problem_response(400, "Bad Request",
-                              "do not send the token in the URL, where it is stored and "
-                              "logged: send it as Authorization: Bearer");
+      return http::problem_response(400, "Bad Request",
+                                    "do not send the token in the URL, where it is stored and "
+                                    "logged: send it as Authorization: Bearer");
     case Verdict::wrong_origin:
       if (request.header("Origin").empty()) {
-        return problem_response(403, "Forbidden",
-                                "cookies and the login form require an Origin header of a page; "
-                                "programs must send Authorization: Bearer");
+        return http::problem_response(
+            403, "Forbidden",
+            "cookies and the login form require an Origin header of a page; "
+            "programs must send Authorization: Bearer");
       }
-      return problem_response(403, "Forbidden",
-                              "pages of " + printable(request.header("Origin")) +
-                                  " may not connect; use --allow-origin to allow them");
+      return http::problem_response(403, "Forbidden",
+                                    "pages of " + printable(request.header("Origin")) +
+                                        " may not connect; use --allow-origin to allow them");
     case Verdict::allowed:
     case Verdict::no_token:
     case Verdict::wrong_token:
@@ -154,19 +156,20 @@ Response turned_away(Verdict verdict, const Request& request, const std::string&
   }
   const bool wrong = verdict == Verdict::wrong_token;
   if (wants_page(request)) return login_page(base_path, "", wrong);
-  Response response = problem_response(
+  http::Response response = http::problem_response(
       401, "Unauthorized",
       wrong ? "invalid token" : "a token is required: Authorization: Bearer TOKEN");
   add_challenge(response, wrong);
   return response;
 }
 
-Response log_in(const Request& request, const Token& token, const std::string& base_path, bool tls,
-                std::int64_t now_s) {
+http::Response log_in(const http::Request& request, const Token& token,
+                      const std::string& base_path, bool tls, std::int64_t now_s) {
   const std::string type = request.header("Content-Type");
-  if (!equal_without_case(split_list(type, ';')[0], "application/x-www-form-urlencoded")) {
-    return problem_response(415, "Unsupported Media Type",
-                            "Content-Type must be application/x-www-form-urlencoded");
+  if (!http::equal_without_case(http::split_list(type, ';')[0],
+                                "application/x-www-form-urlencoded")) {
+    return http::problem_response(415, "Unsupported Media Type",
+                                  "Content-Type must be application/x-www-form-urlencoded");
   }
   if (!token.is(posted_token(request.body))) {
     log::warn("login failed", {{"request", request.id}});
@@ -184,4 +187,4 @@ Response log_in(const Request& request, const Token& token, const std::string& b
       {}};
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

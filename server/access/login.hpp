@@ -7,16 +7,17 @@
 #include "server/access/auth.hpp"
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 inline constexpr std::int64_t cookie_lasts_s = std::int64_t{7} * 24 * 3600;
 
 // For every verdict but `allowed`: a problem, or the login page if a browser navigates to a page.
-Response turned_away(Verdict verdict, const Request& request, const std::string& base_path);
+http::Response turned_away(Verdict verdict, const http::Request& request,
+                           const std::string& base_path);
 
 // Replies to a request that is_login(): 303 to the page with a cookie, or the login page again.
 // `tls`: the connection uses TLS, so the cookie gets the attribute Secure.
-Response log_in(const Request& request, const Token& token, const std::string& base_path, bool tls,
-                std::int64_t now_s);
+http::Response log_in(const http::Request& request, const Token& token,
+                      const std::string& base_path, bool tls, std::int64_t now_s);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <iterator>
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 constexpr double quota_us_per_s = 1e6;
@@ -61,7 +61,7 @@ Quota::Micros Quota::wait_for(Bucket& bucket, const Rate& rate, double room, Mic
   return static_cast<Micros>(std::ceil(over / rate.a_second * quota_us_per_s));
 }
 
-std::optional<Refusal> Quota::take_one(Bucket& bucket, const Rate& rate, LimitKind kind,
+std::optional<Refusal> Quota::take_one(Bucket& bucket, const Rate& rate, metrics::LimitKind kind,
                                        double limit, Micros now) {
   if (rate.a_second <= 0) return std::nullopt;
   const Micros wait = wait_for(bucket, rate, 1, now);
@@ -84,12 +84,13 @@ std::optional<Refusal> Quota::arrive(const std::string& address, bool trusted, b
   const Micros own_wait =
       trusted ? 0 : wait_for(own, own_rate, std::min(cost, own_rate.at_once), now);
   if (own_wait > 0) {
-    return Refusal{LimitKind::arrivals, limits_.arrivals_per_address, whole_seconds(own_wait)};
+    return Refusal{metrics::LimitKind::arrivals, limits_.arrivals_per_address,
+                   whole_seconds(own_wait)};
   }
   const Micros wait = wait_for(arrivals_, rate, std::min(cost, rate.at_once), now);
   const bool often = trusted || own_rate.a_second <= 0 || own.taken > own_rate.a_second;
   if (wait > 0 && often) {
-    return Refusal{LimitKind::arrivals, limits_.arrivals, whole_seconds(wait)};
+    return Refusal{metrics::LimitKind::arrivals, limits_.arrivals, whole_seconds(wait)};
   }
   if (own_rate.a_second > 0 && !trusted) own.taken += cost;
   if (rate.a_second > 0) arrivals_.taken = std::min(arrivals_.taken + cost, rate.at_once);
@@ -101,14 +102,14 @@ std::optional<Refusal> Quota::may_handshake(Entry& entry, bool trusted, Micros n
   const Rate own_rate = rate_for_ten_seconds(limits_.handshake_ms_per_address);
   const Micros own_wait = trusted ? 0 : wait_for(entry.handshakes, own_rate, 0, now);
   if (own_wait > 0) {
-    return Refusal{LimitKind::handshakes, limits_.handshake_ms_per_address,
+    return Refusal{metrics::LimitKind::handshakes, limits_.handshake_ms_per_address,
                    whole_seconds(own_wait)};
   }
   Bucket* const shared = shared_handshakes(&entry, trusted);
   if (shared == nullptr) return std::nullopt;
   const Micros wait = wait_for(*shared, rate_for_ten_seconds(limits_.handshake_ms), 0, now);
   if (wait == 0) return std::nullopt;
-  return Refusal{LimitKind::handshakes, limits_.handshake_ms, whole_seconds(wait)};
+  return Refusal{metrics::LimitKind::handshakes, limits_.handshake_ms, whole_seconds(wait)};
 }
 
 // Health checks of the machine itself must not wait for unknown addresses: if a limit per address
@@ -142,9 +143,9 @@ Quota::Arrival Quota::connect(const std::string& address, bool trusted, Micros n
   const bool known = trusted || here.authenticated;
   std::optional<Refusal> reason;
   if (reached(connections_, limits_.connections)) {
-    reason = Refusal{LimitKind::connections, static_cast<double>(limits_.connections)};
+    reason = Refusal{metrics::LimitKind::connections, static_cast<double>(limits_.connections)};
   } else if (!trusted && reached(here.connections, limits_.connections_per_address)) {
-    reason = Refusal{LimitKind::address_connections,
+    reason = Refusal{metrics::LimitKind::address_connections,
                      static_cast<double>(limits_.connections_per_address)};
   }
   if (!reason) {
@@ -179,7 +180,8 @@ void Quota::disconnect(const std::string& address, Slot place) {
 std::optional<Refusal> Quota::open_session(const std::string& address, Micros now) {
   Entry& here = entry(address, now);
   if (reached(here.sessions, limits_.sessions_per_address)) {
-    return Refusal{LimitKind::address_sessions, static_cast<double>(limits_.sessions_per_address)};
+    return Refusal{metrics::LimitKind::address_sessions,
+                   static_cast<double>(limits_.sessions_per_address)};
   }
   ++here.sessions;
   return std::nullopt;
@@ -191,8 +193,8 @@ void Quota::close_session(const std::string& address) {
 
 std::optional<Refusal> Quota::request(const std::string& address, bool health, Micros now) {
   Entry& here = entry(address, now);
-  return take_one(health ? here.health : here.requests, request_rate(), LimitKind::requests,
-                  limits_.requests_per_address, now);
+  return take_one(health ? here.health : here.requests, request_rate(),
+                  metrics::LimitKind::requests, limits_.requests_per_address, now);
 }
 
 std::optional<Refusal> Quota::picture(const std::string& address, Micros now) {
@@ -201,9 +203,9 @@ std::optional<Refusal> Quota::picture(const std::string& address, Micros now) {
   const Micros render = wait_for(here.render, render_rate(), 0, now);
   if (bytes == 0 && render == 0) return std::nullopt;
   if (bytes > render) {
-    return Refusal{LimitKind::bytes, limits_.bytes_per_address, whole_seconds(bytes)};
+    return Refusal{metrics::LimitKind::bytes, limits_.bytes_per_address, whole_seconds(bytes)};
   }
-  return Refusal{LimitKind::render, limits_.render_s_per_address, whole_seconds(render)};
+  return Refusal{metrics::LimitKind::render, limits_.render_s_per_address, whole_seconds(render)};
 }
 
 Quota::Micros Quota::throttle_delay(const std::string& address, Micros now) {
@@ -229,7 +231,8 @@ void Quota::rendered(const std::string& address, Micros took, Micros now) {
 std::optional<Refusal> Quota::may_try_login(const std::string& address, Micros now) {
   const Micros wait = wait_for(entry(address, now).logins, login_rate(), 1, now);
   if (wait == 0) return std::nullopt;
-  return Refusal{LimitKind::logins, limits_.failed_logins_per_address, whole_seconds(wait)};
+  return Refusal{metrics::LimitKind::logins, limits_.failed_logins_per_address,
+                 whole_seconds(wait)};
 }
 
 Quota::Micros Quota::message_received(const std::string& address, std::size_t bytes, Micros now) {
@@ -246,7 +249,7 @@ Quota::Micros Quota::message_received(const std::string& address, std::size_t by
 }
 
 std::optional<Refusal> Quota::failed_login(const std::string& address, Micros now) {
-  return take_one(entry(address, now).logins, login_rate(), LimitKind::logins,
+  return take_one(entry(address, now).logins, login_rate(), metrics::LimitKind::logins,
                   limits_.failed_logins_per_address, now);
 }
 
@@ -311,4 +314,4 @@ void Quota::make_room() {
   if (oldest != entries_.end()) forget(oldest);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

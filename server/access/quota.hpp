@@ -12,10 +12,10 @@
 #include "server/access/limits.hpp"
 #include "server/metrics/limit_kind.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 
 struct Refusal {
-  LimitKind kind = LimitKind::connections;
+  metrics::LimitKind kind = metrics::LimitKind::connections;
   double limit = 0;       // as in Limits
   int retry_after_s = 1;  // estimated time until admission
 };
@@ -106,7 +106,7 @@ class Quota {
   [[nodiscard]] Rate byte_rate() const;
   [[nodiscard]] Rate render_rate() const;
   [[nodiscard]] Rate login_rate() const;
-  static std::optional<Refusal> take_one(Bucket& bucket, const Rate& rate, LimitKind kind,
+  static std::optional<Refusal> take_one(Bucket& bucket, const Rate& rate, metrics::LimitKind kind,
                                          double limit, Micros now);
   static Micros wait_for(Bucket& bucket, const Rate& rate, double room, Micros now);
 
@@ -128,4 +128,4 @@ class Quota {
   std::size_t reserved_ = 0;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -10,16 +10,16 @@
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
-Response no_content() { return {204, "", {{"Cache-Control", "no-store"}}, {}}; }
+http::Response no_content() { return {204, "", {{"Cache-Control", "no-store"}}, {}}; }
 
-Response open_in_job(Services& services, data::Location location) {
+http::Response open_in_job(Services& services, data::Location location) {
   const auto job = services.backend.jobs.submit(
       "dataset",
-      [&services,
-       location = std::move(location)](const Jobs::Handle& handle) -> Result<protocol::JobResult> {
+      [&services, location = std::move(location)](
+          const work::Jobs::Handle& handle) -> Result<protocol::JobResult> {
         auto opened = services.backend.catalogue.open(location, handle.cancel);
         services.metrics.dataset_opened(opened.has_value());
         if (!opened) return opened.error();
@@ -29,57 +29,59 @@ Response open_in_job(Services& services, data::Location location) {
 }
 
 // Only resolves the name; reads nothing.
-Response locate_and_open(Services& services, const std::string& path) {
+http::Response locate_and_open(Services& services, const std::string& path) {
   const auto located = data::locate_beneath(services.options.data_root, path);
   if (located) return open_in_job(services, *located);
-  return problem_response(make_error_at(located.error().kind, "/path", located.error().message));
+  return http::problem_response(
+      make_error_at(located.error().kind, "/path", located.error().message));
 }
 
 }  // namespace
 
-Response job_response(Services& services, const Result<protocol::JobDescription>& job) {
+http::Response job_response(Services& services, const Result<protocol::JobDescription>& job) {
   if (!job) {
-    if (job.error().kind == ErrorKind::busy) services.metrics.refused(LimitKind::waiting);
-    return problem_response(job.error());
+    if (job.error().kind == ErrorKind::busy) services.metrics.refused(metrics::LimitKind::waiting);
+    return http::problem_response(job.error());
   }
-  Response response = json_response(protocol::encode_job(*job));
+  http::Response response = json_response(protocol::encode_job(*job));
   response.status = 202;
   response.headers.emplace_back("Location", services.options.base_path + "v1/jobs/" + job->id);
   return response;
 }
 
-void post_dataset(Services& services, const Request& request, Reply reply) {
+void post_dataset(Services& services, const http::Request& request, http::Reply reply) {
   if (services.options.data_root.empty()) {
-    reply(problem_response(403, "Forbidden",
-                           "opening files is disabled: start the server with "
-                           "--data-root"));
+    reply(http::problem_response(403, "Forbidden",
+                                 "opening files is disabled: start the server with "
+                                 "--data-root"));
     return;
   }
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type",
-                           "Content-Type must be application/json: {\"path\": ...}"));
+    reply(http::problem_response(415, "Unsupported Media Type",
+                                 "Content-Type must be application/json: {\"path\": ...}"));
     return;
   }
   auto path = protocol::parse_dataset_request(request.body);
   if (!path) {
-    reply(problem_response(path.error()));
+    reply(http::problem_response(path.error()));
     return;
   }
   run_later(services.locator, request, std::move(reply), "a look-up", nullptr,
             [&services, path = std::move(*path)] { return locate_and_open(services, path); });
 }
 
-Response delete_dataset(Services& services, const std::string& id, const Request& request) {
-  QueryReader query(request.query);
+http::Response delete_dataset(Services& services, const std::string& id,
+                              const http::Request& request) {
+  http::QueryReader query(request.query);
   const bool forget = query.boolean("forget").value_or(false);
-  if (const auto ok = query.finish(); !ok) return problem_response(ok.error());
+  if (const auto ok = query.finish(); !ok) return http::problem_response(ok.error());
   const auto dataset = services.backend.catalogue.find(id);
   if (!dataset) {
     if (forget && services.backend.catalogue.forget_failed(id)) return no_content();
-    return problem_response(make_error(ErrorKind::not_found, dataset.error().message));
+    return http::problem_response(make_error(ErrorKind::not_found, dataset.error().message));
   }
   if (forget && !services.backend.catalogue.is_opened_later(id)) {
-    return problem_response(403, "Forbidden", "only datasets opened by POST can be deleted");
+    return http::problem_response(403, "Forbidden", "only datasets opened by POST can be deleted");
   }
   if (forget) {
     services.backend.catalogue.forget(
@@ -90,18 +92,18 @@ Response delete_dataset(Services& services, const std::string& id, const Request
   return no_content();
 }
 
-Response get_jobs(const Services& services) {
+http::Response get_jobs(const Services& services) {
   return json_response(protocol::encode_jobs(services.backend.jobs.list()));
 }
 
-Response get_job(const Services& services, const std::string& id) {
+http::Response get_job(const Services& services, const std::string& id) {
   const auto job = services.backend.jobs.find(id);
-  return job ? json_response(protocol::encode_job(*job)) : problem_response(job.error());
+  return job ? json_response(protocol::encode_job(*job)) : http::problem_response(job.error());
 }
 
-Response delete_job(Services& services, const std::string& id) {
+http::Response delete_job(Services& services, const std::string& id) {
   const auto cancelled = services.backend.jobs.cancel(id);
-  return cancelled ? no_content() : problem_response(cancelled.error());
+  return cancelled ? no_content() : http::problem_response(cancelled.error());
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -1,4 +1,4 @@
-# protocol/view.schema.json -> bytes inside the binary: defines net::view_schema_json().
+# protocol/view.schema.json -> bytes inside the binary: defines api::view_schema_json().
 set(schema_file ${PROJECT_SOURCE_DIR}/protocol/view.schema.json)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${schema_file})
 file(READ ${schema_file} schema_hex HEX)
@@ -11,7 +11,7 @@ file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/generated/view_schema.cpp @ONLY CONT
 "// Written by embed_schema.cmake from protocol/view.schema.json.
 #include \"server/api/view_schema.hpp\"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 constexpr char text[] = {
     @schema_bytes@};
@@ -19,6 +19,6 @@ constexpr char text[] = {
 
 std::string_view view_schema_json() { return {text, sizeof(text)}; }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api
 ")
 target_sources(windsplat_api PRIVATE ${PROJECT_BINARY_DIR}/generated/view_schema.cpp)

@@ -12,7 +12,7 @@
 #include "server/quality/curve.hpp"
 #include "server/scene/completed_view.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 Result<protocol::View> read_view(Services& services, const std::string& body) {
@@ -47,28 +47,29 @@ Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const pr
 
 }  // namespace
 
-void post_forecast(Services& services, const Request& request, Reply reply) {
+void post_forecast(Services& services, const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
+    reply(http::problem_response(415, "Unsupported Media Type",
+                                 "Content-Type must be application/json"));
     return;
   }
   auto view = read_view(services, request.body);
   if (!view) {
-    reply(problem_response(view.error()));
+    reply(http::problem_response(view.error()));
     return;
   }
   const auto dataset = services.backend.catalogue.find(view->dataset);
   if (!dataset) {
-    reply(problem_response(dataset.error()));
+    reply(http::problem_response(dataset.error()));
     return;
   }
   // No dataset id: the job reads none, so it waits only while all loading threads are busy.
   run_later(services.backend.loads, request, std::move(reply), "a forecast", nullptr,
-            [&services, view = std::move(*view), dataset = *dataset]() -> Response {
+            [&services, view = std::move(*view), dataset = *dataset]() -> http::Response {
               const auto made = forecast(services.backend.quality, view, dataset->resident_only());
               return made ? json_response(protocol::encode_forecast(*made))
-                          : problem_response(made.error());
+                          : http::problem_response(made.error());
             });
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

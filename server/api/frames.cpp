@@ -21,7 +21,7 @@
 #include "server/work/run_guarded.hpp"
 #include "server/work/view_completion.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 constexpr int jpeg_quality_default = 90;
@@ -100,7 +100,7 @@ std::string picture_etag(const protocol::View& view, const data::Dataset& datase
 }
 
 // The view of the request, with its preset and orbit.
-Result<scene::CompletedView> complete(const Picture& picture, ViewCompletion& completion,
+Result<scene::CompletedView> complete(const Picture& picture, work::ViewCompletion& completion,
                                       data::Dataset& dataset) {
   const auto completed = completion.of(picture.view, dataset);
   if (!completed) return completed.error();
@@ -133,43 +133,45 @@ quality::Setting setting_of(quality::Tables& tables, const scene::CompletedView&
   return quality::settings[quality::pick(view, known, aim).setting];
 }
 
-Response unchanged_response(const std::string& etag) {
+http::Response unchanged_response(const std::string& etag) {
   return {304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
 }
 
 // Null if the client has the picture already: `reply` is called with 304.
-Result<PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
-                            ViewCompletion& completion, data::Dataset& dataset, Loading loading,
-                            const Reply& reply) {
+Result<work::PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
+                                  work::ViewCompletion& completion, data::Dataset& dataset,
+                                  work::Loading loading, const http::Reply& reply) {
   const auto completed = complete(picture, completion, dataset);
   if (!completed) {
-    if (loading == Loading::none) return completed.error();
-    return with_dataset_name(completed.error(), dataset.info().id);
+    if (loading == work::Loading::none) return completed.error();
+    return work::with_dataset_name(completed.error(), dataset.info().id);
   }
   if (!is_chosen(completed->view())) {
     const std::string etag = picture_etag(completed->view(), dataset, picture.encoding);
-    if (matches_etag(picture.if_none_match, etag)) {
+    if (http::matches_etag(picture.if_none_match, etag)) {
       reply(unchanged_response(etag));
-      return PreparedPtr();
+      return work::PreparedPtr();
     }
   }
-  return prepare_picture(*completed, setting_of(tables, *completed), picture.encoding, dataset,
-                         loading);
+  return work::prepare_picture(*completed, setting_of(tables, *completed), picture.encoding,
+                               dataset, loading);
 }
 
-Result<Response> draw(Services& services, const Picture& picture, const PreparedPicture& prepared,
-                      data::Dataset& dataset, std::int64_t queue_us, Loading loading,
-                      const CancelToken& cancel) {
+Result<http::Response> draw(Services& services, const Picture& picture,
+                            const work::PreparedPicture& prepared, data::Dataset& dataset,
+                            std::int64_t queue_us, work::Loading loading,
+                            const CancelToken& cancel) {
   auto drawn = frame::produce(prepared.frame, dataset, *services.backend.pool, cancel,
                               services.backend.frames);
   if (!drawn) return drawn.error();
   protocol::FrameInfo info = frame::frame_info(*drawn, drawn->view);
-  report_error(*drawn, observed_in(*drawn, prepared.frame.setting), prepared.frame.setting,
-               prepared.frame.encoding, services.backend.quality, info);
-  services.metrics.stage_took(Metrics::Stage::queue, queue_us);
-  services.metrics.stage_took(Metrics::Stage::render, drawn->render_us);
-  services.metrics.stage_took(Metrics::Stage::encode, drawn->encode_us);
-  Response response;
+  work::report_error(*drawn, work::observed_in(*drawn, prepared.frame.setting),
+                     prepared.frame.setting, prepared.frame.encoding, services.backend.quality,
+                     info);
+  services.metrics.stage_took(metrics::Metrics::Stage::queue, queue_us);
+  services.metrics.stage_took(metrics::Metrics::Stage::render, drawn->render_us);
+  services.metrics.stage_took(metrics::Metrics::Stage::encode, drawn->encode_us);
+  http::Response response;
   if (is_chosen(drawn->view)) {
     response.headers = {{"Cache-Control", "no-store"}};
   } else {
@@ -177,7 +179,7 @@ Result<Response> draw(Services& services, const Picture& picture, const Prepared
                         {"ETag", picture_etag(drawn->view, dataset, picture.encoding)}};
     // Settings chosen by the server reduce the work below the estimate; the scene of a picture that
     // waited for data was built elsewhere.
-    if (loading == Loading::none) {
+    if (loading == work::Loading::none) {
       services.backend.request_times.learn(drawn->view.dataset, drawn->view.method.name,
                                            picture.cost.kernels,
                                            drawn->render_us + drawn->encode_us);
@@ -192,12 +194,12 @@ Result<Response> draw(Services& services, const Picture& picture, const Prepared
   response.headers.emplace_back("Vary", "Accept");
   // Other sites may embed a picture by <img>, but not read its pixels.
   response.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
-  response.body = Body::of(std::move(drawn->bytes));
+  response.body = http::Body::of(std::move(drawn->bytes));
   return response;
 }
 
 void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dataset> dataset,
-                    const Request& request, Reply reply) {
+                    const http::Request& request, http::Reply reply) {
   if (auto refusal = services.admission.picture(request.address)) {
     reply(std::move(*refusal));
     return;
@@ -205,39 +207,39 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
   const double estimate_ms = services.backend.request_times.estimate_ms(
       asked.view.dataset, asked.view.method.name, asked.cost.kernels);
   if (const auto fits = services.admission.check_estimate(asked.cost, estimate_ms); !fits) {
-    reply(problem_response(fits.error()));
+    reply(http::problem_response(fits.error()));
     return;
   }
   asked.if_none_match = request.header("If-None-Match");
   const auto picture = std::make_shared<const Picture>(std::move(asked));
-  const auto answer = std::make_shared<const Reply>(std::move(reply));
+  const auto answer = std::make_shared<const http::Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;
   // Addresses take turns, however many connections each has.
   const std::uint64_t owner =
       request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
-  Drawing drawing{
-      RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
+  work::Drawing drawing{
+      work::RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
   drawing.prepare = [&tables = services.backend.quality, picture, answer, cancel,
-                     completion = std::make_shared<ViewCompletion>(),
-                     id = request.id](data::Dataset& available, Loading loading) {
-    return run_guarded<PreparedPtr>(
+                     completion = std::make_shared<work::ViewCompletion>(),
+                     id = request.id](data::Dataset& available, work::Loading loading) {
+    return work::run_guarded<work::PreparedPtr>(
         "preparing a picture", cancel,
         [&] { return prepare(tables, *picture, *completion, available, loading, *answer); }, id);
   };
   drawing.draw = [&services, picture, answer, cancel, id = request.id](
-                     const PreparedPicture& prepared, data::Dataset& resident,
-                     std::int64_t queue_us, Loading loading) {
-    auto response = run_guarded<Response>(
+                     const work::PreparedPicture& prepared, data::Dataset& resident,
+                     std::int64_t queue_us, work::Loading loading) {
+    auto response = work::run_guarded<http::Response>(
         "a picture", cancel,
         [&] { return draw(services, *picture, prepared, resident, queue_us, loading, cancel); },
         id);
-    (*answer)(response ? std::move(*response) : problem_response(response.error()));
+    (*answer)(response ? std::move(*response) : http::problem_response(response.error()));
   };
   drawing.payer = request.address;
   drawing.cost_ms = estimate_ms;
-  drawing.fail = [answer](const Error& error) { (*answer)(problem_response(error)); };
-  if (const auto queued = submit(services.backend, std::move(drawing)); !queued) {
-    (*answer)(problem_response(queued.error()));
+  drawing.fail = [answer](const Error& error) { (*answer)(http::problem_response(error)); };
+  if (const auto queued = work::submit(services.backend, std::move(drawing)); !queued) {
+    (*answer)(http::problem_response(queued.error()));
   }
 }
 
@@ -255,7 +257,7 @@ std::string view_json(const std::optional<std::string>& step,
   return json + '}';
 }
 
-std::optional<Orbit> read_orbit(QueryReader& query) {
+std::optional<Orbit> read_orbit(http::QueryReader& query) {
   const auto azimuth = query.number("azimuth", -angle_max, angle_max);
   const auto elevation = query.number("elevation", -90, 90);
   const auto zoom = query.number("zoom", zoom_min, zoom_max);
@@ -267,8 +269,8 @@ std::optional<Orbit> read_orbit(QueryReader& query) {
   return orbit;
 }
 
-Result<Picture> read_query(const Request& request, frame::Format format) {
-  QueryReader query(request.query);
+Result<Picture> read_query(const http::Request& request, frame::Format format) {
+  http::QueryReader query(request.query);
   Picture picture;
   picture.encoding.format = format;
   picture.encoding.quality = jpeg_quality_default;
@@ -289,7 +291,7 @@ Result<Picture> read_query(const Request& request, frame::Format format) {
 
 // --- POST /v1/frames ----------------------------------------------------------------------------
 
-Result<Picture> read_view(const Request& request, frame::Format format) {
+Result<Picture> read_view(const http::Request& request, frame::Format format) {
   const auto document = protocol::ViewDocument::parse(request.body);
   if (!document) return document.error();
   Picture picture;
@@ -305,58 +307,59 @@ Result<Picture> read_view(const Request& request, frame::Format format) {
 }  // namespace
 
 void get_frame(Services& services, const std::string& id, frame::Format format,
-               const Request& request, Reply reply) {
+               const http::Request& request, http::Reply reply) {
   auto dataset = services.backend.catalogue.find(id);
   if (!dataset) {
-    reply(problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
+    reply(http::problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
     return;
   }
   auto picture = read_query(request, format);
   if (!picture) {
-    reply(problem_response(picture.error()));
+    reply(http::problem_response(picture.error()));
     return;
   }
   picture->view.dataset = id;
   auto checked = services.backend.check(picture->view);
   if (!checked) {
-    reply(problem_response(checked.error()));
+    reply(http::problem_response(checked.error()));
     return;
   }
   picture->cost = std::move(checked->cost);
   submit_picture(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
 }
 
-void post_frame(Services& services, const Request& request, Reply reply) {
+void post_frame(Services& services, const http::Request& request, http::Reply reply) {
   constexpr std::array<frame::Format, 3> formats{frame::Format::jpeg, frame::Format::png,
                                                  frame::Format::npy};
   constexpr std::array<std::string_view, 3> types{"image/jpeg", "image/png", "application/x-npy"};
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
+    reply(http::problem_response(415, "Unsupported Media Type",
+                                 "Content-Type must be application/json"));
     return;
   }
-  const auto type = choose_type(request.header("Accept"), types);
+  const auto type = http::choose_type(request.header("Accept"), types);
   if (!type) {
-    reply(problem_response(406, "Not Acceptable",
-                           "Accept must allow image/jpeg, image/png or application/x-npy"));
+    reply(http::problem_response(406, "Not Acceptable",
+                                 "Accept must allow image/jpeg, image/png or application/x-npy"));
     return;
   }
   auto picture = read_view(request, formats[*type]);
   if (!picture) {
-    reply(problem_response(picture.error()));
+    reply(http::problem_response(picture.error()));
     return;
   }
   auto checked = services.backend.check(picture->view);
   if (!checked) {
-    reply(problem_response(checked.error()));
+    reply(http::problem_response(checked.error()));
     return;
   }
   picture->cost = std::move(checked->cost);
   auto dataset = services.backend.catalogue.find(picture->view.dataset);
   if (!dataset) {
-    reply(problem_response(dataset.error()));
+    reply(http::problem_response(dataset.error()));
     return;
   }
   submit_picture(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -19,7 +19,7 @@
 #include "server/http/request_target.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 namespace limits = protocol::limits;
@@ -32,7 +32,7 @@ constexpr std::chrono::milliseconds turn_budget{
 
 // Dataset and field of a query, resolved before loading.
 struct Subject {
-  Catalogue* catalogue = nullptr;
+  work::Catalogue* catalogue = nullptr;
   DatasetPtr dataset;
   data::FieldInfo field;
   CancelToken cancel;
@@ -45,7 +45,7 @@ Result<DatasetPtr> find_dataset(const Services& services, const std::string& id)
 }
 
 Result<Subject> find_subject(Services& services, const std::string& id, const std::string& field,
-                             const Request& request) {
+                             const http::Request& request) {
   auto dataset = find_dataset(services, id);
   if (!dataset) return dataset.error();
   const data::FieldInfo* found = (*dataset)->info().find(field);
@@ -56,13 +56,15 @@ Result<Subject> find_subject(Services& services, const std::string& id, const st
   return Subject{&services.backend.catalogue, std::move(*dataset), *found, request.cancel};
 }
 
-Result<std::shared_ptr<const data::Volume>> load(Catalogue& catalogue, const data::Dataset& dataset,
+Result<std::shared_ptr<const data::Volume>> load(work::Catalogue& catalogue,
+                                                 const data::Dataset& dataset,
                                                  const std::string& field, std::size_t step,
                                                  const CancelToken& cancel) {
   auto volume = catalogue.load(
       dataset, [&](data::Dataset& loading) { return loading.volume(field, step); }, cancel);
   if (!volume)
-    return with_dataset_name(dataset.with_need(volume.error(), {field}), dataset.info().id, field);
+    return work::with_dataset_name(dataset.with_need(volume.error(), {field}), dataset.info().id,
+                                   field);
   return volume;
 }
 
@@ -70,11 +72,11 @@ Result<std::shared_ptr<const data::Volume>> load(const Subject& subject, std::si
   return load(*subject.catalogue, *subject.dataset, subject.field.name, step, subject.cancel);
 }
 
-std::optional<int> read_step(QueryReader& query, const data::Dataset& dataset) {
+std::optional<int> read_step(http::QueryReader& query, const data::Dataset& dataset) {
   return query.integer("step", 0, static_cast<int>(dataset.info().steps.size()) - 1);
 }
 
-std::array<std::optional<double>, 3> read_place(QueryReader& query) {
+std::array<std::optional<double>, 3> read_place(http::QueryReader& query) {
   return {query.number("x", -limits::coordinate_max, limits::coordinate_max),
           query.number("y", -limits::coordinate_max, limits::coordinate_max),
           query.number("z", -limits::coordinate_max, limits::coordinate_max)};
@@ -103,15 +105,15 @@ struct Pass {
   Subject subject;
   CancelToken cancel;
   std::string payer;
-  std::shared_ptr<Reply> reply;
+  std::shared_ptr<http::Reply> reply;
   std::function<Result<void>()> begin;            // called before the first step; may be empty
   std::function<void(const data::Volume&)> take;  // called for each step
-  std::function<Response()> finish;
+  std::function<http::Response()> finish;
   std::size_t next_step = 0;
 };
 
 // The response, or none if steps remain.
-Result<std::optional<Response>> take_turn(Pass& pass) {
+Result<std::optional<http::Response>> take_turn(Pass& pass) {
   const std::size_t steps = pass.subject.dataset->info().steps.size();
   const auto until = Clock::now() + turn_budget;
   if (pass.begin) {
@@ -127,30 +129,30 @@ Result<std::optional<Response>> take_turn(Pass& pass) {
     ++pass.next_step;
     if (Clock::now() >= until) break;
   }
-  if (pass.next_step < steps) return std::optional<Response>();
+  if (pass.next_step < steps) return std::optional<http::Response>();
   return std::optional(pass.finish());
 }
 
 // Resubmits itself, so that other loads run in between. Only the first job may be refused.
 void go_on(Services& services, const std::shared_ptr<Pass>& pass, bool admitted) {
   const auto run = [&services, pass] {
-    auto answer = run_guarded<std::optional<Response>>("a pass over all steps", pass->cancel,
-                                                       [&] { return take_turn(*pass); });
-    if (!answer) return (*pass->reply)(problem_response(answer.error()));
+    auto answer = work::run_guarded<std::optional<http::Response>>(
+        "a pass over all steps", pass->cancel, [&] { return take_turn(*pass); });
+    if (!answer) return (*pass->reply)(http::problem_response(answer.error()));
     if (*answer) return (*pass->reply)(std::move(**answer));
     go_on(services, pass, true);
   };
   const auto queued = services.backend.loads.submit(
       {pass->cancel, run, admitted, pass->subject.dataset->shared_info(), pass->payer});
-  if (!queued) (*pass->reply)(problem_response(queued.error()));
+  if (!queued) (*pass->reply)(http::problem_response(queued.error()));
 }
 
-std::shared_ptr<Pass> pass_over(Subject subject, const Request& request, Reply reply) {
+std::shared_ptr<Pass> pass_over(Subject subject, const http::Request& request, http::Reply reply) {
   auto pass = std::make_shared<Pass>();
   pass->subject = std::move(subject);
   pass->cancel = request.cancel;
   pass->payer = request.address;
-  pass->reply = std::make_shared<Reply>(std::move(reply));
+  pass->reply = std::make_shared<http::Reply>(std::move(reply));
   return pass;
 }
 
@@ -168,8 +170,8 @@ struct HistogramQuery {
   std::size_t step = 0;
 };
 
-Result<HistogramQuery> read_histogram(const Request& request, const data::Dataset& dataset) {
-  QueryReader query(request.query);
+Result<HistogramQuery> read_histogram(const http::Request& request, const data::Dataset& dataset) {
+  http::QueryReader query(request.query);
   HistogramQuery out;
   out.step = static_cast<std::size_t>(read_step(query, dataset).value_or(0));
   out.request.bins = query.integer("bins", 1, limits::histogram_bins_max).value_or(histogram_bins);
@@ -184,12 +186,12 @@ Result<HistogramQuery> read_histogram(const Request& request, const data::Datase
   return out;
 }
 
-Response histogram_response(const Subject& subject, const HistogramQuery& query,
-                            const CancelToken& cancel) {
+http::Response histogram_response(const Subject& subject, const HistogramQuery& query,
+                                  const CancelToken& cancel) {
   const auto volume = load(subject, query.step);
-  if (!volume) return problem_response(volume.error());
+  if (!volume) return http::problem_response(volume.error());
   auto made = data::histogram(**volume, query.request, cancel);
-  if (!made) return problem_response(made.error());
+  if (!made) return http::problem_response(made.error());
   protocol::HistogramDescription out;
   out.range = made->range;
   out.counts = std::move(made->counts);
@@ -203,22 +205,22 @@ Response histogram_response(const Subject& subject, const HistogramQuery& query,
 
 // --- probe --------------------------------------------------------------------------------------
 
-Response probe_response(Catalogue& catalogue, data::Dataset& dataset,
-                        const std::array<std::optional<double>, 3>& at, int step,
-                        const CancelToken& cancel) {
+http::Response probe_response(work::Catalogue& catalogue, data::Dataset& dataset,
+                              const std::array<std::optional<double>, 3>& at, int step,
+                              const CancelToken& cancel) {
   const data::DatasetInfo& info = dataset.info();
   const auto place = data::nearest_sample(info.grid, at);
-  if (!place) return problem_response(place.error());
+  if (!place) return http::problem_response(place.error());
   protocol::ProbeDescription out;
   out.position = describe(*place, info.grid);
   out.step = step;
   for (const data::FieldInfo& field : info.fields) {
     if (cancel.cancelled()) {
-      return problem_response(make_error(ErrorKind::cancelled, "request cancelled"));
+      return http::problem_response(make_error(ErrorKind::cancelled, "request cancelled"));
     }
     const auto volume =
         load(catalogue, dataset, field.name, static_cast<std::size_t>(step), cancel);
-    if (!volume) return problem_response(volume.error());
+    if (!volume) return http::problem_response(volume.error());
     out.fields.push_back(describe(field));
     out.values.push_back(data::value_at(**volume, place->index));
   }
@@ -227,19 +229,20 @@ Response probe_response(Catalogue& catalogue, data::Dataset& dataset,
 
 // --- range --------------------------------------------------------------------------------------
 
-Response range_response(const data::FieldRange& range, const char* of) {
+http::Response range_response(const data::FieldRange& range, const char* of) {
   return json_response(protocol::encode_range({range.range, range.masked, of}));
 }
 
-Response step_range(const Subject& subject, std::size_t step) {
+http::Response step_range(const Subject& subject, std::size_t step) {
   const auto volume = load(subject, step);
-  if (!volume) return problem_response(volume.error());
+  if (!volume) return http::problem_response(volume.error());
   data::FieldRange range;
   range.add(**volume);
   return range_response(range, "step");
 }
 
-void answer_range_of_all(Services& services, Subject subject, const Request& request, Reply reply) {
+void answer_range_of_all(Services& services, Subject subject, const http::Request& request,
+                         http::Reply reply) {
   auto of = subject.dataset->shared_info();
   if (const auto known = services.backend.ranges.find(of, subject.field.name)) {
     reply(range_response(*known, "all"));
@@ -258,15 +261,15 @@ void answer_range_of_all(Services& services, Subject subject, const Request& req
 }  // namespace
 
 void get_histogram(Services& services, const std::string& id, const std::string& field,
-                   const Request& request, Reply reply) {
+                   const http::Request& request, http::Reply reply) {
   auto subject = find_subject(services, id, field, request);
   if (!subject) {
-    reply(problem_response(subject.error()));
+    reply(http::problem_response(subject.error()));
     return;
   }
   const auto query = read_histogram(request, *subject->dataset);
   if (!query) {
-    reply(problem_response(query.error()));
+    reply(http::problem_response(query.error()));
     return;
   }
   run_later(services.backend.loads, request, std::move(reply), "a histogram",
@@ -275,17 +278,18 @@ void get_histogram(Services& services, const std::string& id, const std::string&
             });
 }
 
-void get_probe(Services& services, const std::string& id, const Request& request, Reply reply) {
+void get_probe(Services& services, const std::string& id, const http::Request& request,
+               http::Reply reply) {
   auto dataset = find_dataset(services, id);
   if (!dataset) {
-    reply(problem_response(dataset.error()));
+    reply(http::problem_response(dataset.error()));
     return;
   }
-  QueryReader query(request.query);
+  http::QueryReader query(request.query);
   const auto at = read_place(query);
   const int step = read_step(query, **dataset).value_or(0);
   if (const auto ok = query.finish(); !ok) {
-    reply(problem_response(ok.error()));
+    reply(http::problem_response(ok.error()));
     return;
   }
   run_later(
@@ -295,12 +299,12 @@ void get_probe(Services& services, const std::string& id, const Request& request
 }
 
 void get_series(Services& services, const std::string& id, const std::string& field,
-                const Request& request, Reply reply) {
-  const auto refuse = [&](const Error& error) { reply(problem_response(error)); };
+                const http::Request& request, http::Reply reply) {
+  const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
   auto subject = find_subject(services, id, field, request);
   if (!subject) return refuse(subject.error());
   const data::DatasetInfo& info = subject->dataset->info();
-  QueryReader query(request.query);
+  http::QueryReader query(request.query);
   const auto at = read_place(query);
   if (const auto ok = query.finish(); !ok) return refuse(ok.error());
   if (const auto ok = check_steps(info); !ok) return refuse(ok.error());
@@ -326,11 +330,11 @@ void get_series(Services& services, const std::string& id, const std::string& fi
 }
 
 void get_range(Services& services, const std::string& id, const std::string& field,
-               const Request& request, Reply reply) {
-  const auto refuse = [&](const Error& error) { reply(problem_response(error)); };
+               const http::Request& request, http::Reply reply) {
+  const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
   auto subject = find_subject(services, id, field, request);
   if (!subject) return refuse(subject.error());
-  QueryReader query(request.query);
+  http::QueryReader query(request.query);
   const std::string of = query.text("of").value_or("step");
   const auto step = read_step(query, *subject->dataset);
   if (const auto ok = query.finish(); !ok) return refuse(ok.error());
@@ -351,4 +355,4 @@ void get_range(Services& services, const std::string& id, const std::string& fie
   answer_range_of_all(services, std::move(*subject), request, std::move(reply));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -9,7 +9,7 @@
 #include "server/base/check.hpp"
 #include "server/http/negotiate.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 constexpr const char* page_policy =
@@ -63,13 +63,13 @@ std::string inflated(std::span<const std::uint8_t> gzip) {
 }
 
 // Cached for each file: a few hundred kilobytes in total.
-Body inflated_once(const WebAsset& asset) {
+http::Body inflated_once(const WebAsset& asset) {
   static std::mutex mutex;
-  static std::map<std::string, Body, std::less<>> made;
+  static std::map<std::string, http::Body, std::less<>> made;
   const std::lock_guard lock(mutex);
   const auto known = made.find(asset.path);
   if (known != made.end()) return known->second;
-  return made.emplace(asset.path, Body::of(inflated(asset.gzip))).first->second;
+  return made.emplace(asset.path, http::Body::of(inflated(asset.gzip))).first->second;
 }
 
 const WebAsset* find_asset(const std::string& path) {
@@ -83,21 +83,21 @@ const WebAsset* find_asset(const std::string& path) {
 
 bool has_page(const std::string& path) { return find_asset(path) != nullptr; }
 
-Response get_page(const Request& request, const std::string& path) {
+http::Response get_page(const http::Request& request, const std::string& path) {
   const WebAsset* asset = find_asset(path);
   WINDSPLAT_CHECK(asset != nullptr);
-  const bool gzip = accepts_gzip(request.header("Accept-Encoding"));
+  const bool gzip = http::accepts_gzip(request.header("Accept-Encoding"));
   std::string etag = etag_of(as_text(asset->gzip));
   // One tag per representation (RFC 9110, 8.8.3.3).
   if (gzip) etag.insert(etag.size() - 1, "-gzip");
-  Response response;
+  http::Response response;
   response.headers = {{"Cache-Control", asset->immutable ? immutable_policy : "no-cache"},
                       {"ETag", etag},
                       {"Vary", "Accept-Encoding"},
                       // Also sent with a 304, where they replace the cached headers.
                       {"Content-Security-Policy", page_policy},
                       {"Cross-Origin-Opener-Policy", "same-origin"}};
-  if (matches_etag(request.header("If-None-Match"), etag)) {
+  if (http::matches_etag(request.header("If-None-Match"), etag)) {
     response.status = 304;
     return response;
   }
@@ -111,4 +111,4 @@ Response get_page(const Request& request, const std::string& path) {
   return response;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -9,12 +9,12 @@
 #include "server/http/problem.hpp"
 #include "server/work/reference_job.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 constexpr std::string_view suffix = ".png";
 
-Result<protocol::View> read_view(Services& services, const Request& request) {
+Result<protocol::View> read_view(Services& services, const http::Request& request) {
   const auto document = protocol::ViewDocument::parse(request.body);
   if (!document) return document.error();
   protocol::View view = document->view();
@@ -38,44 +38,45 @@ Result<protocol::View> read_view(Services& services, const Request& request) {
 
 }  // namespace
 
-void post_reference(Services& services, const Request& request, Reply reply) {
-  const Reply answer = std::move(reply);
+void post_reference(Services& services, const http::Request& request, http::Reply reply) {
+  const http::Reply answer = std::move(reply);
   if (!is_json(request.header("Content-Type"))) {
-    answer(
-        problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
+    answer(http::problem_response(415, "Unsupported Media Type",
+                                  "Content-Type must be application/json"));
     return;
   }
   auto view = read_view(services, request);
-  if (!view) return answer(problem_response(view.error()));
+  if (!view) return answer(http::problem_response(view.error()));
   const auto dataset = services.backend.catalogue.find(view->dataset);
-  if (!dataset) return answer(problem_response(dataset.error()));
+  if (!dataset) return answer(http::problem_response(dataset.error()));
   if (auto refusal = services.admission.picture(request.address)) return answer(*refusal);
-  Jobs::Terms terms;
+  work::Jobs::Terms terms;
   terms.slow = true;
   auto ticket = services.backend.references.admit(request.address, terms.cancel);
-  if (!ticket) return answer(problem_response(ticket.error()));
+  if (!ticket) return answer(http::problem_response(ticket.error()));
   const auto work = [&services, view = std::move(*view), dataset = *dataset,
                      address = request.address,
-                     ticket = std::move(*ticket)](const Jobs::Handle& handle) {
-    return draw_reference(services.backend, view, *dataset, handle, address,
-                          services.options.base_path);
+                     ticket = std::move(*ticket)](const work::Jobs::Handle& handle) {
+    return work::draw_reference(services.backend, view, *dataset, handle, address,
+                                services.options.base_path);
   };
   answer(job_response(services, services.backend.jobs.submit("reference", work, terms)));
 }
 
 // The content of an id never changes.
-Response get_reference(Services& services, const std::string& name, const Request& request) {
+http::Response get_reference(Services& services, const std::string& name,
+                             const http::Request& request) {
   const bool is_png = name.size() > suffix.size() && name.ends_with(suffix);
   const std::string id = is_png ? name.substr(0, name.size() - suffix.size()) : "";
   const auto kept = services.backend.references.find(id);
   if (!kept) {
-    return problem_response(
+    return http::problem_response(
         make_error(ErrorKind::not_found, "unknown or expired reference: post its view again"));
   }
-  Response response;
+  http::Response response;
   const std::string etag = '"' + id + '"';
   response.headers = {{"Cache-Control", "private, max-age=3600, immutable"}, {"ETag", etag}};
-  if (matches_etag(request.header("If-None-Match"), etag)) {
+  if (http::matches_etag(request.header("If-None-Match"), etag)) {
     response.status = 304;
     return response;
   }
@@ -84,4 +85,4 @@ Response get_reference(Services& services, const std::string& name, const Reques
   return response;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

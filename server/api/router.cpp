@@ -14,7 +14,7 @@
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 using Segments = std::vector<std::string>;
@@ -73,12 +73,13 @@ std::optional<Resource> find_page(const Segments& path) {
   for (const std::string& segment : path) file += (file.empty() ? "" : "/") + segment;
   if (path.empty()) file = "index.html";
   if (!has_page(file)) return std::nullopt;
-  const auto get = [](Services& /*services*/, const PathValues& values, const Request& request,
-                      const Reply& reply) { reply(get_page(request, values[0])); };
+  const auto get = [](Services& /*services*/, const PathValues& values,
+                      const http::Request& request,
+                      const http::Reply& reply) { reply(get_page(request, values[0])); };
   return Resource{route_page, {{"GET", "", get, Query::taken}}, {std::move(file)}};
 }
 
-std::optional<Resource> find_resource(const Request& request) {
+std::optional<Resource> find_resource(const http::Request& request) {
   Resource found;
   for (const Route& route : routes()) {
     if (route.place == Place::base && !request.below_base) continue;
@@ -93,33 +94,33 @@ std::optional<Resource> find_resource(const Request& request) {
   return find_page(request.path);
 }
 
-Response method_not_allowed(const std::string& method, const std::string& allow) {
-  Response response = problem_response(405, "Method Not Allowed",
-                                       method + " is not allowed here; allowed methods: " + allow);
+http::Response method_not_allowed(const std::string& method, const std::string& allow) {
+  http::Response response = http::problem_response(
+      405, "Method Not Allowed", method + " is not allowed here; allowed methods: " + allow);
   response.headers.emplace_back("Allow", allow);
   return response;
 }
 
 // Redirects "/a" to "/a/": relative links of the page need the slash.
-bool lacks_slash(const Services& services, const Request& request) {
+bool lacks_slash(const Services& services, const http::Request& request) {
   return request.below_base && request.path.empty() && !request.ends_in_slash &&
          services.options.base_path != "/";
 }
 
-std::optional<Response> refused_by_quota(Services& services, const Route& route,
-                                         const Request& request) {
+std::optional<http::Response> refused_by_quota(Services& services, const Route& route,
+                                               const http::Request& request) {
   if (route.charge != Charge::picture) return std::nullopt;
   return services.admission.picture(request.address);
 }
 
-void answer(Services& services, const Request& request, const std::optional<Resource>& resource,
-            const Reply& reply) {
+void answer(Services& services, const http::Request& request,
+            const std::optional<Resource>& resource, const http::Reply& reply) {
   if (request.method == "OPTIONS" && !request.below_base && request.path == Segments{"*"}) {
     reply({204, "", {{"Allow", "GET, HEAD, POST, PUT, PATCH, DELETE, OPTIONS"}}, {}});
     return;
   }
   if (!resource) {
-    reply(problem_response(make_error(ErrorKind::not_found, "unknown path")));
+    reply(http::problem_response(make_error(ErrorKind::not_found, "unknown path")));
     return;
   }
   const std::string allow = resource->allow();
@@ -131,8 +132,8 @@ void answer(Services& services, const Request& request, const std::optional<Reso
   } else if (lacks_slash(services, request)) {
     reply({308, "", {{"Location", services.options.base_path}}, {}});
   } else if (route->query == Query::refused && !request.query.empty()) {
-    const auto unknown = QueryReader(request.query).finish();
-    reply(problem_response(unknown.error()));
+    const auto unknown = http::QueryReader(request.query).finish();
+    reply(http::problem_response(unknown.error()));
   } else if (auto refusal = refused_by_quota(services, *route, request)) {
     reply(std::move(*refusal));
   } else {
@@ -142,25 +143,25 @@ void answer(Services& services, const Request& request, const std::optional<Reso
 
 }  // namespace
 
-bool names_health(const Request& request) {
+bool names_health(const http::Request& request) {
   return request.path.size() == 1 &&
          std::any_of(routes().begin(), routes().end(), [&](const Route& route) {
            return route.place == Place::root && route.path + 1 == request.path[0];
          });
 }
 
-bool names_stream(const Request& request) {
+bool names_stream(const http::Request& request) {
   return request.below_base && request.path == Segments{"v1", "stream"};
 }
 
-const char* route(Services& services, const Request& request, const Reply& reply) {
+const char* route(Services& services, const http::Request& request, const http::Reply& reply) {
   const auto resource = find_resource(request);
   if (services.draining && !names_health(request)) {
-    reply(problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
+    reply(http::problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
   } else {
     answer(services, request, resource, reply);
   }
   return resource ? resource->name : route_other;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -8,23 +8,23 @@
 #include "server/api/resources.hpp"
 #include "server/http/problem.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
-Response upgrade_required() {
-  Response response = problem_response(426, "Upgrade Required",
-                                       "this resource is a WebSocket: send an upgrade request");
+http::Response upgrade_required() {
+  http::Response response = http::problem_response(
+      426, "Upgrade Required", "this resource is a WebSocket: send an upgrade request");
   response.headers.emplace_back("Upgrade", "websocket");
   return response;
 }
 
 // Handlers that answer at once, or need the request alone.
 template <auto respond>
-void at_once(Services& services, const PathValues& values, const Request& request,
-             const Reply& reply) {
+void at_once(Services& services, const PathValues& values, const http::Request& request,
+             const http::Reply& reply) {
   if constexpr (std::is_invocable_v<decltype(respond)>) {
     reply(respond());
-  } else if constexpr (std::is_invocable_v<decltype(respond), const Request&>) {
+  } else if constexpr (std::is_invocable_v<decltype(respond), const http::Request&>) {
     reply(respond(request));
   } else if constexpr (std::is_invocable_v<decltype(respond), Services&>) {
     reply(respond(services));
@@ -37,13 +37,13 @@ void at_once(Services& services, const PathValues& values, const Request& reques
 
 // Handlers that may reply later.
 template <auto handle>
-void later(Services& services, const PathValues& values, const Request& request,
-           const Reply& reply) {
+void later(Services& services, const PathValues& values, const http::Request& request,
+           const http::Reply& reply) {
   using Handle = decltype(handle);
-  if constexpr (std::is_invocable_v<Handle, Services&, const Request&, Reply>) {
+  if constexpr (std::is_invocable_v<Handle, Services&, const http::Request&, http::Reply>) {
     handle(services, request, reply);
-  } else if constexpr (std::is_invocable_v<Handle, Services&, const std::string&, const Request&,
-                                           Reply>) {
+  } else if constexpr (std::is_invocable_v<Handle, Services&, const std::string&,
+                                           const http::Request&, http::Reply>) {
     handle(services, values[0], request, reply);
   } else {
     handle(services, values[0], values[1], request, reply);
@@ -51,8 +51,8 @@ void later(Services& services, const PathValues& values, const Request& request,
 }
 
 template <frame::Format format>
-void get_frame_as(Services& services, const PathValues& values, const Request& request,
-                  const Reply& reply) {
+void get_frame_as(Services& services, const PathValues& values, const http::Request& request,
+                  const http::Reply& reply) {
   get_frame(services, values[0], format, request, reply);
 }
 
@@ -115,4 +115,4 @@ std::vector<const char*> route_names() {
   return names;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

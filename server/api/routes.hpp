@@ -8,13 +8,13 @@
 #include "server/api/services.hpp"
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 
 // Values of the placeholders of a path, in order.
 using PathValues = std::vector<std::string>;
 // Replies once, now or later. Does not throw after the reply.
-using Handler = void (*)(Services& services, const PathValues& values, const Request& request,
-                         const Reply& reply);
+using Handler = void (*)(Services& services, const PathValues& values, const http::Request& request,
+                         const http::Reply& reply);
 
 enum class Query { refused, taken };
 enum class Charge {
@@ -48,4 +48,4 @@ inline constexpr const char* route_other = "other";  // unknown or unparsed path
 // All of them, without repetition: a bounded set.
 std::vector<const char*> route_names();
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

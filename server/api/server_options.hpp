@@ -11,9 +11,11 @@
 #include "server/access/limits.hpp"
 #include "server/views/saved_views.hpp"
 
-namespace windsplat::net {
-
+namespace windsplat::transport {
 struct TlsContext;
+}  // namespace windsplat::transport
+
+namespace windsplat::api {
 
 struct ServerOptions {
   std::string address = "127.0.0.1";
@@ -29,16 +31,16 @@ struct ServerOptions {
   std::string data_root;
   std::shared_ptr<views::SavedViews> views;  // null: in memory only
   int sessions_max = 64;
-  Limits limits;
+  access::Limits limits;
   int idle_timeout_s = 300;
   // Limit on the waiting time of requests for pictures, milliseconds; further ones are refused.
   double requests_waiting_ms_max = 30'000;
-  std::vector<std::string> allow_origins;  // besides the server's own
-  std::shared_ptr<const Token> token;      // null: no authentication
-  std::shared_ptr<TlsContext> tls;         // null: plain TCP
+  std::vector<std::string> allow_origins;      // besides the server's own
+  std::shared_ptr<const access::Token> token;  // null: no authentication
+  std::shared_ptr<transport::TlsContext> tls;  // null: plain TCP
   // Phases of a drain: when rendering is cancelled, and when connections are closed.
   std::chrono::milliseconds drain_cancel_after{6000};
   std::chrono::milliseconds drain_abort_after{8000};
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

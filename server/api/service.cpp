@@ -12,49 +12,50 @@
 #include "server/scene/presets.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 constexpr int legend_colors = 64;
 
-Response health(int status, const char* state) {
-  Response response;
+http::Response health(int status, const char* state) {
+  http::Response response;
   response.status = status;
   response.content_type = "application/json";
   response.headers = {{"Cache-Control", "no-store"}};
-  response.body = Body::of(std::string("{\"status\":\"") + state + "\"}");
+  response.body = http::Body::of(std::string("{\"status\":\"") + state + "\"}");
   return response;
 }
 
 }  // namespace
 
-Response json_response(std::string json) {
-  Response response;
+http::Response json_response(std::string json) {
+  http::Response response;
   response.content_type = "application/json";
   response.headers = {{"Cache-Control", "no-store"}};
-  response.body = Body::of(std::move(json));
+  response.body = http::Body::of(std::move(json));
   return response;
 }
 
 bool is_json(std::string_view content_type) {
-  return equal_without_case(split_list(content_type, ';')[0], "application/json");
+  return http::equal_without_case(http::split_list(content_type, ';')[0], "application/json");
 }
 
 bool is_merge_patch(std::string_view content_type) {
-  return equal_without_case(split_list(content_type, ';')[0], "application/merge-patch+json");
+  return http::equal_without_case(http::split_list(content_type, ';')[0],
+                                  "application/merge-patch+json");
 }
 
-void run_later(TaskExecutor& service, const Request& request, Reply reply, const char* what,
-               const data::Dataset* of, std::function<Response()> make) {
-  const auto answer = std::make_shared<const Reply>(std::move(reply));
+void run_later(work::TaskExecutor& service, const http::Request& request, http::Reply reply,
+               const char* what, const data::Dataset* of, std::function<http::Response()> make) {
+  const auto answer = std::make_shared<const http::Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;
   const auto run = [what, make = std::move(make), cancel, answer, id = request.id] {
-    auto response = run_guarded<Response>(what, cancel, make, id);
-    (*answer)(response ? std::move(*response) : problem_response(response.error()));
+    auto response = work::run_guarded<http::Response>(what, cancel, make, id);
+    (*answer)(response ? std::move(*response) : http::problem_response(response.error()));
   };
   const auto queued = service.submit(
       {cancel, run, false, of == nullptr ? nullptr : of->shared_info(), request.address});
-  if (!queued) (*answer)(problem_response(queued.error()));
+  if (!queued) (*answer)(http::problem_response(queued.error()));
 }
 
 std::string etag_of(std::string_view text) {
@@ -63,35 +64,35 @@ std::string etag_of(std::string_view text) {
   return '"' + first + data::digest_of(first + std::string(text)) + '"';
 }
 
-Response tagged_response(const Request& request, std::string_view content_type,
-                         std::string_view content) {
-  Response response;
+http::Response tagged_response(const http::Request& request, std::string_view content_type,
+                               std::string_view content) {
+  http::Response response;
   const std::string etag = etag_of(content);
   response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
-  if (matches_etag(request.header("If-None-Match"), etag)) {
+  if (http::matches_etag(request.header("If-None-Match"), etag)) {
     response.status = 304;
     return response;
   }
   response.content_type = content_type;
-  response.body = Body::of(std::string(content));
+  response.body = http::Body::of(std::string(content));
   return response;
 }
 
-Response get_livez() { return health(200, "live"); }
+http::Response get_livez() { return health(200, "live"); }
 
-Response get_readyz(const Services& services) {
+http::Response get_readyz(const Services& services) {
   return services.draining ? health(503, "draining") : health(200, "ready");
 }
 
-Response get_metrics(const Services& services) {
-  Response response;
+http::Response get_metrics(const Services& services) {
+  http::Response response;
   response.content_type = "text/plain; version=0.0.4; charset=utf-8";
   response.headers = {{"Cache-Control", "no-store"}};
-  response.body = Body::of(services.metrics.text(services.backend.catalogue.counts()));
+  response.body = http::Body::of(services.metrics.text(services.backend.catalogue.counts()));
   return response;
 }
 
-Response get_service(const Services& services) {
+http::Response get_service(const Services& services) {
   protocol::ServiceDescription service;
   service.version = WINDSPLAT_VERSION;
   service.image_pixels_max = services.options.limits.pixels_max_reported();
@@ -113,7 +114,7 @@ Response get_service(const Services& services) {
   return json_response(protocol::encode_service(service));
 }
 
-Response get_color_maps() {
+http::Response get_color_maps() {
   std::vector<protocol::ColorMapDescription> maps;
   for (const scene::ColorMap& map : scene::color_maps()) {
     maps.push_back({map.name, map.kind, scene::color_map_srgb(map.name, legend_colors)});
@@ -121,30 +122,33 @@ Response get_color_maps() {
   return json_response(protocol::encode_color_maps(maps));
 }
 
-Response get_presets() { return json_response(protocol::encode_presets(scene::preset_names())); }
+http::Response get_presets() {
+  return json_response(protocol::encode_presets(scene::preset_names()));
+}
 
-Response get_view_schema(const Request& request) {
+http::Response get_view_schema(const http::Request& request) {
   return tagged_response(request, "application/schema+json", view_schema_json());
 }
 
-Response get_datasets(const Services& services) {
+http::Response get_datasets(const Services& services) {
   const auto list = services.backend.catalogue.list();
-  if (!list) return problem_response(list.error());
+  if (!list) return http::problem_response(list.error());
   return json_response(protocol::encode_dataset_list(*list));
 }
 
-void get_dataset(Services& services, const std::string& id, const Request& request, Reply reply) {
+void get_dataset(Services& services, const std::string& id, const http::Request& request,
+                 http::Reply reply) {
   const auto dataset = services.backend.catalogue.find(id);
   if (!dataset) {
-    reply(problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
+    reply(http::problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
     return;
   }
   run_later(services.backend.loads, request, std::move(reply), "a description", dataset->get(),
-            [&services, id, cancel = request.cancel]() -> Response {
+            [&services, id, cancel = request.cancel]() -> http::Response {
               const auto description = services.backend.catalogue.describe(id, cancel);
               return description ? json_response(protocol::encode_dataset(*description))
-                                 : problem_response(description.error());
+                                 : http::problem_response(description.error());
             });
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -6,7 +6,7 @@
 #include "server/api/routes.hpp"
 #include "server/http/request_target.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 constexpr std::size_t view_changes_waiting_max = 64;  // each may take one disk sync
@@ -23,10 +23,10 @@ Services::Services(ServerOptions server_options, std::shared_ptr<data::Store> st
           {options.requests_waiting_ms_max, options.limits.wait_ms,
            [this](const std::string& address, std::int64_t us) { admission.rendered(address, us); },
            [this](const frame::Cost& cost) { return admission.check(cost); }}),
-      locator(1, Backend::requests_waiting_max, "files to open"),
+      locator(1, work::Backend::requests_waiting_max, "files to open"),
       view_io(1, view_changes_waiting_max, "changes of saved views"),
       file_watch(1, 1, "file checks") {
-  options.base_path = normal_base_path(options.base_path);
+  options.base_path = http::normal_base_path(options.base_path);
   if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
 }
 
@@ -37,4 +37,4 @@ void Services::end() {
   view_io.end();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

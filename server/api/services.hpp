@@ -10,7 +10,7 @@
 #include "server/metrics/metrics.hpp"
 #include "server/work/backend.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 
 // Outlives all connections; owned by the server.
 struct Services {
@@ -23,15 +23,15 @@ struct Services {
   // Ends the service threads: no reply is called after it returns.
   void end();
 
-  ServerOptions options;  // base_path normalised
-  Metrics metrics;        // before the members that count
-  Admission admission;
-  RequestIds request_ids;  // used by the io thread only
+  ServerOptions options;     // base_path normalised
+  metrics::Metrics metrics;  // before the members that count
+  access::Admission admission;
+  http::RequestIds request_ids;  // used by the io thread only
   std::atomic<bool> draining{false};
-  Backend backend;
-  TaskExecutor locator;     // resolves posted names: a slow disk delays no other service
-  TaskExecutor view_io;     // changes saved views, also on disk
-  TaskExecutor file_watch;  // checks files for changes and reopens them
+  work::Backend backend;
+  work::TaskExecutor locator;     // resolves posted names: a slow disk delays no other service
+  work::TaskExecutor view_io;     // changes saved views, also on disk
+  work::TaskExecutor file_watch;  // checks files for changes and reopens them
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -3,8 +3,8 @@
 
 #include <string_view>
 
-namespace windsplat::net {
+namespace windsplat::api {
 
 std::string_view view_schema_json();
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

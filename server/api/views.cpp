@@ -12,7 +12,7 @@
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 
-namespace windsplat::net {
+namespace windsplat::api {
 namespace {
 
 using protocol::SavedView;
@@ -32,24 +32,24 @@ std::string utc_now() {
   return text.data();
 }
 
-Response saved_response(const Services& services, const SavedView& saved) {
+http::Response saved_response(const Services& services, const SavedView& saved) {
   std::string text = text_of(services, saved);
   const std::string etag = etag_of(text);
-  Response response = json_response(std::move(text));
+  http::Response response = json_response(std::move(text));
   response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
   return response;
 }
 
 // Whether the saved view satisfies If-Match and If-None-Match (RFC 9110, 13.1).
 struct Unchanged {
-  Unchanged(const Services& of, const Request& request)
+  Unchanged(const Services& of, const http::Request& request)
       : services(of),
         if_match(request.header("If-Match")),
         if_none_match(request.header("If-None-Match")) {}
   bool operator()(const SavedView& now) const {
     const std::string etag = etag_of(text_of(services, now));
-    return allows_change(if_match, etag) &&
-           (if_none_match.empty() || !matches_etag(if_none_match, etag));
+    return http::allows_change(if_match, etag) &&
+           (if_none_match.empty() || !http::matches_etag(if_none_match, etag));
   }
 
   const Services& services;
@@ -57,39 +57,40 @@ struct Unchanged {
   std::string if_none_match;
 };
 
-Response changed_meanwhile() {
-  return problem_response(
+http::Response changed_meanwhile() {
+  return http::problem_response(
       412, "Precondition Failed",
       "the saved view does not satisfy If-Match or If-None-Match; read it again");
 }
 
-void replace_later(Services& services, const std::string& id, const Request& request, Reply reply,
-                   SavedViews::Change change) {
+void replace_later(Services& services, const std::string& id, const http::Request& request,
+                   http::Reply reply, SavedViews::Change change) {
   run_later(services.view_io, request, std::move(reply), "a change of a saved view", nullptr,
             [&services, id, may = Unchanged(services, request), change = std::move(change)] {
               const auto saved = services.options.views->replace(id, may, change);
-              if (!saved) return problem_response(saved.error());
+              if (!saved) return http::problem_response(saved.error());
               return *saved ? saved_response(services, **saved) : changed_meanwhile();
             });
 }
 
 }  // namespace
 
-void post_saved_view(Services& services, const Request& request, Reply reply) {
+void post_saved_view(Services& services, const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
+    reply(http::problem_response(415, "Unsupported Media Type",
+                                 "Content-Type must be application/json"));
     return;
   }
   auto view = ViewDocument::parse(request.body);
   if (!view) {
-    reply(problem_response(view.error()));
+    reply(http::problem_response(view.error()));
     return;
   }
   run_later(services.view_io, request, std::move(reply), "saving a view", nullptr,
             [&services, view = std::move(*view)] {
               const auto saved = services.options.views->add(view, utc_now());
-              if (!saved) return problem_response(saved.error());
-              Response response = saved_response(services, *saved);
+              if (!saved) return http::problem_response(saved.error());
+              http::Response response = saved_response(services, *saved);
               response.status = 201;
               response.headers.emplace_back("Location",
                                             services.options.base_path + "v1/views/" + saved->id);
@@ -97,31 +98,35 @@ void post_saved_view(Services& services, const Request& request, Reply reply) {
             });
 }
 
-Response get_view(const Services& services, const std::string& id, const Request& request) {
+http::Response get_view(const Services& services, const std::string& id,
+                        const http::Request& request) {
   const auto saved = services.options.views->find(id);
-  if (!saved) return problem_response(saved.error());
+  if (!saved) return http::problem_response(saved.error());
   return tagged_response(request, "application/json", text_of(services, *saved));
 }
 
-void put_view(Services& services, const std::string& id, const Request& request, Reply reply) {
+void put_view(Services& services, const std::string& id, const http::Request& request,
+              http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
-    reply(problem_response(415, "Unsupported Media Type", "Content-Type must be application/json"));
+    reply(http::problem_response(415, "Unsupported Media Type",
+                                 "Content-Type must be application/json"));
     return;
   }
   auto view = ViewDocument::parse(request.body);
   if (!view) {
-    reply(problem_response(view.error()));
+    reply(http::problem_response(view.error()));
     return;
   }
   replace_later(services, id, request, std::move(reply),
                 [view = std::move(*view)](const ViewDocument&) { return view; });
 }
 
-void patch_view(Services& services, const std::string& id, const Request& request, Reply reply) {
+void patch_view(Services& services, const std::string& id, const http::Request& request,
+                http::Reply reply) {
   const std::string type = request.header("Content-Type");
   if (!is_json(type) && !is_merge_patch(type)) {
-    Response response = problem_response(415, "Unsupported Media Type",
-                                         "Content-Type must be application/merge-patch+json");
+    http::Response response = http::problem_response(
+        415, "Unsupported Media Type", "Content-Type must be application/merge-patch+json");
     response.headers.emplace_back("Accept-Patch", "application/merge-patch+json, application/json");
     reply(std::move(response));
     return;
@@ -130,14 +135,15 @@ void patch_view(Services& services, const std::string& id, const Request& reques
                 [patch = request.body](const ViewDocument& now) { return now.patched(patch); });
 }
 
-void delete_view(Services& services, const std::string& id, const Request& request, Reply reply) {
+void delete_view(Services& services, const std::string& id, const http::Request& request,
+                 http::Reply reply) {
   run_later(services.view_io, request, std::move(reply), "removing a saved view", nullptr,
-            [&services, id, may = Unchanged(services, request)]() -> Response {
+            [&services, id, may = Unchanged(services, request)]() -> http::Response {
               const auto removed = services.options.views->remove(id, may);
-              if (!removed) return problem_response(removed.error());
+              if (!removed) return http::problem_response(removed.error());
               if (!*removed) return changed_meanwhile();
               return {204, "", {{"Cache-Control", "no-store"}}, {}};
             });
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-namespace windsplat::net {
+namespace windsplat::api {
 
 struct WebAsset {
   std::string_view path;  // "index.html", "app-1a2b3c4d.js": relative to the base path
@@ -16,4 +16,4 @@ struct WebAsset {
 
 std::span<const WebAsset> web_assets();
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api

@@ -17,13 +17,13 @@ constexpr int http_ok = 200;
 int healthcheck(std::string url, const std::string& ca_file) {
   std::string ca;
   if (!ca_file.empty()) {
-    auto text = read_settings_file(ca_file, net::pem_bytes_max);
+    auto text = read_settings_file(ca_file, transport::pem_bytes_max);
     if (!text) return answer(text.error());
     ca = std::move(*text);
   }
   if (url.empty() || url.back() != '/') url += '/';
   url += "readyz";
-  const auto status = net::http_status(url, timeout_s, ca);
+  const auto status = transport::http_status(url, timeout_s, ca);
   if (!status) return answer(status.error());
   if (*status == http_ok) return exit_ok;
   complain(printable(url) + " returned status " + std::to_string(*status));

@@ -4,7 +4,7 @@
 #include <array>
 #include <ctime>
 
-namespace windsplat::net {
+namespace windsplat::http {
 namespace {
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
@@ -187,4 +187,4 @@ std::string response_head(const Response& response, bool keep_alive) {
   return head;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -13,7 +13,7 @@
 
 #include "server/base/cancel.hpp"
 
-namespace windsplat::net {
+namespace windsplat::http {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
 using Parameters = std::vector<std::pair<std::string, std::string>>;
@@ -64,4 +64,4 @@ std::vector<std::string_view> split_list(std::string_view text, char separator);
 // the security headers of every response.
 std::string response_head(const Response& response, bool keep_alive);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

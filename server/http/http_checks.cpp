@@ -11,7 +11,7 @@
 #include "server/base/error.hpp"
 #include "server/http/problem.hpp"
 
-namespace windsplat::net {
+namespace windsplat::http {
 namespace {
 
 constexpr std::array<std::string_view, 7> known_methods{"GET",   "HEAD",   "POST",   "PUT",
@@ -169,4 +169,4 @@ std::optional<Response> check_upgrade(const Request& request) {
   return std::nullopt;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -6,7 +6,7 @@
 
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::http {
 
 // Checks the header as received, with its final empty line: rejects folded lines, bare line ends
 // and malformed request lines.
@@ -24,4 +24,4 @@ std::optional<Response> check_upgrade(const Request& request);
 
 Response body_too_large();
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -10,7 +10,7 @@
 
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::http {
 namespace {
 
 struct Weighted {
@@ -153,4 +153,4 @@ bool local_host_allowed(std::string_view host, const std::vector<std::string>& o
                      [&](const std::string& other) { return equal_without_case(name, other); });
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::http {
 
 // Returns the offer that an Accept header prefers (RFC 9110, 12.5.1); the first wins a tie or an
 // empty header. None if none is acceptable.
@@ -42,4 +42,4 @@ bool is_address(std::string_view host);
 bool local_host_allowed(std::string_view host, const std::vector<std::string>& origins,
                         const std::vector<std::string>& names = {});
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -8,7 +8,7 @@
 #include "protocol/codec.hpp"
 #include "server/http/request_id.hpp"
 
-namespace windsplat::net {
+namespace windsplat::http {
 namespace {
 
 constexpr const char* problem_type = "application/problem+json";
@@ -51,4 +51,4 @@ void name_request(Response& response, const std::string& request_id) {
   response.body = Body::of(std::move(json));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -6,7 +6,7 @@
 #include "server/base/error.hpp"
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::http {
 
 Response problem_response(const Error& error);
 
@@ -17,4 +17,4 @@ Response problem_response(int status, std::string title, std::string detail, int
 // Adds the request id: as a header, and as requestId in a problem.
 void name_request(Response& response, const std::string& request_id);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

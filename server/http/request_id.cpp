@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <random>
 
-namespace windsplat::net {
+namespace windsplat::http {
 
 bool is_request_id(std::string_view text) {
   const auto fits = [](char c) {
@@ -34,4 +34,4 @@ std::string RequestIds::next() {
   return text.data();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

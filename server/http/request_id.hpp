@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace windsplat::net {
+namespace windsplat::http {
 
 inline constexpr const char* request_id_header = "X-Request-Id";
 inline constexpr std::size_t request_id_bytes_max = 64;
@@ -24,4 +24,4 @@ class RequestIds {
   std::uint64_t state_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace windsplat::net {
+namespace windsplat::http {
 namespace {
 
 std::vector<std::string> segments_of(std::string_view path) {
@@ -210,4 +210,4 @@ Result<void> QueryReader::finish() const {
   return {};
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -10,7 +10,7 @@
 #include "server/base/error.hpp"
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::http {
 
 // Normalises to "/" or "/a/b/".
 std::string normal_base_path(std::string_view path);
@@ -46,4 +46,4 @@ class QueryReader {
   std::optional<Error> fault_;  // the first
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -3,7 +3,7 @@
 
 #include <array>
 
-namespace windsplat::net {
+namespace windsplat::metrics {
 
 // The limit that caused a refusal: a fixed set, with the labels used in metrics.
 enum class LimitKind {
@@ -27,4 +27,4 @@ inline constexpr std::array limit_names{
     "render",      "failed_logins",       "pixels",   "kernels",          "waiting",  "arrivals",
     "estimate",    "handshakes"};
 
-}  // namespace windsplat::net
+}  // namespace windsplat::metrics

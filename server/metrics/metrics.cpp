@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::metrics {
 namespace {
 
 using prometheus::Counter;
@@ -280,4 +280,4 @@ std::string Metrics::text(const data::BudgetCounts& budget) const {
   return out.str();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::metrics

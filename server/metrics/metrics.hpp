@@ -15,7 +15,7 @@
 #include "server/metrics/limit_kind.hpp"
 #include "server/session/effects.hpp"
 
-namespace windsplat::net {
+namespace windsplat::metrics {
 
 // Thread-safe.
 class Metrics {
@@ -54,4 +54,4 @@ class Metrics {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::metrics

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <utility>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class Connection {
  public:
@@ -134,4 +134,4 @@ class Connections {
   std::function<void()> empty_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -7,7 +7,7 @@
 
 #include "server/base/log.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // End the session first: logging may fail when memory is exhausted.
 template <class Session>
@@ -61,4 +61,4 @@ auto guarded(std::shared_ptr<Session> session, Body body) {
   return Guarded<Session, Body>(std::move(session), std::move(body));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

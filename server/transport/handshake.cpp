@@ -26,7 +26,7 @@
 #include "server/transport/tls_context.hpp"
 #include "server/transport/wire.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -45,8 +45,8 @@ constexpr std::size_t last_read_bytes = std::size_t{17} * 1024;
 class TlsTask final : public HandshakeTask {
  public:
   TlsTask(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls, HandshakeThread& thread,
-          Admission& admission, const Visitor& visitor)
-      : HandshakeTask(thread, counted_address(visitor.peer)),
+          access::Admission& admission, const access::Visitor& visitor)
+      : HandshakeTask(thread, access::counted_address(visitor.peer)),
         handle_(socket.native_handle()),
         wire_(std::move(socket), std::move(tls)),
         io_(wire_.get_executor()),
@@ -110,7 +110,7 @@ class TlsTask final : public HandshakeTask {
   const int handle_;  // open while this lives, or wire_ after the move
   Wire wire_;
   const asio::any_io_executor io_;
-  Admission& admission_;
+  access::Admission& admission_;
   const bool trusted_;
   std::function<void(ErrorCode)> done_;
   std::optional<ErrorCode> outcome_;
@@ -119,13 +119,13 @@ class TlsTask final : public HandshakeTask {
 
 class Handshake : public Connection, public std::enable_shared_from_this<Handshake> {
  public:
-  Handshake(asio::ip::tcp::socket socket, Services& services, Connections& connections,
-            HandshakeThread& thread, Visitor visitor)
+  Handshake(asio::ip::tcp::socket socket, api::Services& services, Connections& connections,
+            HandshakeThread& thread, access::Visitor visitor)
       : services_(services),
         connections_(connections),
         id_(connections.next_id()),
         visitor_(std::move(visitor)),
-        address_(counted_address(visitor_.peer)),
+        address_(access::counted_address(visitor_.peer)),
         deadline_(socket.get_executor()),
         task_(std::make_shared<TlsTask>(std::move(socket), services.options.tls, thread,
                                         services.admission, visitor_)) {}
@@ -194,10 +194,10 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
     visitor_.place.reset();  // free the place at once
   }
 
-  Services& services_;
+  api::Services& services_;
   Connections& connections_;
   const std::uint64_t id_;
-  Visitor visitor_;
+  access::Visitor visitor_;
   const std::string address_;
   const Clock::time_point came_ = Clock::now();
   asio::steady_timer deadline_;
@@ -207,8 +207,9 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
 
 }  // namespace
 
-void start_connection(asio::ip::tcp::socket socket, Services& services, Connections& connections,
-                      HandshakeThread* handshakes, Visitor visitor) {
+void start_connection(asio::ip::tcp::socket socket, api::Services& services,
+                      Connections& connections, HandshakeThread* handshakes,
+                      access::Visitor visitor) {
   if (handshakes == nullptr) {
     start_http_session(Wire(std::move(socket), nullptr), services, connections, std::move(visitor),
                        services.draining);
@@ -219,4 +220,4 @@ void start_connection(asio::ip::tcp::socket socket, Services& services, Connecti
       ->start();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

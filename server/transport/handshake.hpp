@@ -7,10 +7,11 @@
 #include "server/transport/connections.hpp"
 #include "server/transport/handshake_thread.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // `handshakes` null: plain TCP. Stop it before the socket's io_context ends.
-void start_connection(boost::asio::ip::tcp::socket socket, Services& services,
-                      Connections& connections, HandshakeThread* handshakes, Visitor visitor);
+void start_connection(boost::asio::ip::tcp::socket socket, api::Services& services,
+                      Connections& connections, HandshakeThread* handshakes,
+                      access::Visitor visitor);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -12,7 +12,7 @@
 #include "server/base/log.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 // For setpriority(2): rendering and streams get ten times this thread's share of a contended core.
@@ -101,9 +101,9 @@ void HandshakeThread::run() {
       if (step == nullptr) return;
       step->run();
     } catch (const std::exception& fault) {
-      log_fault("TLS handshake step failed", fault);  // its deadline closes the connection
+      work::log_fault("TLS handshake step failed", fault);  // its deadline closes the connection
     }
   }
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

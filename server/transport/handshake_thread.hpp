@@ -16,7 +16,7 @@
 #include <thread>
 #include <utility>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // Thread-safe. Runs one step at a time: steps of an address in order, addresses in turn.
 class HandshakeThread {
@@ -157,4 +157,4 @@ class HandshakeExecutor {
   boost::asio::execution_context* context_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

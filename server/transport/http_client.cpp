@@ -20,7 +20,7 @@
 #include <optional>
 #include <string>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 namespace asio = boost::asio;
@@ -173,4 +173,4 @@ Result<int> http_status(const std::string& url, int timeout_s, const std::string
   return *status;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -11,7 +11,7 @@
 
 #include "server/base/log.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 namespace asio = boost::asio;
@@ -111,4 +111,4 @@ void Listener::accept() {
   });
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

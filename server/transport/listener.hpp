@@ -12,7 +12,7 @@
 #include "server/base/error.hpp"
 #include "server/transport/spare_descriptor.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class Listener {
  public:
@@ -46,4 +46,4 @@ class Listener {
   std::shared_ptr<const char> waiting_ = std::make_shared<const char>();
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -5,7 +5,7 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 bool peer_has_left(int handle) {
   tcp_info info{};
@@ -14,4 +14,4 @@ bool peer_has_left(int handle) {
   return info.tcpi_state != TCP_ESTABLISHED;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -10,7 +10,7 @@
 #include <thread>
 #include <utility>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 inline bool runs_here(const boost::asio::io_context::executor_type& executor) {
   return executor.running_in_this_thread();
@@ -50,4 +50,4 @@ bool post_or_retry(const Executor& executor, Handler handler,
   }
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

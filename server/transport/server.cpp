@@ -21,7 +21,7 @@
 #include "server/transport/post_or_retry.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 namespace asio = boost::asio;
@@ -33,7 +33,8 @@ constexpr std::chrono::milliseconds after_a_fault{10};
 }  // namespace
 
 struct Server::State {
-  State(ServerOptions options, std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> pool)
+  State(api::ServerOptions options, std::shared_ptr<data::Store> store,
+        std::shared_ptr<ThreadPool> pool)
       : services(std::move(options), std::move(store), std::move(pool)),
         listener(
             io, [this](asio::ip::tcp::socket socket) { accepted(std::move(socket)); },
@@ -61,7 +62,7 @@ struct Server::State {
         io.poll();
         break;
       } catch (const std::exception& fault) {
-        log_fault("a fault reached the io loop", fault);
+        work::log_fault("a fault reached the io loop", fault);
       }
     }
   }
@@ -78,12 +79,12 @@ struct Server::State {
 
   // Frees a place by closing the connection that is idle longest, or in the reserve the longest one
   // without a request.
-  std::optional<Visitor> admit(const std::string& address) {
-    Admission& admission = services.admission;
+  std::optional<access::Visitor> admit(const std::string& address) {
+    access::Admission& admission = services.admission;
     if (!admission.arrive(address, services.options.tls != nullptr)) return std::nullopt;
     auto visitor = admission.connect(address);
     const auto& reason = visitor ? visitor->reserve : std::nullopt;
-    if (visitor && reason && reason->kind == LimitKind::connections &&
+    if (visitor && reason && reason->kind == metrics::LimitKind::connections &&
         connections.end_longest(&Connection::idle_since)) {
       visitor.reset();
       visitor = admission.connect(address);
@@ -104,7 +105,7 @@ struct Server::State {
       if (!fault) services.admission.log_refused_handshakes();
       if (fault || services.draining) return;
       const auto look = [this] {
-        auto found = run_guarded<std::vector<std::string>>(
+        auto found = work::run_guarded<std::vector<std::string>>(
             "file check", never, [this] { return services.backend.catalogue.look_after(); });
         std::vector<std::string> changed;
         if (found) changed = std::move(*found);
@@ -140,9 +141,9 @@ struct Server::State {
 
   // On the io thread.
   void change(Access access) {
-    ServerOptions& options = services.options;
+    api::ServerOptions& options = services.options;
     WINDSPLAT_CHECK((access.tls == nullptr) == (options.tls == nullptr));
-    const bool other_token = is_other_token(options.token.get(), access.token.get());
+    const bool other_token = access::is_other_token(options.token.get(), access.token.get());
     options.allow_origins = std::move(access.allow_origins);
     options.token = std::move(access.token);
     options.tls = std::move(access.tls);
@@ -170,7 +171,7 @@ struct Server::State {
         try {
           services.backend.catalogue.end();
         } catch (const std::exception& failure) {
-          log_fault("pending reads could not be ended", failure);
+          work::log_fault("pending reads could not be ended", failure);
         }
       });
     });
@@ -209,7 +210,7 @@ struct Server::State {
   // Declared before io: sessions left in its queue deregister when it is destroyed. Service threads
   // post to io and end before it, in ~State.
   Connections connections;
-  Services services;
+  api::Services services;
   asio::io_context io{1};
   // The loop ends by stop() only, not when all pending operations failed to allocate.
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
@@ -226,14 +227,14 @@ struct Server::State {
   std::thread ending;             // ends pending reads when a drain takes long
 };
 
-Server::Server(ServerOptions options, std::shared_ptr<data::Store> store,
+Server::Server(api::ServerOptions options, std::shared_ptr<data::Store> store,
                std::shared_ptr<ThreadPool> pool)
     : state_(std::make_unique<State>(std::move(options), std::move(store), std::move(pool))) {}
 
 Server::~Server() = default;
 
 Result<void> Server::listen() {
-  const ServerOptions& options = state_->services.options;
+  const api::ServerOptions& options = state_->services.options;
   return state_->listener.listen(options.address, options.port);
 }
 
@@ -258,7 +259,7 @@ void Server::run() {
       state_->go_on();
       state_->io.run();
     } catch (const std::exception& fault) {
-      log_fault("a fault reached the io loop", fault);
+      work::log_fault("a fault reached the io loop", fault);
       std::this_thread::sleep_for(after_a_fault);
     }
   }
@@ -277,4 +278,4 @@ void Server::change(Access access) {
   });
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -13,12 +13,12 @@
 #include "server/data/resident/store.hpp"
 #include "server/transport/tls.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // Settings that can change while the server runs.
 struct Access {
   std::vector<std::string> allow_origins;
-  std::shared_ptr<const Token> token;
+  std::shared_ptr<const access::Token> token;
   std::shared_ptr<TlsContext> tls;  // for new connections; null only if it was null before
   bool known_hosts_only = false;
   std::vector<std::string> allow_hosts;
@@ -26,7 +26,7 @@ struct Access {
 
 class Server {
  public:
-  Server(ServerOptions options, std::shared_ptr<data::Store> store,
+  Server(api::ServerOptions options, std::shared_ptr<data::Store> store,
          std::shared_ptr<ThreadPool> pool);
   ~Server();
 
@@ -46,4 +46,4 @@ class Server {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -5,7 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 int take() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
@@ -27,4 +27,4 @@ bool SpareDescriptor::turn_away(int listening) {
   return taken >= 0;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

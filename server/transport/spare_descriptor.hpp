@@ -2,7 +2,7 @@
 // connection instead of leaving the client waiting.
 #pragma once
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class SpareDescriptor {
  public:
@@ -18,4 +18,4 @@ class SpareDescriptor {
   int spare_ = -1;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

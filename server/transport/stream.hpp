@@ -13,7 +13,7 @@
 #include <cstddef>
 #include <limits>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 namespace asio = boost::asio;
 namespace beast = boost::beast;
@@ -47,4 +47,4 @@ inline std::chrono::milliseconds write_deadline(std::size_t bytes, int fixed_s) 
   return std::chrono::seconds(fixed_s) + std::chrono::milliseconds(bytes / 64);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

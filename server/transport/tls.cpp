@@ -11,7 +11,7 @@
 
 #include "server/transport/tls_context.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 namespace asio = boost::asio;
@@ -119,4 +119,4 @@ bool is_plain_http(const ErrorCode& fault) {
          ERR_GET_REASON(static_cast<unsigned long>(fault.value())) == SSL_R_HTTP_REQUEST;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -7,7 +7,7 @@
 
 #include "server/base/error.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // Opaque: only the network sources see OpenSSL (tls_context.hpp).
 struct TlsContext;
@@ -25,4 +25,4 @@ std::int64_t certificate_ends(const TlsContext& tls);
 // Reason why handshakes are expensive: a large RSA key or a long chain. Empty: they are not.
 std::string expensive_handshakes(const TlsContext& tls);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -4,7 +4,7 @@
 #include <boost/asio/ssl/context.hpp>
 #include <boost/system/error_code.hpp>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 struct TlsContext {
   boost::asio::ssl::context context{boost::asio::ssl::context::tls_server};
@@ -13,4 +13,4 @@ struct TlsContext {
 // Whether a handshake failed because the client sent plain HTTP.
 bool is_plain_http(const boost::system::error_code& fault);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -10,7 +10,7 @@
 
 #include "server/transport/tls_context.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 struct Wire::Tls {
   Tls(TcpStream& tcp, std::shared_ptr<TlsContext> with)
@@ -84,4 +84,4 @@ void Wire::write_tls(asio::const_buffer from, IoHandler done) {
       from, asio::bind_cancellation_slot(tls_->stop_writing.slot(), std::move(done)));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -16,7 +16,7 @@
 #include "server/transport/stream.hpp"
 #include "server/transport/tls.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // A type-erased completion handler, so that the TLS layer is compiled once. Called once.
 class IoHandler {
@@ -146,4 +146,4 @@ void async_teardown(beast::role_type role, Wire& wire, Handler&& handler) {
       }));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -5,7 +5,7 @@
 
 #include "protocol/limits.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 constexpr std::size_t load_threads = 2;
@@ -14,7 +14,7 @@ constexpr std::size_t load_threads_spare = 4;  // for loads that hang or wait fo
 }  // namespace
 
 Backend::Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> threads,
-                 Metrics& metrics_of_server, BackendOptions options)
+                 metrics::Metrics& metrics_of_server, BackendOptions options)
     : catalogue(std::move(store)),
       metrics(metrics_of_server),
       pool(std::move(threads)),
@@ -26,10 +26,10 @@ Backend::Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool>
                 {},
                 options.wait_ms,
                 std::move(options.charge),
-                [this] { metrics.refused(LimitKind::waiting); }}),
+                [this] { metrics.refused(metrics::LimitKind::waiting); }}),
       loads(
           load_threads, requests_waiting_max, "loads",
-          [this] { metrics.refused(LimitKind::waiting); }, load_threads_spare),
+          [this] { metrics.refused(metrics::LimitKind::waiting); }, load_threads_spare),
       check_cost_(std::move(options.check_cost)) {}
 
 Result<Catalogue::Checked> Backend::check(const protocol::View& view) {
@@ -45,4 +45,4 @@ void Backend::end() {
   renderer.end();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

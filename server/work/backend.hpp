@@ -19,7 +19,7 @@
 #include "server/work/request_times.hpp"
 #include "server/work/task_executor.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 struct BackendOptions {
   double requests_waiting_ms_max = 30'000;  // see RenderService::Options
@@ -36,7 +36,7 @@ struct Backend {
   static constexpr std::size_t requests_waiting_max = 16;
 
   Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> threads,
-          Metrics& metrics_of_server, BackendOptions options);
+          metrics::Metrics& metrics_of_server, BackendOptions options);
 
   // Checks whether the view can be drawn (Catalogue::check) within the cost limit. Loads nothing.
   Result<Catalogue::Checked> check(const protocol::View& view);
@@ -45,7 +45,7 @@ struct Backend {
   void end();
 
   Catalogue catalogue;
-  Metrics& metrics;
+  metrics::Metrics& metrics;
   std::shared_ptr<ThreadPool> pool;
   frame::Workspace frames;  // used by the renderer's thread only
   quality::Tables quality;
@@ -60,4 +60,4 @@ struct Backend {
   std::function<Result<void>(const frame::Cost& cost)> check_cost_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

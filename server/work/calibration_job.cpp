@@ -7,7 +7,7 @@
 #include "server/frame/measure.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 // A study that is started in the tables and ended there by its destructor.
@@ -93,4 +93,4 @@ void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::V
   (void)backend.loads.submit({unwanted, run, true, (*found)->shared_info()});
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -9,7 +9,7 @@
 #include "server/work/backend.hpp"
 #include "server/work/view_completion.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Prepares the averages that coarser settings show on a thread that may block, then draws every
 // setting while the renderer is idle. Does nothing if the tables cover the scene near this
@@ -18,4 +18,4 @@ void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::V
                         const std::shared_ptr<ViewCompletion>& completion,
                         const CancelToken& unwanted);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -6,7 +6,7 @@
 #include "server/scene/completed_view.hpp"
 #include "server/scene/describe.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 Result<std::shared_ptr<data::Dataset>> Catalogue::find(const std::string& id) const {
   auto dataset = store_->find(id);
@@ -161,4 +161,4 @@ Error with_dataset_name(Error error, const std::string& dataset, const std::stri
   return error;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

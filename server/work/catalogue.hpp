@@ -17,7 +17,7 @@
 #include "server/data/resident/store.hpp"
 #include "server/frame/cost.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Thread-safe.
 class Catalogue {
@@ -116,4 +116,4 @@ class Catalogue {
 // An out-of-memory error with the name of what was being loaded; other errors unchanged.
 Error with_dataset_name(Error error, const std::string& dataset, const std::string& field = "");
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 namespace {
 
@@ -116,4 +116,4 @@ Result<void> submit(Backend& backend, Drawing asked) {
                                   false, drawing->cost_ms, drawing->payer});
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

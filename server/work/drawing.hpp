@@ -10,7 +10,7 @@
 #include "server/quality/setting.hpp"
 #include "server/work/backend.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // A picture ready to be drawn: its scene and the memory reserved for its pixels.
 struct PreparedPicture {
@@ -53,4 +53,4 @@ Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
 // subject to admission; sessions bound the loads of streams, one picture at a time each.
 Result<void> submit(Backend& backend, Drawing drawing);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -1,7 +1,7 @@
 // Frame + tables -> the errors of its report.
 #include "server/work/error_report.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 Observation observed_in(const frame::Frame& drawn, const quality::Setting& setting) {
   protocol::View asked = drawn.view;
@@ -40,4 +40,4 @@ void report_error(const frame::Frame& drawn, const Observation& observed,
                                                 observed.viewpoint);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -5,7 +5,7 @@
 #include "server/frame/frame.hpp"
 #include "server/quality/tables.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Scene signature and viewpoint of a frame drawn at a setting.
 struct Observation {
@@ -20,4 +20,4 @@ void report_error(const frame::Frame& drawn, const Observation& observed,
                   const quality::Setting& setting, const frame::Encoding& encoding,
                   quality::Tables& tables, protocol::FrameInfo& info);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

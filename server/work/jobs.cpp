@@ -13,7 +13,7 @@
 #include "server/work/run_guarded.hpp"
 #include "server/work/task_executor.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 namespace {
 
@@ -206,4 +206,4 @@ void Jobs::cancel_all() {
   for (const auto& job : state_->jobs) State::cancel(*job);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -13,7 +13,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Thread-safe. A job that throws ends as failed.
 class Jobs {
@@ -56,4 +56,4 @@ class Jobs {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

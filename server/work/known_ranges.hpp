@@ -11,7 +11,7 @@
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/measure.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Thread-safe.
 class KnownRanges {
@@ -40,4 +40,4 @@ class KnownRanges {
   std::map<std::weak_ptr<const data::DatasetInfo>, ByField, std::owner_less<>> ranges_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -16,7 +16,7 @@
 #include "server/scene/completed_view.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -130,4 +130,4 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
   return protocol::JobResult(std::move(description));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

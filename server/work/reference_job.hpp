@@ -9,7 +9,7 @@
 #include "server/work/backend.hpp"
 #include "server/work/jobs.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Returns at once if the reference is cached, otherwise blocks until it is drawn. Cancellation
 // takes effect within about a tenth of a second, except while loading. Drawing is charged to the
@@ -18,4 +18,4 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
                                            data::Dataset& dataset, const Jobs::Handle& handle,
                                            const std::string& payer, const std::string& base_path);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

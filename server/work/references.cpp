@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 // Retry time for a reference that has not been started, whose duration is unknown.
@@ -59,4 +59,4 @@ Result<References::Ticket> References::admit(const std::string& address,
   return Ticket(std::move(ticket));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

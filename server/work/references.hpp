@@ -16,7 +16,7 @@
 #include "server/base/error.hpp"
 #include "server/image/encode.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Thread-safe.
 class References {
@@ -53,4 +53,4 @@ class References {
   std::vector<Wanted> wanted_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // --- Shares --------------------------------------------------------------------------------------
 
@@ -202,4 +202,4 @@ void RenderQueue::cancel_all() const {
   if (running_) running_->cancel.cancel();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -13,7 +13,7 @@
 
 #include "server/base/cancel.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 enum class RenderKind {
   stream,      // frames of sessions
@@ -128,4 +128,4 @@ class RenderQueue {
   std::size_t waiting_ = 0;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

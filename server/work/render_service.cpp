@@ -14,7 +14,7 @@
 
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 constexpr int retry_after_s_max = 60;
@@ -161,4 +161,4 @@ void RenderService::cancel_all() {
   state_->queue.cancel_all();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -11,7 +11,7 @@
 #include "server/base/error.hpp"
 #include "server/work/render_queue.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 class RenderService {
  public:
@@ -52,4 +52,4 @@ class RenderService {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

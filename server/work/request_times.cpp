@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 namespace {
 
@@ -38,4 +38,4 @@ double RequestTimes::estimate_ms(const std::string& dataset, protocol::MethodNam
   return us_a_kernel * kernels / 1000;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

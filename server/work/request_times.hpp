@@ -12,7 +12,7 @@
 
 #include "protocol/view.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Thread-safe.
 class RequestTimes {
@@ -45,4 +45,4 @@ class RequestTimes {
   std::uint64_t uses_ = 0;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -9,7 +9,7 @@
 #include "server/base/error.hpp"
 #include "server/base/log.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Ignore a failure to log when memory is exhausted.
 inline void log_fault(const char* message, const std::exception& fault, const char* job = "",
@@ -38,4 +38,4 @@ Result<T> run_guarded(const char* what, const CancelToken& cancel, const Make& m
   }
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

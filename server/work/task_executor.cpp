@@ -14,7 +14,7 @@
 
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 struct TaskExecutor::State {
   using Clock = std::chrono::steady_clock;
@@ -157,4 +157,4 @@ void TaskExecutor::end() {
   }
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

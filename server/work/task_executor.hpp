@@ -14,7 +14,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 class TaskExecutor {
  public:
@@ -52,4 +52,4 @@ class TaskExecutor {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

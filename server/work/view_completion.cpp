@@ -1,6 +1,6 @@
 #include "server/work/view_completion.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 Result<scene::CompletedView> ViewCompletion::of(const protocol::View& view,
                                                 data::Dataset& dataset) {
@@ -17,4 +17,4 @@ Result<scene::CompletedView> ViewCompletion::of(const protocol::View& view,
   return completed;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -9,7 +9,7 @@
 #include "server/frame/frame.hpp"
 #include "server/scene/completed_view.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Thread-safe. Never held locked while a view is completed, which may wait for a file. Views on a
 // bent lattice are completed anew: their placement is as large as a field and is kept, once, by the
@@ -29,4 +29,4 @@ class ViewCompletion {
   std::optional<Latest> latest_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -14,7 +14,7 @@
 #include "server/work/error_report.hpp"
 #include "server/work/run_guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 frame::Encoding frame_encoding(const session::Encoding& wanted) {
@@ -45,9 +45,9 @@ Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
   out.render_us = drawn->render_us;
   out.measure_us = drawn->measure_us;
   out.encode_us = drawn->encode_us;
-  backend.metrics.stage_took(Metrics::Stage::queue, out.queue_us);
-  backend.metrics.stage_took(Metrics::Stage::render, out.render_us);
-  backend.metrics.stage_took(Metrics::Stage::encode, out.encode_us);
+  backend.metrics.stage_took(metrics::Metrics::Stage::queue, out.queue_us);
+  backend.metrics.stage_took(metrics::Metrics::Stage::render, out.render_us);
+  backend.metrics.stage_took(metrics::Metrics::Stage::encode, out.encode_us);
   return out;
 }
 
@@ -227,4 +227,4 @@ void Viewer::cancel_all() {
   for (const auto& [ticket, token] : running_) token.cancel();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

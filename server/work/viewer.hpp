@@ -11,7 +11,7 @@
 #include "server/work/backend.hpp"
 #include "server/work/view_completion.hpp"
 
-namespace windsplat::net {
+namespace windsplat::work {
 
 // Called on a thread of the renderer or the loader, or synchronously.
 using DrawnReply = std::function<void(std::uint64_t ticket, Result<session::Drawn>)>;
@@ -56,4 +56,4 @@ class Viewer {
   CancelToken calibration_;            // of the latest calibration
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::work

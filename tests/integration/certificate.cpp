@@ -7,7 +7,7 @@
 
 #include <memory>
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 template <class T, void (*release)(T*)>
@@ -51,4 +51,4 @@ Certificate make_certificate(const std::string& name, int days) {
   return {text_of(chain.get()), text_of(secret.get())};
 }
 
-}  // namespace net_test
+}  // namespace server_test

@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace net_test {
+namespace server_test {
 
 struct Certificate {
   std::string chain;  // PEM
@@ -13,4 +13,4 @@ struct Certificate {
 // `name` is the subject, which distinguishes certificates. `days`: expiry relative to now, in days.
 Certificate make_certificate(const std::string& name, int days = 2);
 
-}  // namespace net_test
+}  // namespace server_test

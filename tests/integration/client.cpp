@@ -17,7 +17,7 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -352,4 +352,4 @@ int StreamClient::close_code(int timeout_ms) {
   return 0;
 }
 
-}  // namespace net_test
+}  // namespace server_test

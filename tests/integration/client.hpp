@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace net_test {
+namespace server_test {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
@@ -115,4 +115,4 @@ class StreamClient {
   std::string buffer_;
 };
 
-}  // namespace net_test
+}  // namespace server_test

@@ -65,7 +65,7 @@ const listing = (assets) => `// Made by web/scripts/embed.mjs from web/dist.
 extern "C" {
 ${assets.map(declaration).join("")}}
 
-namespace windsplat::net {
+namespace windsplat::api {
 
 std::span<const WebAsset> web_assets() {
   static const std::array<WebAsset, ${assets.length}> assets = {{
@@ -73,7 +73,7 @@ ${assets.map(entry).join("")}  }};
   return assets;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::api
 `;
 
 const reportAssembly = (path, digest) => `/* Made by web/scripts/embed.mjs. ${digest} */

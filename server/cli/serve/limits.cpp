@@ -37,13 +37,13 @@ void add(CLI::App& command, const char* flag, const char* environment, Number& v
 }
 
 std::string fault_of_proxy(const std::string& text) {
-  if (net::Network::parse(text)) return "";
+  if (access::Network::parse(text)) return "";
   return "must be an address or a network such as 172.17.0.0/16, not '" + text + "'";
 }
 
 }  // namespace
 
-void add_limit_options(CLI::App& command, net::Limits& limits) {
+void add_limit_options(CLI::App& command, access::Limits& limits) {
   add(command, "--max-connections", "WINDSPLAT_MAX_CONNECTIONS", limits.connections, count_max,
       "Concurrent connections, including streams", "N");
   add(command, "--max-connections-per-address", "WINDSPLAT_MAX_CONNECTIONS_PER_ADDRESS",

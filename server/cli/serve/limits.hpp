@@ -7,6 +7,6 @@
 
 namespace windsplat::cli {
 
-void add_limit_options(CLI::App& command, net::Limits& limits);
+void add_limit_options(CLI::App& command, access::Limits& limits);
 
 }  // namespace windsplat::cli

@@ -31,7 +31,7 @@ struct ServeArguments {
   int idle_timeout_s = 300;
   std::string log_format = "text";
   std::string log_level = "info";
-  net::Limits limits;
+  access::Limits limits;
 };
 
 // `arguments` must outlive the command.

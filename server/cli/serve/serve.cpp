@@ -51,7 +51,7 @@ class Control {
   explicit Control(const CLI::App& given) : given_(given) {}
 
   // Applies requests received before the server existed.
-  void arm(net::Server& server, std::shared_ptr<data::Store> store,
+  void arm(transport::Server& server, std::shared_ptr<data::Store> store,
            std::unique_ptr<ServeSettings> started) {
     store_ = std::move(store);
     started_ = std::move(started);
@@ -65,7 +65,7 @@ class Control {
         }
         reload_wanted_ = false;
       }
-      reload_now([&server](net::Access access) { server.change(std::move(access)); });
+      reload_now([&server](transport::Access access) { server.change(std::move(access)); });
     }
   }
   void disarm() {
@@ -88,7 +88,7 @@ class Control {
       reload_wanted_ = server_ == nullptr;
       if (reload_wanted_) return;
     }
-    reload_now([this](net::Access access) {
+    reload_now([this](transport::Access access) {
       const std::lock_guard lock(mutex_);
       if (server_ != nullptr) server_->change(std::move(access));
     });
@@ -96,7 +96,7 @@ class Control {
 
  private:
   // All or nothing, also when memory or threads are short.
-  void reload_now(const std::function<void(net::Access)>& change) {
+  void reload_now(const std::function<void(transport::Access)>& change) {
     try {
       take_over(change);
     } catch (const std::exception& fault) {
@@ -105,7 +105,7 @@ class Control {
   }
 
   // May block on a disk, so only `change` takes the lock.
-  void take_over(const std::function<void(net::Access)>& change) {
+  void take_over(const std::function<void(transport::Access)>& change) {
     const auto fresh = read_settings(given_);
     if (!fresh) return refuse(fresh.error());
     const ServeSettings& settings = **fresh;
@@ -117,7 +117,7 @@ class Control {
         log::warn("a changed option requires a restart", {{"option", name}});
       }
     }
-    const net::ServerOptions& options = settings.options;
+    const api::ServerOptions& options = settings.options;
     auto tls = tls_;
     if ((tls != nullptr) != (options.tls != nullptr)) {
       log::warn("enabling or disabling TLS requires a restart", {{"option", "tls-cert"}});
@@ -140,9 +140,9 @@ class Control {
   const CLI::App& given_;
   std::shared_ptr<data::Store> store_;
   std::unique_ptr<ServeSettings> started_;
-  std::shared_ptr<net::TlsContext> tls_;  // the newest
-  std::mutex mutex_;                      // guards the members below, held briefly
-  net::Server* server_ = nullptr;
+  std::shared_ptr<transport::TlsContext> tls_;  // the newest
+  std::mutex mutex_;                            // guards the members below, held briefly
+  transport::Server* server_ = nullptr;
   bool reload_wanted_ = false;
 };
 
@@ -191,7 +191,7 @@ int serve(const CLI::App& given) {
   if (!settings) return answer(settings.error());
   const ServeArguments arguments = (*settings)->arguments;
   configure_log(arguments);
-  net::ServerOptions options = (*settings)->options;
+  api::ServerOptions options = (*settings)->options;
   warn_of(**settings);
 
   data::StoreOptions stored = store_options(
@@ -207,7 +207,8 @@ int serve(const CLI::App& given) {
   auto views = views::SavedViews::open({arguments.state_dir});
   if (!views) return answer(views.error());
   options.views = std::move(*views);
-  net::Server server(std::move(options), store, std::make_shared<ThreadPool>(arguments.threads));
+  transport::Server server(std::move(options), store,
+                           std::make_shared<ThreadPool>(arguments.threads));
   if (const auto ok = server.listen(); !ok) return answer(ok.error());
   const std::string url = server.url();
   control->arm(server, store, std::move(*settings));

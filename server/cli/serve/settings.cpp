@@ -57,29 +57,29 @@ Error of_file(const char* option, const std::string& path, Error error) {
   return error;
 }
 
-Result<std::shared_ptr<const net::Token>> read_token(const std::string& path) {
-  if (path.empty()) return std::shared_ptr<const net::Token>();
+Result<std::shared_ptr<const access::Token>> read_token(const std::string& path) {
+  if (path.empty()) return std::shared_ptr<const access::Token>();
   auto text = read_settings_file(path, token_file_bytes_max);
   if (!text) return of_file("--token-file", path, text.error());
-  auto token = net::Token::parse(*text);
-  net::wipe(*text);
+  auto token = access::Token::parse(*text);
+  access::wipe(*text);
   if (!token) return of_file("--token-file", path, token.error());
-  return std::make_shared<const net::Token>(*token);
+  return std::make_shared<const access::Token>(*token);
 }
 
-Result<std::shared_ptr<net::TlsContext>> read_tls(const ServeArguments& arguments) {
+Result<std::shared_ptr<transport::TlsContext>> read_tls(const ServeArguments& arguments) {
   if (arguments.tls_cert.empty() && arguments.tls_key.empty()) {
-    return std::shared_ptr<net::TlsContext>();
+    return std::shared_ptr<transport::TlsContext>();
   }
   if (arguments.tls_cert.empty() || arguments.tls_key.empty()) {
     return make_error(ErrorKind::invalid, "--tls-cert and --tls-key must be given together");
   }
-  const auto chain = read_settings_file(arguments.tls_cert, net::pem_bytes_max);
+  const auto chain = read_settings_file(arguments.tls_cert, transport::pem_bytes_max);
   if (!chain) return of_file("--tls-cert", arguments.tls_cert, chain.error());
-  auto key = read_settings_file(arguments.tls_key, net::pem_bytes_max);
+  auto key = read_settings_file(arguments.tls_key, transport::pem_bytes_max);
   if (!key) return of_file("--tls-key", arguments.tls_key, key.error());
-  auto tls = net::make_tls(*chain, *key);
-  net::wipe(*key);
+  auto tls = transport::make_tls(*chain, *key);
+  access::wipe(*key);
   if (!tls) {
     return of_file("--tls-cert and --tls-key", arguments.tls_cert + "', '" + arguments.tls_key,
                    tls.error());
@@ -113,7 +113,7 @@ Result<void> check_host_names(const std::vector<std::string>& names) {
                                               "' is not a host name such as winds.example");
 }
 
-Result<net::ServerOptions> server_options(const ServeArguments& arguments) {
+Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   const auto listen = parse_listen_address(arguments.listen);
   if (!listen) return listen.error();
   if (const auto ok = check_exposure(arguments, listen->loopback); !ok) return ok.error();
@@ -132,7 +132,7 @@ Result<net::ServerOptions> server_options(const ServeArguments& arguments) {
   if (*token != nullptr || *tls != nullptr) {
     if (const auto ok = forbid_dumps(); !ok) return ok.error();
   }
-  net::ServerOptions options;
+  api::ServerOptions options;
   options.token = std::move(*token);
   options.tls = std::move(*tls);
   options.data_root = std::move(*data_root);
@@ -173,17 +173,17 @@ Result<void> check_exposure(const ServeArguments& arguments, bool loopback) {
 
 void warn_of(const ServeSettings& settings) {
   const ServeArguments& arguments = settings.arguments;
-  const net::ServerOptions& options = settings.options;
+  const api::ServerOptions& options = settings.options;
   for (const std::string* secret : {&arguments.token_file, &arguments.tls_key}) {
     if (!secret->empty() && others_read(*secret)) {
       log::warn("a secret is readable by other users", {{"file", *secret}});
     }
   }
-  if (options.tls != nullptr && net::certificate_ends(*options.tls) < std::time(nullptr)) {
+  if (options.tls != nullptr && transport::certificate_ends(*options.tls) < std::time(nullptr)) {
     log::warn("the certificate has expired", {{"file", arguments.tls_cert}});
   }
   const std::string expensive =
-      options.tls != nullptr ? net::expensive_handshakes(*options.tls) : "";
+      options.tls != nullptr ? transport::expensive_handshakes(*options.tls) : "";
   if (!expensive.empty()) {
     log::warn("TLS handshakes are expensive", {{"file", arguments.tls_cert}, {"fault", expensive}});
   }

@@ -13,7 +13,7 @@ namespace windsplat::cli {
 struct ServeSettings {
   CLI::App command;  // records which arguments were given
   ServeArguments arguments;
-  net::ServerOptions options;  // without members built from other folders
+  api::ServerOptions options;  // without members built from other folders
 };
 
 // Settings from `given` (command line and environment) and the current configuration, token and

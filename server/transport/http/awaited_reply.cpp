@@ -5,7 +5,7 @@
 
 #include "server/transport/post_or_retry.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 AwaitedReply::AwaitedReply(HttpOwner& owner, boost::asio::any_io_executor executor,
                            std::shared_ptr<std::atomic<bool>> lost)
@@ -28,7 +28,7 @@ AwaitedReply::~AwaitedReply() {
   }
 }
 
-void AwaitedReply::answer(Response response) {
+void AwaitedReply::answer(http::Response response) {
   if (answered_) return;
   answered_ = true;
   tell([response = std::move(response)](HttpOwner& owner) mutable {
@@ -36,4 +36,4 @@ void AwaitedReply::answer(Response response) {
   });
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

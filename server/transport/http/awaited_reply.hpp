@@ -8,7 +8,7 @@
 #include "server/http/exchange.hpp"
 #include "server/transport/http/http_owner.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // Holds the session weakly: it must not be destroyed on the renderer's thread; its timer keeps it
 // alive while a response is pending. If the work is lost and no response arrives, the connection is
@@ -21,7 +21,7 @@ class AwaitedReply {
   AwaitedReply(const AwaitedReply&) = delete;
   AwaitedReply& operator=(const AwaitedReply&) = delete;
 
-  void answer(Response response);  // any thread
+  void answer(http::Response response);  // any thread
 
  private:
   template <class Body>
@@ -33,4 +33,4 @@ class AwaitedReply {
   bool answered_ = false;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

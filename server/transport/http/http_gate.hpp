@@ -8,13 +8,14 @@
 #include "server/api/server_options.hpp"
 #include "server/http/exchange.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // Parses the target into the request. `version`: as of Beast, 11 for HTTP/1.1. A refusal, or none.
-std::optional<Response> check_form(const ServerOptions& options, Request& request,
-                                   boost::beast::string_view target, unsigned version);
+std::optional<http::Response> check_form(const api::ServerOptions& options, http::Request& request,
+                                         boost::beast::string_view target, unsigned version);
 // Token, origin and login attempts. `upgrade`: to a stream. A refusal, or none.
-std::optional<Response> check_access(const ServerOptions& options, Admission& admission,
-                                     const Request& request, bool upgrade, bool secure);
+std::optional<http::Response> check_access(const api::ServerOptions& options,
+                                           access::Admission& admission,
+                                           const http::Request& request, bool upgrade, bool secure);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

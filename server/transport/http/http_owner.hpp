@@ -8,7 +8,7 @@
 #include "server/http/exchange.hpp"
 #include "server/transport/guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
  public:
@@ -18,7 +18,7 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
   HttpOwner& operator=(const HttpOwner&) = delete;
 
   [[nodiscard]] virtual const std::string& request_id() const = 0;
-  virtual void on_reply(Response response) = 0;
+  virtual void on_reply(http::Response response) = 0;
   virtual void abort() = 0;  // end now
   virtual void close() = 0;  // the connection's time is over, or it has failed
 
@@ -29,4 +29,4 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
   }
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

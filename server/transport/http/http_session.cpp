@@ -29,10 +29,9 @@
 #include "server/transport/websocket/websocket_session.hpp"
 #include "server/transport/wire.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
-namespace http = beast::http;
 namespace limits = protocol::limits;
 using Clock = std::chrono::steady_clock;
 
@@ -48,8 +47,8 @@ std::int64_t micros_since(Clock::time_point since) {
 
 // One request and its response.
 struct CurrentRequest {
-  Request request;
-  const char* route = route_other;
+  http::Request request;
+  const char* route = api::route_other;
   Clock::time_point began;  // first byte of the request
   bool charged = false;     // the request was charged to its address
   bool quiet = false;       // do not log the request
@@ -59,7 +58,7 @@ struct CurrentRequest {
 
 class HttpSession final : public Connection, public HttpOwner {
  public:
-  HttpSession(Wire wire, Services& services, Connections& connections, Visitor visitor)
+  HttpSession(Wire wire, api::Services& services, Connections& connections, access::Visitor visitor)
       : services_(services),
         connections_(connections),
         id_(connections.next_id()),
@@ -78,7 +77,7 @@ class HttpSession final : public Connection, public HttpOwner {
 
   void refuse_plain(bool late) {
     add(late);
-    refuse(problem_response(400, "Bad Request", "this port requires TLS: use https://"));
+    refuse(http::problem_response(400, "Bad Request", "this port requires TLS: use https://"));
   }
 
   void drain() override {
@@ -98,7 +97,7 @@ class HttpSession final : public Connection, public HttpOwner {
     visitor_.place.reset();  // free the place at once
   }
 
-  void on_reply(Response response) override {
+  void on_reply(http::Response response) override {
     if (phase_ != Phase::answering) return;
     phase_ = Phase::reading;
     leave_timer_.cancel();
@@ -122,21 +121,21 @@ class HttpSession final : public Connection, public HttpOwner {
   void add(bool late) {
     connections_.add(id_, std::static_pointer_cast<HttpSession>(shared_from_this()), false, late);
     came_ = Clock::now();
-    current_ = {blank_request(), route_other, came_};
+    current_ = {blank_request(), api::route_other, came_};
   }
 
   // Charged to the peer until the client address is known.
-  [[nodiscard]] Request blank_request() const {
-    Request request;
+  [[nodiscard]] http::Request blank_request() const {
+    http::Request request;
     request.peer = id_;
-    request.address = counted_address(visitor_.peer);
+    request.address = access::counted_address(visitor_.peer);
     return request;
   }
 
   // --- reading ----------------------------------------------------------------------------------
 
   void next_request() {
-    current_ = {blank_request(), route_other, current_.began};
+    current_ = {blank_request(), api::route_other, current_.began};
     input_.begin();
     if (input_.has_input()) return begin_header();
     phase_ = Phase::idle;
@@ -178,10 +177,10 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   void on_header() {
-    Request& request = current_.request;
+    http::Request& request = current_.request;
     input_.copy_header(request);
     current_.is_head = request.method == "HEAD";
-    if (std::string id = request.header(request_id_header); is_request_id(id)) {
+    if (std::string id = request.header(http::request_id_header); http::is_request_id(id)) {
       request.id = std::move(id);
     } else {
       request.id = services_.request_ids.next();
@@ -191,11 +190,12 @@ class HttpSession final : public Connection, public HttpOwner {
       return refuse(std::move(*fault));
     }
     current_.charged = true;
-    if (auto refusal = services_.admission.request(visitor_, request, names_health(request))) {
+    if (auto refusal = services_.admission.request(visitor_, request, api::names_health(request))) {
       return refuse(std::move(*refusal));
     }
-    const bool upgrade = asks_for_websocket(request, message.version()) && names_stream(request);
-    if (upgrade) current_.route = route_stream;
+    const bool upgrade =
+        http::asks_for_websocket(request, message.version()) && api::names_stream(request);
+    if (upgrade) current_.route = api::route_stream;
     if (auto refusal = check_access(services_.options, services_.admission, request, upgrade,
                                     wire_.secure())) {
       return refuse(std::move(*refusal));
@@ -207,8 +207,9 @@ class HttpSession final : public Connection, public HttpOwner {
     if (input_.parser().is_done()) return dispatch();
     wire_.within(std::chrono::seconds(limits::http_body_timeout_s));
     // Ignored in HTTP/1.0 (RFC 9110, 10.1.1).
-    const bool expects = input_.parser().get().version() == 11 &&
-                         equal_without_case(current_.request.header("Expect"), "100-continue");
+    const bool expects =
+        input_.parser().get().version() == 11 &&
+        http::equal_without_case(current_.request.header("Expect"), "100-continue");
     if (!expects) return read_rest();
     static constexpr std::string_view go_on = "HTTP/1.1 100 Continue\r\n\r\n";
     asio::async_write(wire_.wire(), asio::buffer(go_on),
@@ -219,31 +220,33 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   void read_rest() {
-    http::async_read(wire_.wire(), input_.buffer(), input_.parser(),
-                     handler([this](ErrorCode fault, std::size_t) {
-                       if (fault == http::error::body_limit) return refuse(body_too_large());
-                       // Other errors are those of the connection, or its deadline.
-                       if (fault && !RequestParser::is_fault_of_text(fault)) return close();
-                       if (fault) return refuse(RequestParser::refusal_of(fault));
-                       dispatch();
-                     }));
+    beast::http::async_read(wire_.wire(), input_.buffer(), input_.parser(),
+                            handler([this](ErrorCode fault, std::size_t) {
+                              if (fault == beast::http::error::body_limit)
+                                return refuse(http::body_too_large());
+                              // Other errors are those of the connection, or its deadline.
+                              if (fault && !RequestParser::is_fault_of_text(fault)) return close();
+                              if (fault) return refuse(RequestParser::refusal_of(fault));
+                              dispatch();
+                            }));
   }
 
   // --- answering --------------------------------------------------------------------------------
 
   void dispatch() {
     asked_ = true;
-    Request& request = current_.request;
+    http::Request& request = current_.request;
     request.body = std::move(input_.parser().get().body());
     current_.keep_alive = input_.parser().get().keep_alive();
     wire_.with_no_deadline();
-    if (services_.options.token != nullptr && is_login(request)) {
-      current_.route = route_login;
+    if (services_.options.token != nullptr && access::is_login(request)) {
+      current_.route = api::route_login;
       if (auto over = services_.admission.may_try_login(request.address)) {
         return send(std::move(*over));
       }
-      Response answer = log_in(request, *services_.options.token, services_.options.base_path,
-                               wire_.secure(), std::time(nullptr));
+      http::Response answer =
+          access::log_in(request, *services_.options.token, services_.options.base_path,
+                         wire_.secure(), std::time(nullptr));
       if (answer.status == 401) services_.admission.failed_login(request.address);
       return send(std::move(answer));
     }
@@ -251,8 +254,9 @@ class HttpSession final : public Connection, public HttpOwner {
     watch_for_leaving();
     const auto awaited =
         std::make_shared<AwaitedReply>(*this, wire_.wire().get_executor(), answer_lost_);
-    current_.route = route(services_, request,
-                           [awaited](Response response) { awaited->answer(std::move(response)); });
+    current_.route = route(services_, request, [awaited](http::Response response) {
+      awaited->answer(std::move(response));
+    });
   }
 
   // While a picture is drawn, detect a peer that disconnects. The read continues after the
@@ -283,7 +287,7 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   // A response after which the connection is closed: the rest of the stream cannot be parsed.
-  void refuse(Response response) {
+  void refuse(http::Response response) {
     response.close = true;
     // Requests refused before parsing are charged as well.
     if (!current_.charged) {
@@ -292,20 +296,20 @@ class HttpSession final : public Connection, public HttpOwner {
     send(std::move(response));
   }
 
-  void send(Response response) {
-    Request& request = current_.request;
+  void send(http::Response response) {
+    http::Request& request = current_.request;
     current_.keep_alive = current_.keep_alive && !response.close && !draining_ &&
                           !services_.draining && !visitor_.reserve;
     if (request.id.empty()) request.id = services_.request_ids.next();  // refused before parsing
-    name_request(response, request.id);
+    http::name_request(response, request.id);
     // Applies to every port of the host, and other programs listen on this machine's loopback.
     if (const std::string host = request.header("Host");
-        wire_.secure() && !host.empty() && !names_loopback(host)) {
+        wire_.secure() && !host.empty() && !http::names_loopback(host)) {
       response.headers.emplace_back("Strict-Transport-Security", hsts);
     }
     services_.metrics.answered(current_.route, response.status);
     response_ = std::move(response);
-    head_ = response_head(response_, current_.keep_alive);
+    head_ = http::response_head(response_, current_.keep_alive);
     const auto body = current_.is_head ? std::span<const std::uint8_t>{} : response_.body.bytes;
     wire_.within(write_deadline(body.size(), limits::write_timeout_s));
     phase_ = Phase::sending;
@@ -317,7 +321,7 @@ class HttpSession final : public Connection, public HttpOwner {
           phase_ = Phase::reading;
           on_sent(bytes, written_since);
           if (fault) return close();
-          response_ = Response{};
+          response_ = http::Response{};
           if (peer_ended_)
             return close();  // end of stream is reported once: another read would hang
           current_.keep_alive && !draining_ ? next_request() : wire_.linger(input_);
@@ -325,10 +329,10 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   void on_sent(std::size_t bytes, Clock::time_point since) {
-    services_.metrics.bytes_sent(Metrics::Over::http, bytes);
+    services_.metrics.bytes_sent(metrics::Metrics::Over::http, bytes);
     services_.admission.sent(current_.request.address, bytes);
     if (response_.content_type.starts_with("image/")) {
-      services_.metrics.stage_took(Metrics::Stage::write, micros_since(since));
+      services_.metrics.stage_took(metrics::Metrics::Stage::write, micros_since(since));
     }
     log_access(response_.status, bytes);
   }
@@ -338,7 +342,7 @@ class HttpSession final : public Connection, public HttpOwner {
     if (current_.quiet) return;
     const std::string_view route = current_.route;
     const bool often =
-        route == "/livez" || route == "/readyz" || route == "/metrics" || route == route_page;
+        route == "/livez" || route == "/readyz" || route == "/metrics" || route == api::route_page;
     log::write(often ? log::Level::debug : log::Level::info, "request",
                {{"request", current_.request.id},
                 {"method", current_.request.method},
@@ -351,36 +355,36 @@ class HttpSession final : public Connection, public HttpOwner {
   // --- a stream ---------------------------------------------------------------------------------
 
   void begin_stream() {
-    const Request& request = current_.request;
+    const http::Request& request = current_.request;
     if (!input_.parser().is_done() || input_.has_input()) {
-      return refuse(problem_response(400, "Bad Request", "an upgrade has no body"));
+      return refuse(http::problem_response(400, "Bad Request", "an upgrade has no body"));
     }
-    if (auto fault = check_upgrade(request)) return refuse(std::move(*fault));
+    if (auto fault = http::check_upgrade(request)) return refuse(std::move(*fault));
     if (services_.draining) {
       return refuse(
-          problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
+          http::problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
     }
     auto seat = services_.admission.open_session(request.address);
     if (seat.refusal) return refuse(std::move(*seat.refusal));
     wire_.with_no_deadline();
     UpgradeRequest message;
-    static_cast<http::request_header<>&>(message) = std::move(input_.parser().get().base());
+    static_cast<beast::http::request_header<>&>(message) = std::move(input_.parser().get().base());
     // The library parses only the first line of a list header.
-    message.set(http::field::connection, "Upgrade");
-    message.set(http::field::upgrade, "websocket");
+    message.set(beast::http::field::connection, "Upgrade");
+    message.set(beast::http::field::upgrade, "websocket");
     start_websocket_session(std::move(wire_.wire()), message, request.id, services_, connections_,
                             {request.address, std::move(visitor_.place), std::move(seat.place)});
   }
 
-  Services& services_;
+  api::Services& services_;
   Connections& connections_;
   const std::uint64_t id_;
-  Visitor visitor_;
+  access::Visitor visitor_;
   HttpWire wire_;
   asio::steady_timer leave_timer_;
   RequestParser input_;
   CurrentRequest current_;
-  Response response_;
+  http::Response response_;
   std::string head_;
   // A response could not be posted to the io thread.
   const std::shared_ptr<std::atomic<bool>> answer_lost_ =
@@ -395,16 +399,16 @@ class HttpSession final : public Connection, public HttpOwner {
 
 }  // namespace
 
-void start_http_session(Wire wire, Services& services, Connections& connections, Visitor visitor,
-                        bool late) {
+void start_http_session(Wire wire, api::Services& services, Connections& connections,
+                        access::Visitor visitor, bool late) {
   std::make_shared<HttpSession>(std::move(wire), services, connections, std::move(visitor))
       ->start(late);
 }
 
-void refuse_plain_http(Wire wire, Services& services, Connections& connections, Visitor visitor,
-                       bool late) {
+void refuse_plain_http(Wire wire, api::Services& services, Connections& connections,
+                       access::Visitor visitor, bool late) {
   std::make_shared<HttpSession>(std::move(wire), services, connections, std::move(visitor))
       ->refuse_plain(late);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -5,15 +5,15 @@
 #include "server/api/router.hpp"
 #include "server/transport/connections.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class Wire;
 
 // `late`: accepted during a drain, which does not wait for it.
-void start_http_session(Wire wire, Services& services, Connections& connections, Visitor visitor,
-                        bool late);
+void start_http_session(Wire wire, api::Services& services, Connections& connections,
+                        access::Visitor visitor, bool late);
 // Responds to a plain HTTP request on a TLS port.
-void refuse_plain_http(Wire wire, Services& services, Connections& connections, Visitor visitor,
-                       bool late);
+void refuse_plain_http(Wire wire, api::Services& services, Connections& connections,
+                       access::Visitor visitor, bool late);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

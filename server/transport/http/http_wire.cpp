@@ -5,7 +5,7 @@
 
 #include "server/transport/peer.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -19,7 +19,7 @@ HttpWire::HttpWire(HttpOwner& owner, Wire wire, bool reserve)
     : owner_(owner), wire_(std::move(wire)), deadline_(wire_.get_executor()), reserve_(reserve) {}
 
 bool HttpWire::peer_has_left() {
-  return net::peer_has_left(wire_.next_layer().socket().native_handle());
+  return transport::peer_has_left(wire_.next_layer().socket().native_handle());
 }
 
 void HttpWire::within(std::chrono::milliseconds time) {
@@ -63,4 +63,4 @@ void HttpWire::close() {
   wire_.close();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

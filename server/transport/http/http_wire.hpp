@@ -9,7 +9,7 @@
 #include "server/transport/http/request_parser.hpp"
 #include "server/transport/wire.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class HttpWire {
  public:
@@ -57,4 +57,4 @@ class HttpWire {
   bool lingering_ = false;  // discarding input before closing
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

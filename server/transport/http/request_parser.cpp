@@ -10,10 +10,9 @@
 #include "server/http/http_checks.hpp"
 #include "server/http/problem.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
-namespace http = beast::http;
 namespace limits = protocol::limits;
 
 }  // namespace
@@ -40,7 +39,8 @@ RequestParser::Header RequestParser::parse_header() {
   const std::size_t end = text.find("\r\n\r\n", searched_);
   const std::size_t length = end == std::string_view::npos ? text.size() : end + 4;
   if (length > limits::http_header_bytes_max) {
-    return {true, problem_response(431, "Request Header Fields Too Large",
+    return {true,
+            http::problem_response(431, "Request Header Fields Too Large",
                                    "a request's header may have " +
                                        std::to_string(limits::http_header_bytes_max) + " bytes")};
   }
@@ -48,14 +48,15 @@ RequestParser::Header RequestParser::parse_header() {
     searched_ = text.size() < 3 ? 0 : text.size() - 3;
     return {};
   }
-  if (auto fault = check_header_bytes(text.substr(0, length))) return {true, std::move(fault)};
+  if (auto fault = http::check_header_bytes(text.substr(0, length)))
+    return {true, std::move(fault)};
   ErrorCode fault;
   buffer_.consume(parser_->put(buffer_.data(), fault));
   if (fault || !parser_->is_header_done()) return {true, refusal_of(fault)};
   return {true, std::nullopt};
 }
 
-void RequestParser::copy_header(Request& request) const {
+void RequestParser::copy_header(http::Request& request) const {
   const auto& message = parser_->get();
   request.method = std::string(message.method_string());
   for (const auto& field : message) {
@@ -64,20 +65,20 @@ void RequestParser::copy_header(Request& request) const {
 }
 
 bool RequestParser::is_fault_of_text(ErrorCode fault) {
-  return fault.category() == ErrorCode(http::error::end_of_stream).category() &&
-         fault != http::error::partial_message;
+  return fault.category() == ErrorCode(beast::http::error::end_of_stream).category() &&
+         fault != beast::http::error::partial_message;
 }
 
-Response RequestParser::refusal_of(ErrorCode fault) {
-  if (fault == http::error::body_limit) return body_too_large();
-  if (fault == http::error::header_limit) {
-    return problem_response(431, "Request Header Fields Too Large", fault.message());
+http::Response RequestParser::refusal_of(ErrorCode fault) {
+  if (fault == beast::http::error::body_limit) return http::body_too_large();
+  if (fault == beast::http::error::header_limit) {
+    return http::problem_response(431, "Request Header Fields Too Large", fault.message());
   }
-  if (fault == http::error::bad_version) {
-    return problem_response(505, "HTTP Version Not Supported",
-                            "this server speaks HTTP/1.1 and HTTP/1.0");
+  if (fault == beast::http::error::bad_version) {
+    return http::problem_response(505, "HTTP Version Not Supported",
+                                  "this server speaks HTTP/1.1 and HTTP/1.0");
   }
-  return problem_response(400, "Bad Request", "malformed HTTP request: " + fault.message());
+  return http::problem_response(400, "Bad Request", "malformed HTTP request: " + fault.message());
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -12,7 +12,7 @@
 #include "server/http/exchange.hpp"
 #include "server/transport/stream.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class RequestParser {
  public:
@@ -29,16 +29,16 @@ class RequestParser {
 
   struct Header {
     bool complete = false;
-    std::optional<Response> refusal;
+    std::optional<http::Response> refusal;
   };
   // Parses the header if it has arrived.
   Header parse_header();
   // The parsed header's method and fields.
-  void copy_header(Request& request) const;
+  void copy_header(http::Request& request) const;
 
   // Whether the error is in the request's text, not in the connection; and its answer.
   static bool is_fault_of_text(ErrorCode fault);
-  static Response refusal_of(ErrorCode fault);
+  static http::Response refusal_of(ErrorCode fault);
 
  private:
   static constexpr std::size_t buffer_bytes_max = std::size_t{16} * 1024;
@@ -48,4 +48,4 @@ class RequestParser {
   std::optional<Parser> parser_;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

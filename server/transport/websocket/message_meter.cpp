@@ -4,7 +4,7 @@
 
 #include "protocol/limits.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 // Bytes on the wire for one message: text and frame headers.
@@ -36,4 +36,4 @@ MessageMeter::Verdict MessageMeter::check(std::size_t bytes_read, Clock::time_po
   return bytes > wire_bytes_max ? Verdict::too_long : Verdict::fine;
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <optional>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class MessageMeter {
  public:
@@ -27,4 +27,4 @@ class MessageMeter {
   int controls_ = 0;                        // since the last check
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

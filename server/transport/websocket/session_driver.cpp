@@ -7,7 +7,7 @@
 
 #include "protocol/codec.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 struct EffectRunner {
@@ -29,8 +29,8 @@ struct EffectRunner {
 }  // namespace
 
 SessionDriver::SessionDriver(StreamOwner& owner, WebSocketStream& socket, session::Session session,
-                             Backend& backend, Metrics& metrics, Admission& admission,
-                             const std::string& address)
+                             work::Backend& backend, metrics::Metrics& metrics,
+                             access::Admission& admission, const std::string& address)
     : owner_(owner),
       metrics_(metrics),
       writer_(owner, socket, metrics, admission, address, *this),
@@ -117,4 +117,4 @@ void SessionDriver::schedule() {
   }));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -13,13 +13,13 @@
 #include "server/transport/websocket/stream_owner.hpp"
 #include "server/transport/websocket/websocket_writer.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class SessionDriver final : public StreamEvents {
  public:
   // `address` is charged with the work and the bytes sent.
   SessionDriver(StreamOwner& owner, WebSocketStream& socket, session::Session session,
-                Backend& backend, Metrics& metrics, Admission& admission,
+                work::Backend& backend, metrics::Metrics& metrics, access::Admission& admission,
                 const std::string& address);
   ~SessionDriver() override;
 
@@ -42,7 +42,7 @@ class SessionDriver final : public StreamEvents {
   void schedule();
 
   StreamOwner& owner_;
-  Metrics& metrics_;
+  metrics::Metrics& metrics_;
   WebSocketWriter writer_;
   SessionWork work_;
   session::Session session_;
@@ -52,4 +52,4 @@ class SessionDriver final : public StreamEvents {
   bool counted_ = false;  // counted as a session
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

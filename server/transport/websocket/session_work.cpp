@@ -5,7 +5,7 @@
 
 #include "server/transport/post_or_retry.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 constexpr int close_over_quota = 1013;
@@ -14,8 +14,9 @@ constexpr std::chrono::seconds throttle_max{10};
 }  // namespace
 
 SessionWork::SessionWork(StreamOwner& owner, const boost::asio::any_io_executor& executor,
-                         Backend& backend, Admission& admission, const std::string& address,
-                         DrawnReply on_rendered, DescribedReply on_described)
+                         work::Backend& backend, access::Admission& admission,
+                         const std::string& address, work::DrawnReply on_rendered,
+                         work::DescribedReply on_described)
     : owner_(owner),
       executor_(executor),
       admission_(admission),
@@ -85,4 +86,4 @@ void SessionWork::stop() {
   timer_.cancel();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

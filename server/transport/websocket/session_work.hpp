@@ -16,13 +16,13 @@
 #include "server/transport/websocket/stream_owner.hpp"
 #include "server/work/viewer.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class SessionWork {
  public:
-  SessionWork(StreamOwner& owner, const boost::asio::any_io_executor& executor, Backend& backend,
-              Admission& admission, const std::string& address, DrawnReply on_rendered,
-              DescribedReply on_described);
+  SessionWork(StreamOwner& owner, const boost::asio::any_io_executor& executor,
+              work::Backend& backend, access::Admission& admission, const std::string& address,
+              work::DrawnReply on_rendered, work::DescribedReply on_described);
 
   // A throttled address gets its frames later; a long delay closes the session.
   void start(const session::StartRender& effect);
@@ -43,14 +43,14 @@ class SessionWork {
 
   StreamOwner& owner_;
   const boost::asio::any_io_executor executor_;
-  Admission& admission_;
+  access::Admission& admission_;
   const std::string& address_;
-  Viewer viewer_;
-  DrawnReply on_rendered_;
-  DescribedReply on_described_;
+  work::Viewer viewer_;
+  work::DrawnReply on_rendered_;
+  work::DescribedReply on_described_;
   boost::asio::steady_timer timer_;
   std::optional<session::StartRender> throttled_;  // starts when timer_ expires
   const std::shared_ptr<std::atomic<bool>> reply_lost_ = std::make_shared<std::atomic<bool>>(false);
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class StreamEvents {
  public:
@@ -21,4 +21,4 @@ class StreamEvents {
   [[nodiscard]] virtual bool has_lost_reply() const = 0;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

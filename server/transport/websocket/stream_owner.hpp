@@ -8,7 +8,7 @@
 
 #include "server/transport/guarded.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class StreamOwner : public std::enable_shared_from_this<StreamOwner> {
  public:
@@ -42,4 +42,4 @@ class StreamOwner : public std::enable_shared_from_this<StreamOwner> {
   bool ended_ = false;  // disconnected
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -6,7 +6,7 @@
 
 #include "protocol/limits.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 constexpr int close_policy = 1008;
@@ -14,9 +14,9 @@ constexpr int close_too_big = 1009;
 
 }  // namespace
 
-WebSocketReader::WebSocketReader(StreamOwner& owner, WebSocketStream& socket, Admission& admission,
-                                 const std::string& address, const WriteQueue& queue,
-                                 StreamEvents& events)
+WebSocketReader::WebSocketReader(StreamOwner& owner, WebSocketStream& socket,
+                                 access::Admission& admission, const std::string& address,
+                                 const WriteQueue& queue, StreamEvents& events)
     : owner_(owner),
       socket_(socket),
       admission_(admission),
@@ -118,4 +118,4 @@ void WebSocketReader::watch() {
   }));
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -13,12 +13,12 @@
 #include "server/transport/websocket/websocket_stream.hpp"
 #include "server/transport/websocket/write_queue.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class WebSocketReader {
  public:
   // Messages are charged to `address`. While the queue is backlogged, nothing is read.
-  WebSocketReader(StreamOwner& owner, WebSocketStream& socket, Admission& admission,
+  WebSocketReader(StreamOwner& owner, WebSocketStream& socket, access::Admission& admission,
                   const std::string& address, const WriteQueue& queue, StreamEvents& events);
 
   // Before the socket is accepted: limits the size of messages and listens to pings.
@@ -36,7 +36,7 @@ class WebSocketReader {
 
   StreamOwner& owner_;
   WebSocketStream& socket_;
-  Admission& admission_;
+  access::Admission& admission_;
   const std::string& address_;
   const WriteQueue& queue_;
   StreamEvents& events_;
@@ -49,4 +49,4 @@ class WebSocketReader {
   bool watching_ = false;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

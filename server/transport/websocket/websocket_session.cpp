@@ -16,7 +16,7 @@
 #include "server/transport/websocket/websocket_reader.hpp"
 #include "server/transport/websocket/websocket_stream.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 constexpr int close_policy = 1008;
@@ -29,21 +29,21 @@ constexpr std::chrono::seconds close_timeout{2};
 bool offers_protocol(const UpgradeRequest& request) {
   for (const auto& field : request) {
     if (field.name() != beast::http::field::sec_websocket_protocol) continue;
-    for (const std::string_view name : split_list(field.value(), ',')) {
+    for (const std::string_view name : http::split_list(field.value(), ',')) {
       if (name == protocol::protocol_name) return true;
     }
   }
   return false;
 }
 
-std::optional<session::Reading> what_is_read(const Services& services, const std::string& id) {
+std::optional<session::Reading> what_is_read(const api::Services& services, const std::string& id) {
   const auto dataset = services.backend.catalogue.find(id);
   const auto loading = dataset ? (*dataset)->loading() : std::nullopt;
   if (!loading) return std::nullopt;
   return session::Reading{loading->field, loading->done};
 }
 
-session::Session new_session(Services& services) {
+session::Session new_session(api::Services& services) {
   session::Options options;
   options.idle_timeout_us = session::Micros{services.options.idle_timeout_s} * 1'000'000;
   return {
@@ -62,8 +62,8 @@ session::Session new_session(Services& services) {
 
 class WebSocketSession final : public Connection, public StreamOwner {
  public:
-  WebSocketSession(Wire wire, std::string request_id, Services& services, Connections& connections,
-                   Guest guest)
+  WebSocketSession(Wire wire, std::string request_id, api::Services& services,
+                   Connections& connections, Guest guest)
       : StreamOwner(connections.next_id(), std::move(request_id)),
         socket_(std::move(wire)),
         services_(services),
@@ -90,7 +90,7 @@ class WebSocketSession final : public Connection, public StreamOwner {
     const bool named = offers_protocol(request);
     socket_.set_option(websocket::stream_base::decorator(
         [named, id = request_id_](websocket::response_type& response) {
-          response.set(request_id_header, id);
+          response.set(http::request_id_header, id);
           response.set(beast::http::field::server, "windsplat");
           if (named) {
             response.set(beast::http::field::sec_websocket_protocol, protocol::protocol_name);
@@ -149,10 +149,10 @@ class WebSocketSession final : public Connection, public StreamOwner {
  private:
   void on_open(bool full) {
     open_ = true;
-    if (is_other_token(token_.get(), services_.options.token.get())) return on_new_token();
-    services_.metrics.answered(route_stream, 101);
+    if (access::is_other_token(token_.get(), services_.options.token.get())) return on_new_token();
+    services_.metrics.answered(api::route_stream, 101);
     if (full) {
-      services_.metrics.refused(LimitKind::sessions);
+      services_.metrics.refused(metrics::LimitKind::sessions);
       return close(close_full, "the server is full");
     }
     if (services_.draining) return drain();
@@ -165,10 +165,10 @@ class WebSocketSession final : public Connection, public StreamOwner {
   }
 
   WebSocketStream socket_;
-  Services& services_;
+  api::Services& services_;
   Connections& connections_;
   const Guest guest_;
-  const std::shared_ptr<const Token> token_;  // token that authorised it
+  const std::shared_ptr<const access::Token> token_;  // token that authorised it
   asio::steady_timer close_timer_;
   SessionDriver driver_;
   WebSocketReader reader_;
@@ -177,10 +177,10 @@ class WebSocketSession final : public Connection, public StreamOwner {
 }  // namespace
 
 void start_websocket_session(Wire wire, const UpgradeRequest& request, std::string request_id,
-                             Services& services, Connections& connections, Guest guest) {
+                             api::Services& services, Connections& connections, Guest guest) {
   std::make_shared<WebSocketSession>(std::move(wire), std::move(request_id), services, connections,
                                      std::move(guest))
       ->start(request);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

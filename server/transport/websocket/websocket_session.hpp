@@ -8,17 +8,17 @@
 #include "server/transport/connections.hpp"
 #include "server/transport/wire.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 // Client of the session: the address charged, and its places among connections and sessions.
 struct Guest {
   std::string address;
-  Ticket connection;
-  Ticket session;
+  access::Ticket connection;
+  access::Ticket session;
 };
 
 // `request` is an authorised upgrade (auth.hpp); `request_id` names it in the response and the log.
 void start_websocket_session(Wire wire, const UpgradeRequest& request, std::string request_id,
-                             Services& services, Connections& connections, Guest guest);
+                             api::Services& services, Connections& connections, Guest guest);
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -7,7 +7,7 @@
 #include "server/session/pacing/link.hpp"
 #include "server/transport/wire.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 namespace websocket = beast::websocket;
 using WebSocketStream = websocket::stream<Wire>;
@@ -19,4 +19,4 @@ inline session::Micros now_us() {
       .count();
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

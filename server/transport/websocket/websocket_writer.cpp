@@ -6,11 +6,11 @@
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
-WebSocketWriter::WebSocketWriter(StreamOwner& owner, WebSocketStream& socket, Metrics& metrics,
-                                 Admission& admission, const std::string& address,
-                                 StreamEvents& events)
+WebSocketWriter::WebSocketWriter(StreamOwner& owner, WebSocketStream& socket,
+                                 metrics::Metrics& metrics, access::Admission& admission,
+                                 const std::string& address, StreamEvents& events)
     : owner_(owner),
       socket_(socket),
       metrics_(metrics),
@@ -65,7 +65,7 @@ void WebSocketWriter::write(const Buffers& buffers, std::size_t bytes, bool is_t
   socket_.text(is_text);
   socket_.async_write(buffers, owner_.handler([this, is_text](ErrorCode fault, std::size_t sent) {
     writing_ = false;
-    metrics_.bytes_sent(Metrics::Over::stream, sent);
+    metrics_.bytes_sent(metrics::Metrics::Over::stream, sent);
     admission_.sent(address_, sent);
     timer_.cancel();
     if (owner_.has_ended()) return;
@@ -80,11 +80,11 @@ void WebSocketWriter::on_written(bool is_text) {
     pump();
     owner_.on_text_written();
   } else {
-    metrics_.stage_took(Metrics::Stage::write, now_us() - written_since_);
+    metrics_.stage_took(metrics::Metrics::Stage::write, now_us() - written_since_);
     metrics_.frame_sent(queue_.frame()->tier, queue_.frame()->facts);
     queue_.pop_frame();
     events_.on_frame_written();
   }
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -14,13 +14,13 @@
 #include "server/transport/websocket/websocket_stream.hpp"
 #include "server/transport/websocket/write_queue.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 class WebSocketWriter {
  public:
   // `address` is charged with the bytes sent.
-  WebSocketWriter(StreamOwner& owner, WebSocketStream& socket, Metrics& metrics,
-                  Admission& admission, const std::string& address, StreamEvents& events);
+  WebSocketWriter(StreamOwner& owner, WebSocketStream& socket, metrics::Metrics& metrics,
+                  access::Admission& admission, const std::string& address, StreamEvents& events);
 
   [[nodiscard]] const WriteQueue& queue() const { return queue_; }
   void send(const protocol::ServerMessage& message);
@@ -37,8 +37,8 @@ class WebSocketWriter {
 
   StreamOwner& owner_;
   WebSocketStream& socket_;
-  Metrics& metrics_;
-  Admission& admission_;
+  metrics::Metrics& metrics_;
+  access::Admission& admission_;
   const std::string& address_;
   StreamEvents& events_;
   WriteQueue queue_;
@@ -48,4 +48,4 @@ class WebSocketWriter {
   bool pinging_ = false;
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 constexpr std::size_t waiting_text_bytes_max = std::size_t{256} * 1024;
@@ -38,4 +38,4 @@ void WriteQueue::hold(std::int64_t more_bytes) {
   metrics_.unsent(more_bytes);
 }
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -13,7 +13,7 @@
 #include "server/metrics/metrics.hpp"
 #include "server/session/effects.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 
 struct QueuedFrame {
   std::array<std::uint8_t, protocol::frame_header_bytes> header;
@@ -26,7 +26,7 @@ struct QueuedFrame {
 
 class WriteQueue {
  public:
-  explicit WriteQueue(Metrics& metrics) : metrics_(metrics) {}
+  explicit WriteQueue(metrics::Metrics& metrics) : metrics_(metrics) {}
   ~WriteQueue() { hold(-held_bytes_); }
   WriteQueue(const WriteQueue&) = delete;
   WriteQueue& operator=(const WriteQueue&) = delete;
@@ -44,11 +44,11 @@ class WriteQueue {
  private:
   void hold(std::int64_t more_bytes);
 
-  Metrics& metrics_;
+  metrics::Metrics& metrics_;
   std::deque<std::string> texts_;
   std::size_t text_bytes_ = 0;
   std::optional<QueuedFrame> frame_;
   std::int64_t held_bytes_ = 0;  // of texts_ and frame_
 };
 
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -33,16 +33,16 @@ using std::chrono::milliseconds;
 constexpr milliseconds end_of_life{20'000};
 
 // Never destroyed: it serves until the process ends.
-net::Server& server() {
-  static net::Server* const the_one = [] {
+transport::Server& server() {
+  static transport::Server* const the_one = [] {
     log::configure(log::Format::text, log::Level::off);
     auto store = std::make_shared<data::Store>(std::uint64_t{512} << 20);
     expect(store->add("climate:8x6x4").has_value(), "a sample is there");
-    net::ServerOptions options;
+    api::ServerOptions options;
     options.port = 0;
     options.local_hosts_only = true;
-    auto* made =
-        new net::Server(std::move(options), std::move(store), std::make_shared<ThreadPool>(1));
+    auto* made = new transport::Server(std::move(options), std::move(store),
+                                       std::make_shared<ThreadPool>(1));
     expect(made->listen().has_value(), "a free port");
     std::thread([made] {
       made->run();

@@ -18,8 +18,8 @@ namespace {
 using fuzz::expect;
 using namespace windsplat;
 
-void read_parameters(const net::Request& request) {
-  net::QueryReader query(request.query);
+void read_parameters(const http::Request& request) {
+  http::QueryReader query(request.query);
   if (const auto x = query.number("x", -10, 10)) {
     expect(*x >= -10 && *x <= 10, "a number is in range");
   }
@@ -45,8 +45,8 @@ void read_parameters(const net::Request& request) {
 }
 
 void read_target(std::string_view target) {
-  net::Request request;
-  const auto ok = net::parse_target(target, "/base/", request);
+  http::Request request;
+  const auto ok = http::parse_target(target, "/base/", request);
   if (!ok) {
     expect(ok.error().kind == ErrorKind::malformed, "a target is understood or malformed");
     return;
@@ -61,19 +61,19 @@ void read_target(std::string_view target) {
 void read_header(std::string_view value) {
   static constexpr std::array<std::string_view, 3> offers{"image/jpeg", "image/png",
                                                           "application/x-npy"};
-  const auto chosen = net::choose_type(value, offers);
+  const auto chosen = http::choose_type(value, offers);
   expect(!chosen || *chosen < offers.size(), "what is chosen was offered");
-  (void)net::accepts_gzip(value);
-  const bool matches = net::matches_etag(value, "\"tag\"");
+  (void)http::accepts_gzip(value);
+  const bool matches = http::matches_etag(value, "\"tag\"");
   expect(!matches || value.find('*') != std::string_view::npos ||
              value.find("\"tag\"") != std::string_view::npos,
          "a tag that matches is there", value);
-  (void)net::allows_change(value, "\"tag\"");
-  expect(!net::origin_allowed(value, "good.example", {}) ||
+  (void)http::allows_change(value, "\"tag\"");
+  expect(!http::origin_allowed(value, "good.example", {}) ||
              value.find("good.example") != std::string_view::npos,
          "an origin of another host is refused", value);
-  (void)net::local_host_allowed(value, {"https://good.example"});
-  (void)net::normal_base_path(value);
+  (void)http::local_host_allowed(value, {"https://good.example"});
+  (void)http::normal_base_path(value);
 }
 
 // Line ends would start another field.

@@ -13,7 +13,7 @@
 namespace cli_test {
 namespace {
 
-using net_test::Place;
+using server_test::Place;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -33,7 +33,7 @@ class CliAccess : public testing::Test {
     return path;
   }
   void give_certificate(const std::string& name, int days = 2) const {
-    const net_test::Certificate made = net_test::make_certificate(name, days);
+    const server_test::Certificate made = server_test::make_certificate(name, days);
     write_file(folder.file("cert.pem"), made.chain);
     secret("key.pem", made.key);
   }
@@ -56,7 +56,7 @@ class CliAccess : public testing::Test {
 };
 
 int status_with(std::uint16_t port, const std::string& token, bool tls = false) {
-  return net_test::get(Place(port, tls), "/v1", {{"Authorization", "Bearer " + token}}).status;
+  return server_test::get(Place(port, tls), "/v1", {{"Authorization", "Bearer " + token}}).status;
 }
 
 // The effect of a signal is delayed.
@@ -83,7 +83,7 @@ TEST_F(CliAccess, TokenFileIsRequiredAndItsTokenNeverPrinted) {
   const auto port = port_of(daemon);
   EXPECT_EQ(status_with(port, first_token), 200);
   EXPECT_EQ(status_with(port, second_token), 401);
-  EXPECT_EQ(net_test::get(port, "/livez").status, 200);
+  EXPECT_EQ(server_test::get(port, "/livez").status, 200);
   EXPECT_EQ(run({"healthcheck", "http://127.0.0.1:" + std::to_string(port)}).code, 0);
   stop(daemon);
   EXPECT_THAT(daemon.messages(), Not(HasSubstr(first_token)));
@@ -159,7 +159,7 @@ TEST_F(CliAccess, HealthcheckOverTlsUsesTheTrustedCertificates) {
   EXPECT_THAT(untrusted.err, HasSubstr("use --ca to name certificates to trust"));
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("cert.pem")}).code, 0);
   EXPECT_EQ(run({"healthcheck", by_name}, {"WINDSPLAT_CA=" + folder.file("cert.pem")}).code, 0);
-  write_file(folder.file("other.pem"), net_test::make_certificate("mine").chain);
+  write_file(folder.file("other.pem"), server_test::make_certificate("mine").chain);
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("other.pem")}).code, 1);
   write_file(folder.file("none.pem"), "no certificate");
   EXPECT_EQ(run({"healthcheck", url, "--ca", folder.file("none.pem")}).code, 2);
@@ -178,7 +178,7 @@ TEST_F(CliAccess, InvalidCertificatePreventsStartup) {
   EXPECT_EQ(refused({"--tls-cert", cert}).code, 2);
   EXPECT_EQ(refused({"--tls-key", folder.file("key.pem")}).code, 2);
   EXPECT_EQ(refused({"--tls-cert", cert, "--tls-key", folder.file("absent")}).code, 1);
-  const std::string other = secret("other.pem", net_test::make_certificate("other").key);
+  const std::string other = secret("other.pem", server_test::make_certificate("other").key);
   const Outcome outcome = refused({"--tls-cert", cert, "--tls-key", other});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("other.pem"));
@@ -210,7 +210,7 @@ TEST_F(CliAccess, CommandLineOverridesEnvironmentOverridesConfiguration) {
   Process remote({"serve", "--config", folder.file("remote.json"), "--allow-origin",
                   "https://b.example", dataset});
   const auto from = [port = port_of(remote)](const char* origin) {
-    return net_test::StreamClient(port, {{"Origin", origin}}).handshake().status;
+    return server_test::StreamClient(port, {{"Origin", origin}}).handshake().status;
   };
   EXPECT_EQ(from("https://b.example"), 101);
   EXPECT_EQ(from("https://a.example"), 403) << "a list replaces the earlier one";
@@ -276,16 +276,16 @@ TEST_F(CliAccess, SighupReloadsTheCertificateAndAnInvalidOneChangesNothing) {
   give_certificate("first");
   Process daemon(serve(tls_words()));
   const Place place(port_of(daemon), true);
-  const auto name = [&] { return net_test::Socket(place).peer_name(); };
+  const auto name = [&] { return server_test::Socket(place).peer_name(); };
   ASSERT_EQ(name(), "first");
   give_certificate("second");
   daemon.send(SIGHUP);
   EXPECT_TRUE(eventually([&] { return name() == "second"; }));
-  write_file(folder.file("cert.pem"), net_test::make_certificate("third").chain);  // not its key
+  write_file(folder.file("cert.pem"), server_test::make_certificate("third").chain);  // not its key
   daemon.send(SIGHUP);
   EXPECT_TRUE(says(daemon, "configuration is unchanged"));
   EXPECT_EQ(name(), "second");
-  EXPECT_EQ(net_test::get(place, "/livez").status, 200);
+  EXPECT_EQ(server_test::get(place, "/livez").status, 200);
   stop(daemon);
 }
 
@@ -299,8 +299,8 @@ TEST_F(CliAccess, SighupAppliesTheConfigurationWholeOrNotAtAll) {
   Process daemon(serve({"--config", config}));
   const auto port = port_of(daemon);
   const auto from_friend = [&] {
-    return net_test::StreamClient(port, {{"Authorization", "Bearer " + first_token},
-                                         {"Origin", "https://friend.example"}})
+    return server_test::StreamClient(port, {{"Authorization", "Bearer " + first_token},
+                                            {"Origin", "https://friend.example"}})
         .handshake()
         .status;
   };
@@ -328,9 +328,9 @@ TEST_F(CliAccess, RootOnANonLoopbackAddressRequiresItsFlag) {
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, HasSubstr("--allow-root"));
   Process open(words, {"WINDSPLAT_ALLOW_ROOT=true"});
-  EXPECT_EQ(net_test::get(port_of(open), "/v1").status, 200);
+  EXPECT_EQ(server_test::get(port_of(open), "/v1").status, 200);
   Process local({"serve", "--listen", "127.0.0.1:0", dataset});
-  EXPECT_EQ(net_test::get(port_of(local), "/v1").status, 200) << "loopback needs no flag";
+  EXPECT_EQ(server_test::get(port_of(local), "/v1").status, 200) << "loopback needs no flag";
 }
 
 TEST_F(CliAccess, SighupCannotRemoveTheTokenOfANonLoopbackServer) {
@@ -349,7 +349,7 @@ TEST_F(CliAccess, SighupCannotRemoveTheTokenOfANonLoopbackServer) {
       return daemon.messages().find("configuration is unchanged", before.size()) !=
              std::string::npos;
     }));
-    EXPECT_EQ(net_test::get(port, "/v1").status, 401);
+    EXPECT_EQ(server_test::get(port, "/v1").status, 401);
   }
 }
 
@@ -387,7 +387,7 @@ TEST_F(CliAccess, CoreDumpsHoldNoSecrets) {
 // same-origin.
 TEST_F(CliAccess, NonLoopbackWithoutTokenAnswersOnlyKnownHostNames) {
   const auto status_for = [](std::uint16_t port, const std::string& host) {
-    return net_test::raw(port, "GET /v1 HTTP/1.1\r\nHost: " + host + "\r\n\r\n").status;
+    return server_test::raw(port, "GET /v1 HTTP/1.1\r\nHost: " + host + "\r\n\r\n").status;
   };
   const Words remote{"serve", "--listen", "0.0.0.0:0", "--allow-remote", "--allow-root", dataset};
   const auto with = [&](const Words& more) {

@@ -21,7 +21,7 @@ struct Frame {
   std::string payload;
 };
 
-class Viewer : public net_test::StreamClient {
+class Viewer : public server_test::StreamClient {
  public:
   using StreamClient::StreamClient;
 

@@ -82,14 +82,14 @@ std::uint16_t port_of(const std::string& url) {
 TEST_F(CliServe, StateFolderKeepsViewsAfterAKillAndIsLockedByOneDaemon) {
   const Words words{"serve", "--listen", "127.0.0.1:0", "--threads", "2", dataset};
   const std::string state = folder.file("state");
-  const net_test::Headers json{{"Content-Type", "application/json"}};
+  const server_test::Headers json{{"Content-Type", "application/json"}};
   std::string location;
   {
     Words with_flag = words;
     with_flag.insert(with_flag.end(), {"--state-dir", state});
     Process daemon(with_flag);
     const auto port = port_of(url_of(daemon));
-    const auto made = net_test::request(port, "POST", "/v1/views", json, R"({"step":1})");
+    const auto made = server_test::request(port, "POST", "/v1/views", json, R"({"step":1})");
     EXPECT_EQ(made.status, 201) << made.body;
     location = made.header("location");
     const Outcome second = run(with_flag);
@@ -100,11 +100,11 @@ TEST_F(CliServe, StateFolderKeepsViewsAfterAKillAndIsLockedByOneDaemon) {
   }
   Process daemon(words, {"WINDSPLAT_STATE_DIR=" + state});
   const auto port = port_of(url_of(daemon));
-  const auto found = net_test::get(port, location);
+  const auto found = server_test::get(port, location);
   EXPECT_EQ(found.status, 200) << found.body;
   EXPECT_THAT(found.body, HasSubstr(R"("view":{"step":1})"));
   Process without(words);
-  EXPECT_EQ(net_test::get(port_of(url_of(without)), location).status, 404);
+  EXPECT_EQ(server_test::get(port_of(url_of(without)), location).status, 404);
 }
 
 // The first child of a process; -1 if it has none.
@@ -132,11 +132,11 @@ TEST_F(CliServe, SigtermDoesNotWaitForAHangingLoader) {
   const pid_t loader = child_of(daemon.id());
   ASSERT_GT(loader, 1) << "files are read by a separate process";
   ASSERT_EQ(kill(loader, SIGSTOP), 0);
-  net_test::Socket asking(port);
+  server_test::Socket asking(port);
   asking.send(
       "GET /v1/datasets/tornado-small/frame.png?width=32&height=32 HTTP/1.1\r\n"
       "Host: localhost\r\n\r\n");
-  EXPECT_EQ(net_test::get(port, "/livez").status, 200);
+  EXPECT_EQ(server_test::get(port, "/livez").status, 200);
   const auto begin = std::chrono::steady_clock::now();
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0) << daemon.messages();
@@ -166,16 +166,16 @@ TEST_F(CliServe, DatasetWithoutAFittingStepIsRefusedWithTheRequiredLimit) {
                                      "do\n"));
   Process daemon({"serve", "--listen", "127.0.0.1:0", "--memory-limit", "192M", large, dataset});
   const auto port = port_of(url_of(daemon));
-  EXPECT_THAT(net_test::get(port, "/v1/datasets").body, HasSubstr("91.6 MiB"));
-  const auto picture = net_test::get(port, "/v1/datasets/" + large + "/frame.png?width=32");
+  EXPECT_THAT(server_test::get(port, "/v1/datasets").body, HasSubstr("91.6 MiB"));
+  const auto picture = server_test::get(port, "/v1/datasets/" + large + "/frame.png?width=32");
   EXPECT_EQ(picture.status, 404);
   EXPECT_THAT(picture.body, HasSubstr("--memory-limit 250M would do"));
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0);
 
   Process enough({"serve", "--listen", "127.0.0.1:0", "--memory-limit", "250M", large});
-  const auto drawn = net_test::get(port_of(url_of(enough)),
-                                   "/v1/datasets/" + large + "/frame.png?width=640&height=640");
+  const auto drawn = server_test::get(port_of(url_of(enough)),
+                                      "/v1/datasets/" + large + "/frame.png?width=640&height=640");
   EXPECT_EQ(drawn.status, 200) << drawn.body;
 }
 
@@ -200,13 +200,13 @@ TEST_F(CliServe, DatasetAboveTheMemoryLimitIsReportedWithTheOption) {
   const auto port = port_of(url);
   const std::string of = "/v1/datasets/" + large + '/';
   // Small pictures use averages, which need memory in turn.
-  const auto picture = net_test::get(port, of + "frame.png?width=512&height=512");
+  const auto picture = server_test::get(port, of + "frame.png?width=512&height=512");
   ASSERT_EQ(picture.status, 507);
   EXPECT_THAT(picture.body, HasSubstr("dataset '" + large + "'"));
   EXPECT_THAT(picture.body, HasSubstr("--memory-limit 192M leaves 68.0 MiB for data"));
   EXPECT_THAT(picture.body, HasSubstr("'wind' and 'cloud' need 75.0 MiB together"));
   EXPECT_EQ(limit_told(picture.body), "200M");
-  EXPECT_EQ(net_test::get(port, of + "fields/wind/range").status, 200) << "a single field fits";
+  EXPECT_EQ(server_test::get(port, of + "fields/wind/range").status, 200) << "a single field fits";
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0);
   EXPECT_THAT(daemon.messages(), HasSubstr("may be too small for a dataset's first view"));
@@ -262,13 +262,13 @@ TEST_F(CliServe, DatasetThatFailsToOpenIsListedAsFailed) {
   write_file(bad, "nothing of use");
   Process daemon({"serve", "--listen", "127.0.0.1:0", bad, folder.file("absent.nc"), dataset});
   const std::uint16_t port = port_of(daemon);
-  const std::string list = net_test::get(port, "/v1/datasets").body;
+  const std::string list = server_test::get(port, "/v1/datasets").body;
   EXPECT_THAT(list, HasSubstr(R"("id":"tornado-small")"));
   EXPECT_THAT(list, HasSubstr(R"("id":"bad")"));
   EXPECT_THAT(list, HasSubstr("not a netCDF file"));
   EXPECT_THAT(list, HasSubstr(R"("id":"absent")"));
-  EXPECT_EQ(net_test::get(port, "/v1/datasets/tornado-small").status, 200);
-  const auto refused = net_test::get(port, "/v1/datasets/bad");
+  EXPECT_EQ(server_test::get(port, "/v1/datasets/tornado-small").status, 200);
+  const auto refused = server_test::get(port, "/v1/datasets/bad");
   EXPECT_EQ(refused.status, 404);
   EXPECT_THAT(refused.body, HasSubstr("could not be opened"));
   EXPECT_THAT(daemon.messages(), HasSubstr("listed as failed"));
@@ -283,7 +283,7 @@ TEST_F(CliServe, FailedDatasetRecoversWithItsFileOrIsRemoved) {
   Process daemon({"serve", "--listen", "127.0.0.1:0", bad, mended, dataset});
   const std::uint16_t port = port_of(daemon);
   const auto status_of = [&](const char* id) {
-    return net_test::get(port, std::string("/v1/datasets/") + id).status;
+    return server_test::get(port, std::string("/v1/datasets/") + id).status;
   };
   EXPECT_EQ(status_of("mended"), 404);
   std::filesystem::copy_file(dataset, mended);
@@ -293,10 +293,10 @@ TEST_F(CliServe, FailedDatasetRecoversWithItsFileOrIsRemoved) {
   }
   EXPECT_EQ(status_of("mended"), 200) << daemon.messages();
 
-  EXPECT_EQ(net_test::request(port, "DELETE", "/v1/datasets/bad").status, 404);
-  EXPECT_EQ(net_test::request(port, "DELETE", "/v1/datasets/bad?forget=true").status, 204);
-  EXPECT_THAT(net_test::get(port, "/v1/datasets").body, Not(HasSubstr(R"("id":"bad")")));
-  EXPECT_EQ(net_test::request(port, "DELETE", "/v1/datasets/bad?forget=true").status, 404);
+  EXPECT_EQ(server_test::request(port, "DELETE", "/v1/datasets/bad").status, 404);
+  EXPECT_EQ(server_test::request(port, "DELETE", "/v1/datasets/bad?forget=true").status, 204);
+  EXPECT_THAT(server_test::get(port, "/v1/datasets").body, Not(HasSubstr(R"("id":"bad")")));
+  EXPECT_EQ(server_test::request(port, "DELETE", "/v1/datasets/bad?forget=true").status, 404);
   daemon.send(SIGTERM);
   EXPECT_EQ(daemon.wait(), 0);
 }

@@ -3,17 +3,17 @@
 
 #include "server/access/auth.hpp"
 #include "server/base/log.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 namespace log = windsplat::log;
 using testing::HasSubstr;
 using testing::Not;
-using windsplat::net::Access;
-using windsplat::net::ServerOptions;
-using windsplat::net::Token;
+using windsplat::access::Token;
+using windsplat::api::ServerOptions;
+using windsplat::transport::Access;
 
 const std::string secret = "correct-horse_battery.staple";
 const std::string secret_in_base64url = "Y29ycmVjdC1ob3JzZV9iYXR0ZXJ5LnN0YXBsZQ";
@@ -229,4 +229,4 @@ TEST(GuardedLog, ContainsNeitherTheTokenNorAttempts) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -12,17 +12,17 @@
 #include "server/data/open/open.hpp"
 #include "server/work/drawing.hpp"
 #include "server/work/viewer.hpp"
-#include "tests/integration/server/net_server.hpp"
 #include "tests/integration/server/slow_source.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using namespace windsplat;  // NOLINT(google-build-using-namespace)
 namespace fs = std::filesystem;
 
-net::ServerOptions with_root(const fs::path& root) {
-  net::ServerOptions options;
+api::ServerOptions with_root(const fs::path& root) {
+  api::ServerOptions options;
   options.data_root = root.native();
   return options;
 }
@@ -265,7 +265,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
   std::promise<void> cancelled_ran;
   std::promise<void> other_ran;
   std::promise<void> last_ran;
-  net::TaskExecutor loads(2, 16, "loads");  // last: its threads use all of these until they end
+  work::TaskExecutor loads(2, 16, "loads");  // last: its threads use all of these until they end
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
   ASSERT_TRUE(gate.wait_for(1));
   const CancelToken unwanted;
@@ -286,7 +286,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
 // The queue of one dataset is full: others are still admitted.
 TEST(Loads, EveryDatasetHasItsOwnQueue) {
   Gate gate;
-  net::TaskExecutor loads(2, 2, "loads");
+  work::TaskExecutor loads(2, 2, "loads");
   const auto one = std::make_shared<int>(1);
   const auto two = std::make_shared<int>(2);
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
@@ -309,7 +309,7 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   const std::string vector = dataset->info().first(data::FieldKind::vector)->name;
   Gate gate;
   std::promise<void> done;
-  net::Services services({}, store, std::make_shared<ThreadPool>(2));
+  api::Services services({}, store, std::make_shared<ThreadPool>(2));
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(services.backend.loads.submit({{}, [&] { gate.pass(); }}));
   }
@@ -321,7 +321,7 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   of_scalar.scalars.emplace(1);
   of_scalar.scalars->front().field = scalar;
   of_vector.scalars.emplace();
-  net::Viewer viewer(services.backend, 1, "192.0.2.1");
+  work::Viewer viewer(services.backend, 1, "192.0.2.1");
   for (int i = 0; i < 1000; ++i) {
     viewer.start(session::Prefetch{i < 999 ? of_scalar : of_vector, {1}, {}});
   }
@@ -337,30 +337,31 @@ TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
   Gate gate;  // before the services, whose threads use it until they end
   std::promise<std::string> told;
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
-  net::Services services({}, store, std::make_shared<ThreadPool>(1));
-  net::Drawing drawing;
+  api::Services services({}, store, std::make_shared<ThreadPool>(1));
+  work::Drawing drawing;
   drawing.dataset = store->add("climate:8x8x4").value();
-  drawing.draw = [&](const net::PreparedPicture& /*picture*/, data::Dataset& /*dataset*/,
-                     std::int64_t /*queue_us*/, net::Loading loading) {
-    told.set_value(loading == net::Loading::allowed ? "drawn" : "drawn without loading");
+  drawing.draw = [&](const work::PreparedPicture& /*picture*/, data::Dataset& /*dataset*/,
+                     std::int64_t /*queue_us*/, work::Loading loading) {
+    told.set_value(loading == work::Loading::allowed ? "drawn" : "drawn without loading");
   };
   // While it loads, as many others come as may wait.
-  drawing.prepare = [&](data::Dataset& dataset, net::Loading loading) -> Result<net::PreparedPtr> {
-    if (loading == net::Loading::none) return make_error(ErrorKind::not_resident, "not loaded");
+  drawing.prepare = [&](data::Dataset& dataset,
+                        work::Loading loading) -> Result<work::PreparedPtr> {
+    if (loading == work::Loading::none) return make_error(ErrorKind::not_resident, "not loaded");
     const auto hold = [&](std::int64_t /*queue_us*/) { gate.pass(); };
-    const net::RenderService::Job job{net::RenderService::Kind::request, 1, {}, hold, false, 0};
+    const work::RenderService::Job job{work::RenderService::Kind::request, 1, {}, hold, false, 0};
     EXPECT_TRUE(services.backend.renderer.submit(job));
     EXPECT_TRUE(gate.wait_for(1));
     while (services.backend.renderer.submit(job)) {
     }
-    return net::prepare_picture(frame::complete({}, dataset).value(), {}, {}, dataset, loading);
+    return work::prepare_picture(frame::complete({}, dataset).value(), {}, {}, dataset, loading);
   };
   drawing.fail = [&](const Error& error) { told.set_value(error.message); };
-  ASSERT_TRUE(net::submit(services.backend, std::move(drawing)));
+  ASSERT_TRUE(work::submit(services.backend, std::move(drawing)));
   ASSERT_TRUE(gate.wait_for(1));
   gate.open();
   EXPECT_EQ(told.get_future().get(), "drawn");
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "protocol/frame_header.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 // Receives and acknowledges frames until the view is at rest, so that the next request starts at
@@ -72,7 +72,7 @@ TEST(Drain, IsNotDelayedByRepeatedRequests) {
 
 // Operations still in progress at the deadline must not access destroyed objects.
 TEST(Drain, RemainingConnectionsAreClosedAtTheDeadline) {
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.drain_cancel_after = std::chrono::milliseconds(0);
   options.drain_abort_after = std::chrono::milliseconds(0);
   TestServer server(options);
@@ -147,4 +147,4 @@ TEST(Drain, IdleConnectionsDoNotDelayIt) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

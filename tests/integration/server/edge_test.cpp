@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 class Edge : public testing::Test {
@@ -63,7 +63,7 @@ TEST_F(Edge, AmbiguousRequestsAreRefused) {
 
 // DNS rebinding: the page of a foreign name that resolves to this machine.
 TEST(LocalHosts, AreTheOnlyHostNamesAnsweredOnLoopback) {
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.local_hosts_only = true;
   options.allow_origins = {"https://winds.example"};
   TestServer server(options);
@@ -212,4 +212,4 @@ TEST_F(Edge, DisconnectCancelsTheRendering) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -6,9 +6,9 @@
 #include <string>
 #include <thread>
 
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using testing::HasSubstr;
@@ -175,4 +175,4 @@ TEST_F(Forecasts, ViewWithoutForecastIsRefused) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -25,31 +25,31 @@
 #include "server/transport/handshake.hpp"
 #include "server/transport/tls.hpp"
 #include "tests/integration/certificate.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using testing::HasSubstr;
 using testing::Not;
-using windsplat::net::HandshakeThread;
-using windsplat::net::Visitor;
+using windsplat::access::Visitor;
+using windsplat::transport::HandshakeThread;
 using Tcp = boost::asio::ip::tcp;
 
 class HandshakePlaces : public testing::Test {
  protected:
   // The server's order of destruction (server.cpp).
   ~HandshakePlaces() override {
-    connections.each([](windsplat::net::Connection& one) { one.abort(); });
+    connections.each([](windsplat::transport::Connection& one) { one.abort(); });
     gate_.set_value();
     thread.stop();
     go_on();
   }
 
-  static windsplat::net::ServerOptions over_tls() {
+  static windsplat::api::ServerOptions over_tls() {
     const Certificate made = make_certificate("places");
-    windsplat::net::ServerOptions options;
-    options.tls = windsplat::net::make_tls(made.chain, made.key).value();
+    windsplat::api::ServerOptions options;
+    options.tls = windsplat::transport::make_tls(made.chain, made.key).value();
     return options;
   }
 
@@ -57,8 +57,8 @@ class HandshakePlaces : public testing::Test {
   Tcp::socket& come(const std::string& address, bool known = false) {
     Tcp::socket& client = clients.emplace_back(io);
     client.connect(acceptor.local_endpoint());
-    windsplat::net::start_connection(acceptor.accept(), services, connections, &thread,
-                                     Visitor{address, nullptr, std::nullopt, false, known});
+    windsplat::transport::start_connection(acceptor.accept(), services, connections, &thread,
+                                           Visitor{address, nullptr, std::nullopt, false, known});
     return client;
   }
 
@@ -118,8 +118,8 @@ class HandshakePlaces : public testing::Test {
     return hello;
   }
 
-  windsplat::net::Connections connections;
-  windsplat::net::Services services{
+  windsplat::transport::Connections connections;
+  windsplat::api::Services services{
       over_tls(), std::make_shared<windsplat::data::Store>(std::uint64_t{1} << 20),
       std::make_shared<windsplat::ThreadPool>(1)};
   boost::asio::io_context io{1};
@@ -186,11 +186,11 @@ TEST_F(HandshakePlaces, AreChargedForComputationBeforeTheClose) {
       go_on();
       return client.available() > 0;
     }));
-    connections.each([](windsplat::net::Connection& one) { one.abort(); });
+    connections.each([](windsplat::transport::Connection& one) { one.abort(); });
     clients.clear();
   }
   EXPECT_THAT(took(), Not(HasSubstr(nothing)));
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

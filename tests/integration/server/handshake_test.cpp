@@ -16,19 +16,19 @@
 #include "server/access/auth.hpp"
 #include "server/transport/tls.hpp"
 #include "tests/integration/certificate.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using testing::HasSubstr;
-using windsplat::net::Limits;
-using windsplat::net::ServerOptions;
-using windsplat::net::Token;
+using windsplat::access::Limits;
+using windsplat::access::Token;
+using windsplat::api::ServerOptions;
 
 ServerOptions over_tls(const Limits& limits = {}) {
   const Certificate made = make_certificate("handshake");
-  auto tls = windsplat::net::make_tls(made.chain, made.key);
+  auto tls = windsplat::transport::make_tls(made.chain, made.key);
   EXPECT_TRUE(tls) << (tls ? "" : tls.error().message);
   ServerOptions options;
   options.limits = limits;
@@ -263,4 +263,4 @@ TEST(TlsHandshakes, MayBeAbortedAtAnyTime) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 using testing::ElementsAre;
@@ -208,4 +208,4 @@ TEST(Jobs, ShutdownCancelsRunningAndWaitingJobs) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -8,15 +8,15 @@
 
 #include "server/data/files/files.hpp"
 #include "server/data/open/open.hpp"
-#include "tests/integration/server/net_server.hpp"
 #include "tests/integration/server/prometheus_text.hpp"
 #include "tests/integration/server/slow_source.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using testing::HasSubstr;
-using windsplat::net::ServerOptions;
+using windsplat::api::ServerOptions;
 
 // Refused with the reason.
 void expect_limit(const Answer& answer, int status, const std::string& words) {
@@ -413,4 +413,4 @@ TEST(Cancel, DisconnectCancelsTheRendering) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

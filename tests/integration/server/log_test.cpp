@@ -7,9 +7,9 @@
 #include <sstream>
 #include <thread>
 
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 namespace log = windsplat::log;
@@ -144,4 +144,4 @@ TEST_F(Logged, ContainsNoPathsQueriesOrHeaders) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

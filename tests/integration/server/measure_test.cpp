@@ -9,9 +9,9 @@
 #include <numeric>
 #include <thread>
 
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -243,7 +243,7 @@ class DataRoot : public testing::Test {
     std::ofstream(root_ / "broken.nc") << "not a data file";
     fs::create_symlink("../secret.nc", root_ / "out.nc");
     EXPECT_EQ(mkfifo((root_ / "pipe.nc").c_str(), 0600), 0);
-    windsplat::net::ServerOptions options;
+    windsplat::api::ServerOptions options;
     options.data_root = root_.native();
     server_ = std::make_unique<TestServer>(options);
   }
@@ -352,4 +352,4 @@ TEST(NoDataRoot, PostedFilesAreRefusedWithTheReason) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -8,10 +8,10 @@
 #include <thread>
 
 #include "protocol/frame_header.hpp"
-#include "tests/integration/server/net_server.hpp"
 #include "tests/integration/server/prometheus_text.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 namespace protocol = windsplat::protocol;
@@ -212,7 +212,7 @@ TEST_F(MetricsTest, OfTheProcessMatchTheSystem) {
 }
 
 TEST(MetricsAt, RootAndBasePath) {
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.base_path = "/winds";
   TestServer server(options);
   EXPECT_EQ(get(server.port(), "/winds/metrics").status, 200);
@@ -234,4 +234,4 @@ TEST_F(MetricsTest, AreExactlyThoseOfTheManual) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -8,7 +8,7 @@
 #include <regex>
 #include <sstream>
 
-namespace net_test {
+namespace server_test {
 
 namespace {
 
@@ -146,4 +146,4 @@ std::set<std::string> Exposition::families() const {
 
 Exposition parse_exposition(const std::string& text) { return Reader().read(text); }
 
-}  // namespace net_test
+}  // namespace server_test

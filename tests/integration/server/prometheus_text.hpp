@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace net_test {
+namespace server_test {
 
 struct Exposition {
   std::map<std::string, std::string> types;  // family -> counter, gauge or histogram
@@ -25,4 +25,4 @@ struct Exposition {
 
 Exposition parse_exposition(const std::string& text);
 
-}  // namespace net_test
+}  // namespace server_test

@@ -11,13 +11,13 @@
 #include "server/base/trim_storage.hpp"
 #include "server/work/references.hpp"
 #include "tests/integration/cli_program.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using windsplat::CancelToken;
-using windsplat::net::References;
+using windsplat::work::References;
 
 const std::string reference_view = R"({"dataset":"small","image":{"width":96,"height":64}})";
 // Takes seconds at least.
@@ -233,4 +233,4 @@ TEST(ReferencePictures, LeastRecentlyRequestedAreEvicted) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -8,9 +8,9 @@
 
 #include "server/scene/completed_view.hpp"
 #include "server/transport/http_client.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using testing::HasSubstr;
@@ -115,10 +115,10 @@ TEST_F(Rest, HealthAnswers) {
   EXPECT_EQ(get(port(), "/livez").status, 200);
   EXPECT_EQ(get(port(), "/readyz").status, 200);
   const std::string base = "http://127.0.0.1:" + std::to_string(port());
-  EXPECT_EQ(windsplat::net::http_status(base + "/readyz", 20).value(), 200);
-  EXPECT_EQ(windsplat::net::http_status(base + "/nothing", 20).value(), 404);
-  EXPECT_FALSE(windsplat::net::http_status("ftp://127.0.0.1/", 1));
-  EXPECT_FALSE(windsplat::net::http_status("http://127.0.0.1:1/", 5));
+  EXPECT_EQ(windsplat::transport::http_status(base + "/readyz", 20).value(), 200);
+  EXPECT_EQ(windsplat::transport::http_status(base + "/nothing", 20).value(), 404);
+  EXPECT_FALSE(windsplat::transport::http_status("ftp://127.0.0.1/", 1));
+  EXPECT_FALSE(windsplat::transport::http_status("http://127.0.0.1:1/", 5));
 }
 
 // --- pictures -----------------------------------------------------------------------------------
@@ -407,7 +407,7 @@ TEST(RestFrames, APostedViewIsCompletedOnceThoughItsDataHadToBeLoaded) {
 }
 
 TEST(RestBase, BasePathPrefixesEverythingAndHealthIsAlsoAtTheRoot) {
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.base_path = "/a/b";
   TestServer server(options);
   const std::uint16_t port = server.port();
@@ -427,12 +427,12 @@ TEST(RestBase, BasePathPrefixesEverythingAndHealthIsAlsoAtTheRoot) {
 TEST(RestListen, UnavailableAddressIsReported) {
   const auto store = std::make_shared<windsplat::data::Store>(1 << 20);
   const auto pool = std::make_shared<windsplat::ThreadPool>(1);
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.port = 0;
-  windsplat::net::Server first(options, store, pool);
+  windsplat::transport::Server first(options, store, pool);
   ASSERT_TRUE(first.listen());
   options.port = first.port();
-  windsplat::net::Server second(options, store, pool);
+  windsplat::transport::Server second(options, store, pool);
   const auto taken = second.listen();
   ASSERT_FALSE(taken);
   EXPECT_THAT(taken.error().message, HasSubstr(std::to_string(first.port())));
@@ -440,4 +440,4 @@ TEST(RestListen, UnavailableAddressIsReported) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

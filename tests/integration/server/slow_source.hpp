@@ -12,7 +12,7 @@
 #include "server/data/model/source.hpp"
 #include "server/data/model/volume.hpp"
 
-namespace net_test {
+namespace server_test {
 
 // Blocks every caller until it is opened.
 class Gate {
@@ -66,4 +66,4 @@ class SlowSource : public windsplat::data::Source {
   std::shared_ptr<Gate> gate_;
 };
 
-}  // namespace net_test
+}  // namespace server_test

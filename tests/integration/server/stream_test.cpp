@@ -5,9 +5,9 @@
 #include <thread>
 
 #include "protocol/frame_header.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 namespace protocol = windsplat::protocol;
@@ -380,7 +380,7 @@ TEST_F(Stream, PagesOfOtherOriginsCannotConnect) {
   EXPECT_EQ(status("http://evil.example"), 403);
   EXPECT_EQ(status("http://evil.example?127.0.0.1:" + std::to_string(port())), 403);
   EXPECT_EQ(status("null"), 403);
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.allow_origins = {"https://lab.example"};
   const TestServer other(options);
   EXPECT_EQ(StreamClient(other.port(), {{"Origin", "https://lab.example"}}).handshake().status,
@@ -389,7 +389,7 @@ TEST_F(Stream, PagesOfOtherOriginsCannotConnect) {
 }
 
 TEST_F(Stream, SessionsAboveTheLimitAreRefusedWithTheReason) {
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.sessions_max = 2;
   TestServer server(options);
   {
@@ -409,7 +409,7 @@ TEST_F(Stream, SessionsAboveTheLimitAreRefusedWithTheReason) {
 }
 
 TEST_F(Stream, SilenceClosesTheSession) {
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.idle_timeout_s = 1;
   const TestServer server(options);
   StreamClient client(server.port());
@@ -435,4 +435,4 @@ TEST_F(Stream, PeerThatNeverReadsIsSentAtMostTwoFrames) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

@@ -6,19 +6,19 @@
 #include <chrono>
 
 #include "tests/integration/certificate.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using testing::HasSubstr;
-using windsplat::net::Access;
-using windsplat::net::ServerOptions;
+using windsplat::api::ServerOptions;
+using windsplat::transport::Access;
 using Clock = std::chrono::steady_clock;
 
-std::shared_ptr<windsplat::net::TlsContext> tls_named(const std::string& name) {
+std::shared_ptr<windsplat::transport::TlsContext> tls_named(const std::string& name) {
   const Certificate made = make_certificate(name);
-  auto tls = windsplat::net::make_tls(made.chain, made.key);
+  auto tls = windsplat::transport::make_tls(made.chain, made.key);
   EXPECT_TRUE(tls) << (tls ? "" : tls.error().message);
   return tls ? *tls : nullptr;
 }
@@ -249,7 +249,7 @@ TEST(TlsFiles, InvalidFilesAreRefusedWithAReason) {
   const Certificate mine = make_certificate("mine");
   const Certificate other = make_certificate("other");
   const auto refused = [](const std::string& chain, const std::string& key) {
-    const auto tls = windsplat::net::make_tls(chain, key);
+    const auto tls = windsplat::transport::make_tls(chain, key);
     EXPECT_FALSE(tls);
     return tls ? "" : tls.error().message;
   };
@@ -260,8 +260,8 @@ TEST(TlsFiles, InvalidFilesAreRefusedWithAReason) {
   EXPECT_THAT(refused(mine.chain, mine.chain), HasSubstr("key"));
   EXPECT_THAT(refused(mine.chain, other.key), HasSubstr("key"));
   EXPECT_THAT(refused(mine.chain, mine.key.substr(0, mine.key.size() / 2)), HasSubstr("key"));
-  EXPECT_TRUE(windsplat::net::make_tls(mine.chain, mine.key));
+  EXPECT_TRUE(windsplat::transport::make_tls(mine.chain, mine.key));
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

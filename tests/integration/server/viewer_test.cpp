@@ -13,15 +13,15 @@
 #include "server/api/services.hpp"
 #include "server/frame/frame.hpp"
 #include "server/scene/completed_view.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 using namespace windsplat;  // NOLINT(google-build-using-namespace)
 
 // Whether data was prepared for the frame, which the next of its kind need not do again.
-bool prepared(net::Viewer& viewer, std::uint64_t ticket, const protocol::View& view,
+bool prepared(work::Viewer& viewer, std::uint64_t ticket, const protocol::View& view,
               const quality::Setting& setting = {}) {
   std::promise<bool> told;
   viewer.start(session::StartRender{ticket, view, setting, {}},
@@ -45,8 +45,8 @@ protocol::View view_of_small(int width, int height) {
 TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
-  net::Services services({}, store, std::make_shared<ThreadPool>(2));
-  net::Viewer viewer(services.backend, 1, "192.0.2.1");
+  api::Services services({}, store, std::make_shared<ThreadPool>(2));
+  work::Viewer viewer(services.backend, 1, "192.0.2.1");
   protocol::View view = view_of_small(16, 12);
   view.method.detail = protocol::Detail::full;
   EXPECT_TRUE(prepared(viewer, 1, view));
@@ -65,8 +65,8 @@ TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
 TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
-  net::Services services({}, store, std::make_shared<ThreadPool>(2));
-  net::Viewer viewer(services.backend, 1, "192.0.2.1");
+  api::Services services({}, store, std::make_shared<ThreadPool>(2));
+  work::Viewer viewer(services.backend, 1, "192.0.2.1");
   protocol::View view = view_of_small(96, 72);
   const std::uint64_t before = scene::completions();
   EXPECT_TRUE(prepared(viewer, 1, view));
@@ -88,12 +88,12 @@ TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * sample_bytes;
   const auto store = std::make_shared<data::Store>(step_bytes * 3 / 2);
   ASSERT_TRUE(store->add(small_file()));
-  net::Services services({}, store, std::make_shared<ThreadPool>(2));
+  api::Services services({}, store, std::make_shared<ThreadPool>(2));
   constexpr int viewers_count = 8;
   constexpr int rounds = 5;
-  std::vector<std::unique_ptr<net::Viewer>> viewers;
+  std::vector<std::unique_ptr<work::Viewer>> viewers;
   for (int v = 0; v < viewers_count; ++v) {
-    viewers.push_back(std::make_unique<net::Viewer>(
+    viewers.push_back(std::make_unique<work::Viewer>(
         services.backend, static_cast<std::uint64_t>(v + 1), "192.0.2.1"));
   }
   for (int round = 0; round < rounds; ++round) {
@@ -133,11 +133,11 @@ class LargePictures : public testing::Test {
     store_ = std::make_shared<data::Store>(
         frame::bytes_beyond_kept(2048, 1104, frame::Format::jpeg) + step_bytes * 3 / 2);
     EXPECT_TRUE(store_->add(small_file()));
-    services_ = std::make_unique<net::Services>(net::ServerOptions{}, store_,
+    services_ = std::make_unique<api::Services>(api::ServerOptions{}, store_,
                                                 std::make_shared<ThreadPool>(2));
   }
   // Why there is no frame; empty if there is one.
-  std::future<std::string> fault_of(net::Viewer& viewer, const protocol::View& view) {
+  std::future<std::string> fault_of(work::Viewer& viewer, const protocol::View& view) {
     const auto told = std::make_shared<std::promise<std::string>>();
     viewer.start(session::StartRender{++tickets_, view, {}, {}},
                  [told](std::uint64_t /*ticket*/, const Result<session::Drawn>& drawn) {
@@ -148,12 +148,12 @@ class LargePictures : public testing::Test {
 
   protocol::View view_;
   std::shared_ptr<data::Store> store_;
-  std::unique_ptr<net::Services> services_;
+  std::unique_ptr<api::Services> services_;
   std::uint64_t tickets_ = 0;
 };
 
 TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
-  net::Viewer viewer(services_->backend, 1, "192.0.2.1");
+  work::Viewer viewer(services_->backend, 1, "192.0.2.1");
   ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
   auto others = store_->reserve(step_bytes);
   while (!others) {  // memory is released shortly after the reply
@@ -167,8 +167,8 @@ TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
 }
 
 TEST_F(LargePictures, OfTwoSessionsAreRenderedInTurnWhenOneFits) {
-  net::Viewer one(services_->backend, 1, "192.0.2.1");
-  net::Viewer other(services_->backend, 2, "192.0.2.2");
+  work::Viewer one(services_->backend, 1, "192.0.2.1");
+  work::Viewer other(services_->backend, 2, "192.0.2.2");
   for (int round = 0; round < 4; ++round) {
     view_.step = round % small_steps;
     auto first = fault_of(one, view_);
@@ -181,7 +181,7 @@ TEST_F(LargePictures, OfTwoSessionsAreRenderedInTurnWhenOneFits) {
 }
 
 TEST_F(LargePictures, ThatNeverFitAreRefusedAtOnce) {
-  net::Viewer viewer(services_->backend, 1, "192.0.2.1");
+  work::Viewer viewer(services_->backend, 1, "192.0.2.1");
   view_.image.height = 2048;
   const std::string fault = fault_of(viewer, view_).get();
   EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: what is beside the fields"),
@@ -190,4 +190,4 @@ TEST_F(LargePictures, ThatNeverFitAreRefusedAtOnce) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

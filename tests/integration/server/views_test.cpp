@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "protocol/saved_view.hpp"
-#include "tests/integration/server/net_server.hpp"
+#include "tests/integration/server/test_server.hpp"
 
-namespace net_test {
+namespace server_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -79,7 +79,7 @@ TEST_F(Views, PostedViewIsStoredInCanonicalFormAtItsLocation) {
 }
 
 TEST_F(Views, LocationContainsTheBasePath) {
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   options.base_path = "/a/b/";
   const TestServer below(options);
   const Answer made = request(below.port(), "POST", "/a/b/v1/views", json_type, "{}");
@@ -267,8 +267,8 @@ class Folder {
   fs::path path;
 };
 
-windsplat::net::ServerOptions keeping(const windsplat::views::Options& options) {
-  windsplat::net::ServerOptions out;
+windsplat::api::ServerOptions keeping(const windsplat::views::Options& options) {
+  windsplat::api::ServerOptions out;
   auto views = SavedViews::open(options);
   EXPECT_TRUE(views) << (views ? "" : views.error().message);
   if (views) out.views = std::move(*views);
@@ -323,7 +323,7 @@ TEST(ViewsOfAServer, SavedViewRendersTheSamePicture) {
 
 // A page that saves a few views at once is within the limit.
 TEST(ViewChanges, AtMostTwentyWaitForASlowDisk) {
-  windsplat::net::ServerOptions options;
+  windsplat::api::ServerOptions options;
   const auto views = SavedViews::open({}).value();
   options.views = views;
   TestServer server(std::move(options));
@@ -354,4 +354,4 @@ TEST(ViewChanges, AtMostTwentyWaitForASlowDisk) {
 }
 
 }  // namespace
-}  // namespace net_test
+}  // namespace server_test

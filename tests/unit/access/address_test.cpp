@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 TEST(Address, CountsIpv4WholeAndIpv6ByTheFirst64Bits) {
@@ -64,4 +64,4 @@ TEST(ClientAddress, IsTheLastHopThatIsNoTrustedProxy) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::access

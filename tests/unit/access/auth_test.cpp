@@ -8,7 +8,7 @@
 
 #include "server/access/login.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 using testing::HasSubstr;
@@ -20,8 +20,9 @@ constexpr std::int64_t now_s = 1'900'000'000;
 
 Token token(std::string_view text = secret) { return Token::parse(text).value(); }
 
-Request request(std::string method, std::vector<std::string> path, Headers headers = {}) {
-  Request out;
+http::Request request(std::string method, std::vector<std::string> path,
+                      http::Headers headers = {}) {
+  http::Request out;
   out.method = std::move(method);
   out.path = std::move(path);
   out.headers = std::move(headers);
@@ -29,7 +30,7 @@ Request request(std::string method, std::vector<std::string> path, Headers heade
   return out;
 }
 
-Verdict verdict(const Request& request, bool upgrade = false) {
+Verdict verdict(const http::Request& request, bool upgrade = false) {
   const Token mine = token();
   return judge(request, upgrade, &mine, {"https://friend.example"}, now_s);
 }
@@ -90,7 +91,7 @@ TEST(Cookie, ExpiresAndIsValidForItsTokenOnly) {
 
 TEST(Cookie, ContainsThePortInItsName) {
   const auto name = [](const char* host) {
-    Request out;
+    http::Request out;
     out.headers = {{"Host", host}};
     return cookie_name(out);
   };
@@ -100,7 +101,7 @@ TEST(Cookie, ContainsThePortInItsName) {
   EXPECT_EQ(name("[::1]:8081"), "windsplat-8081");
   EXPECT_EQ(name("winds.example:"), "windsplat");
   const Token mine = token();
-  Request asked = request("GET", {"v1"}, {{"Cookie", cookie_header(mine.cookie(now_s + 9))}});
+  http::Request asked = request("GET", {"v1"}, {{"Cookie", cookie_header(mine.cookie(now_s + 9))}});
   asked.headers.back().second = "winds.example:8080";  // the Host
   EXPECT_EQ(judge(asked, false, &mine, {}, now_s), Verdict::no_token) << "cookie of another daemon";
   asked.headers.front().second = "windsplat-8080=" + mine.cookie(now_s + 9);
@@ -169,7 +170,7 @@ TEST(Authentication, BearerTokenGrantsAccess) {
 TEST(Authentication, AnotherSchemeIsNeitherProofNorAWrongToken) {
   const std::string basic = "Basic dXNlcjpwYXNzd29yZA==";
   for (const std::string& other : {basic, std::string(secret), std::string("Bearers ") + secret}) {
-    const Headers alone{{"Authorization", other}};
+    const http::Headers alone{{"Authorization", other}};
     EXPECT_EQ(verdict(request("GET", {"v1"}, alone)), Verdict::no_token) << other;
     EXPECT_FALSE(shows_token(request("GET", {"v1"}, alone), false)) << other;
   }
@@ -187,8 +188,8 @@ TEST(Authentication, AnotherSchemeIsNeitherProofNorAWrongToken) {
 
 // Credentials that could be attempts are counted before they are compared.
 TEST(Authentication, WrongTokensCountOnlyWhereOneIsRequired) {
-  const Headers bearer{{"Authorization", "Bearer x"}};
-  const Headers offer{{"Sec-WebSocket-Protocol", "bearer.eA"}};
+  const http::Headers bearer{{"Authorization", "Bearer x"}};
+  const http::Headers offer{{"Sec-WebSocket-Protocol", "bearer.eA"}};
   EXPECT_TRUE(shows_token(request("GET", {"v1"}, bearer), false));
   EXPECT_TRUE(shows_token(request("GET", {"v1", "stream"}, offer), true));
   EXPECT_FALSE(shows_token(request("GET", {"v1", "stream"}, offer), false));
@@ -227,7 +228,7 @@ TEST(Authentication, SubprotocolAuthenticatesAWebSocket) {
 
 TEST(Authentication, CookieAuthenticatesAndAllowsChangesFromOwnPagesOnly) {
   const std::string cookie = cookie_header(token().cookie(now_s + 100));
-  const auto with = [&](const char* method, Headers more) {
+  const auto with = [&](const char* method, http::Headers more) {
     more.emplace_back("Cookie", cookie);
     return request(method, {"v1", "views"}, std::move(more));
   };
@@ -235,10 +236,12 @@ TEST(Authentication, CookieAuthenticatesAndAllowsChangesFromOwnPagesOnly) {
   EXPECT_EQ(verdict(with("POST", {{"Origin", "http://winds.example"}})), Verdict::allowed);
   EXPECT_EQ(verdict(with("POST", {{"Origin", "https://friend.example"}})), Verdict::allowed);
   EXPECT_EQ(verdict(with("DELETE", {{"Sec-Fetch-Site", "same-origin"}})), Verdict::allowed);
-  for (const Headers& foreign :
-       {Headers{}, Headers{{"Origin", "http://evil.example"}}, Headers{{"Origin", "null"}},
-        Headers{{"Origin", "null"}, {"Sec-Fetch-Site", "same-origin"}},
-        Headers{{"Sec-Fetch-Site", "same-site"}}, Headers{{"Sec-Fetch-Site", "none"}}}) {
+  for (const http::Headers& foreign :
+       {http::Headers{}, http::Headers{{"Origin", "http://evil.example"}},
+        http::Headers{{"Origin", "null"}},
+        http::Headers{{"Origin", "null"}, {"Sec-Fetch-Site", "same-origin"}},
+        http::Headers{{"Sec-Fetch-Site", "same-site"}},
+        http::Headers{{"Sec-Fetch-Site", "none"}}}) {
     EXPECT_EQ(verdict(with("POST", foreign)), Verdict::wrong_origin);
     EXPECT_EQ(verdict(with("GET", foreign), true), Verdict::wrong_origin) << "a WebSocket";
   }
@@ -252,8 +255,8 @@ TEST(Authentication, CookieAuthenticatesAndAllowsChangesFromOwnPagesOnly) {
 }
 
 TEST(Authentication, ForeignOriginIsRefusedEvenWithTheToken) {
-  const Headers headers{{"Authorization", std::string("Bearer ") + secret},
-                        {"Origin", "https://evil.example"}};
+  const http::Headers headers{{"Authorization", std::string("Bearer ") + secret},
+                              {"Origin", "https://evil.example"}};
   EXPECT_EQ(verdict(request("GET", {"v1", "stream"}, headers), true), Verdict::wrong_origin);
   EXPECT_EQ(verdict(request("POST", {"v1", "views"}, headers)), Verdict::wrong_origin);
   EXPECT_EQ(verdict(request("GET", {"v1"}, headers)), Verdict::allowed)
@@ -266,41 +269,42 @@ TEST(Authentication, ForeignOriginIsRefusedEvenWithTheToken) {
 
 TEST(Authentication, TokenInAUrlIsRefusedFirst) {
   for (const char* key : {"token", "access_token", "TOKEN"}) {
-    Request asked = request("GET", {"livez"}, {{"Authorization", std::string("Bearer ") + secret}});
+    http::Request asked =
+        request("GET", {"livez"}, {{"Authorization", std::string("Bearer ") + secret}});
     asked.query = {{"width", "3"}, {key, secret}};
     EXPECT_EQ(verdict(asked), Verdict::token_in_url);
     EXPECT_EQ(judge(asked, false, nullptr, {}, now_s), Verdict::token_in_url);
-    const Response answer = turned_away(Verdict::token_in_url, asked, "/");
+    const http::Response answer = turned_away(Verdict::token_in_url, asked, "/");
     EXPECT_EQ(answer.status, 400);
     const std::string body(answer.body.bytes.begin(), answer.body.bytes.end());
     EXPECT_THAT(body, Not(HasSubstr(secret)));
   }
 }
 
-std::string header_of(const Response& response, const std::string& name) {
+std::string header_of(const http::Response& response, const std::string& name) {
   for (const auto& [key, value] : response.headers) {
     if (key == name) return value;
   }
   return "";
 }
 
-std::string text_of(const Response& response) {
+std::string text_of(const http::Response& response) {
   return {response.body.bytes.begin(), response.body.bytes.end()};
 }
 
 TEST(AccessRefusal, ProgramsGetAProblemAndBrowsersAForm) {
-  const Request program = request("GET", {"v1"}, {{"Accept", "*/*"}});
-  const Response problem = turned_away(Verdict::no_token, program, "/");
+  const http::Request program = request("GET", {"v1"}, {{"Accept", "*/*"}});
+  const http::Response problem = turned_away(Verdict::no_token, program, "/");
   EXPECT_EQ(problem.status, 401);
   EXPECT_EQ(problem.content_type, "application/problem+json");
   EXPECT_EQ(header_of(problem, "WWW-Authenticate"), "Bearer realm=\"windsplat\"");
-  const Response wrong = turned_away(Verdict::wrong_token, program, "/");
+  const http::Response wrong = turned_away(Verdict::wrong_token, program, "/");
   EXPECT_EQ(wrong.status, 401);
   EXPECT_THAT(header_of(wrong, "WWW-Authenticate"), HasSubstr("invalid_token"));
 
-  const Request person =
+  const http::Request person =
       request("GET", {}, {{"Accept", "text/html,application/xhtml+xml,*/*;q=0.8"}});
-  const Response page = turned_away(Verdict::no_token, person, "/winds/");
+  const http::Response page = turned_away(Verdict::no_token, person, "/winds/");
   EXPECT_EQ(page.status, 401);
   EXPECT_THAT(page.content_type, HasSubstr("text/html"));
   EXPECT_THAT(header_of(page, "WWW-Authenticate"), HasSubstr("Bearer"));
@@ -310,9 +314,10 @@ TEST(AccessRefusal, ProgramsGetAProblemAndBrowsersAForm) {
   EXPECT_EQ(turned_away(Verdict::wrong_origin, person, "/").status, 403);
 }
 
-Request login(const std::string& body, Headers headers = {{"Origin", "http://winds.example"}}) {
+http::Request login(const std::string& body,
+                    http::Headers headers = {{"Origin", "http://winds.example"}}) {
   headers.emplace_back("Content-Type", "application/x-www-form-urlencoded; charset=utf-8");
-  Request out = request("POST", {"login"}, std::move(headers));
+  http::Request out = request("POST", {"login"}, std::move(headers));
   out.body = body;
   return out;
 }
@@ -330,7 +335,7 @@ TEST(Login, ExchangesTheTokenForACookie) {
   for (const char* body :
        {"token=0123456789abcdef-._~%2B%2F%3D%3D", "token=+0123456789abcdef-._~%2b/==+",
         "x=1&token=0123456789abcdef-._~%2B/=="}) {
-    const Response in = log_in(login(body), mine, "/winds/", false, now_s);
+    const http::Response in = log_in(login(body), mine, "/winds/", false, now_s);
     ASSERT_EQ(in.status, 303) << body;
     EXPECT_EQ(header_of(in, "Location"), "/winds/");
     const std::string cookie = header_of(in, "Set-Cookie");
@@ -357,16 +362,16 @@ TEST(Login, CookieIsSecureUnderTls) {
 TEST(Login, WrongTokenShowsTheFormAgain) {
   for (const char* body : {"", "token", "token=", "token=wrong", "nekot=0123456789abcdef-._~%2B/==",
                            "token=%", "token=%2", "token=%zz"}) {
-    const Response out = log_in(login(body), token(), "/", false, now_s);
+    const http::Response out = log_in(login(body), token(), "/", false, now_s);
     EXPECT_EQ(out.status, 401) << body;
     EXPECT_EQ(header_of(out, "Set-Cookie"), "");
     EXPECT_THAT(text_of(out), HasSubstr("Invalid token."));
   }
-  Request json = login("token=0123456789abcdef-._~%2B/==");
+  http::Request json = login("token=0123456789abcdef-._~%2B/==");
   json.headers.insert(json.headers.begin(), {"Content-Type", "application/json"});
   json.headers.erase(json.headers.begin() + 2);
   EXPECT_EQ(log_in(json, token(), "/", false, now_s).status, 415);
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -6,7 +6,7 @@
 #include "server/access/cost_limits.hpp"
 #include "server/data/resident/store.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 // Lines of 100 x 80 x 60 samples and one medium.
@@ -162,4 +162,4 @@ TEST(CheckCost, NamesTheLimitAndHowToReduceTheCost) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::access

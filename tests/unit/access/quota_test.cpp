@@ -8,7 +8,7 @@
 
 #include "server/access/admission.hpp"
 
-namespace windsplat::net {
+namespace windsplat::access {
 namespace {
 
 constexpr Quota::Micros second = 1'000'000;
@@ -35,12 +35,12 @@ TEST(Quota, OneAddressCannotUseAllConnections) {
   const auto third = quota.connect(here, false, 0);
   EXPECT_EQ(third.place, Quota::Slot::reserve);
   ASSERT_TRUE(third.reason);
-  EXPECT_EQ(third.reason->kind, LimitKind::address_connections);
+  EXPECT_EQ(third.reason->kind, metrics::LimitKind::address_connections);
   EXPECT_EQ(third.reason->limit, 2);
   EXPECT_EQ(quota.connect(there, false, 0).place, Quota::Slot::ordinary);
   const auto full = quota.connect("192.0.2.3", false, 0);
   EXPECT_EQ(full.place, Quota::Slot::reserve);
-  EXPECT_EQ(full.reason->kind, LimitKind::connections);
+  EXPECT_EQ(full.reason->kind, metrics::LimitKind::connections);
   quota.disconnect(here, Quota::Slot::ordinary);
   EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
 }
@@ -83,7 +83,7 @@ TEST(Quota, SessionsAreCountedByAddress) {
   EXPECT_FALSE(quota.open_session(here, 0));
   const auto refused = quota.open_session(here, 0);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->kind, LimitKind::address_sessions);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::address_sessions);
   EXPECT_FALSE(quota.open_session(there, 0));
   quota.close_session(here);
   EXPECT_FALSE(quota.open_session(here, 0));
@@ -98,7 +98,7 @@ TEST(Quota, RequestsRefillAtTheirRateAndHealthHasItsOwn) {
   EXPECT_EQ(at_once, 20) << "the burst of ten seconds";
   const auto refused = quota.request(here, false, 0);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->kind, LimitKind::requests);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::requests);
   EXPECT_EQ(refused->limit, 2);
   EXPECT_EQ(refused->retry_after_s, 1);
   EXPECT_FALSE(quota.request(here, true, 0));
@@ -118,7 +118,7 @@ TEST(Quota, OnePictureMayOverdrawAndTheNextWaitsUntilRepaid) {
   quota.rendered(here, 3 * second, 0);
   const auto refused = quota.picture(here, 0);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->kind, LimitKind::render);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::render);
   EXPECT_EQ(refused->retry_after_s, 30) << "3 s of rendering at 6 s per minute";
   EXPECT_EQ(quota.throttle_delay(here, 0), 30 * second);
   EXPECT_FALSE(quota.picture(there, 0));
@@ -135,7 +135,7 @@ TEST(Quota, BytesAreChargedWhenSent) {
   quota.sent(here, 5000, 0);
   const auto refused = quota.picture(here, 0);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->kind, LimitKind::bytes);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::bytes);
   EXPECT_EQ(refused->retry_after_s, 5);
   EXPECT_FALSE(quota.picture(here, 5 * second));
 }
@@ -147,7 +147,7 @@ TEST(Quota, WrongTokensAreLimitedPerMinute) {
   for (int n = 0; n < 3; ++n) EXPECT_FALSE(quota.failed_login(here, 0)) << n;
   const auto refused = quota.failed_login(here, 0);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->kind, LimitKind::logins);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::logins);
   EXPECT_EQ(refused->retry_after_s, 20);
   EXPECT_FALSE(quota.failed_login(there, 0));
   EXPECT_FALSE(quota.failed_login(here, 20 * second));
@@ -163,7 +163,7 @@ TEST(Quota, TokensAreCheckedUntilTooManyWereWrong) {
   quota.failed_login(here, 0);
   const auto refused = quota.may_try_login(here, 0);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->kind, LimitKind::logins);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::logins);
   EXPECT_EQ(refused->retry_after_s, 30);
   EXPECT_FALSE(quota.may_try_login(there, 0));
   EXPECT_FALSE(quota.may_try_login(here, 30 * second));
@@ -176,7 +176,7 @@ TEST(Quota, NewConnectionsRefillAtTheirRateAndTlsCostsMore) {
   for (int n = 0; n < 4; ++n) EXPECT_FALSE(quota.arrive(here, false, true, 0)) << n;
   const auto refused = quota.arrive(here, false, false, 0);
   ASSERT_TRUE(refused) << "the burst is used up";
-  EXPECT_EQ(refused->kind, LimitKind::arrivals);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::arrivals);
   EXPECT_FALSE(quota.arrive(there, false, false, 0));
   EXPECT_FALSE(quota.arrive(here, true, false, 0)) << "a proxy's";
   EXPECT_FALSE(quota.arrive(here, false, false, second / 2));
@@ -208,7 +208,7 @@ TEST(Quota, AddressOverItsHandshakeTimeIsThrottled) {
   quota.handshake_took(here, false, second / 10, 0);
   const auto refused = quota.arrive(here, false, true, 0);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->kind, LimitKind::handshakes);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::handshakes);
   EXPECT_EQ(refused->limit, 100);
   EXPECT_EQ(refused->retry_after_s, 1);
   EXPECT_FALSE(quota.arrive(here, false, false, 0)) << "plain TCP has no handshake";
@@ -230,7 +230,7 @@ TEST(Quota, UnauthenticatedClientsExhaustTheirOwnHandshakeTimeOnly) {
   }
   const auto refused = quota.arrive(there, false, true, 0);
   ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->kind, LimitKind::handshakes);
+  EXPECT_EQ(refused->kind, metrics::LimitKind::handshakes);
   EXPECT_FALSE(quota.arrive(here, false, true, 0)) << "authenticated";
   EXPECT_FALSE(quota.arrive(there, true, true, 0)) << "a proxy's";
   quota.handshake_took(here, false, 2 * second, 0);
@@ -343,7 +343,7 @@ TEST(Quota, UnauthenticatedClientsDoNotEvictAuthenticatedAddresses) {
 TEST(Admission, LogsRefusedHandshakesOncePerMinute) {
   Limits limits = none();
   limits.handshake_ms_per_address = 0.1;  // one at once
-  Metrics metrics;
+  metrics::Metrics metrics;
   Quota::Micros now = 0;
   Admission admission(limits, metrics, [&now] { return now; });
   testing::internal::CaptureStderr();
@@ -366,7 +366,7 @@ TEST(Admission, LogsRefusedHandshakesOncePerMinute) {
 TEST(Admission, ReleasesSlotsWithTheirTickets) {
   Limits limits = none();
   limits.connections = 1;
-  Metrics metrics;
+  metrics::Metrics metrics;
   Admission admission(limits, metrics, [] { return 0; });
   auto first = admission.connect(here);
   ASSERT_TRUE(first);
@@ -382,10 +382,10 @@ TEST(Admission, RefusesWithTheLimitAndARetryTime) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   limits.connections = 1;
-  Metrics metrics;
+  metrics::Metrics metrics;
   Admission admission(limits, metrics, [] { return 0; });
   const auto visitor = admission.connect("2001:db8:1:2:3::4");
-  Request request;
+  http::Request request;
   EXPECT_FALSE(admission.request(*visitor, request, false));
   EXPECT_EQ(request.address, "2001:db8:1:2::/64");
   const auto refused = admission.request(*visitor, request, false);
@@ -407,19 +407,19 @@ TEST(Admission, RefusesWithTheLimitAndARetryTime) {
 TEST(Admission, ChargesRefusedUnreadBodies) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
-  Metrics metrics;
+  metrics::Metrics metrics;
   Admission admission(limits, metrics, [] { return 0; });
   const auto visitor = admission.connect(here);
   EXPECT_TRUE(admission.count_malformed(*visitor, {}));
   EXPECT_FALSE(admission.count_malformed(*visitor, {})) << "not logged yet";
-  Request request;
+  http::Request request;
   EXPECT_TRUE(admission.request(*visitor, request, false)) << "the same allowance";
 }
 
 TEST(Admission, RefusesExpensiveRequests) {
   Limits limits = none();
   limits.render_s = 2;
-  Metrics metrics;
+  metrics::Metrics metrics;
   Admission admission(limits, metrics, [] { return 0; });
   const frame::Cost cost{100, 1e9, "/vector/stride"};
   EXPECT_TRUE(admission.check_estimate(cost, 2000));
@@ -436,11 +436,11 @@ TEST(Admission, ChargesTheClientBehindATrustedProxy) {
   Limits limits = none();
   limits.requests_per_address = 0.1;
   limits.trusted_proxies = {"10.0.0.0/8"};
-  Metrics metrics;
+  metrics::Metrics metrics;
   Admission admission(limits, metrics, [] { return 0; });
   const auto proxy = admission.connect("10.1.2.3");
   const auto ask = [&](const Visitor& visitor, const std::string& hops) {
-    Request request;
+    http::Request request;
     request.headers = {{"X-Forwarded-For", hops}};
     return admission.request(visitor, request, false).has_value();
   };
@@ -454,9 +454,11 @@ TEST(Admission, ChargesTheClientBehindATrustedProxy) {
 }
 
 TEST(Metrics, HaveEveryLimitOnce) {
-  EXPECT_EQ(std::set(limit_names.begin(), limit_names.end()).size(), limit_names.size());
-  EXPECT_EQ(static_cast<std::size_t>(LimitKind::handshakes) + 1, limit_names.size());
+  EXPECT_EQ(std::set(metrics::limit_names.begin(), metrics::limit_names.end()).size(),
+            metrics::limit_names.size());
+  EXPECT_EQ(static_cast<std::size_t>(metrics::LimitKind::handshakes) + 1,
+            metrics::limit_names.size());
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::access

@@ -5,7 +5,7 @@
 
 #include "server/http/request_target.hpp"
 
-namespace windsplat::net {
+namespace windsplat::http {
 namespace {
 
 int status_of(const std::optional<Response>& response) { return response ? response->status : 0; }
@@ -143,4 +143,4 @@ TEST(Target, WithoutQueryTextHasNoQuery) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace windsplat::net {
+namespace windsplat::http {
 namespace {
 
 TEST(HostNames, LoopbackHasThree) {
@@ -38,4 +38,4 @@ TEST(HostNames, CanBeConfigured) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::http

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace windsplat::net {
+namespace windsplat::http {
 namespace {
 
 TEST(Problems, ContainARetryTimeInTheirHeader) {
@@ -23,4 +23,4 @@ TEST(Problems, ContainARetryTimeInTheirHeader) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::http

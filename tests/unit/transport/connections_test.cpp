@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -103,4 +103,4 @@ TEST(Connections, CloseAHandshakeOfTheLargestHolderAndUnauthenticatedFirst) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -14,7 +14,7 @@
 #include <string>
 #include <thread>
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 // Steps are queued behind a blocked one, so that the thread alone decides the order.
@@ -153,4 +153,4 @@ TEST(HandshakeThread, DiscardsWaitingStepsAtShutdown) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

@@ -5,7 +5,7 @@
 
 #include "protocol/limits.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 using Verdict = MessageMeter::Verdict;
@@ -52,4 +52,4 @@ TEST(MessageMeter, RefusesAFloodOfControlFramesBetweenTwoChecks) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

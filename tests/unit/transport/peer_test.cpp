@@ -15,7 +15,7 @@
 
 #include "server/transport/spare_descriptor.hpp"
 
-namespace windsplat::net {
+namespace windsplat::transport {
 namespace {
 
 class Listening {
@@ -98,4 +98,4 @@ TEST(SpareDescriptor, RefusesAClientWhenDescriptorsRunOut) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::transport

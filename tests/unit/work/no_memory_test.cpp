@@ -42,7 +42,7 @@ thread_local int allocations_left = enough;
   std::free(memory);
 }
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 // Whether `body` succeeded with that many allocations.
@@ -97,7 +97,7 @@ TEST(NoMemory, AddressIsRegisteredWholeOrNotAtAll) {
   const std::string here = "2001:db8:1:2:3:4:5:6";
   int failed = 0;
   for (int count = 0;; ++count) {
-    Quota quota(Limits{});
+    access::Quota quota(access::Limits{});
     if (with_allocations(count, [&] { quota.connect(here, false, 0); })) break;
     ++failed;
     EXPECT_EQ(quota.known(), 0U);
@@ -107,14 +107,14 @@ TEST(NoMemory, AddressIsRegisteredWholeOrNotAtAll) {
 }
 
 TEST(NoMemory, NoConnectionOrSessionSlotIsLost) {
-  Limits limits;
+  access::Limits limits;
   limits.connections = 1;
   limits.sessions_per_address = 1;
   const std::string here = "2001:db8:1:2:3:4:5:6";
   int failed = 0;
   for (int count = 0;; ++count) {
-    Metrics metrics;
-    Admission admission(limits, metrics, [] { return 0; });
+    metrics::Metrics metrics;
+    access::Admission admission(limits, metrics, [] { return 0; });
     const auto both = [&] {
       const auto visitor = admission.connect(here);
       const auto seat = admission.open_session("2001:db8:1:2::/64");
@@ -208,15 +208,16 @@ TEST(NoMemory, CallbackThatCannotBePostedRunsInPlaceOrIsCancelled) {
   const auto call = [&] { ++called; };
   const std::chrono::milliseconds patience(30);
   bool posted = true;
-  EXPECT_TRUE(
-      with_allocations(0, [&] { posted = post_or_retry(io.get_executor(), call, patience); }));
+  EXPECT_TRUE(with_allocations(
+      0, [&] { posted = transport::post_or_retry(io.get_executor(), call, patience); }));
   EXPECT_FALSE(posted);
   boost::asio::post(io, [&] {
     const boost::asio::any_io_executor executor = io.get_executor();
-    EXPECT_TRUE(with_allocations(0, [&] { posted = post_or_retry(executor, call, patience); }));
+    EXPECT_TRUE(
+        with_allocations(0, [&] { posted = transport::post_or_retry(executor, call, patience); }));
     EXPECT_TRUE(posted);
     EXPECT_EQ(called, 1);
-    EXPECT_TRUE(post_or_retry(executor, call));
+    EXPECT_TRUE(transport::post_or_retry(executor, call));
     EXPECT_EQ(called, 1) << "not before its turn";
   });
   io.run();
@@ -238,7 +239,7 @@ TEST(NoMemory, LostConnectionDoesNotStopTheListener) {
   const auto more = asio::make_work_guard(io);  // a server has its timers
   asio::io_context clients;
   int accepted = 0;
-  Listener listener(
+  transport::Listener listener(
       io, [&](asio::ip::tcp::socket) { ++accepted; }, [] {});
   ASSERT_TRUE(listener.listen("127.0.0.1", 0));
   listener.start();
@@ -258,4 +259,4 @@ TEST(NoMemory, LostConnectionDoesNotStopTheListener) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 // Owners that always have something to do: each gives its next job as soon as one was begun.
@@ -231,4 +231,4 @@ TEST(RenderQueue, UsesTheGivenCostForJobsOfUnknownCost) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work

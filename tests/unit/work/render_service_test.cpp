@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 // A service whose thread is held in a job of a stream's until release() or the end.
@@ -250,4 +250,4 @@ TEST(RenderService, OnePayerMayUseHalfOfTheSlots) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 constexpr auto slab = protocol::MethodName::slab;
@@ -62,4 +62,4 @@ TEST(RequestTimes, ForgetTheLeastRecentlyRenderedDataset) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work

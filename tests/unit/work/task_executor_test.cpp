@@ -8,7 +8,7 @@
 #include <future>
 #include <thread>
 
-namespace windsplat::net {
+namespace windsplat::work {
 namespace {
 
 TEST(TaskExecutor, LimitsWaitingJobsPerDatasetAndInTotal) {
@@ -108,4 +108,4 @@ TEST(TaskExecutor, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
 }
 
 }  // namespace
-}  // namespace windsplat::net
+}  // namespace windsplat::work

@@ -18,7 +18,7 @@
 #include "server/transport/server.hpp"
 #include "tests/integration/client.hpp"
 
-namespace net_test {
+namespace server_test {
 
 using Json = nlohmann::json;
 
@@ -53,7 +53,7 @@ inline const std::string& small_file() {
 class TestServer {
  public:
   // `open`: how files are opened, other than in this process.
-  explicit TestServer(windsplat::net::ServerOptions options = {},
+  explicit TestServer(windsplat::api::ServerOptions options = {},
                       decltype(windsplat::data::StoreOptions::open) open = {},
                       std::uint64_t bytes_max = std::uint64_t{1} << 30) {
     options.port = 0;
@@ -61,8 +61,8 @@ class TestServer {
         bytes_max, windsplat::data::Storage::float32, std::move(open)});
     const auto added = store_->add(small_file());
     EXPECT_TRUE(added) << (added ? "" : added.error().message);
-    server_ = std::make_unique<windsplat::net::Server>(std::move(options), store_,
-                                                       std::make_shared<windsplat::ThreadPool>(2));
+    server_ = std::make_unique<windsplat::transport::Server>(
+        std::move(options), store_, std::make_shared<windsplat::ThreadPool>(2));
     const auto bound = server_->listen();
     EXPECT_TRUE(bound) << (bound ? "" : bound.error().message);
     thread_ = std::thread([this] { server_->run(); });
@@ -79,12 +79,12 @@ class TestServer {
   }
 
   [[nodiscard]] std::uint16_t port() const { return server_->port(); }
-  windsplat::net::Server& server() { return *server_; }
+  windsplat::transport::Server& server() { return *server_; }
   [[nodiscard]] std::uint64_t loads() const { return store_->find("small").value()->loads(); }
 
  private:
   std::shared_ptr<windsplat::data::Store> store_;
-  std::unique_ptr<windsplat::net::Server> server_;
+  std::unique_ptr<windsplat::transport::Server> server_;
   std::thread thread_;
 };
 
@@ -124,4 +124,4 @@ inline Picture decode_jpeg(const std::string& bytes) {
   return picture;
 }
 
-}  // namespace net_test
+}  // namespace server_test
