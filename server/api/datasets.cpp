@@ -52,8 +52,8 @@ http::Response job_response(metrics::Metrics& metrics, const std::string& base_p
   return response;
 }
 
-void post_dataset(const ServerOptions& options, work::TaskExecutor& locator, work::Backend& backend,
-                  const http::Request& request, http::Reply reply) {
+void post_dataset(const ServerOptions& options, work::TaskExecutor& look_ups,
+                  work::Backend& backend, const http::Request& request, http::Reply reply) {
   if (options.data_root.empty()) {
     reply(http::problem_response(403, "Forbidden",
                                  "opening files is disabled: start the server with "
@@ -70,7 +70,7 @@ void post_dataset(const ServerOptions& options, work::TaskExecutor& locator, wor
     reply(http::problem_response(path.error()));
     return;
   }
-  run_later(locator, request, std::move(reply), "a look-up", nullptr,
+  run_later(look_ups, request, std::move(reply), "a look-up", nullptr,
             [&options, &backend, path = std::move(*path)] {
               return locate_and_open(options, backend, path);
             });

@@ -37,8 +37,8 @@ void get_dataset(work::Catalogue& catalogue, work::TaskExecutor& loads, const st
                  const http::Request& request, http::Reply reply);
 
 // Opens a file below a root given by --data-root, in a job.
-void post_dataset(const ServerOptions& options, work::TaskExecutor& locator, work::Backend& backend,
-                  const http::Request& request, http::Reply reply);
+void post_dataset(const ServerOptions& options, work::TaskExecutor& look_ups,
+                  work::Backend& backend, const http::Request& request, http::Reply reply);
 http::Response delete_dataset(work::Catalogue& catalogue, const std::string& id,
                               const http::Request& request);
 // 202 with the location of the job, or the error.

@@ -58,7 +58,7 @@ constexpr const char* frame_name = "/v1/datasets/{id}/frame";
 
 std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
                           access::Admission& admission, work::Backend& backend,
-                          work::TaskExecutor& locator, work::TaskExecutor& view_io) {
+                          work::TaskExecutor& look_ups, work::TaskExecutor& view_io) {
   work::Catalogue& catalogue = backend.catalogue;
   work::TaskExecutor& loads = backend.loads;
   work::Jobs& jobs = backend.jobs;
@@ -93,7 +93,7 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
       Route{"DELETE", "/v1/jobs/{id}", at_once(delete_job, jobs)},
 
       Route{"GET", "/v1/datasets", at_once(get_datasets, catalogue)},
-      Route{"POST", "/v1/datasets", later(post_dataset, options, locator, backend)},
+      Route{"POST", "/v1/datasets", later(post_dataset, options, look_ups, backend)},
       Route{"GET", "/v1/datasets/{id}", later(get_dataset, catalogue, loads)},
       Route{"DELETE", "/v1/datasets/{id}", at_once(delete_dataset, catalogue), Query::taken},
       Route{"GET", "/v1/datasets/{id}/frame.jpg", later(get_frame, backend, admission, jpeg),

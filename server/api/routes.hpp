@@ -41,11 +41,11 @@ struct Route {
 };
 
 // The table, with each handler bound to the parts of the server that it uses. In the order of
-// methods that Allow states. Documented in docs/user/api.md. `locator` resolves posted names,
+// methods that Allow states. Documented in docs/user/api.md. `look_ups` resolve posted names,
 // `view_io` changes saved views.
 std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
                           access::Admission& admission, work::Backend& backend,
-                          work::TaskExecutor& locator, work::TaskExecutor& view_io);
+                          work::TaskExecutor& look_ups, work::TaskExecutor& view_io);
 
 // What requests are counted by besides the paths of routes().
 inline constexpr const char* route_stream = "/v1/stream";

@@ -115,7 +115,7 @@ struct Server::State {
         while (!post_or_retry(io.get_executor(), go_on_looking) && !parts.draining) {
         }
       };
-      if (!parts.file_watch.submit({never, look, true})) return check_data_files();
+      if (!parts.file_checks.submit({never, look, true})) return check_data_files();
       checking_files = true;
     });
     checking_files = true;

@@ -9,8 +9,6 @@
 namespace windsplat::transport {
 namespace {
 
-constexpr std::size_t view_changes_waiting_max = 64;  // each may take one disk sync
-
 api::ServerOptions completed(api::ServerOptions options) {
   options.base_path = http::normal_base_path(options.base_path);
   if (options.views == nullptr) options.views = views::SavedViews::open({}).value();
@@ -28,18 +26,15 @@ ServerParts::ServerParts(api::ServerOptions server_options, std::shared_ptr<data
           {options.requests_waiting_ms_max, options.limits.wait_ms,
            [this](const std::string& address, std::int64_t us) { admission.rendered(address, us); },
            [this](const frame::Cost& cost) { return admission.check(cost); }}),
-      locator(1, work::Backend::requests_waiting_max, "files to open"),
-      view_io(1, view_changes_waiting_max, "changes of saved views"),
-      file_watch(1, 1, "file checks"),
-      router(api::routes(options, draining, admission, backend, locator, view_io),
+      router(api::routes(options, draining, admission, backend, look_ups, view_io),
              options.base_path, admission, draining) {
   metrics.count_routes(router.route_names());
 }
 
 void ServerParts::end() {
-  locator.end();  // submits jobs
+  look_ups.end();  // submit jobs
   backend.end();
-  file_watch.end();
+  file_checks.end();
   view_io.end();
 }
 

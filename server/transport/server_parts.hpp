@@ -14,6 +14,7 @@
 #include "server/transport/http/http_session.hpp"
 #include "server/transport/websocket/websocket_session.hpp"
 #include "server/work/backend.hpp"
+#include "server/work/task_executor.hpp"
 
 namespace windsplat::transport {
 
@@ -33,10 +34,10 @@ struct ServerParts {
   access::Admission admission;
   std::atomic<bool> draining{false};
   work::Backend backend;
-  work::TaskExecutor locator;     // resolves posted names: a slow disk delays no other executor
-  work::TaskExecutor view_io;     // changes saved views, also on disk
-  work::TaskExecutor file_watch;  // checks files for changes and reopens them
-  http::RequestIds request_ids;   // used by the io thread only
+  work::TaskExecutor look_ups{work::look_up_settings};
+  work::TaskExecutor view_io{work::view_io_settings};
+  work::TaskExecutor file_checks{work::file_check_settings};
+  http::RequestIds request_ids;  // used by the io thread only
   const api::Router router;
   const StreamContext streams{options, backend, admission, draining, connections};
   const HttpContext http{options,     router,   admission,   metrics,

@@ -265,7 +265,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
   std::promise<void> cancelled_ran;
   std::promise<void> other_ran;
   std::promise<void> last_ran;
-  work::TaskExecutor loads(2, 16, "loads");  // last: its threads use all of these until they end
+  work::TaskExecutor loads({"loads", 2, 16});  // last: its threads use all of these until they end
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
   ASSERT_TRUE(gate.wait_for(1));
   const CancelToken unwanted;
@@ -286,7 +286,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
 // The queue of one dataset is full: others are still admitted.
 TEST(Loads, EveryDatasetHasItsOwnQueue) {
   Gate gate;
-  work::TaskExecutor loads(2, 2, "loads");
+  work::TaskExecutor loads({"loads", 2, 2});
   const auto one = std::make_shared<int>(1);
   const auto two = std::make_shared<int>(2);
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
