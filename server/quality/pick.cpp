@@ -36,8 +36,8 @@ double pixels_at(const protocol::View& view, const Setting& setting) {
          edge_at(view.image.height, setting.half_level);
 }
 
-Choice pick(const protocol::View& view, const Forecasts& forecasts,
-            const std::array<double, settings_count>& ms, const Aim& aim, double pixels_most) {
+Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim,
+            double pixels_most) {
   const double budget =
       aim.budget_ms ? headroom * *aim.budget_ms : std::numeric_limits<double>::max();
   const bool any_small = std::any_of(settings.begin(), settings.end(), [&](const auto& setting) {
@@ -49,20 +49,15 @@ Choice pick(const protocol::View& view, const Forecasts& forecasts,
   for (std::size_t i = 0; i < settings_count; ++i) {
     const bool large = pixels_at(view, settings[i]) > pixels_most;
     if (!is_allowed(settings[i], view) || (any_small && large)) continue;
-    fastest.take(i, ms[i]);
-    if (ms[i] > budget) continue;
+    const double ms = forecasts[i].ms;
+    fastest.take(i, ms);
+    if (ms > budget) continue;
     least_error.take(i, forecasts[i].error);
-    if (aim.max_error && error_bound(forecasts[i]) <= *aim.max_error) keeps_both.take(i, ms[i]);
+    if (aim.max_error && error_bound(forecasts[i]) <= *aim.max_error) keeps_both.take(i, ms);
   }
   if (keeps_both.found()) return {keeps_both.setting, true};
   if (least_error.found()) return {least_error.setting, true};
   return {fastest.setting, false};
-}
-
-Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim) {
-  std::array<double, settings_count> ms{};
-  for (std::size_t i = 0; i < ms.size(); ++i) ms[i] = forecasts[i].ms;
-  return pick(view, forecasts, ms, aim, std::numeric_limits<double>::infinity());
 }
 
 }  // namespace windsplat::quality

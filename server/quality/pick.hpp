@@ -1,8 +1,8 @@
 // Forecasts and limits of time and error -> the setting to render with.
 #pragma once
 
-#include <array>
 #include <cstddef>
+#include <limits>
 #include <optional>
 
 #include "protocol/view.hpp"
@@ -31,11 +31,8 @@ struct Choice {
 };
 
 // Chooses among the settings allowed for the view with at most `pixels_most` pixels, or among all
-// allowed ones if none is that small. `ms`: expected time of each setting.
-Choice pick(const protocol::View& view, const Forecasts& forecasts,
-            const std::array<double, settings_count>& ms, const Aim& aim, double pixels_most);
-
-// The same with the forecast times and without a limit of pixels.
-Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim);
+// allowed ones if none is that small.
+Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim,
+            double pixels_most = std::numeric_limits<double>::infinity());
 
 }  // namespace windsplat::quality

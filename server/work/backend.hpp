@@ -12,12 +12,12 @@
 #include "server/metrics/metrics.hpp"
 #include "server/quality/tables.hpp"
 #include "server/work/catalogue.hpp"
-#include "server/work/cost_history.hpp"
 #include "server/work/jobs.hpp"
 #include "server/work/known_ranges.hpp"
-#include "server/work/load_service.hpp"
 #include "server/work/references.hpp"
 #include "server/work/render_service.hpp"
+#include "server/work/request_times.hpp"
+#include "server/work/task_executor.hpp"
 
 namespace windsplat::work {
 
@@ -32,9 +32,6 @@ struct BackendOptions {
 
 // Outlives all connections; owned by the server.
 struct Backend {
-  // Limit of waiting requests for pictures and descriptions.
-  static constexpr std::size_t requests_waiting_max = 16;
-
   Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> threads,
           metrics::Metrics& metrics_of_server, BackendOptions options);
 
@@ -50,11 +47,11 @@ struct Backend {
   frame::Workspace frames;  // used by the renderer's thread only
   quality::Tables quality;
   KnownRanges ranges;
-  RenderCosts costs;
+  RequestTimes request_times;
   References references;
   Jobs jobs;               // use the catalogue and the renderer: ended before them
   RenderService renderer;  // uses the members above
-  LoadService loads;       // use the members above, including the renderer: ended first
+  TaskExecutor loads;      // use the members above, including the renderer: ended first
 
  private:
   std::function<Result<void>(const frame::Cost& cost)> check_cost_;

@@ -37,7 +37,7 @@ class Catalogue {
   // callers that open a dataset share it. Errors: those of opening; cancelled, in which case the
   // dataset is listed only if another caller still holds it. May block for long.
   Result<std::string> open(const data::Location& location, const CancelToken& cancel);
-  // Replaces the prefetch requests of a session; see data::Store::request_prefetch().
+  // Replaces the prefetch requests of a session; see data::Store::request_prefetch.
   void request_prefetch(std::uint64_t owner, std::vector<data::PrefetchRequest> requests) {
     store_->request_prefetch(owner, std::move(requests));
   }

@@ -1,15 +1,13 @@
-// Jobs in order of arrival; each thread takes the first waiting one.
+// The list of jobs; a task executor has their threads and their order.
 #include "server/work/jobs.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <list>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "server/work/run_guarded.hpp"
@@ -46,7 +44,6 @@ struct Job {
   std::string kind;
   Jobs::Work work;  // empty once started or cancelled
   CancelToken cancel;
-  bool slow = false;
   Stage stage = Stage::queued;
   Clock::time_point since;
   std::atomic<double> progress{0};
@@ -83,23 +80,22 @@ Result<protocol::JobResult> run_work(const Jobs::Work& work, const std::shared_p
 struct Jobs::State {
   using Shared = std::shared_ptr<Job>;
 
-  void work() {
-    std::unique_lock lock(mutex);
-    while (true) {
-      Shared job;
-      wake.wait(lock, [&] { return stopping || (job = first_queued()) != nullptr; });
-      if (stopping) return;
-      if (job->slow) ++slow_running;
+  explicit State(const TaskExecutor::Settings& settings)
+      : known_max(settings.tasks_max), threads(settings) {}
+
+  void run(const Shared& job) {
+    Work task;
+    {
+      const std::lock_guard lock(mutex);
+      if (job->stage != Stage::queued) return;  // cancelled
       job->stage = Stage::running;
       job->since = Clock::now();
-      Work task = std::exchange(job->work, nullptr);
-      lock.unlock();
-      auto outcome = run_work(task, job);
-      task = nullptr;  // release what the job holds before locking
-      lock.lock();
-      finish(*job, std::move(outcome));
-      if (job->slow) --slow_running;
+      task = std::exchange(job->work, nullptr);
     }
+    auto outcome = run_work(task, job);
+    task = nullptr;  // release what the job holds before locking
+    const std::lock_guard lock(mutex);
+    finish(*job, std::move(outcome));
   }
 
   // Only moves values: no exception may leave the thread.
@@ -117,14 +113,6 @@ struct Jobs::State {
   }
 
   // The functions below require the mutex.
-  [[nodiscard]] Shared first_queued() const {
-    const bool slow_too = slow_running < slow_max;
-    const auto at = std::find_if(jobs.begin(), jobs.end(), [&](const Shared& job) {
-      return job->stage == Stage::queued && (slow_too || !job->slow);
-    });
-    return at == jobs.end() ? nullptr : *at;
-  }
-
   [[nodiscard]] Result<Shared> find(const std::string& id) const {
     const auto at =
         std::find_if(jobs.begin(), jobs.end(), [&](const Shared& job) { return job->id == id; });
@@ -150,36 +138,21 @@ struct Jobs::State {
     job.work = nullptr;
   }
 
-  std::size_t known_max = 1;
-  std::size_t slow_max = 1;  // limit of running slow jobs
-  std::size_t slow_running = 0;
+  const std::size_t known_max;
   mutable std::mutex mutex;
-  std::condition_variable wake;
   std::list<Shared> jobs;
   std::uint64_t next_id = 1;
-  bool stopping = false;
-  std::vector<std::thread> threads;
+  const std::shared_ptr<const void> one_slow = std::make_shared<int>(0);  // their key
+  TaskExecutor threads;  // last: its threads use the members above
 };
 
-Jobs::Jobs(std::size_t known_max, std::size_t running_max) : state_(std::make_unique<State>()) {
-  state_->known_max = known_max;
-  state_->slow_max = std::max<std::size_t>(running_max, 2) - 1;
-  for (std::size_t i = 0; i < running_max; ++i) {
-    state_->threads.emplace_back([state = state_.get()] { state->work(); });
-  }
-}
+Jobs::Jobs(const TaskExecutor::Settings& settings) : state_(std::make_unique<State>(settings)) {}
 
 Jobs::~Jobs() { end(); }
 
 void Jobs::end() {
   cancel_all();
-  {
-    const std::lock_guard lock(state_->mutex);
-    state_->stopping = true;
-  }
-  state_->wake.notify_all();
-  for (std::thread& thread : state_->threads) thread.join();
-  state_->threads.clear();
+  state_->threads.end();
 }
 
 Result<protocol::JobDescription> Jobs::submit(std::string kind, Work work, const Terms& terms) {
@@ -187,22 +160,21 @@ Result<protocol::JobDescription> Jobs::submit(std::string kind, Work work, const
   job->kind = std::move(kind);
   job->work = std::move(work);
   job->cancel = terms.cancel;
-  job->slow = terms.slow;
-  protocol::JobDescription described;
-  {
-    const std::lock_guard lock(state_->mutex);
-    if (state_->stopping) return make_error(ErrorKind::draining, "the server is shutting down");
-    if (!state_->make_room()) {
-      return make_error(ErrorKind::busy,
-                        std::to_string(state_->known_max) +
-                            " jobs are waiting or running, which is the limit; try "
-                            "again after one has finished");
-    }
-    job->id = std::to_string(state_->next_id++);
-    state_->jobs.push_back(job);
-    described = describe(*job);
+  const std::lock_guard lock(state_->mutex);
+  if (!state_->make_room()) {
+    return make_error(ErrorKind::busy, std::to_string(state_->known_max) +
+                                           " jobs are waiting or running, which is the limit; try "
+                                           "again after one has finished");
   }
-  state_->wake.notify_one();
+  job->id = std::to_string(state_->next_id);
+  auto described = describe(*job);
+  std::list<State::Shared> entry{job};  // allocated before the task is queued
+  const auto queued =
+      state_->threads.submit({job->cancel, [state = state_.get(), job] { state->run(job); }, true,
+                              terms.slow ? state_->one_slow : nullptr});
+  if (!queued) return queued.error();
+  ++state_->next_id;
+  state_->jobs.splice(state_->jobs.end(), entry);
   return described;
 }
 

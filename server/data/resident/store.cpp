@@ -16,7 +16,7 @@
 #include "server/base/log.hpp"
 #include "server/data/files/locate_parts.hpp"
 #include "server/data/open/open.hpp"
-#include "server/data/resident/prefetcher.hpp"
+#include "server/data/resident/prefetch_thread.hpp"
 #include "server/data/resident/watched_files.hpp"
 #include "server/data/samples/samples.hpp"
 
@@ -258,7 +258,7 @@ struct Store::State {
   std::vector<Entry> entries;
   std::vector<FailedEntry> failed;
   bool ended = false;
-  Prefetcher prefetcher;  // last member: its thread uses datasets
+  PrefetchThread prefetcher;  // last: its thread uses datasets
 };
 
 Store::Store(StoreOptions options) : state_(std::make_unique<State>(std::move(options))) {}

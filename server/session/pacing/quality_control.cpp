@@ -44,16 +44,8 @@ quality::Aim QualityControl::aim(const protocol::View& view) const {
   return aim;
 }
 
-Micros QualityControl::final_cost(const protocol::View& view, const quality::Forecasts& known,
-                                  Micros now) const {
-  const bool slab = view.method.name == protocol::MethodName::slab;
-  const double factor = final_factor_.value_or(slab ? 2.6 : 6.4);
-  const Micros own = chooser_.expected(quality::own_setting(view), known, now);
-  return static_cast<Micros>(factor * static_cast<double>(own));
-}
-
 bool QualityControl::final_is_cheap(const protocol::View& view, Micros now) const {
-  return final_cost(view, forecast_.of(view), now) <= budget_of(view);
+  return times_.forecast(view, now).final_us <= budget_of(view);
 }
 
 FramePlan QualityControl::moving(const protocol::View& view, const Link& link, Micros now) {
@@ -65,8 +57,8 @@ FramePlan QualityControl::moving(const protocol::View& view, const Link& link, M
   const double pixels_most = least > 0 ? static_cast<double>(width) * height / std::pow(4.0, least)
                                        : std::numeric_limits<double>::infinity();
   if (!is_reference(view)) {
-    plan.setting =
-        quality::settings[chooser_.choose(view, forecast_.of(view), aim(view), pixels_most, now)];
+    plan.setting = quality::settings[chooser_.choose(view, times_.forecast(view, now).settings,
+                                                     aim(view), pixels_most, now)];
     moving_setting_ = plan.setting;
   }
   plan.encoding.quality = jpeg_.choose(quality::pixels_at(view, plan.setting), link, budget);
@@ -78,14 +70,12 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   constexpr Micros long_in_coming = 200'000;
   constexpr double better = 0.5;
   constexpr int usual = JpegRate::quality_usual;
-  const quality::Forecasts known = forecast_.of(view);
-  const bool guessed = !final_factor_ && !known[quality::own_setting(view)].timed;
-  const Micros cost = final_cost(view, known, now);
+  const auto [known, cost, guessed] = times_.forecast(view, now);
   if (guessed || cost <= long_in_coming || is_reference(view)) return std::nullopt;
-  const auto next = chooser_.least_error(view, known, cost / 4, now);
-  if (!next || !(known[*next].error < better * shown_error)) return std::nullopt;
+  const auto next = quality::pick(view, known, {1e-3 * static_cast<double>(cost / 4), {}});
+  if (!next.fits || !(known[next.setting].error < better * shown_error)) return std::nullopt;
   FramePlan plan;
-  plan.setting = quality::settings[*next];
+  plan.setting = quality::settings[next.setting];
   plan.encoding.quality = usual;
   const double bytes = jpeg_.predicted_bytes(quality::pixels_at(view, plan.setting), usual);
   if (!(link.transfer(bytes) < cost / 2)) return std::nullopt;
@@ -117,8 +107,7 @@ void QualityControl::on_view_changed(bool other_dataset) {
   thinner_ = 0;
   if (!other_dataset) return;
   chooser_ = Chooser();
-  final_factor_.reset();
-  forecast_.forget();
+  times_.forget();
 }
 
 void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewState& state,
@@ -127,7 +116,7 @@ void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewS
   if (drawn.info.method == "reference" || render.purpose == Purpose::still) return;
   if (render.dataset != view.dataset) return;
   if (!drawn.signature.key.empty() && render.version == state.version()) {
-    forecast_.learn(view, drawn);
+    times_.complete(view, drawn);
   }
   if (drawn.loaded) return;
   if (render.purpose == Purpose::moving) {
@@ -135,11 +124,10 @@ void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewS
     queue_us_ += newest * (static_cast<double>(drawn.queue_us) - queue_us_);
   }
   if (render.purpose == Purpose::final) {
-    const auto cost = static_cast<double>(drawn.render_us + drawn.measure_us + drawn.encode_us);
-    const auto own = chooser_.expected(quality::own_setting(view), forecast_.of(view), now);
-    final_factor_ = cost / std::max(static_cast<double>(own), 1.0);
+    times_.learn_final(drawn.render_us + drawn.measure_us + drawn.encode_us, view, now);
   } else if (const auto setting = quality::index_of(render.setting)) {
-    chooser_.learn(*setting, drawn.render_us + drawn.encode_us, forecast_.of(view), now);
+    const Micros cost = drawn.render_us + drawn.encode_us;
+    if (times_.learn(*setting, cost, view, now)) chooser_.restart();
   }
 }
 

@@ -10,10 +10,10 @@
 #include "server/quality/setting.hpp"
 #include "server/session/effects.hpp"
 #include "server/session/pacing/chooser.hpp"
+#include "server/session/pacing/frame_times.hpp"
 #include "server/session/pacing/jpeg_rate.hpp"
 #include "server/session/pacing/link.hpp"
 #include "server/session/pacing/render_slot.hpp"
-#include "server/session/pacing/view_forecast.hpp"
 #include "server/session/view_state.hpp"
 
 namespace windsplat::session {
@@ -26,7 +26,7 @@ struct FramePlan {
 
 class QualityControl {
  public:
-  explicit QualityControl(Forecaster forecaster) : forecast_(std::move(forecaster)) {}
+  explicit QualityControl(Forecaster forecaster) : times_(std::move(forecaster)) {}
 
   [[nodiscard]] FramePlan moving(const protocol::View& view, const Link& link, Micros now);
   // Refinement before the final frame: at most half of `shown_error`, that of the frame displayed,
@@ -55,20 +55,15 @@ class QualityControl {
 
  private:
   [[nodiscard]] quality::Aim aim(const protocol::View& view) const;
-  // Expected time of a final frame, including the finer slab rendering that measures its error.
-  [[nodiscard]] Micros final_cost(const protocol::View& view, const quality::Forecasts& known,
-                                  Micros now) const;
   [[nodiscard]] quality::Setting final_setting(const protocol::View& view) const;
 
-  ViewForecast forecast_;
+  FrameTimes times_;
   Chooser chooser_;
   JpegRate jpeg_;
-  std::optional<double> final_factor_;  // time of the last final frame relative to that of its
-                                        // setting
-  quality::Setting moving_setting_;     // the last setting chosen
-  double queue_us_ = 0;                 // recent waiting time of moving frames for the renderer
-  int thinner_ = 0;           // number of halvings of the final frame's slabs for maxError
-  double thicker_error_ = 0;  // measured before the last halving
+  quality::Setting moving_setting_;  // the last one chosen
+  double queue_us_ = 0;              // recent waiting time of moving frames for the renderer
+  int thinner_ = 0;                  // number of halvings of the final frame's slabs for maxError
+  double thicker_error_ = 0;         // measured before the last halving
 };
 
 }  // namespace windsplat::session

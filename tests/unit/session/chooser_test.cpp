@@ -1,5 +1,5 @@
-// The chooser: measured times correct forecasts; finer settings are chosen with hysteresis, coarser
-// ones at once.
+// The chooser and the times it relies on: measured times correct forecasts; finer settings are
+// chosen with hysteresis, coarser ones at once.
 #include "server/session/pacing/chooser.hpp"
 
 #include <gtest/gtest.h>
@@ -8,6 +8,8 @@
 #include <functional>
 #include <limits>
 #include <vector>
+
+#include "server/session/pacing/frame_times.hpp"
 
 namespace windsplat::session {
 namespace {
@@ -33,6 +35,8 @@ Forecasts calibrated(double full_ms) {
 }
 
 struct Drag {
+  Forecasts tables;
+  FrameTimes times{[this](const auto& /*signature*/, const auto& /*viewpoint*/) { return tables; }};
   Chooser chooser;
   protocol::View view;
   Micros now = 0;
@@ -40,12 +44,15 @@ struct Drag {
   // Settings of `count` frames. A setting takes `slower` times its forecast.
   std::vector<std::size_t> run(const Forecasts& known, const quality::Aim& aim, int count,
                                const std::function<double(int frame)>& slower) {
+    tables = known;
     std::vector<std::size_t> drawn;
     for (int n = 0; n < count; ++n) {
-      const std::size_t setting = chooser.choose(view, known, aim, no_limit, now);
+      const Forecasts expected = times.forecast(view, now).settings;
+      const std::size_t setting = chooser.choose(view, expected, aim, no_limit, now);
       drawn.push_back(setting);
       now += frame_us;
-      chooser.learn(setting, static_cast<Micros>(1000 * slower(n) * known[setting].ms), known, now);
+      const auto cost = static_cast<Micros>(1000 * slower(n) * known[setting].ms);
+      if (times.learn(setting, cost, view, now)) chooser.restart();
     }
     return drawn;
   }
@@ -58,8 +65,7 @@ TEST(Chooser, CorrectsForecastsByMeasuredFrames) {
   const Forecasts known = calibrated(100);
   const auto drawn = drag.run(known, {50.0, std::nullopt}, 30, [](int) { return 3.0; });
   for (std::size_t n = 2; n < drawn.size(); ++n) EXPECT_LE(3 * known[drawn[n]].ms, 50) << n;
-  const double expected =
-      1e-3 * static_cast<double>(drag.chooser.expected(drawn.back(), known, drag.now));
+  const double expected = drag.times.forecast(drag.view, drag.now).settings[drawn.back()].ms;
   EXPECT_NEAR(expected, 3 * known[drawn.back()].ms, 0.05 * expected);
 }
 

@@ -1,6 +1,5 @@
-// Serves owners round-robin, the earliest request of each first; after a failure an owner waits for
-// new requests.
-#include "server/data/resident/prefetcher.hpp"
+// Owners in turn, the earliest request of each first; failed requests wait for new ones.
+#include "server/data/resident/prefetch_thread.hpp"
 
 #include <algorithm>
 #include <condition_variable>
@@ -16,7 +15,7 @@
 
 namespace windsplat::data {
 
-struct Prefetcher::State {
+struct PrefetchThread::State {
   explicit State(std::shared_ptr<Budget> shared)
       : budget(std::move(shared)), thread([this] { work(); }) {}
 
@@ -90,10 +89,10 @@ struct Prefetcher::State {
   std::thread thread;  // last member: the thread uses all of the above
 };
 
-Prefetcher::Prefetcher(std::shared_ptr<Budget> budget)
+PrefetchThread::PrefetchThread(std::shared_ptr<Budget> budget)
     : state_(std::make_unique<State>(std::move(budget))) {}
 
-Prefetcher::~Prefetcher() {
+PrefetchThread::~PrefetchThread() {
   {
     const std::lock_guard lock(state_->mutex);
     state_->stopping = true;
@@ -102,8 +101,8 @@ Prefetcher::~Prefetcher() {
   state_->thread.join();
 }
 
-void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
-  if (requests.empty()) {  // without allocation, as destructors require
+void PrefetchThread::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
+  if (requests.empty()) {  // as destructors say it: without memory, which an empty deque has
     state_->budget->request_prefetch(owner, {});
     const std::lock_guard lock(state_->mutex);
     state_->queues.erase(owner);
@@ -130,7 +129,7 @@ void Prefetcher::request_prefetch(std::uint64_t owner, std::vector<PrefetchReque
   state_->wake.notify_one();
 }
 
-void Prefetcher::forget(const DatasetInfo& info) {
+void PrefetchThread::forget(const DatasetInfo& info) {
   const std::lock_guard lock(state_->mutex);
   for (auto at = state_->queues.begin(); at != state_->queues.end();) {
     auto& queue = at->second.requests;

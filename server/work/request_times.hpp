@@ -1,5 +1,6 @@
-// Estimates render times from earlier pictures of the same dataset and method: work (cost.hpp) and
-// times in, an estimate out.
+// Estimates the time of a requested picture for admission, before its dataset is read: its work
+// (frame/cost.hpp) in, a time that most pictures do not exceed out. Learnt from earlier pictures of
+// the same dataset and method.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,7 @@
 namespace windsplat::work {
 
 // Thread-safe.
-class RenderCosts {
+class RequestTimes {
  public:
   // Default without history: time of one thread, within the measured range
   // (docs/user/configuration.md).
@@ -25,7 +26,7 @@ class RenderCosts {
   static constexpr std::size_t known_max = 256;  // maximum number of entries; the least recently
                                                  // drawn one is removed
 
-  explicit RenderCosts(unsigned threads) : threads_(threads) {}
+  explicit RequestTimes(unsigned threads) : threads_(threads) {}
 
   void learn(const std::string& dataset, protocol::MethodName method, double kernels,
              std::int64_t took_us);

@@ -9,14 +9,14 @@
 
 namespace windsplat::data {
 
-class Prefetcher {
+class PrefetchThread {
  public:
-  explicit Prefetcher(std::shared_ptr<Budget> budget);
-  ~Prefetcher();  // ends after the running load
-  Prefetcher(const Prefetcher&) = delete;
-  Prefetcher& operator=(const Prefetcher&) = delete;
+  explicit PrefetchThread(std::shared_ptr<Budget> budget);
+  ~PrefetchThread();  // ends after the load in work
+  PrefetchThread(const PrefetchThread&) = delete;
+  PrefetchThread& operator=(const PrefetchThread&) = delete;
 
-  // See Store::request_prefetch().
+  // See Store::request_prefetch.
   void request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests);
   // Stops prefetching for a dataset.
   void forget(const DatasetInfo& info);

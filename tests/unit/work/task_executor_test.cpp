@@ -1,5 +1,5 @@
 // Limits of waiting loads: per dataset, in total, and exemptions.
-#include "server/work/load_service.hpp"
+#include "server/work/task_executor.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,14 +11,14 @@
 namespace windsplat::work {
 namespace {
 
-TEST(LoadService, LimitsWaitingJobsPerDatasetAndInTotal) {
+TEST(TaskExecutor, LimitsWaitingJobsPerDatasetAndInTotal) {
   constexpr std::size_t most = 3;
   std::promise<void> let_go;
   const std::shared_future<void> gone = let_go.get_future().share();
   std::promise<void> begun;
   std::atomic<int> ran{0};
   int refusals = 0;
-  LoadService loads(1, most, "loads", [&] { ++refusals; });
+  TaskExecutor loads({"loads", 1, most}, [&] { ++refusals; });
   ASSERT_TRUE(loads.submit({{}, [&] {
                               begun.set_value();
                               gone.wait();
@@ -33,24 +33,24 @@ TEST(LoadService, LimitsWaitingJobsPerDatasetAndInTotal) {
     return static_cast<bool>(queued);
   };
   int taken = 0;
-  for (std::size_t n = 0; n < LoadService::datasets_full; ++n) {
+  for (std::size_t n = 0; n < TaskExecutor::keys_full; ++n) {
     const auto dataset = std::make_shared<const int>(0);
     for (std::size_t one = 0; one < most; ++one) taken += ask(dataset) ? 1 : 0;
     EXPECT_FALSE(ask(dataset)) << n;
   }
-  EXPECT_EQ(taken, static_cast<int>(most * LoadService::datasets_full));
+  EXPECT_EQ(taken, static_cast<int>(most * TaskExecutor::keys_full));
   EXPECT_FALSE(ask(std::make_shared<const int>(0))) << "the limit of all datasets";
-  EXPECT_TRUE(ask(nullptr, true)) << "was admitted before";
-  EXPECT_EQ(refusals, static_cast<int>(LoadService::datasets_full) + 1);
+  EXPECT_TRUE(ask(nullptr, true)) << "admitted before";
+  EXPECT_EQ(refusals, static_cast<int>(TaskExecutor::keys_full) + 1);
   let_go.set_value();
   loads.end();
   EXPECT_EQ(ran, taken + 1);
 }
 
-TEST(LoadService, OnePayerMayUseHalfOfTheSlots) {
+TEST(TaskExecutor, OnePayerMayUseHalfOfTheSlots) {
   std::promise<void> let_go;
   std::promise<void> begun;
-  LoadService loads(1, 4, "loads");
+  TaskExecutor loads({"loads", 1, 4});
   ASSERT_TRUE(loads.submit({{}, [&] {
                               begun.set_value();
                               let_go.get_future().wait();
@@ -72,13 +72,13 @@ TEST(LoadService, OnePayerMayUseHalfOfTheSlots) {
 }
 
 // Loads that wait for memory or block on their files.
-TEST(LoadService, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
+TEST(TaskExecutor, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
   constexpr std::size_t places = 2;
   constexpr std::size_t spare = 2;
   std::promise<void> let_go;
   const std::shared_future<void> gone = let_go.get_future().share();
   std::atomic<std::size_t> hanging{0};
-  LoadService loads(places, 16, "loads", {}, spare);
+  TaskExecutor loads({"loads", places, 16, spare});
   const auto hang = [&] {
     EXPECT_TRUE(loads.submit({{},
                               [&hanging, gone] {
@@ -102,7 +102,7 @@ TEST(LoadService, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
   for (std::size_t n = 0; n < spare; ++n) hang();
   while (hanging < places + spare) std::this_thread::yield();
   auto beside_all = run_one();
-  EXPECT_EQ(beside_all.wait_for(2 * LoadService::long_run), std::future_status::timeout);
+  EXPECT_EQ(beside_all.wait_for(2 * TaskExecutor::long_run), std::future_status::timeout);
   let_go.set_value();
   EXPECT_EQ(beside_all.wait_for(std::chrono::minutes(1)), std::future_status::ready);
 }

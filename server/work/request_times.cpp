@@ -1,5 +1,5 @@
 // Tracks microseconds per kernel for each dataset and method; rises fast, falls slowly.
-#include "server/work/cost_history.hpp"
+#include "server/work/request_times.hpp"
 
 #include <algorithm>
 
@@ -13,8 +13,8 @@ constexpr double weight_below = 0.1;
 
 }  // namespace
 
-void RenderCosts::learn(const std::string& dataset, protocol::MethodName method, double kernels,
-                        std::int64_t took_us) {
+void RequestTimes::learn(const std::string& dataset, protocol::MethodName method, double kernels,
+                         std::int64_t took_us) {
   if (kernels <= 0) return;
   const double seen = std::min(static_cast<double>(took_us) / kernels, us_a_kernel_max);
   const std::lock_guard lock(mutex_);
@@ -29,8 +29,8 @@ void RenderCosts::learn(const std::string& dataset, protocol::MethodName method,
   }));
 }
 
-double RenderCosts::estimate_ms(const std::string& dataset, protocol::MethodName method,
-                                double kernels) const {
+double RequestTimes::estimate_ms(const std::string& dataset, protocol::MethodName method,
+                                 double kernels) const {
   const std::lock_guard lock(mutex_);
   const auto known = known_.find({dataset, method});
   const double us_a_kernel =

@@ -1,0 +1,66 @@
+// Expected error and time of each setting for the view of a session: the forecasts of the tables,
+// corrected by the times of the session's frames.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "protocol/view.hpp"
+#include "server/quality/table.hpp"
+#include "server/session/effects.hpp"
+#include "server/session/surroundings.hpp"
+
+namespace windsplat::session {
+
+// What the frames of a view are expected to cost: rendering and encoding, without waiting.
+struct FrameForecast {
+  quality::Forecasts settings;  // `timed`: calibrated, or a frame was measured recently
+  // The final frame, including the finer slab run that measures its error.
+  Micros final_us = 0;
+  bool final_is_guessed = false;  // neither calibrated nor measured
+};
+
+// A forecast's time is multiplied by the recent ratio of measured to forecast times, common to all
+// settings and additionally per setting.
+class FrameTimes {
+ public:
+  explicit FrameTimes(Forecaster forecaster) : forecaster_(std::move(forecaster)) {}
+
+  [[nodiscard]] FrameForecast forecast(const protocol::View& view, Micros now) const;
+
+  // The view was drawn: its scene signature is known after completion during drawing, before that
+  // its method only.
+  void complete(const protocol::View& view, const Drawn& drawn);
+  // A frame of the view at the setting took `cost`. True: the first one, or earlier times no longer
+  // apply, since they corrected guesses and this one a calibrated time, or vice versa.
+  bool learn(std::size_t setting, Micros cost, const protocol::View& view, Micros now);
+  void learn_final(Micros cost, const protocol::View& view, Micros now);
+  void forget();  // another dataset
+
+ private:
+  struct Correction {
+    double log_ratio = 0;  // relative to that of all settings
+    std::optional<Micros> at;
+    [[nodiscard]] bool is_recent(Micros now) const;
+  };
+  // Of times measured over forecast.
+  struct Measured {
+    bool any = false;
+    bool timed = false;  // against calibrated times
+    double log_ratio = 0;
+    std::array<Correction, quality::settings_count> own{};
+  };
+
+  [[nodiscard]] quality::Forecasts uncorrected(const protocol::View& view) const;
+
+  Forecaster forecaster_;
+  std::string drawn_key_;              // of the view drawn last, before completion
+  quality::SceneSignature signature_;  // after completion
+  quality::Viewpoint viewpoint_;
+  Measured measured_;
+  std::optional<double> final_factor_;  // time of the last final frame over that of its setting
+};
+
+}  // namespace windsplat::session
