@@ -5,8 +5,8 @@ that turn the camera and take every frame. Table as Markdown on stdout. Linux on
 Usage: memory.py [--program=windsplat] [--frames=20] [--sessions=4] [--size=1280x720]
        [--dims=320x160x19 | --built-in] [--max-mb=N]
 
-It serves a netCDF file of the sample; with --built-in the sample itself. Exit 1 where the first
-session's peak is above N MB."""
+Serves a netCDF file of the sample, or with --built-in the sample itself. Exit 1 if the peak of
+the first session exceeds N MB."""
 import argparse
 import math
 import pathlib
@@ -20,7 +20,7 @@ MB = 1e6
 
 
 def measure(daemon, options):
-    """Rows of name, resident and peak bytes; and the resident bytes a further session costs."""
+    """Rows of name, resident and peak bytes; and the resident bytes of an additional session."""
     width, height = map(int, options.size.split("x"))
     rows = [("started, nothing loaded", daemon.memory())]
     first = Viewer(daemon.port)

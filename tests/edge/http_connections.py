@@ -1,5 +1,5 @@
-"""Cases of HTTP/1.1: sizes of headers, connections and pipelines, deadlines, conditions, and what a
-client accepts."""
+"""Cases of HTTP/1.1: sizes of headers, connections and pipelines, deadlines, conditional
+requests, and content negotiation."""
 import functools
 import gzip
 import socket
@@ -12,7 +12,7 @@ from suite import Case, require
 from wire_client import Connection, request
 
 HEADER_MAX = 8192
-CUT_S = 5  # for a header, and for a body
+CUT_S = 5  # seconds until a slow header or body is cut off
 FRAME = "v1/datasets/tornado/frame.jpg?width=16&height=12"
 
 
@@ -57,7 +57,8 @@ def size_cases():
 
 
 def pipeline(target, count, kind):
-    """Requests in one segment; answers in their order, each known by its own id."""
+    """Sends requests in one segment; the answers must be in order, each identified by its own
+    id."""
     paths = {"livez": ["livez"], "mixed": ["livez", FRAME, "nothing", "v1"]}[kind]
     with Connection(target, timeout=60) as connection:
         asked, data = [], b""
@@ -77,7 +78,7 @@ def pipeline(target, count, kind):
 
 
 def pipeline_ends(target, data, count, statuses):
-    """So many answers, then the end, although more was asked."""
+    """Expects this many answers, then the end of the connection, although more was requested."""
     with Connection(target) as connection:
         connection.raw_or_lost(fill(target, data))
         got = [connection.answer().status for _ in range(count)]
@@ -177,7 +178,8 @@ def expect_cases():
 
 
 def cut(target, data, drip, pause):
-    """Ended between 4 s and 9 s after it began, however bytes drip in; the limit is 5 s."""
+    """The connection must end between 4 s and 9 s after its start, however slowly bytes arrive;
+    the limit is 5 s."""
     with Connection(target) as connection:
         begun = time.monotonic()
         connection.raw(fill(target, data))
@@ -194,7 +196,7 @@ def cut(target, data, drip, pause):
 
 
 def served_meanwhile(target):
-    """While those wait: a request every 0.2 s, each answered within a second."""
+    """During the slow requests: a request every 0.2 s, each answered within a second."""
     end = time.monotonic() + CUT_S
     while time.monotonic() < end:
         begun = time.monotonic()
@@ -228,7 +230,7 @@ def slow_cases():
 
 
 def refused_dripping(target, data):
-    """The rest of a refused body is thrown away for a while, not for ever."""
+    """The rest of a refused body is discarded for a limited time."""
     with Connection(target) as connection:
         connection.raw(fill(target, data))
         require(connection.answer().status == 413, "not refused")
@@ -359,7 +361,7 @@ def negotiation_cases():
             ("weight-small", f"{png};q=0.001", 200, png),
             ("browser", f"text/html, {png}, */*;q=0.8", 200, png)):
         if name == "spaces":
-            continue  # no white space about "=" (RFC 9110, 5.6.6): nothing is said of what comes
+            continue  # white space about "=" (RFC 9110, 5.6.6): the reaction is unspecified
         yield Case(f"http.accept.{name}", where, f"Accept: {value}", str(status),
                    functools.partial(accepting, value=value, status=status, kind=kind))
     where = "RFC 9110 12.5.3"

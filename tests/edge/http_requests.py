@@ -1,15 +1,16 @@
-"""Cases of HTTP/1.1 (RFC 9110, RFC 9112): request line, fields, Host, how a body is framed."""
+"""Cases of HTTP/1.1 (RFC 9110, RFC 9112): request line, fields, Host, framing of bodies."""
 import functools
 
 from suite import Case, require
 from wire_client import Connection
 
 BODY = b'{"dataset":"tornado","image":{"width":16,"height":12}}'
-ATTACK_BYTES = 66 * 1024  # a trailer of this size killed a plain server of the library we use
+ATTACK_BYTES = 66 * 1024  # a trailer of this size crashed a plain server of the library in use
 
 
 def fill(target, text):
-    """HOST is the daemon's authority, BASE its path, AUTH its token's field; the rest as it is."""
+    """HOST is the daemon's authority, BASE its path, AUTH its token's field; the rest is sent
+    unchanged."""
     data = text if isinstance(text, bytes) else text.encode("latin-1")
     for name, value in (
             (b"HOST", target.authority()), (b"BASE", target.base),
@@ -19,8 +20,8 @@ def fill(target, text):
 
 
 def one(target, data, statuses, closed, method):
-    """One answer with one of those statuses. `closed`: the connection is ended behind it, and
-    nothing else came; False: it serves another request."""
+    """Expects one answer with one of those statuses. `closed`: the connection ends after it
+    without further data; False: it serves another request."""
     with Connection(target) as connection:
         connection.raw_or_lost(fill(target, data))
         answer = connection.answer(method)

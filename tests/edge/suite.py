@@ -11,8 +11,8 @@ import time
 
 from wire_client import Closed, Daemon, Target, WebSocket, request, status_bytes
 
-# `section`: of the RFC or of our documents; `expected`: the required reaction; `run(target)` raises
-# on any other reaction. Slow cases run concurrently.
+# `section`: of the RFC or of the project's documents; `expected`: the required reaction;
+# `run(target)` raises on any other reaction. Slow cases run concurrently.
 Case = collections.namedtuple("Case", "id section what expected run slow", defaults=(False,))
 KIB = 1024
 
@@ -45,7 +45,7 @@ def parser_of(description):
 
 
 class Watched:
-    """A daemon under test: its own, or one that runs already."""
+    """A daemon under test: started here, or already running."""
 
     def __init__(self, options):
         self.growth_max = options.growth_kib * KIB
@@ -63,7 +63,7 @@ class Watched:
         self.pid = self.child.pid
 
     def check_good_client(self):
-        """A request, a picture and a session, as if nothing had been."""
+        """A well-behaved client: a request, a picture and a session must succeed."""
         require(self.child is None or self.child.poll() is None, "the daemon died")
         require(request(self.target, "GET", "livez").status == 200, "/livez does not answer 200")
         view = {"dataset": "tornado", "image": {"width": 32, "height": 24}}
@@ -88,14 +88,14 @@ class Watched:
         return status_bytes(self.pid, "VmHWM") if self.pid else 0
 
     def settled_growth(self, before):
-        """What stayed behind, once connections that were left have been noticed."""
+        """Memory and descriptors that remain once closed connections have been noticed."""
         end = time.monotonic() + (3 if self.growth_max else 0)
         while self.resident() - before > self.growth_max and time.monotonic() < end:
             time.sleep(0.1)
         return self.resident() - before
 
     def stop(self):
-        """Its exit code."""
+        """Stops the daemon; returns its exit code."""
         code = self.daemon.stop() if self.child else 0
         if self.log and code != 0:
             self.log.seek(0)
@@ -166,7 +166,7 @@ def print_table(groups):
 
 
 def main(groups, options):
-    """Runs (name, cases) pairs; the exit code."""
+    """Runs (name, cases) pairs; returns the exit code."""
     ids = collections.Counter(case.id for _, cases in groups for case in cases)
     repeated = [name for name, count in ids.items() if count > 1]
     if repeated:
@@ -176,7 +176,7 @@ def main(groups, options):
         return 0
     daemon = Watched(options)
     run = Run(daemon, options)
-    for _ in range(3):  # one-time allocations are no growth
+    for _ in range(3):  # one-time allocations do not count as growth
         daemon.check_good_client()
     for name, cases in groups:
         run.group(name, cases)

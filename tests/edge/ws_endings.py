@@ -6,14 +6,14 @@ from suite import Case, require
 from wire_client import CLOSE, PING, TEXT, Closed, frame
 from ws_frames import CONTINUE, closing, custom, living, question, require_close, session
 
-# Neither in use nor reserved for others (7.4.2), or never to be sent (7.4.1).
+# Codes neither in use nor reserved for others (7.4.2), or never to be sent (7.4.1).
 BAD_CODES = (0, 1, 999, 1004, 1005, 1006, 1015, 1016, 1100, 1999, 2000, 2500, 2999)
 GOOD_CODES = (1000, 1001, 1002, 1003, 1007, 1008, 1009, 1010, 1011, 1012, 1013, 3000, 3001, 3500,
               3999, 4000, 4001, 4400, 4410, 4999)
-# Registered after the RFC, or beyond its ranges: the reaction is unspecified.
+# Codes registered after the RFC, or beyond its ranges: the reaction is unspecified.
 OPEN_CODES = (1014, 5000, 32768, 65535)
 
-# By the first and last letters of each length, and those about the surrogates.
+# The first and last characters of each encoded length, and those next to the surrogates.
 VALID = {
     "ascii": b"hello", "nul": b"\0", "u7f": b"\x7f", "u80": b"\xc2\x80", "u7ff": b"\xdf\xbf",
     "u800": b"\xe0\xa0\x80", "ufff": b"\xe0\xbf\xbf", "u1000": b"\xe1\x80\x80",
@@ -67,7 +67,7 @@ def code_cases():
 
 
 def silence_after(viewer, data):
-    """Data after a close are not answered; the close is, once."""
+    """Data after a close are ignored; the close is answered once."""
     viewer.raw(goodbye(1000) + data)
     closes, texts = 0, []
     try:
@@ -114,14 +114,14 @@ def failing_then_text(viewer):
 
 
 def in_fragments(data, size=1):
-    """A text, in fragments of so many bytes."""
+    """A text in fragments of that many bytes."""
     parts = [data[at:at + size] for at in range(0, len(data), size)]
     return b"".join(frame(CONTINUE if number else TEXT, part, fin=number == len(parts) - 1)
                     for number, part in enumerate(parts))
 
 
 def fail_fast(viewer, bad):
-    """At once or at the message's end, as the RFC leaves open; but 1007 it is."""
+    """The close code is 1007; the RFC permits it at once or at the end of the message."""
     viewer.raw(frame(TEXT, b"abc" + bad, fin=False))
     viewer.raw_or_lost(frame(CONTINUE, b"xyz"))
     require_close(viewer, (1007,))

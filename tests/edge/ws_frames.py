@@ -1,5 +1,5 @@
-"""Cases of RFC 6455, chapters 5 and 6: masks, reserved bits and opcodes, lengths, fragments, pings,
-binary messages, delivery, limits of time."""
+"""Cases of RFC 6455, chapters 5 and 6: masks, reserved bits and opcodes, lengths, fragments,
+pings, binary messages, delivery, deadlines."""
 import functools
 import json
 import socket
@@ -22,13 +22,13 @@ def session(target):
 
 
 def question(number=5, size=0):
-    """A text whose answer names its number, of that many bytes or as few as may be."""
+    """A text of that many bytes, or the fewest possible, whose answer contains its number."""
     text = json.dumps({"type": "open", "id": number, "dataset": "nowhere"})
     return text.encode().ljust(size)
 
 
 def require_life(viewer, errors=None):
-    """A question is answered; before it came so many errors, where told."""
+    """A request is answered; before the answer arrive that many errors, if given."""
     viewer.send(TEXT, question(4242))
     before = 0
     while viewer.text("error").get("id") != 4242:
@@ -37,13 +37,14 @@ def require_life(viewer, errors=None):
 
 
 def require_close(viewer, codes):
-    """A close frame with one of those codes (None: the bare end will do), then the end of TCP."""
+    """Expects a close frame with one of those codes (None: no close frame needed), then the end
+    of TCP."""
     try:
         while True:
             viewer.message()
     except Closed as end:
         require(end.code in codes, f"closed with {end.code}: {end}")
-        if end.code:  # else the daemon waits for its answer
+        if end.code:  # otherwise the daemon waits for the answering close
             viewer.raw_or_lost(frame(CLOSE, struct.pack(">H", 1000)))
     require(viewer.ended(), "TCP stays open behind the close frame")
 
@@ -162,7 +163,7 @@ def fragment_cases():
     text = question()
 
     def cut(*sizes, between=b"", opcode=TEXT):
-        """The question in fragments of those sizes, the rest last."""
+        """The request in fragments of those sizes, the remainder last."""
         out, at = b"", 0
         for number, size in enumerate(sizes):
             out += frame(CONTINUE if number else opcode, text[at:at + size], fin=False) + between
@@ -281,7 +282,7 @@ def flood(viewer):
         while viewer.frame() != (0x80 | PONG, b"last"):
             pass
     except (TimeoutError, OSError, Closed):
-        pass  # the peer may have had enough; that it lives is looked at after the group
+        pass  # the peer may have closed; the daemon is checked after the group
 
 
 def binary_cases():
@@ -330,7 +331,7 @@ def delivery_cases():
 
 
 def ended_within(viewer, seconds, data, every):
-    """Sends that again and again; the daemon must end it."""
+    """Sends the frame repeatedly; the daemon must close the connection."""
     end = time.monotonic() + seconds
     codes = (None, 1002, 1008, 1009)
     viewer.socket.settimeout(0.01)
@@ -359,7 +360,7 @@ def once_then(first, seconds, data, every):
 
 
 def deadline_cases():
-    """A message has 10 s and 128 KiB of wire; twice that is given."""
+    """A message is limited to 10 s and 128 KiB; the test sends for twice that time."""
     def patient(name, what, first, data, every):
         return custom("deadline." + name, "the time of a message", what, "ended within 20 s",
                       once_then(first, 20, data, every), slow=True)

@@ -1,4 +1,4 @@
-"""Cases of RFC 6455, chapter 4: the opening handshake, as a client may get it wrong."""
+"""Cases of RFC 6455, chapter 4: the opening handshake with errors of the client."""
 import functools
 
 from suite import Case, require
@@ -12,7 +12,7 @@ GOOD = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Key": KE
 
 
 def handshake(target, line="GET {path} HTTP/1.1", change=None, more=(), host=None):
-    """The request's bytes: good fields, those of `change` instead (None: without), then `more`."""
+    """The request's bytes: valid fields, those of `change` instead (None: omitted), then `more`."""
     fields = {"Host": host or target.authority(), **GOOD, **(change or {})}
     lines = [line.format(path=target.base + "v1/stream", authority=target.authority())]
     lines += [f"{name}: {value}" for name, value in fields.items() if value is not None]
@@ -37,8 +37,8 @@ def accepted(target, check=None, **how):
 
 
 def refused(target, statuses, version=False, **how):
-    """No session; a final answer with one of those statuses and, where the version is at fault, the
-    version that would do (4.2.2, 4)."""
+    """Expects no session, and a final answer with one of those statuses which, for a wrong
+    version, names the supported one (4.2.2, 4)."""
     with Connection(target) as connection:
         connection.raw(handshake(target, **how))
         method = how.get("line", "GET").split(" ")[0]
@@ -143,7 +143,7 @@ def key_cases():
               change={"Sec-WebSocket-Key": f"{KEY}, {KEY}"})
     yield good("key.spaces", "RFC 9110 5.5", "a key with white space about it",
                change={"Sec-WebSocket-Key": f" \t {KEY}\t "})
-    # The last two bits of 22 letters are no part of the 16 bytes.
+    # The last two bits of 22 base64 letters are not part of the 16 bytes.
     odd = KEY[:21] + "R=="
     yield Case("ws.open.key.other", "RFC 6455 1.3", "another key has another accept value",
                "101 and its SHA-1", functools.partial(other_key, key=odd))
@@ -153,7 +153,7 @@ def other_key(target, key):
     with Connection(target) as connection:
         connection.raw(handshake(target, change={"Sec-WebSocket-Key": key}))
         answer = connection.answer()
-        # RFC 4648, 3.5 lets a decoder refuse bits that are not zero.
+        # RFC 4648, 3.5 permits a decoder to refuse non-zero padding bits.
         require(answer.status in (101, 400), str(answer.status))
         require(answer.status == 400 or answer.header("Sec-WebSocket-Accept") == accept_of(key),
                 "another accept value")
@@ -222,7 +222,7 @@ def origin_cases():
             ("other", "http://evil.example"), ("null", "null"), ("empty", ""), ("file", "file://"),
             ("prefix", "http://127.0.0.1.evil.example"), ("port", "http://127.0.0.1:1")):
         if name == "empty":
-            continue  # as good as none
+            continue  # equivalent to an absent field
         yield bad("origin." + name, where, f"Origin: {value}", (403,), more=["Origin: " + value])
     yield Case("ws.open.origin.twice", where, "its own Origin and another", "400 or 403",
                lambda target: refused(target, (400, 403), more=[

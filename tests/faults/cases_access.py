@@ -1,4 +1,4 @@
-"""Who may connect: origins, hosts, tokens, TLS."""
+"""Access: origins, hosts, tokens, TLS."""
 import os
 import re
 import secrets
@@ -11,8 +11,8 @@ import time
 from support import (PATIENCE_S, SAMPLE, Closed, Stream, Untried, ask, case, check_good, need,
                      status_of, talk)
 
-SILENT_S = 10  # after which a connection without a first byte is given up
-SLACK_S = 4  # for a loaded machine
+SILENT_S = 10  # deadline of a connection without a first byte
+SLACK_S = 4  # tolerance for a loaded machine
 
 EVIL = ["https://evil.example", "null", "http://127.0.0.1.evil.example", "http://evil.example:80",
         "file://", "https://127.0.0.1@evil.example", "http://localhost.evil.example"]
@@ -124,7 +124,7 @@ def with_tls(world):
 
 
 def over_tls(port, request, cut=False):
-    """What comes back; `cut`: the connection ends without TLS' own goodbye."""
+    """The bytes received; `cut`: the connection ends without close_notify."""
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     plain = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
@@ -155,7 +155,7 @@ def tls_faults(world, count):
 
 @case("connections that say nothing", 100, 20)
 def silent(world, count):
-    """Not a byte, by plain TCP and by TLS, whose handshake does not begin."""
+    """Connections that send nothing, over plain TCP and over TLS before the handshake."""
     plain, over_tls = world.daemon(), with_tls(world)
     since = time.monotonic()
     held = [socket.create_connection(("127.0.0.1", (plain, over_tls)[n % 2].port),
@@ -207,8 +207,8 @@ def tls_all(world, _count):
          f"127.0.0.1:{daemon.port}"], capture_output=True, text=True, timeout=900, check=False)
     found = [line.strip() for line in done.stdout.splitlines()
              if re.search(r"\bVULNERABLE\b|\bNOT ok\b", line) and "not vulnerable" not in line
-             # It asks for secrets beside what a stranger chose in one compressed answer: files of
-             # the page alone are compressed, which hold neither.
+             # BREACH needs secrets and attacker-chosen text in one compressed answer: only files of
+             # the page are compressed, which contain neither.
              and "BREACH" not in line]
     need("TLS 1.3" in done.stdout, f"testssl.sh told nothing: {done.stdout[-200:]}")
     need(not found, f"{found[:3]}")

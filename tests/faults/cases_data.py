@@ -1,5 +1,5 @@
-"""Files that want to break the reader or to get out, names that lead elsewhere, files that change
-under the daemon, and memory that is not enough."""
+"""Hostile files, names that lead outside the data root, files that change while being read, and
+insufficient memory."""
 import json
 import os
 import pathlib
@@ -116,7 +116,7 @@ def changing(world, count):
         elif how == 3:
             path.unlink()
         else:
-            with open(path, "r+b") as file:  # in place, under the reader
+            with open(path, "r+b") as file:  # in place, while it is being read
                 file.seek(len(data) // 3)
                 file.write(os.urandom(len(data) // 3))
         # A step that is resident, and one that may have to be read.
@@ -182,8 +182,8 @@ def little_space(world, count):
 
 @case("little memory (cgroup)", 10, 2)
 def little_cgroup(world, count):
-    """The kernel ends the loader or takes pages back; where the daemon itself is too large for the
-    group it is ended, and that is what the group is for: what is tried leaves room for it."""
+    """The kernel kills the loader or reclaims pages; if the daemon itself exceeds the group's
+    limit it is killed, as intended, so the sizes used here leave room for it."""
     group = CGROUPS / f"windsplat-faults-{os.getpid()}"
     if "memory" not in read_or_nothing(CGROUPS / "cgroup.subtree_control"):
         raise Untried("no cgroup with a memory controller can be made here: none was tried")

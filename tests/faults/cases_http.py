@@ -1,5 +1,5 @@
-"""Requests that are no requests, or that take too long: the HTTP edge in short (tests/edge has it
-in depth)."""
+"""Malformed and slow requests: a short version of the HTTP edge cases (tests/edge has all of
+them)."""
 import re
 import shutil
 import socket
@@ -10,13 +10,14 @@ import time
 from support import (MIB, PATIENCE_S, SAMPLE, Failed, Untried, ask, case, check_good, need, picture,
                      rss, status_of, talk, wait_for)
 
-CUT_S = 5  # after which a header or a body that does not come is given up
-SLACK_S = 4  # for a loaded machine
+CUT_S = 5  # deadline of an incomplete header or body
+SLACK_S = 4  # tolerance for a loaded machine
 SIZES = [0, 1, 4095, 4096, 8191, 8192, 16383, 16384, 65535, 65536, 66000, 131072, 1 << 20]
 
 
 def refused(port, request, allowed):
-    """Answered by one of these, then closed; or closed at once. The status, 0 for none."""
+    """Expects one of these statuses and then the end of the connection, or the end at once.
+    Returns the status, 0 for none."""
     got, took = talk(port, request)
     need(took < CUT_S + SLACK_S, f"closed after {took:.1f} s: {request[:60]!r}")
     if not got:
@@ -27,7 +28,7 @@ def refused(port, request, allowed):
 
 
 def by_size(world, count, make, allowed):
-    """Sizes around the limits, again and again; the daemon's memory must not grow with them."""
+    """Sizes around the limits, repeatedly; the daemon's memory must not grow with them."""
     daemon = world.daemon()
     for size in SIZES:
         refused(daemon.port, make(size), allowed)
@@ -83,7 +84,7 @@ def lengths(world, count):
 
 
 class Slow(threading.Thread):
-    """Says a request a byte at a time; how long it was listened to."""
+    """Sends a request one byte at a time; returns how long the connection stayed open."""
 
     def __init__(self, port, request, at_once):
         super().__init__(daemon=True)

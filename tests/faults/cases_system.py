@@ -1,4 +1,4 @@
-"""What the system refuses: memory, sockets, files, disk, descriptors; and a clock that jumps."""
+"""Failures of the system: memory, sockets, files, disk, descriptors; and a clock that jumps."""
 import json
 import os
 import pathlib
@@ -24,7 +24,7 @@ def shim_of(world):
 
 
 def inject(world, count, *kinds, phases=("serve", "guarded")):
-    """So many rounds of each kind; the whole sweep is inject.py's own."""
+    """That many rounds of each kind; inject.py runs the complete sweep."""
     if not shim_of(world).exists():
         raise Untried(f"{shim_of(world)} is not built (sanitizers have their own allocator): no "
                       f"{', '.join(kinds)} was made to fail")
@@ -253,7 +253,7 @@ def killed_loader(world, count):
 
 @case("a loader that is stopped", 3, 1)
 def stopped_loader(world, count):
-    """By SIGSTOP, as if during playback; other datasets are served meanwhile."""
+    """The loader is stopped by SIGSTOP, as during playback; other datasets are served meanwhile."""
     folder = world.new_folder()
     for name in ("wind", "other"):
         subprocess.run([world.program, "synth", "tornado", "--dims", "32x32x32", "--steps", "12",

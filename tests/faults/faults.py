@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
-"""Every fault that docs/design/testing.md lists, tried against a running daemon. A Markdown
-table on stdout: the fault, how often it was tried, what came of it. Linux only.
+"""Provokes every fault listed in docs/design/testing.md in a running daemon. Prints a Markdown
+table of the fault, the number of tries and the result. Linux only.
 
 Usage: faults.py [--program=build/release/windsplat] [--quick] [--count=N] [--only=PART]...
        [--list] [--require-all] [--slack=1]
 
---quick tries each a few times; --count gives all the same number of tries; --only takes cases
-whose name has this part; --slack allows so much more time than is asked of a machine of its own. A
-tool that is not installed or a right that is missing is named, with what was therefore not tried:
-those rows say NOT TRIED, and with --require-all they are failures. Exit code 0: every case that
-was tried is ok."""
+--quick tries each fault a few times; --count sets the number of tries for all; --only selects
+cases by a part of their name; --slack is a factor for the time limits of an idle machine. A
+missing tool or permission is reported with the cases it prevents: those rows say NOT TRIED, and
+with --require-all they are failures. Exit code 0: every case that was tried passed."""
 import argparse
 import pathlib
 import sys
@@ -18,7 +17,7 @@ import time
 import traceback
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-# Cases are entered by being imported, in the order of the table.
+# Importing these modules registers their cases, in the order of the table.
 import cases_http  # noqa: E402, F401
 import cases_stream  # noqa: E402, F401
 import cases_access  # noqa: E402, F401
@@ -30,7 +29,7 @@ from support import CASES, Failed, Untried, World, check_good  # noqa: E402
 
 
 def run_case(world, one, count):
-    """What came of it, and the verdict."""
+    """Runs a case; returns the result and the verdict."""
     try:
         told = one.call(world, count)
         daemon = world.daemon()
@@ -40,7 +39,7 @@ def run_case(world, one, count):
         return str(why), "NOT TRIED"
     except Failed as fault:
         return str(fault), "FAILED"
-    except Exception:  # a fault of the script, or one that it does not foresee
+    except Exception:  # an error of the script, or an unexpected one
         return " / ".join(traceback.format_exc().strip().splitlines()[-3:]), "FAILED"
     finally:
         world.end_case()

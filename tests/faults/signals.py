@@ -5,10 +5,10 @@ Linux only.
 Usage: signals.py [--program=build/release/windsplat] [--rounds=50] [--signal=TERM]... [--quick]
        [--slack=1]
 
-TERM: /readyz fails first, streams are closed with 1001, the daemon exits with 0 within 10 s. KILL:
-the next daemon on the same state folder has every acknowledged view and no partial one; a client
-that reconnects and sends its view gets the same picture. HUP: an invalid configuration is logged
-and the old one stays. Exit code 0: all of this holds."""
+TERM: /readyz fails first, streams are closed with 1001, the daemon exits with 0 within 10 s.
+KILL: the next daemon on the same state folder has every acknowledged view and no partial one; a
+client that reconnects and sends its view gets the same picture. HUP: an invalid configuration is
+logged and the old one remains in effect. Exit code 0: all of this holds."""
 import argparse
 import http.client
 import json
@@ -37,9 +37,9 @@ class Load(threading.Thread):
     def __init__(self, port, number):
         super().__init__(daemon=True)
         self.port, self.number, self.over = port, number, False
-        self.code = None  # by which its stream ended
+        self.code = None  # close code of its stream
         self.done = 0
-        self.saved = {}  # id -> the step that was acknowledged last, or the two it may be
+        self.saved = {}  # id -> the last acknowledged step, or the two possible ones
 
     def run(self):
         work = (self.stream, self.pictures, self.views)[self.number % 3]
@@ -74,7 +74,7 @@ class Load(threading.Thread):
         name = json.loads(got.body)["id"]
         self.saved[name] = {0}
         for step in range(1, 4):
-            self.saved[name] = self.saved[name] | {step}  # either, until it is told
+            self.saved[name] = self.saved[name] | {step}  # either, until the answer arrives
             got = ask(self.port, "PATCH", f"/v1/views/{name}", {"step": step},
                       {"Content-Type": "application/merge-patch+json"}, timeout=20)
             if got.status == 200:
@@ -98,8 +98,8 @@ def stop_all(loads):
 
 
 def not_ready(connection, port):
-    """What /readyz says on a connection that was there before, or on a new one where that is no
-    more; "closed" where there is none to be had."""
+    """The status of /readyz on an existing connection, or on a new one if that is closed;
+    "closed" if no connection is possible."""
     try:
         connection.request("GET", "/readyz")
         answer = connection.getresponse()
@@ -121,14 +121,14 @@ def terminate(program, folder, rounds, slack=1):
         daemon = Daemon(program, "--state-dir", str(folder / "state"), SAMPLE)
         loads = loaded(daemon.port)
         held = http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=20)
-        held.connect()  # there before the drain, asks during it
+        held.connect()  # opened before the drain, used during it
         time.sleep(random.uniform(0.2, 0.8))
         since = time.monotonic()
         daemon.child.send_signal(signal.SIGTERM)
         status = wait_for(lambda at=daemon.port, one=held: not_ready(one, at), SEEN_S * slack,
                           "/readyz goes on saying 200")
         held.close()
-        # No further signal: a second one would end it at once.
+        # No further signal is sent: a second one would terminate the daemon at once.
         code = daemon.stop(0, patience=3 * DRAIN_S * slack)
         took = time.monotonic() - since
         stop_all(loads)
@@ -179,7 +179,7 @@ def kill(program, folder, rounds, _slack=1):
     everything = []
     for n in range(rounds):
         daemon = Daemon(program, "--state-dir", str(state), SAMPLE, listen=listen)
-        if n % 10 == 0:  # of all that were ever saved
+        if n % 10 == 0:  # checks all views saved so far
             kept += saved_views(daemon.port, everything, f"round {n}")
         with Stream(daemon.port) as viewer:
             got = viewer.final_frame(view)[64:]
@@ -211,7 +211,7 @@ def kill(program, folder, rounds, _slack=1):
 
 SPOILED = ["", "{", '{"nothing": 1}', '{"listen": 7}', "\0\1\2", '{"max-sessions": -5}', "[]",
            '{"\\u001b[31m\\n": 1}', "x" * 100000, '{"log-level": "loud"}',
-           # The half that is good must not be taken either.
+           # The valid half must not be applied either.
            '{"allow-origin": ["https://second.example"], "log-level": "loud"}']
 ORIGINS = ["https://first.example", "https://second.example"]
 

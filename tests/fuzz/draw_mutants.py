@@ -1,24 +1,25 @@
 #!/usr/bin/env python3
-"""Mutates small datasets whose every number is known, and compares what two daemons report and draw
-of each with that truth.
+"""Mutates small datasets whose values are all known, and compares the reports and pictures of two
+daemons with that truth.
 
     tests/fuzz/draw_mutants.py --count 340                # the short form, in ctest
     tests/fuzz/draw_mutants.py --count 10000 --reasons 20
     tests/fuzz/draw_mutants.py --only 1234 --keep found   # one file again, kept in a folder
 
 mutate_files.py changes bytes, and nearly all of its files are refused when they are opened. Here
-the mutation acts on the dataset (model.py): values, attributes, axes, times, packing, chunk tables
+the mutation changes the dataset (model.py): values, attributes, axes, times, packing, chunk tables
 (model_mutations.py). The result is then written as a file of each format (model_writers.py,
-model_grib.py), so most files open, and what they hold is known without reading them.
+model_grib.py), so most files open, and their contents are known without reading them.
 
-Every file is opened by two daemons, with one render thread and with three. Compared with the truth
-are the range and the count of masked samples of each field, over all steps and at the last one, the
-values at some samples, the coordinates of the axes and the dates. Both rendering methods draw the
-last step; each picture must be finite, within [0, 1], premultiplied, and empty if all samples are
-masked. Both daemons must give the same bytes. CPU time per file and peak memory are bounded.
+Two daemons open every file, with one render thread and with three. The following are compared with
+the truth: the range and the count of masked samples of each field, over all steps and at the last
+one, the values at some samples, the coordinates of the axes and the dates. Both rendering methods
+render the last step; each picture must be finite, within [0, 1], premultiplied, and empty if all
+samples are masked. Both daemons must give the same bytes. CPU time per file and peak memory are
+bounded.
 
-Needs python3-netcdf4. The files depend on --seed alone. Exit code 0: no assertion failed, and at
-least half of the files of each format were opened and drawn by both methods.
+Needs python3-netcdf4. The files depend on --seed only. Exit code 0: no assertion failed, and at
+least half of the files of each format were opened and rendered by both methods.
 """
 
 import argparse
@@ -58,7 +59,7 @@ class Process:
         self.cpu = self.cpu_seconds()
 
     def cpu_seconds(self):
-        """Of the daemon, and of those of its loaders that ended."""
+        """Peak memory of the daemon, and of its ended loaders."""
         stat = pathlib.Path(f"/proc/{self.daemon.child.pid}/stat").read_text()
         return sum(map(int, stat.rpartition(")")[2].split()[11:15])) / os.sysconf("SC_CLK_TCK")
 
@@ -79,7 +80,8 @@ def expect_near(reported, truth, what):
 
 
 def check_range(reported, masked, values, model, what):
-    """values: (component, ...) of the truth. An exact file is compared, a resampled one bounded."""
+    """values: (component, ...) of the truth. Exact datasets are compared, resampled ones
+    bounded."""
     truth, absent = models.range_and_masked(values)
     if model.resampled:
         slack = 1e-5 * max(map(abs, truth or [0])) + 1e-30
@@ -96,7 +98,7 @@ def check_range(reported, masked, values, model, what):
 
 
 def truths(about, model):
-    """(field, truth) of those that the file holds."""
+    """(field, truth) of those that the file contains."""
     out = []
     for field in about["fields"]:
         values = model.truth(model.vectors.get(field["name"], field["components"]))
@@ -173,8 +175,8 @@ def picture(daemon, view):
 
 
 def view_of(about, step, method, dice):
-    """From any side, also from within: every line, however weak, and fog of the last scalar over
-    its whole range."""
+    """A view from any direction, also from within: every line, however weak, and the last scalar
+    as a medium over its whole range."""
     view = {"dataset": about["id"], "step": step, "image": {"width": 64, "height": 48},
             "method": {"name": method, "detail": str(dice.choice(["auto", "full"]))},
             "camera": {"projection": str(dice.choice(["perspective", "orthographic"])),
@@ -185,7 +187,7 @@ def view_of(about, step, method, dice):
         view["vector"] = {"minMagnitude": 0, "stride": int(dice.integers(1, 3))}
     for field in about["fields"]:
         if field["kind"] == "scalar" and field["range"]:
-            low, high = np.clip(field["range"], -9e37, 9e37).tolist()  # a view has limits
+            low, high = np.clip(field["range"], -9e37, 9e37).tolist()  # limits of the view
             if low == high:
                 low, high = low - abs(low) / 2 - 1, high + abs(high) / 2 + 1
             view["scalars"] = [{"field": field["name"], "extinction": [[low, 1], [high, 5]],
@@ -210,8 +212,8 @@ def check_picture(data, method, empty):
 
 
 def examine(process, path, model, seed):
-    """What a daemon reports and draws of a file, to be compared with the other's, and whether any
-    pixel is drawn. Raises Refused or Failure."""
+    """The reports and pictures of one daemon for a file, to be compared with those of the other,
+    and whether any pixel is covered. Raises Refused or Failure."""
     daemon = process.daemon
     dataset = urllib.parse.quote(open_dataset(daemon, path), safe="")
     answers, drawn = [], []
@@ -234,7 +236,7 @@ def examine(process, path, model, seed):
             drawn.append(check_picture(data, method, empty))
             answers.append(data)
         process.check_cpu()
-        # Again: by now it has the ranges of all steps.
+        # Repeated, because it now includes the ranges of all steps.
         answers.append(daemon.json("GET", f"/v1/datasets/{dataset}"))
     finally:
         daemon.json("DELETE", f"/v1/datasets/{dataset}?forget=true")
@@ -253,7 +255,7 @@ class Run:
         self.pool = concurrent.futures.ThreadPoolExecutor(len(processes))
 
     def outcome_of(self, path, model, number):
-        """refused, drawn or failed, and why."""
+        """Returns refused, drawn or failed, and the reason."""
         asked = [self.pool.submit(examine, process, path, model, number)
                  for process in self.processes]
         results = []

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Whether the built program has the hardening of cmake/hardening.cmake: position-independent, stack
-protected, relocations read-only and bound at start, no executable stack, fortified calls, no search
-path that others could fill. Shadow stacks (-fcf-protection) are not looked for: one object without
-the mark takes it from all, and Debian 12's start files have none.
+"""Checks that the built program has the hardening of cmake/hardening.cmake: position-independent,
+stack protection, relocations read-only and bound at start, no executable stack, fortified calls, no
+writable library search path. Shadow stacks (-fcf-protection) are not checked: one object without
+the mark disables them for the program, and Debian 12's start files lack it.
 
-Usage: check_hardening.py PROGRAM      reads it by readelf, and by checksec where that is installed
+Usage: check_hardening.py PROGRAM      uses readelf, and checksec if it is installed
 """
 import json
 import pathlib
@@ -53,7 +53,7 @@ def by_readelf(program):
 
 
 def by_checksec(program):
-    """What checksec (Debian's package of that name) finds missing."""
+    """The protections that checksec (a Debian package) reports as missing."""
     if shutil.which("checksec") is None:
         return None
     text = subprocess.run(["checksec", "--format=json", f"--file={program}"], text=True,

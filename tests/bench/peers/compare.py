@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""windsplat beside VTK: the same file, camera path and picture sizes in one run, as a Markdown
-table on stdout. Where VTK is not installed it says so and exits 0.
+"""Compares windsplat with VTK: the same file, camera path and picture sizes in one run. Prints a
+Markdown table. Without VTK it prints a message and exits 0.
 
 Usage: compare.py [--build=build/release] [--frames=9] [--sizes=640x480,1280x720] [--dims=XxYxZ]
                   [--sample=climate|tornado] [--pictures=DIR] [--slow] [--only=TEXT]
@@ -21,9 +21,9 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 MB = 1e6
 FOV_Y = 35  # degrees
-STEP = 1    # of the camera, degrees a frame
+STEP = 1    # of the camera, degrees per frame
 
-# What is drawn, in world units (windsplat's: the longest edge of the box is 2).
+# The rendered data in world units (windsplat's: the longest edge of the box is 2).
 SAMPLES = {
     "climate": {"dimensions": "(level, lat, lon)", "half_box": [1, 0.5, 0.15],
                 "components": ["u", "v", "w"], "top_magnitude": 100, "line_length": 0.04,
@@ -39,7 +39,7 @@ class Skip(Exception):
 
 
 def vtk_python():
-    """An interpreter that has VTK: this one, or the system's, for which Debian packages it."""
+    """A Python interpreter with VTK: this one, or the system's, for which Debian packages VTK."""
     for python in (sys.executable, "/usr/bin/python3"):
         probe = subprocess.run([python, "-c", "import vtkmodules"], capture_output=True)
         if probe.returncode == 0:
@@ -48,8 +48,8 @@ def vtk_python():
 
 
 class Display:
-    """The X server that Debian's VTK needs: the one at hand, or a virtual one for as long as this
-    lives."""
+    """The X server that Debian's VTK needs: the existing one, or a virtual one that ends with
+    this object."""
 
     def __enter__(self):
         self.server = None
@@ -147,7 +147,7 @@ class Bench:
         return json.loads(done.stdout)
 
 
-# Name, the windsplat scene that it is compared with, what VTK draws.
+# Name, the windsplat scene to compare with, and the parts that VTK draws.
 VTK_CONFIGS = [
     ("fixed-point ray cast", "clouds", {"volume": "fixed-point", "lines": False}),
     ("GPU ray cast on llvmpipe", "clouds", {"volume": "gpu", "lines": False}),
@@ -176,7 +176,7 @@ def row(size, scene, name, result, reference):
 
 
 def table(bench, configs):
-    """Returns one result of each program, for the line that names them."""
+    """Runs both programs once and returns the results, to print their versions."""
     print("| size | scene | drawn by | wall, ms | processor, ms | peak, MB | wall / kernel's | "
           "processor / kernel's |\n|---|---|---|---|---|---|---|---|")
     ours = peer = None
