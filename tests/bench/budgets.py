@@ -103,7 +103,7 @@ def wait_for_survey(port, seconds):
         if re.search(r'^windsplat_background_jobs_total{result="done"} [1-9]', told, re.M):
             return
         time.sleep(0.2)
-    print(f"not surveyed within {seconds} s", file=sys.stderr)
+    print(f"not calibrated within {seconds} s", file=sys.stderr)
 
 
 def used(kept):
@@ -161,7 +161,7 @@ def main():
     parser.add_argument("--budgets", type=numbers, default=[16, 33, 66, 100])
     parser.add_argument("--max-errors", type=numbers, default=[0.05, 0.02, 0.005])
     parser.add_argument("--frames", type=int, default=120)
-    parser.add_argument("--rest", type=float, default=60, help="seconds to wait for a survey")
+    parser.add_argument("--rest", type=float, default=60, help="seconds of the calibration")
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
     print("| data | aim | render ms, median | p95 | p95 / budget | with encoding, p95 | "

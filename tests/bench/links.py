@@ -115,7 +115,7 @@ def main():
     parser.add_argument("--dataset", default="climate")
     parser.add_argument("--seconds", type=float, default=10)
     parser.add_argument("--check", action="store_true")
-    parser.add_argument("--smoke", action="store_true", help="one link, small and short, each way")
+    parser.add_argument("--smoke", action="store_true", help="one small, short link by each method")
     options = parser.parse_args()
     how = {"auto": Tunnel if can_tunnel() else Proxy, "tunnel": Tunnel, "proxy": Proxy}[options.how]
     if options.smoke:

@@ -292,7 +292,7 @@ def measure(options, daemon):
     ramp = {}
     for count in options.ramp:
         ramp[count] = judged(options, run(options, daemon, "closed_loop", count))
-        print(row("unloaded" if count == 1 else f"{count} who wait", ramp[count]), flush=True)
+        print(row("unloaded" if count == 1 else f"{count} clients", ramp[count]), flush=True)
     peak = max(r["goodput"] for r in ramp.values())
     loads = {}
     for times in options.times:
@@ -340,7 +340,7 @@ def main():
     if not alive:
         sys.exit("load.py: the daemon died")
     if not works:
-        sys.exit("load.py: no pictures came, or health checks failed")
+        sys.exit("load.py: no picture was received, or health checks failed")
     return 1 if options.check and not options.smoke and not fine else 0
 
 

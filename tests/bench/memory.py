@@ -62,11 +62,11 @@ def main():
         print(f"| {name} | {memory['VmRSS'] / MB:.1f} | {memory['VmHWM'] / MB:.1f} |")
     voxels = math.prod(map(int, options.dims.split("x")))
     resident = [memory["VmRSS"] for _, memory in rows]
-    print(f"\nBytes a voxel resident: {(resident[1] - resident[0]) / voxels:.1f} "
+    print(f"\nResident bytes per voxel: {(resident[1] - resident[0]) / voxels:.1f} "
           "(winds and clouds, with what reading them leaves behind)")
     if options.sessions > 1:
         more = (resident[3] - resident[2]) / (options.sessions - 1)
-        print(f"Bytes a further session: {more / MB:.2f} MB")
+        print(f"An additional session: {more / MB:.2f} MB")
     peak = rows[2][1]["VmHWM"] / MB
     if options.max_mb is not None and peak > options.max_mb:
         sys.exit(f"memory.py: the peak, {peak:.1f} MB, is above {options.max_mb:g} MB")

@@ -65,7 +65,7 @@ def play(port, dataset, steps, options):
         if step == last:
             continue
         if last is not None and step != (last + 1) % steps:
-            raise RuntimeError(f"step {step} came after {last}")
+            raise RuntimeError(f"step {step} followed {last}")
         last, count, full = step, count + 1, full + (level == 0)
         if count == steps:
             now = time.monotonic()

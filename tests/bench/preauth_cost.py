@@ -161,10 +161,10 @@ def main():
     options = parser.parse_args()
     keys = options.key or ["P-256", "rsa:2048"]
     if not tls_peer.has_openssl():
-        print("nothing measured: openssl is not installed, which makes certificates")
+        print("nothing measured: openssl, which creates the certificates, is not installed")
         return
     base = None
-    print("| what | bytes sent | CPU, us | CPU a byte, ns | a GET's, times |\n"
+    print("| request | bytes sent | CPU, us | CPU per byte, ns | relative to a GET |\n"
           "|---|---|---|---|---|")
     with tempfile.TemporaryDirectory(prefix="windsplat-preauth-") as text:
         folder = pathlib.Path(text)

@@ -125,7 +125,7 @@ def settle(options, daemon, before, failures):
         if now["fds"] <= before["fds"] and now["threads"] <= before["threads"] and sessions == 0:
             return now
         if time.monotonic() > end:
-            failures.append(f"not back at the start: {now['fds']} descriptors of {before['fds']}, "
+            failures.append(f"not back to the initial state: {now['fds']} of {before['fds']} descriptors, "
                             f"{now['threads']} threads of {before['threads']}, "
                             f"{sessions:.0f} sessions")
             return now
@@ -146,11 +146,11 @@ def report(options, counts, samples, before, after, failures):
     highest = max((s["rss"] for _, s in samples), default=0)
     how = "over TLS " if options.context else ""
     came = ", ".join(f"{n} {kind}" for kind, n in counts.came.items() if n)
-    print(f"{options.sessions} sessions {how}at a time for {took / 60:.1f} minutes: {came} came; "
+    print(f"{options.sessions} concurrent sessions {how}for {took / 60:.1f} minutes: {came};  "
           f"{counts.frames} frames, {counts.requests} requests, {counts.refused} refused. Hostile: "
           + (", ".join(f"{n} {name}" for name, n in sorted(counts.kinds.items())) or "none")
           + ".\n")
-    print("| | before | most | after |\n|---|---|---|---|")
+    print("| | before | peak | after |\n|---|---|---|---|")
     print(f"| resident, MB | {before['rss'] / MB:.1f} | {highest / MB:.1f} "
           f"| {after['rss'] / MB:.1f} |")
     for name, key in (("descriptors", "fds"), ("threads", "threads")):
@@ -173,12 +173,12 @@ def parsed_options():
     parser.add_argument("--dataset", default="tornado:32x32x32")
     parser.add_argument("--minutes", type=float, default=20)
     parser.add_argument("--sessions", type=int, default=200)
-    parser.add_argument("--mix", default="normal:8,hostile:1,deaf:1", help="kinds and shares")
-    parser.add_argument("--stay", type=float, default=30, help="seconds of a session, about")
+    parser.add_argument("--mix", default="normal:8,hostile:1,deaf:1", help="session kinds and shares")
+    parser.add_argument("--stay", type=float, default=30, help="approximate seconds of a session")
     parser.add_argument("--size", default="160x120")
     parser.add_argument("--every", type=float, default=5, help="seconds between samples")
-    parser.add_argument("--max-slope", type=float, default=8, help="MB/hour that are no failure")
-    parser.add_argument("--samples", help="a file for seconds and resident MB, a line a sample")
+    parser.add_argument("--max-slope", type=float, default=8, help="permitted slope in MB/hour")
+    parser.add_argument("--samples", help="file for seconds and resident MB, one line per sample")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--tls", action="store_true", help="over TLS")
     parser.add_argument("--smoke", action="store_true")

@@ -130,7 +130,7 @@ def run(orbits, seconds, besides=None):
     for orbit in orbits:
         orbit.join(120)
         if orbit.fault:
-            sys.exit(f"viewers.py: a viewer failed: {orbit.fault}")
+            sys.exit(f"viewers.py: a session failed: {orbit.fault}")
     return took
 
 
@@ -247,7 +247,7 @@ def measure_ended(daemon, options, size):
 
     first = visit(max(1, options.ended // 4))
     left = (visit(options.ended) - first) / options.ended
-    print(f"A session that has ended leaves {left / KIB:.1f} KiB (mean of {options.ended}, "
+    print(f"An ended session leaves {left / KIB:.1f} KiB allocated (mean of {options.ended}, "
           f"after {max(1, options.ended // 4)} others)")
 
 
@@ -283,7 +283,7 @@ def main():
         first.turn({"dataset": options.dataset_id,
                     "image": {"width": size[0], "height": size[1]}}, 1)
         first.socket.close()
-        print(f"One final frame was drawn: RSS {daemon.memory()['VmRSS'] / MB:.1f} MB\n")
+        print(f"After one final frame: RSS {daemon.memory()['VmRSS'] / MB:.1f} MB\n")
         for count in (1, options.viewers):
             fine = measure(daemon, options, size, count, False) >= options.min_jain and fine
         if options.mixed:

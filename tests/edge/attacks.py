@@ -97,11 +97,11 @@ class Scene:
         """Raises Failure if anything outside was accessed; returns how access was watched."""
         self.daemon.vitals()
         code = self.daemon.stop()
-        require(code == 0, f"the daemon ended with {code}")
-        require(not self.watch.seen(), f"opened outside: {dict(self.watch.names)}")
+        require(code == 0, f"the daemon exited with {code}")
+        require(not self.watch.seen(), f"outside files opened: {dict(self.watch.names)}")
         require(self.canary.visitors == 0, f"{self.canary.visitors} connections were made")
         if not self.straced:
-            return "canaries alone, without strace"
+            return "canaries only, without strace"
         judge = strace_log.Judge([self.root, self.folder / "tmp"], self.outside,
                                  checked_daemon.LIBRARIES, pathlib.Path(self.program).resolve())
         judge.read(self.daemon.log)
@@ -135,7 +135,7 @@ def chunked_trailer(options, _folder):
     peak = daemon.peak() - before
     require(not daemon.growth_max or peak <= daemon.growth_max, f"{peak / KIB:.0f} KiB more")
     daemon.check_good_client()
-    require(daemon.stop() == 0, "the daemon did not end well")
+    require(daemon.stop() == 0, "the daemon did not exit with 0")
     return f"{ROUNDS * len(bodies)} attacks, each 501 and closed; at most {peak / KIB:.0f} KiB more"
 
 

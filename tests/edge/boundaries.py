@@ -62,13 +62,13 @@ class Gunner:
             last = number == len(shots)
             if (last or number % EVERY == 0) and not self.look_after(before, f"{number} {name}"):
                 return
-        print(f"{name}: {len(shots)} sent, most memory {self.most / KIB:.0f} KiB above the start")
+        print(f"{name}: {len(shots)} sent, peak memory growth {self.most / KIB:.0f} KiB")
 
 
 def main():
     parser = suite.parser_of(__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--count", type=int, default=0, help="0: all there are")
+    parser.add_argument("--count", type=int, default=0, help="0: all inputs")
     parser.add_argument("--kind", default="")
     options = parser.parse_args()
     daemon = Watched(options)
@@ -86,7 +86,7 @@ def main():
         daemon.growth_max *= DRAWN_SHARE
     code = daemon.stop()
     if code != 0:
-        gunner.failures.append(f"the daemon ended with {code}")
+        gunner.failures.append(f"the daemon exited with {code}")
     if options.verbose:
         for kind, count in sorted(gunner.kinds.items()):
             print(f"{count:6} {kind}")

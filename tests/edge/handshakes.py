@@ -221,7 +221,7 @@ def main():
     parser.add_argument("--slack", type=float, default=1)
     options = parser.parse_args()
     if not tls_peer.has_openssl():
-        print("skipped: openssl is not installed, which makes certificates and ClientHellos")
+        print("skipped: openssl, which creates certificates and ClientHellos, is not installed")
         return SKIPPED
     with tempfile.TemporaryDirectory(prefix="windsplat-handshakes-") as folder:
         cert, key = tls_peer.make_certificate(pathlib.Path(folder))
@@ -244,7 +244,7 @@ def main():
             faults += phase.wrong(quiet, options.slack)
         code = daemon.stop()
         if code != 0:
-            faults.append(f"the daemon ended with {code}")
+            faults.append(f"the daemon exited with {code}")
     for fault in faults:
         print("FAILED " + fault)
     return 1 if faults else 0

@@ -32,7 +32,7 @@ def sized(target, size, statuses, shape):
         start = start.replace(b" HTTP", b"?" + b"a" * (room - 1) + b" HTTP", 1)
     with Connection(target) as connection:
         data = start + middle + end
-        require(len(data) == size, f"the case itself is wrong: {len(data)}")
+        require(len(data) == size, f"invalid test case: {len(data)} bytes")
         connection.raw_or_lost(data)
         answer = connection.answer()
         require(answer.status in statuses, f"{answer.status} {answer.body[:200]!r}")
@@ -84,7 +84,7 @@ def pipeline_ends(target, data, count, statuses):
         got = [connection.answer().status for _ in range(count)]
         require(got[-1] in statuses, f"{got}")
         require(connection.ended(), "stays open")
-        require(not connection.buffer, f"more came: {bytes(connection.buffer[:200])!r}")
+        require(not connection.buffer, f"unexpected data: {bytes(connection.buffer[:200])!r}")
 
 
 def pipeline_cases():
@@ -103,7 +103,7 @@ def pipeline_cases():
              2, (501,)),
             ("http10", get(version="HTTP/1.0") + one, 1, (200,)),
             ("large", one + get("X: " + "a" * 9000 + "\r\n") + one, 2, (431,))):
-        yield Case(f"http.pipeline.ends.{name}", where, f"a pipeline in which one ends it: {name}",
+        yield Case(f"http.pipeline.ends.{name}", where, f"a pipeline ended by one request: {name}",
                    f"{count} answers, then the end", functools.partial(
                        pipeline_ends, data=data, count=count, statuses=statuses))
     yield Case("http.body.next", where, "a body, and the next request in its segment",
@@ -153,7 +153,7 @@ def old_expectation(target):
             connection.raw(BODY)
             require(connection.answer().status == 200, "the body is not read")
         else:
-            require(False, f"was told {bytes(connection.buffer[:60])!r}")
+            require(False, f"received {bytes(connection.buffer[:60])!r}")
 
 
 def expect_cases():
@@ -162,7 +162,7 @@ def expect_cases():
         yield Case(f"http.expect.{word}", where, f"Expect: {word}", "100, then 200",
                    functools.partial(expected_100, word=word))
     length = f"Content-Length: {len(BODY)}\r\n"
-    yield row("expect.at-once", where, "the body comes without waiting",
+    yield row("expect.at-once", where, "the body follows without waiting",
               post("Expect: 100-continue\r\n" + length), 200, closed=False)
     yield row("expect.large", where, "an expectation of a body too large, in place of 100",
               post("Expect: 100-continue\r\nContent-Length: 65537\r\n", b""), 413)
@@ -223,7 +223,7 @@ def slow_cases():
             check = functools.partial(refused_dripping, data=data)
         yield Case(f"http.slow.{name}", where, f"{name}, a byte in {pause} s or none",
                    "ended within 4 to 9 s", check, True)
-    yield Case("http.slow.others", where, "requests of others meanwhile",
+    yield Case("http.slow.others", where, "concurrent requests of other clients",
                "each answered within a second", served_meanwhile, True)
     yield Case("http.slow.crowd", where, "60 slow headers at a time", "ended within 4 to 9 s",
                functools.partial(crowd, count=60), True)

@@ -33,7 +33,7 @@ def one(target, data, statuses, closed, method):
         if closed:
             require(answer.header("Connection") == "close", "does not say close")
             require(connection.ended(), "stays open")
-            require(not connection.buffer, f"more came: {bytes(connection.buffer[:200])!r}")
+            require(not connection.buffer, f"unexpected data: {bytes(connection.buffer[:200])!r}")
         elif closed is False:
             connection.raw(fill(target, "GET BASElivez HTTP/1.1\r\nHost: HOST\r\nAUTH\r\n"))
             again = connection.answer()
@@ -253,7 +253,7 @@ def length_cases():
     yield row("length.none", "RFC 9110 15.5.12", "POST without a length", post("", b""), 411)
     yield row("length.get", "RFC 9110 9.3.1", "GET with a body",
               get("Content-Length: 5\r\n") + "hello", 200, 400, closed=None)
-    yield row("length.short", where, "a body shorter than told, then a good request",
+    yield row("length.short", where, "a body shorter than declared, then a valid request",
               post("Content-Length: 10\r\n", b"{}") + b"12345678", 400, closed=None)
 
 

@@ -29,18 +29,18 @@ def require(truth, what):
 def parser_of(description):
     default = pathlib.Path(__file__).resolve().parents[2] / "build/release/windsplat"
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--program", default=str(default), help="its daemon is started")
-    parser.add_argument("--url", help="of a daemon that runs already")
-    parser.add_argument("--pid", type=int, help="of that daemon, to watch its memory")
-    parser.add_argument("--ca", help="certificate that the daemon's is checked by (https)")
-    parser.add_argument("--token-file", help="the token that the daemon wants")
+    parser.add_argument("--program", default=str(default), help="program whose daemon is started")
+    parser.add_argument("--url", help="URL of a running daemon")
+    parser.add_argument("--pid", type=int, help="process id of that daemon, to measure its memory")
+    parser.add_argument("--ca", help="certificate that verifies the daemon's (https)")
+    parser.add_argument("--token-file", help="file of the token that the daemon requires")
     parser.add_argument("--serve-option", action="append", default=[], metavar="OPTION",
-                        help="for the daemon that is started; more than one may be given")
-    parser.add_argument("--only", default="", help="cases whose id begins so")
+                        help="option for the started daemon; repeatable")
+    parser.add_argument("--only", default="", help="prefix of the ids of cases to run")
     parser.add_argument("--growth-kib", type=int, default=KIB,
-                        help="resident memory that a group may leave behind; 0: not looked at")
-    parser.add_argument("--list", action="store_true", help="the cases as a Markdown table")
-    parser.add_argument("--verbose", action="store_true", help="every case that was tried")
+                        help="permitted growth of resident memory in a group; 0: not checked")
+    parser.add_argument("--list", action="store_true", help="print the cases as a Markdown table")
+    parser.add_argument("--verbose", action="store_true", help="print every case")
     return parser
 
 
@@ -75,7 +75,7 @@ class Watched:
             hello = viewer.text("hello")
             require(hello["datasets"], f"no datasets: {hello}")
             viewer.say({"type": "open", "id": 7, "dataset": "nowhere"})
-            require(viewer.text("error")["id"] == 7, "a good session is not answered")
+            require(viewer.text("error")["id"] == 7, "a well-behaved session is not answered")
 
     def resident(self):
         return status_bytes(self.pid, "VmRSS") if self.pid else 0
@@ -170,7 +170,7 @@ def main(groups, options):
     ids = collections.Counter(case.id for _, cases in groups for case in cases)
     repeated = [name for name, count in ids.items() if count > 1]
     if repeated:
-        sys.exit(f"ids that are not unique: {repeated}")
+        sys.exit(f"duplicate ids: {repeated}")
     if options.list:
         print_table(groups)
         return 0
@@ -182,7 +182,7 @@ def main(groups, options):
         run.group(name, cases)
     code = daemon.stop()
     if code != 0:
-        run.failures.append(f"the daemon ended with {code}")
+        run.failures.append(f"the daemon exited with {code}")
     print(f"{run.passed} passed, {len(run.failures)} failures")
     for failure in run.failures:
         print("FAILED " + failure)

@@ -113,7 +113,7 @@ class Connection:
         try:
             got = self.socket.recv(1 << 18)
         except (ConnectionError, ssl.SSLError) as fault:
-            raise Closed(f"the connection broke: {fault!r}") from fault
+            raise Closed(f"connection failed: {fault!r}") from fault
         if not got:
             raise Closed("the daemon closed the connection")
         self.buffer += got

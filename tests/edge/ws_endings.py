@@ -51,7 +51,7 @@ def code_cases():
     for code in BAD_CODES:
         yield closing(f"close.{code}", where, f"close with {code}", goodbye(code), 1002)
     for code in OPEN_CODES:
-        yield closing(f"close.{code}", where, f"close with {code}, of which nothing is said",
+        yield closing(f"close.{code}", where, f"close with {code}, unspecified in the RFC",
                       goodbye(code), code, 1000, 1002)
     yield closing("close.empty", "RFC 6455 5.5.1", "a close without a code", frame(CLOSE), 1000,
                   1005)
@@ -62,7 +62,7 @@ def code_cases():
         yield closing(f"close.reason.{name}", "RFC 6455 5.5.1", f"a reason: {name}",
                       goodbye(1000, reason), 1000)
     for name in ("lone80", "over-slash2", "ud800", "u110000", "ff", "cut3", "broken2"):
-        yield closing(f"close.reason.{name}", "RFC 6455 8.1", f"a reason that is no UTF-8: {name}",
+        yield closing(f"close.reason.{name}", "RFC 6455 8.1", f"a reason that is not UTF-8: {name}",
                       goodbye(1000, INVALID[name]), 1002, 1007)
 
 
@@ -91,9 +91,9 @@ def after_cases():
         yield custom(f"after.{name}", where, f"a close, then {name}",
                      "one close frame, no answer, TCP ended",
                      functools.partial(silence_after, data=data))
-    yield Case("ws.after.waits", "RFC 6455 7.1.1", "the daemon ends TCP first, unasked",
+    yield Case("ws.after.waits", "RFC 6455 7.1.1", "the daemon closes TCP first",
                "TCP ended within 5 s", ends_first)
-    yield custom("after.error", "RFC 6455 7.1.7", "texts behind a frame that fails the session",
+    yield custom("after.error", "RFC 6455 7.1.7", "texts after a frame that fails the session",
                  "1002 and no answer to them", failing_then_text)
 
 
@@ -108,7 +108,7 @@ def failing_then_text(viewer):
     try:
         while True:
             kind, payload = viewer.message()
-            require(b'"id":5' not in payload, "a text behind the fault was answered")
+            require(b'"id":5' not in payload, "a text after the fault was answered")
     except Closed as end:
         require(end.code == 1002, f"closed with {end.code}")
 
@@ -146,11 +146,11 @@ def utf8_cases():
                      functools.partial(fail_fast, bad=INVALID[name]))
     name = '{"type":"open","id":5,"dataset":"κόσμε \U0001f32a"}'.encode()
     for size in (1, 2, 3, 5):
-        yield living(f"utf8.json.{size}", where, f"names of many letters, {size} bytes a fragment",
+        yield living(f"utf8.json.{size}", where, f"non-ASCII names, {size} bytes a fragment",
                      in_fragments(name, size), 1)
     yield living("utf8.ping", where, "a ping within a letter", frame(TEXT, b"\xe2\x82", fin=False)
                  + frame(PING, b"\xff") + frame(CONTINUE, b"\xac"), 1)
-    yield closing("utf8.resumed", where, "a letter cut by the message's end, its rest in the next",
+    yield closing("utf8.resumed", where, "a character divided between two messages",
                   frame(TEXT, b"\xe2\x82") + frame(TEXT, b"\xac"), 1007)
 
 

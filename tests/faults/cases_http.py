@@ -122,8 +122,8 @@ def slowly(world, count, request, at_once):
         served += 1
         time.sleep(0.1)
     longest = max(one.took for one in slow)
-    need(served > 0 and longest < CUT_S + SLACK_S, f"one was listened to for {longest:.1f} s")
-    need(min(one.took for one in slow) > CUT_S - 1, "one was cut before its time")
+    need(served > 0 and longest < CUT_S + SLACK_S, f"one stayed open for {longest:.1f} s")
+    need(min(one.took for one in slow) > CUT_S - 1, "one was closed before the deadline")
     return (f"cut after {longest:.1f} s at most; {served} pictures meanwhile, the slowest in "
             f"{1000 * slowest:.0f} ms")
 
@@ -154,14 +154,14 @@ def slow_by_tool(world, count):
         text = re.sub(r"\x1b\[[0-9;]*m", "", done.stdout)
         available = re.findall(r"service available:\s+(\w+)", text)
         ended = re.findall(r"Test ended on (\d+)\w+ second\s+Exit status:\s*(.*)", text)
-        need(ended and available, f"slowhttptest says nothing that is understood: {text[-200:]}")
+        need(ended and available, f"cannot parse the output of slowhttptest: {text[-200:]}")
         need(set(available) == {"YES"}, f"slowhttptest {how} found the service not available")
         need("No open connections left" in ended[0][1], f"connections are still held: {ended[0]}")
         told.append(f"{'headers' if how == '-H' else 'bodies'}: all closed by second {ended[0][0]}")
     return "; ".join(told) + "; service available throughout"
 
 
-@case("clients that leave in the middle of a request", 200, 20)
+@case("clients that disconnect in the middle of a request", 200, 20)
 def leave(world, count):
     daemon = world.daemon()
     request = head("Content-Type: application/json\r\nContent-Length: 20") + b"{}" + b" " * 18
@@ -191,9 +191,9 @@ def control_characters(world, count):
     daemon.stop()
     for line in daemon.lines:
         need(line.isprintable(), f"a control character in the log: {line!r}")
-        need(not re.match(r"\s*injected", line), f"a line that a client wrote: {line!r}")
+        need(not re.match(r"\s*injected", line), f"a log line injected by a client: {line!r}")
         need(len(line) < 4096, f"a line of {len(line)} characters")
-    need(len(daemon.lines) >= 5 * count, "the log tells too little to judge it")
+    need(len(daemon.lines) >= 5 * count, "the log has too few lines for this test")
     return f"{len(daemon.lines)} log lines, each one line without control characters"
 
 

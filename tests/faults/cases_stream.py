@@ -51,7 +51,7 @@ def lengths(world, count):
 def deflate(world, count):
     daemon = world.daemon()
     with Stream(daemon.port, [("Sec-WebSocket-Extensions", "permessage-deflate")]) as one:
-        need(b"permessage-deflate" not in one.head.lower(), "compression was agreed to")
+        need(b"permessage-deflate" not in one.head.lower(), "compression was negotiated")
     # 64 kB of which each byte decompresses to a thousand.
     packed = b"\xec\xc1" + bytes(60000)
     return codes_of(world, count, lambda one, n: one.send(1, packed, reserved=4),
@@ -128,7 +128,7 @@ def never_read(world, count):
         # The deadline of a frame is 15 s plus its size at 64 KiB/s. A frame that fits the kernel's
         # buffers is not blocked, and its session ends after 60 s without an answer to a ping.
         wait_for(lambda: metric(daemon.port, "windsplat_sessions") == 0, 90 + PATIENCE_S,
-                 "sessions that never read are still there")
+                 "sessions that never read are still open")
         told += "; gone by the deadline"
     for one in first + many:
         one.close()
@@ -185,7 +185,7 @@ def by_proxy(world, seconds):
 
 
 def judged_crawl(name, program, frames, behind, more):
-    need(frames >= 3, f"{name}: only {frames} frames came")
+    need(frames >= 3, f"{name}: only {frames} frames were received")
     # The renderer's one-time memory for the final picture may be included.
     need(more < 8 * MIB or is_sanitized(program),
          f"{name}: the daemon grew by {more / MIB:.1f} MiB")
@@ -242,7 +242,7 @@ def no_messages(world, count):
     return f"{errors} answered by an error and lived, then {closed} closed by 4400, 1007 or 1002"
 
 
-@case("streams cut off without a goodbye", 100, 20)
+@case("streams cut off without a close frame", 100, 20)
 def cut_off(world, count):
     daemon = world.daemon()
     wait_for(lambda: metric(daemon.port, "windsplat_sessions") == 0, PATIENCE_S, "sessions")
@@ -254,11 +254,11 @@ def cut_off(world, count):
             one.socket.sendall(b"\x81\xfe")  # in the middle of a frame
         one.close()
     wait_for(lambda: metric(daemon.port, "windsplat_sessions") == 0, PATIENCE_S,
-             "sessions of peers that are gone")
+             "sessions of disconnected peers")
     return "no session is left"
 
 
-@case("more viewers than there may be", 20, 5)
+@case("more sessions than allowed", 20, 5)
 def too_many(world, count):
     daemon = world.start("--max-sessions", "3", SAMPLE)
     kept = [Stream(daemon.port) for _ in range(3)]
@@ -267,13 +267,13 @@ def too_many(world, count):
     for _ in range(count):
         with Stream(daemon.port) as one:
             if one.status == 101:
-                need(one.until_closed() == 1013, "not sent away by 1013")
+                need(one.until_closed() == 1013, "not closed with 1013")
             else:
                 need(one.status in (429, 503), f"answered by {one.status}")
     for one in kept:
         one.final_frame(small_view())
         one.close()
-    return "1013 or 503; those before go on"
+    return "1013 or 503; the earlier sessions continue"
 
 
 

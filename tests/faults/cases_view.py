@@ -122,13 +122,13 @@ def busy(daemon):
     return cpu_s(daemon.pid) - before > 0.02
 
 
-@case("a render bomb whose client has gone", 20, 4)
+@case("an expensive picture whose client disconnects", 20, 4)
 def bomb(world, count):
     daemon = world.start("--memory-limit", "4G", SAMPLE)
     check_good(daemon.port)
     waits, costs = [], []
     for n in range(count):
-        wait_for(lambda: not busy(daemon), PATIENCE_S, "the daemon does not come to rest")
+        wait_for(lambda: not busy(daemon), PATIENCE_S, "the daemon does not become idle")
         if n % 2:
             one = Stream(daemon.port)
             one.patch(dict(BOMB, quality={"budgetMs": 10000}))
@@ -148,10 +148,10 @@ def bomb(world, count):
     # Only the daemon's own CPU time counts, so that other work on the machine has no effect.
     limit = FREE_S * os.cpu_count() * world.slack
     need(statistics.median(costs) <= limit, f"{1000 * statistics.median(costs):.0f} ms of "
-         f"processor time for nobody in the median, above {1000 * limit:.0f}")
-    return (f"processor time for nobody: median {1000 * statistics.median(costs):.0f} ms, most "
+         f"CPU time after the disconnection in the median, above {1000 * limit:.0f}")
+    return (f"CPU time after the disconnection: median {1000 * statistics.median(costs):.0f} ms, most "
             f"{1000 * max(costs):.0f}; at rest after {1000 * statistics.median(waits):.0f} ms, "
-            f"most {1000 * max(waits):.0f} (looked at every 20 ms)")
+            f"most {1000 * max(waits):.0f} (sampled every 20 ms)")
 
 
 # --- overload ------------------------------------------------------------------------------------
@@ -169,7 +169,7 @@ class Asker(threading.Thread):
             self.answers.append((got.status, time.monotonic() - since, got.headers))
 
 
-@case("more requests than can be drawn", 400, 80)
+@case("more requests than can be rendered", 400, 80)
 def overload(world, count):
     daemon = world.daemon()
     askers = [Asker(daemon.port, n, max(1, count // 40)) for n in range(40)]
@@ -201,7 +201,7 @@ def overload(world, count):
             "machine)")
 
 
-@case("patches faster than they can be drawn", 2000, 400)
+@case("patches faster than they can be rendered", 2000, 400)
 def flood(world, count):
     """A flood of patches by one client: the newest view wins, and another client is served
     meanwhile."""
@@ -213,4 +213,4 @@ def flood(world, count):
         last = one.answer_to_patch()
         need(isinstance(last, (bytes, dict)) and got, "no frame")
         need(not isinstance(last, dict) or last["type"] == "unchanged", f"{last}")
-    return "its last view arrives, another viewer is served"
+    return "its last view is rendered, another client is served"

@@ -53,8 +53,8 @@ def run(options, world):
     chosen = [c for c in CASES
               if not options.only or any(part in c.name for part in options.only)]
     if not chosen:
-        sys.exit("faults.py: no case has such a name; --list tells them")
-    print("| fault | tried | what came of it | |\n|---|---|---|---|", flush=True)
+        sys.exit("faults.py: unknown case; --list prints the names")
+    print("| fault | tries | result | |\n|---|---|---|---|", flush=True)
     verdicts = []
     for one in chosen:
         count = options.count or (one.quick if options.quick else one.count)
@@ -62,7 +62,7 @@ def run(options, world):
         before = world.shared
         told, verdict = run_case(world, one, count)
         if before is not None and not before.alive():
-            told, verdict = f"the daemon died ({before.child.returncode}); {told}", "FAILED"
+            told, verdict = f"the daemon exited ({before.child.returncode}); {told}", "FAILED"
         verdicts.append(verdict)
         tried = "-" if verdict == "NOT TRIED" else str(count)
         print(f"| {one.name} | {tried} | {cell(told)} | {verdict} |", flush=True)
@@ -77,7 +77,7 @@ def main():
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--count", type=int)
     parser.add_argument("--only", action="append", default=[])
-    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
+    parser.add_argument("--slack", type=float, default=1, help="factor for time limits")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--require-all", action="store_true")
     options = parser.parse_args()

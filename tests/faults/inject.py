@@ -255,7 +255,7 @@ class Sweep:
         """After a session with that many failed calls: the daemon must run and serve others."""
         time.sleep(0.01)
         try:
-            need(self.daemon.alive(), f"{what}: the daemon died ({self.daemon.child.poll()})")
+            need(self.daemon.alive(), f"{what}: the daemon exited ({self.daemon.child.poll()})")
             for fault in session.faults:
                 raise Failed(f"{what}: {fault}")
             self.ask_bystander(failed, log_from)
@@ -326,7 +326,7 @@ class Sweep:
             lost += session.lost
             bursts += 1
             self.judge(f"{kind}, {BURST} calls in a row", session, failed, log_from)
-        told = "every place met" if all_met else "ended by its limit, places are left"
+        told = "every call site reached" if all_met else "stopped at its limit"
         phase = "guarded" if self.guards else "serve"
         self.must_have_failed(kind, phase, hit)
         if self.bystanders_ended > max(BYSTANDERS_MAX, (rounds + bursts) * BYSTANDERS_SHARE):
@@ -338,7 +338,7 @@ class Sweep:
     def must_have_failed(self, kind, phase, hit):
         """Reports kinds of which no call failed, because nothing was tested."""
         if hit == 0:
-            self.fail(f"{kind}, {phase}: no call was made to fail")
+            self.fail(f"{kind}, {phase}: no call failed")
 
     def calls_of_a_session(self, kind):
         self.shim.arm(kind, at=1 << 40)
@@ -366,17 +366,17 @@ class Sweep:
                     if code == -signal.SIGABRT and LIBRARY in self.daemon.log():
                         aborts += 1
                         continue
-                    need(code in (1, 2, 3), f"it ended with {code}")
-                    need(any(self.daemon.lines), "it ended without a message")
+                    need(code in (1, 2, 3), f"it exited with {code}")
+                    need(any(self.daemon.lines), "it exited without a message")
                 else:
                     started += 1
                     check_good(self.daemon.port)
-                    need(self.daemon.stop() == 0, "it was stopped and did not end with 0")
+                    need(self.daemon.stop() == 0, "it was stopped and did not exit with 0")
             except (Failed, *LOST) as fault:
                 self.fail(f"{kind} at the start: {fault}")
                 if self.daemon.alive():
                     self.daemon.stop(signal.SIGKILL)
-        told = "every place met" if quiet >= QUIET_ROUNDS else "ended by its limit, places are left"
+        told = "every call site reached" if quiet >= QUIET_ROUNDS else "stopped at its limit"
         self.must_have_failed(kind, "start", hit)
         return (f"| {kind} | start | - | {self.shim.get(kind, 'known')} ({told}) | {hit} "
                 f"| {ended} ended with a message, {started} started, {aborts} were ended by "
@@ -402,7 +402,7 @@ class Sweep:
             slowest = max(slowest, took)
             if code != 0 or took > DRAIN_S * self.options.slack:
                 self.fail(f"{kind} in a drain: ended with {code} after {took:.1f} s")
-        told = "every place met" if quiet >= QUIET_ROUNDS else "ended by its limit, places are left"
+        told = "every call site reached" if quiet >= QUIET_ROUNDS else "stopped at its limit"
         self.must_have_failed(kind, "drain", hit)
         return (f"| {kind} | drain | - | {self.shim.get(kind, 'known')} ({told}) | {hit} "
                 f"| {rounds} drains, the longest {slowest:.1f} s |")
@@ -422,7 +422,7 @@ class Sweep:
             if serves:
                 self.bystander.close()
                 code = self.daemon.stop()
-                need(code == 0, f"the daemon that lived through them ended with {code}")
+                need(code == 0, f"the daemon that survived them exited with {code}")
         return self.failures
 
 
@@ -432,9 +432,9 @@ def parsed_options(words=None):
     parser.add_argument("--shim")
     parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--phase", action="append", choices=PHASES)
-    parser.add_argument("--count", type=int, default=100000, help="rounds of a sweep, at most")
-    parser.add_argument("--seconds", type=float, default=1800, help="of a sweep, at most")
-    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
+    parser.add_argument("--count", type=int, default=100000, help="greatest number of rounds")
+    parser.add_argument("--seconds", type=float, default=1800, help="time limit of a sweep")
+    parser.add_argument("--slack", type=float, default=1, help="factor for time limits")
     parser.add_argument("--quick", action="store_true", help="a few rounds of every sweep")
     options = parser.parse_args(words)
     options.phase = options.phase or PHASES

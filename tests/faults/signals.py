@@ -162,9 +162,9 @@ def saved_views(port, loads, tell):
     kept = 0
     for name, steps in ((n, s) for one in loads for n, s in one.saved.items()):
         got = ask(port, "GET", f"/v1/views/{name}")
-        need(got.status == 200, f"{tell}: a saved view is gone: {got.status}")
+        need(got.status == 200, f"{tell}: a saved view is lost: {got.status}")
         step = json.loads(got.body)["view"].get("step", 0)
-        need(step in steps, f"{tell}: a saved view has step {step}, told was {steps}")
+        need(step in steps, f"{tell}: a saved view has step {step}, acknowledged was {steps}")
         kept += 1
     return kept
 
@@ -183,7 +183,7 @@ def kill(program, folder, rounds, _slack=1):
             kept += saved_views(daemon.port, everything, f"round {n}")
         with Stream(daemon.port) as viewer:
             got = viewer.final_frame(view)[64:]
-        need(picture in (None, got), "a viewer that comes back sees another picture")
+        need(picture in (None, got), "a reconnecting client gets another picture")
         picture = got
         for line in daemon.lines:
             need("ignoring an unreadable" not in line,
@@ -206,7 +206,7 @@ def kill(program, folder, rounds, _slack=1):
     need(kept > 0, "no view was ever saved")
     need(not left, f"left behind: {left[:3]}")
     return (f"{kept} looks at saved views, none lost or half written; the viewer's picture is the "
-            f"same each time; {parts} half-written files cleared away")
+            f"same each time; {parts} incomplete files removed")
 
 
 SPOILED = ["", "{", '{"nothing": 1}', '{"listen": 7}', "\0\1\2", '{"max-sessions": -5}', "[]",
@@ -244,26 +244,26 @@ def hang_up(program, folder, rounds, _slack=1):
             if how <= len(SPOILED):
                 wait_for(lambda at=said: [line for line in daemon.lines[at:]
                                           if " warn " in line or " error " in line],
-                         PATIENCE_S, f"nothing in the log about a spoiled config ({how})")
+                         PATIENCE_S, f"no log message about an invalid configuration ({how})")
             else:
                 wait_for(lambda at=said: [line for line in daemon.lines[at:]
                                           if "configuration reloaded" in line],
-                         PATIENCE_S, "nothing in the log about a config that is good")
+                         PATIENCE_S, "no log message about a valid configuration")
             for origin, status in ((allowed, 101), (other, 403)):
                 with Stream(daemon.port, [("Origin", origin)]) as one:
                     need(one.status == status, f"after config {how} {origin} is answered by "
                          f"{one.status}, not {status}")
             check_good(daemon.port)
         stop_all(loads)
-        need(daemon.alive(), "the daemon died")
+        need(daemon.alive(), "the daemon exited")
         need(all(line.isprintable() for line in daemon.lines), "control characters in the log")
         code = daemon.stop()
         need(code == 0, f"ended with {code}")
     finally:
         if daemon.alive():
             daemon.stop(signal.SIGKILL)
-    return (f"{taken} times the new origin is let in and the old one refused; the old config "
-            "stays, and its origins, with each spoiled one, which the log tells; streams go on")
+    return (f"{taken} times the new origin is accepted and the old one refused; the old config "
+            "remains in effect after each invalid one, which is logged; streams continue")
 
 
 LOOPS = {"TERM": terminate, "KILL": kill, "HUP": hang_up}
@@ -275,11 +275,11 @@ def main():
     parser.add_argument("--program", default=str(ROOT / "build/release/windsplat"))
     parser.add_argument("--rounds", type=int, default=50)
     parser.add_argument("--signal", action="append", choices=list(LOOPS))
-    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
-    parser.add_argument("--quick", action="store_true", help="a few rounds of each")
+    parser.add_argument("--slack", type=float, default=1, help="factor for time limits")
+    parser.add_argument("--quick", action="store_true", help="few rounds of each")
     options = parser.parse_args()
     failed = 0
-    print("| signal | rounds | what came of it | |\n|---|---|---|---|", flush=True)
+    print("| signal | rounds | result | |\n|---|---|---|---|", flush=True)
     for name in options.signal or list(LOOPS):
         rounds = QUICK_ROUNDS[name] if options.quick else options.rounds
         with tempfile.TemporaryDirectory(prefix="windsplat-signals-") as folder:

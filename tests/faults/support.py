@@ -189,7 +189,7 @@ def talk(port, request, timeout=PATIENCE_S, pieces=1 << 30):
 
 def status_of(got):
     words = got.split(b" ", 2)
-    need(len(words) > 2 and words[0].startswith(b"HTTP/1."), f"no answer by HTTP: {got[:80]!r}")
+    need(len(words) > 2 and words[0].startswith(b"HTTP/1."), f"not an HTTP answer: {got[:80]!r}")
     return int(words[1])
 
 
@@ -216,7 +216,7 @@ def check_good(port, dataset=SAMPLE):
             break
         time.sleep(0.2)
     need(got.status == 200 and got.body[:2] == b"\xff\xd8",
-         f"a good request is answered by {got.status}: {got.body[:200]!r}")
+         f"a valid request is answered by {got.status}: {got.body[:200]!r}")
 
 
 # --- the stream ----------------------------------------------------------------------------------

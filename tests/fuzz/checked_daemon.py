@@ -96,7 +96,7 @@ class Daemon:
                 self.own.connection.close()
                 del self.own.connection
                 if attempt:  # only a kept connection may have been closed by the daemon
-                    raise Failure(f"the connection broke at {method} {path}: {fault!r}") from fault
+                    raise Failure(f"connection failed during {method} {path}: {fault!r}") from fault
 
     def json(self, method, path, body=None):
         status, headers, data = self.ask(method, path, body)
@@ -106,7 +106,7 @@ class Daemon:
     def vitals(self):
         """Resident MB and number of open files; fails if the daemon has ended."""
         if self.child.poll() is not None:
-            raise Failure(f"the daemon died: {self.child.returncode}")
+            raise Failure(f"the daemon exited: {self.child.returncode}")
         if self.ask("GET", "/livez")[0] != 200:
             raise Failure("/livez does not answer 200")
         status = pathlib.Path(f"/proc/{self.child.pid}/status").read_text()
@@ -130,7 +130,7 @@ class Daemon:
 def check_for_marks(data):
     marks = (str(seeds_escaping.MARK_NUMBER), seeds_escaping.MARK_TEXT)
     if any(mark.encode() in data for mark in marks):
-        raise Failure(f"what lies outside came back: {data[:300]!r}")
+        raise Failure(f"content from outside the data root was returned: {data[:300]!r}")
 
 
 def no_constant(name):
@@ -197,7 +197,7 @@ def check_picture(daemon, dataset):
         judged(status, headers, data)
     if headers["Content-Type"] != "image/jpeg" or data[:2] != b"\xff\xd8" \
             or data[-2:] != b"\xff\xd9":
-        raise Failure(f"a picture of type {headers['Content-Type']} that begins {data[:8]!r}")
+        raise Failure(f"a picture of type {headers['Content-Type']} that starts with {data[:8]!r}")
 
 
 def check_probe(daemon, dataset, about):

@@ -149,7 +149,7 @@ def check_axes(about, model):
         truth = np.sort(model.axes[a].values)
         if reported is None or len(reported) != len(truth) or not np.allclose(
                 np.sort(reported), truth, rtol=1e-6, atol=1e-6 * (truth[-1] - truth[0])):
-            raise Failure(f"the axis {a} is at {reported}, not at {truth.tolist()}")
+            raise Failure(f"axis {a} has coordinates {reported}, not {truth.tolist()}")
 
 
 def check_times(about, model):
@@ -272,7 +272,7 @@ class Run:
         for result in results:
             if isinstance(result, Refused):
                 kind = "failed" if model.must_open else "refused"
-                return kind, ("a sound file was refused: " if model.must_open else "") + str(result)
+                return kind, ("a valid file was refused: " if model.must_open else "") + str(result)
         (first, visible), (second, _) = results
         for one, other, what in zip(first, second, (*METHODS, "the description")):
             if one != other:
@@ -285,7 +285,7 @@ class Run:
         folder = self.root / f"m{number}"
         for process in self.processes:
             if process.daemon.child.poll() is not None:
-                sys.exit(f"draw_mutants: a daemon died before m{number}: "
+                sys.exit(f"draw_mutants: a daemon exited before m{number}: "
                          + "; ".join(self.failures[-3:]))
         outcome, text = self.outcome_of(write_case(folder, path, files, {}), model, number)
         if self.options.keep and (outcome == "failed" or self.options.only is not None):
@@ -308,7 +308,7 @@ class Run:
         if peak > self.options.peak_mib:
             self.failures.append(f"a daemon had {peak:.0f} MiB resident")
         if (code := process.daemon.stop()) != 0:
-            self.failures.append(f"a daemon ended with {code}")
+            self.failures.append(f"a daemon exited with {code}")
 
     def report(self):
         columns = ("files", "seen", "drawn", "refused", "failed")
@@ -342,13 +342,13 @@ def parsed_options():
     parser.add_argument("--program", default=str(build / "release/windsplat"))
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, help="this file alone")
-    parser.add_argument("--format", help="this format alone")
-    parser.add_argument("--keep", help="a folder for files that failed")
+    parser.add_argument("--only", type=int, help="number of the only file to test")
+    parser.add_argument("--format", help="the only format to test")
+    parser.add_argument("--keep", help="folder for failing files")
     parser.add_argument("--patience", type=float, default=90, help="seconds for a call")
     parser.add_argument("--peak-mib", type=float, default=256,
-                        help="resident memory that a daemon may have")
-    parser.add_argument("--reasons", type=int, default=0, help="show so many reasons")
+                        help="permitted resident memory of a daemon")
+    parser.add_argument("--reasons", type=int, default=0, help="number of reasons to print")
     options = parser.parse_args()
     options.strace = False
     return options
@@ -375,7 +375,7 @@ def main():
     for text in run.failures[:50]:
         print("  " + text[:300])
     if too_few:
-        print(f"fewer than half of the files were drawn: {', '.join(too_few)}")
+        print(f"fewer than half of the files were rendered: {', '.join(too_few)}")
     return 1 if run.failures or too_few else 0
 
 

@@ -92,7 +92,7 @@ class Run:
         except Refused as reason:
             outcome, text = "refused", str(reason)
             if sure:
-                outcome, text = "failed", f"a sound file was refused: {text}"
+                outcome, text = "failed", f"a valid file was refused: {text}"
         except (Failure, KeyError, TypeError, IndexError, AttributeError) as fault:
             outcome, text = "failed", repr(fault) if not isinstance(fault, Failure) else str(fault)
         taken = time.monotonic() - begin
@@ -182,12 +182,12 @@ def parsed_options():
     parser.add_argument("--test-data", type=pathlib.Path, default=default / "test-data")
     parser.add_argument("--count", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, help="this mutated file alone")
-    parser.add_argument("--format", help="this format alone")
+    parser.add_argument("--only", type=int, help="number of the only mutated file to test")
+    parser.add_argument("--format", help="the only format to test")
     parser.add_argument("--strace", action="store_true")
-    parser.add_argument("--keep", help="a folder for files that failed")
+    parser.add_argument("--keep", help="folder for failing files")
     parser.add_argument("--patience", type=float, default=90, help="seconds for a call")
-    parser.add_argument("--reasons", type=int, default=0, help="show so many reasons")
+    parser.add_argument("--reasons", type=int, default=0, help="number of reasons to print")
     options = parser.parse_args()
     if options.strace and not shutil.which("strace"):
         sys.exit("mutate_files: strace is not installed")
@@ -211,7 +211,7 @@ def run_in(folder, options):
     watch = Watch(outside)
     (outside / "mark.txt").read_bytes()
     if not watch.seen():
-        sys.exit("mutate_files: inotify sees nothing here")
+        sys.exit("mutate_files: inotify does not work here")
     daemon = Daemon(options, root, folder)
     check_controls(daemon, root, outside)
     watch.seen()
@@ -223,7 +223,7 @@ def run_in(folder, options):
         run.fail(str(fault))
     code = daemon.stop()
     if code != 0:
-        run.fail(f"the daemon ended with {code}")
+        run.fail(f"the daemon exited with {code}")
     if options.strace:
         judge_log(run, options, root, outside)
     run.table()

@@ -105,7 +105,7 @@ class Judge:
         elif starts:
             self.at_startup.add(path)
             if role == "startup" and not path.startswith(STARTUP) and path != self.program:
-                self.faults.append(f"a loader that starts opened: {text}")
+                self.faults.append(f"a starting loader opened: {text}")
         elif not self.may_open(path):
             self.faults.append(f"the daemon opened: {text}")
 

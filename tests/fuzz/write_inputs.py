@@ -145,7 +145,7 @@ def reader_input(name, kind, members, path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--program", help="windsplat, to write netCDF")
+    parser.add_argument("--program", help="path of windsplat, which writes netCDF files")
     options = parser.parse_args()
     shutil.rmtree(options.out, ignore_errors=True)
     for kind, inputs in (("seed", vectors()), ("seed", requests()),

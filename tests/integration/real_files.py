@@ -29,7 +29,7 @@ TOLERANCE = 1e-6  # of float32 and of the shortest decimal text
 
 
 class Independent:
-    """The values of another reader. axes: x, y, z -> coordinates as the file has them, or None where
+    """The values of another reader. axes: x, y, z -> coordinates as in the file, or None where
     a grid has no such axis. scalars: name -> masked array (step, z, y, x). vectors: name -> names
     of its components. units: name of a scalar or an axis -> text, if the file contains it."""
 

@@ -82,7 +82,7 @@ def conflicts_are_named():
                  "libboost-dev: needs a package that would be removed",
                  "apt-get remove libcurl4-gnutls-dev libboost-dev libboost1.74-dev\n",
                  "deploy/build-image.sh"):
-        need(line in done.stderr, f"setup does not say '{line}':\n{done.stderr}")
+        need(line in done.stderr, f"setup does not print '{line}':\n{done.stderr}")
     changes = [call for call in calls if " install " in f" {call} " and " -s " not in f" {call} "]
     need(not changes, f"setup installs: {changes}")
 

@@ -43,12 +43,12 @@ def by_readelf(program):
     if any({"W", "E"} <= set(flags) for flags in parts.get("LOAD", {"WE"})):
         out.append("a segment can be written and executed")
     if "__stack_chk_fail" not in symbols:
-        out.append("no function guards its stack (-fstack-protector-strong)")
+        out.append("no function has stack protection (-fstack-protector-strong)")
     if not re.search(r"__(memcpy|snprintf|read|memset|memmove|poll)_chk", symbols):
         out.append("no call is fortified (-D_FORTIFY_SOURCE)")
     paths = re.findall(r"\((?:RPATH|RUNPATH)\)\s+Library r\w*path: \[(.*)\]", dynamic)
     if any(not folder.startswith("/") for path in paths for folder in path.split(":")):
-        out.append("it looks for libraries in a folder that is not absolute")
+        out.append("it searches for libraries in a relative folder")
     return out
 
 
@@ -68,7 +68,7 @@ def check(program):
     complaints = by_readelf(program)
     further = by_checksec(program)
     if further is None:
-        print("hardening: checksec is not installed; readelf alone was asked")
+        print("hardening: checksec is not installed; only readelf was used")
     return complaints + (further or [])
 
 

@@ -41,7 +41,7 @@ def folder_of(path):
     return path.split("/")[2]
 
 
-def circles(imports):
+def cycles(imports):
     """Every import cycle once, as the paths along it."""
     found, finished, trail = [], set(), []
 
@@ -100,8 +100,8 @@ def check(root):
         complaints += complaints_about(path + ".ts", found)
     for path, found in report.items():
         complaints += complaints_about_report(path + ".ts", found)
-    complaints += [f"a circle of imports: {' -> '.join(path)}"
-                   for path in circles(imports | report)]
+    complaints += [f"an import cycle: {' -> '.join(path)}"
+                   for path in cycles(imports | report)]
     complaints += [f"web/src/{folder}: {count} files, more than {MAX_FILES}"
                    for folder, count in counts.items() if count > MAX_FILES]
     return complaints

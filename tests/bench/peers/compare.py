@@ -177,8 +177,8 @@ def row(size, scene, name, result, reference):
 
 def table(bench, configs):
     """Runs both programs once and returns the results, to print their versions."""
-    print("| size | scene | drawn by | wall, ms | processor, ms | peak, MB | wall / kernel's | "
-          "processor / kernel's |\n|---|---|---|---|---|---|---|---|")
+    print("| size | scene | renderer | wall, ms | CPU, ms | peak, MB | wall / kernel | "
+          "CPU / kernel |\n|---|---|---|---|---|---|---|---|")
     ours = peer = None
     for text in bench.options.sizes.split(","):
         size = [int(part) for part in text.split("x")]
@@ -202,7 +202,7 @@ def main():
     parser.add_argument("--sizes", default="640x480,1280x720")
     parser.add_argument("--sample", choices=sorted(SAMPLES), default="climate")
     parser.add_argument("--dims")
-    parser.add_argument("--pictures", help="keep the first frames here")
+    parser.add_argument("--pictures", help="folder for the first frames")
     parser.add_argument("--slow", action="store_true")
     parser.add_argument("--only", default="", help="VTK configurations whose name has this text")
     options = parser.parse_args()
@@ -215,7 +215,7 @@ def main():
         parser.error(f"{options.build} has no {' and no '.join(missing)}: "
                      "./scripts/build release windsplat bench_path")
     if not configs:
-        parser.error(f"no VTK configuration has '{options.only}' in its name; there are: {names}")
+        parser.error(f"no VTK configuration is named '{options.only}'; known are: {names}")
     try:
         python = vtk_python()
         with Display() as display, tempfile.TemporaryDirectory() as folder:
@@ -229,7 +229,7 @@ def main():
           f"{ours['compiler']}, target {ours['target']}; VTK {peer['version']} on {peer['gl']}. "
           f"Sample {options.sample} {options.dims or 'at its own size'}, {peer['lines']} lines in "
           f"the last row. Medians of {options.frames} warm frames, the camera moving {STEP} degree "
-          "each; processor time is of all threads.")
+          "each; CPU time is of all threads.")
 
 
 main()
