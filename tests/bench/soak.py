@@ -125,7 +125,7 @@ def settle(options, daemon, before, failures):
         if now["fds"] <= before["fds"] and now["threads"] <= before["threads"] and sessions == 0:
             return now
         if time.monotonic() > end:
-            failures.append(f"not back to the initial state: {now['fds']} of {before['fds']} descriptors, "
+            failures.append(f"still open: {now['fds']} descriptors of {before['fds']}, "
                             f"{now['threads']} threads of {before['threads']}, "
                             f"{sessions:.0f} sessions")
             return now
@@ -146,7 +146,7 @@ def report(options, counts, samples, before, after, failures):
     highest = max((s["rss"] for _, s in samples), default=0)
     how = "over TLS " if options.context else ""
     came = ", ".join(f"{n} {kind}" for kind, n in counts.came.items() if n)
-    print(f"{options.sessions} concurrent sessions {how}for {took / 60:.1f} minutes: {came};  "
+    print(f"{options.sessions} concurrent sessions {how}for {took / 60:.1f} minutes: {came}; "
           f"{counts.frames} frames, {counts.requests} requests, {counts.refused} refused. Hostile: "
           + (", ".join(f"{n} {name}" for name, n in sorted(counts.kinds.items())) or "none")
           + ".\n")
@@ -173,7 +173,7 @@ def parsed_options():
     parser.add_argument("--dataset", default="tornado:32x32x32")
     parser.add_argument("--minutes", type=float, default=20)
     parser.add_argument("--sessions", type=int, default=200)
-    parser.add_argument("--mix", default="normal:8,hostile:1,deaf:1", help="session kinds and shares")
+    parser.add_argument("--mix", default="normal:8,hostile:1,deaf:1", help="kinds and shares")
     parser.add_argument("--stay", type=float, default=30, help="approximate seconds of a session")
     parser.add_argument("--size", default="160x120")
     parser.add_argument("--every", type=float, default=5, help="seconds between samples")

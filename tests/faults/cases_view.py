@@ -149,7 +149,7 @@ def bomb(world, count):
     limit = FREE_S * os.cpu_count() * world.slack
     need(statistics.median(costs) <= limit, f"{1000 * statistics.median(costs):.0f} ms of "
          f"CPU time after the disconnection in the median, above {1000 * limit:.0f}")
-    return (f"CPU time after the disconnection: median {1000 * statistics.median(costs):.0f} ms, most "
+    return (f"CPU time afterwards: median {1000 * statistics.median(costs):.0f} ms, most "
             f"{1000 * max(costs):.0f}; at rest after {1000 * statistics.median(waits):.0f} ms, "
             f"most {1000 * max(waits):.0f} (sampled every 20 ms)")
 
