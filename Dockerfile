@@ -1,9 +1,9 @@
-# Two stages: the first builds the release program on Debian 12, the second carries it and the
-# libraries it is linked to, and nothing else. BASE may be any Debian 12.
+# Two stages: the first builds the release program on Debian 12; the second contains only the
+# program and the libraries it is linked to. BASE may be any Debian 12 image.
 ARG BASE=debian:bookworm-slim
 
 FROM ${BASE} AS build
-# A certificate for npm's registry behind a proxy that has its own; empty otherwise.
+# The certificate of a proxy that intercepts npm's registry; empty without one.
 ARG NODE_EXTRA_CA_CERTS=
 WORKDIR /src
 COPY scripts scripts
@@ -25,13 +25,14 @@ RUN apt-get -q update \
         --shell /usr/sbin/nologin windsplat \
     && install -d -o windsplat -g windsplat -m 0700 /var/lib/windsplat
 COPY --from=build /opt/windsplat/bin/windsplat /usr/local/bin/windsplat
-# For WINDSPLAT_STATE_DIR: a volume that is put there new belongs to the user from the start.
+# For WINDSPLAT_STATE_DIR: a new volume mounted here belongs to the user.
 USER windsplat
 EXPOSE 8080
 HEALTHCHECK --interval=15s --timeout=5s --start-period=20s --retries=3 \
     CMD ["windsplat", "healthcheck"]
 ENTRYPOINT ["windsplat"]
-# A container's addresses are all its own, and who reaches them is decided where its port is published:
-# to others only with WINDSPLAT_TOKEN_FILE, which makes the flag unneeded (deploy/compose.yaml).
-# Without a token it answers for localhost and numeric addresses alone; WINDSPLAT_ALLOW_HOST names others.
+# The container listens on all its addresses; the published port determines which machines can reach
+# it. Publish it to others only with WINDSPLAT_TOKEN_FILE, which makes the flag unnecessary
+# (deploy/compose.yaml). Without a token only localhost and numeric addresses are accepted as Host;
+# WINDSPLAT_ALLOW_HOST adds others.
 CMD ["serve", "--listen", "0.0.0.0:8080", "--allow-remote"]

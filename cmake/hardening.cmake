@@ -1,5 +1,5 @@
-# Hardening against memory errors: they end the program instead of being exploitable.
-# tests/tidy/check_hardening.py checks the result in the program.
+# Hardening against memory errors, so that they terminate the program instead of being exploitable.
+# tests/tidy/check_hardening.py checks the built program.
 include(CheckPIESupported)
 check_pie_supported()
 
@@ -11,14 +11,14 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   add_compile_options(-fcf-protection)
 endif()
 if(NOT WINDSPLAT_SANITIZE)
-  # Needs an optimising compiler; the sanitizers look at more.
+  # Fortified calls need optimisation; sanitizer builds detect more without them.
   add_compile_options($<$<CONFIG:Release>:-U_FORTIFY_SOURCE>
     $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=3>)
 endif()
 add_link_options(-Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack -Wl,-z,separate-code)
 
-# Bounds checks of standard containers, wherever external data are parsed. The engine and the image
-# codecs get validated values only.
+# Bounds checks of standard containers, in all code that parses external data. The engine and the
+# image codecs receive validated values only.
 function(windsplat_check_containers target)
   target_compile_definitions(${target} PRIVATE $<$<CONFIG:Release>:_GLIBCXX_ASSERTIONS>)
 endfunction()

@@ -1,5 +1,5 @@
-# The linker. The sanitizer presets use mold, which takes a tenth of the time; releases use the
-# default linker of the compiler.
+# Selects the linker. The sanitizer presets use mold, which takes a tenth of the time; releases use
+# the compiler's default linker.
 set(WINDSPLAT_LINKER "" CACHE STRING "mold, lld, gold or bfd; empty: the compiler's own")
 if(WINDSPLAT_LINKER)
   find_program(WINDSPLAT_LINKER_PROGRAM NAMES ${WINDSPLAT_LINKER} ld.${WINDSPLAT_LINKER})

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Builds the container image without a container engine: debootstrap makes the Debian 12 base (kept
-# in build/image for the next time), buildah runs the Dockerfile in a chroot. Needs root.
-# Takes this machine's apt sources and proxy, and its npm settings and certificates, for the build.
+# Builds the container image without a container engine: debootstrap creates the Debian 12 base
+# (cached in build/image), and buildah runs the Dockerfile in a chroot. Needs root. The build uses
+# this machine's apt sources, proxy, npm settings and certificates.
 # Usage: deploy/build-image.sh [TAG]         the image stays in build/image/storage
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
@@ -20,10 +20,10 @@ done
 [ "$(id -u)" = 0 ] || fail "debootstrap and the chroot need root"
 
 mkdir -p "$work"
-# The storage is this folder's own, so that nothing of the machine's images is touched.
+# Separate storage, so that the machine's own images are not affected.
 buildah=(buildah --storage-driver vfs --root "$work/storage" --runroot "$work/run")
 
-# This machine's Debian 12 sources, as "URI suite component"; none known: debootstrap's own choice.
+# This machine's Debian 12 sources as "URI suite component"; if none is known, debootstrap chooses.
 sources() {
   # shellcheck disable=SC2016  # apt fills these in
   apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' \
@@ -60,7 +60,7 @@ if ! "${buildah[@]}" inspect --type image "$base" >/dev/null 2>&1; then
   "${buildah[@]}" commit --quiet --rm "$container" "$base" >/dev/null
 fi
 
-# Settings of this machine that the build sees and the image does not keep.
+# Settings of this machine for the build only; they are not stored in the image.
 options=(--build-arg "BASE=$base")
 for name in http_proxy https_proxy no_proxy; do
   [ -z "${!name:-}" ] || options+=(--build-arg "$name=${!name}")

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Tries the image of deploy/build-image.sh: unpacks its files, serves from them in a chroot as the
-# image's user, asks for health, the datasets and one JPEG, and ends it by SIGTERM. Needs root.
+# Tests the image of deploy/build-image.sh: unpacks it, runs its server in a chroot as the image's
+# user, requests the health check, the datasets and one JPEG, and stops it with SIGTERM. Needs root.
 # Usage: deploy/try-image.sh [TAG]
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
@@ -21,7 +21,7 @@ buildah=(buildah --storage-driver vfs --root "$work/storage" --runroot "$work/ru
 
 settings=$("${buildah[@]}" inspect --type image "$tag" 2>/dev/null) ||
   fail "no image $tag; say: deploy/build-image.sh"
-# One value of the image's configuration, by its keys.
+# Reads one value of the image's configuration by its keys.
 setting() {
   python3 -c 'import json, sys
 value = json.loads(sys.argv[1])["Docker"]["config"]
@@ -57,7 +57,7 @@ missing=$(inside ldd /usr/local/bin/windsplat | grep 'not found' || true)
 $missing"
 echo "libraries  all found"
 
-# The image's own command, at a port that is free here.
+# The image's own command, on a free port of this machine.
 port=$(python3 -c 'import socket
 s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
 mapfile -t entry < <(setting Entrypoint)

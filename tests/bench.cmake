@@ -1,11 +1,12 @@
-# The benchmarks: run by hand (docs/benchmarks). A tiny run of each is a test, so that none can rot.
+# The benchmarks are run manually (docs/benchmarks). A tiny run of each is a test, so that all
+# remain usable.
 set(bench_dir ${CMAKE_CURRENT_LIST_DIR}/bench)
-# What the engine is measured against is built plainly: for the baseline instruction set, with what
-# -O2 vectorises (g++ 12: loops where that costs nothing), without what -O3 adds.
+# The baseline for the engine is compiled for the baseline instruction set with -O2, whose limited
+# vectorisation in g++ 12 is intended, without the additional optimisations of -O3.
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp
   PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 
-# Times under a sanitizer tell nothing.
+# Times under a sanitizer are meaningless.
 if(WINDSPLAT_SANITIZE)
   return()
 endif()
@@ -36,7 +37,7 @@ function(windsplat_smoke name)
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 
-# Sanitizers need memory of their own.
+# Sanitizers increase memory use, so memory is not measured there.
 
 windsplat_smoke(frame bench_frame --smoke)
 windsplat_smoke(kernels bench_kernels --smoke)
@@ -58,7 +59,7 @@ windsplat_smoke(links python3 ${bench_dir}/links.py --program=$<TARGET_FILE:wind
 windsplat_smoke(preauth_cost python3 ${bench_dir}/preauth_cost.py --program=$<TARGET_FILE:windsplat>
   --count=2 --key=P-256)
 windsplat_smoke(viewers python3 ${bench_dir}/viewers.py --program=$<TARGET_FILE:windsplat> --smoke)
-# Where there is no VTK it only says so.
+# Without VTK it prints a message and succeeds.
 windsplat_smoke(peers python3 ${bench_dir}/peers/compare.py --build=${PROJECT_BINARY_DIR}
   --frames=1 --sizes=64x48 --dims=32x16x8 --slow)
 windsplat_smoke(peers_only python3 ${bench_dir}/peers/compare.py --only=nothing-matches)

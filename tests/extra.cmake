@@ -1,12 +1,12 @@
-# The tests that are no C++: form, size and include directions of the tree; and the benchmarks.
+# Tests other than C++ ones: style, size and include directions of the tree; and the benchmarks.
 include(${CMAKE_CURRENT_LIST_DIR}/bench.cmake OPTIONAL)
 
-# Under the thread sanitizer the daemon is asked by integration_tests.
+# Under the thread sanitizer integration_tests covers the daemon.
 if(sanitizer STREQUAL "TSAN")
   return()
 endif()
 
-# A sanitizer sees nothing of them.
+# Not repeated under sanitizers, which cannot find errors in these tests.
 function(windsplat_tidy_test name)
   if(WINDSPLAT_SANITIZE)
     return()
@@ -26,34 +26,34 @@ windsplat_tidy_test(format scripts/format --check)
 windsplat_tidy_test(spelling python3 tests/tidy/check_spelling.py)
 windsplat_tidy_test(runner python3 tests/run/self_test.py)
 
-# Whether the kernels' flags keep what this compiler would remove.
+# Whether the kernels' flags prevent the removal of calls by this compiler.
 add_executable(dropped_call ${CMAKE_CURRENT_LIST_DIR}/toolchain/dropped_call.cpp)
 target_compile_options(dropped_call PRIVATE ${kernel_flags})
 add_test(NAME toolchain.dropped_call COMMAND dropped_call)
 set_tests_properties(toolchain.dropped_call PROPERTIES LABELS unit TIMEOUT 60)
 
-# Real files against independent readers, and spoiled ones against a daemon.
+# Real files against independent readers, and mutated files against a daemon.
 function(windsplat_program_test name)
   add_test(NAME files.${name} COMMAND ${ARGN} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
   set_tests_properties(files.${name} PROPERTIES LABELS integration TIMEOUT 300
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 
-# Debian's own, which finds Debian's modules.
+# Debian's python, which has access to Debian's modules.
 find_program(SYSTEM_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
-# The fuzzers do the same to the readers themselves, under the sanitizers.
+# The fuzzers apply the same mutations to the readers under the sanitizers.
 set(spoiled_count 300)
 set(drawn_options --count=340)
 if(WINDSPLAT_SANITIZE)
   set(spoiled_count 60)
-  set(drawn_options --count=68 --peak-mib=1500)  # sanitizers keep what is freed
+  set(drawn_options --count=68 --peak-mib=1500)  # sanitizers retain freed memory
 endif()
 windsplat_program_test(spoiled python3 tests/fuzz/mutate_files.py --program=$<TARGET_FILE:windsplat>
   --count=${spoiled_count})
-# Datasets that were mutated from within: opened, compared with the truth, drawn.
+# Mutated datasets: opened, compared with the truth, rendered.
 windsplat_program_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py
   --program=$<TARGET_FILE:windsplat> ${drawn_options})
-# Well-formed files, of which the fuzzers replay small ones of every format.
+# Well-formed files; the fuzzers replay small ones of every format.
 if(NOT WINDSPLAT_SANITIZE)
   windsplat_program_test(real ${SYSTEM_PYTHON} tests/integration/real_files.py
     --program=$<TARGET_FILE:windsplat>)
@@ -62,7 +62,7 @@ if(NOT WINDSPLAT_SANITIZE)
   windsplat_program_test(hardening python3 tests/tidy/check_hardening.py $<TARGET_FILE:windsplat>)
 endif()
 
-# What the program does, as text: the same in two runs. Pictures are left out, which take a minute.
+# The program's results as text must agree in two runs. Pictures are omitted, as they take a minute.
 if(NOT WINDSPLAT_SANITIZE)
   add_executable(session_transcript ${CMAKE_CURRENT_LIST_DIR}/fingerprint/session_transcript.cpp)
   target_link_libraries(session_transcript PRIVATE windsplat_session nlohmann_json::nlohmann_json)
@@ -70,8 +70,8 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat> --transcripts=$<TARGET_FILE:session_transcript>)
 endif()
 
-# Cases at the edges of HTTP and WebSocket against a daemon. Sanitizers keep what is freed, so that
-# memory tells nothing there, and look for leaks, which strace keeps them from.
+# HTTP and WebSocket edge cases against a daemon. Sanitizers retain freed memory, so memory growth
+# is not checked there, and their leak detection does not work under strace.
 set(edge_options)
 set(attack_options)
 if(WINDSPLAT_SANITIZE)
@@ -93,7 +93,7 @@ foreach(attack chunked_trailer external_files url_paths)
   windsplat_edge_test(attack_${attack} attacks --attack=${attack} ${attack_options})
 endforeach()
 
-# How long others wait, which a sanitizer changes.
+# Latencies of other clients, which a sanitizer would change.
 if(NOT WINDSPLAT_SANITIZE)
   add_test(NAME edge.handshakes COMMAND python3 tests/edge/handshakes.py
     --program=$<TARGET_FILE:windsplat> --slack=8 WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
@@ -101,7 +101,7 @@ if(NOT WINDSPLAT_SANITIZE)
     SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endif()
 
-# Longer rounds of what the tests above do in short.
+# Longer runs of the short tests above.
 function(windsplat_long_test name)
   add_test(NAME thorough.${name} COMMAND ${ARGN} --program=$<TARGET_FILE:windsplat>
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
@@ -114,8 +114,8 @@ if(NOT WINDSPLAT_SANITIZE)
   windsplat_long_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py --count=3400)
 endif()
 
-# Every fault in short; calls of the system that fail, by a library that is preloaded. It stands in
-# for the allocator, which sanitizers bring of their own.
+# Short rounds of every fault, and failing library calls by a preloaded library. That library
+# replaces the allocator, so it cannot be combined with sanitizers.
 function(windsplat_fault_test name script)
   add_test(NAME faults.${name} COMMAND python3 tests/faults/${script} ${ARGN}
     --program=$<TARGET_FILE:windsplat> --quick WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
@@ -123,7 +123,7 @@ function(windsplat_fault_test name script)
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 
-# Times that are asserted may be so much longer: tests share the machine, and sanitizers are slow.
+# Factor for asserted times: tests share the machine, and sanitizers are slow.
 set(fault_slack 8)
 if(WINDSPLAT_SANITIZE)
   set(fault_slack 20)

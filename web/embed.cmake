@@ -1,6 +1,6 @@
 # web/ -> files inside the binary: target windsplat_web defines api::web_assets() (gzipped), target
 # windsplat_report_template study::report_template().
-# Runs again only when a source of the pages changes; needs node (18 or later) and npm.
+# Rebuilds only if a source of the pages changes; needs node (18 or later) and npm.
 find_program(WINDSPLAT_NODE NAMES node nodejs)
 if(NOT WINDSPLAT_NODE)
   message(FATAL_ERROR "The page needs node and npm to be built: say ./scripts/setup web")
@@ -33,5 +33,5 @@ target_link_libraries(windsplat_api PUBLIC windsplat_web)
 add_library(windsplat_report_template STATIC
   ${web_out}/report_template.cpp ${web_out}/report_template.S)
 target_include_directories(windsplat_report_template PUBLIC ${PROJECT_SOURCE_DIR})
-add_dependencies(windsplat_report_template windsplat_web)  # one run of the command for both
+add_dependencies(windsplat_report_template windsplat_web)  # one run of the command creates both
 target_link_libraries(windsplat_study PUBLIC windsplat_report_template)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Whether moving frames keep their budget: a daemon, a client that orbits, and for every budget the
-times, reported errors and settings of frames. Markdown on stdout.
+"""Checks whether moving frames keep their budget: runs a daemon and a client that orbits, and lists
+for every budget the times, reported errors and settings of frames. Prints Markdown.
 
 Usage: budgets.py [--program=windsplat] [--dataset=climate ...] [--size=640x480]
        [--budgets=16,33,66,100] [--max-errors=0.05,0.02,0.005] [--frames=120] [--check]
@@ -27,7 +27,7 @@ METHODS = {1: "kernel", 2: "slab", 3: "reference"}
 
 
 def frames(viewer):
-    """Header fields of every frame with what `chosen` said of it, acknowledged at once."""
+    """The header fields of every frame with those of its `chosen` message, acknowledged at once."""
     chosen = {}
     while True:
         opcode, payload = viewer.message()
@@ -80,7 +80,7 @@ class Orbit:
                                        self.target[1] + s * x + c * y, self.eye[2]]}})
 
     def run(self, quality, count):
-        """Frames of a steady drag, 60 moves a second at most; the first few are left out."""
+        """Frames of a steady drag with at most 60 moves a second; the first few are omitted."""
         self.patch({"quality": quality})
         kept, begun = [], time.monotonic()
         for n in range(count + 20):

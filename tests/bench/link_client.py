@@ -1,5 +1,5 @@
-"""A viewer of the stream that drags and notes what it sees. One thread reads, another says what the
-hand does."""
+"""A client of the stream that simulates a drag and records the frames it receives. One thread
+reads, another sends the camera changes."""
 import json
 import pathlib
 import socket
@@ -35,8 +35,8 @@ class LinkViewer(WebSocket):
     def __init__(self, host, port):
         super().__init__(Target(host, port), 60)
         self.frames = []
-        self.waits = {}   # id of an open -> when it was asked
-        self.answers = []  # seconds from asking to the answer
+        self.waits = {}   # id of an open -> time it was sent
+        self.answers = []  # seconds from request to answer
         self.fault = None
         self.open = True
         self.rev = 0
@@ -48,7 +48,7 @@ class LinkViewer(WebSocket):
         self.say({"type": "patch", "rev": self.rev, "t": time.monotonic() * 1e3, "patch": patch})
 
     def ask(self):
-        """Something that is answered at once, by an error that names the id."""
+        """Sends a request that is answered at once, by an error that names the id."""
         number = 1000 + len(self.answers) + len(self.waits)
         self.waits[number] = time.monotonic()
         self.say({"type": "open", "id": number, "dataset": "nowhere"})

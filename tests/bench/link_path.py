@@ -1,10 +1,9 @@
-"""A link of given rate and delay between a daemon and its viewers, on one machine.
+"""A simulated link of given rate and delay between a daemon and its clients on one machine.
 
-`Tunnel`: two network namespaces joined by TUN devices, packets moved between them by a process of
-ours that holds each back: real TCP on a link with a queue of its own. Needs root, /dev/net/tun and
-iproute2. `Proxy`: TCP connections handed on by a process that takes bytes at the link's rate and
-gives them on after its delay: TCP itself sees no distance. Both hold the same amount in both
-directions' queues. Linux only."""
+`Tunnel`: two network namespaces joined by TUN devices. A process moves the packets between them
+and delays each: real TCP over a link with its own queue. Needs root, /dev/net/tun and iproute2.
+`Proxy`: a process forwards TCP connections at the link's rate after its delay, which TCP itself
+cannot observe. Both have queues of the same size in each direction. Linux only."""
 import collections
 import ctypes
 import fcntl
@@ -19,7 +18,7 @@ import time
 
 TUNSETIFF, IFF_TUN, IFF_NO_PI = 0x400454CA, 1, 0x1000
 CLONE_NEWNET = 0x40000000
-QUEUE_S = 0.2  # what the narrowest place holds before it drops, as time at the link's rate
+QUEUE_S = 0.2  # capacity of the bottleneck queue, as time at the link's rate
 
 
 def can_tunnel():
@@ -33,8 +32,8 @@ def can_tunnel():
 
 
 class Pipe:
-    """One direction: packets leave at `rate` bytes/s, arrive `delay` seconds after; a full queue
-    drops them."""
+    """One direction: packets leave at `rate` bytes/s and arrive `delay` seconds later; a full
+    queue drops them."""
 
     def __init__(self, rate, delay):
         self.rate, self.delay = rate, delay
@@ -57,7 +56,8 @@ class Pipe:
 
 
 def packet_bytes(rate):
-    """Larger packets on faster links: Python moves a few thousand a second."""
+    """The packet size: larger on faster links, because Python forwards only a few thousand a
+    second."""
     return 1400 if rate <= 2e6 else 9000 if rate <= 2e7 else 60000
 
 
@@ -66,7 +66,7 @@ def network(*words):
 
 
 def move(ends, pipes):
-    """Packets from one end to the other for ever, each by its pipe."""
+    """Forwards packets between the two ends for ever, one pipe per direction."""
     for end in ends:
         os.set_blocking(end, False)
     while True:
@@ -89,8 +89,8 @@ def move(ends, pipes):
 
 
 class Tunnel:
-    """Run in a network namespace of our own (see `enter`): the viewer's side is here, the daemon's
-    in another."""
+    """Runs in a separate network namespace (see `enter`): the client side is here, the daemon's
+    side in another namespace."""
 
     name = "network namespaces"
     host = "10.77.0.1"  # the daemon
@@ -115,7 +115,7 @@ class Tunnel:
 
     @staticmethod
     def enter():
-        """This program again, where it may make devices and nobody else sees them."""
+        """Runs this program again in a namespace where it may create devices."""
         if os.environ.get("WINDSPLAT_LINKS_INSIDE") != "1":
             os.environ["WINDSPLAT_LINKS_INSIDE"] = "1"
             os.execvp("unshare", ["unshare", "--net", sys.executable, *sys.argv])
@@ -138,7 +138,7 @@ class Tunnel:
         return handle
 
     def start(self, command):
-        """A daemon on the far side; it listens on `host`."""
+        """Starts a daemon on the far side; it listens on `host`."""
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                                 text=True, preexec_fn=lambda: self.enter_net(self.there))
 
@@ -153,7 +153,7 @@ class Tunnel:
 
 
 def hand_on(viewer, daemon, rate, delay):
-    """Bytes of one connection both ways until either side closes."""
+    """Forwards the bytes of one connection in both directions until either side closes."""
     sides = [daemon, viewer]
     pipes = [Pipe(rate, delay), Pipe(rate, delay)]
     piece = min(1 << 16, max(1400, int(rate * 0.002)))
@@ -195,7 +195,7 @@ class Proxy:
                                 text=True)
 
     def port_of(self, port):
-        """Where to connect to reach the daemon's port by the link, once."""
+        """Address and port by which the daemon is reached over the link, for one connection."""
         listener = socket.socket()
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 16384)
         listener.bind((self.host, 0))

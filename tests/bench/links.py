@@ -1,17 +1,16 @@
 #!/usr/bin/env python3
-"""Frames of a real daemon over links of known rate and delay while a viewer drags: how many, how
-large, how old. Table as Markdown on stdout. Linux only.
+"""Measures frames of a real daemon over links of known rate and delay during a drag: frame rate,
+size and age. Prints a Markdown table. Linux only.
 
 Usage: links.py [--program=windsplat] [--how=auto|tunnel|proxy] [--mbit=0.5,2,...] [--trip-ms=...]
        [--size=1280x720] [--dataset=climate] [--seconds=10] [--check] [--smoke]
 
-The viewer changes the camera every 16 ms and acknowledges frames as they arrive. A frame's age is
-its arrival less the time of the newest change it shows; the link's time is the round trip (that
-change there, the frame back) and the frame's bytes, with the texts before it, over the rate. A
-render interval is the time from one moving frame to the next, the mean. In bounds is where the 99th
-percentile of age less link's time is at most two render intervals; --check exits 1 where any link
-is not. Times of frames that came within the first two seconds do not count: the daemon and TCP
-learn the link."""
+The client changes the camera every 16 ms and acknowledges frames as they arrive. A frame's age
+is its arrival time minus the time of the newest change it shows. The link time is the round trip
+plus the bytes of the frame and of the texts before it, divided by the rate. The render interval
+is the mean time between moving frames. A link is within bounds if the 99th percentile of age
+minus link time is at most two render intervals; --check exits 1 if any link is not. Frames of
+the first two seconds do not count, because the daemon and TCP are still adapting to the link."""
 import argparse
 import math
 import statistics
@@ -116,7 +115,7 @@ def main():
     parser.add_argument("--dataset", default="climate")
     parser.add_argument("--seconds", type=float, default=10)
     parser.add_argument("--check", action="store_true")
-    parser.add_argument("--smoke", action="store_true", help="one link, small and short, each way")
+    parser.add_argument("--smoke", action="store_true", help="one small, short link by each method")
     options = parser.parse_args()
     how = {"auto": Tunnel if can_tunnel() else Proxy, "tunnel": Tunnel, "proxy": Proxy}[options.how]
     if options.smoke:

@@ -1,22 +1,21 @@
 #!/usr/bin/env python3
-"""Pictures asked for by many clients at once: how many are drawn, how late, how quickly the others
-are refused, and whether health checks come through. Table as Markdown on stdout. Linux only.
+"""Overload test: many clients request pictures at once. Measures goodput, latency, the speed of
+refusals, and whether health checks succeed. Prints a Markdown table. Linux only.
 
 Usage: load.py [--program=windsplat] [--dataset=climate] [--size=640x360] [--seconds=10]
        [--times=1,10] [--addresses=200] [--check] [--smoke] [-- further options of serve]
 
-Unloaded: one request at a time. Peak: the most answers a second that 1, 2, 4, 8 or 16 clients get
-who each ask anew once they have their answer, or 50 ms after a refusal. Then requests are sent at 1
-and 10 times that rate whatever comes back (an open loop), each on a connection that waits for
-nothing, from so many addresses of 127.0.0.0/8. Every picture is another, so that none is
-remembered. A latency counts from sending the request; how late it was sent is told apart, as is
-what the client itself costs: where client and daemon share two cores, that is lost to both.
-Goodput is answers of 200 a second. Health is asked every 20 ms by a process of its own, on a new
-connection each time.
+Unloaded: one request at a time. Peak: the highest rate of answers for 1, 2, 4, 8 or 16 clients that
+each send the next request after an answer, or 50 ms after a refusal. Then requests are sent at 1
+and 10 times that rate regardless of answers (an open loop), each on a separate connection, from
+many addresses of 127.0.0.0/8. All pictures differ, so none is cached. Latency counts from sending
+the request; the delay of sending and the CPU time of the client are reported separately, because on
+two cores the client slows the daemon. Goodput is answers of 200 a second. A separate process
+requests /livez every 20 ms on new connections.
 
-Targets: under 10 times the peak's load the p99 of /livez is below 50 ms, that of admitted requests
-at most twice that of unloaded ones, and goodput at least 80 % of the peak. --check: exit 1 where
-one is missed, or a refusal says no Retry-After. --smoke: short, fails where nothing works."""
+Targets: at 10 times the peak the p99 of /livez is below 50 ms, that of admitted requests at most
+twice the unloaded one, and goodput at least 80 % of the peak. --check: exit 1 if a target is
+missed or a refusal has no Retry-After. --smoke: short, fails only if nothing works."""
 import argparse
 import collections
 import math
@@ -33,22 +32,22 @@ from stream_client import Daemon
 
 HEALTH_EVERY_S = 0.02
 HEALTH_P99_S, ADMITTED_TIMES, GOODPUT_SHARE = 0.05, 2, 0.8
-WARM_UP_SHARE = 0.2  # of the seconds, before answers count
-PAUSE_S = 0.05  # of a client that was refused and has nothing else to do
-GATHER_S = 8  # for answers that are under way at the end
-CLOSED = 0  # in place of a status: no answer came
+WARM_UP_SHARE = 0.2  # fraction of the duration before answers count
+PAUSE_S = 0.05  # delay of a client after a refusal
+GATHER_S = 8  # time for pending answers at the end
+CLOSED = 0  # used in place of a status: no answer
 
 Answer = collections.namedtuple("Answer", "sent took status retry_after")
 
 
 def quantile(values, share):
-    """The smallest value that so many are not above."""
+    """The smallest value that at least this share of the values does not exceed."""
     ordered = sorted(values)
     return ordered[max(0, math.ceil(share * len(ordered)) - 1)] if ordered else math.nan
 
 
 class Asker:
-    """A connection that asks for one picture after the other."""
+    """A connection that requests one picture after another."""
 
     def __init__(self, selector, port, number, addresses):
         self.selector = selector
@@ -65,7 +64,7 @@ class Asker:
         self.selector.modify(self.socket, selectors.EVENT_WRITE, self)
 
     def turn(self, mask):
-        """What came of it: an answer, True where the connection is of no more use, else None."""
+        """Returns an answer; True if the connection is no longer usable; else None."""
         try:
             if mask & selectors.EVENT_WRITE:
                 self.out = self.out[self.socket.send(self.out):] if self.out else b""
@@ -132,7 +131,7 @@ class Clients:
         asker.ask(self.request(), now)
 
     def gather(self, until):
-        """Answers that come until then; the connections that may ask again."""
+        """Handles answers until that time; returns the connections that may send again."""
         ready = self.selector.select(max(0, until - time.monotonic()))
         for key, mask in ready:
             outcome = key.data.turn(mask)
@@ -148,7 +147,7 @@ class Clients:
 
     def closed_loop(self, count, seconds):
         end = time.monotonic() + seconds
-        paused, seen = collections.deque(), 0  # until when, of clients that were refused
+        paused, seen = collections.deque(), 0  # times at which refused clients may continue
         while time.monotonic() < end:
             now = time.monotonic()
             paused.extend(now + PAUSE_S for a in self.answers[seen:] if a.status != 200)
@@ -174,7 +173,7 @@ class Clients:
 
 
 def ask_for_pictures(options, port, how, much, pipe):
-    """A process of its own: loads the daemon and tells what came of it."""
+    """Runs in a separate process: loads the daemon and reports the results."""
     clients = Clients(options, port)
     begun = time.monotonic()
     getattr(clients, how)(much, options.seconds)
@@ -188,7 +187,7 @@ def ask_for_pictures(options, port, how, much, pipe):
 
 
 def ask_for_health(port, seconds, pipe):
-    """A process of its own: seconds that /livez took, and how often it failed."""
+    """Runs in a separate process: seconds that /livez took, and the number of failures."""
     took, failed = [], 0
     begun = time.monotonic()
     request = f"GET /livez HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n\r\n".encode()
@@ -215,7 +214,7 @@ def daemon_cpu_s(pid):
 
 
 def run(options, daemon, how, much):
-    """One load and the health checks meanwhile."""
+    """Runs one load with concurrent health checks."""
     ends = [multiprocessing.Pipe(False) for _ in range(2)]
     cpu = daemon_cpu_s(daemon.child.pid)
     workers = [
@@ -269,7 +268,7 @@ COLUMNS = ["load", "offered/s", "goodput/s", "admitted p50, ms", "p99", "refused
 
 
 def targets(unloaded, peak, high):
-    """What is asked for under the highest load, whether it is kept."""
+    """The targets under the highest load, and whether they are met."""
     ratio = high["p99"] / unloaded["p99"]
     share = high["goodput"] / peak
     return [
@@ -293,7 +292,7 @@ def measure(options, daemon):
     ramp = {}
     for count in options.ramp:
         ramp[count] = judged(options, run(options, daemon, "closed_loop", count))
-        print(row("unloaded" if count == 1 else f"{count} who wait", ramp[count]), flush=True)
+        print(row("unloaded" if count == 1 else f"{count} clients", ramp[count]), flush=True)
     peak = max(r["goodput"] for r in ramp.values())
     loads = {}
     for times in options.times:
@@ -341,7 +340,7 @@ def main():
     if not alive:
         sys.exit("load.py: the daemon died")
     if not works:
-        sys.exit("load.py: no pictures came, or health checks failed")
+        sys.exit("load.py: no picture was received, or health checks failed")
     return 1 if options.check and not options.smoke and not fine else 0
 
 

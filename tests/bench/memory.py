@@ -5,8 +5,8 @@ that turn the camera and take every frame. Table as Markdown on stdout. Linux on
 Usage: memory.py [--program=windsplat] [--frames=20] [--sessions=4] [--size=1280x720]
        [--dims=320x160x19 | --built-in] [--max-mb=N]
 
-It serves a netCDF file of the sample; with --built-in the sample itself. Exit 1 where the first
-session's peak is above N MB."""
+Serves a netCDF file of the sample, or with --built-in the sample itself. Exit 1 if the peak of
+the first session exceeds N MB."""
 import argparse
 import math
 import pathlib
@@ -20,7 +20,7 @@ MB = 1e6
 
 
 def measure(daemon, options):
-    """Rows of name, resident and peak bytes; and the resident bytes a further session costs."""
+    """Rows of name, resident and peak bytes; and the resident bytes of an additional session."""
     width, height = map(int, options.size.split("x"))
     rows = [("started, nothing loaded", daemon.memory())]
     first = Viewer(daemon.port)
@@ -62,11 +62,11 @@ def main():
         print(f"| {name} | {memory['VmRSS'] / MB:.1f} | {memory['VmHWM'] / MB:.1f} |")
     voxels = math.prod(map(int, options.dims.split("x")))
     resident = [memory["VmRSS"] for _, memory in rows]
-    print(f"\nBytes a voxel resident: {(resident[1] - resident[0]) / voxels:.1f} "
+    print(f"\nResident bytes per voxel: {(resident[1] - resident[0]) / voxels:.1f} "
           "(winds and clouds, with what reading them leaves behind)")
     if options.sessions > 1:
         more = (resident[3] - resident[2]) / (options.sessions - 1)
-        print(f"Bytes a further session: {more / MB:.2f} MB")
+        print(f"An additional session: {more / MB:.2f} MB")
     peak = rows[2][1]["VmHWM"] / MB
     if options.max_mb is not None and peak > options.max_mb:
         sys.exit(f"memory.py: the peak, {peak:.1f} MB, is above {options.max_mb:g} MB")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Playback of a long series by a real daemon: steps shown a second, how old they were, and what
-memory the daemon and its loaders took meanwhile. Table as Markdown on stdout. Linux only (/proc).
+"""Measures playback of a long series by a real daemon: steps per second, their age, and the memory
+of the daemon and its loaders. Prints a Markdown table. Linux only (/proc).
 
 Usage: playback.py [--program=windsplat] [--file=F.nc] [--steps=240] [--dims=320x160x19]
        [--memory-limit=4G ...] [--size=640x480] [--fps=24] [--loops=2] [--storage=float32]
@@ -8,16 +8,17 @@ Usage: playback.py [--program=windsplat] [--file=F.nc] [--steps=240] [--dims=320
        playback.py --sessions=8 [--seconds=20] [--at-most=60] [--apart] [--steps=40]
        [--dims=256x256x64] ...
 
-Without --file it makes one with `synth climate`. Each --memory-limit is a row with the rate of
-every loop: in the first the steps are read, later what fits is resident. Memory is the proportional
-set size. Exit 1 where the last loop shows fewer than --min-fps steps a second, or with
---check-memory where memory exceeded the limit.
+Without --file it creates one with `synth climate`. Each --memory-limit is a row with the rate of
+every loop: the first loop reads the steps, later loops use those that are resident. Memory is the
+proportional set size. Exit 1 if the last loop shows fewer than --min-fps steps a second, or with
+--check-memory if memory exceeded the limit.
 
-With --sessions that many play at once for --seconds, and on, while one of them has no frame yet, to
---at-most (a busy machine is no fault of the daemon), with --apart from steps spread over the
-series; without --file it is a scalar field in a netCDF classic file, 16 MiB a step. Each row has
-the frames of all sessions and of the one that had fewest, the longest wait for a new step, and the
-errors. Exit 1 where a session had no frame or an error, or with --check-memory as above."""
+--sessions: number of concurrent sessions, which play for --seconds, prolonged up to --at-most
+while one of them has no frame yet (the machine may be busy); with --apart they start at
+different steps. Without --file the data are a scalar field in a netCDF classic file, 16 MiB a
+step. Each row has the frames of all sessions and of the slowest session, the longest wait for a
+new step, and the errors. Exit 1 if a session had no frame or an error, or with --check-memory as
+above."""
 import argparse
 import json
 import os
@@ -49,7 +50,7 @@ def frames(viewer):
 
 
 def play(port, dataset, steps, options):
-    """Of every loop the steps shown a second, none dropped, and the share at full resolution."""
+    """For every loop the steps shown a second (none dropped), and the share at full resolution."""
     viewer = Viewer(port)
     width, height = map(int, options.size.split("x"))
     viewer.say({"type": "open", "id": 1, "dataset": dataset})
@@ -64,7 +65,7 @@ def play(port, dataset, steps, options):
         if step == last:
             continue
         if last is not None and step != (last + 1) % steps:
-            raise RuntimeError(f"step {step} came after {last}")
+            raise RuntimeError(f"step {step} followed {last}")
         last, count, full = step, count + 1, full + (level == 0)
         if count == steps:
             now = time.monotonic()
@@ -75,7 +76,7 @@ def play(port, dataset, steps, options):
 
 
 class Watcher(threading.Thread):
-    """A session that plays from a step of its own. An error ends playback, so it plays again."""
+    """A session that plays from its own first step. An error ends playback, so it starts again."""
 
     def __init__(self, port, dataset, first, options, everyone):
         super().__init__(daemon=True)
@@ -128,7 +129,7 @@ class Watcher(threading.Thread):
 
 
 def play_together(options, path, limit):
-    """The sessions that played, and the peak of the daemon and its loaders."""
+    """Runs the sessions; returns them and the peak memory of the daemon and its loaders."""
     daemon, port = start(options, path, limit)
     try:
         watch = PeakPss(daemon.pid)
@@ -147,7 +148,7 @@ def play_together(options, path, limit):
 
 
 def report_together(options, path):
-    """Prints a row for each limit. Whether all is as it should be."""
+    """Prints a row for each limit; returns whether all checks passed."""
     print(f"{options.sessions} sessions, {options.steps} steps, {options.size}, {options.storage}, "
           f"{options.seconds:g} s\n")
     print("| memory limit | frames (fewest of a session) | longest wait | errors "

@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
-"""What a stranger makes the daemon compute: processor time of each thing that can be asked before a
-token is shown, a connection each, by byte that the stranger sends.
+"""Measures the cost of unauthenticated clients: the daemon's processor time for each kind of
+request before authentication, one connection each, relative to the bytes sent.
 
     tests/bench/preauth_cost.py                       # a certificate of P-256, one of RSA 2048
     tests/bench/preauth_cost.py --key=rsa:4096        # another one; may be repeated
     tests/bench/preauth_cost.py --count=20            # quick
 
-Daemons run without limits of handshakes, connections and requests. Times are those of all threads
-of the daemon, its system calls among them; the last column compares with a plain GET that gets
-401."""
+Daemons run without limits of handshakes, connections and requests. Times include all threads of
+the daemon and its system calls; the last column is relative to a GET answered with 401."""
 import argparse
 import contextlib
 import os
@@ -33,7 +32,8 @@ GROUPS = ["X25519", "P-256", "P-384", "ffdhe2048", "ffdhe8192"]
 
 
 def cpu_s(pid):
-    """Of all running threads. A tick of /proc/PID/stat is longer than most measured intervals."""
+    """CPU time of all running threads. A tick of /proc/PID/stat is longer than most measured
+    intervals."""
     total = 0
     for task in os.listdir(f"/proc/{pid}/task"):
         with contextlib.suppress(FileNotFoundError):
@@ -93,7 +93,8 @@ def hello_of(groups):
 
 
 def shake_by_memory(port, context, session=None, keep=None):
-    """A handshake whose bytes are counted; a GET follows where its ticket is to be kept."""
+    """Performs a handshake and counts its bytes; a GET follows if its session ticket is to be
+    kept."""
     incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
     tls = context.wrap_bio(incoming, outgoing, session=session)
     sent = 0
@@ -122,7 +123,7 @@ def shake_by_memory(port, context, session=None, keep=None):
             until_done(lambda: tls.read(65536))
             keep.append(tls.session)
         elif tls.version() == "TLSv1.3":
-            incoming.write(one.recv(65536))  # tickets: the daemon has done its part
+            incoming.write(one.recv(65536))  # session tickets: the handshake is complete
     return sent
 
 
@@ -142,12 +143,12 @@ def tls_cases(port):
 
 
 def measure(daemon, call, count):
-    """Bytes sent and seconds of processor time, of one."""
+    """Bytes sent and seconds of processor time of one request."""
     call(daemon.port)
     before, sent = cpu_s(daemon.child.pid), 0
     for _ in range(count):
         sent += call(daemon.port)
-    time.sleep(0.05)  # for what is done after the answer
+    time.sleep(0.05)  # for work that follows the answer
     return sent / count, (cpu_s(daemon.child.pid) - before) / count
 
 
@@ -160,10 +161,10 @@ def main():
     options = parser.parse_args()
     keys = options.key or ["P-256", "rsa:2048"]
     if not tls_peer.has_openssl():
-        print("nothing measured: openssl is not installed, which makes certificates")
+        print("nothing measured: openssl, which creates the certificates, is not installed")
         return
     base = None
-    print("| what | bytes sent | CPU, us | CPU a byte, ns | a GET's, times |\n"
+    print("| request | bytes sent | CPU, us | CPU per byte, ns | relative to a GET |\n"
           "|---|---|---|---|---|")
     with tempfile.TemporaryDirectory(prefix="windsplat-preauth-") as text:
         folder = pathlib.Path(text)

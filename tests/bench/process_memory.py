@@ -21,7 +21,7 @@ def children(pid):
 
 
 def proportional_bytes(pid):
-    """The proportional set size: a page that n processes share counts as 1/n of a page in each."""
+    """The proportional set size: a page shared by n processes counts as 1/n in each."""
     try:
         for line in pathlib.Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
             if line.startswith("Pss:"):

@@ -1,5 +1,5 @@
-"""A series of time steps as a netCDF classic file (64-bit offsets), written without any library:
-one scalar field of 32-bit floats, whose steps differ. Dimensions in, file out."""
+"""Writes a series of time steps as a netCDF classic file (64-bit offsets) without any library:
+one scalar field of 32-bit floats, whose steps differ."""
 import array
 import math
 import struct
@@ -34,7 +34,7 @@ def header(dims, steps):
 
 
 def write_series(path, dims, steps):
-    """A cloud of layers that move up by one each step."""
+    """Cloud layers that move up by one sample each step."""
     x, y, z = dims
     wave = [0.5 + 0.5 * math.sin(0.1 * i) for i in range(max(x, y) + z)]
     layers = []

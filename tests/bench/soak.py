@@ -19,10 +19,9 @@ takes about 15 MB for a moment, which a sample hits by chance; minima show what 
 The line through the means of the intervals is printed beside it.
 
 Failures: a daemon that dies, stops answering /livez or ends with another code than 0; a slope
-above its interval's half width and above --max-slope MB/hour; descriptors, threads or sessions
-that are
-not back at the start once all have left. --smoke: some seconds, without the slope. Exit code 0:
-none."""
+above its interval's half width and above --max-slope MB/hour; descriptors, threads or sessions that
+do not return to their initial number after all clients have disconnected. --smoke: some seconds,
+without the slope. Exit code 0: no failure."""
 import argparse
 import asyncio
 import json
@@ -42,12 +41,12 @@ from stream_client import Daemon, status_bytes
 
 MB = 1e6
 WARM_UP_SHARE, STRETCHES = 0.25, 12
-LEAVE_S = 100  # a deaf one is given up after its write's deadline or 60 s of silence
+LEAVE_S = 100  # a client that never reads is given up after its write deadline or 60 s of silence
 # Student's t for 95 %, by degrees of freedom: 1, 2, ...
 STUDENT_T = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23]
 
 
-# --- what is looked at ---------------------------------------------------------------------------
+# --- observed state ------------------------------------------------------------------------------
 
 def state(pid):
     threads = status_bytes(pid, "Threads") // 1024
@@ -94,9 +93,9 @@ def mean(values):
 
 
 def slope(samples, of_stretch):
-    """MB/hour and half of its 95 % confidence interval, of one figure a stretch of what came after
-    the warm-up. Stretches are long beside what disturbs a sample; where their residuals are still
-    correlated the interval is widened accordingly."""
+    """The slope in MB/hour, and half of its 95 % confidence interval, of one value per stretch
+    after the warm-up. Stretches are long compared with disturbances of a sample; if their residuals
+    are still correlated, the interval is widened accordingly."""
     kept = samples[int(WARM_UP_SHARE * len(samples)):]
     count = min(STRETCHES, len(kept))
     if count < 3:
@@ -126,7 +125,7 @@ def settle(options, daemon, before, failures):
         if now["fds"] <= before["fds"] and now["threads"] <= before["threads"] and sessions == 0:
             return now
         if time.monotonic() > end:
-            failures.append(f"not back at the start: {now['fds']} descriptors of {before['fds']}, "
+            failures.append(f"still open: {now['fds']} descriptors of {before['fds']}, "
                             f"{now['threads']} threads of {before['threads']}, "
                             f"{sessions:.0f} sessions")
             return now
@@ -147,11 +146,11 @@ def report(options, counts, samples, before, after, failures):
     highest = max((s["rss"] for _, s in samples), default=0)
     how = "over TLS " if options.context else ""
     came = ", ".join(f"{n} {kind}" for kind, n in counts.came.items() if n)
-    print(f"{options.sessions} sessions {how}at a time for {took / 60:.1f} minutes: {came} came; "
+    print(f"{options.sessions} concurrent sessions {how}for {took / 60:.1f} minutes: {came}; "
           f"{counts.frames} frames, {counts.requests} requests, {counts.refused} refused. Hostile: "
           + (", ".join(f"{n} {name}" for name, n in sorted(counts.kinds.items())) or "none")
           + ".\n")
-    print("| | before | most | after |\n|---|---|---|---|")
+    print("| | before | peak | after |\n|---|---|---|---|")
     print(f"| resident, MB | {before['rss'] / MB:.1f} | {highest / MB:.1f} "
           f"| {after['rss'] / MB:.1f} |")
     for name, key in (("descriptors", "fds"), ("threads", "threads")):
@@ -175,11 +174,11 @@ def parsed_options():
     parser.add_argument("--minutes", type=float, default=20)
     parser.add_argument("--sessions", type=int, default=200)
     parser.add_argument("--mix", default="normal:8,hostile:1,deaf:1", help="kinds and shares")
-    parser.add_argument("--stay", type=float, default=30, help="seconds of a session, about")
+    parser.add_argument("--stay", type=float, default=30, help="approximate seconds of a session")
     parser.add_argument("--size", default="160x120")
     parser.add_argument("--every", type=float, default=5, help="seconds between samples")
-    parser.add_argument("--max-slope", type=float, default=8, help="MB/hour that are no failure")
-    parser.add_argument("--samples", help="a file for seconds and resident MB, a line a sample")
+    parser.add_argument("--max-slope", type=float, default=8, help="permitted slope in MB/hour")
+    parser.add_argument("--samples", help="file for seconds and resident MB, one line per sample")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--tls", action="store_true", help="over TLS")
     parser.add_argument("--smoke", action="store_true")
@@ -196,7 +195,7 @@ def parsed_options():
 
 
 def certificate(options, folder):
-    """Options of serve; the clients trust what is made here."""
+    """Options of serve; the clients trust the certificate created here."""
     options.context = None
     if not options.tls:
         return []
@@ -219,7 +218,7 @@ def measure(options, folder):
     daemon = Daemon(options.program, options.dataset, "--max-sessions", str(2 * options.sessions),
                     *tls, *options.further)
     counts, samples, failures = Counts(), [], []
-    # A picture first, so that one-time allocations are not counted.
+    # A first picture, so that one-time allocations are not counted.
     fetch(options, daemon.port, f"/v1/datasets/{options.dataset}/frame.jpg?width=64&height=48")
     metric(options, daemon.port, "windsplat_sessions")
     time.sleep(0.3)

@@ -1,4 +1,4 @@
-"""The clients of soak.py: behaviour of each kind, and replacement of ended ones."""
+"""The clients of soak.py: behaviour of each kind, and replacement of disconnected ones."""
 import asyncio
 import json
 import math
@@ -20,7 +20,8 @@ GONE = (OSError, EOFError, asyncio.IncompleteReadError, asyncio.TimeoutError, Co
 class Client:
     def __init__(self, options, port, chance, number):
         self.options, self.port, self.chance = options, port, chance
-        # Limits are those of addresses: each seat has its own, beside the one that looks at health.
+        # Limits apply to addresses, so each client has its own, different from that of the health
+        # checks.
         self.address = f"127.0.{1 + number // 250}.{2 + number % 250}"
         self.reader = self.writer = None
         self.rev = 0
@@ -101,7 +102,7 @@ async def normal(client, counts, until):
         counts.frames += 1
         seq = struct.unpack_from("<I", payload, 8)[0]
         client.send(1, json.dumps({"type": "ack", "seq": seq, "decodeMs": 2}).encode())
-        await asyncio.sleep(client.chance.uniform(0.2, 2))  # somebody looks at it
+        await asyncio.sleep(client.chance.uniform(0.2, 2))  # time to view the still
         turn = client.chance.random()
         if turn < 0.05:
             client.send(1, json.dumps({"type": "still", "id": client.rev + 1, "width": 64,
@@ -116,7 +117,7 @@ async def normal(client, counts, until):
 
 
 async def request(client, counts):
-    """A picture or a saved view by HTTP."""
+    """Requests a picture or a saved view by HTTP."""
     reader, writer = await asyncio.open_connection("127.0.0.1", client.port,
                                                    ssl=client.options.context,
                                                    local_addr=(client.address, 0))
@@ -159,7 +160,7 @@ async def deaf(client, _counts, until):
 
 
 async def drag(client, counts, until):
-    """A change of the view every 50 ms; frames are acknowledged as they come."""
+    """Changes the view every 50 ms; frames are acknowledged as they arrive."""
     await client.connect(1 << 20)
     await client.upgrade()
 
@@ -187,7 +188,7 @@ async def slow(client, counts, until):
 
 
 async def cut(client, counts, until):
-    """Its connection is reset, wherever it is then."""
+    """Resets the connection at a random moment."""
     await drag(client, counts, min(until, time.monotonic() + client.chance.uniform(0.2, 5)))
 
 
@@ -201,7 +202,7 @@ async def acknowledge(client, counts, until):
 
 
 async def both(moving, reading):
-    """Until the first of the two ends."""
+    """Waits until the first of the two ends."""
     tasks = [asyncio.ensure_future(moving), asyncio.ensure_future(reading)]
     done, left = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     for task in left:
@@ -212,7 +213,7 @@ async def both(moving, reading):
             raise result
 
 
-# --- what hostile ones do ------------------------------------------------------------------------
+# --- behaviour of hostile clients ----------------------------------------------------------------
 
 async def bad_frames(client):
     await client.upgrade()
@@ -259,7 +260,7 @@ async def half_open(client):
     client.writer.write(b"POST /v1/frames HTTP/1.1\r\nHost: 127.0.0.1\r\n"
                         b"Content-Length: 100\r\n\r\n{")
     await client.writer.drain()
-    client.writer.get_extra_info("socket").shutdown(socket.SHUT_WR)  # over TLS no goodbye of its
+    client.writer.get_extra_info("socket").shutdown(socket.SHUT_WR)  # over TLS without close_notify
     await asyncio.wait_for(client.reader.read(), 20)
 
 
@@ -300,7 +301,7 @@ WAYS = {"normal": normal, "hostile": hostile, "deaf": deaf, "drag": drag, "slow"
 
 
 def kinds_of(mix):
-    """The kinds of some seats in a row, by their shares."""
+    """The kinds of consecutive clients, by their shares."""
     out = []
     for word in mix.split(","):
         kind, _, share = word.partition(":")
@@ -311,7 +312,7 @@ def kinds_of(mix):
 
 
 async def seat(number, options, port, counts, end):
-    """One place, taken by one client after the other of its kind."""
+    """One place, occupied by successive clients of its kind."""
     chance = random.Random(number + options.seed)
     kind = options.kinds[number % len(options.kinds)]
     await asyncio.sleep(chance.uniform(0, min(5, options.stay)))
@@ -324,7 +325,7 @@ async def seat(number, options, port, counts, end):
         except GONE as fault:
             if isinstance(fault, EOFError) and "refused" in str(fault):
                 counts.refused += 1
-                await asyncio.sleep(1)  # as its Retry-After asks, at least
+                await asyncio.sleep(1)  # at least the delay of its Retry-After
         finally:
             client.close(reset=kind not in ("normal", "drag") or chance.random() < 0.3)
         await asyncio.sleep(chance.uniform(0, 0.5))

@@ -1,4 +1,4 @@
-"""What the benchmarks share: a daemon, and a session with it that takes frames."""
+"""Shared by the benchmarks: a daemon, and a session that receives frames."""
 import json
 import math
 import pathlib
@@ -12,14 +12,14 @@ FINAL = 1  # of a frame header's flags
 
 
 class Viewer(WebSocket):
-    """A session: as much of the stream's protocol as taking frames needs."""
+    """A session that implements the part of the protocol needed to receive frames."""
 
     def __init__(self, port, receive_buffer=0):
         super().__init__(Target("127.0.0.1", port), 120, receive_buffer)
-        self.final_bytes = {}  # by seq, of the newest
+        self.final_bytes = {}  # by seq, of the newest final frame
 
     def final_frame(self, rev):
-        """Takes frames until the final one that shows that revision; its payload's bytes."""
+        """Receives frames until the final one of that revision; returns its payload size."""
         while True:
             opcode, payload = self.message()
             if opcode == TEXT:

@@ -29,7 +29,7 @@ from stream_client import Daemon, Viewer
 MB = 1e6
 KIB = 1024
 BIG, DEAF_VIEW = (1920, 1080), (2560, 1440)
-DISTANCE = 2.4  # of the eye from the middle of the data
+DISTANCE = 2.4  # of the eye from the centre of the data
 
 
 def camera(angle):
@@ -85,7 +85,7 @@ class Orbit(threading.Thread):
 
 
 def percentile(values, share):
-    """The smallest value that so many are not above."""
+    """The smallest value that at least this share of the values does not exceed."""
     ordered = sorted(values)
     return ordered[max(0, math.ceil(share * len(ordered)) - 1)] if ordered else math.nan
 
@@ -96,7 +96,7 @@ def jain(rates):
 
 
 class Deaf:
-    """Asks for pictures, one after the other, and reads nothing; its receive buffer is small."""
+    """Requests pictures one after the other without reading them; its receive buffer is small."""
 
     def __init__(self, port, dataset, size):
         self.viewer = Viewer(port, receive_buffer=4 * KIB)
@@ -111,7 +111,7 @@ class Deaf:
 
 
 def run(orbits, seconds, besides=None):
-    """Lets them start, then counts for so long; the seconds that it took."""
+    """Waits for the start-up, then measures for this time; returns the elapsed seconds."""
     for orbit in orbits:
         orbit.start()
     time.sleep(min(2.0, seconds / 4))
@@ -130,7 +130,7 @@ def run(orbits, seconds, besides=None):
     for orbit in orbits:
         orbit.join(120)
         if orbit.fault:
-            sys.exit(f"viewers.py: a viewer failed: {orbit.fault}")
+            sys.exit(f"viewers.py: a session failed: {orbit.fault}")
     return took
 
 
@@ -142,7 +142,7 @@ def row(name, orbit, took):
 
 
 def measure(daemon, options, size, count, mixed):
-    """Prints the table of one run; Jain's index of the equal viewers."""
+    """Prints the table of one run; returns Jain's index of the equal sessions."""
     orbits = [Orbit(daemon.port, options.dataset_id, size, 2 * math.pi * i / count)
               for i in range(count)]
     big = [Orbit(daemon.port, options.dataset_id, BIG, 0)] if mixed else []
@@ -166,7 +166,7 @@ def measure(daemon, options, size, count, mixed):
 
 
 def settled(daemon):
-    """Resident bytes once they change no more."""
+    """Resident bytes once they are constant."""
     last = 0
     for _ in range(50):
         now = daemon.memory()["VmRSS"]
@@ -178,7 +178,7 @@ def settled(daemon):
 
 
 def kernel_bytes():
-    """What sockets of this network namespace hold, peers' receive buffers too."""
+    """Bytes in the sockets of this network namespace, including the peers' receive buffers."""
     for line in pathlib.Path("/proc/net/sockstat").read_text().splitlines():
         words = line.split()
         if words[0] == "TCP:":
@@ -195,7 +195,7 @@ def metric(daemon, name):
 
 
 def ask_all(daemon, deaf):
-    """Lets them ask until no more is drawn for them."""
+    """Lets the clients request pictures until the daemon renders no more of them."""
     for _ in range(3):
         for one in deaf:
             one.ask()
@@ -208,7 +208,7 @@ def ask_all(daemon, deaf):
 
 
 def measure_deaf(daemon, options, size):
-    """The resident bytes of a session that never reads, against two frames and 256 KiB."""
+    """The resident bytes of a session that never reads, compared with two frames and 256 KiB."""
     reader = Viewer(daemon.port)
     view = {"dataset": options.dataset_id, "image": {"width": size[0], "height": size[1]},
             "camera": camera(0.1)}
@@ -216,7 +216,7 @@ def measure_deaf(daemon, options, size):
     frame = reader.final_frame(1)
     reader.socket.close()
     first = [Deaf(daemon.port, options.dataset_id, size) for _ in range(3)]
-    ask_all(daemon, first)  # the renderer has all it needs after these
+    ask_all(daemon, first)  # one-time allocations of the renderer are complete after these
     held_before = metric(daemon, "windsplat_unsent_bytes")
     before, kernel_before = settled(daemon), kernel_bytes()
     deaf = [Deaf(daemon.port, options.dataset_id, size) for _ in range(options.deaf)]
@@ -235,7 +235,7 @@ def measure_deaf(daemon, options, size):
 
 
 def measure_ended(daemon, options, size):
-    """What sessions that have ended leave behind, in bytes each."""
+    """Memory that remains allocated after sessions have ended, in bytes each."""
     view = {"dataset": options.dataset_id, "image": {"width": size[0], "height": size[1]}}
 
     def visit(count):
@@ -247,7 +247,7 @@ def measure_ended(daemon, options, size):
 
     first = visit(max(1, options.ended // 4))
     left = (visit(options.ended) - first) / options.ended
-    print(f"A session that has ended leaves {left / KIB:.1f} KiB (mean of {options.ended}, "
+    print(f"An ended session leaves {left / KIB:.1f} KiB allocated (mean of {options.ended}, "
           f"after {max(1, options.ended // 4)} others)")
 
 
@@ -283,7 +283,7 @@ def main():
         first.turn({"dataset": options.dataset_id,
                     "image": {"width": size[0], "height": size[1]}}, 1)
         first.socket.close()
-        print(f"One final frame was drawn: RSS {daemon.memory()['VmRSS'] / MB:.1f} MB\n")
+        print(f"After one final frame: RSS {daemon.memory()['VmRSS'] / MB:.1f} MB\n")
         for count in (1, options.viewers):
             fine = measure(daemon, options, size, count, False) >= options.min_jain and fine
         if options.mixed:
@@ -292,7 +292,8 @@ def main():
     finally:
         daemon.stop()
     if options.deaf or options.ended:
-        daemon = Daemon(options.program, options.dataset)  # whose memory nothing else has moved
+        # a fresh process, whose memory is not fragmented
+        daemon = Daemon(options.program, options.dataset)
         try:
             if options.ended:
                 measure_ended(daemon, options, size)

@@ -1,5 +1,5 @@
-// Whether everybody can use the page: axe's rules in both themes and in small windows, the whole
-// page by the keyboard alone, and less motion for those who ask for it.
+// Accessibility of the page: axe's rules in both themes and in small windows, operation by keyboard
+// alone, and reduced motion.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -12,21 +12,21 @@ const { withPage } = sharedDaemon();
 
 async function violations(page) {
   await page.evaluate(axe);
-  // Contrast during a fade differs from the final one.
+  // Contrast during a fade differs from the final contrast.
   await page.evaluate(() =>
     Promise.allSettled(document.getAnimations().map(({ finished }) => finished)),
   );
   const found = await page.evaluate(() =>
     window.axe.run(document, { resultTypes: ["violations"] }),
   );
-  assert.ok(found.passes.length > 15, "axe looked at the page");
+  assert.ok(found.passes.length > 15, "axe has checked the page");
   return found.violations.map(({ id, nodes }) => [
     id,
     ...nodes.map(({ target, any }) => [...target, ...any.map(({ message }) => message)].join(" ")),
   ]);
 }
 
-// Every folder of the panel, those within folders too.
+// Opens every folder of the panel, including nested ones.
 async function unfoldAll(page) {
   const folded = page.locator('#panel .lil-title[aria-expanded="false"]:visible');
   while ((await folded.count()) > 0) await folded.first().click();
@@ -39,7 +39,7 @@ const windows = [
   ["light phone", { colorScheme: "light", viewport: { width: 390, height: 844 } }],
 ];
 
-// Opens each dialog as a user does, with its complete content.
+// Opens each dialog as a user does and waits for its complete content.
 const openers = {
   datasets: async (page) => {
     await page.keyboard.press("d");
@@ -61,9 +61,9 @@ const openers = {
 };
 
 for (const [name, options] of windows) {
-  test(`axe finds nothing: ${name}`, () =>
+  test(`axe reports no violation: ${name}`, () =>
     withPage(async (page) => {
-      assert.deepEqual(await violations(page), [], "as it opens");
+      assert.deepEqual(await violations(page), [], "after loading");
       if (await page.locator("#panel").isVisible()) {
         await unfoldAll(page);
         assert.deepEqual(await violations(page), [], "with the whole panel open");
@@ -80,8 +80,8 @@ for (const [name, options] of windows) {
     }, options));
 }
 
-// A busy browser reports late that a plot is visible; until then the plot is not drawn.
-test("axe reports nothing while plots wait to become visible", () =>
+// A busy browser may report the visibility of a plot late; until then the plot is not drawn.
+test("axe reports no violation while plots wait to become visible", () =>
   withPage(
     async (page) => {
       await unfoldAll(page);
@@ -101,7 +101,7 @@ test("axe reports a button without a name", () =>
     );
   }));
 
-// What has the focus: its name, and whether one sees that it has it.
+// The name of the focused element, and whether its focus is visible.
 const focused = (page) =>
   page.evaluate(() => {
     const element = document.activeElement;
@@ -137,20 +137,20 @@ test("the tab key reaches every control once with visible focus", () =>
     for (let n = 0; n < 2 * expected; n++) {
       await page.keyboard.press("Tab");
       const now = await focused(page);
-      if (now === null) break; // the browser's own controls come next
+      if (now === null) break; // the focus has moved on to the browser's own controls
       seen.push(now);
     }
     assert.ok(seen.length >= expected, `${seen.length} of ${expected} were reached`);
-    assert.ok(seen.length < 2 * expected, "the way round has an end");
+    assert.ok(seen.length < 2 * expected, "the tab order is finite");
     assert.deepEqual(
       seen.filter(({ ring }) => !ring),
       [],
-      "no focus is hidden",
+      "every focus is visible",
     );
     assert.deepEqual(
       seen.filter(({ seen: at }) => !at),
       [],
-      "and each comes into sight",
+      "every focused control is scrolled into view",
     );
   }));
 
@@ -187,7 +187,7 @@ test("keyboard alone opens a dataset, rotates, lengthens lines and shows the hel
     await tabTo("#panel .lil-number input");
     for (let n = 0; n < 5; n++) await page.keyboard.press("ArrowUp");
     await finalPicture(page);
-    assert.notEqual((await pixels(page)).hash, turned.hash, "longer lines are seen");
+    assert.notEqual((await pixels(page)).hash, turned.hash, "longer lines change the picture");
     await tabTo("#help-button");
     await page.keyboard.press("Enter");
     await page.locator("#help").waitFor();
@@ -195,7 +195,7 @@ test("keyboard alone opens a dataset, rotates, lengthens lines and shows the hel
     assert.equal(await page.evaluate(() => document.activeElement.id), "help-button");
   }));
 
-test("with reduced motion nothing moves on its own", () =>
+test("with reduced motion there is no animation", () =>
   withPage(
     async (page) => {
       const moving = await page.evaluate(() =>

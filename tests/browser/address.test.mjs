@@ -1,11 +1,11 @@
-// The page's address with a link to a stored view, and the cards while their list is refreshed.
+// The page's address with a link to a stored view, and dataset cards while their list is refreshed.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { drag, finalPicture, sharedDaemon } from "./support.mjs";
 
 const { withPage } = sharedDaemon({ page: { viewport: { width: 900, height: 600 } } });
 
-// Every address that the page writes.
+// Records every address that the page writes.
 const watchAddress = () => {
   window.addresses = [];
   const { history } = window;
@@ -16,7 +16,7 @@ const watchAddress = () => {
   };
 };
 
-// The server never answers, and the deadline is near.
+// The server never answers, and the page's time limit is shortened.
 test("a stored view that fails to load shows the default and the reason", () => {
   const hurry = () => {
     const timeout = AbortSignal.timeout.bind(AbortSignal);
@@ -26,13 +26,17 @@ test("a stored view that fails to load shows the default and the reason", () => 
     async (page) => {
       assert.match(await page.locator("#alert-text").textContent(), /did not answer in time/);
       assert.equal(await page.locator("#dataset").inputValue(), "climate");
-      // What the page does by itself (its size, its dataset) has had time to be written here.
+      // By now the page has had time to write its own changes (size, dataset) to the address.
       await page.setViewportSize({ width: 860, height: 580 });
       await finalPicture(page);
       await drag(page, 60, 10);
       await page.waitForFunction(() => window.addresses.length > 0);
       const addresses = await page.evaluate(() => window.addresses);
-      assert.match(decodeURIComponent(addresses[0]), /"camera"/, "nothing before the user's own");
+      assert.match(
+        decodeURIComponent(addresses[0]),
+        /"camera"/,
+        "the address changes only with the user's edit",
+      );
     },
     {
       path: "#!view=k7",
@@ -63,7 +67,7 @@ test("a refreshed dataset list keeps cards, pictures and focus", () => {
       const same = await page.evaluate(() =>
         [...document.querySelectorAll(".card")].map((card) => window.oldCards.includes(card)),
       );
-      assert.deepEqual(same, [true, true, false, true], "the new one is the third");
+      assert.deepEqual(same, [true, true, false, true], "only the third card is new");
       await page.waitForFunction(() => document.querySelectorAll(".card img").length === 4);
       assert.equal(previews.length, 4, previews.join());
     },

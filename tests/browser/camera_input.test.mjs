@@ -1,4 +1,4 @@
-// The camera in a real browser: axis gizmo, roll, touch and wheel.
+// Camera controls in a real browser: axis gizmo, roll, touch and wheel.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -84,7 +84,7 @@ test("each axis end sets its view direction, animated or at once", async () => {
       await page.getByRole("button", { name: "View from the east" }).press("Enter");
       await until(page, "azimuth", "90.0");
       await finalPicture(page);
-      assert.equal((await cameras(page)).length, 1, "no movement is wanted");
+      assert.equal((await cameras(page)).length, 1, "with reduced motion one patch is sent");
     },
     { reducedMotion: "reduce" },
   );
@@ -113,7 +113,7 @@ test("keys roll the picture, orbiting keeps the roll, and 0 resets it", () =>
     for (let n = 0; n < 4; n++) await page.keyboard.press("ArrowRight");
     await settled(page);
     const turned = await state(page);
-    assert.equal(turned.roll, "15.0", "a turn keeps the roll");
+    assert.equal(turned.roll, "15.0", "orbiting preserves the roll");
     assert.notEqual(turned.azimuth, start.azimuth);
     for (let n = 0; n < 2; n++) await page.keyboard.press(",");
     await until(page, "roll", "5.0");
@@ -129,7 +129,7 @@ const upOf = async (page) => (await cameras(page)).at(-1).up;
 test("twisting two fingers rolls the camera by their angle", () =>
   withPage(
     async (page) => {
-      await page.keyboard.press("1"); // from the south: up is z, right is x
+      await page.keyboard.press("1"); // view from the south: up is z, right is x
       await until(page, "elevation", "0.0");
       const cdp = await page.context().newCDPSession(page);
       const box = await pictureBox(page);
@@ -150,11 +150,11 @@ test("twisting two fingers rolls the camera by their angle", () =>
       await touch("touchStart", 0);
       await touch("touchMove", 2, 4);
       await finalPicture(page);
-      assert.equal((await state(page)).roll, "0.0", "fingers that tremble do not twist");
+      assert.equal((await state(page)).roll, "0.0", "small rotations of the fingers do not roll");
       await touch("touchMove", 10, 15, 20, 25, 30);
       await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
       await finalPicture(page);
-      // Clockwise by 30 degrees: what was 30 degrees to the left is up now.
+      // After 30 degrees clockwise, the former direction 30 degrees left of up points up.
       const up = await upOf(page);
       for (const [n, value] of [-0.5, 0, Math.sqrt(3) / 2].entries()) {
         assert.ok(Math.abs(up[n] - value) < 0.01, `${up}`);
@@ -186,7 +186,7 @@ test("a burst of wheel events reaches the right zoom with few patches and no scr
     assert.ok(frames.length >= 1);
     await page.keyboard.press("Control+z");
     await until(page, "distance", start.toFixed(4));
-    // A trackpad sends a pinch as a wheel event with ctrl, which would zoom the page.
+    // A trackpad pinch arrives as a wheel event with ctrl, which by default would zoom the page.
     await page.evaluate(() => {
       const picture = document.querySelector("#picture");
       for (let n = 0; n < 10; n++) {
@@ -241,7 +241,7 @@ test("one finger orbits, two fingers pan and pinch", () =>
     ]);
     assert.ok(
       Number(pinched.distance) < 0.7 * Number(turned.distance),
-      "twice as wide is half as far",
+      "doubling the finger distance halves the camera distance",
     );
     assert.equal(pinched.azimuth, turned.azimuth, "pinching does not turn");
     const moved = await touch([

@@ -1,4 +1,4 @@
-// Datasets as cards, a page without any, a loading that is cancelled, and a lost connection.
+// Dataset cards, a page without datasets, a cancelled load, and a lost connection.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -14,8 +14,8 @@ import {
 
 const shared = sharedDaemon({ page: { initScript: [watchFrames, watchPatches] } });
 
-// `alter` may change a message of the server's, hold it back (null) or let it pass (true); while
-// the wire is frozen nothing comes.
+// `alter` may change a message of the server, withhold it (null) or pass it on (true); while the
+// wire is frozen, no message arrives.
 function withPage(run, { alter, ...options } = {}) {
   const wire = {};
   const stand = (socket) => {
@@ -80,7 +80,7 @@ test("card pictures load one at a time, and a failure is shown on its card", () 
       assert.equal(most, 1);
     },
     {
-      faulty: true, // the browser itself reports the answer that is an error
+      faulty: true, // the browser logs the error response
       prepare: (page) =>
         page.route(/\/frame\.jpg\?width=320&height=200$/, async (route) => {
           running += 1;
@@ -136,7 +136,7 @@ test("a server without datasets explains how to add one", () =>
     async (page) => {
       await page.getByText("The server has no dataset yet.").waitFor();
       assert.match(await page.locator("#datasets").textContent(), /windsplat serve FILE/);
-      assert.equal(await page.locator("#alert").isVisible(), false, "that is no error");
+      assert.equal(await page.locator("#alert").isVisible(), false, "no alert is shown");
       await shot(page, "no-dataset");
     },
     {
@@ -158,19 +158,23 @@ test("a slow dataset has a progress bar, and Cancel returns to the previous view
       await page.locator("#dataset").selectOption("tornado");
       const loading = page.locator("#loading");
       await loading.waitFor();
-      assert.equal(await page.locator("#loading-bar").getAttribute("value"), null, "unknown yet");
+      assert.equal(
+        await page.locator("#loading-bar").getAttribute("value"),
+        null,
+        "the progress is indeterminate",
+      );
       wire.say({ type: "progress", id: null, phase: "loading wind", done: 0.25, etaMs: 4000 });
       await page.getByText("loading wind: 25 %, 4 s left").waitFor();
       assert.equal(await page.locator("#loading-bar").evaluate((bar) => bar.value), 0.25);
       await shot(page, "loading");
       await page.locator("#cancel-button").click();
-      wire.thaw(); // pictures of the other dataset, too late
+      wire.thaw(); // releases late pictures of the other dataset
       assert.equal(await loading.isVisible(), false);
       await finalPicture(page);
       assert.equal(await page.locator("#dataset").inputValue(), "climate");
       const { view } = await page.evaluate(() => window.frameHeaders.at(-1).chosen);
       assert.equal(view.dataset, "climate");
-      assert.deepEqual(view.camera.eye, hash.eye, "the camera too");
+      assert.deepEqual(view.camera.eye, hash.eye, "the camera is restored too");
       assert.equal((await pixels(page)).hash, before.hash);
       assert.equal(await page.locator("#alert").isVisible(), false);
     },
@@ -208,14 +212,14 @@ test("a lost connection is shown as offline with the reason, and the button retr
     async (page, wire) => {
       const before = await pixels(page);
       assert.equal(await page.locator("#mark").textContent(), "final");
-      wire.close(1008); // after which the page waits for long
+      wire.close(1008); // policy violation: the page waits long before it reconnects
       await page.locator("#offline").waitFor();
       assert.equal(await page.locator("#mark").textContent(), "offline");
       assert.match(
         await page.locator("#offline-text").textContent(),
         /refused this page.*in \d+ s/,
       );
-      assert.equal((await pixels(page)).hash, before.hash, "the last picture stays");
+      assert.equal((await pixels(page)).hash, before.hash, "the last picture remains");
       const { filter } = await page.locator("#picture").evaluate((e) => {
         return { filter: getComputedStyle(e).filter };
       });
@@ -245,7 +249,7 @@ for (const [name, options] of [
   ["low", { viewport: { width: 701, height: 503 } }],
   ["phone", { viewport: { width: 360, height: 740 }, hasTouch: true, isMobile: true }],
 ]) {
-  test(`a small window (${name}) leaves most of the picture free, and nothing sticks out`, () =>
+  test(`a small window (${name}) leaves most of the picture free, and nothing overflows`, () =>
     withPage(async (page) => {
       const share = await page.evaluate(() => {
         const area = (element) => {

@@ -1,5 +1,5 @@
-// The panel's controls in a real browser: what each sends, what the link contains, what it
-// hides, and, for what every server draws, that the picture changes.
+// The panel's controls in a real browser: the patch that each sends, the resulting link, the
+// controls that it hides, and for settings that every method supports the change of the picture.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -19,14 +19,14 @@ const { withPage } = sharedDaemon({ page: { initScript: watchPatches } });
 
 const isShown = (page, label, tag) => control(page, label, tag).isVisible();
 
-// The newest patch that holds something at this path, from there on.
+// The newest patch that contains this path, and the value there.
 const lastPatch = (page, ...path) =>
   page.evaluate((keys) => {
     const inner = (value) => keys.reduce((v, key) => v?.[key], value);
     return window.patches.map(({ patch }) => inner(patch)).findLast((v) => v !== undefined);
   }, path);
 
-// Waits until the link contains this.
+// Waits until the link contains this value at this path.
 async function linkSays(page, ...pathAndValue) {
   const wanted = pathAndValue.pop();
   await page.waitForFunction(
@@ -69,7 +69,7 @@ test("every number is sent under its key and kept in the link", () =>
     for (const [, , value, ...path] of numbers) await linkSays(page, ...path, value);
   }));
 
-// These change the picture, whatever method the server has.
+// These settings change the picture with every method.
 const visible = [
   ["Lines", "length", 0.1],
   ["Lines", "opacity", 0.2],
@@ -237,13 +237,13 @@ test("colour by direction has compass labels, by a scalar its name", () =>
     assert.equal(await isShown(page, "share of rise", "input"), true);
     await choose(page, "colour by", /^constant/);
     assert.equal(await isShown(page, "share of rise", "input"), false);
-    assert.equal(await isShown(page, "map"), false, "one colour needs no map");
+    assert.equal(await isShown(page, "map"), false, "a constant colour has no map");
     await linkSays(page, "vector", "color", "by", "constant");
     await control(page, "colour", "input").fill("#ff8000");
     assert.equal(await lastPatch(page, "vector", "color", "constant"), "#ff8000");
   }));
 
-// --- the flow: only its patches, which go out whatever the server draws ----------------------
+// --- line motion: checks the patches only, which do not depend on the rendered picture -------
 
 const moves = (page) =>
   page.evaluate(() =>
@@ -264,15 +264,15 @@ test("line motion follows the frame rate, and the link is updated when it stops"
       () => window.patches.filter(({ patch }) => patch.vector?.motion?.time > 0).length >= 8,
     );
     const hash = await page.evaluate(() => location.hash);
-    assert.ok(!/%22time%22/.test(hash), "not while it flows");
+    assert.ok(!/%22time%22/.test(hash), "the link is not updated during the motion");
     await flow.uncheck();
     const sent = await moves(page);
     for (let n = 1; n < sent.length; n++) {
-      assert.ok(sent[n].time > sent[n - 1].time, "time runs on");
-      assert.ok(sent[n].at - sent[n - 1].at > 60, "no more than 15 a second");
+      assert.ok(sent[n].time > sent[n - 1].time, "the time increases");
+      assert.ok(sent[n].at - sent[n - 1].at > 60, "at most 15 patches a second");
     }
     await page.waitForTimeout(300);
-    assert.equal((await moves(page)).length, sent.length, "a stop is a stop");
+    assert.equal((await moves(page)).length, sent.length, "no patch is sent after the stop");
     await linkSays(page, "vector", "motion", "time", sent.at(-1).time);
     await finalPicture(page);
   }));
@@ -343,7 +343,7 @@ test("screenshots of the open panel", async () => {
           .filter({ hasText: new RegExp(`^${title}$`) })
           .first()
           .evaluate((element) => element.scrollIntoView());
-        await page.waitForTimeout(250); // the folders' own opening
+        await page.waitForTimeout(250); // animation of the folders
         await shot(page, `panel-${name}-${part}`);
       }
     }, options);

@@ -1,4 +1,5 @@
-// Files that cannot be shown, and files that change, in a real browser: what the page says of them.
+// Files that cannot be shown, and files that change, in a real browser: the page's messages and
+// state.
 import assert from "node:assert/strict";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -20,7 +21,7 @@ after(async () => {
   rmSync(folder, { recursive: true, force: true });
 });
 
-// A cube of n x n x n vectors, all files by the same title.
+// Writes a cube of n x n x n vectors; all files have the same title.
 function writeCube(name, n, damaged = false) {
   const values = Float32Array.from({ length: 3 * n ** 3 }, (_, i) => 5 + 4 * Math.sin(i / 7));
   const packed = gzipSync(Buffer.from(values.buffer), { level: 1 });
@@ -44,7 +45,7 @@ const viewport = { width: 1280, height: 800 };
 
 const texts = (page) => page.locator("#dataset option").allTextContents();
 
-test("the reason why a dataset cannot be shown stays visible", async (t) => {
+test("the reason why a dataset cannot be shown remains visible", async (t) => {
   const files = [writeCube("ok.nrrd", 12), writeCube("big.nrrd", 190)];
   files.push(writeCube("torn.nrrd", 12, true));
   const args = ["--memory-limit", "192M", ...files];
@@ -61,7 +62,7 @@ test("the reason why a dataset cannot be shown stays visible", async (t) => {
       return option.textContent.endsWith("failed");
     }, id);
     await finalPicture(page);
-    await page.waitForTimeout(500); // what the server answers to the view that went back
+    await page.waitForTimeout(500); // time for the server's answer to the restored view
     assert.ok(await page.locator("#alert").isVisible(), id);
     assert.match(await page.locator("#alert-text").textContent(), why);
     assert.equal(await page.locator("#dataset").inputValue(), "ok");
@@ -104,7 +105,7 @@ test("the page follows changed files, their steps and their errors", async (t) =
   );
   await finalPicture(page);
   assert.equal(await page.locator("#picture").getAttribute("data-step"), "2");
-  assert.equal(await page.locator("#probe-x").inputValue(), place, "the probe stays");
+  assert.equal(await page.locator("#probe-x").inputValue(), place, "the probe is not moved");
   const detail = "'climate.nc' is damaged: its header cannot be read";
   const problem = { type: "about:blank", title: "Unprocessable Content", status: 422, detail };
   say({ type: "error", id, problem });
@@ -123,8 +124,8 @@ test("the legend states the slow limit, and the probe labels times", async (t) =
   const path = '#!{"dataset":"climate","vector":{"minMagnitude":3}}';
   const { page } = await ownPage(t, browser, { args: ["climate"], path, viewport });
   await finalPicture(page);
-  const told = page.locator(".legend-lines .legend-left-out");
-  assert.equal(await told.textContent(), "slower than 3 m s⁻¹ not drawn");
+  const leftOut = page.locator(".legend-lines .legend-left-out");
+  assert.equal(await leftOut.textContent(), "slower than 3 m s⁻¹ not drawn");
   const name = await page.locator(".legend-lines").getAttribute("aria-label");
   assert.match(name, /slower than 3 m s⁻¹ not drawn$/);
   await unfold(page, "Probe");

@@ -1,5 +1,5 @@
-// The daemon's errors in the page: every frame has one, a requested limit is met, and a lossless
-// final frame is what the daemon has drawn, pixel by pixel.
+// Errors reported by the daemon: every frame has one, a requested limit is met, and a lossless
+// final frame equals the daemon's picture pixel by pixel.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -27,7 +27,10 @@ test("moving frames show an estimated error, final frames a measured one", () =>
     for (const { estimated, error, chosen } of moving) {
       assert.ok(estimated && error > 0, `${error}`);
       assert.equal(chosen.error.kind, "estimated");
-      assert.ok(Math.abs(chosen.error.value / error - 1) < 1e-5, "`chosen` says the same");
+      assert.ok(
+        Math.abs(chosen.error.value / error - 1) < 1e-5,
+        "`chosen` contains the same error",
+      );
     }
     assert.match(await page.locator("#hud-error").textContent(), /^error [\d.e-]+ measured$/);
     assert.match(await page.locator("#hud-encoding").textContent(), /^ · JPEG [\d.e-]+$/);
@@ -42,9 +45,9 @@ test("a requested error is met without more pixels than needed", () =>
     for (const limit of [0.2, Math.max(0.001, 2 * best.error)]) {
       await type(page, "max error \\(linear RMSE\\)", limit);
       const frames = await moving();
-      // The first frames may have been begun for the limit before.
+      // The first frames may have been started for the previous limit.
       const last = frames.at(-1);
-      assert.ok(last.error <= limit, `${last.error} where ${limit} was asked for`);
+      assert.ok(last.error <= limit, `${last.error} exceeds the limit ${limit}`);
       assert.equal(last.chosen.view.quality.maxError, Number(limit.toPrecision(5)));
       if (limit === 0.2) {
         assert.ok(
@@ -58,7 +61,7 @@ test("a requested error is met without more pixels than needed", () =>
 
 test("a lossless final frame equals the pixels of the daemon, a JPEG does not", () =>
   withPage(async (page) => {
-    // How many pixels differ from a PNG of the same view that was asked for apart.
+    // Counts the pixels that differ from a separately requested PNG of the same view.
     const differing = () =>
       page.evaluate(async () => {
         const { view } = window.frameHeaders.at(-1).chosen;
@@ -86,5 +89,5 @@ test("a lossless final frame equals the pixels of the daemon, a JPEG does not", 
     assert.equal(await differing(), 0);
     await drag(page, 60, 0);
     await finalPicture(page);
-    assert.equal((await lastFrame(page)).codec, "png", "and the next one too");
+    assert.equal((await lastFrame(page)).codec, "png", "the next final frame is lossless too");
   }));

@@ -1,5 +1,6 @@
-// Files of the Save dialog, read by other decoders: pictures by the browser and by the server's own
-// frames, ZIP files by python, videos by a <video>; and the views that they contain.
+// Files of the Save dialog, checked with independent decoders: pictures against the browser and the
+// server's own frames, ZIP files with Python, videos with a <video> element; and the views that
+// they contain.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
@@ -22,7 +23,7 @@ const { withPage } = shared;
 const hashOf = (view) => `#!${encodeURIComponent(JSON.stringify(view))}`;
 const linkTo = (view) => ({ path: hashOf(view) });
 
-// What the button saves: the file's name and bytes.
+// The name and bytes of the file that the button saves.
 async function saved(page, button) {
   const [download] = await Promise.all([
     page.waitForEvent("download", { timeout: 120_000 * patience }),
@@ -38,7 +39,7 @@ async function savePicture(page, scale, legend = true) {
   return saved(page, "#save-picture");
 }
 
-// The pixels of a PNG or JPEG, by the browser.
+// The pixels of a PNG or JPEG, decoded by the browser.
 const decoded = (page, bytes) =>
   page.evaluate(async (text) => {
     const file = new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))]);
@@ -59,7 +60,7 @@ const decode = async (page, bytes) => {
   return { width, height, data: Buffer.from(data, "base64") };
 };
 
-// The box about the pixels that differ; null: none do.
+// The bounding box of the differing pixels; null: none differ.
 function difference(a, b) {
   assert.deepEqual([a.width, a.height], [b.width, b.height]);
   let box = null;
@@ -76,7 +77,7 @@ function difference(a, b) {
   return box === null ? null : { ...box, count };
 }
 
-// The view in a PNG, found without the page's code.
+// The view in a PNG, read without the page's code.
 function viewIn(bytes) {
   const text = execFileSync(
     "python3",
@@ -121,7 +122,10 @@ async function drop(page, bytes, name = "picture.png") {
     [bytes.toString("base64"), name],
   );
   await page.dispatchEvent("#picture", "dragover", { dataTransfer: transfer });
-  assert.ok(await page.locator("#drop-hint").isVisible(), "there is a hint while it is above");
+  assert.ok(
+    await page.locator("#drop-hint").isVisible(),
+    "a hint is shown while the file is over the page",
+  );
   await page.dispatchEvent("#picture", "drop", { dataTransfer: transfer });
   assert.equal(await page.locator("#drop-hint").isVisible(), false);
 }
@@ -144,7 +148,7 @@ test("a saved picture is n times as large as the view and contains the view", ()
       assert.deepEqual(
         { ...view, image: undefined },
         { ...(await addressView(page)), image: undefined },
-        "the view in the file is the page's",
+        "the file contains the page's view",
       );
       assert.equal(difference(picture, await decode(page, await drawn(view))), null);
     }
@@ -160,7 +164,7 @@ test("a saved picture contains the visible legend at every scale", () =>
       const { bytes } = await savePicture(page, scale, true);
       const box = difference(plain, await decode(page, bytes));
       assert.notEqual(box, null);
-      // Nothing but the legend and the line above it, to a pixel of the page.
+      // Only the legend and the line above it differ; tolerance one CSS pixel.
       const inPage = (pixels) => pixels / scale;
       assert.ok(Math.abs(inPage(box.left) - 10) <= 1, `left ${box.left}`);
       assert.ok(Math.abs(inPage(box.right + 1) - (legend.x - stage.x + legend.width)) <= 2);
@@ -209,7 +213,7 @@ test("a picture dropped on another page restores its view exactly", async () => 
   });
 });
 
-test("a file without a view is an alert, and the view stays", () =>
+test("a file without a view causes an alert, and the view is unchanged", () =>
   withPage(
     async (page) => {
       const before = await pixels(page);
@@ -313,9 +317,9 @@ test("a WebM video has the size and duration of its frames", () =>
     await setAnimation(page, { as: "webm", to: 5, fps: 4 });
     const { name, bytes } = await saved(page, "#save-animation");
     assert.equal(name, "climate-steps.webm");
-    assert.equal(bytes.subarray(0, 4).toString("hex"), "1a45dfa3", "it is EBML");
+    assert.equal(bytes.subarray(0, 4).toString("hex"), "1a45dfa3", "EBML signature");
     const size = await page.locator("#picture").evaluate((c) => [c.clientWidth, c.clientHeight]);
-    // The page's policy knows no media, so it plays on a page without one.
+    // The content security policy of the page forbids media, so the video plays on a blank page.
     const theatre = await page.context().newPage();
     const played = await theatre.evaluate(async (text) => {
       const video = document.createElement("video");
@@ -340,7 +344,7 @@ test("a WebM video has the size and duration of its frames", () =>
       };
     }, bytes.toString("base64"));
     assert.deepEqual(played.size, size);
-    assert.ok(played.time > 1, `${played.time} s of 6 frames, 4 a second`);
+    assert.ok(played.time > 1, `${played.time} s for 6 frames at 4 frames/s`);
     assert.ok(played.seen >= 4, `${played.seen} pictures of 6 steps`);
   }));
 
@@ -350,8 +354,8 @@ test("cancel stops the requests and saves nothing", () =>
     const failed = [];
     const ours = (one) => one.url().endsWith("/v1/frames");
     page.on("requestfailed", (one) => ours(one) && failed.push(one));
-    page.on("download", () => assert.fail("nothing is to be saved"));
-    // The server answers the first frame and lets the others wait.
+    page.on("download", () => assert.fail("no file may be saved"));
+    // The server answers the first request and delays the others.
     await page.route("**/v1/frames", (route) => {
       asked.push(route.request());
       return asked.length === 1 ? route.continue() : undefined;
@@ -366,9 +370,9 @@ test("cancel stops the requests and saves nothing", () =>
     assert.ok(await page.locator("#save-picture").isDisabled());
     await page.keyboard.press("Escape");
     await page.locator("#save-said").getByText("Cancelled.").waitFor();
-    assert.ok(await page.locator("#save").isVisible(), "the dialog stays");
+    assert.ok(await page.locator("#save").isVisible(), "the dialog remains open");
     await page.waitForFunction(() => document.querySelector("#save-job").hidden);
-    assert.equal(asked.length, 3, "no other was asked for");
+    assert.equal(asked.length, 3, "no further frame is requested");
     while (failed.length < 2) await page.waitForEvent("requestfailed");
     assert.ok(await page.locator("#save-picture").isEnabled());
     await page.locator("#save-close").click();
@@ -390,7 +394,7 @@ test("an error of the server is shown in the dialog", () =>
     await page.keyboard.press("s");
     await page.locator("#save-picture").click();
     await page.locator("#save-error").getByText("needs 9 GB of memory").waitFor();
-    assert.equal(tries, 2, "busy: asked again; refused: not");
+    assert.equal(tries, 2, "retried when busy, not when refused");
     page.faults = page.faults.filter((fault) => !/429|507/.test(fault));
   }));
 
@@ -412,7 +416,7 @@ test("shortcuts are disabled while a dialog is open", () =>
     assert.notEqual(
       (await state(page)).azimuth,
       before.azimuth,
-      "and work again once it is closed",
+      "shortcuts work after the dialog is closed",
     );
   }));
 

@@ -1,5 +1,5 @@
-// Frames of every kind that the wire allows, on the page: the test stands between the daemon and
-// the page and slips in frames of its own, whose every pixel is known.
+// Frames of every kind that the protocol allows: a proxy between daemon and page inserts synthetic
+// frames with known pixels.
 import assert from "node:assert/strict";
 import { deflateSync } from "node:zlib";
 import { test } from "node:test";
@@ -7,7 +7,7 @@ import { pictureBox, sharedDaemon, shot } from "./support.mjs";
 
 const shared = sharedDaemon();
 
-// --- pictures and frames that are made up -------------------------------------------------------
+// --- synthetic pictures and frames ---------------------------------------------------------------
 
 function crc(bytes) {
   let sum = ~0;
@@ -26,7 +26,7 @@ function chunk(type, data) {
   return Buffer.concat([ends.subarray(0, 4), body, ends.subarray(4)]);
 }
 
-// RGB, 8 bits; color(x, y) -> [r, g, b].
+// An RGB picture with 8 bits per channel; color(x, y) -> [r, g, b].
 function png(width, height, color) {
   const rows = Buffer.alloc(height * (3 * width + 1));
   for (let y = 0; y < height; y++) {
@@ -50,11 +50,11 @@ const corners = [
     [230, 210, 50],
   ],
 ];
-// Left and right, top and bottom have colours of their own.
+// A picture of four quadrants with distinct colours.
 const quarters = (width, height) =>
   png(width, height, (x, y) => corners[y < height / 2 ? 0 : 1][x < width / 2 ? 0 : 1]);
 
-// A frame of kind PNG; flags: 1 final, 2 error measured, 4 estimated.
+// A frame with a PNG payload; flags: 1 final, 2 error measured, 4 estimated.
 function frame(picture, { seq, rev, flags, width, height, error = NaN, jpegError = NaN }) {
   const header = Buffer.alloc(64);
   header.write("WSPL", 0);
@@ -69,7 +69,7 @@ function frame(picture, { seq, rev, flags, width, height, error = NaN, jpegError
   return Buffer.concat([header, picture]);
 }
 
-// A proxy between the page and the daemon. While `closed` it holds frames of the daemon back.
+// A proxy between the page and the daemon. While `closed` it withholds the daemon's frames.
 class Between {
   closed = false;
   patches = 0;
@@ -84,7 +84,7 @@ class Between {
         const message = JSON.parse(text);
         if (message.type === "ack") this.acks.push(message.seq);
         if (message.type === "patch") this.patches += 1;
-        // The daemon knows nothing of the frames that were slipped in.
+        // Acknowledgements of inserted frames are not passed on.
         if (message.type !== "ack" || message.seq <= this.seq) server.send(text);
       });
       server.onMessage((message) => {
@@ -125,7 +125,8 @@ function withPage(run) {
   );
 }
 
-// The canvas's colours at shares of its width and height, and how many colours it has in all.
+// The colours of the canvas at fractions of its width and height, and its number of distinct
+// colours.
 const looks = (page, places) =>
   page.evaluate((wanted) => {
     const canvas = document.querySelector("#picture");
@@ -150,7 +151,7 @@ const middles = [
 
 // --- tests --------------------------------------------------------------------------------------
 
-test("a PNG frame is drawn without any change of pixels", () =>
+test("a PNG frame is drawn pixel by pixel", () =>
   withPage(async (page, between, { width, height }) => {
     await between.show(page, { width, height, flags: 1 });
     const shown = await looks(page, middles);
@@ -158,7 +159,7 @@ test("a PNG frame is drawn without any change of pixels", () =>
     assert.equal(shown.colors, 4, "nothing was scaled or compressed");
     assert.match(await page.locator("#hud-head").textContent(), / png /);
     assert.equal(await page.locator("#hud-encoding").textContent(), " · PNG lossless");
-    assert.ok(between.acks.includes(between.last), "its credit went back");
+    assert.ok(between.acks.includes(between.last), "the frame was acknowledged");
   }));
 
 test("smaller frames fill the canvas smoothly", () =>
@@ -180,7 +181,11 @@ test("frames at rest refine the view until the final one", () =>
     const { patches } = between;
     await page.keyboard.press("ArrowRight");
     while (between.patches === patches) await page.waitForTimeout(20);
-    assert.equal((await mark()).split(" ")[0], "moving", "the final picture is of another view");
+    assert.equal(
+      (await mark()).split(" ")[0],
+      "moving",
+      "the final picture belongs to another view",
+    );
     await between.show(page, { ...half, flags: 4, error: 0.031 });
     assert.equal(await mark(), "moving 1/2");
     const error = page.locator("#hud-error");
@@ -204,7 +209,7 @@ test("frames at rest refine the view until the final one", () =>
 test("the HUD has no live region", () =>
   withPage(async (page) => {
     const live = await page.locator("#hud").evaluate((hud) => {
-      // Except the notice that a requested reference is ready.
+      // The notice that a requested reference is ready is the one exception.
       const parts = [hud, ...hud.querySelectorAll("*:not(#reference-words)")];
       const loud = (one) => one.ariaLive !== null || /status|alert|log/.test(one.role ?? "");
       return [parts.some(loud), hud.closest("[aria-live], [role=status], [role=alert]") !== null];
@@ -215,7 +220,7 @@ test("the HUD has no live region", () =>
 test("the canvas is never empty between frames of different sizes", () =>
   withPage(async (page, between, { width, height }) => {
     await between.show(page, { width, height });
-    // The darkest of a few pixels at each display frame.
+    // Records the darkest of a few pixels at each display frame.
     await page.evaluate(() => {
       const canvas = document.querySelector("#picture");
       const context = canvas.getContext("2d");
@@ -250,7 +255,7 @@ test("the canvas is never empty between frames of different sizes", () =>
     }
     const { seen, darkest } = await page.evaluate(() => ({ seen, darkest }));
     assert.ok(seen > 12, `${seen} display frames`);
-    assert.ok(darkest >= 190, `a pixel as dark as ${darkest}`);
+    assert.ok(darkest >= 190, `darkest pixel ${darkest}`);
   }));
 
 test("a picture keeps its aspect ratio in a window of another shape", () =>
@@ -259,9 +264,12 @@ test("a picture keeps its aspect ratio in a window of another shape", () =>
     const before = await pictureBox(page);
     await page.setViewportSize({ width: 1000, height: 900 });
     const box = await pictureBox(page);
-    assert.ok(box.width / box.height < 0.8 * (before.width / before.height), "another shape");
-    // What is on the screen, not on the canvas: a band of nothing above the picture.
-    await page.keyboard.press("\\"); // folds the HUD
+    assert.ok(
+      box.width / box.height < 0.8 * (before.width / before.height),
+      "the aspect ratio has changed",
+    );
+    // Checks the screen instead of the canvas: an empty band above the picture.
+    await page.keyboard.press("\\"); // hides the HUD
     const image = (await page.screenshot({ clip: box })).toString("base64");
     const [band, inside] = await page.evaluate(async (data) => {
       const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));

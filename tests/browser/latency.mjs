@@ -1,6 +1,6 @@
-// From a move of the mouse to its picture on the screen: a drag in chromium against the daemon on
-// this machine, climate at 1280x720, and what each stage of the way takes. Prints a table.
-// Usage: tests/browser/run latency [--quick]
+// Measures the latency from a mouse movement to the picture on the screen: a drag in chromium
+// against a local daemon, climate at 1280x720, split into stages. Prints a table. Usage:
+// tests/browser/run latency [--quick]
 import { Daemon, finalPicture, freePort, launch, openPage, pictureBox } from "./support.mjs";
 
 const size = { width: 1280, height: 720 };
@@ -9,8 +9,8 @@ const counts = quick
   ? { visits: 2, single: 5, drag: 30, echo: 5 }
   : { visits: 11, single: 60, drag: 300, echo: 50 };
 
-// Runs in the page before its own scripts. Times are the page's, ms. Every function of the browser
-// that a picture passes through is wrapped, so that the page needs to know nothing of this.
+// Runs in the page before its own scripts. Times are in ms of the page's clock. Wraps every browser
+// function that handles a picture, so that the page's code needs no changes.
 const watchWay = () => {
   const way = { events: [], patches: [], frames: [] };
   window.way = way;
@@ -64,12 +64,12 @@ const watchWay = () => {
     const frame = frameOf.get(bitmap);
     if (frame === undefined) return;
     frame.drawn = now();
-    queueMicrotask(() => (frame.told = now())); // legend, panels and figures follow it
+    queueMicrotask(() => (frame.updated = now())); // when legend, panels and HUD have been updated
     requestAnimationFrame(() => (frame.shown = now()));
   };
 };
 
-// What a refused patch takes to be answered, ms: the way there and back, without any drawing.
+// Round-trip time of a refused patch in ms, without any rendering.
 const echoes = (page, count) =>
   page.evaluate(async (wanted) => {
     const address = new URL("v1/stream", document.baseURI.replace(/^http/, "ws"));
@@ -98,7 +98,7 @@ async function watched(page, act) {
   return page.evaluate(() => window.way);
 }
 
-// Moves the mouse with its button down, on and on round a small circle.
+// Moves the mouse along a small circle with its button down.
 async function moves(page, count, pauseMs) {
   const box = await pictureBox(page);
   const at = (n) => [
@@ -115,9 +115,10 @@ async function moves(page, count, pauseMs) {
   await page.mouse.up();
 }
 
-// Of each event the stages of its way, ms: its own patch or the next one, and the first picture
-// that has it in it. The server's stages are its own words; while it drew the frame before, the
-// patch waited; what is left of the time between patch and frame is the way.
+// Splits the latency of each event into stages, in ms, from the event to the first picture that
+// shows it. The event belongs to the first patch sent afterwards. Queue, render and encode times
+// are reported by the server; time in which the server was still drawing the previous frame counts
+// as "frame before"; the rest between patch and frame is the transport.
 function stages({ events, patches, frames }, echo) {
   return events.flatMap(({ born, handled }) => {
     const patch = patches.find(({ sent }) => sent >= handled);
@@ -137,7 +138,7 @@ function stages({ events, patches, frames }, echo) {
         queue,
         render,
         encode,
-        "the way": outside - wait,
+        transport: outside - wait,
         decode: frame.decoded - frame.received,
         draw: frame.drawn - frame.decoded,
         "to the display": frame.shown - frame.drawn,
@@ -161,26 +162,26 @@ const line = (name, values) =>
 
 function report(title, log, echo) {
   const all = stages(log, echo);
-  if (all.length === 0) throw new Error(`${title}: no event has come to a picture`);
+  if (all.length === 0) throw new Error(`${title}: no event has a picture`);
   const column = (name) => all.map((one) => one[name]);
   console.log(`\n${title}: ${all.length} events, ${log.frames.length} frames`);
   console.log(
     `  ${"ms".padEnd(20)}${["median", "p95", "mean"].map((w) => w.padStart(9)).join("")}`,
   );
   for (const name of Object.keys(all[0])) console.log(line(name, column(name)));
-  const known = 100 * (1 - mean(column("the way")) / mean(column("total")));
-  console.log(`  what was measured, all but the way, is ${known.toFixed(0)} % of the mean`);
-  const moving = log.frames.filter(({ final, told }) => !final && told !== undefined);
+  const known = 100 * (1 - mean(column("transport")) / mean(column("total")));
+  console.log(`  all stages but the transport are ${known.toFixed(0)} % of the mean`);
+  const moving = log.frames.filter(({ final, updated }) => !final && updated !== undefined);
   if (moving.length === 0) return;
   const widths = [...new Set(moving.map(({ width }) => width))].sort((a, b) => a - b);
   const kB = mean(moving.map(({ bytes }) => bytes)) / 1e3;
   console.log(`  moving frames: ${widths.join(", ")} px wide, ${kB.toFixed(0)} kB`);
-  const told = moving.map((frame) => frame.told - frame.drawn);
-  console.log(line("panels and figures", told));
+  const updated = moving.map((frame) => frame.updated - frame.drawn);
+  console.log(line("panels and HUD", updated));
 }
 
-// New visitors, one after the other, none with anything of the page kept: ms from the beginning of
-// the navigation to the page's load, the first picture on the display, and the final one.
+// New visitors one after the other, each with an empty cache: ms from the start of the navigation
+// to the load event, the first displayed picture, and the final one.
 async function visits(count) {
   const times = [];
   for (let n = 0; n < count; n++) {
@@ -230,7 +231,7 @@ try {
       ),
     );
   }
-  console.log(line("there and back", echo));
+  console.log(line("round trip", echo));
   for (const [title, count, pauseMs] of [
     ["one move at a time", counts.single, 400],
     ["a drag at 60 events a second", counts.drag, 16.7],

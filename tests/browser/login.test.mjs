@@ -1,5 +1,6 @@
-// A daemon that asks for a token: the login page leads to the page, whose stream and requests then
-// go by the cookie. A shared link's view survives the login; without scripts the form works, too.
+// A daemon that requires a token: the login page leads to the page, whose stream and requests are
+// then authenticated by the cookie. The view of a shared link survives the login, and the form
+// works without scripts.
 import assert from "node:assert/strict";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -13,7 +14,7 @@ const file = join(folder, "token");
 writeFileSync(file, `${token}\n`, { mode: 0o600 });
 const shared = sharedDaemon({
   args: ["--token-file", file, "tornado"],
-  // The browser itself reports that the first page is a 401.
+  // the browser logs the 401 of the first page
   page: { settle: false, faulty: true },
 });
 const { withPage } = shared;
@@ -24,7 +25,7 @@ async function logIn(page, text) {
   await Promise.all([page.waitForLoadState("load"), page.locator("button").click()]);
 }
 
-// The 401 of the first page is one, as the browser sees it.
+// Errors of the page except the 401 of the first page.
 const faultsBut401 = (page) => page.faults.filter((fault) => !/status of 401/.test(fault));
 
 test("login opens the page, and its stream is authenticated by the cookie", () =>
@@ -37,8 +38,8 @@ test("login opens the page, and its stream is authenticated by the cookie", () =
     await logIn(page, token);
     await page.waitForURL((url) => url.pathname === "/");
     await finalPicture(page);
-    assert.ok((await pixels(page)).colors > 100, "a picture came over the stream");
-    assert.deepEqual(faultsBut401(page), [], "no policy was violated");
+    assert.ok((await pixels(page)).colors > 100, "a picture was received over the stream");
+    assert.deepEqual(faultsBut401(page), [], "no content security policy violation");
 
     const [cookie] = await page.context().cookies();
     assert.match(cookie.name, /^windsplat-\d+$/);
@@ -50,7 +51,7 @@ test("login opens the page, and its stream is authenticated by the cookie", () =
       const headers = { "Content-Type": "application/json" };
       return (await fetch("v1/views", { method: "POST", headers, body: "{}" })).status;
     });
-    assert.equal(kept, 201, "what the page itself posts is allowed");
+    assert.equal(kept, 201, "requests of the page itself are allowed");
 
     await page.reload();
     await finalPicture(page);
@@ -61,8 +62,8 @@ test("the view of a shared link survives the login", async () => {
     await logIn(page, token);
     await finalPicture(page);
     await page.keyboard.press("3");
-    // The camera turns for a while, and the address follows the view a little later: until it holds
-    // the view from the east, neither it nor a final picture is that of the key.
+    // The camera animates for a while, and the address is updated later. Until the address contains
+    // the view from the east, neither the address nor a final picture belongs to the pressed key.
     await page.waitForFunction(() => {
       const { camera } = JSON.parse(decodeURIComponent(location.hash.slice(2)) || "{}");
       return camera?.eye[0] > 0 && camera.eye[1] === 0 && camera.eye[2] === 0;
@@ -96,7 +97,7 @@ test("another site cannot use the cookie", () =>
   withPage(async (page) => {
     await logIn(page, token);
     await finalPicture(page);
-    // The same machine by another name is another site, whose page asks for the stream.
+    // The same host under another name is another site; its page tries to open the stream.
     const url = shared.daemon.url.replace("127.0.0.1", "localhost");
     const other = await openPage(shared.browser, url);
     const outcome = await other.evaluate(
@@ -109,6 +110,6 @@ test("another site cannot use the cookie", () =>
       `${shared.daemon.url.replace("http", "ws")}v1/stream`,
     );
     assert.equal(outcome, "refused");
-    assert.equal((await state(page)).state, "final", "the first page goes on");
+    assert.equal((await state(page)).state, "final", "the first page still works");
     await other.context().close();
   }));

@@ -1,4 +1,4 @@
-// The page in a real browser, shown by the real daemon: what a user sees and does.
+// The page in a real browser against the real daemon: the main user actions and their results.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -23,7 +23,7 @@ const { withPage } = shared;
 
 const phone = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
 
-// The colour maps have come and the legend shows one.
+// Waits until the colour maps are loaded and the legend shows one.
 const mapsAreShown = (page) =>
   page.waitForFunction(() =>
     /linear-gradient/.test(document.querySelector(".legend-strip").style.background),
@@ -49,7 +49,7 @@ test("the climate sample is shown within 3 s of load and its final frame soon af
     { settle: false },
   ));
 
-test("a server with a pixel limit is not asked for larger pictures", async (t) => {
+test("pictures above the server's pixel limit are not requested", async (t) => {
   const args = ["tornado", "--max-pixels", "1000000"];
   const viewport = { width: 1920, height: 1080 };
   const { page } = await ownPage(t, shared.browser, { args, viewport });
@@ -70,10 +70,7 @@ test("a drag rotates the volume and ends in a final frame", () =>
     // The volume follows the pointer: dragging right moves the eye west, dragging down moves it up.
     assert.ok(Number(after.azimuth) < Number(before.azimuth) - 10, `${after.azimuth}`);
     assert.ok(Number(after.elevation) > Number(before.elevation) + 5, `${after.elevation}`);
-    assert.ok(
-      Number(after.seq) >= Number(before.seq) + 2,
-      "moving frames came before the final one",
-    );
+    assert.ok(Number(after.seq) >= Number(before.seq) + 2, "moving frames precede the final one");
     const second = await pixels(page);
     assertDrawn(second);
     assert.notEqual(second.hash, first.hash);
@@ -123,20 +120,20 @@ test("every dataset of the picker can be shown", () =>
       assert.ok((await page.locator(".legend-entry").count()) >= 1);
       await shot(page, `dataset-${id}`);
     }
-    assert.equal(hashes.size, ids.length, "each looks different");
+    assert.equal(hashes.size, ids.length, "the pictures differ");
   }));
 
 test("playback updates step, slider and time; pausing keeps the step", () =>
   withPage(async (page) => {
     const firstTime = await page.locator("#time-label").textContent();
     const first = await pixels(page);
-    await page.locator("#time-fps").selectOption("2"); // slow enough not to be round again
+    await page.locator("#time-fps").selectOption("2"); // slow enough not to wrap around
     await page.locator("#time-play").click();
     await page.waitForFunction(() => Number(document.querySelector("#picture").dataset.step) >= 2);
     assert.equal(await page.locator("#time-play").getAttribute("aria-label"), "Pause");
     await page.locator("#time-play").click();
     await finalPicture(page);
-    // The last frame of the play may still be on its way, so all is read at one moment.
+    // The last frame of the playback may still arrive, so all values are read in one call.
     const shown = await page.evaluate(() => ({
       step: document.querySelector("#picture").dataset.step,
       slider: document.querySelector("#time-slider").value,
@@ -151,7 +148,11 @@ test("playback updates step, slider and time; pausing keeps the step", () =>
     await page.locator("#time-first").click();
     await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "0");
     await finalPicture(page);
-    assert.equal((await pixels(page)).hash, first.hash, "the first step looks as before");
+    assert.equal(
+      (await pixels(page)).hash,
+      first.hash,
+      "the first step has the same pixels as before",
+    );
   }));
 
 test("another colour map changes the picture and the legend", () =>
@@ -204,7 +205,7 @@ test("lines and medium can be switched off and on", () =>
     await switches.nth(1).check();
     await page.waitForFunction(() => document.querySelector(".legend-medium") !== null);
     await finalPicture(page);
-    assert.equal((await pixels(page)).hash, all.hash, "all as before");
+    assert.equal((await pixels(page)).hash, all.hash, "the initial picture is restored");
   }));
 
 test("a link restores the same pixels in another window", () =>
@@ -236,7 +237,7 @@ test("the view is restored on reload and in a second tab", () =>
     assertDrawn(await pixels(second));
   }));
 
-test("a link to an unknown dataset is an error, and the default is shown", () =>
+test("a link to an unknown dataset causes an alert, and the default is shown", () =>
   withPage(
     async (page) => {
       await page.locator("#alert").waitFor();
@@ -249,7 +250,7 @@ test("a link to an unknown dataset is an error, and the default is shown", () =>
     { path: '#!{"dataset":"nowhere"}' },
   ));
 
-test("a link with a value out of range names it and shows the remaining view", () =>
+test("a link with a value out of range names the value and shows the remaining view", () =>
   withPage(
     async (page) => {
       await page.locator("#alert").waitFor();
@@ -260,7 +261,7 @@ test("a link with a value out of range names it and shows the remaining view", (
     { path: '#!{"dataset":"climate","vector":{"length":-5}}', alert: true },
   ));
 
-test("after a server is killed the picture stays dimmed and the page reconnects", async (t) => {
+test("after a server is killed the picture is dimmed and the page reconnects", async (t) => {
   const { daemon, page } = await ownPage(t, shared.browser, {
     initScript: [watchFrames, watchPatches],
   });
@@ -279,7 +280,7 @@ test("after a server is killed the picture stays dimmed and the page reconnects"
       document.documentElement.dataset.connection === "waiting" &&
       /lost/.test(document.querySelector("#status").textContent),
   );
-  assert.equal((await pixels(page)).hash, before.hash, "the last picture stays");
+  assert.equal((await pixels(page)).hash, before.hash, "the last picture remains");
   await page.evaluate(() => (window.patches.length = 0));
   assert.match(
     await page.locator("#picture").evaluate((e) => getComputedStyle(e).filter),
@@ -293,16 +294,16 @@ test("after a server is killed the picture stays dimmed and the page reconnects"
   await finalPicture(page);
   assert.equal((await pixels(page)).hash, before.hash, "the same view as before");
   const frame = await lastFrame();
-  const told = ({ final, step, width, height, codec, quality, method, level, chosen }) => ({
+  const summary = ({ final, step, width, height, codec, quality, method, level, chosen }) => ({
     ...{ final, step, width, height, codec, quality, method, level },
     view: chosen.view,
   });
-  assert.deepEqual(told(frame), told(frameBefore));
+  assert.deepEqual(summary(frame), summary(frameBefore));
   assert.equal(frame.final, true);
   const patches = await page.evaluate(() => window.patches.map(({ patch }) => patch));
   assert.equal(patches.length, 1, "the whole view in one patch");
   assert.equal(patches[0].vector.color.map, "plasma");
-  // The browser itself reports the connections that failed; nothing else may be there.
+  // The browser logs the failed connections; there must be no other errors.
   const others = page.faults.filter((text) => !/WebSocket|ERR_CONNECTION_REFUSED/.test(text));
   assert.deepEqual(others, []);
 });
@@ -389,7 +390,7 @@ test("every function is usable by keyboard", () =>
     await shot(page, "help");
     await page.keyboard.press("Escape");
     assert.equal(await page.locator("#help").isVisible(), false);
-    // Keys in a control are the control's.
+    // A focused control handles the keys itself.
     await page.locator("#time-first").click();
     await until("step", "0");
     await page.locator("#time-slider").focus();
@@ -400,7 +401,7 @@ test("every function is usable by keyboard", () =>
     assert.equal((await state(page)).azimuth, azimuth);
   }));
 
-test("under a base path", async (t) => {
+test("the page works under a base path", async (t) => {
   const { page } = await ownPage(t, shared.browser, { basePath: "/a/b/" });
   await finalPicture(page);
   assertDrawn(await pixels(page));
@@ -408,7 +409,7 @@ test("under a base path", async (t) => {
   assert.deepEqual(page.faults, []);
 });
 
-test("on a high-density screen the picture has its device pixels", () =>
+test("on a high-density screen the picture has the screen's resolution", () =>
   withPage(
     async (page) => {
       const box = await pictureBox(page);

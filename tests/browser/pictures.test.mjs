@@ -1,5 +1,5 @@
-// What the methods, slices, shapes, colours and the motion of the paper look like when they are
-// chosen in the panel: each changes the picture, and its own way back gives the old one.
+// Pictures of the methods, slices, mappings, colours and line motion, as chosen in the panel: each
+// choice changes the picture, and reverting it restores the previous one.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -16,7 +16,7 @@ import {
 
 const { withPage } = sharedDaemon({ page: { initScript: watchPatches } });
 
-// The final picture after a change, saved as a screenshot under `name`.
+// The final picture after a change, saved as a screenshot called `name`.
 async function picture(page, name) {
   await finalPicture(page);
   await shot(page, `picture-${name}`);
@@ -33,7 +33,10 @@ test("slabs change the picture, as does their thickness, and the HUD names them"
     await choose(page, "method", /^slab$/);
     const slab = await picture(page, "slab");
     assert.notEqual(slab.hash, kernel.hash);
-    assert.ok(Math.abs(slab.mean - kernel.mean) < 0.3 * kernel.mean, "and yet much the same");
+    assert.ok(
+      Math.abs(slab.mean - kernel.mean) < 0.3 * kernel.mean,
+      "the mean brightness is similar",
+    );
     assert.match(await head(page), /slab of 1 cells analytic/);
     await type(page, "slab thickness", 4);
     assert.notEqual((await picture(page, "slab-4")).hash, slab.hash);
@@ -42,7 +45,7 @@ test("slabs change the picture, as does their thickness, and the HUD names them"
     assert.equal((await picture(page, "kernel-again")).hash, kernel.hash);
   }));
 
-test("every compositing changes the picture", () =>
+test("every compositing method changes the picture", () =>
   withPage(async (page) => {
     await unfold(page, "Method");
     const hashes = new Set([(await pixels(page)).hash]);
@@ -59,7 +62,7 @@ test("every compositing changes the picture", () =>
     assert.equal(hashes.size, 5);
   }));
 
-test("a slice covers less than the volume, and another layer another part", () =>
+test("a slice covers less than the volume, and another layer covers another part", () =>
   withPage(async (page) => {
     const whole = await pixels(page);
     await unfold(page, "Geometry");
@@ -67,7 +70,7 @@ test("a slice covers less than the volume, and another layer another part", () =
       await choose(page, "slice", new RegExp(`^across ${axis}`));
       const middle = await picture(page, `slice-${axis}`);
       assert.notEqual(middle.hash, whole.hash);
-      // A layer of heights has lines all over the map; the others are seen edge on or stand alone.
+      // A horizontal slice has lines all over the map; in the others few lines are visible.
       const most = axis === "z" ? 1 : 0.8 * whole.covered;
       assert.ok(middle.covered > 0 && middle.covered < most, `${axis}: ${middle.covered}`);
       await page.locator("#panel .panel-note", { hasText: /^Layer \d+ of 0 to \d+/ }).waitFor();

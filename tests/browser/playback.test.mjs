@@ -1,6 +1,6 @@
-// Steps that run, in a real browser against the real daemon: both ways, at a chosen pace, under the
-// slider and by keys; and the panel's measures, whose answers the test gives itself where it checks
-// what the page makes of them.
+// Playback in a real browser against the real daemon: both directions, a chosen speed, the slider
+// and keys; and the measuring panels, with simulated answers where a test checks how the page
+// displays them.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -15,7 +15,7 @@ import {
 
 const shared = sharedDaemon();
 
-// Records the steps that were shown, in order, each once.
+// Records the displayed steps in order, each once.
 const watchSteps = () => {
   window.steps = [];
   addEventListener("DOMContentLoaded", () => {
@@ -27,8 +27,7 @@ const watchSteps = () => {
   });
 };
 
-// `answers` takes the server's place: for each pattern of addresses what it says. What was asked
-// for is recorded in page.asked.
+// `answers` replaces the server's answers by URL pattern. The requests are recorded in page.asked.
 function withPage(run, { answers = {}, ...options } = {}) {
   return shared.withPage(run, {
     viewport: { width: 1280, height: 800 },
@@ -59,7 +58,7 @@ const waitForSteps = (page, count) =>
     timeout: 30_000 * patience,
   });
 
-// Every step shown is the one after the one before, `way` onward and round the end.
+// Asserts that each step follows the previous one in direction `way`, wrapping around at the end.
 function assertInOrder(steps, way, count, hint) {
   for (let n = 1; n < steps.length; n++) {
     assert.equal(steps[n], (steps[n - 1] + way + count) % count, `${hint}: ${steps}`);
@@ -68,10 +67,10 @@ function assertInOrder(steps, way, count, hint) {
 
 const label = (page, id) => page.locator(id).getAttribute("aria-label");
 
-test("every step is shown forward, then backward without a jump, until a pause", async () => {
+test("playback shows every step forward, then backward without a jump, until paused", async () => {
   await withPage(async (page) => {
     const count = await stepCount(page);
-    assert.ok(count > 4, "a sample with steps");
+    assert.ok(count > 4, "the dataset has several steps");
     await page.locator("#time-drop").selectOption("steps");
     await page.locator("#time-fps").selectOption("12");
     await page.locator("#time-play").click();
@@ -148,7 +147,7 @@ test("dragging the slider pauses playback until release", async () => {
     await page.mouse.down();
     for (let n = 20; n <= 70; n++) await page.mouse.move(box.x + (n / 100) * box.width, y);
     const under = await page.locator("#time-slider").inputValue();
-    assert.equal(await label(page, "#time-play"), "Play", "time stands still");
+    assert.equal(await label(page, "#time-play"), "Play", "playback is paused");
     const words = await page.locator("#time-step").textContent();
     assert.match(words, new RegExp(`step ${under} `));
     await page.waitForFunction(
@@ -156,7 +155,7 @@ test("dragging the slider pauses playback until release", async () => {
       under,
     );
     await page.mouse.up();
-    assert.equal(await label(page, "#time-play"), "Pause", "and runs on");
+    assert.equal(await label(page, "#time-play"), "Pause", "playback resumes");
     await page.waitForFunction(
       (step) => Number(document.querySelector("#picture").dataset.step) === Number(step) + 1,
       under,
@@ -183,7 +182,7 @@ test("the time bar fits at 700 pixels", async () => {
       assert.equal(
         await page.evaluate(() => document.documentElement.scrollWidth),
         700,
-        "nothing sticks out",
+        "nothing overflows",
       );
       await shot(page, "playback-700");
     },
@@ -191,7 +190,7 @@ test("the time bar fits at 700 pixels", async () => {
   );
 });
 
-// --- measures -------------------------------------------------------------------------------
+// --- measuring panels -----------------------------------------------------------------------
 
 const bell = Array.from({ length: 128 }, (_, n) =>
   Math.round(1e4 * Math.exp(-(((n - 40) / 18) ** 2))),
@@ -251,7 +250,8 @@ test("a histogram loads when visible, and a drag over its colours sets their ran
       assert.match(await svg.getAttribute("aria-label"), /0 to 64.*12 masked/);
       await medium.getByRole("button", { name: "1–99 %" }).click();
       const [low, high] = await lastRange(page);
-      // Of a bell about bin 40, half as wide at 1/e as 18 bins of 0.5: 2.33 deviations each way.
+      // A Gaussian about bin 40 that falls to 1/e within 18 bins of width 0.5; the range is 2.33
+      // deviations to each side.
       const deviation = (18 / Math.SQRT2) * 0.5;
       assert.ok(Math.abs(low - (20.25 - 2.326 * deviation)) < 0.4, `${low}`);
       assert.ok(Math.abs(high - (20.25 + 2.326 * deviation)) < 0.4, `${high}`);
@@ -286,7 +286,7 @@ test("the range of all steps is added to the view and removed from it", async ()
       await finalPicture(page);
       assert.equal(await range.inputValue(), "all");
       await range.selectOption("default");
-      assert.equal(await lastRange(page), null, "its default again");
+      assert.equal(await lastRange(page), null, "the default is restored");
       await finalPicture(page);
       assert.equal(await range.inputValue(), "default");
     },
@@ -319,8 +319,8 @@ test("the probe reads a position, follows the step and plots the series", async 
       const course = page.locator(".course");
       await course.waitFor();
       assert.match(await course.getAttribute("aria-label"), /From 1 K to 7 K/);
-      const told = await course.getAttribute("aria-label");
-      assert.match(told, /between 2001-01-01 00:00Z and 2001-01-01 02:00Z$/);
+      const label = await course.getAttribute("aria-label");
+      assert.match(label, /between 2001-01-01 00:00Z and 2001-01-01 02:00Z$/);
       assert.match(await course.textContent(), /2001-01-01 00:00Z.*2001-01-01 02:00Z/);
       await finalPicture(page);
       await course.scrollIntoViewIfNeeded();

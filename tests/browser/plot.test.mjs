@@ -1,5 +1,5 @@
-// Error against time in the Quality panel, in a real browser; what the server forecasts is made up
-// here, what budget and limit do to the frames is the daemon's own.
+// Plot of error against time in the Quality panel, in a real browser. The forecast is simulated;
+// the effects of budget and limit on the frames are the daemon's own.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -33,7 +33,7 @@ const points = [4, 9, 20, 45, 100, 220].map((ms, n) => ({
   pareto: n !== 2,
 }));
 
-// The server's forecast is `json`; page.asked holds the views that it was asked for.
+// The server's forecast is `json`; page.asked contains the views for which it was requested.
 function withPage(run, { status = 200, json = { view: {}, points, chosen: 2 }, ...options } = {}) {
   return shared.withPage(run, {
     initScript: [watchFrames, watchPatches],
@@ -63,7 +63,7 @@ async function open(page) {
 
 test("the plot loads when visible and at rest, and describes each setting", () =>
   withPage(async (page) => {
-    assert.deepEqual(page.asked, [], "not while hidden");
+    assert.deepEqual(page.asked, [], "no request while hidden");
     await open(page);
     assert.equal(page.asked.length, 1);
     assert.equal(page.asked[0].dataset, "climate");
@@ -76,11 +76,11 @@ test("the plot loads when visible and at rest, and describes each setting", () =
       told,
       "slab of 2 cells, 1136×818: 45 ms, error 0.0044 (0.0022 to 0.0089), measured",
     );
-    // Ratios of time are distances: 4 -> 20 is as far as 20 -> 100.
+    // Equal ratios of time are equal distances: 4 -> 20 as far as 20 -> 100.
     const x = async (n) => Number(await circles.nth(n).getAttribute("cx"));
     assert.ok(Math.abs((await x(2)) - (await x(0)) - ((await x(4)) - (await x(2)))) < 0.01);
     const line = await page.locator(".forecast polyline").getAttribute("points");
-    assert.equal(line.split(" ").length, points.length - 1, "through what nothing beats");
+    assert.equal(line.split(" ").length, points.length - 1, "the line connects the Pareto points");
     const final = page.locator(".plot-final");
     const frame = await page.evaluate(() => window.frameHeaders.at(-1));
     assert.match(await final.locator("title").textContent(), /^final [\d.]+ ms, error /);
@@ -91,7 +91,11 @@ test("the plot loads when visible and at rest, and describes each setting", () =
     await drag(page, 60, 10);
     await again;
     await page.waitForFunction(() => /final/.test(document.querySelector("#mark").textContent));
-    assert.notDeepEqual(page.asked.at(-1).camera, page.asked[0].camera, "of the view as it is");
+    assert.notDeepEqual(
+      page.asked.at(-1).camera,
+      page.asked[0].camera,
+      "the request contains the current view",
+    );
     await shot(page, "plot");
   }));
 
@@ -128,7 +132,7 @@ test("the budget handle sets the budget of moving frames by pointer and keys", (
     await page.keyboard.press("Shift+ArrowRight");
     assert.equal(await budgetOf(page), large - Math.max(1, Math.round(0.05 * large)) + 1);
     await type(page, "moving budget \\(ms\\)", 2);
-    assert.equal(await budgetOf(page), 2, "down to what the wire takes");
+    assert.equal(await budgetOf(page), 2, "clamped to the protocol's minimum");
     assert.equal(await budget.getAttribute("aria-valuetext"), "2 ms");
     const quick = await moving();
     assert.equal(quick.at(-1).chosen.view.quality.budgetMs, 2);

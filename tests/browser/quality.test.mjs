@@ -1,5 +1,5 @@
-// The Quality panel in a real browser: what is asked for is what the daemon's frames show, by their
-// headers and by what `chosen` says of them.
+// The Quality panel in a real browser: the daemon's frames, by their headers and `chosen` messages,
+// comply with the requested quality.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -40,14 +40,14 @@ test("a small budget reduces moving frames, a large one keeps their full size", 
       await type(page, budget, ms);
       const frames = await framesOf(page, () => drag(page, 120, 30, 60));
       const moving = movingOf(frames);
-      assert.ok(moving.length >= 1, "frames came while it moved");
+      assert.ok(moving.length >= 1, "moving frames were received");
       widths[ms] = moving.at(-1).width;
       const last = frames.at(-1);
       finals.push(last.renderUs / 1000);
-      assert.deepEqual([last.final, last.width], [true, full], "the final frame is whole");
-      assert.equal(last.chosen.view.quality.budgetMs, ms, "drawn for this budget");
+      assert.deepEqual([last.final, last.width], [true, full], "the final frame has full size");
+      assert.equal(last.chosen.view.quality.budgetMs, ms, "the frame was drawn for this budget");
     }
-    // A busy machine may need longer than that for a whole one.
+    // On a busy machine the large budget may not suffice for full-size frames.
     assert.ok(Math.min(...finals) > 0);
     if (Math.max(...finals) < 200) assert.equal(widths[500], full);
     assert.ok(widths[5] < widths[500], `${widths[5]} px, ${widths[500]} px of ${full}`);
@@ -55,14 +55,18 @@ test("a small budget reduces moving frames, a large one keeps their full size", 
 
 test("an error limit is set by a switch and its magnitude", () =>
   withPage(async (page) => {
-    assert.equal(await control(page, limit, "input").isVisible(), false, "none by default");
+    assert.equal(await control(page, limit, "input").isVisible(), false, "no limit by default");
     await control(page, limited, "input").check();
     assert.deepEqual(await qualities(page), [{ maxError: 0.01 }]);
     const slider = page.getByRole("slider", { name: "max error (linear RMSE)" });
     const box = page.getByRole("textbox", { name: "max error (linear RMSE)" });
     assert.equal(await slider.getAttribute("aria-valuetext"), "0.01");
     for (let n = 0; n < 20; n++) await slider.press("ArrowLeft");
-    assert.deepEqual((await qualities(page)).at(-1), { maxError: 0.001 }, "a decade is 20 presses");
+    assert.deepEqual(
+      (await qualities(page)).at(-1),
+      { maxError: 0.001 },
+      "20 presses are a decade",
+    );
     assert.equal(await box.inputValue(), "0.001");
     await box.fill("0.0234");
     await box.press("Enter");
@@ -76,7 +80,11 @@ test("an error limit is set by a switch and its magnitude", () =>
     await finalPicture(page);
     assert.equal(await control(page, limited, "input").isChecked(), false);
     await control(page, limited, "input").check();
-    assert.deepEqual((await qualities(page)).at(-1), { maxError: 0.0234 }, "the last one again");
+    assert.deepEqual(
+      (await qualities(page)).at(-1),
+      { maxError: 0.0234 },
+      "the last limit is restored",
+    );
   }));
 
 test("a link contains budget, error and lossless, and `All defaults` removes them", () =>

@@ -1,10 +1,10 @@
-// The reference in a real browser: drawn once it is asked for, on the page as long as it is held,
-// gone with the view that it is of.
+// The reference in a real browser: rendered on request, shown while held, discarded when the view
+// changes.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { drag, finalPicture, patience, pixels, sharedDaemon, shot } from "./support.mjs";
 
-// Small, for references cost by the pixel.
+// A small picture, because the cost of references is proportional to the pixels.
 const { withPage } = sharedDaemon({
   args: ["climate"],
   page: { viewport: { width: 420, height: 480 } },
@@ -20,8 +20,8 @@ const ready = (page) =>
     { timeout: 60_000 * patience },
   );
 
-// Mean and largest difference of the picture's and the reference's codes, and the share of pixels
-// that differ; how far their boxes on the page are apart.
+// Mean and largest difference between the pixel values of picture and reference, the fraction of
+// differing pixels, and the offset between their boxes on the page.
 const apart = (page) =>
   page.evaluate(() => {
     const canvas = document.querySelector("#picture");
@@ -47,7 +47,7 @@ const apart = (page) =>
     };
   });
 
-// The displayed pixels of the picture, without the areas covered by other elements.
+// A screenshot of the picture without the areas covered by other elements.
 async function seen(page) {
   const box = await page.locator("#picture").boundingBox();
   const clip = { x: box.x + 100, y: box.y + 120, width: 220, height: 100 };
@@ -71,22 +71,22 @@ test("r requests the reference and shows it while held", () =>
     );
     assert.equal(await page.locator("#reference-picture").isVisible(), false);
     await ready(page);
-    assert.equal(await seen(page), seenBefore, "it is not shown before it is held");
+    assert.equal(await seen(page), seenBefore, "the reference is not shown until held");
     await page.keyboard.down("r");
-    await page.keyboard.down("r"); // as it repeats
+    await page.keyboard.down("r"); // key repeat
     assert.equal(await page.locator("#reference-picture").isVisible(), true);
     assert.equal(await mark(page), "reference");
     const { size, mean, differ, boxes } = await apart(page);
     assert.deepEqual(size, [0, 0]);
     assert.ok(mean > 0.01 && mean < 2, `${mean} codes apart on average`);
     assert.ok(differ > 0.01, `${differ} of the values differ`);
-    assert.deepEqual(boxes, [0, 0, 0, 0], "pixel on pixel");
-    assert.notEqual(await seen(page), seenBefore, "another picture is seen");
+    assert.deepEqual(boxes, [0, 0, 0, 0], "both pictures coincide");
+    assert.notEqual(await seen(page), seenBefore, "the reference is visible");
     await shot(page, "reference");
     await page.keyboard.up("r");
     assert.equal(await page.locator("#reference-picture").isVisible(), false);
     assert.equal(await mark(page), "final");
-    assert.equal(await seen(page), seenBefore, "exactly as before");
+    assert.equal(await seen(page), seenBefore, "the same pixels as before");
     assert.equal((await pixels(page)).hash, before.hash);
   }));
 
@@ -103,7 +103,8 @@ test("the shown error is the true error of the picture", () =>
     });
     assert.equal(view, "reference");
     assert.ok(Math.abs(told - truth.value) <= 0.05 * truth.value, `${told} of ${truth.value}`);
-    // In displayed codes an error is some 13 times larger at most, and a JPEG's own comes in too.
+    // An error in display values is at most about 13 times the linear error; the JPEG error adds to
+    // it.
     const { mean } = await apart(page);
     assert.ok(mean / 255 < 13 * truth.value + 0.01, `${mean} for ${truth.value}`);
   }));
@@ -117,7 +118,11 @@ test("a view change discards the reference and its job", () =>
     assert.equal(await page.locator("#reference").isVisible(), false);
     const cancelled = page.waitForResponse((answer) => answer.request().method() === "DELETE");
     await page.keyboard.down("r");
-    assert.equal(await page.locator("#reference-picture").isVisible(), false, "not the old one");
+    assert.equal(
+      await page.locator("#reference-picture").isVisible(),
+      false,
+      "the old reference is not shown",
+    );
     await page.waitForFunction(() =>
       /: \d+ %/.test(document.querySelector("#reference").textContent),
     );
@@ -127,7 +132,7 @@ test("a view change discards the reference and its job", () =>
     assert.equal((await cancelled).status(), 204);
     await finalPicture(page);
     assert.equal(await page.locator("#reference").isVisible(), false);
-    // Escape does the same, and the next hold starts again.
+    // Escape discards the reference too, and the next press starts again.
     await page.keyboard.press("r");
     await page.waitForFunction(() =>
       /: \d+ %/.test(document.querySelector("#reference").textContent),
@@ -155,7 +160,7 @@ test("the button can be held by mouse, finger or space", () =>
       assert.equal(await isShown(), true);
       await page.mouse.move(10, 200);
       await page.mouse.up();
-      assert.equal(await isShown(), false, "let go elsewhere");
+      assert.equal(await isShown(), false, "released outside the button");
       await button.focus();
       await page.keyboard.down("Space");
       assert.equal(await isShown(), true);

@@ -33,7 +33,7 @@ async function withReport(run, options = {}) {
   const page = await openPage(browser, address, { colorScheme: "light", prepare, ...options });
   try {
     await run(page);
-    assert.deepEqual(page.faults, [], "the browser's console is clean");
+    assert.deepEqual(page.faults, [], "no errors in the browser's console");
     const loaded = requests.filter((url) => !url.startsWith("data:"));
     assert.deepEqual(loaded, [address], "nothing else is loaded");
   } finally {
@@ -65,7 +65,7 @@ const marksOf = (figure, selector) =>
 
 const isWithin = ([x, y]) => x >= -0.005 && x <= 1.005 && y >= -0.005 && y <= 1.005;
 
-test("figures have a mark of every point, within the frame and in order", () =>
+test("figures contain a mark for every point, within the frame and in order", () =>
   withReport(async (page) => {
     const figures = page.locator("figure.plot");
     const titles = await figures
@@ -83,7 +83,7 @@ test("figures have a mark of every point, within the frame and in order", () =>
       assert.ok(marks.every(isWithin), JSON.stringify(marks));
       const rings = await marksOf(figure, ".pareto > *");
       assert.equal(rings.length, scene.points.filter(({ pareto }) => pareto).length);
-      // Along the Pareto front the error falls as the time rises.
+      // Along the Pareto front the error decreases as the time increases.
       rings.sort(([a], [b]) => a - b);
       assert.ok(rings.every(([, y], i) => i === 0 || y <= rings[i - 1][1] + 1e-3));
       const labels = await figure.locator("svg text").allTextContents();
@@ -127,7 +127,7 @@ test("marks stand at the values on logarithmic axes", () =>
     }
   }));
 
-test("tables have the numbers of study.json", () =>
+test("tables contain the numbers of study.json", () =>
   withReport(async (page) => {
     const points = await rowsOf(page, "all points");
     for (const [n, scene] of study.scenes.entries()) {
@@ -193,7 +193,7 @@ for (const [name, viewport] of Object.entries({
   window: { width: 1440, height: 900 },
   phone: { width: 390, height: 844 },
 })) {
-  test(`axe finds nothing: ${name}`, () =>
+  test(`axe reports no violation: ${name}`, () =>
     withReport(
       async (page) => {
         for (const details of await page.locator("details").all()) {
@@ -208,7 +208,7 @@ for (const [name, viewport] of Object.entries({
     ));
 }
 
-test("without JavaScript the report says where its numbers are", () =>
+test("without JavaScript the report refers to the file with its numbers", () =>
   withReport(
     async (page) => {
       const words = await page.locator("body").innerText();

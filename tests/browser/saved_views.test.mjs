@@ -51,14 +51,15 @@ test("renaming a view keeps its row, the focus and the button under the pointer"
     await name.press("Tab");
     const label = () => page.evaluate(() => document.activeElement.ariaLabel);
     assert.equal(await label(), "Open first");
-    // One press of the mouse leaves the name, which renames, and deletes.
+    // One mouse press removes the focus from the name, which renames the view, and clicks a delete
+    // button.
     await name.fill("other");
     await page.locator("#kept li button").last().click();
     assert.equal(await page.locator("#kept li").count(), 1);
     assert.equal(await page.locator("#kept li input").inputValue(), "two");
   }));
 
-test("a link with a malformed view is an error and changes nothing", () =>
+test("a link with a malformed view causes an alert and changes nothing", () =>
   withPage(
     async (page) => {
       const before = await pixels(page);
@@ -102,7 +103,7 @@ const share = async (page) => {
   return page.evaluate(() => navigator.clipboard.readText());
 };
 
-test("share copies the link, and shortens a long one to one that restores the same pixels", () =>
+test("Share copies the link, shortened if long, and the short link restores the same pixels", () =>
   withPage(async (page) => {
     assert.ok((await page.evaluate(() => location.href.length)) > 2000);
     const before = await pixels(page);
@@ -112,7 +113,8 @@ test("share copies the link, and shortens a long one to one that restores the sa
     await withPage(
       async (other) => {
         assert.equal((await pixels(other)).hash, before.hash);
-        // Its own address is whole again, so that it survives a restart of the server.
+        // The other page's address contains the whole view, so it remains valid after a server
+        // restart.
         await other.waitForFunction(() => location.hash.startsWith("#!{"));
         assert.deepEqual((await addressView(other)).scalars, long.scalars);
       },
@@ -120,7 +122,7 @@ test("share copies the link, and shortens a long one to one that restores the sa
     );
   }, linkTo(long)));
 
-test("share copies the long link with the reason if the server stores no views", () =>
+test("Share copies the long link and shows the reason if the server stores no views", () =>
   withPage(async (page) => {
     const problem = { type: "about:blank", title: "No", status: 507, detail: "no room for views" };
     await page.route("**/v1/views", (route) => route.fulfill({ status: 507, json: problem }));
@@ -130,12 +132,12 @@ test("share copies the long link with the reason if the server stores no views",
     page.faults = page.faults.filter((fault) => !/507/.test(fault));
   }, linkTo(long)));
 
-test("a short link to an unknown view is an error, and the default is shown", () =>
+test("a short link to an unknown view causes an alert, and the default is shown", () =>
   withPage(
     async (page) => {
       assert.match(await page.locator("#alert-text").textContent(), /^The link's view: /);
       assert.equal(await page.locator("#dataset").inputValue(), "climate");
     },
-    // The browser itself reports the answer that there is no such view.
+    // The browser logs the 404 response.
     { path: "#!view=no-such-view", alert: true, faulty: true },
   ));

@@ -1,4 +1,5 @@
-// What the browser tests share: the daemon, the browser, and a page that is watched for errors.
+// Shared parts of the browser tests: the daemon, the browser, and a page whose errors are
+// collected.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { mkdirSync } from "node:fs";
@@ -38,7 +39,7 @@ export class Daemon {
     return `http://127.0.0.1:${this.port}${this.basePath}`;
   }
 
-  // Without datasets: the built-in samples.
+  // Without arguments the built-in samples are served.
   async start(...datasets) {
     const child = spawn(
       program,
@@ -52,7 +53,7 @@ export class Daemon {
     }
     const until = Date.now() + 30_000 * patience;
     while (Date.now() < until && child.exitCode === null) {
-      // Where a token is asked for, too.
+      // /readyz answers without a token.
       const answer = await fetch(`${this.url}readyz`).catch(() => null);
       if (answer?.ok) return this;
       await sleep(50);
@@ -82,9 +83,9 @@ export const launch = () =>
     ],
   });
 
-// A page whose console errors, exceptions and violations of the content policy are collected.
-// options: playwright's for a context; `initScript`, a function or several to run in the page
-// first; `prepare`, what to do with the page before it goes anywhere.
+// Opens a page and collects its console errors, exceptions and violations of the content security
+// policy. options: those of a Playwright context; `initScript`, one or several functions to run in
+// the page first; `prepare`, called with the page before the navigation.
 export async function openPage(browser, url, { initScript, prepare, ...options } = {}) {
   const context = await browser.newContext({
     viewport: { width: 1024, height: 640 },
@@ -109,14 +110,15 @@ export async function openPage(browser, url, { initScript, prepare, ...options }
   return page;
 }
 
-// One browser and one daemon for all tests of a file; `args` are the daemon's, its datasets for the
-// most part, and `page` holds the options that every page of the file has unless a test says
-// otherwise. Browser and daemon are there once the tests run, not before.
+// One browser and one daemon for all tests of a file. `args` are the daemon's arguments, usually
+// its datasets; `page` holds the default page options of the file. Browser and daemon are started
+// when the tests run, not before.
 export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {}) {
   const shared = { withPage };
   before(async () => {
     shared.browser = await launch();
-    shared.daemon = new Daemon(await freePort(), basePath); // ended even where it does not start
+    // stored before start() so that a daemon that fails to start is stopped too
+    shared.daemon = new Daemon(await freePort(), basePath);
     await shared.daemon.start(...args);
   });
   after(async () => {
@@ -124,10 +126,10 @@ export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {
     await shared.daemon?.kill();
   });
 
-  // Runs a test on a page of its own and returns what it returns; in the end nothing may be wrong.
-  // options: openPage's; `path`, what follows the daemon's address; `settle: false`, so as not to
-  // wait for the final picture first; `unfolded`, folders of the panel to open; `alert` and
-  // `faulty`, where an alert or errors in the console are part of the test.
+  // Runs a test on a new page and returns its result; afterwards the page must have no errors.
+  // options: those of openPage; `path`, appended to the daemon's URL; `settle: false`, not to wait
+  // for the final picture first; `unfolded`, panel folders to open; `alert` and `faulty`, if the
+  // test expects an alert or console errors.
   async function withPage(run, options) {
     const {
       path = "",
@@ -144,7 +146,7 @@ export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {
       const result = await run(page);
       const alerts = await page.locator("#alert:visible").allTextContents();
       if (!alert) assert.deepEqual(alerts, [], "no alert is shown");
-      if (!faulty) assert.deepEqual(page.faults, [], "the browser's console is clean");
+      if (!faulty) assert.deepEqual(page.faults, [], "no errors in the browser's console");
       return result;
     } finally {
       await page.context().close();
@@ -153,8 +155,8 @@ export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {
   return shared;
 }
 
-// A daemon and a page for one test; both are closed when it ends, pass or fail.
-// options: openPage's, and the daemon's and `path` as above.
+// A daemon and a page for one test; both are closed when it ends. options: those of openPage, and
+// the daemon's and `path` as above.
 export async function ownPage(t, browser, { basePath, args = [], path = "", ...options } = {}) {
   const daemon = new Daemon(await freePort(), basePath);
   t.after(() => daemon.kill());
@@ -164,15 +166,15 @@ export async function ownPage(t, browser, { basePath, args = [], path = "", ...o
   return { daemon, page };
 }
 
-// Any frame at all has been drawn.
+// Waits until any frame has been drawn.
 export const somePicture = (page, timeout = 15_000 * patience) =>
   page.waitForFunction(() => Number(document.querySelector("#picture").dataset.seq) > 0, null, {
     timeout,
     polling: 20,
   });
 
-// The final frame of the requested view has been drawn. Input is sent with the next display frame,
-// so two of those pass first.
+// Waits until the final frame of the requested view has been drawn. Input is sent with the next
+// display frame, so two of those are awaited first.
 export async function finalPicture(page) {
   await page.evaluate(
     () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))),
@@ -187,8 +189,8 @@ export async function finalPicture(page) {
   );
 }
 
-// Statistics of the canvas's pixels: mean and deviation of the brightness (0..255), share of pixels
-// that differ from the most frequent colour, and a hash of all.
+// Statistics of the canvas pixels: mean and deviation of the brightness (0..255), fraction of
+// pixels that differ from the most frequent colour, and a hash of all pixels.
 export const pixels = (page) =>
   page.evaluate(() => {
     const canvas = document.querySelector("#picture");
@@ -220,10 +222,10 @@ export const pixels = (page) =>
     };
   });
 
-// The picture is neither blank nor flat.
+// Asserts that the picture is neither empty nor uniform.
 export function assertDrawn(stats) {
   assert.ok(stats.covered > 0.02, `only ${stats.covered} of the picture is drawn`);
-  assert.ok(stats.deviation > 3, `the picture is flat: deviation ${stats.deviation}`);
+  assert.ok(stats.deviation > 3, `the picture is uniform: deviation ${stats.deviation}`);
   assert.ok(stats.colors > 100, `only ${stats.colors} colours`);
 }
 
@@ -245,7 +247,7 @@ export async function drag(page, dx, dy, steps = 12) {
   await page.mouse.up();
 }
 
-// The select of a control in the panels, by its folder's and its own label.
+// The element of a panel control, by the labels of its folder and its own.
 export const control = (page, label, tag = "select") =>
   page
     .locator("#panel .lil-controller", {
@@ -255,7 +257,7 @@ export const control = (page, label, tag = "select") =>
     .locator(tag)
     .first();
 
-// Runs in a page before its own scripts (initScript): records outgoing patches, with the time.
+// Runs in a page before its own scripts (initScript): records outgoing patches with their times.
 export const watchPatches = () => {
   window.patches = [];
   const send = WebSocket.prototype.send;
@@ -266,7 +268,7 @@ export const watchPatches = () => {
   };
 };
 
-// The same for received data: frame headers, and the `chosen` message of each.
+// Records received data in the same way: frame headers with their `chosen` messages.
 export const watchFrames = () => {
   const chosen = new Map();
   window.frameHeaders = [];
@@ -307,7 +309,7 @@ export const watchFrames = () => {
   };
 };
 
-// The headers of the frames that came while `act` ran and until the view rests again.
+// The headers of the frames received while `act` ran and until the view is at rest.
 export async function framesOf(page, act) {
   await finalPicture(page);
   await page.evaluate(() => (window.frameHeaders.length = 0));
@@ -316,8 +318,8 @@ export async function framesOf(page, act) {
   return page.evaluate(() => window.frameHeaders);
 }
 
-// Of those the ones that came while the view moved: a slow final frame is preceded by frames that
-// refine a view which was shown before.
+// The moving frames among them: a slow final frame is preceded by frames that refine an already
+// displayed view, which are excluded.
 export const movingOf = (frames) =>
   frames.filter(
     ({ final, rev }, n) => !final && frames.findIndex((frame) => frame.rev === rev) === n,
@@ -334,7 +336,7 @@ export async function unfold(page, ...titles) {
   }
 }
 
-// The first option whose text matches.
+// Selects the first option whose text matches.
 export async function choose(page, label, text) {
   const select = control(page, label);
   const options = await select.locator("option").allTextContents();
@@ -343,7 +345,7 @@ export async function choose(page, label, text) {
   await select.selectOption({ label: wanted });
 }
 
-// Into the number box of a control.
+// Types a value into the number box of a control.
 export async function type(page, label, value) {
   const input = control(page, label, 'input:not([type="range"])');
   await input.fill(String(value));

@@ -1,5 +1,5 @@
-// The opacity curve's editor and the colours' range in a real browser: by mouse, keys and numbers,
-// and what pixels, frames and legend make of it.
+// The opacity curve editor and the colour range in a real browser: operation by mouse, keys and
+// numbers, and the effect on pixels, frames and legend.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -15,7 +15,7 @@ import {
 
 const shared = sharedDaemon({ page: { initScript: [watchFrames, watchPatches] } });
 
-// A page without lines, so that its pixels are the medium's.
+// A page without lines, so that only the medium affects the pixels.
 const mediaOnly = '#!{"dataset":"tornado","vector":{"field":null}}';
 
 const withPage = (run, options) =>
@@ -73,7 +73,7 @@ test("dragging a point up increases opacity, down decreases it", () =>
     await dragPoint(page, 2, 0, 70);
     const thin = await pixels(page);
     assert.ok(thin.mean < before.mean * 0.9, `${before.mean} -> ${thin.mean}`);
-    assert.equal((await drawnCurve(page))[1][1], 0, "the lower edge is clear");
+    assert.equal((await drawnCurve(page))[1][1], 0, "the lower edge is transparent");
   }));
 
 test("dragging a point sends at most one patch per display frame", () =>
@@ -111,14 +111,22 @@ test("a press on an empty position adds a point, double click or Delete removes 
     const added = await drawnCurve(page);
     assert.equal(added.length, 4);
     assert.ok(Math.abs(added[2][0] - 0.5) < 0.01 && Math.abs(added[2][1] - 0.7 * 7.5) < 0.15);
-    assert.equal(await control(page, "clear below", "input").isDisabled(), true, "another form");
+    assert.equal(
+      await control(page, "clear below", "input").isDisabled(),
+      true,
+      "the curve is not a ramp",
+    );
     await page.mouse.dblclick(...(await center(points(page).nth(2))), { delay: 20 });
     await finalPicture(page);
     assert.equal((await drawnCurve(page)).length, 3);
     assert.equal(await control(page, "clear below", "input").isDisabled(), false);
     await page.mouse.dblclick(box.x + 0.6 * box.width, box.y + 0.5 * box.height);
     await finalPicture(page);
-    assert.equal((await drawnCurve(page)).length, 4, "two clicks on an empty place add one");
+    assert.equal(
+      (await drawnCurve(page)).length,
+      4,
+      "a double click on an empty position adds one point",
+    );
     await points(page).nth(2).focus();
     await page.keyboard.press("Delete");
     await finalPicture(page);
@@ -128,7 +136,7 @@ test("a press on an empty position adds a point, double click or Delete removes 
       await page.keyboard.press("Delete");
     }
     await finalPicture(page);
-    assert.equal((await drawnCurve(page)).length, 1, "the last one stays");
+    assert.equal((await drawnCurve(page)).length, 1, "the last point remains");
   }));
 
 test("arrow keys move the focused point, finer with shift, and not the volume", () =>
@@ -162,18 +170,18 @@ test("the table and the plot show the same curve", () =>
     assert.deepEqual((await drawnCurve(page))[2], [0.25, 5]);
     assert.deepEqual(await table(page), await drawnCurve(page));
     await fill("value of point 3", 7);
-    assert.equal((await table(page))[2][0], 1, "not beyond its neighbour");
+    assert.equal((await table(page))[2][0], 1, "clamped to its neighbour");
     await page.getByLabel("remove point 2", { exact: true }).click();
     await finalPicture(page);
     assert.deepEqual(await table(page), await drawnCurve(page));
     assert.equal((await table(page)).length, 3);
     const focused = () => page.evaluate(() => document.activeElement.ariaLabel);
-    assert.equal(await focused(), "remove point 2", "the next row's");
+    assert.equal(await focused(), "remove point 2", "the focus moves to the next row");
     const box = page.getByLabel("extinction of point 2", { exact: true });
     await box.focus();
     for (let n = 0; n < 2; n++) await page.keyboard.press("ArrowUp");
     await finalPicture(page);
-    assert.equal(await focused(), "extinction of point 2", "the arrow keys go on");
+    assert.equal(await focused(), "extinction of point 2", "the focus is preserved");
     assert.deepEqual((await drawnCurve(page))[1], [1, 7]);
     await box.fill("-3");
     await box.press("Enter");
@@ -198,11 +206,15 @@ test("density scales every curve, and a logarithmic scale magnifies small values
     await page.getByLabel("log opacity").check();
     const [, high] = await center(points(page).nth(1));
     assert.ok(high < low - 15, `${low} -> ${high}`);
-    assert.equal(await page.evaluate(() => window.patches.length), patches, "a look, no change");
+    assert.equal(
+      await page.evaluate(() => window.patches.length),
+      patches,
+      "the scale is not part of the view",
+    );
     await shot(page, "transfer-log");
   }));
 
-test("the range follows the step, stays with all steps, and is custom by hand", () =>
+test("the range follows the step, is fixed for all steps, and is custom after an edit", () =>
   withPage(
     async (page) => {
       const range = page.locator(".range-choice select").last();
@@ -229,10 +241,13 @@ test("the range follows the step, stays with all steps, and is custom by hand", 
       await drawn(ranges.get(1));
       assert.notEqual(await page.locator(".legend-medium .legend-ticks").innerHTML(), legend);
       const box = control(page, "colours to \\(s⁻¹\\)", "input");
-      assert.ok(close([Number(await box.inputValue())], [ranges.get(1)[1]]), "and the panel's box");
+      assert.ok(
+        close([Number(await box.inputValue())], [ranges.get(1)[1]]),
+        "the panel shows the restored range",
+      );
       await page.locator("#undo-button").click();
       await drawn(ranges.get(0));
-      assert.equal(await range.inputValue(), "step", "one undo for one step");
+      assert.equal(await range.inputValue(), "step", "one undo entry per step");
       await page.locator("#redo-button").click();
       await drawn(ranges.get(1));
       assert.equal(await range.inputValue(), "step");
@@ -258,7 +273,7 @@ test("the range follows the step, stays with all steps, and is custom by hand", 
       await page.mouse.move(strip.x + 0.5 * strip.width, strip.y + 12, { steps: 4 });
       await page.mouse.up();
       await finalPicture(page);
-      assert.equal(await range.inputValue(), "custom", "a drag over the colours");
+      assert.equal(await range.inputValue(), "custom", "custom after a drag over the colours");
     },
     { path: '#!{"dataset":"tornado","vector":{"field":null},"scalars":[{"field":"vorticity"}]}' },
   ));

@@ -1,5 +1,5 @@
-// Controls over the picture in a real browser: undo, the value under the cursor, dense screens,
-// keys, and a hidden page.
+// Controls over the picture in a real browser: undo, the value under the cursor, high-density
+// screens, keys, and a hidden page.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -94,7 +94,7 @@ test("undo restores the previous dataset with its view", () =>
     assert.equal(await hashOf(page), before);
   }));
 
-test("undo of the camera keeps the played step, and a resize is no entry", () =>
+test("undo of the camera preserves the played step, and a resize adds no entry", () =>
   withPage(async (page) => {
     const start = await state(page);
     await drag(page, 80, 20);
@@ -140,8 +140,8 @@ test("the value under the cursor equals the probe of the server", () =>
       `${shared.daemon.url}v1/datasets/climate/probe?x=${x}&y=${y}&z=${z}&step=0`,
     ).then((response) => response.json());
     for (const axis of ["x", "y", "z"]) {
-      const told = Number({ x, y, z }[axis]);
-      assert.ok(Math.abs(answer.position[axis] - told) <= 1e-3 * Math.abs(told), axis);
+      const shown = Number({ x, y, z }[axis]);
+      assert.ok(Math.abs(answer.position[axis] - shown) <= 1e-3 * Math.abs(shown), axis);
     }
     const size = Math.hypot(...answer.values.wind.value);
     const [, wind] = values.match(/^wind ([-\d.e]+) m s⁻¹/);
@@ -149,7 +149,7 @@ test("the value under the cursor equals the probe of the server", () =>
     const [, cloud] = values.match(/cloud ([-\d.e]+)/);
     assert.ok(Math.abs(Number(cloud) - answer.values.cloud.value) < 1e-3);
     await shot(page, "hover");
-    // However fast the mouse is, no more than about eight questions a second go out.
+    // At most about eight requests a second are sent, however fast the mouse moves.
     const before = asked.length;
     const start = Date.now();
     for (let n = 0; n < 60; n++) {
@@ -213,7 +213,7 @@ test("a refused hover probe raises no alert", () =>
     assert.equal(await page.locator("#hover").isVisible(), false);
   }));
 
-// --- dense screens ---------------------------------------------------------------------------
+// --- high-density screens --------------------------------------------------------------------
 
 const watchDensities = () => {
   window.densities = [];
@@ -236,8 +236,8 @@ test("a high-density screen is sharp at rest and keeps the budget in motion", ()
       assert.deepEqual([last.final, last.width, last.height], [true, ...full]);
       const stats = await pixels(page);
       assert.deepEqual([stats.width, stats.height], full);
-      // The server draws them smaller, of the picture that is wanted: the error it reports
-      // is relative to that one.
+      // The server draws them at a lower resolution than requested; the reported error is relative
+      // to the requested picture.
       const moving = movingOf(frames);
       assert.ok(moving.length >= 2);
       for (const { chosen } of moving) {
@@ -246,7 +246,7 @@ test("a high-density screen is sharp at rest and keeps the budget in motion", ()
       }
       const sent = (await patches(page)).slice(before.length);
       assert.ok(sent.every(({ patch }) => patch.image === undefined));
-      // Another screen.
+      // The window moves to another screen.
       const cdp = await page.context().newCDPSession(page);
       await cdp.send("Emulation.setDeviceMetricsOverride", {
         width: 800,
@@ -254,7 +254,7 @@ test("a high-density screen is sharp at rest and keeps the budget in motion", ()
         deviceScaleFactor: 1.5,
         mobile: false,
       });
-      // The event of a window that moves to another screen; emulation does not send it.
+      // Emulation does not send the event of a window that moves to another screen.
       await page.evaluate(() => window.densities.at(-1).dispatchEvent(new Event("change")));
       await page.waitForFunction(
         (width) => document.querySelector("#picture").width === width,
@@ -348,7 +348,7 @@ test("e shows errors in dB, and the help lists every key", () =>
     await shot(page, "help-hands");
   }));
 
-// --- hidden ----------------------------------------------------------------------------------
+// --- hidden page -----------------------------------------------------------------------------
 
 test("a hidden page gets no frames, and the newest one when visible again", () =>
   withPage(async (page) => {
@@ -359,7 +359,7 @@ test("a hidden page gets no frames, and the newest one when visible again", () =
       }, hidden);
     const headers = () => page.evaluate(() => window.frameHeaders.length);
     const quiet = async () => {
-      // Frames in flight still arrive; then a second without a frame.
+      // Frames in flight still arrive; afterwards no frame may arrive for a second.
       let last = -1;
       for (let n = 0; n < 10 && (await headers()) !== last; n++) {
         last = await headers();
@@ -390,7 +390,7 @@ test("a hidden page gets no frames, and the newest one when visible again", () =
     await finalPicture(page);
   }));
 
-test("undo and redo are empty at first", () =>
+test("undo and redo are initially empty", () =>
   withPage(async (page) => {
     await page.keyboard.press("Control+z");
     await saysStatus(page, "nothing to undo");

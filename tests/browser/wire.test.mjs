@@ -1,4 +1,5 @@
-// The page and its wire: bytes that come one at a time, recorded sessions that come all at once.
+// The page's protocol handling: data arriving byte by byte, and recorded sessions replayed at full
+// speed.
 import assert from "node:assert/strict";
 import { connect, createServer } from "node:net";
 import { test } from "node:test";
@@ -8,8 +9,8 @@ const small = { viewport: { width: 500, height: 420 } };
 const shared = sharedDaemon({ page: small });
 const { withPage } = shared;
 
-// Between the browser and the daemon: what the daemon says goes on a byte at a time, each in a
-// segment of its own, as far as the system does not join what its reader has not yet taken.
+// A proxy that forwards the daemon's data one byte at a time, each in a TCP segment of its own
+// unless the system merges unread ones.
 async function byteProxy(port) {
   const counts = { segments: 0, reads: 0 };
   const sockets = new Set();
@@ -53,18 +54,22 @@ test("page and frames received one byte at a time are unchanged", (t) =>
     t.after(() => torn.context().close());
     await finalPicture(torn);
     assert.deepEqual(await pixels(torn), await pixels(whole));
-    assert.ok(proxy.counts.segments > 60_000, `${proxy.counts.segments} bytes, one by one`);
-    assert.ok(proxy.counts.segments > 100 * proxy.counts.reads, "fewer came in as many parts");
+    assert.ok(proxy.counts.segments > 60_000, `${proxy.counts.segments} single-byte segments`);
+    assert.ok(proxy.counts.segments > 100 * proxy.counts.reads, "the daemon sent far fewer chunks");
     for (const page of [whole, torn]) {
       await page.locator("#picture").focus();
       await page.keyboard.press("ArrowRight");
       await finalPicture(page);
       assert.deepEqual(page.faults, []);
     }
-    assert.deepEqual(await pixels(torn), await pixels(whole), "after a turn too");
+    assert.deepEqual(
+      await pixels(torn),
+      await pixels(whole),
+      "the pictures are equal after a camera change",
+    );
   }));
 
-// Injected before the page: records every received message and those sent in between.
+// Runs before the page's scripts: records every received message, and the sent messages in order.
 const record = () => {
   window.tape = [];
   const Native = window.WebSocket;
@@ -87,8 +92,8 @@ const record = () => {
   };
 };
 
-// Runs in a page first: a socket that plays the tape, what follows a message of the page's as soon
-// as it was sent, all else without a pause. Pictures being decoded at a time are counted.
+// Runs before the page's scripts: a socket that replays the tape, answers to the page's first
+// messages once those are sent, everything else without delay. Counts concurrent picture decodes.
 const replay = (tape) => {
   window.played = { acks: [], sent: 0, frames: 0, decodes: 0, decodesMost: 0, decoded: 0 };
   const { played } = window;
@@ -127,7 +132,7 @@ const replay = (tape) => {
     play() {
       for (; this.next < tape.length; this.next++) {
         const entry = tape[this.next];
-        // Only the page's first messages are awaited; later ones are not replayed.
+        // The tape waits only for the page's first messages; later ones are not awaited.
         if (entry.sent !== undefined) {
           if (entry.first && played.sent < entry.first) return;
           continue;
@@ -167,7 +172,7 @@ const sessions = {
 };
 
 for (const [name, run] of Object.entries(sessions)) {
-  test(`${name}, recorded and replayed flat out, ends in the same picture`, async () => {
+  test(`${name}, replayed at full speed, ends in the same picture`, async () => {
     const { tape, pixels: expected, state: last } = await recorded(run);
     await withPage(
       async (page) => {
@@ -179,11 +184,19 @@ for (const [name, run] of Object.entries(sessions)) {
         const played = await page.evaluate(() => window.played);
         assert.ok(played.frames > 5, `${played.frames} frames were recorded`);
         assert.ok(played.decodesMost <= 2, `${played.decodesMost} decoded at a time`);
-        assert.ok(played.decoded < played.frames, "what is overtaken is not decoded");
-        // Two are decoded at a time, and the later one may be done first.
-        assert.equal(Math.max(...played.acks), Number(last.seq), "the newest counts for all");
-        assert.equal(new Set(played.acks).size, played.acks.length, "each is answered once");
-        assert.equal(played.closed, undefined, "the page takes it for the protocol that it is");
+        assert.ok(played.decoded < played.frames, "replaced frames are not decoded");
+        // Two pictures are decoded at a time, and the later one may finish first.
+        assert.equal(
+          Math.max(...played.acks),
+          Number(last.seq),
+          "the newest frame is acknowledged",
+        );
+        assert.equal(
+          new Set(played.acks).size,
+          played.acks.length,
+          "each frame is acknowledged at most once",
+        );
+        assert.equal(played.closed, undefined, "the page detects no protocol error");
       },
       { settle: false, prepare: (page) => page.addInitScript(replay, tape) },
     );

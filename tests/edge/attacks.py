@@ -65,7 +65,7 @@ def strace_works():
 
 
 class Scene:
-    """A daemon with a data root, files outside that must not be opened, and canaries."""
+    """A daemon with a data root, files outside of it that must not be opened, and canaries."""
 
     def __init__(self, options, folder):
         self.folder, self.root, self.outside = folder, folder / "root", folder / "outside"
@@ -80,13 +80,13 @@ class Scene:
         self.straced = options.strace == "yes" or (options.strace == "auto" and strace_works())
         started = argparse.Namespace(program=options.program, strace=self.straced, patience=60)
         self.daemon = checked_daemon.Daemon(started, self.root, folder)
-        # What lies outside would be known, were it told.
+        # Verifies that a disclosure of the outside files would be detected.
         checked_daemon.check_controls(self.daemon, self.root, self.outside)
         self.watch.seen()
         self.watch.names.clear()
 
     def refuse(self, path):
-        """Posted, that path must not load; the reason."""
+        """Posts a path that must not load; returns the reason."""
         try:
             checked_daemon.try_file(self.daemon, path)
         except Refused as reason:
@@ -94,14 +94,14 @@ class Scene:
         raise Failure(f"{path} was loaded")
 
     def end(self):
-        """Raises Failure where anything was reached; how it was watched."""
+        """Raises Failure if anything outside was accessed; returns how access was watched."""
         self.daemon.vitals()
         code = self.daemon.stop()
-        require(code == 0, f"the daemon ended with {code}")
-        require(not self.watch.seen(), f"opened outside: {dict(self.watch.names)}")
+        require(code == 0, f"the daemon exited with {code}")
+        require(not self.watch.seen(), f"outside files opened: {dict(self.watch.names)}")
         require(self.canary.visitors == 0, f"{self.canary.visitors} connections were made")
         if not self.straced:
-            return "canaries alone, without strace"
+            return "canaries only, without strace"
         judge = strace_log.Judge([self.root, self.folder / "tmp"], self.outside,
                                  checked_daemon.LIBRARIES, pathlib.Path(self.program).resolve())
         judge.read(self.daemon.log)
@@ -112,8 +112,8 @@ class Scene:
 
 
 def chunked_trailer(options, _folder):
-    """66 kB of trailer, of trailers and of chunk extensions, again and again: 501, closed, and no
-    more than a megabyte at any time."""
+    """66 kB of trailer, of trailers and of chunk extensions, repeatedly: 501, closed, and at
+    most a megabyte of memory growth at any time."""
     daemon = Watched(options)
     for _ in range(3):
         daemon.check_good_client()
@@ -135,13 +135,13 @@ def chunked_trailer(options, _folder):
     peak = daemon.peak() - before
     require(not daemon.growth_max or peak <= daemon.growth_max, f"{peak / KIB:.0f} KiB more")
     daemon.check_good_client()
-    require(daemon.stop() == 0, "the daemon did not end well")
+    require(daemon.stop() == 0, "the daemon did not exit with 0")
     return f"{ROUNDS * len(bodies)} attacks, each 501 and closed; at most {peak / KIB:.0f} KiB more"
 
 
 def external_files(options, folder):
     """External links, external storage and virtual datasets, by relative, absolute and doubled
-    paths and by links, under the names of both formats that HDF5 is read by."""
+    paths and by links, under the names of both formats that use HDF5."""
     scene = Scene(options, folder)
     tried, refused = 0, 0
     for seed in seeds_escaping.escape_seeds(scene.outside):
@@ -155,7 +155,7 @@ def external_files(options, folder):
             path = seed.path.replace(".h5", "." + ending)
             links = {(name if name.startswith("link_") else name.replace(".h5", "." + ending)): to
                      for name, to in seed.links.items()}
-            try:  # what the file holds itself may be shown
+            try:  # data in the file itself may be shown
                 checked_daemon.try_file(scene.daemon, checked_daemon.write_case(
                     place, path, renamed, links))
             except Refused:
@@ -175,7 +175,7 @@ def addresses(port, outside):
 
 
 def near_addresses(port):
-    """Addresses to netCDF's own eyes, or names of files to ours."""
+    """Strings that the netCDF library treats as URLs, or names of files."""
     host = f"127.0.0.1:{port}"
     yield from (f"http:{host}/a.nc", f"http:/{host}/a.nc", f"//{host}/a.nc", f"\\\\{host}\\a.nc",
                 "good.h5#mode=bytes", "good.h5#mode=zarr,file", "good.h5#mode=dap4",
@@ -192,7 +192,7 @@ def ways_out(outside):
 
 
 def run_command(scene, command, path):
-    """The command line with an address in place of a file must fail and say why."""
+    """The command line must refuse a URL in place of a file, with a reason."""
     more = ["--listen", "127.0.0.1:0"] if command == "serve" else []
     more += ["-o", str(scene.folder / "out.png")] if command == "render" else []
     done = subprocess.run([scene.program, command, path, *more], capture_output=True, text=True,
@@ -203,7 +203,7 @@ def run_command(scene, command, path):
 
 
 def names_over_http(scene, path):
-    """As the name of a dataset it is one that is not there."""
+    """As the name of a dataset it is reported as unknown."""
     target = Target("127.0.0.1", scene.daemon.port)
     body = json.dumps({"dataset": path, "image": {"width": 16, "height": 12}}).encode()
     answer = request(target, "POST", "v1/frames", {"Content-Type": "application/json"}, body)
@@ -214,7 +214,7 @@ def names_over_http(scene, path):
 
 
 def url_paths(options, folder):
-    """Addresses, `#mode=` and ways out of the data root: by POST, as names, on the command line."""
+    """URLs, `#mode=` and paths out of the data root: by POST, as names, on the command line."""
     scene = Scene(options, folder)
     file = hdf5_bytes.File()
     file.add("u", DIMS[::-1], floats(numbers(0)))

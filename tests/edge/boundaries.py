@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Requests and WebSocket frames of sizes at boundaries against one daemon, which must answer each
-as documented, live, and serve a good client after every hundred.
+"""Sends requests and WebSocket frames of sizes at boundaries to one daemon, which must answer each
+as documented, keep running, and serve a well-behaved client after every hundred.
 
     tests/edge/boundaries.py                      # starts build/release/windsplat; every shot
     tests/edge/boundaries.py --count=1000 --seed=7 # so many, drawn and ordered by the seed
     tests/edge/boundaries.py --kind=trailer        # kinds whose name holds that
     tests/edge/boundaries.py --url=https://127.0.0.1:8443/ --ca=cert.pem --token-file=token
 
-Sizes are 2^k - 1, 2^k, 2^k + 1 and each limit that GET /v1 tells with its neighbours. What is sent
-depends on --seed and those limits alone. Exit code 0: nothing failed."""
+Sizes are 2^k - 1, 2^k, 2^k + 1 and each limit reported by GET /v1 with its neighbours. The data
+sent depend on --seed and those limits only. Exit code 0: no failure."""
 import collections
 import random
 import sys
@@ -20,7 +20,7 @@ from suite import KIB, Watched, Wrong
 from wire_client import request
 
 EVERY = 100
-# Pictures leave behind the steps of the sample that they were drawn of, 4 MiB each.
+# Rendered pictures leave steps of the sample in memory, 4 MiB each.
 DRAWN_SHARE = 64
 
 
@@ -56,23 +56,23 @@ class Gunner:
     def all(self, name, shots):
         before, self.most = 0, 0
         for number, shot in enumerate(shots, 1):
-            if number <= EVERY:  # what the largest of all sizes needs once is no growth
+            if number <= EVERY:  # memory that the largest size needs once does not count as growth
                 before = self.daemon.resident()
             self.one(shot)
             last = number == len(shots)
             if (last or number % EVERY == 0) and not self.look_after(before, f"{number} {name}"):
                 return
-        print(f"{name}: {len(shots)} sent, most memory {self.most / KIB:.0f} KiB above the start")
+        print(f"{name}: {len(shots)} sent, peak memory growth {self.most / KIB:.0f} KiB")
 
 
 def main():
     parser = suite.parser_of(__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--count", type=int, default=0, help="0: all there are")
+    parser.add_argument("--count", type=int, default=0, help="0: all inputs")
     parser.add_argument("--kind", default="")
     options = parser.parse_args()
     daemon = Watched(options)
-    for _ in range(3):  # one-time allocations are no growth
+    for _ in range(3):  # one-time allocations do not count as growth
         daemon.check_good_client()
     chance = random.Random(options.seed)
     limits = request(daemon.target, "GET", "v1").json()["limits"]
@@ -86,7 +86,7 @@ def main():
         daemon.growth_max *= DRAWN_SHARE
     code = daemon.stop()
     if code != 0:
-        gunner.failures.append(f"the daemon ended with {code}")
+        gunner.failures.append(f"the daemon exited with {code}")
     if options.verbose:
         for kind, count in sorted(gunner.kinds.items()):
             print(f"{count:6} {kind}")

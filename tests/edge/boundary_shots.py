@@ -1,5 +1,6 @@
-"""Requests and frames of sizes at boundaries: each kind a function from a size to bytes and what
-may come of them. Sizes are powers of two and the documented limits, each with its neighbours."""
+"""Requests and frames of sizes at boundaries: each kind is a function from a size to bytes and
+the permitted reactions. Sizes are powers of two and the documented limits, each with its
+neighbours."""
 import collections
 import functools
 import json
@@ -8,7 +9,7 @@ import struct
 from suite import require
 from wire_client import (CLOSE, PING, PONG, TEXT, Closed, Connection, WebSocket, frame)
 
-# `run(target)` gives what came, as a short word to be counted.
+# `run(target)` returns the reaction as a short word to be counted.
 Shot = collections.namedtuple("Shot", "kind size run")
 REFUSED = {"400", "404", "413", "414", "415", "422"}
 COMMA = ","
@@ -36,7 +37,8 @@ def http(target, data, expected, method="GET", end=False):
 
 
 class Kinds:
-    """Shots for a daemon of those limits (as GET /v1 tells them); `chance` fills what is free."""
+    """Shots for a daemon with those limits (as reported by GET /v1); `chance` chooses the free
+    bytes."""
 
     def __init__(self, target, limits, chance):
         self.target, self.limits, self.chance = target, limits, chance
@@ -120,7 +122,7 @@ class Kinds:
             yield self.shot("chunk size", size, coded + b"%x\r\n" % size, {"501"})
 
     def documents(self):
-        """JSON as deep, long and wide as it may be, and more so."""
+        """JSON of the greatest permitted depth, length and width, and beyond."""
         for depth in around(15, self.limits["jsonDepthMax"], lowest=1):
             for kind, body in (("arrays in arrays", "[" * depth + "]" * depth),
                                ("objects in objects", '{"a":' * depth + "1" + "}" * depth),
@@ -234,12 +236,12 @@ class Kinds:
 
     @staticmethod
     def session(kind, size, data, expected):
-        """`expected`: a close code, "answered" where the session goes on, None: either."""
+        """`expected`: a close code, "answered" if the session continues, None: either."""
         return Shot("stream: " + kind, size, functools.partial(stream, data=data,
                                                                expected=expected))
 
     def refused(self):
-        """Those of which no picture comes: nothing of them may stay."""
+        """Shots that yield no picture, and therefore must not increase memory."""
         for make in (self.headers, self.bodies, self.chunks, self.documents, self.messages):
             yield from make()
 

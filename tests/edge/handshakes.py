@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""TLS handshakes as fast as a daemon lets one address have them, while another address asks for
-/livez and takes frames of a stream.
+"""One address attempts TLS handshakes as fast as the daemon permits, while another address requests
+/livez and receives frames of a stream.
 
     tests/edge/handshakes.py                  # 4 attacks, 4 s each
-    tests/edge/handshakes.py --slack=8        # times may be so much longer: on a shared machine
+    tests/edge/handshakes.py --slack=8        # factor for time limits, on a shared machine
 
-For each attack: requests on a connection that is open and on fresh ones must be answered within
-50 ms (the 99th percentile; three times that of the undisturbed run where that is more), the stream
-must get half of the frames it got undisturbed, and handshakes may take no more processor time than
-an address has. Where handshakes are computed at all some must be refused once the address's share
-is used up, and their time must have been spent by their own thread, however loaded the machine
-is. Exit code 0: all of it holds; 77: openssl is not installed."""
+For each attack: requests on an open connection and on new ones must be answered within 50 ms
+(the 99th percentile; three times that of the undisturbed run if that is more), the stream must
+get at least half of its undisturbed frames, and handshakes may take no more processor time than
+the limit of an address. If handshakes are computed, some must be refused once the address's
+share is exhausted, and their time must be spent by their own thread, under any load. Exit code
+0: all of this holds; 77: openssl is not installed."""
 import argparse
 import json
 import multiprocessing
@@ -28,23 +28,23 @@ from wire_client import BINARY, Closed, Connection, Daemon, WebSocket, request
 HEALTH_MS = 50
 FRAME_EVERY_S = 0.05
 THREADS = 8  # of the attacker
-# So little that it is used up on a slow machine, too; ten seconds' worth at once. Without limits of
-# arrivals, which would refuse first.
+# Small enough to be exhausted on a slow machine; the burst is ten seconds' worth. Limits of new
+# connections are disabled, as they would apply first.
 ADDRESS_SHARE = 0.06
 ADDRESS_AT_ONCE_S = 10 * ADDRESS_SHARE
 LIMITS = [f"--max-handshakes-per-address={1000 * ADDRESS_SHARE:g}", "--max-arrivals=0",
           "--max-arrivals-per-address=0"]
-REFUSED_WITHIN_S = 30  # where the attacker gets little of the machine
+REFUSED_WITHIN_S = 30  # in case the attacker gets little processor time
 BYSTANDER_SHARE = 0.1
 SKIPPED = 77
 THREAD = "handshakes"
-# Not by fork: a lock of OpenSSL that the bystander's threads hold at that moment would stay locked.
+# spawn instead of fork: a lock of OpenSSL held by another thread at that moment would stay locked.
 PROCESSES = multiprocessing.get_context("spawn")
 VIEW = {"image": {"width": 96, "height": 64}}
 
 
 def attack(port, hello, until, answered, refused, nice):
-    """In a separate process with low priority, so that it does not disturb the measurement."""
+    """Runs in a separate process with low priority, so that it does not disturb the measurement."""
     os.nice(nice)
     context = tls_peer.trusting_context()
     lock = threading.Lock()
@@ -71,7 +71,7 @@ def percentile(times, share):
 
 
 class Bystander:
-    """What another address sees while `seconds` pass."""
+    """The measurements of another address during `seconds`."""
 
     def __init__(self, target, seconds):
         self.target, self.until = target, time.monotonic() + seconds
@@ -125,7 +125,7 @@ class Bystander:
         return viewer.text("hello")["datasets"][0]["id"]
 
     def shows(self, viewer, rev):
-        """Takes a message; whether it was a frame of that revision."""
+        """Reads a message; returns whether it was a frame of that revision."""
         opcode, payload = viewer.message()
         if opcode != BINARY:
             message = json.loads(payload)
@@ -138,7 +138,7 @@ class Bystander:
 
 
 class Counts:
-    """What the daemon has counted so far, and the system of the daemon's thread."""
+    """The counters of the daemon, and the CPU times of its threads."""
 
     def __init__(self, daemon):
         text = request(daemon.target, "GET", "/metrics").body.decode()
@@ -154,7 +154,7 @@ class Counts:
 
 
 def cpu_of(task):
-    """Seconds, of user and system."""
+    """User and system seconds."""
     fields = (task / "stat").read_text().rpartition(")")[2].split()
     return sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
 
@@ -200,10 +200,10 @@ class Phase:
         if self.frames < quiet.frames / 2:
             out.append(f"{self.name}: {self.frames} frames, undisturbed {quiet.frames}")
         most_s = ADDRESS_AT_ONCE_S + (ADDRESS_SHARE + BYSTANDER_SHARE) * self.seconds
-        # What was under way when the time was used up: 64 handshakes, each a few milliseconds.
+        # Handshakes in progress when the limit was reached: 64, each a few milliseconds.
         if self.cpu_s > most_s + 0.3:
             out.append(f"{self.name}: handshakes took {self.cpu_s} s, not {most_s:.1f} s")
-        # Less, where the attacker gets too little of the machine to use the address's share up.
+        # Less if the attacker gets too little processor time to exhaust the address's share.
         if self.computed and self.limited == 0 and (
                 self.cpu_s > ADDRESS_AT_ONCE_S + ADDRESS_SHARE * self.seconds):
             out.append(f"{self.name}: none was refused for the time that handshakes took")
@@ -221,7 +221,7 @@ def main():
     parser.add_argument("--slack", type=float, default=1)
     options = parser.parse_args()
     if not tls_peer.has_openssl():
-        print("skipped: openssl is not installed, which makes certificates and ClientHellos")
+        print("skipped: openssl, which creates certificates and ClientHellos, is not installed")
         return SKIPPED
     with tempfile.TemporaryDirectory(prefix="windsplat-handshakes-") as folder:
         cert, key = tls_peer.make_certificate(pathlib.Path(folder))
@@ -244,7 +244,7 @@ def main():
             faults += phase.wrong(quiet, options.slack)
         code = daemon.stop()
         if code != 0:
-            faults.append(f"the daemon ended with {code}")
+            faults.append(f"the daemon exited with {code}")
     for fault in faults:
         print("FAILED " + fault)
     return 1 if faults else 0

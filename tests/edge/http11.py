@@ -6,8 +6,8 @@
     tests/edge/http11.py --url=https://127.0.0.1:8443/ --ca=cert.pem --token-file=token
     tests/edge/http11.py --only=http.coding --verbose # some of them; --list prints all as a table
 
-After each group the daemon must live, serve a good client and hold no more than a megabyte more.
-Exit code 0: every case passed."""
+After each group the daemon must run, serve a well-behaved client and hold at most one megabyte
+more. Exit code 0: every case passed."""
 import sys
 
 import http_connections

@@ -1,5 +1,5 @@
-"""Cases of HTTP/1.1: sizes of headers, connections and pipelines, deadlines, conditions, and what a
-client accepts."""
+"""Cases of HTTP/1.1: sizes of headers, connections and pipelines, deadlines, conditional
+requests, and content negotiation."""
 import functools
 import gzip
 import socket
@@ -12,7 +12,7 @@ from suite import Case, require
 from wire_client import Connection, request
 
 HEADER_MAX = 8192
-CUT_S = 5  # for a header, and for a body
+CUT_S = 5  # seconds until a slow header or body is cut off
 FRAME = "v1/datasets/tornado/frame.jpg?width=16&height=12"
 
 
@@ -32,7 +32,7 @@ def sized(target, size, statuses, shape):
         start = start.replace(b" HTTP", b"?" + b"a" * (room - 1) + b" HTTP", 1)
     with Connection(target) as connection:
         data = start + middle + end
-        require(len(data) == size, f"the case itself is wrong: {len(data)}")
+        require(len(data) == size, f"invalid test case: {len(data)} bytes")
         connection.raw_or_lost(data)
         answer = connection.answer()
         require(answer.status in statuses, f"{answer.status} {answer.body[:200]!r}")
@@ -57,7 +57,8 @@ def size_cases():
 
 
 def pipeline(target, count, kind):
-    """Requests in one segment; answers in their order, each known by its own id."""
+    """Sends requests in one segment; the answers must be in order, each identified by its own
+    id."""
     paths = {"livez": ["livez"], "mixed": ["livez", FRAME, "nothing", "v1"]}[kind]
     with Connection(target, timeout=60) as connection:
         asked, data = [], b""
@@ -77,13 +78,13 @@ def pipeline(target, count, kind):
 
 
 def pipeline_ends(target, data, count, statuses):
-    """So many answers, then the end, although more was asked."""
+    """Expects this many answers, then the end of the connection, although more was requested."""
     with Connection(target) as connection:
         connection.raw_or_lost(fill(target, data))
         got = [connection.answer().status for _ in range(count)]
         require(got[-1] in statuses, f"{got}")
         require(connection.ended(), "stays open")
-        require(not connection.buffer, f"more came: {bytes(connection.buffer[:200])!r}")
+        require(not connection.buffer, f"unexpected data: {bytes(connection.buffer[:200])!r}")
 
 
 def pipeline_cases():
@@ -102,7 +103,7 @@ def pipeline_cases():
              2, (501,)),
             ("http10", get(version="HTTP/1.0") + one, 1, (200,)),
             ("large", one + get("X: " + "a" * 9000 + "\r\n") + one, 2, (431,))):
-        yield Case(f"http.pipeline.ends.{name}", where, f"a pipeline in which one ends it: {name}",
+        yield Case(f"http.pipeline.ends.{name}", where, f"a pipeline ended by one request: {name}",
                    f"{count} answers, then the end", functools.partial(
                        pipeline_ends, data=data, count=count, statuses=statuses))
     yield Case("http.body.next", where, "a body, and the next request in its segment",
@@ -152,7 +153,7 @@ def old_expectation(target):
             connection.raw(BODY)
             require(connection.answer().status == 200, "the body is not read")
         else:
-            require(False, f"was told {bytes(connection.buffer[:60])!r}")
+            require(False, f"received {bytes(connection.buffer[:60])!r}")
 
 
 def expect_cases():
@@ -161,7 +162,7 @@ def expect_cases():
         yield Case(f"http.expect.{word}", where, f"Expect: {word}", "100, then 200",
                    functools.partial(expected_100, word=word))
     length = f"Content-Length: {len(BODY)}\r\n"
-    yield row("expect.at-once", where, "the body comes without waiting",
+    yield row("expect.at-once", where, "the body follows without waiting",
               post("Expect: 100-continue\r\n" + length), 200, closed=False)
     yield row("expect.large", where, "an expectation of a body too large, in place of 100",
               post("Expect: 100-continue\r\nContent-Length: 65537\r\n", b""), 413)
@@ -177,7 +178,8 @@ def expect_cases():
 
 
 def cut(target, data, drip, pause):
-    """Ended between 4 s and 9 s after it began, however bytes drip in; the limit is 5 s."""
+    """The connection must end between 4 s and 9 s after its start, however slowly bytes arrive;
+    the limit is 5 s."""
     with Connection(target) as connection:
         begun = time.monotonic()
         connection.raw(fill(target, data))
@@ -194,7 +196,7 @@ def cut(target, data, drip, pause):
 
 
 def served_meanwhile(target):
-    """While those wait: a request every 0.2 s, each answered within a second."""
+    """During the slow requests: a request every 0.2 s, each answered within a second."""
     end = time.monotonic() + CUT_S
     while time.monotonic() < end:
         begun = time.monotonic()
@@ -221,14 +223,14 @@ def slow_cases():
             check = functools.partial(refused_dripping, data=data)
         yield Case(f"http.slow.{name}", where, f"{name}, a byte in {pause} s or none",
                    "ended within 4 to 9 s", check, True)
-    yield Case("http.slow.others", where, "requests of others meanwhile",
+    yield Case("http.slow.others", where, "concurrent requests of other clients",
                "each answered within a second", served_meanwhile, True)
     yield Case("http.slow.crowd", where, "60 slow headers at a time", "ended within 4 to 9 s",
                functools.partial(crowd, count=60), True)
 
 
 def refused_dripping(target, data):
-    """The rest of a refused body is thrown away for a while, not for ever."""
+    """The rest of a refused body is discarded for a limited time."""
     with Connection(target) as connection:
         connection.raw(fill(target, data))
         require(connection.answer().status == 413, "not refused")
@@ -359,7 +361,7 @@ def negotiation_cases():
             ("weight-small", f"{png};q=0.001", 200, png),
             ("browser", f"text/html, {png}, */*;q=0.8", 200, png)):
         if name == "spaces":
-            continue  # no white space about "=" (RFC 9110, 5.6.6): nothing is said of what comes
+            continue  # white space about "=" (RFC 9110, 5.6.6): the reaction is unspecified
         yield Case(f"http.accept.{name}", where, f"Accept: {value}", str(status),
                    functools.partial(accepting, value=value, status=status, kind=kind))
     where = "RFC 9110 12.5.3"

@@ -1,15 +1,16 @@
-"""Cases of HTTP/1.1 (RFC 9110, RFC 9112): request line, fields, Host, how a body is framed."""
+"""Cases of HTTP/1.1 (RFC 9110, RFC 9112): request line, fields, Host, framing of bodies."""
 import functools
 
 from suite import Case, require
 from wire_client import Connection
 
 BODY = b'{"dataset":"tornado","image":{"width":16,"height":12}}'
-ATTACK_BYTES = 66 * 1024  # a trailer of this size killed a plain server of the library we use
+ATTACK_BYTES = 66 * 1024  # a trailer of this size crashed a plain server of the library in use
 
 
 def fill(target, text):
-    """HOST is the daemon's authority, BASE its path, AUTH its token's field; the rest as it is."""
+    """HOST is the daemon's authority, BASE its path, AUTH its token's field; the rest is sent
+    unchanged."""
     data = text if isinstance(text, bytes) else text.encode("latin-1")
     for name, value in (
             (b"HOST", target.authority()), (b"BASE", target.base),
@@ -19,8 +20,8 @@ def fill(target, text):
 
 
 def one(target, data, statuses, closed, method):
-    """One answer with one of those statuses. `closed`: the connection is ended behind it, and
-    nothing else came; False: it serves another request."""
+    """Expects one answer with one of those statuses. `closed`: the connection ends after it
+    without further data; False: it serves another request."""
     with Connection(target) as connection:
         connection.raw_or_lost(fill(target, data))
         answer = connection.answer(method)
@@ -32,7 +33,7 @@ def one(target, data, statuses, closed, method):
         if closed:
             require(answer.header("Connection") == "close", "does not say close")
             require(connection.ended(), "stays open")
-            require(not connection.buffer, f"more came: {bytes(connection.buffer[:200])!r}")
+            require(not connection.buffer, f"unexpected data: {bytes(connection.buffer[:200])!r}")
         elif closed is False:
             connection.raw(fill(target, "GET BASElivez HTTP/1.1\r\nHost: HOST\r\nAUTH\r\n"))
             again = connection.answer()
@@ -252,7 +253,7 @@ def length_cases():
     yield row("length.none", "RFC 9110 15.5.12", "POST without a length", post("", b""), 411)
     yield row("length.get", "RFC 9110 9.3.1", "GET with a body",
               get("Content-Length: 5\r\n") + "hello", 200, 400, closed=None)
-    yield row("length.short", where, "a body shorter than told, then a good request",
+    yield row("length.short", where, "a body shorter than declared, then a valid request",
               post("Content-Length: 10\r\n", b"{}") + b"12345678", 400, closed=None)
 
 

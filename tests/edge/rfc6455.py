@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Conformance cases of our own for RFC 6455 (the WebSocket protocol) against a running daemon.
+"""The project's conformance cases for RFC 6455 (the WebSocket protocol) against a running daemon.
 
     tests/edge/rfc6455.py                           # starts build/release/windsplat
     tests/edge/rfc6455.py --program=build/dev/windsplat --growth-kib=0
     tests/edge/rfc6455.py --url=https://127.0.0.1:8443/ --ca=cert.pem --token-file=token
     tests/edge/rfc6455.py --only=ws.utf8 --verbose   # some of them; --list prints all as a table
 
-After each group the daemon must live, serve a good client and hold no more than a megabyte more.
-Exit code 0: every case passed."""
+After each group the daemon must run, serve a well-behaved client and hold at most one megabyte
+more. Exit code 0: every case passed."""
 import sys
 
 import suite

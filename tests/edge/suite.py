@@ -11,8 +11,8 @@ import time
 
 from wire_client import Closed, Daemon, Target, WebSocket, request, status_bytes
 
-# `section`: of the RFC or of our documents; `expected`: the required reaction; `run(target)` raises
-# on any other reaction. Slow cases run concurrently.
+# `section`: of the RFC or of the project's documents; `expected`: the required reaction;
+# `run(target)` raises on any other reaction. Slow cases run concurrently.
 Case = collections.namedtuple("Case", "id section what expected run slow", defaults=(False,))
 KIB = 1024
 
@@ -29,23 +29,23 @@ def require(truth, what):
 def parser_of(description):
     default = pathlib.Path(__file__).resolve().parents[2] / "build/release/windsplat"
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--program", default=str(default), help="its daemon is started")
-    parser.add_argument("--url", help="of a daemon that runs already")
-    parser.add_argument("--pid", type=int, help="of that daemon, to watch its memory")
-    parser.add_argument("--ca", help="certificate that the daemon's is checked by (https)")
-    parser.add_argument("--token-file", help="the token that the daemon wants")
+    parser.add_argument("--program", default=str(default), help="program whose daemon is started")
+    parser.add_argument("--url", help="URL of a running daemon")
+    parser.add_argument("--pid", type=int, help="process id of that daemon, to measure its memory")
+    parser.add_argument("--ca", help="certificate that verifies the daemon's (https)")
+    parser.add_argument("--token-file", help="file of the token that the daemon requires")
     parser.add_argument("--serve-option", action="append", default=[], metavar="OPTION",
-                        help="for the daemon that is started; more than one may be given")
-    parser.add_argument("--only", default="", help="cases whose id begins so")
+                        help="option for the started daemon; repeatable")
+    parser.add_argument("--only", default="", help="prefix of the ids of cases to run")
     parser.add_argument("--growth-kib", type=int, default=KIB,
-                        help="resident memory that a group may leave behind; 0: not looked at")
-    parser.add_argument("--list", action="store_true", help="the cases as a Markdown table")
-    parser.add_argument("--verbose", action="store_true", help="every case that was tried")
+                        help="permitted growth of resident memory in a group; 0: not checked")
+    parser.add_argument("--list", action="store_true", help="print the cases as a Markdown table")
+    parser.add_argument("--verbose", action="store_true", help="print every case")
     return parser
 
 
 class Watched:
-    """A daemon under test: its own, or one that runs already."""
+    """A daemon under test: started here, or already running."""
 
     def __init__(self, options):
         self.growth_max = options.growth_kib * KIB
@@ -63,7 +63,7 @@ class Watched:
         self.pid = self.child.pid
 
     def check_good_client(self):
-        """A request, a picture and a session, as if nothing had been."""
+        """A well-behaved client: a request, a picture and a session must succeed."""
         require(self.child is None or self.child.poll() is None, "the daemon died")
         require(request(self.target, "GET", "livez").status == 200, "/livez does not answer 200")
         view = {"dataset": "tornado", "image": {"width": 32, "height": 24}}
@@ -75,7 +75,7 @@ class Watched:
             hello = viewer.text("hello")
             require(hello["datasets"], f"no datasets: {hello}")
             viewer.say({"type": "open", "id": 7, "dataset": "nowhere"})
-            require(viewer.text("error")["id"] == 7, "a good session is not answered")
+            require(viewer.text("error")["id"] == 7, "a well-behaved session is not answered")
 
     def resident(self):
         return status_bytes(self.pid, "VmRSS") if self.pid else 0
@@ -88,14 +88,14 @@ class Watched:
         return status_bytes(self.pid, "VmHWM") if self.pid else 0
 
     def settled_growth(self, before):
-        """What stayed behind, once connections that were left have been noticed."""
+        """Memory and descriptors that remain once closed connections have been noticed."""
         end = time.monotonic() + (3 if self.growth_max else 0)
         while self.resident() - before > self.growth_max and time.monotonic() < end:
             time.sleep(0.1)
         return self.resident() - before
 
     def stop(self):
-        """Its exit code."""
+        """Stops the daemon; returns its exit code."""
         code = self.daemon.stop() if self.child else 0
         if self.log and code != 0:
             self.log.seek(0)
@@ -166,23 +166,23 @@ def print_table(groups):
 
 
 def main(groups, options):
-    """Runs (name, cases) pairs; the exit code."""
+    """Runs (name, cases) pairs; returns the exit code."""
     ids = collections.Counter(case.id for _, cases in groups for case in cases)
     repeated = [name for name, count in ids.items() if count > 1]
     if repeated:
-        sys.exit(f"ids that are not unique: {repeated}")
+        sys.exit(f"duplicate ids: {repeated}")
     if options.list:
         print_table(groups)
         return 0
     daemon = Watched(options)
     run = Run(daemon, options)
-    for _ in range(3):  # one-time allocations are no growth
+    for _ in range(3):  # one-time allocations do not count as growth
         daemon.check_good_client()
     for name, cases in groups:
         run.group(name, cases)
     code = daemon.stop()
     if code != 0:
-        run.failures.append(f"the daemon ended with {code}")
+        run.failures.append(f"the daemon exited with {code}")
     print(f"{run.passed} passed, {len(run.failures)} failures")
     for failure in run.failures:
         print("FAILED " + failure)

@@ -1,5 +1,4 @@
-"""What the scripts about TLS share: certificates, ClientHellos by groups, connections from an
-address."""
+"""Shared by the TLS scripts: certificates, ClientHellos by groups, connections from an address."""
 import contextlib
 import shutil
 import socket
@@ -10,7 +9,7 @@ import subprocess
 from wire_client import Target
 
 ATTACKER, BYSTANDER = "127.0.0.1", "127.0.0.2"
-NO_TIME_WAIT = struct.pack("ii", 1, 0)  # else an attacker runs out of ports
+NO_TIME_WAIT = struct.pack("ii", 1, 0)  # otherwise an attacker runs out of ports
 
 
 def make_certificate(folder, kind="rsa:2048"):
@@ -25,7 +24,7 @@ def make_certificate(folder, kind="rsa:2048"):
 
 
 def client_hello(groups, *options):
-    """The bytes by which openssl's client begins where it offers those groups."""
+    """The ClientHello of openssl's client when it offers those groups."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         client = subprocess.Popen(
             ["openssl", "s_client", "-connect", f"127.0.0.1:{listener.getsockname()[1]}",
@@ -50,7 +49,7 @@ def connect_from(address, port, timeout=60):
 
 
 class TargetFrom(Target):
-    """A daemon in TLS, as an address of loopback reaches it."""
+    """A daemon over TLS, as seen from one loopback address."""
 
     def __init__(self, address, port, cert):
         super().__init__("127.0.0.1", port, ssl.create_default_context(cafile=cert))
@@ -62,7 +61,8 @@ class TargetFrom(Target):
 
 
 def replay(port, hello):
-    """Sends a recorded ClientHello; whether the daemon computed an answer. OSError: refused."""
+    """Sends a recorded ClientHello; returns whether the daemon computed an answer. OSError:
+    refused."""
     with connect_from(ATTACKER, port) as one:
         one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_TIME_WAIT)
         one.sendall(hello)
@@ -70,7 +70,7 @@ def replay(port, hello):
 
 
 def shake(port, context, session=None):
-    """A handshake to its end."""
+    """Performs a complete handshake."""
     plain = connect_from(ATTACKER, port)
     with contextlib.closing(plain), context.wrap_socket(plain, session=session) as one:
         one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_TIME_WAIT)

@@ -17,7 +17,7 @@ import urllib.parse
 
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 FIN, MASKED = 0x80, 0x80
-NO_MASK = bytes(4)  # masks nothing, and is allowed
+NO_MASK = bytes(4)  # a mask of zeros, which is permitted
 ACCEPT_SALT = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455, 1.3
 STREAM_PROTOCOL = "windsplat.v1"
 
@@ -51,13 +51,15 @@ class Target:
         return f"Authorization: Bearer {self.token}\r\n" if self.token else ""
 
     def connect(self, timeout=20, receive_buffer=0):
-        """A connected socket. The receive buffer must be told before, or the window is large."""
+        """A connected socket. The receive buffer must be set before connecting, else the window
+        is large."""
         family = socket.AF_INET6 if ":" in self.host else socket.AF_INET
         plain = socket.socket(family)
         if receive_buffer:
             plain.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
         plain.settimeout(timeout)
-        # As browsers do; else an ack and a patch wait for each other's delayed acknowledgement.
+        # As in browsers; otherwise an ack and a patch wait for each other's delayed
+        # acknowledgement.
         plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         plain.connect((self.host, self.port))
         return self.tls.wrap_socket(plain, server_hostname=self.host) if self.tls else plain
@@ -68,7 +70,7 @@ class Answer:
         self.status, self.headers, self.body, self.head = status, headers, body, head
 
     def header(self, name):
-        """Its values, in order, joined by ", "; "" where there is none."""
+        """The values of a field in order, joined by ", "; "" if it is absent."""
         return ", ".join(value for key, value in self.headers if key.lower() == name.lower())
 
     def json(self):
@@ -76,7 +78,7 @@ class Answer:
 
 
 class Connection:
-    """Bytes to and from a peer, whatever they mean."""
+    """Sends and receives bytes without interpretation."""
 
     def __init__(self, target, timeout=20, receive_buffer=0):
         self.target = target
@@ -96,7 +98,7 @@ class Connection:
         self.socket.sendall(data)
 
     def raw_or_lost(self, data):
-        """False where the peer had enough before all was sent."""
+        """Sends data; returns False if the peer stopped reading before all was sent."""
         try:
             self.socket.sendall(data)
         except OSError:
@@ -104,14 +106,14 @@ class Connection:
         return True
 
     def half_close(self):
-        """Says that no more will be sent. What TLS still brings cannot be read after that."""
+        """Closes the sending direction. Over TLS, later data of the peer cannot be read."""
         self.socket.shutdown(socket.SHUT_WR)
 
     def receive(self):
         try:
             got = self.socket.recv(1 << 18)
         except (ConnectionError, ssl.SSLError) as fault:
-            raise Closed(f"the connection broke: {fault!r}") from fault
+            raise Closed(f"connection failed: {fault!r}") from fault
         if not got:
             raise Closed("the daemon closed the connection")
         self.buffer += got
@@ -124,13 +126,13 @@ class Connection:
         return out
 
     def until(self, end):
-        """Everything up to and with those bytes."""
+        """Everything up to and including those bytes."""
         while end not in self.buffer:
             self.receive()
         return self.take(self.buffer.find(end) + len(end))
 
     def answer(self, method="GET"):
-        """The next final HTTP answer; interim ones (1xx, but 101) are left out."""
+        """The next final HTTP answer; interim ones (1xx except 101) are skipped."""
         while True:
             head = self.until(b"\r\n\r\n").decode("latin-1")
             line, *rest = head[:-4].split("\r\n")
@@ -146,7 +148,8 @@ class Connection:
         return answer
 
     def ended(self, seconds=5):
-        """Whether the peer ends the connection within that time; what still came is in buffer."""
+        """Whether the peer closes the connection within that time; data received meanwhile are
+        in buffer."""
         end = time.monotonic() + seconds
         try:
             while (left := end - time.monotonic()) > 0:
@@ -160,7 +163,7 @@ class Connection:
 
 
 def request(target, method, path, headers=None, body=b""):
-    """The answer to a good request on a connection of its own."""
+    """The answer to a valid request on a separate connection."""
     fields = "".join(f"{name}: {value}\r\n" for name, value in (headers or {}).items())
     if body or method in ("POST", "PUT", "PATCH"):
         fields += f"Content-Length: {len(body)}\r\n"
@@ -180,8 +183,8 @@ def masked(payload, mask):
 
 
 def frame(opcode, payload=b"", fin=True, rsv=0, mask=None, length=None, width=None):
-    """A frame's bytes. `mask`: 4 bytes, None: random, b"": unmasked. `length` is what it claims to
-    have, `width` 7, 16 or 64 bits for it (None: the fewest)."""
+    """The bytes of a frame. `mask`: 4 bytes; None: random; b"": unmasked. `length` is the
+    declared length, `width` 7, 16 or 64 bits for it (None: the fewest)."""
     length = len(payload) if length is None else length
     width = width or (7 if length < 126 else 16 if length < 65536 else 64)
     mask = os.urandom(4) if mask is None else mask
@@ -193,7 +196,7 @@ def frame(opcode, payload=b"", fin=True, rsv=0, mask=None, length=None, width=No
 
 
 def upgrade_request(authority, key, target="/v1/stream", protocols=STREAM_PROTOCOL, fields=""):
-    """The bytes that ask for a stream; `fields` are whole lines."""
+    """The bytes of an upgrade request to the stream; `fields` are whole lines."""
     return (f"GET {target} HTTP/1.1\r\nHost: {authority}\r\nUpgrade: websocket\r\n"
             f"Connection: Upgrade\r\nSec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n"
             f"Sec-WebSocket-Protocol: {protocols}\r\n{fields}\r\n").encode()
@@ -244,7 +247,7 @@ class WebSocket(Connection):
         return first, self.take(size)
 
     def message(self):
-        """Opcode and payload of the next whole message; pings are answered. Raises Closed."""
+        """Opcode and payload of the next complete message; pings are answered. Raises Closed."""
         kind, whole = None, b""
         while True:
             first, part = self.frame()
@@ -262,7 +265,7 @@ class WebSocket(Connection):
                 return kind, whole
 
     def text(self, kind):
-        """The next text of that type; frames and other texts are passed over."""
+        """The next text of that type; frames and other texts are skipped."""
         while True:
             opcode, payload = self.message()
             if opcode == TEXT:

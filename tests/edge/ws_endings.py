@@ -6,14 +6,14 @@ from suite import Case, require
 from wire_client import CLOSE, PING, TEXT, Closed, frame
 from ws_frames import CONTINUE, closing, custom, living, question, require_close, session
 
-# Neither in use nor reserved for others (7.4.2), or never to be sent (7.4.1).
+# Codes neither in use nor reserved for others (7.4.2), or never to be sent (7.4.1).
 BAD_CODES = (0, 1, 999, 1004, 1005, 1006, 1015, 1016, 1100, 1999, 2000, 2500, 2999)
 GOOD_CODES = (1000, 1001, 1002, 1003, 1007, 1008, 1009, 1010, 1011, 1012, 1013, 3000, 3001, 3500,
               3999, 4000, 4001, 4400, 4410, 4999)
-# Registered after the RFC, or beyond its ranges: the reaction is unspecified.
+# Codes registered after the RFC, or beyond its ranges: the reaction is unspecified.
 OPEN_CODES = (1014, 5000, 32768, 65535)
 
-# By the first and last letters of each length, and those about the surrogates.
+# The first and last characters of each encoded length, and those next to the surrogates.
 VALID = {
     "ascii": b"hello", "nul": b"\0", "u7f": b"\x7f", "u80": b"\xc2\x80", "u7ff": b"\xdf\xbf",
     "u800": b"\xe0\xa0\x80", "ufff": b"\xe0\xbf\xbf", "u1000": b"\xe1\x80\x80",
@@ -51,7 +51,7 @@ def code_cases():
     for code in BAD_CODES:
         yield closing(f"close.{code}", where, f"close with {code}", goodbye(code), 1002)
     for code in OPEN_CODES:
-        yield closing(f"close.{code}", where, f"close with {code}, of which nothing is said",
+        yield closing(f"close.{code}", where, f"close with {code}, unspecified in the RFC",
                       goodbye(code), code, 1000, 1002)
     yield closing("close.empty", "RFC 6455 5.5.1", "a close without a code", frame(CLOSE), 1000,
                   1005)
@@ -62,12 +62,12 @@ def code_cases():
         yield closing(f"close.reason.{name}", "RFC 6455 5.5.1", f"a reason: {name}",
                       goodbye(1000, reason), 1000)
     for name in ("lone80", "over-slash2", "ud800", "u110000", "ff", "cut3", "broken2"):
-        yield closing(f"close.reason.{name}", "RFC 6455 8.1", f"a reason that is no UTF-8: {name}",
+        yield closing(f"close.reason.{name}", "RFC 6455 8.1", f"a reason that is not UTF-8: {name}",
                       goodbye(1000, INVALID[name]), 1002, 1007)
 
 
 def silence_after(viewer, data):
-    """Data after a close are not answered; the close is, once."""
+    """Data after a close are ignored; the close is answered once."""
     viewer.raw(goodbye(1000) + data)
     closes, texts = 0, []
     try:
@@ -91,9 +91,9 @@ def after_cases():
         yield custom(f"after.{name}", where, f"a close, then {name}",
                      "one close frame, no answer, TCP ended",
                      functools.partial(silence_after, data=data))
-    yield Case("ws.after.waits", "RFC 6455 7.1.1", "the daemon ends TCP first, unasked",
+    yield Case("ws.after.waits", "RFC 6455 7.1.1", "the daemon closes TCP first",
                "TCP ended within 5 s", ends_first)
-    yield custom("after.error", "RFC 6455 7.1.7", "texts behind a frame that fails the session",
+    yield custom("after.error", "RFC 6455 7.1.7", "texts after a frame that fails the session",
                  "1002 and no answer to them", failing_then_text)
 
 
@@ -108,20 +108,20 @@ def failing_then_text(viewer):
     try:
         while True:
             kind, payload = viewer.message()
-            require(b'"id":5' not in payload, "a text behind the fault was answered")
+            require(b'"id":5' not in payload, "a text after the fault was answered")
     except Closed as end:
         require(end.code == 1002, f"closed with {end.code}")
 
 
 def in_fragments(data, size=1):
-    """A text, in fragments of so many bytes."""
+    """A text in fragments of that many bytes."""
     parts = [data[at:at + size] for at in range(0, len(data), size)]
     return b"".join(frame(CONTINUE if number else TEXT, part, fin=number == len(parts) - 1)
                     for number, part in enumerate(parts))
 
 
 def fail_fast(viewer, bad):
-    """At once or at the message's end, as the RFC leaves open; but 1007 it is."""
+    """The close code is 1007; the RFC permits it at once or at the end of the message."""
     viewer.raw(frame(TEXT, b"abc" + bad, fin=False))
     viewer.raw_or_lost(frame(CONTINUE, b"xyz"))
     require_close(viewer, (1007,))
@@ -146,11 +146,11 @@ def utf8_cases():
                      functools.partial(fail_fast, bad=INVALID[name]))
     name = '{"type":"open","id":5,"dataset":"κόσμε \U0001f32a"}'.encode()
     for size in (1, 2, 3, 5):
-        yield living(f"utf8.json.{size}", where, f"names of many letters, {size} bytes a fragment",
+        yield living(f"utf8.json.{size}", where, f"non-ASCII names, {size} bytes a fragment",
                      in_fragments(name, size), 1)
     yield living("utf8.ping", where, "a ping within a letter", frame(TEXT, b"\xe2\x82", fin=False)
                  + frame(PING, b"\xff") + frame(CONTINUE, b"\xac"), 1)
-    yield closing("utf8.resumed", where, "a letter cut by the message's end, its rest in the next",
+    yield closing("utf8.resumed", where, "a character divided between two messages",
                   frame(TEXT, b"\xe2\x82") + frame(TEXT, b"\xac"), 1007)
 
 

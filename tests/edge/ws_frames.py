@@ -1,5 +1,5 @@
-"""Cases of RFC 6455, chapters 5 and 6: masks, reserved bits and opcodes, lengths, fragments, pings,
-binary messages, delivery, limits of time."""
+"""Cases of RFC 6455, chapters 5 and 6: masks, reserved bits and opcodes, lengths, fragments,
+pings, binary messages, delivery, deadlines."""
 import functools
 import json
 import socket
@@ -22,13 +22,13 @@ def session(target):
 
 
 def question(number=5, size=0):
-    """A text whose answer names its number, of that many bytes or as few as may be."""
+    """A text of that many bytes, or the fewest possible, whose answer contains its number."""
     text = json.dumps({"type": "open", "id": number, "dataset": "nowhere"})
     return text.encode().ljust(size)
 
 
 def require_life(viewer, errors=None):
-    """A question is answered; before it came so many errors, where told."""
+    """A request is answered; before the answer arrive that many errors, if given."""
     viewer.send(TEXT, question(4242))
     before = 0
     while viewer.text("error").get("id") != 4242:
@@ -37,13 +37,14 @@ def require_life(viewer, errors=None):
 
 
 def require_close(viewer, codes):
-    """A close frame with one of those codes (None: the bare end will do), then the end of TCP."""
+    """Expects a close frame with one of those codes (None: no close frame needed), then the end
+    of TCP."""
     try:
         while True:
             viewer.message()
     except Closed as end:
         require(end.code in codes, f"closed with {end.code}: {end}")
-        if end.code:  # else the daemon waits for its answer
+        if end.code:  # otherwise the daemon waits for the answering close
             viewer.raw_or_lost(frame(CLOSE, struct.pack(">H", 1000)))
     require(viewer.ended(), "TCP stays open behind the close frame")
 
@@ -105,9 +106,9 @@ def mask_cases():
         yield living(f"mask.{name}.long", "RFC 6455 5.3", f"the mask {mask.hex()}, 65535 bytes",
                      frame(TEXT, question(5, 65535), mask=mask), 1)
     halves = frame(TEXT, question()[:11], fin=False) + frame(CONTINUE, question()[11:])
-    yield living("mask.each", "RFC 6455 5.3", "a mask of its own for each fragment", halves, 1)
+    yield living("mask.each", "RFC 6455 5.3", "a separate mask for each fragment", halves, 1)
     for size in range(9):
-        yield living(f"mask.tail.{size}", "RFC 6455 5.3", f"a text of {size} bytes, no whole word",
+        yield living(f"mask.tail.{size}", "RFC 6455 5.3", f"a text of {size} bytes (mask tail)",
                      frame(TEXT, b"x" * size), 1)
 
 
@@ -145,7 +146,7 @@ def length_cases():
             MESSAGE_MAX + 1, 1 << 31, (1 << 32) - 1, 1 << 32, (1 << 32) + 5, 1 << 40,
             (1 << 63) - 1):
         yield closing(f"length.claim.{size:x}", "the limit of a message",
-                      f"a text that says it has {size:#x} bytes",
+                      f"a text with the declared length {size:#x}",
                       frame(TEXT, b"hi", length=size, width=64), 1009)
     for size in (1 << 63, (1 << 63) + 5, (1 << 64) - 1):
         yield closing(f"length.high.{size:x}", where, f"the highest bit set: {size:#x}",
@@ -162,7 +163,7 @@ def fragment_cases():
     text = question()
 
     def cut(*sizes, between=b"", opcode=TEXT):
-        """The question in fragments of those sizes, the rest last."""
+        """The request in fragments of those sizes, the remainder last."""
         out, at = b"", 0
         for number, size in enumerate(sizes):
             out += frame(CONTINUE if number else opcode, text[at:at + size], fin=False) + between
@@ -187,12 +188,12 @@ def fragment_cases():
         yield living(f"fragments.{name}", where, f"{name} between fragments",
                      cut(5, 5, between=control), 1)
     yield custom("fragments.answered", where, "a ping between fragments is answered at once",
-                 "its pong before the text's end is sent", ping_between)
+                 "its pong before the end of the text is sent", ping_between)
     yield closing("fragments.close", where, "a close between fragments",
                   cut(5, between=frame(CLOSE, struct.pack(">H", 1000))), 1000)
     yield closing("fragments.no-start", where, "a continuation of nothing",
                   frame(CONTINUE, b"hi"), 1002)
-    yield closing("fragments.no-start.part", where, "a continuation of nothing, not the last",
+    yield closing("fragments.no-start.part", where, "a continuation without a start, not final",
                   frame(CONTINUE, b"hi", fin=False), 1002)
     yield closing("fragments.over", where, "a continuation after the last one",
                   cut(5) + frame(CONTINUE, b"hi"), 1002)
@@ -234,12 +235,12 @@ def ping_cases():
     for size in (0, 1, 2, 4, 63, 64, 124, 125):
         yield custom(f"ping.{size}", where, f"a ping of {size} bytes", "its pong",
                      functools.partial(echo, payload=bytes(range(size))))
-    yield custom("ping.every", where, "pings of every size, one after the other", "126 pongs",
+    yield custom("ping.every", where, "pings of every size in sequence", "126 pongs",
                  lambda viewer: [echo(viewer, b"\xff" * size) for size in range(126)])
     yield custom("ping.many", where, "20 pings at once",
-                 "pongs in their order, the last one among them", many_pings)
+                 "pongs in order, including the last one", many_pings)
     yield custom("ping.flood", where, "20,000 pings of 125 bytes, pongs not read meanwhile",
-                 "the session lives, or is ended", flood)
+                 "the session continues, or is closed", flood)
     for name, payload in (
             ("empty", b""), ("text", b"hello"), ("number", b"1"), ("huge", b"99999999999999999999"),
             ("longest", b"\x80" * 125)):
@@ -253,7 +254,7 @@ def ping_cases():
                           f"a {NAMES[opcode]} of {size} bytes",
                           frame(opcode, body.ljust(size, b"x")), 1002)
         yield closing(f"control.{NAMES[opcode]}.wide", where,
-                      f"a {NAMES[opcode]} of 5 bytes, told in 16 bits",
+                      f"a {NAMES[opcode]} of 5 bytes, length in 16 bits",
                       frame(opcode, body.ljust(5, b"x"), width=16), 1002)
         yield closing(f"control.{NAMES[opcode]}.part", where, f"a {NAMES[opcode]} without FIN",
                       frame(opcode, body, fin=False), 1002)
@@ -281,7 +282,7 @@ def flood(viewer):
         while viewer.frame() != (0x80 | PONG, b"last"):
             pass
     except (TimeoutError, OSError, Closed):
-        pass  # the peer may have had enough; that it lives is looked at after the group
+        pass  # the peer may have closed; the daemon is checked after the group
 
 
 def binary_cases():
@@ -315,7 +316,7 @@ def delivery_cases():
     yield living("delivery.many", where, "50 texts in one segment", single * 50, 50)
     yield living("delivery.cut", where, "a text and a half, then the other half",
                  [single + single[:9], single[9:]], 2)
-    yield living("delivery.head", where, "the frame's head alone, then its payload",
+    yield living("delivery.head", where, "the frame's header first, then its payload",
                  [single[:6], single[6:]], 1)
     yield living("delivery.ping", where, "a ping byte by byte",
                  [bytes([byte]) for byte in frame(PING, b"abc")], 0)
@@ -325,12 +326,12 @@ def delivery_cases():
             ("whole", single)):
         for reset in (False, True):
             yield custom(f"leaving.{name}.{'reset' if reset else 'end'}", "RFC 6455 7.1.7",
-                         f"the client goes within the {name}", "the daemon lives",
+                         f"the client disconnects within the {name}", "the daemon runs",
                          functools.partial(leave, data=data, reset=reset))
 
 
 def ended_within(viewer, seconds, data, every):
-    """Sends that again and again; the daemon must end it."""
+    """Sends the frame repeatedly; the daemon must close the connection."""
     end = time.monotonic() + seconds
     codes = (None, 1002, 1008, 1009)
     viewer.socket.settimeout(0.01)
@@ -359,7 +360,7 @@ def once_then(first, seconds, data, every):
 
 
 def deadline_cases():
-    """A message has 10 s and 128 KiB of wire; twice that is given."""
+    """A message is limited to 10 s and 128 KiB; the test sends for twice that time."""
     def patient(name, what, first, data, every):
         return custom("deadline." + name, "the time of a message", what, "ended within 20 s",
                       once_then(first, 20, data, every), slow=True)
@@ -371,7 +372,7 @@ def deadline_cases():
                   frame(CONTINUE, fin=False), 0.2)
     yield patient("bytes.slow", "a payload byte by byte, one in 0.2 s",
                   frame(TEXT, b"{", length=60000, width=16), b" ", 0.2)
-    yield patient("head", "half of a frame's head, then nothing", start[:1], b"", 0.2)
+    yield patient("head", "half of a frame's header, then nothing", start[:1], b"", 0.2)
     yield patient("fragment", "a fragment, then nothing", frame(TEXT, b"{", fin=False), b"", 0.2)
 
 

@@ -1,4 +1,4 @@
-"""Cases of RFC 6455, chapter 4: the opening handshake, as a client may get it wrong."""
+"""Cases of RFC 6455, chapter 4: the opening handshake with errors of the client."""
 import functools
 
 from suite import Case, require
@@ -12,7 +12,7 @@ GOOD = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Key": KE
 
 
 def handshake(target, line="GET {path} HTTP/1.1", change=None, more=(), host=None):
-    """The request's bytes: good fields, those of `change` instead (None: without), then `more`."""
+    """The request's bytes: valid fields, those of `change` instead (None: omitted), then `more`."""
     fields = {"Host": host or target.authority(), **GOOD, **(change or {})}
     lines = [line.format(path=target.base + "v1/stream", authority=target.authority())]
     lines += [f"{name}: {value}" for name, value in fields.items() if value is not None]
@@ -28,25 +28,25 @@ def accepted(target, check=None, **how):
         require(answer.header("Upgrade").lower() == "websocket", "no Upgrade: websocket")
         require(answer.header("Connection").lower() == "upgrade", "no Connection: Upgrade")
         require(answer.header("Sec-WebSocket-Accept") == ACCEPT, "another accept value")
-        require(not answer.header("Sec-WebSocket-Extensions"), "an extension was agreed on")
+        require(not answer.header("Sec-WebSocket-Extensions"), "an extension was negotiated")
         require(len(answer.header("Sec-WebSocket-Protocol").split(",")) == 1, "two protocols")
         first = connection.take(1)[0]
-        require(first == 0x81, f"the first frame begins with {first:#x}, not with a whole text")
+        require(first == 0x81, f"the first frame starts with {first:#x}, not with a complete text")
         if check:
             check(answer)
 
 
 def refused(target, statuses, version=False, **how):
-    """No session; a final answer with one of those statuses and, where the version is at fault, the
-    version that would do (4.2.2, 4)."""
+    """Expects no session, and a final answer with one of those statuses which, for a wrong
+    version, names the supported one (4.2.2, 4)."""
     with Connection(target) as connection:
         connection.raw(handshake(target, **how))
         method = how.get("line", "GET").split(" ")[0]
         answer = connection.answer(method)
         require(answer.status in statuses, f"{answer.status} {answer.body[:300]!r}")
-        require(not answer.header("Sec-WebSocket-Accept"), "an accept value all the same")
+        require(not answer.header("Sec-WebSocket-Accept"), "an accept value despite the refusal")
         if version and answer.status == 426:
-            require(answer.header("Sec-WebSocket-Version") == "13", "does not say which version")
+            require(answer.header("Sec-WebSocket-Version") == "13", "no supported version named")
         if answer.header("Connection") == "close":
             require(connection.ended(), "says close and stays open")
 
@@ -79,7 +79,7 @@ def request_cases():
     yield bad("http10", where, "HTTP/1.0", (400, 426, 505), line="GET {path} HTTP/1.0")
     yield bad("http09", where, "no version", (400, 505), line="GET {path}")
     yield bad("http20", where, "HTTP/2.0", (400, 505), line="GET {path} HTTP/2.0")
-    yield bad("elsewhere", where, "a path that is no WebSocket", (400, 404),
+    yield bad("elsewhere", where, "a path that is not a WebSocket", (400, 404),
               line="GET /v1/nothing HTTP/1.1")
     yield good("absolute", "RFC 9112 3.2.2", "absolute form of the target",
                line="GET http://{authority}{path} HTTP/1.1")
@@ -120,7 +120,7 @@ def field_cases():
                    change={"Connection": value})
     yield good("connection.lines", "RFC 9110 5.3", "Connection in two lines, keep-alive first",
                change={"Connection": "keep-alive"}, more=["Connection: Upgrade"])
-    yield good("names.case", "RFC 9110 5.1", "names of fields in other letters", change={
+    yield good("names.case", "RFC 9110 5.1", "names of fields in another case", change={
         "Upgrade": None, "Sec-WebSocket-Key": None, "Sec-WebSocket-Version": None},
         more=["UPGRADE: websocket", "sec-websocket-key: " + KEY, "SEC-WebSocket-version: 13"])
 
@@ -141,9 +141,9 @@ def key_cases():
               more=["Sec-WebSocket-Key: " + KEY])
     yield bad("key.list", "RFC 6455 11.3.1", "two keys in a line", (400,),
               change={"Sec-WebSocket-Key": f"{KEY}, {KEY}"})
-    yield good("key.spaces", "RFC 9110 5.5", "a key with white space about it",
+    yield good("key.spaces", "RFC 9110 5.5", "a key surrounded by white space",
                change={"Sec-WebSocket-Key": f" \t {KEY}\t "})
-    # The last two bits of 22 letters are no part of the 16 bytes.
+    # The last two bits of 22 base64 letters are not part of the 16 bytes.
     odd = KEY[:21] + "R=="
     yield Case("ws.open.key.other", "RFC 6455 1.3", "another key has another accept value",
                "101 and its SHA-1", functools.partial(other_key, key=odd))
@@ -153,7 +153,7 @@ def other_key(target, key):
     with Connection(target) as connection:
         connection.raw(handshake(target, change={"Sec-WebSocket-Key": key}))
         answer = connection.answer()
-        # RFC 4648, 3.5 lets a decoder refuse bits that are not zero.
+        # RFC 4648, 3.5 permits a decoder to refuse non-zero padding bits.
         require(answer.status in (101, 400), str(answer.status))
         require(answer.status == 400 or answer.header("Sec-WebSocket-Accept") == accept_of(key),
                 "another accept value")
@@ -172,7 +172,7 @@ def version_cases():
               more=["Sec-WebSocket-Version: 8"])
     for version in ("7", "8", "99"):
         yield Case(f"ws.open.version.{version}.says", where,
-                   f"version {version} is told which one would do",
+                   f"the answer to version {version} names the supported one",
                    "426 with Sec-WebSocket-Version: 13", functools.partial(
                        refused, statuses=(426,), version=True,
                        change={"Sec-WebSocket-Version": version}))
@@ -222,9 +222,9 @@ def origin_cases():
             ("other", "http://evil.example"), ("null", "null"), ("empty", ""), ("file", "file://"),
             ("prefix", "http://127.0.0.1.evil.example"), ("port", "http://127.0.0.1:1")):
         if name == "empty":
-            continue  # as good as none
+            continue  # equivalent to an absent field
         yield bad("origin." + name, where, f"Origin: {value}", (403,), more=["Origin: " + value])
-    yield Case("ws.open.origin.twice", where, "its own Origin and another", "400 or 403",
+    yield Case("ws.open.origin.twice", where, "the own Origin and another one", "400 or 403",
                lambda target: refused(target, (400, 403), more=[
                    f"Origin: http://{target.authority()}", "Origin: http://evil.example"]))
     yield bad("host.other", "the Host check", "a name that resolved to this machine", (421,),

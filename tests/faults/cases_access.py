@@ -1,4 +1,4 @@
-"""Who may connect: origins, hosts, tokens, TLS."""
+"""Access: origins, hosts, tokens, TLS."""
 import os
 import re
 import secrets
@@ -11,8 +11,8 @@ import time
 from support import (PATIENCE_S, SAMPLE, Closed, Stream, Untried, ask, case, check_good, need,
                      status_of, talk)
 
-SILENT_S = 10  # after which a connection without a first byte is given up
-SLACK_S = 4  # for a loaded machine
+SILENT_S = 10  # deadline of a connection without a first byte
+SLACK_S = 4  # tolerance for a loaded machine
 
 EVIL = ["https://evil.example", "null", "http://127.0.0.1.evil.example", "http://evil.example:80",
         "file://", "https://127.0.0.1@evil.example", "http://localhost.evil.example"]
@@ -32,7 +32,7 @@ def origins(world, count):
     return "403; the page's own and a program's go through"
 
 
-@case("names made to resolve to this machine", 60, 6)
+@case("foreign host names that resolve to this machine", 60, 6)
 def hosts(world, count):
     daemon = world.daemon()
     names = ["evil.example", "127.0.0.1.evil.example", "169.254.1.1", "localhost.evil.example:80",
@@ -63,7 +63,7 @@ def tokens(world, count):
         given = {"Authorization": f"Bearer {bad}"} if bad else {}
         got = ask(daemon.port, "GET", "/v1/datasets", headers=given)
         need(got.status in (401, 403, 431), f"a wrong token is answered by {got.status}")
-        need(token.encode() not in got.body, "the answer tells the token")
+        need(token.encode() not in got.body, "the answer contains the token")
         for target in (f"/v1/datasets?token={token}", f"/v1/datasets?access_token={token}"):
             got = ask(daemon.port, "GET", target)
             need(got.status in (400, 401, 403), f"a token in a URL is answered by {got.status}")
@@ -93,7 +93,7 @@ def remote(world, count):
                               capture_output=True, text=True, timeout=PATIENCE_S, check=False)
         need(done.returncode not in (0, None) and "--allow-remote" in done.stderr,
              f"it ended with {done.returncode}: {done.stderr[-200:]}")
-    return "refuses to start and says why"
+    return "refuses to start, with the reason"
 
 
 @case("root behind a remote address", 3, 1)
@@ -106,7 +106,7 @@ def remote_root(world, count):
                               capture_output=True, text=True, timeout=PATIENCE_S, check=False)
         need(done.returncode == 2 and "--allow-root" in done.stderr,
              f"it ended with {done.returncode}: {done.stderr[-200:]}")
-    return "refuses to start and says why"
+    return "refuses to start, with the reason"
 
 
 # --- TLS -----------------------------------------------------------------------------------------
@@ -124,7 +124,7 @@ def with_tls(world):
 
 
 def over_tls(port, request, cut=False):
-    """What comes back; `cut`: the connection ends without TLS' own goodbye."""
+    """The bytes received; `cut`: the connection ends without close_notify."""
     context = ssl.create_default_context()
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     plain = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
@@ -150,12 +150,12 @@ def tls_faults(world, count):
     need(status_of(over_tls(daemon.port, GET)) == 200, "no answer over TLS")
     got, _ = talk(daemon.port, GET)
     need(b" 200 " not in got[:20], "it answers without TLS")
-    return "closed; a good connection works"
+    return "closed; a valid connection works"
 
 
-@case("connections that say nothing", 100, 20)
+@case("silent connections", 100, 20)
 def silent(world, count):
-    """Not a byte, by plain TCP and by TLS, whose handshake does not begin."""
+    """Connections that send nothing, over plain TCP and over TLS before the handshake."""
     plain, over_tls = world.daemon(), with_tls(world)
     since = time.monotonic()
     held = [socket.create_connection(("127.0.0.1", (plain, over_tls)[n % 2].port),
@@ -164,7 +164,7 @@ def silent(world, count):
     for one in held:
         with one:
             try:
-                need(one.recv(1) in (b"", b"H"), "something was said to a silent peer")
+                need(one.recv(1) in (b"", b"H"), "data was sent to a silent peer")
             except ConnectionResetError:
                 pass
         took.append(time.monotonic() - since)
@@ -207,11 +207,11 @@ def tls_all(world, _count):
          f"127.0.0.1:{daemon.port}"], capture_output=True, text=True, timeout=900, check=False)
     found = [line.strip() for line in done.stdout.splitlines()
              if re.search(r"\bVULNERABLE\b|\bNOT ok\b", line) and "not vulnerable" not in line
-             # It asks for secrets beside what a stranger chose in one compressed answer: files of
-             # the page alone are compressed, which hold neither.
+             # BREACH needs secrets and attacker-chosen text in one compressed answer: only files of
+             # the page are compressed, which contain neither.
              and "BREACH" not in line]
-    need("TLS 1.3" in done.stdout, f"testssl.sh told nothing: {done.stdout[-200:]}")
+    need("TLS 1.3" in done.stdout, f"cannot parse the output of testssl.sh: {done.stdout[-200:]}")
     need(not found, f"{found[:3]}")
     check_alive = over_tls(daemon.port, GET)
     need(status_of(check_alive) == 200, "no answer after it")
-    return "nothing vulnerable; compressed are files of the page alone"
+    return "no vulnerability; only files of the page are compressed"

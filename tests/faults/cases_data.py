@@ -1,5 +1,5 @@
-"""Files that want to break the reader or to get out, names that lead elsewhere, files that change
-under the daemon, and memory that is not enough."""
+"""Hostile files, names that lead outside the data root, files that change while being read, and
+insufficient memory."""
 import json
 import os
 import pathlib
@@ -46,7 +46,7 @@ def synth(world, path, dims="16x16x16", steps=3):
                     path], check=True, capture_output=True)
 
 
-@case("names of datasets that lead elsewhere", 200, 40)
+@case("names of datasets that refer to other locations", 200, 40)
 def names(world, count):
     folder = world.new_folder()
     root, outside = folder / "root", folder / "outside"
@@ -81,7 +81,7 @@ def names(world, count):
     need(now.st_atime_ns == canary.st_atime_ns, "the file outside was read")
     got = ask(daemon.port, "POST", "/v1/datasets", {"path": "good.nc"})
     job = wait_for(lambda: finished(daemon.port, got.headers["location"]), PATIENCE_S, "no job")
-    need(job["state"] == "done", f"a good file is refused: {job}")
+    need(job["state"] == "done", f"a valid file is refused: {job}")
     for target in ("/v1/datasets/../../etc/passwd", "/v1/datasets/%2e%2e%2f%2e%2e",
                    "/../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/..%5c..%5cetc"):
         got = ask(daemon.port, "GET", target)
@@ -116,7 +116,7 @@ def changing(world, count):
         elif how == 3:
             path.unlink()
         else:
-            with open(path, "r+b") as file:  # in place, under the reader
+            with open(path, "r+b") as file:  # in place, while it is being read
                 file.seek(len(data) // 3)
                 file.write(os.urandom(len(data) // 3))
         # A step that is resident, and one that may have to be read.
@@ -126,12 +126,12 @@ def changing(world, count):
             need(got.status == 200 or 400 <= got.status < 500 or got.status in (500, 503),
                  f"answered by {got.status}")
             old += got.status == 200
-        need(daemon.alive(), f"the daemon died: {daemon.child.returncode}")
+        need(daemon.alive(), f"the daemon exited: {daemon.child.returncode}")
         path.unlink(missing_ok=True)
         path.write_bytes(data)
         wait_for(lambda: picture(daemon.port, "wind").status == 200, PATIENCE_S,
-                 "the file is whole again and is not drawn")
-    need(old > 0, "nothing of the old data was ever drawn")
+                 "the file is complete again but is not rendered")
+    need(old > 0, "the old data were never rendered")
     return f"{old} of {2 * count} pictures from what was loaded, the others an error; no SIGBUS"
 
 
@@ -142,16 +142,16 @@ def little_memory(world, count):
     daemon = world.start("--memory-limit", "192M", "tornado:200x200x200", "tornado:170x170x170",
                          SAMPLE)
     listed = ask(daemon.port, "GET", "/v1/datasets").body
-    need(b"'wind' needs 91.6 MiB" in listed, "no reason why one is refused at the start")
+    need(b"'wind' needs 91.6 MiB" in listed, "no reason for the refusal at startup")
     for n in range(count):
         got = picture(daemon.port, "tornado:200x200x200", azimuth=n)
         need(got.status == 404 and b"could not be opened" in got.body,
              f"refused at the start, answered by {got.status}: {got.body[:100]!r}")
         got = picture(daemon.port, "tornado:170x170x170", (512, 512), azimuth=n)
         need(got.status == 507, f"answered by {got.status}: {got.body[:100]!r}")
-        need(b"need 75.0 MiB" in got.body, f"without what is needed: {got.body[:200]!r}")
+        need(b"need 75.0 MiB" in got.body, f"the required memory is missing: {got.body[:200]!r}")
         need(picture(daemon.port, SAMPLE, azimuth=n).status == 200, "a small one is refused too")
-    return "refused at the start or 507; a small dataset is drawn between"
+    return "refused at startup or 507; a small dataset is still rendered"
 
 
 @case("little address space (ulimit -v)", 10, 3)
@@ -175,15 +175,15 @@ def little_space(world, count):
         refused += got.status in (500, 503, 507)
         need(got.status in (200, 500, 503, 507), f"answered by {got.status}")
         check_good(daemon.port)
-    need(refused > 0, "there was room for everything: nothing was tried")
+    need(refused > 0, "nothing was tested: there was memory for everything")
     need(daemon.stop() == 0, "it did not end with 0")
     return f"{refused} of {count} refused by 507 or 503, good ones between; ends with 0"
 
 
 @case("little memory (cgroup)", 10, 2)
 def little_cgroup(world, count):
-    """The kernel ends the loader or takes pages back; where the daemon itself is too large for the
-    group it is ended, and that is what the group is for: what is tried leaves room for it."""
+    """The kernel kills the loader or reclaims pages; if the daemon itself exceeds the group's
+    limit it is killed, as intended, so the sizes used here leave room for it."""
     group = CGROUPS / f"windsplat-faults-{os.getpid()}"
     if "memory" not in read_or_nothing(CGROUPS / "cgroup.subtree_control"):
         raise Untried("no cgroup with a memory controller can be made here: none was tried")

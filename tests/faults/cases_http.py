@@ -1,5 +1,5 @@
-"""Requests that are no requests, or that take too long: the HTTP edge in short (tests/edge has it
-in depth)."""
+"""Malformed and slow requests: a short version of the HTTP edge cases (tests/edge has all of
+them)."""
 import re
 import shutil
 import socket
@@ -10,13 +10,14 @@ import time
 from support import (MIB, PATIENCE_S, SAMPLE, Failed, Untried, ask, case, check_good, need, picture,
                      rss, status_of, talk, wait_for)
 
-CUT_S = 5  # after which a header or a body that does not come is given up
-SLACK_S = 4  # for a loaded machine
+CUT_S = 5  # deadline of an incomplete header or body
+SLACK_S = 4  # tolerance for a loaded machine
 SIZES = [0, 1, 4095, 4096, 8191, 8192, 16383, 16384, 65535, 65536, 66000, 131072, 1 << 20]
 
 
 def refused(port, request, allowed):
-    """Answered by one of these, then closed; or closed at once. The status, 0 for none."""
+    """Expects one of these statuses and then the end of the connection, or the end at once.
+    Returns the status, 0 for none."""
     got, took = talk(port, request)
     need(took < CUT_S + SLACK_S, f"closed after {took:.1f} s: {request[:60]!r}")
     if not got:
@@ -27,7 +28,7 @@ def refused(port, request, allowed):
 
 
 def by_size(world, count, make, allowed):
-    """Sizes around the limits, again and again; the daemon's memory must not grow with them."""
+    """Sizes around the limits, repeatedly; the daemon's memory must not grow with them."""
     daemon = world.daemon()
     for size in SIZES:
         refused(daemon.port, make(size), allowed)
@@ -83,7 +84,7 @@ def lengths(world, count):
 
 
 class Slow(threading.Thread):
-    """Says a request a byte at a time; how long it was listened to."""
+    """Sends a request one byte at a time; returns how long the connection stayed open."""
 
     def __init__(self, port, request, at_once):
         super().__init__(daemon=True)
@@ -121,8 +122,8 @@ def slowly(world, count, request, at_once):
         served += 1
         time.sleep(0.1)
     longest = max(one.took for one in slow)
-    need(served > 0 and longest < CUT_S + SLACK_S, f"one was listened to for {longest:.1f} s")
-    need(min(one.took for one in slow) > CUT_S - 1, "one was cut before its time")
+    need(served > 0 and longest < CUT_S + SLACK_S, f"one stayed open for {longest:.1f} s")
+    need(min(one.took for one in slow) > CUT_S - 1, "one was closed before the deadline")
     return (f"cut after {longest:.1f} s at most; {served} pictures meanwhile, the slowest in "
             f"{1000 * slowest:.0f} ms")
 
@@ -153,14 +154,14 @@ def slow_by_tool(world, count):
         text = re.sub(r"\x1b\[[0-9;]*m", "", done.stdout)
         available = re.findall(r"service available:\s+(\w+)", text)
         ended = re.findall(r"Test ended on (\d+)\w+ second\s+Exit status:\s*(.*)", text)
-        need(ended and available, f"slowhttptest says nothing that is understood: {text[-200:]}")
+        need(ended and available, f"cannot parse the output of slowhttptest: {text[-200:]}")
         need(set(available) == {"YES"}, f"slowhttptest {how} found the service not available")
         need("No open connections left" in ended[0][1], f"connections are still held: {ended[0]}")
         told.append(f"{'headers' if how == '-H' else 'bodies'}: all closed by second {ended[0][0]}")
     return "; ".join(told) + "; service available throughout"
 
 
-@case("clients that leave in the middle of a request", 200, 20)
+@case("clients that disconnect in the middle of a request", 200, 20)
 def leave(world, count):
     daemon = world.daemon()
     request = head("Content-Type: application/json\r\nContent-Length: 20") + b"{}" + b" " * 18
@@ -190,9 +191,9 @@ def control_characters(world, count):
     daemon.stop()
     for line in daemon.lines:
         need(line.isprintable(), f"a control character in the log: {line!r}")
-        need(not re.match(r"\s*injected", line), f"a line that a client wrote: {line!r}")
+        need(not re.match(r"\s*injected", line), f"a log line injected by a client: {line!r}")
         need(len(line) < 4096, f"a line of {len(line)} characters")
-    need(len(daemon.lines) >= 5 * count, "the log tells too little to judge it")
+    need(len(daemon.lines) >= 5 * count, "the log has too few lines for this test")
     return f"{len(daemon.lines)} log lines, each one line without control characters"
 
 

@@ -1,4 +1,4 @@
-"""Streams that break the protocol, never end, never read, or come over a slow link."""
+"""Streams that violate the protocol, never end, never read, or use a slow link."""
 import os
 import pathlib
 import select
@@ -16,13 +16,13 @@ sys.path.insert(0, str(ROOT / "tests/bench"))
 from link_path import Proxy  # noqa: E402
 
 MESSAGE_MAX = 64 * KIB
-MESSAGE_CUT_S = 10  # after which a message that does not end is given up
+MESSAGE_CUT_S = 10  # deadline of an incomplete message
 SLACK_S = 5
 LARGE = (2560, 1440)
 
 
 def codes_of(world, count, spoil, allowed):
-    """The codes by which streams end that are spoiled so; 0 is an end without one."""
+    """The close codes of streams that send these invalid bytes; 0 is an end without a code."""
     daemon = world.daemon()
     seen = {}
     for n in range(count):
@@ -51,8 +51,8 @@ def lengths(world, count):
 def deflate(world, count):
     daemon = world.daemon()
     with Stream(daemon.port, [("Sec-WebSocket-Extensions", "permessage-deflate")]) as one:
-        need(b"permessage-deflate" not in one.head.lower(), "compression was agreed to")
-    # 64 KB of which each byte unpacks to a thousand.
+        need(b"permessage-deflate" not in one.head.lower(), "compression was negotiated")
+    # 64 kB of which each byte decompresses to a thousand.
     packed = b"\xec\xc1" + bytes(60000)
     return codes_of(world, count, lambda one, n: one.send(1, packed, reserved=4),
                     {1002}) + "; no compression is agreed to"
@@ -103,11 +103,11 @@ def deaf(daemon, count, size):
 
 @case("peers that never read", 20, 4)
 def never_read(world, count):
-    """As many at once. Each may hold two frames and 256 KiB; at the deadline they go."""
+    """Several at once. Each may hold two frames and 256 KiB; they are closed at the deadline."""
     daemon = world.start("--max-sessions", "64", SAMPLE)
     with Stream(daemon.port) as reader:
         frame = len(reader.final_frame(small_view(size=LARGE)))
-    first = deaf(daemon, 2, LARGE)  # the renderer has all it needs after these
+    first = deaf(daemon, 2, LARGE)  # one-time allocations of the renderer are complete after these
     time.sleep(1.0 if world.quick else 4.0)
     before, unsent = rss(daemon.pid), metric(daemon.port, "windsplat_unsent_bytes")
     many = deaf(daemon, count, LARGE)
@@ -125,10 +125,10 @@ def never_read(world, count):
     told = (f"{max(0, each) / KIB:.0f} KiB each (two frames and 256 KiB are {room / KIB:.0f}), "
             f"{held / KIB:.0f} KiB of them unsent")
     if not world.quick:
-        # A frame's 15 s and 64 KiB/s; one that fits the kernel's buffers is no stuck write, and the
-        # session goes after 60 s without an answer to a ping.
+        # The deadline of a frame is 15 s plus its size at 64 KiB/s. A frame that fits the kernel's
+        # buffers is not blocked, and its session ends after 60 s without an answer to a ping.
         wait_for(lambda: metric(daemon.port, "windsplat_sessions") == 0, 90 + PATIENCE_S,
-                 "sessions that never read are still there")
+                 "sessions that never read are still open")
         told += "; gone by the deadline"
     for one in first + many:
         one.close()
@@ -136,7 +136,8 @@ def never_read(world, count):
 
 
 def crawl(daemon, port, seconds):
-    """A viewer that changes its view all the time over a slow link; the frames' delays in revs."""
+    """A client that continuously changes its view over a slow link; the delays of the frames in
+    revs."""
     behind, frames = [], 0
     with Stream(port, timeout=30) as one:
         one.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 16 * KIB)
@@ -184,13 +185,13 @@ def by_proxy(world, seconds):
 
 
 def judged_crawl(name, program, frames, behind, more):
-    need(frames >= 3, f"{name}: only {frames} frames came")
-    # The renderer's own memory for the final picture may come within it, once.
+    need(frames >= 3, f"{name}: only {frames} frames were received")
+    # The renderer's one-time memory for the final picture may be included.
     need(more < 8 * MIB or is_sanitized(program),
          f"{name}: the daemon grew by {more / MIB:.1f} MiB")
     late = statistics.median(behind)
-    # Patches come every 50 ms or with each message; old frames in a queue would fall ever farther
-    # behind.
+    # Patches are sent every 50 ms or with each message; queued old frames would increase the delay
+    # steadily.
     early, last = statistics.median(behind[:3]), statistics.median(behind[-3:])
     need(last <= early + 20, f"{name}: frames fall behind, from {early} to {last} changes")
     return (f"{name}: {frames} frames, each {late:.0f} changes old, memory "
@@ -218,7 +219,8 @@ def by_tc(world, seconds):
 
 @case("messages that are none", 200, 40)
 def no_messages(world, count):
-    """Broken JSON and unknown types are answered, binary and no UTF-8 close; the stream's edge."""
+    """Broken JSON and unknown types are answered by errors; binary messages and invalid UTF-8
+    close the stream."""
     daemon = world.daemon()
     answered = [b"{", b"[]", b"null", b'{"type": "nothing"}', b'{"type": "ack", "seq": 99}',
                 b'{"type": "patch"}', b"[" * 5000, b'{"type": "open", "id": 1e400, "dataset": "x"}',
@@ -240,7 +242,7 @@ def no_messages(world, count):
     return f"{errors} answered by an error and lived, then {closed} closed by 4400, 1007 or 1002"
 
 
-@case("streams cut off without a goodbye", 100, 20)
+@case("streams cut off without a close frame", 100, 20)
 def cut_off(world, count):
     daemon = world.daemon()
     wait_for(lambda: metric(daemon.port, "windsplat_sessions") == 0, PATIENCE_S, "sessions")
@@ -252,11 +254,11 @@ def cut_off(world, count):
             one.socket.sendall(b"\x81\xfe")  # in the middle of a frame
         one.close()
     wait_for(lambda: metric(daemon.port, "windsplat_sessions") == 0, PATIENCE_S,
-             "sessions of peers that are gone")
+             "sessions of disconnected peers")
     return "no session is left"
 
 
-@case("more viewers than there may be", 20, 5)
+@case("more sessions than allowed", 20, 5)
 def too_many(world, count):
     daemon = world.start("--max-sessions", "3", SAMPLE)
     kept = [Stream(daemon.port) for _ in range(3)]
@@ -265,13 +267,13 @@ def too_many(world, count):
     for _ in range(count):
         with Stream(daemon.port) as one:
             if one.status == 101:
-                need(one.until_closed() == 1013, "not sent away by 1013")
+                need(one.until_closed() == 1013, "not closed with 1013")
             else:
                 need(one.status in (429, 503), f"answered by {one.status}")
     for one in kept:
         one.final_frame(small_view())
         one.close()
-    return "1013 or 503; those before go on"
+    return "1013 or 503; the earlier sessions continue"
 
 
 
@@ -279,7 +281,7 @@ def too_many(world, count):
 
 
 def main():
-    """One crawl in a network namespace that by_tc has made."""
+    """Runs one slow client in a network namespace created by by_tc."""
 
     daemon = Daemon(sys.argv[1], SAMPLE)
     try:

@@ -1,4 +1,4 @@
-"""What the system refuses: memory, sockets, files, disk, descriptors; and a clock that jumps."""
+"""Failures of the system: memory, sockets, files, disk, descriptors; and a clock that jumps."""
 import json
 import os
 import pathlib
@@ -24,7 +24,7 @@ def shim_of(world):
 
 
 def inject(world, count, *kinds, phases=("serve", "guarded")):
-    """So many rounds of each kind; the whole sweep is inject.py's own."""
+    """That many rounds of each kind; inject.py runs the complete sweep."""
     if not shim_of(world).exists():
         raise Untried(f"{shim_of(world)} is not built (sanitizers have their own allocator): no "
                       f"{', '.join(kinds)} was made to fail")
@@ -39,9 +39,9 @@ def inject(world, count, *kinds, phases=("serve", "guarded")):
     need(done.returncode == 0, done.stdout[-400:] + done.stderr[-200:])
     rows = re.findall(r"^\| \w+ \| \w+ \| [\d-]+ \| (\d+) \(.*?\) \| (\d+) ", done.stdout,
                       re.MULTILINE)
-    need(rows, f"inject.py tells nothing: {done.stdout[-200:]}")
+    need(rows, f"no result of inject.py: {done.stdout[-200:]}")
     places, calls = (sum(int(row[n]) for row in rows) for n in (0, 1))
-    return f"{calls} calls failed at {places} places; nobody else was hit, it goes on"
+    return f"{calls} calls failed at {places} call sites; others were not affected"
 
 
 @case("malloc that fails", 200, 3)
@@ -59,12 +59,12 @@ def no_files(world, count):
     return inject(world, count, "read", "write", "fsync", "open")
 
 
-@case("threads that cannot be had at the start", 10, 3)
+@case("threads that cannot be created at startup", 10, 3)
 def no_threads(world, count):
     return inject(world, count, "thread", phases=["start"])
 
 
-@case("random numbers that are not to be had", 50, 3)
+@case("random numbers that are unavailable", 50, 3)
 def no_random(world, count):
     return inject(world, count, "random")
 
@@ -95,7 +95,7 @@ def full_disk(world, count):
             check_good(daemon.port)
         need(ask(daemon.port, "DELETE", f"/v1/views/{saved.pop()}").status == 204, "cannot delete")
         need(ask(daemon.port, "POST", "/v1/views", view).status == 201, "there is room again")
-        need(not list(folder.rglob("*.part")), "a part of a file was left")
+        need(not list(folder.rglob("*.part")), "an incomplete file was left")
         need(daemon.stop() == 0, "it did not end with 0")
         again = world.start("--state-dir", str(folder), SAMPLE)
         for name in saved:
@@ -114,9 +114,9 @@ def through_jumps(daemon, jump, count):
             since = time.monotonic()
             one.final_frame(small_view(turn=0.01 * n))
             check_good(daemon.port)
-            need(time.monotonic() - since < PATIENCE_S / 2, "a jump of the clock holds it up")
+            need(time.monotonic() - since < PATIENCE_S / 2, "a jump of the clock delays it")
         jump(0)
-    need(metric(daemon.port, "windsplat_sessions") <= 1, "sessions were counted wrongly")
+    need(metric(daemon.port, "windsplat_sessions") <= 1, "the number of sessions is wrong")
     check_good_stream(daemon.port)
 
 
@@ -164,9 +164,9 @@ def clock(world, count):
     world.started.append(daemon)
     through_jumps(daemon, shim.jump, count)
     days = {line[:10] for line in daemon.lines}
-    need(len(days) > 1, "the log shows no jump: nothing was tried")
+    need(len(days) > 1, "nothing was tested: the log shows no jump")
     need(daemon.stop() == 0, "it did not end with 0")
-    return f"by up to {10 ** min(count - 1, 8)} s both ways; streams and requests go on"
+    return f"by up to {10 ** min(count - 1, 8)} s both ways; streams and requests continue"
 
 
 @case("a clock that jumps, by faketime", 20, 4)
@@ -186,7 +186,7 @@ def faked_clock(world, count):
         os.replace(file.parent / "next", file)
     through_jumps(daemon, jump, count)
     need(daemon.stop() == 0, "it did not end with 0")
-    return "streams and requests go on"
+    return "streams and requests continue"
 
 
 @case("no file descriptors left", 200, 60)
@@ -211,7 +211,7 @@ def no_descriptors(world, count):
         one.close()
     wait_for(lambda: answers(daemon.port), PATIENCE_S, "no answer once descriptors are free")
     failures = metric(daemon.port, "windsplat_accept_failures_total")
-    need(failures > 0 and "cannot accept" in daemon.log(), "no lack of descriptors was met")
+    need(failures > 0 and "cannot accept" in daemon.log(), "the lack of descriptors did not occur")
     need(failures < 200, f"{failures:.0f} attempts: it does not back off")
     check_good_stream(daemon.port)
     need(daemon.stop() == 0, "it did not end with 0")
@@ -243,9 +243,9 @@ def killed_loader(world, count):
         got = ask(daemon.port, "GET", f"{target}{n % 40}")
         need(got.status in (200, 409, 422, 500, 503), f"answered by {got.status}")
         failed += got.status != 200
-    need(killed > 0, "there was never a loader to kill")
+    need(killed > 0, "no loader was running when it was to be killed")
     wait_for(lambda: ask(daemon.port, "GET", f"{target}39").status == 200, PATIENCE_S,
-             "the file is not drawn any more")
+             "the file is no longer rendered")
     zombies = [c for c in children(daemon.pid) if state_of(c) == "Z"]
     need(len(zombies) <= 1, f"{len(zombies)} zombies")
     return f"{killed} killed, {failed} requests failed; the file is read again"
@@ -253,7 +253,7 @@ def killed_loader(world, count):
 
 @case("a loader that is stopped", 3, 1)
 def stopped_loader(world, count):
-    """By SIGSTOP, as if during playback; other datasets are served meanwhile."""
+    """The loader is stopped by SIGSTOP, as during playback; other datasets are served meanwhile."""
     folder = world.new_folder()
     for name in ("wind", "other"):
         subprocess.run([world.program, "synth", "tornado", "--dims", "32x32x32", "--steps", "12",
@@ -274,14 +274,14 @@ def stopped_loader(world, count):
         asking = threading.Thread(target=lambda: answers.append(step("wind", n + 1)))
         asking.start()
         for other in range(3):
-            need(step("other", n + other).status == 200, "another dataset is held up")
+            need(step("other", n + other).status == 200, "another dataset is blocked")
         need(asking.is_alive(), "the stopped loader answered")
         asking.join()
         longest = max(longest, time.monotonic() - began)
         need(answers[0].status == 422, f"answered by {answers[0].status}")
         need(b"made no progress for 15.0 s" in answers[0].body, f"{answers[0].body[:200]!r}")
-        need(state_of(stopped) in ("", "Z"), "the stopped loader is still there")
-        need(step("wind", n + 1).status == 200, "no new loader takes its place")
+        need(state_of(stopped) in ("", "Z"), "the stopped loader still exists")
+        need(step("wind", n + 1).status == 200, "no new loader replaces it")
     need(longest < 25, f"it took {longest:.1f} s")
     return f"refused after {longest:.1f} s with the reason, read again by another loader"
 

@@ -1,5 +1,5 @@
-"""Views that ask for the impossible or for too much; JSON that is no view; pictures that nobody
-waits for any more; more requests than can be drawn."""
+"""Views with impossible or excessive values; JSON that is not a view; pictures of disconnected
+clients; more requests than can be rendered."""
 import http.client
 import json
 import os
@@ -20,7 +20,7 @@ def pointers(answer):
 
 
 def refused_views(world, count, spoiled):
-    """Each: text, the statuses that are right, the pointer that is to be named or None."""
+    """Rows of text, permitted statuses, and the pointer that must be named or None."""
     daemon = world.daemon()
     named = 0
     for n in range(count):
@@ -37,7 +37,7 @@ def refused_views(world, count, spoiled):
 
 
 def with_value(pointer, value):
-    """A view that is good but for that value, given as JSON text."""
+    """A view that is valid except for that value, given as JSON text."""
     keys = pointer.strip("/").split("/")
     text = value
     for key in reversed(keys):
@@ -93,16 +93,16 @@ def giants(world, count):
     return told
 
 
-# --- the client is gone --------------------------------------------------------------------------
+# --- disconnected clients ------------------------------------------------------------------------
 
-FREE_S = 0.1  # of every processor, after the client left
+FREE_S = 0.1  # CPU seconds of each processor after the client disconnected
 BOMB = {"dataset": SAMPLE, "image": {"width": 8192, "height": 4320},
         "method": {"name": "slab", "slabThickness": 0.05},
         "scalars": [{"field": "cloud", "extinction": [[0, 0.01], [1, 0.02]]}]}
 
 
 def idle_after(daemon, begun):
-    """Seconds until the process rests after that time, and the processor time it took till then."""
+    """Seconds until the process is idle after that time, and its processor time until then."""
     at_end = cpu_s(daemon.pid)
     last, last_time, used = at_end, time.monotonic(), 0.0
     while True:
@@ -122,13 +122,13 @@ def busy(daemon):
     return cpu_s(daemon.pid) - before > 0.02
 
 
-@case("a render bomb whose client has gone", 20, 4)
+@case("an expensive picture whose client disconnects", 20, 4)
 def bomb(world, count):
     daemon = world.start("--memory-limit", "4G", SAMPLE)
     check_good(daemon.port)
     waits, costs = [], []
     for n in range(count):
-        wait_for(lambda: not busy(daemon), PATIENCE_S, "the daemon does not come to rest")
+        wait_for(lambda: not busy(daemon), PATIENCE_S, "the daemon does not become idle")
         if n % 2:
             one = Stream(daemon.port)
             one.patch(dict(BOMB, quality={"budgetMs": 10000}))
@@ -145,16 +145,16 @@ def bomb(world, count):
         waits.append(wait)
         costs.append(cost)
         check_good(daemon.port)
-    # What the processors did for nobody, so that other work on the machine does not count.
+    # Only the daemon's own CPU time counts, so that other work on the machine has no effect.
     limit = FREE_S * os.cpu_count() * world.slack
     need(statistics.median(costs) <= limit, f"{1000 * statistics.median(costs):.0f} ms of "
-         f"processor time for nobody in the median, above {1000 * limit:.0f}")
-    return (f"processor time for nobody: median {1000 * statistics.median(costs):.0f} ms, most "
+         f"CPU time after the disconnection in the median, above {1000 * limit:.0f}")
+    return (f"CPU time afterwards: median {1000 * statistics.median(costs):.0f} ms, most "
             f"{1000 * max(costs):.0f}; at rest after {1000 * statistics.median(waits):.0f} ms, "
-            f"most {1000 * max(waits):.0f} (looked at every 20 ms)")
+            f"most {1000 * max(waits):.0f} (sampled every 20 ms)")
 
 
-# --- too many ------------------------------------------------------------------------------------
+# --- overload ------------------------------------------------------------------------------------
 
 class Asker(threading.Thread):
     def __init__(self, port, number, each):
@@ -169,7 +169,7 @@ class Asker(threading.Thread):
             self.answers.append((got.status, time.monotonic() - since, got.headers))
 
 
-@case("more requests than can be drawn", 400, 80)
+@case("more requests than can be rendered", 400, 80)
 def overload(world, count):
     daemon = world.daemon()
     askers = [Asker(daemon.port, n, max(1, count // 40)) for n in range(40)]
@@ -189,7 +189,7 @@ def overload(world, count):
     need(drawn > 0 and refused, f"{drawn} drawn, {len(refused)} refused")
     for _, _, headers in refused:
         need(int(headers.get("retry-after", "0")) >= 1, "a refusal without Retry-After")
-    # A refusal waits for no picture, however slow the machine is, and neither does /livez.
+    # Neither a refusal nor /livez waits for a picture, however slow the machine is.
     took, picture = (statistics.median(a[1] for a in answers if (a[0] == 200) == good)
                      for good in (False, True))
     alive = statistics.median(health)
@@ -201,9 +201,10 @@ def overload(world, count):
             "machine)")
 
 
-@case("patches faster than they can be drawn", 2000, 400)
+@case("patches faster than they can be rendered", 2000, 400)
 def flood(world, count):
-    """One viewer's flood: the newest view wins, another is served meanwhile."""
+    """A flood of patches by one client: the newest view wins, and another client is served
+    meanwhile."""
     daemon = world.daemon()
     with Stream(daemon.port) as one, Stream(daemon.port) as other:
         for n in range(count):
@@ -212,4 +213,4 @@ def flood(world, count):
         last = one.answer_to_patch()
         need(isinstance(last, (bytes, dict)) and got, "no frame")
         need(not isinstance(last, dict) or last["type"] == "unchanged", f"{last}")
-    return "its last view arrives, another viewer is served"
+    return "its last view is rendered, another client is served"

@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
-"""Every fault that docs/design/testing.md lists, tried against a running daemon. A Markdown
-table on stdout: the fault, how often it was tried, what came of it. Linux only.
+"""Provokes every fault listed in docs/design/testing.md in a running daemon. Prints a Markdown
+table of the fault, the number of tries and the result. Linux only.
 
 Usage: faults.py [--program=build/release/windsplat] [--quick] [--count=N] [--only=PART]...
        [--list] [--require-all] [--slack=1]
 
---quick tries each a few times; --count gives all the same number of tries; --only takes cases
-whose name has this part; --slack allows so much more time than is asked of a machine of its own. A
-tool that is not installed or a right that is missing is named, with what was therefore not tried:
-those rows say NOT TRIED, and with --require-all they are failures. Exit code 0: every case that
-was tried is ok."""
+--quick tries each fault a few times; --count sets the number of tries for all; --only selects
+cases by a part of their name; --slack is a factor for the time limits of an idle machine. A
+missing tool or permission is reported with the cases it prevents: those rows say NOT TRIED, and
+with --require-all they are failures. Exit code 0: every case that was tried passed."""
 import argparse
 import pathlib
 import sys
@@ -18,7 +17,7 @@ import time
 import traceback
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-# Cases are entered by being imported, in the order of the table.
+# Importing these modules registers their cases, in the order of the table.
 import cases_http  # noqa: E402, F401
 import cases_stream  # noqa: E402, F401
 import cases_access  # noqa: E402, F401
@@ -30,7 +29,7 @@ from support import CASES, Failed, Untried, World, check_good  # noqa: E402
 
 
 def run_case(world, one, count):
-    """What came of it, and the verdict."""
+    """Runs a case; returns the result and the verdict."""
     try:
         told = one.call(world, count)
         daemon = world.daemon()
@@ -40,7 +39,7 @@ def run_case(world, one, count):
         return str(why), "NOT TRIED"
     except Failed as fault:
         return str(fault), "FAILED"
-    except Exception:  # a fault of the script, or one that it does not foresee
+    except Exception:  # an error of the script, or an unexpected one
         return " / ".join(traceback.format_exc().strip().splitlines()[-3:]), "FAILED"
     finally:
         world.end_case()
@@ -54,8 +53,8 @@ def run(options, world):
     chosen = [c for c in CASES
               if not options.only or any(part in c.name for part in options.only)]
     if not chosen:
-        sys.exit("faults.py: no case has such a name; --list tells them")
-    print("| fault | tried | what came of it | |\n|---|---|---|---|", flush=True)
+        sys.exit("faults.py: unknown case; --list prints the names")
+    print("| fault | tries | result | |\n|---|---|---|---|", flush=True)
     verdicts = []
     for one in chosen:
         count = options.count or (one.quick if options.quick else one.count)
@@ -63,7 +62,7 @@ def run(options, world):
         before = world.shared
         told, verdict = run_case(world, one, count)
         if before is not None and not before.alive():
-            told, verdict = f"the daemon died ({before.child.returncode}); {told}", "FAILED"
+            told, verdict = f"the daemon exited ({before.child.returncode}); {told}", "FAILED"
         verdicts.append(verdict)
         tried = "-" if verdict == "NOT TRIED" else str(count)
         print(f"| {one.name} | {tried} | {cell(told)} | {verdict} |", flush=True)
@@ -78,7 +77,7 @@ def main():
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--count", type=int)
     parser.add_argument("--only", action="append", default=[])
-    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
+    parser.add_argument("--slack", type=float, default=1, help="factor for time limits")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--require-all", action="store_true")
     options = parser.parse_args()

@@ -1,23 +1,22 @@
 #!/usr/bin/env python3
-"""Calls of the system's library that fail inside a running daemon: memory, sockets, files, threads.
-Each fails once at every place of the program that a scripted session reaches; then again with
-many failing in a row. A Markdown table on stdout. Linux only; not for builds with sanitizers,
-which have an allocator of their own.
+"""Makes library calls fail inside a running daemon: memory, sockets, files, threads. Each call
+fails once at every call site that a scripted session reaches; then many consecutive calls fail.
+Prints a Markdown table. Linux only; not for sanitizer builds, which have their own allocator.
 
 Usage: inject.py [--program=build/release/windsplat] [--shim=build/release/tests/libfaults_shim.so]
        [--kind=malloc]... [--phase=serve|guarded|start|drain]... [--count=N] [--quick]
        [--seconds=S] [--slack=1]
 
-The session: the page, a picture, values, a histogram, a file loaded by a job, a saved view made,
-changed and deleted, a stream with frames, a still and a patch that is wrong, the metrics. While it
-runs one call fails; what it hits may be answered by an error or be cut off, but not hang. After it
-a stream that was open all the while must go on, unless the log says that its own connection failed,
-and a new request must work. --count and --seconds end a sweep
-early; the table says how many places were met. Phase guarded: the same on [::1] over TLS, with a
-token, with limits of one address, with logins and SIGHUPs. Phase start: the daemon starts or ends
-with a message and an exit code. Phase drain: it ends with 0 within 10 s. A kind of call of which
-none failed in a phase is a failure: then nothing was tried. Exit code 0: the daemon never died,
-hung, or refused good work afterwards."""
+The session: the page, a picture, values, a histogram, a file loaded by a job, a saved view
+created, changed and deleted, a stream with frames, a still and an invalid patch, the metrics.
+While it runs one call fails; the affected request may be answered by an error or be cut off, but
+must not hang. Afterwards a stream opened before must continue, unless the log says that its own
+connection failed, and a new request must succeed. --count and --seconds end a sweep early; the
+table gives the number of call sites. Phase guarded: the same on [::1] over TLS, with a token,
+limits of one address, logins and SIGHUPs. Phase start: the daemon starts, or exits with a
+message and an exit code. Phase drain: it exits with 0 within 10 s. A kind of call of which none
+failed in a phase is a failure, because nothing was tested. Exit code 0: the daemon never
+crashed, hung, or refused valid requests afterwards."""
 import argparse
 import http.client
 import json
@@ -38,22 +37,23 @@ from support import (PATIENCE_S, ROOT, SAMPLE, Closed, Door, Failed, Stream,  # 
                      Untried, ask, check_good, check_good_stream, need, picture, small_view,
                      wait_for)
 
-STEP_S = 20  # a step that takes longer hangs
-# But for a job: it may wait for others, left by sessions that were cut off, and each may take
+STEP_S = 20  # a step that takes longer counts as hanging
+# A job may take longer: it may wait for jobs of sessions that were cut off, and each may take
 # loader::Limits::open_time, 60 s.
 JOB_S = 200
 DRAIN_S = 10
-BYSTANDERS_MAX, BYSTANDERS_SHARE = 2, 0.2  # that end since the call was made for them
-QUIET_ROUNDS = 2  # sessions without a new place end a sweep
-# Asked for its folder as the daemon starts; it ends the program where it finds no memory.
+# streams that may end because the failed call was made for them
+BYSTANDERS_MAX, BYSTANDERS_SHARE = 2, 0.2
+QUIET_ROUNDS = 2  # number of sessions without a new call site that end a sweep
+# This library reads its folder at startup and terminates the program if it has no memory.
 LIBRARY = "libeccodes"
-BURST = 40  # calls in a row that fail
-LOG_S = 10  # until a line of the log is here
-# What the log says of a stream that ended, and where it had no memory to say so.
+BURST = 40  # consecutive failing calls
+LOG_S = 10  # time limit for a line of the log to appear
+# Log messages about the end of a stream, and those that replace them without memory.
 ENDS = ("connection failed", "session disconnected", "closing session")
 LOST_LINES = ("log line lost", "no memory to log details")
-SERVED = [kind for kind in KINDS if kind != "thread"]  # all threads are there from the start
-# What is called at all, by phase: each must fail there.
+SERVED = [kind for kind in KINDS if kind != "thread"]  # all threads are created at startup
+# Kinds of calls that occur in each phase: each must have failed there.
 CALLED = {"serve": SERVED, "guarded": SERVED,
           "start": ["malloc", "open", "socket", "thread"], "drain": ["malloc", "send", "recv"]}
 PHASES = list(CALLED)
@@ -61,7 +61,7 @@ LOST = (OSError, http.client.HTTPException, Closed, json.JSONDecodeError, KeyErr
 
 
 class Session:
-    """What one visitor does. Each step is by itself; `lost` counts those that went wrong."""
+    """The requests of one session. Each step is independent; `lost` counts failed steps."""
 
     def __init__(self, port, turn):
         self.port, self.turn, self.lost, self.faults, self.words = port, turn, 0, [], []
@@ -119,7 +119,8 @@ class Session:
             late = time.monotonic() > end
             time.sleep(0.01)
             job = json.loads(self.get("GET", f"/v1/jobs/{job['id']}").body)
-            # Only a look that began after the end counts: this process may have stood still.
+            # Only a query that started after the deadline counts: this process may have been
+            # stopped.
             if late and job["state"] in ("queued", "running"):
                 jobs = self.get("GET", "/v1/jobs").body.decode()
                 raise Failed(f"the job stays {job['state']}; all jobs: {jobs}")
@@ -160,8 +161,8 @@ class Session:
 
 
 class GuardedSession(Session):
-    """One that logs in, too, with the right token and a wrong one, while the daemon reads its
-    configuration, its token and its certificate again."""
+    """A session that also logs in with the right token and a wrong one, while the daemon reloads
+    its configuration, token and certificate."""
 
     def __init__(self, port, turn, pid):
         super().__init__(port, turn)
@@ -210,7 +211,7 @@ class Sweep:
         file.chmod(0o600)
         config = self.folder / "config"
         config.write_text(json.dumps({"allow-origin": ["https://elsewhere.example"]}))
-        # Limits that are counted and never reached: an answer of 429 would be a step that is lost.
+        # Limits that are counted but never reached: an answer of 429 would be a failed step.
         options = ["--tls-cert", str(cert), "--tls-key", str(key), "--token-file", str(file),
                    "--config", str(config), "--max-render-per-address", "1000000",
                    "--max-bytes-per-address", "1000000000",
@@ -224,7 +225,7 @@ class Sweep:
         self.daemon = self.shim.start(self.options.program, *more, *self.arguments, **how)
         self.door = (Door("::1", self.daemon.port, *self.guards[1:]) if self.guards
                      else Door("127.0.0.1", self.daemon.port))
-        # Undisturbed every step goes well; what is made once is made.
+        # Without faults every step must succeed; this also makes all one-time allocations.
         first = self.session()
         need(not first.words and not first.faults, f"without a fault: {first.words + first.faults}")
         self.new_bystander()
@@ -240,7 +241,7 @@ class Sweep:
         return self.turn % 300
 
     def fail(self, text):
-        """Notes it, and goes on with a new daemon where this one is of no more use."""
+        """Records the failure, and starts a new daemon if this one is no longer usable."""
         log = self.daemon.lines[-14:] if self.daemon else []
         self.failures.append(f"{text}; log: {' / '.join(log)}"[:2500])
         print(f"FAILED: {self.failures[-1]}", file=sys.stderr, flush=True)
@@ -251,10 +252,10 @@ class Sweep:
         self.bystander.round_trip()
 
     def judge(self, what, session, failed, log_from):
-        """After a session in which so many calls failed: the daemon lives, others are served."""
+        """After a session with that many failed calls: the daemon must run and serve others."""
         time.sleep(0.01)
         try:
-            need(self.daemon.alive(), f"{what}: the daemon died ({self.daemon.child.poll()})")
+            need(self.daemon.alive(), f"{what}: the daemon exited ({self.daemon.child.poll()})")
             for fault in session.faults:
                 raise Failed(f"{what}: {fault}")
             self.ask_bystander(failed, log_from)
@@ -267,11 +268,12 @@ class Sweep:
         self.renew()
 
     def ask_bystander(self, failed, log_from):
-        """Its next frame. A call that failed may have been one for the bystander's own sake: its
-        last frame's end, a timer, what is drawn for a view at rest. By that alone it may end."""
+        """Requests the bystander's next frame. A failed call may have belonged to the bystander
+        itself: the end of its last frame, a timer, a refinement at rest. Only in that case may
+        it end."""
         try:
             self.bystander.final_frame(small_view(turn=0.01 * self.next_turn(), size=(32, 24)))
-            self.bystander.round_trip()  # nothing of it is left for the next call that fails
+            self.bystander.round_trip()  # so that no pending work of it meets the next failing call
         except (Closed, ConnectionError, ssl.SSLError) as end:
             need(failed, f"no call failed, but the bystander's stream ended: {end!r}")
             wait_for(lambda: self.says_why(log_from), LOG_S,
@@ -281,7 +283,7 @@ class Sweep:
             self.new_bystander()
 
     def says_why(self, log_from):
-        """Whether the log names the bystander's own connection as failed, or had no memory to."""
+        """Whether the log names the bystander's own connection as failed, or reports lost lines."""
         own = f"request={self.bystander.request_id()}"
         return any(any(words in line for words in LOST_LINES) or
                    own in line and any(words in line for words in ENDS)
@@ -299,7 +301,7 @@ class Sweep:
                 time.monotonic() - since > self.options.seconds)
 
     def serve(self, kind):
-        """Every place once; then runs of failing calls."""
+        """Every call site once; then runs of consecutive failing calls."""
         since, rounds, quiet, hit, lost = time.monotonic(), 0, 0, 0, 0
         self.bystanders_ended = 0
         while quiet < QUIET_ROUNDS and not self.out_of_time(since, rounds):
@@ -324,7 +326,7 @@ class Sweep:
             lost += session.lost
             bursts += 1
             self.judge(f"{kind}, {BURST} calls in a row", session, failed, log_from)
-        told = "every place met" if all_met else "ended by its limit, places are left"
+        told = "every call site reached" if all_met else "stopped at its limit"
         phase = "guarded" if self.guards else "serve"
         self.must_have_failed(kind, phase, hit)
         if self.bystanders_ended > max(BYSTANDERS_MAX, (rounds + bursts) * BYSTANDERS_SHARE):
@@ -334,9 +336,9 @@ class Sweep:
                 f"the bystander ended {self.bystanders_ended} times |")
 
     def must_have_failed(self, kind, phase, hit):
-        """A sweep in which no call failed has tried nothing."""
+        """Reports kinds of which no call failed, because nothing was tested."""
         if hit == 0:
-            self.fail(f"{kind}, {phase}: no call was made to fail")
+            self.fail(f"{kind}, {phase}: no call failed")
 
     def calls_of_a_session(self, kind):
         self.shim.arm(kind, at=1 << 40)
@@ -346,7 +348,7 @@ class Sweep:
         return seen
 
     def at_start(self, kind):
-        """Until it starts without meeting a new place."""
+        """Restarts the daemon until a start reaches no new call site."""
         since, rounds, started, ended, hit, quiet = time.monotonic(), 0, 0, 0, 0, 0
         aborts = 0
         while quiet < QUIET_ROUNDS and not self.out_of_time(since, rounds):
@@ -364,17 +366,17 @@ class Sweep:
                     if code == -signal.SIGABRT and LIBRARY in self.daemon.log():
                         aborts += 1
                         continue
-                    need(code in (1, 2, 3), f"it ended with {code}")
-                    need(any(self.daemon.lines), "it ended without a message")
+                    need(code in (1, 2, 3), f"it exited with {code}")
+                    need(any(self.daemon.lines), "it exited without a message")
                 else:
                     started += 1
                     check_good(self.daemon.port)
-                    need(self.daemon.stop() == 0, "it was stopped and did not end with 0")
+                    need(self.daemon.stop() == 0, "it was stopped and did not exit with 0")
             except (Failed, *LOST) as fault:
                 self.fail(f"{kind} at the start: {fault}")
                 if self.daemon.alive():
                     self.daemon.stop(signal.SIGKILL)
-        told = "every place met" if quiet >= QUIET_ROUNDS else "ended by its limit, places are left"
+        told = "every call site reached" if quiet >= QUIET_ROUNDS else "stopped at its limit"
         self.must_have_failed(kind, "start", hit)
         return (f"| {kind} | start | - | {self.shim.get(kind, 'known')} ({told}) | {hit} "
                 f"| {ended} ended with a message, {started} started, {aborts} were ended by "
@@ -400,7 +402,7 @@ class Sweep:
             slowest = max(slowest, took)
             if code != 0 or took > DRAIN_S * self.options.slack:
                 self.fail(f"{kind} in a drain: ended with {code} after {took:.1f} s")
-        told = "every place met" if quiet >= QUIET_ROUNDS else "ended by its limit, places are left"
+        told = "every call site reached" if quiet >= QUIET_ROUNDS else "stopped at its limit"
         self.must_have_failed(kind, "drain", hit)
         return (f"| {kind} | drain | - | {self.shim.get(kind, 'known')} ({told}) | {hit} "
                 f"| {rounds} drains, the longest {slowest:.1f} s |")
@@ -420,7 +422,7 @@ class Sweep:
             if serves:
                 self.bystander.close()
                 code = self.daemon.stop()
-                need(code == 0, f"the daemon that lived through them ended with {code}")
+                need(code == 0, f"the daemon that survived them exited with {code}")
         return self.failures
 
 
@@ -430,9 +432,9 @@ def parsed_options(words=None):
     parser.add_argument("--shim")
     parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--phase", action="append", choices=PHASES)
-    parser.add_argument("--count", type=int, default=100000, help="rounds of a sweep, at most")
-    parser.add_argument("--seconds", type=float, default=1800, help="of a sweep, at most")
-    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
+    parser.add_argument("--count", type=int, default=100000, help="greatest number of rounds")
+    parser.add_argument("--seconds", type=float, default=1800, help="time limit of a sweep")
+    parser.add_argument("--slack", type=float, default=1, help="factor for time limits")
     parser.add_argument("--quick", action="store_true", help="a few rounds of every sweep")
     options = parser.parse_args(words)
     options.phase = options.phase or PHASES

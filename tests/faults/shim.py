@@ -9,7 +9,7 @@ import struct
 from support import Daemon, Untried
 
 KINDS = ["malloc", "send", "recv", "read", "write", "fsync", "open", "accept", "socket", "thread",
-         "mmap", "random"]  # the order is shim.cpp's
+         "mmap", "random"]  # the same order as in shim.cpp
 FAULTS = {"malloc": errno.ENOMEM, "send": errno.ENOBUFS, "recv": errno.ECONNRESET,
           "read": errno.EIO, "write": errno.ENOSPC, "fsync": errno.EIO, "open": errno.EMFILE,
           "accept": errno.EMFILE, "socket": errno.EMFILE, "thread": errno.EAGAIN,
@@ -22,7 +22,8 @@ DEPTH = 7
 
 
 def plain_addresses():
-    """In the child: code lies at the same places in every process, so that places can be told."""
+    """Runs in the child: disables address randomization, so that call sites have the same
+    addresses."""
     libc = ctypes.CDLL(None)
     libc.personality(ADDR_NO_RANDOMIZE)
 
@@ -55,14 +56,14 @@ class Shim:
         return 8 * (2 + KINDS.index(kind) * len(FIELDS) + FIELDS.index(field))
 
     def arm(self, kind, at, times=1, fault=None):
-        """The calls from the at-th from now on fail."""
+        """Lets the calls from the at-th on fail."""
         self.disarm(kind)
         self.set(kind, "fault", FAULTS[kind] if fault is None else fault)
         self.set(kind, "times", times)
         self.set(kind, "at", at)
 
     def arm_sites(self, kind, times=1):
-        """The next calls from places that have not failed yet fail."""
+        """Lets the next call from each new call site fail."""
         self.disarm(kind)
         self.set(kind, "fault", FAULTS[kind])
         self.set(kind, "times", times)
@@ -70,14 +71,14 @@ class Shim:
         self.set(kind, "sites", 1)
 
     def disarm(self, kind):
-        """How many calls failed since it was armed."""
+        """How many calls have failed since it was armed."""
         failed = self.get(kind, "failed")
         for field in ("at", "sites", "seen", "failed"):
             self.set(kind, field, 0)
         return failed
 
     def forget(self, kind):
-        """No place has failed yet; this forgets those of all kinds."""
+        """Forgets the call sites of all kinds that have failed."""
         struct.pack_into("q", self.page, self.at(kind, "known"), 0)
         begin = 8 * (2 + len(KINDS) * len(FIELDS))
         self.page[begin:BYTES] = bytes(BYTES - begin)

@@ -5,10 +5,10 @@ Linux only.
 Usage: signals.py [--program=build/release/windsplat] [--rounds=50] [--signal=TERM]... [--quick]
        [--slack=1]
 
-TERM: /readyz fails first, streams are closed with 1001, the daemon exits with 0 within 10 s. KILL:
-the next daemon on the same state folder has every acknowledged view and no partial one; a client
-that reconnects and sends its view gets the same picture. HUP: an invalid configuration is logged
-and the old one stays. Exit code 0: all of this holds."""
+TERM: /readyz fails first, streams are closed with 1001, the daemon exits with 0 within 10 s.
+KILL: the next daemon on the same state folder has every acknowledged view and no partial one; a
+client that reconnects and sends its view gets the same picture. HUP: an invalid configuration is
+logged and the old one remains in effect. Exit code 0: all of this holds."""
 import argparse
 import http.client
 import json
@@ -37,9 +37,9 @@ class Load(threading.Thread):
     def __init__(self, port, number):
         super().__init__(daemon=True)
         self.port, self.number, self.over = port, number, False
-        self.code = None  # by which its stream ended
+        self.code = None  # close code of its stream
         self.done = 0
-        self.saved = {}  # id -> the step that was acknowledged last, or the two it may be
+        self.saved = {}  # id -> the last acknowledged step, or the two possible ones
 
     def run(self):
         work = (self.stream, self.pictures, self.views)[self.number % 3]
@@ -74,7 +74,7 @@ class Load(threading.Thread):
         name = json.loads(got.body)["id"]
         self.saved[name] = {0}
         for step in range(1, 4):
-            self.saved[name] = self.saved[name] | {step}  # either, until it is told
+            self.saved[name] = self.saved[name] | {step}  # either, until the answer arrives
             got = ask(self.port, "PATCH", f"/v1/views/{name}", {"step": step},
                       {"Content-Type": "application/merge-patch+json"}, timeout=20)
             if got.status == 200:
@@ -98,8 +98,8 @@ def stop_all(loads):
 
 
 def not_ready(connection, port):
-    """What /readyz says on a connection that was there before, or on a new one where that is no
-    more; "closed" where there is none to be had."""
+    """The status of /readyz on an existing connection, or on a new one if that is closed;
+    "closed" if no connection is possible."""
     try:
         connection.request("GET", "/readyz")
         answer = connection.getresponse()
@@ -121,14 +121,14 @@ def terminate(program, folder, rounds, slack=1):
         daemon = Daemon(program, "--state-dir", str(folder / "state"), SAMPLE)
         loads = loaded(daemon.port)
         held = http.client.HTTPConnection("127.0.0.1", daemon.port, timeout=20)
-        held.connect()  # there before the drain, asks during it
+        held.connect()  # opened before the drain, used during it
         time.sleep(random.uniform(0.2, 0.8))
         since = time.monotonic()
         daemon.child.send_signal(signal.SIGTERM)
         status = wait_for(lambda at=daemon.port, one=held: not_ready(one, at), SEEN_S * slack,
                           "/readyz goes on saying 200")
         held.close()
-        # No further signal: a second one would end it at once.
+        # No further signal is sent: a second one would terminate the daemon at once.
         code = daemon.stop(0, patience=3 * DRAIN_S * slack)
         took = time.monotonic() - since
         stop_all(loads)
@@ -162,9 +162,9 @@ def saved_views(port, loads, tell):
     kept = 0
     for name, steps in ((n, s) for one in loads for n, s in one.saved.items()):
         got = ask(port, "GET", f"/v1/views/{name}")
-        need(got.status == 200, f"{tell}: a saved view is gone: {got.status}")
+        need(got.status == 200, f"{tell}: a saved view is lost: {got.status}")
         step = json.loads(got.body)["view"].get("step", 0)
-        need(step in steps, f"{tell}: a saved view has step {step}, told was {steps}")
+        need(step in steps, f"{tell}: a saved view has step {step}, acknowledged was {steps}")
         kept += 1
     return kept
 
@@ -179,11 +179,11 @@ def kill(program, folder, rounds, _slack=1):
     everything = []
     for n in range(rounds):
         daemon = Daemon(program, "--state-dir", str(state), SAMPLE, listen=listen)
-        if n % 10 == 0:  # of all that were ever saved
+        if n % 10 == 0:  # checks all views saved so far
             kept += saved_views(daemon.port, everything, f"round {n}")
         with Stream(daemon.port) as viewer:
             got = viewer.final_frame(view)[64:]
-        need(picture in (None, got), "a viewer that comes back sees another picture")
+        need(picture in (None, got), "a reconnecting client gets another picture")
         picture = got
         for line in daemon.lines:
             need("ignoring an unreadable" not in line,
@@ -206,12 +206,12 @@ def kill(program, folder, rounds, _slack=1):
     need(kept > 0, "no view was ever saved")
     need(not left, f"left behind: {left[:3]}")
     return (f"{kept} looks at saved views, none lost or half written; the viewer's picture is the "
-            f"same each time; {parts} half-written files cleared away")
+            f"same each time; {parts} incomplete files removed")
 
 
 SPOILED = ["", "{", '{"nothing": 1}', '{"listen": 7}', "\0\1\2", '{"max-sessions": -5}', "[]",
            '{"\\u001b[31m\\n": 1}', "x" * 100000, '{"log-level": "loud"}',
-           # The half that is good must not be taken either.
+           # The valid half must not be applied either.
            '{"allow-origin": ["https://second.example"], "log-level": "loud"}']
 ORIGINS = ["https://first.example", "https://second.example"]
 
@@ -244,26 +244,26 @@ def hang_up(program, folder, rounds, _slack=1):
             if how <= len(SPOILED):
                 wait_for(lambda at=said: [line for line in daemon.lines[at:]
                                           if " warn " in line or " error " in line],
-                         PATIENCE_S, f"nothing in the log about a spoiled config ({how})")
+                         PATIENCE_S, f"no log message about an invalid configuration ({how})")
             else:
                 wait_for(lambda at=said: [line for line in daemon.lines[at:]
                                           if "configuration reloaded" in line],
-                         PATIENCE_S, "nothing in the log about a config that is good")
+                         PATIENCE_S, "no log message about a valid configuration")
             for origin, status in ((allowed, 101), (other, 403)):
                 with Stream(daemon.port, [("Origin", origin)]) as one:
                     need(one.status == status, f"after config {how} {origin} is answered by "
                          f"{one.status}, not {status}")
             check_good(daemon.port)
         stop_all(loads)
-        need(daemon.alive(), "the daemon died")
+        need(daemon.alive(), "the daemon exited")
         need(all(line.isprintable() for line in daemon.lines), "control characters in the log")
         code = daemon.stop()
         need(code == 0, f"ended with {code}")
     finally:
         if daemon.alive():
             daemon.stop(signal.SIGKILL)
-    return (f"{taken} times the new origin is let in and the old one refused; the old config "
-            "stays, and its origins, with each spoiled one, which the log tells; streams go on")
+    return (f"{taken} times the new origin is accepted and the old one refused; the old config "
+            "remains in effect after each invalid one, which is logged; streams continue")
 
 
 LOOPS = {"TERM": terminate, "KILL": kill, "HUP": hang_up}
@@ -275,11 +275,11 @@ def main():
     parser.add_argument("--program", default=str(ROOT / "build/release/windsplat"))
     parser.add_argument("--rounds", type=int, default=50)
     parser.add_argument("--signal", action="append", choices=list(LOOPS))
-    parser.add_argument("--slack", type=float, default=1, help="times are so much longer")
-    parser.add_argument("--quick", action="store_true", help="a few rounds of each")
+    parser.add_argument("--slack", type=float, default=1, help="factor for time limits")
+    parser.add_argument("--quick", action="store_true", help="few rounds of each")
     options = parser.parse_args()
     failed = 0
-    print("| signal | rounds | what came of it | |\n|---|---|---|---|", flush=True)
+    print("| signal | rounds | result | |\n|---|---|---|---|", flush=True)
     for name in options.signal or list(LOOPS):
         rounds = QUICK_ROUNDS[name] if options.quick else options.rounds
         with tempfile.TemporaryDirectory(prefix="windsplat-signals-") as folder:

@@ -26,20 +26,20 @@ PATIENCE_S = 60
 
 
 class Failed(Exception):
-    """What must not be."""
+    """A violated requirement."""
 
 
 class Untried(Exception):
-    """A tool or a right that is missing: nothing was tried."""
+    """A tool or permission is missing: nothing was tested."""
 
 
 Answer = collections.namedtuple("Answer", "status headers body")
-# Where a daemon is: its address, a TLS context or None, a token or None.
+# The location of a daemon: its address, a TLS context or None, a token or None.
 Door = collections.namedtuple("Door", "host port tls token", defaults=(None, None))
 
 
 def door_of(port):
-    """Of what the functions below call a port: a Door, or the number of one on 127.0.0.1."""
+    """The Door for what the functions below call a port: a Door, or a port number on 127.0.0.1."""
     return port if isinstance(port, Door) else Door("127.0.0.1", port)
 
 
@@ -49,7 +49,7 @@ def need(condition, words):
 
 
 def wait_for(condition, seconds, words):
-    """What the condition gives once it gives something true."""
+    """Polls the condition; returns its first true value."""
     end = time.monotonic() + seconds
     while True:
         got = condition()
@@ -60,7 +60,7 @@ def wait_for(condition, seconds, words):
 
 
 class Daemon:
-    """One on a free port. Its log is read by a thread, line by line."""
+    """A daemon on a free port. A thread reads its log line by line."""
 
     def __init__(self, program, *arguments, env=None, prepare=None, must_start=True,
                  listen="127.0.0.1:0"):
@@ -97,7 +97,7 @@ class Daemon:
         return "\n".join(self.lines)
 
     def stop(self, how=signal.SIGTERM, patience=PATIENCE_S):
-        """The exit code."""
+        """Stops the daemon; returns the exit code."""
         if self.alive():
             self.child.send_signal(how)
         try:
@@ -134,7 +134,7 @@ def open_files(pid):
 
 
 def cpu_s(pid):
-    """Processor seconds of all its threads that still live."""
+    """Processor seconds of all its running threads."""
     total = 0
     for task in os.listdir(f"/proc/{pid}/task"):
         try:
@@ -176,7 +176,7 @@ def talk(port, request, timeout=PATIENCE_S, pieces=1 << 30):
             for at in range(0, len(request), pieces):
                 one.sendall(request[at:at + pieces])
         except OSError:
-            pass  # it may have closed already
+            pass  # it may already be closed
         try:
             while piece := one.recv(65536):
                 got += piece
@@ -189,7 +189,7 @@ def talk(port, request, timeout=PATIENCE_S, pieces=1 << 30):
 
 def status_of(got):
     words = got.split(b" ", 2)
-    need(len(words) > 2 and words[0].startswith(b"HTTP/1."), f"no answer by HTTP: {got[:80]!r}")
+    need(len(words) > 2 and words[0].startswith(b"HTTP/1."), f"not an HTTP answer: {got[:80]!r}")
     return int(words[1])
 
 
@@ -208,7 +208,7 @@ def picture(port, dataset=SAMPLE, size=(64, 48), azimuth=0.0, timeout=PATIENCE_S
 
 
 def check_good(port, dataset=SAMPLE):
-    """A valid request gets a picture, after those still rendering for others."""
+    """A valid request must get a picture, possibly after those still rendering for others."""
     end = time.monotonic() + PATIENCE_S
     while True:
         got = picture(port, dataset, azimuth=time.monotonic() % 360)
@@ -216,13 +216,13 @@ def check_good(port, dataset=SAMPLE):
             break
         time.sleep(0.2)
     need(got.status == 200 and got.body[:2] == b"\xff\xd8",
-         f"a good request is answered by {got.status}: {got.body[:200]!r}")
+         f"a valid request is answered by {got.status}: {got.body[:200]!r}")
 
 
 # --- the stream ----------------------------------------------------------------------------------
 
 class Closed(Exception):
-    """The daemon ended the stream: by this code, or 0 without one."""
+    """The daemon ended the stream, with this code, or 0 without one."""
 
     def __init__(self, code, reason=""):
         super().__init__(f"{code} {reason}")
@@ -230,7 +230,7 @@ class Closed(Exception):
 
 
 class Stream:
-    """A WebSocket by its bytes, so that any of them may be wrong."""
+    """A WebSocket on the byte level, so that any byte may be invalid."""
 
     def __init__(self, port, headers=(), receive_buffer=0, timeout=PATIENCE_S, target="/v1/stream",
                  protocols="windsplat.v1"):
@@ -283,14 +283,14 @@ class Stream:
         return out
 
     def send(self, opcode, payload=b"", fin=True, reserved=0, length=None):
-        """`length`: the one told, if another than the payload's."""
+        """`length`: the declared length, if it differs from the payload's."""
         self.socket.sendall(frame(opcode, payload, fin, reserved, NO_MASK, length))
 
     def say(self, message):
         self.send(1, json.dumps(message).encode())
 
     def frame(self):
-        """First byte and payload of the next frame; a ping is answered, an end is Closed."""
+        """First byte and payload of the next frame; pings are answered; an end raises Closed."""
         first, second = self.take(2)
         size = second & 0x7F
         if size == 126:
@@ -307,7 +307,7 @@ class Stream:
         return first, part
 
     def message(self):
-        """Opcode and payload of the next whole message; an end is Closed."""
+        """Opcode and payload of the next complete message; an end raises Closed."""
         opcode, payload = None, b""
         while True:
             first, part = self.frame()
@@ -320,13 +320,13 @@ class Stream:
                 return opcode, payload
 
     def round_trip(self):
-        """A ping and its pong: the daemon has dealt with all that was sent before."""
+        """A ping and its pong: the daemon has processed everything sent before."""
         self.send(9, b"settled")
         while self.frame() != (0x8A, b"settled"):
             pass
 
     def request_id(self):
-        """By which the daemon's log names this stream."""
+        """The name of this stream in the daemon's log."""
         for line in self.head.split(b"\r\n"):
             name, _, value = line.partition(b":")
             if name.lower() == b"x-request-id":
@@ -387,7 +387,7 @@ CASES = []
 
 
 def case(name, count, quick):
-    """Names a fault; so many tries of it, and so many of a quick round."""
+    """Registers a fault with its number of tries, and that of a quick round."""
     def keep(call):
         CASES.append(Case(name, call, count, quick))
         return call
@@ -395,13 +395,13 @@ def case(name, count, quick):
 
 
 def is_sanitized(program):
-    """Sanitizers keep what is freed, and must come before all libraries that are preloaded."""
+    """Sanitizers retain freed memory, and must precede all preloaded libraries."""
     code = pathlib.Path(program).read_bytes()
     return b"__asan_init" in code or b"__tsan_init" in code
 
 
 class World:
-    """What cases are given: the program, a folder of their own, and a daemon that lives on."""
+    """The environment of the cases: the program, a folder for each, and a shared daemon."""
 
     def __init__(self, program, folder, quick, slack):
         self.program, self.folder, self.quick, self.slack = program, folder, quick, slack
@@ -426,13 +426,13 @@ class World:
         return out
 
     def daemon(self):
-        """The one that cases share; none of them may harm it."""
+        """The shared daemon; no case may harm it."""
         if self.shared is None or not self.shared.alive():
             self.shared = Daemon(self.program, "--max-sessions", "64", SAMPLE)
         return self.shared
 
     def start(self, *arguments, **how):
-        """One for this case alone, ended after it whatever happens."""
+        """A daemon for this case alone, stopped after it in any case."""
         self.started.append(Daemon(self.program, *arguments, **how))
         return self.started[-1]
 

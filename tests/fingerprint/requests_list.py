@@ -1,5 +1,5 @@
-"""The requests of the fingerprint: (method, target, headers, body), in order. What changes the
-daemon comes last, so that what stands before it does not depend on it."""
+"""The requests of the fingerprint: (method, target, headers, body), in order. Requests that
+change the daemon's state are last, so that the others do not depend on them."""
 import json
 
 DATASETS = ["tornado:24x24x24", "climate:32x16x6", "efield:16x16x16"]

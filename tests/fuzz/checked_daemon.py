@@ -1,4 +1,4 @@
-"""A daemon that is asked to open hostile files, and what its answers are checked for."""
+"""A daemon that opens hostile files, and the checks of its answers."""
 
 import collections
 import ctypes
@@ -20,12 +20,12 @@ import seeds_escaping
 import strace_log
 
 MEMORY_LIMIT = 1 << 30
-CALM = (503, 507)  # the 5xx that are answers
+CALM = (503, 507)  # 5xx statuses that are valid answers
 LIBRARIES = ["/usr/share/eccodes/definitions"]
 
 
 class Failure(Exception):
-    """What must not be."""
+    """A violated requirement."""
 
 
 class Refused(Exception):
@@ -33,7 +33,7 @@ class Refused(Exception):
 
 
 class Watch:
-    """Counts opens of the files in a folder, by whatever process, through inotify."""
+    """Counts, through inotify, opens of the files in a folder by any process."""
 
     def __init__(self, folder):
         libc = ctypes.CDLL(None, use_errno=True)
@@ -95,8 +95,8 @@ class Daemon:
             except (http.client.HTTPException, OSError) as fault:
                 self.own.connection.close()
                 del self.own.connection
-                if attempt:  # a kept connection may have been closed meanwhile, a new one not
-                    raise Failure(f"the connection broke at {method} {path}: {fault!r}") from fault
+                if attempt:  # only a kept connection may have been closed by the daemon
+                    raise Failure(f"connection failed during {method} {path}: {fault!r}") from fault
 
     def json(self, method, path, body=None):
         status, headers, data = self.ask(method, path, body)
@@ -104,9 +104,9 @@ class Daemon:
         return judged(status, headers, data)
 
     def vitals(self):
-        """Resident MB and open files; fails if it is not there."""
+        """Resident MB and number of open files; fails if the daemon has ended."""
         if self.child.poll() is not None:
-            raise Failure(f"the daemon died: {self.child.returncode}")
+            raise Failure(f"the daemon exited: {self.child.returncode}")
         if self.ask("GET", "/livez")[0] != 200:
             raise Failure("/livez does not answer 200")
         status = pathlib.Path(f"/proc/{self.child.pid}/status").read_text()
@@ -116,7 +116,7 @@ class Daemon:
         return resident, len(os.listdir(f"/proc/{self.child.pid}/fd"))
 
     def stop(self):
-        """Its exit code, once what watched it has written everything."""
+        """Stops the daemon; returns its exit code once its log and trace are complete."""
         self.child.terminate()
         code = self.child.wait(60)
         end = f"{self.child.pid} +++ exited"
@@ -130,7 +130,7 @@ class Daemon:
 def check_for_marks(data):
     marks = (str(seeds_escaping.MARK_NUMBER), seeds_escaping.MARK_TEXT)
     if any(mark.encode() in data for mark in marks):
-        raise Failure(f"what lies outside came back: {data[:300]!r}")
+        raise Failure(f"content from outside the data root was returned: {data[:300]!r}")
 
 
 def no_constant(name):
@@ -138,7 +138,7 @@ def no_constant(name):
 
 
 def judged(status, headers, data):
-    """The JSON of a good answer. Raises Refused or Failure."""
+    """The JSON of a successful answer. Raises Refused or Failure."""
     kind = headers.get("Content-Type", "")
     try:
         parsed = json.loads(data, parse_constant=no_constant) if data else None
@@ -163,7 +163,7 @@ def refusal(problem, status=None):
 
 
 def check_numbers(value, where):
-    """Every number is one; null may stand for what is not there."""
+    """Checks that every number is finite; null may represent a missing value."""
     if isinstance(value, bool) or value is None or isinstance(value, str):
         return
     if isinstance(value, (int, float)):
@@ -197,7 +197,7 @@ def check_picture(daemon, dataset):
         judged(status, headers, data)
     if headers["Content-Type"] != "image/jpeg" or data[:2] != b"\xff\xd8" \
             or data[-2:] != b"\xff\xd9":
-        raise Failure(f"a picture of type {headers['Content-Type']} that begins {data[:8]!r}")
+        raise Failure(f"a picture of type {headers['Content-Type']} that starts with {data[:8]!r}")
 
 
 def check_probe(daemon, dataset, about):
@@ -208,7 +208,8 @@ def check_probe(daemon, dataset, about):
     try:
         probe = daemon.json("GET", f"/v1/datasets/{dataset}/probe?{at}")
     except Refused as reason:
-        if "outside the box of the data" in str(reason):  # columns stand where no axis tells
+        # some columns have positions that no axis contains
+        if "outside the box of the data" in str(reason):
             return
         raise
     check_numbers(probe, "probe")
@@ -227,7 +228,7 @@ def check_histogram(daemon, dataset, about):
 
 
 def open_dataset(daemon, path):
-    """Its id. Raises Refused or Failure."""
+    """Opens a file; returns the dataset's id. Raises Refused or Failure."""
     until = time.monotonic() + daemon.patience
     job = daemon.json("POST", "/v1/datasets", json.dumps({"path": path}))
     pause = 0.01
@@ -243,7 +244,7 @@ def open_dataset(daemon, path):
 
 
 def try_file(daemon, path):
-    """Raises Refused if it does not load, or not all of it; Failure."""
+    """Loads all steps. Raises Refused if any of them does not load, or Failure."""
     dataset = urllib.parse.quote(open_dataset(daemon, path), safe="")
     try:
         about = daemon.json("GET", f"/v1/datasets/{dataset}")
@@ -266,12 +267,13 @@ def write_case(folder, path, files, links):
 
 
 def plain(reason):
-    """A reason without what differs from file to file."""
+    """A reason without the parts that depend on the file."""
     return re.sub(r"-?\d+(\.\d+)?(e[+-]?\d+)?", "N", re.sub(r"'[^']*'", "'...'", reason))[:150]
 
 
 def check_controls(daemon, root, outside):
-    """What lies outside is recognised when it does come back: from copies that lie inside."""
+    """Verifies with copies inside the data root that the content of outside files would be
+    recognised."""
     for name in ("mark.vti", "mark.dx", "mark.h5"):
         shutil.copy(outside / name, root / name)
         try:

@@ -1,24 +1,25 @@
 #!/usr/bin/env python3
-"""Mutates small datasets whose every number is known, and compares what two daemons report and draw
-of each with that truth.
+"""Mutates small datasets whose values are all known, and compares the reports and pictures of two
+daemons with that truth.
 
     tests/fuzz/draw_mutants.py --count 340                # the short form, in ctest
     tests/fuzz/draw_mutants.py --count 10000 --reasons 20
     tests/fuzz/draw_mutants.py --only 1234 --keep found   # one file again, kept in a folder
 
 mutate_files.py changes bytes, and nearly all of its files are refused when they are opened. Here
-the mutation acts on the dataset (model.py): values, attributes, axes, times, packing, chunk tables
+the mutation changes the dataset (model.py): values, attributes, axes, times, packing, chunk tables
 (model_mutations.py). The result is then written as a file of each format (model_writers.py,
-model_grib.py), so most files open, and what they hold is known without reading them.
+model_grib.py), so most files open, and their contents are known without reading them.
 
-Every file is opened by two daemons, with one render thread and with three. Compared with the truth
-are the range and the count of masked samples of each field, over all steps and at the last one, the
-values at some samples, the coordinates of the axes and the dates. Both rendering methods draw the
-last step; each picture must be finite, within [0, 1], premultiplied, and empty if all samples are
-masked. Both daemons must give the same bytes. CPU time per file and peak memory are bounded.
+Two daemons open every file, with one render thread and with three. The following are compared with
+the truth: the range and the count of masked samples of each field, over all steps and at the last
+one, the values at some samples, the coordinates of the axes and the dates. Both rendering methods
+render the last step; each picture must be finite, within [0, 1], premultiplied, and empty if all
+samples are masked. Both daemons must give the same bytes. CPU time per file and peak memory are
+bounded.
 
-Needs python3-netcdf4. The files depend on --seed alone. Exit code 0: no assertion failed, and at
-least half of the files of each format were opened and drawn by both methods.
+Needs python3-netcdf4. The files depend on --seed only. Exit code 0: no assertion failed, and at
+least half of the files of each format were opened and rendered by both methods.
 """
 
 import argparse
@@ -58,7 +59,7 @@ class Process:
         self.cpu = self.cpu_seconds()
 
     def cpu_seconds(self):
-        """Of the daemon, and of those of its loaders that ended."""
+        """Peak memory of the daemon, and of its ended loaders."""
         stat = pathlib.Path(f"/proc/{self.daemon.child.pid}/stat").read_text()
         return sum(map(int, stat.rpartition(")")[2].split()[11:15])) / os.sysconf("SC_CLK_TCK")
 
@@ -79,7 +80,8 @@ def expect_near(reported, truth, what):
 
 
 def check_range(reported, masked, values, model, what):
-    """values: (component, ...) of the truth. An exact file is compared, a resampled one bounded."""
+    """values: (component, ...) of the truth. Exact datasets are compared, resampled ones
+    bounded."""
     truth, absent = models.range_and_masked(values)
     if model.resampled:
         slack = 1e-5 * max(map(abs, truth or [0])) + 1e-30
@@ -96,7 +98,7 @@ def check_range(reported, masked, values, model, what):
 
 
 def truths(about, model):
-    """(field, truth) of those that the file holds."""
+    """(field, truth) of those that the file contains."""
     out = []
     for field in about["fields"]:
         values = model.truth(model.vectors.get(field["name"], field["components"]))
@@ -147,7 +149,7 @@ def check_axes(about, model):
         truth = np.sort(model.axes[a].values)
         if reported is None or len(reported) != len(truth) or not np.allclose(
                 np.sort(reported), truth, rtol=1e-6, atol=1e-6 * (truth[-1] - truth[0])):
-            raise Failure(f"the axis {a} is at {reported}, not at {truth.tolist()}")
+            raise Failure(f"axis {a} has coordinates {reported}, not {truth.tolist()}")
 
 
 def check_times(about, model):
@@ -173,8 +175,8 @@ def picture(daemon, view):
 
 
 def view_of(about, step, method, dice):
-    """From any side, also from within: every line, however weak, and fog of the last scalar over
-    its whole range."""
+    """A view from any direction, also from within: every line, however weak, and the last scalar
+    as a medium over its whole range."""
     view = {"dataset": about["id"], "step": step, "image": {"width": 64, "height": 48},
             "method": {"name": method, "detail": str(dice.choice(["auto", "full"]))},
             "camera": {"projection": str(dice.choice(["perspective", "orthographic"])),
@@ -185,7 +187,7 @@ def view_of(about, step, method, dice):
         view["vector"] = {"minMagnitude": 0, "stride": int(dice.integers(1, 3))}
     for field in about["fields"]:
         if field["kind"] == "scalar" and field["range"]:
-            low, high = np.clip(field["range"], -9e37, 9e37).tolist()  # a view has limits
+            low, high = np.clip(field["range"], -9e37, 9e37).tolist()  # limits of the view
             if low == high:
                 low, high = low - abs(low) / 2 - 1, high + abs(high) / 2 + 1
             view["scalars"] = [{"field": field["name"], "extinction": [[low, 1], [high, 5]],
@@ -210,8 +212,8 @@ def check_picture(data, method, empty):
 
 
 def examine(process, path, model, seed):
-    """What a daemon reports and draws of a file, to be compared with the other's, and whether any
-    pixel is drawn. Raises Refused or Failure."""
+    """The reports and pictures of one daemon for a file, to be compared with those of the other,
+    and whether any pixel is covered. Raises Refused or Failure."""
     daemon = process.daemon
     dataset = urllib.parse.quote(open_dataset(daemon, path), safe="")
     answers, drawn = [], []
@@ -234,7 +236,7 @@ def examine(process, path, model, seed):
             drawn.append(check_picture(data, method, empty))
             answers.append(data)
         process.check_cpu()
-        # Again: by now it has the ranges of all steps.
+        # Repeated, because it now includes the ranges of all steps.
         answers.append(daemon.json("GET", f"/v1/datasets/{dataset}"))
     finally:
         daemon.json("DELETE", f"/v1/datasets/{dataset}?forget=true")
@@ -253,7 +255,7 @@ class Run:
         self.pool = concurrent.futures.ThreadPoolExecutor(len(processes))
 
     def outcome_of(self, path, model, number):
-        """refused, drawn or failed, and why."""
+        """Returns refused, drawn or failed, and the reason."""
         asked = [self.pool.submit(examine, process, path, model, number)
                  for process in self.processes]
         results = []
@@ -270,7 +272,7 @@ class Run:
         for result in results:
             if isinstance(result, Refused):
                 kind = "failed" if model.must_open else "refused"
-                return kind, ("a sound file was refused: " if model.must_open else "") + str(result)
+                return kind, ("a valid file was refused: " if model.must_open else "") + str(result)
         (first, visible), (second, _) = results
         for one, other, what in zip(first, second, (*METHODS, "the description")):
             if one != other:
@@ -283,7 +285,7 @@ class Run:
         folder = self.root / f"m{number}"
         for process in self.processes:
             if process.daemon.child.poll() is not None:
-                sys.exit(f"draw_mutants: a daemon died before m{number}: "
+                sys.exit(f"draw_mutants: a daemon exited before m{number}: "
                          + "; ".join(self.failures[-3:]))
         outcome, text = self.outcome_of(write_case(folder, path, files, {}), model, number)
         if self.options.keep and (outcome == "failed" or self.options.only is not None):
@@ -306,7 +308,7 @@ class Run:
         if peak > self.options.peak_mib:
             self.failures.append(f"a daemon had {peak:.0f} MiB resident")
         if (code := process.daemon.stop()) != 0:
-            self.failures.append(f"a daemon ended with {code}")
+            self.failures.append(f"a daemon exited with {code}")
 
     def report(self):
         columns = ("files", "seen", "drawn", "refused", "failed")
@@ -340,13 +342,13 @@ def parsed_options():
     parser.add_argument("--program", default=str(build / "release/windsplat"))
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, help="this file alone")
-    parser.add_argument("--format", help="this format alone")
-    parser.add_argument("--keep", help="a folder for files that failed")
+    parser.add_argument("--only", type=int, help="number of the only file to test")
+    parser.add_argument("--format", help="the only format to test")
+    parser.add_argument("--keep", help="folder for failing files")
     parser.add_argument("--patience", type=float, default=90, help="seconds for a call")
     parser.add_argument("--peak-mib", type=float, default=256,
-                        help="resident memory that a daemon may have")
-    parser.add_argument("--reasons", type=int, default=0, help="show so many reasons")
+                        help="permitted resident memory of a daemon")
+    parser.add_argument("--reasons", type=int, default=0, help="number of reasons to print")
     options = parser.parse_args()
     options.strace = False
     return options
@@ -373,7 +375,7 @@ def main():
     for text in run.failures[:50]:
         print("  " + text[:300])
     if too_few:
-        print(f"fewer than half of the files were drawn: {', '.join(too_few)}")
+        print(f"fewer than half of the files were rendered: {', '.join(too_few)}")
     return 1 if run.failures or too_few else 0
 
 

@@ -1,6 +1,6 @@
-"""HDF5 files byte by byte (superblock 0, object headers 1), for what no library writes for a test:
-datasets that lie elsewhere, by an external link, by external storage, as a virtual dataset. And the
-sums of headers set right after a mutation, which otherwise is found before it is read."""
+"""Writes HDF5 files byte by byte (superblock 0, object headers 1), for features that no library
+writes: datasets stored elsewhere by an external link, external storage or as a virtual dataset.
+Also corrects header checksums after a mutation, which would otherwise be detected first."""
 
 import struct
 
@@ -32,7 +32,7 @@ def external_link(name, file, path):
 
 
 def dataset(dims, layout, more=()):
-    """Of 32-bit floats, little-endian."""
+    """The type of 32-bit little-endian floats."""
     space = struct.pack("<BBBx4x", 1, len(dims), 0) + struct.pack(f"<{len(dims)}Q", *dims)
     number = struct.pack("<BBBBIHHBBBBI", 0x11, 0x20, 31, 0, 4, 0, 32, 23, 8, 0, 23, 127)
     return object_header([(1, space), (3, number), (5, bytes([2, 2, 2, 0])), (8, layout), *more])
@@ -92,7 +92,7 @@ class File:
 
 
 def lookup3(data):
-    """Bob Jenkins' hash, with which the format sums its blocks."""
+    """Bob Jenkins' hash, the checksum of the format's blocks."""
     mask = 0xFFFFFFFF
 
     def rotated(x, by):
@@ -124,7 +124,7 @@ def lookup3(data):
 
 
 def summed_anew(data):
-    """With the checksums of a superblock 2 or 3 and of object headers 2 as they should be."""
+    """Corrects the checksums of superblocks 2 and 3 and of version 2 object headers."""
     out = bytearray(data)
     if data[8:9] in (b"\2", b"\3") and len(data) >= 48:
         out[44:48] = struct.pack("<I", lookup3(data[:44]))

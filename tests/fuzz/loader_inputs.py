@@ -1,5 +1,5 @@
-"""What a loader may say to the daemon, honest and not: payloads, frames, and whole calls as turns
-(see targets/fuzz_loader*.cpp). Mirrors server/data/loader/{messages,channel}."""
+"""Valid and hostile messages of a loader to the daemon: payloads, frames, and whole calls as
+turns (see targets/fuzz_loader*.cpp). Mirrors server/data/loader/{messages,channel}."""
 
 import struct
 

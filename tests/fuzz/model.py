@@ -1,15 +1,15 @@
-"""A small dataset whose every number is known, and what the numbers stored in its file mean by the
-conventions of the format. Nothing here reads a file: the truth comes from what was written."""
+"""A small dataset whose values are all known, and the meaning of its stored numbers by the
+conventions of the format. Nothing here reads a file: the truth comes from the written values."""
 
 import warnings
 
 import numpy as np
 
-# Of casts and sums of numbers that are meant not to fit.
+# Casts and sums overflow intentionally.
 warnings.simplefilter("ignore", RuntimeWarning)
 
 FLOAT_MAX = float(np.finfo(np.float32).max)
-# netCDF's default fill values (netcdf.h); there is none of 8-bit types.
+# netCDF's default fill values (netcdf.h); 8-bit types have none.
 DEFAULT_FILL = {"int16": -32767, "uint16": 65535, "int32": -2147483647, "uint32": 4294967295,
                 "int64": -9223372036854775806, "uint64": 18446744073709551614,
                 "float32": float(np.float32(9.969209968386869e36)),
@@ -17,7 +17,7 @@ DEFAULT_FILL = {"int16": -32767, "uint16": 65535, "int32": -2147483647, "uint32"
 
 
 def as_float32(values):
-    """Doubles as the renderer has them: NaN is masked, and so is what float32 cannot hold."""
+    """Values as the renderer receives them: NaN and values beyond float32 are masked."""
     values = np.array(values, np.float64)
     values[~(np.abs(values) <= FLOAT_MAX)] = np.nan
     return values.astype(np.float32)
@@ -38,8 +38,9 @@ class Field:
         self.stored = np.array(stored)
         self.attributes = attributes
         self.absent = np.zeros(self.stored.shape, bool)
-        self.in_file = None  # where it is not `stored`, because a chunk table says otherwise
-        self.packing = None  # GRIB's
+        # the numbers in the file if they differ from `stored`, because of a chunk table
+        self.in_file = None
+        self.packing = None  # of GRIB only
 
     def written(self):
         return self.stored if self.in_file is None else self.in_file
@@ -55,7 +56,7 @@ def plain(field):
 
 
 def listed(field):
-    """Raw files: numbers that are declared missing."""
+    """Raw files: the listed missing values are masked."""
     values = field.stored.astype(np.float64)
     for missing in np.atleast_1d(field.attributes.get("missing", [])):
         values[field.stored == missing] = np.nan
@@ -63,7 +64,7 @@ def listed(field):
 
 
 def near_undef(field):
-    """GrADS: what lies within a hundred thousandth of undef."""
+    """GrADS: values within a hundred thousandth of undef are masked."""
     values = field.stored.astype(np.float64)
     undef = field.attributes["missing"]
     values[np.abs(values - undef) <= abs(undef) / 1e5] = np.nan
@@ -97,7 +98,7 @@ def conventions(field, default_fill=DEFAULT_FILL):
 
 
 def grib(field):
-    """Simple packing: (R + X 2^E) / 10^D, each message with its own."""
+    """Simple packing: (R + X 2^E) / 10^D, with parameters for each message."""
     out = np.empty(field.stored.shape)
     for at, (reference, binary, decimal, _bits) in np.ndenumerate(field.packing):
         with np.errstate(all="ignore"):
@@ -110,8 +111,8 @@ RULES = {"plain": plain, "listed": listed, "near undef": near_undef, "cf": conve
 
 
 class Model:
-    """axes: t, z, y, x. vectors: names of components by the name of the vector, where the file
-    itself groups them. Mutations clear what they make unknown: `must_open` (no reader may refuse
+    """axes: t, z, y, x. vectors: names of components by the name of the vector, if the file
+    groups them. Mutations clear the flags of unknown properties: `must_open` (no reader may refuse
     the file), `exact` (values are known), `placed` (axes are known), `timed` (times are known)."""
 
     def __init__(self, kind, rule, axes, fields, vectors=None):
@@ -133,7 +134,7 @@ class Model:
         return next((field for field in self.fields if field.name == name), None)
 
     def truth(self, components):
-        """(component, time, z, y, x) with common masks, or None if a component is not ours."""
+        """(component, time, z, y, x) with common masks, or None if a component is unknown."""
         fields = [self.field(name) for name in components]
         if not fields or None in fields:
             return None
@@ -143,7 +144,7 @@ class Model:
 
 
 def magnitude(values):
-    """Of the components of a vector, or the values of a scalar; no more than float32 can hold."""
+    """The components of a vector, or the values of a scalar, limited to float32."""
     if len(values) == 1:
         return values[0].astype(np.float64)
     length = np.sqrt((values.astype(np.float64) ** 2).sum(axis=0))
@@ -151,14 +152,14 @@ def magnitude(values):
 
 
 def range_and_masked(values):
-    """Least and greatest value that is not masked, or None, and how many are."""
+    """Least and greatest unmasked value, or None, and the number of masked values."""
     lengths = magnitude(values)
     valid = lengths[~np.isnan(lengths)]
     return ([valid.min(), valid.max()] if valid.size else None), lengths.size - valid.size
 
 
 def random_values(dice, shape, scale=10.0):
-    """Smooth, of both signs, with noise: the same for the same generator."""
+    """Smooth values of both signs with noise; the same for the same generator."""
     t, z, y, x = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
     a, b, c = dice.uniform(0.2, 1.2, 3)
     smooth = np.sin(a * x + t) + np.cos(b * y) + 0.3 * np.sin(c * z + t)

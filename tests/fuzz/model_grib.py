@@ -1,5 +1,5 @@
-"""GRIB 1 and 2 messages byte by byte, in simple packing on a grid of latitudes and longitudes
-(WMO Manual on Codes, templates 3.0, 4.0, 5.0 and 7.0; edition 1 likewise)."""
+"""Writes GRIB 1 and 2 messages byte by byte, in simple packing on a grid of latitudes and
+longitudes (WMO Manual on Codes, templates 3.0, 4.0, 5.0 and 7.0; edition 1 likewise)."""
 
 import struct
 
@@ -15,14 +15,14 @@ I_NEGATIVE, J_POSITIVE, J_CONSECUTIVE, ALTERNATING = 128, 64, 32, 16
 
 
 def signed(value, size):
-    """Sign and magnitude, as GRIB has negative numbers."""
+    """Sign and magnitude, the encoding of negative numbers in GRIB."""
     value = int(value)
     sign = 1 << (8 * size - 1) if value < 0 else 0
     return (abs(value) | sign).to_bytes(size, "big")
 
 
 def ibm_float(value):
-    """Four bytes, and the number that they mean."""
+    """The four bytes, and the number that they represent."""
     if value == 0:
         return b"\0\0\0\0", 0.0
     sign = 0x80 if value < 0 else 0
@@ -37,7 +37,7 @@ def ibm_float(value):
 
 
 def packed_bits(numbers, bits):
-    """Numbers of so many bits each, the greatest bit first."""
+    """Packs numbers of that many bits each, most significant bit first."""
     if not bits:
         return b""
     shifts = np.arange(bits - 1, -1, -1, dtype=np.uint64)
@@ -46,7 +46,7 @@ def packed_bits(numbers, bits):
 
 
 def scanned(grid, scan):
-    """A (y, x) array in the order of the message: rows as they are, unless `scan` says more."""
+    """A (y, x) array in the order of the message: rows unchanged unless `scan` reorders them."""
     if scan & J_CONSECUTIVE:
         grid = grid.T
     if scan & ALTERNATING:
@@ -134,7 +134,7 @@ def edition_of(model):
 
 
 def written(model):
-    """Every field at every step and level is a message; a message may be left out or come twice."""
+    """A message for every field, step and level; messages may be omitted or repeated."""
     messages = []
     for field in model.fields:
         for t in range(model.shape[0]):
@@ -151,10 +151,10 @@ def grib_model(kind, dice):
     out = models.cf_model(kind, dice)
     out.rule = "grib"
     steps, nz, ny, nx = out.shape
-    # Whole numbers of the unit that the edition keeps, so that coordinates are exact.
+    # Multiples of the edition's unit, so that coordinates are exact.
     out.axes["x"].values = np.round(10 + 7.5 * np.arange(nx), 3)
     out.axes["y"].values = np.round(40 - 8.5 * np.arange(ny), 3)
-    # 10, 100 and 200 m have parameters of their own in ecCodes.
+    # ecCodes has separate parameters for 10, 100 and 200 m.
     out.axes["z"].values += 50
     if kind == "grib 1":
         out.axes["z"].values = np.array([1000.0, 850, 500, 200, 100])[:nz]
@@ -181,5 +181,5 @@ def pack(field, at, values, bits, decimal, edition):
 
 
 def kept_reference(wanted, edition):
-    """The nearest number that the edition can keep: IBM's float in 1, IEEE's in 2."""
+    """The nearest representable number: IBM's float in edition 1, IEEE's in edition 2."""
     return ibm_float(wanted)[1] if edition == 1 else float(np.float32(wanted))

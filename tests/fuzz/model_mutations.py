@@ -1,5 +1,5 @@
-"""The mutants of a seed by number: a dataset of each format in turn, and one to three mutations of
-it, applied in a sound order."""
+"""The mutants by number: a dataset of each format in turn, with one to three mutations applied
+in a valid order."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ import model_grib
 import mutations_layout as layout
 import mutations_values as values
 
-# Types and sizes first, what refers to values after the values, chunk tables last.
+# Types and sizes first, mutations that depend on values after those of values, chunk tables last.
 STAGES = (
     (values.integers, values.unsigned, layout.lone_sample, layout.many_samples,
      layout.pressure_levels),
@@ -53,7 +53,7 @@ def model_of(kind, dice):
 
 
 def mutate(model, dice):
-    """One to three mutations."""
+    """Applies one to three mutations."""
     ways = OF_GRIB if model.kind in values.GRIB else OF_OTHERS
     while not model.applied:
         chosen = {ways[int(i)] for i in dice.choice(len(ways), int(dice.integers(1, 4)))}
@@ -63,7 +63,7 @@ def mutate(model, dice):
 
 
 def mutant(seed, number, kind=None):
-    """The same Model whenever it is asked for; of a format, or of each in turn."""
+    """The Model of a number, reproducibly; of one format, or of each in turn."""
     dice = np.random.default_rng([seed, number])
     model = model_of(kind or values.ALL[number % len(values.ALL)], dice)
     mutate(model, dice)

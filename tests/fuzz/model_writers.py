@@ -1,4 +1,4 @@
-"""Model -> the files of a dataset: netCDF by the C library, all others byte by byte."""
+"""Model -> the files of a dataset: netCDF by the C library, other formats byte by byte."""
 
 import gzip
 import json
@@ -67,8 +67,8 @@ def netcdf(model):
 
 
 def layer_chunks(data, layers):
-    """B-trees of version 1 that index chunks of a layer each, as (place of the node, its keys and
-    children in order) (HDF5 file format specification, III.A.1)."""
+    """Version 1 B-trees that index chunks of one layer each, as (position of the node, its keys
+    and children in order) (HDF5 file format specification, III.A.1)."""
     key = struct.Struct("<II5QQ")  # size, filter mask, offsets in 4 dimensions and the element
     at = data.find(b"TREE\1\0")
     while at >= 0:
@@ -81,7 +81,7 @@ def layer_chunks(data, layers):
 
 
 def with_tables(data, layers, tables):
-    """The file with the chunk table of each variable changed: entries (size, filters, address)."""
+    """The file with a modified chunk table of each variable: entries (size, filters, address)."""
     out = bytearray(data)
     found = 0
     for at, rows in layer_chunks(data, layers):
@@ -90,7 +90,7 @@ def with_tables(data, layers, tables):
         for change in tables:
             change(table)
         struct.pack_into("<H", out, at + 6, len(table))
-        # Behind the last child stands a key that none of the chunks reaches.
+        # The last child is followed by a key beyond all chunks.
         bound = data[at + 24 + len(rows) * 56:at + 24 + len(rows) * 56 + 48]
         out[at + 24 + len(table) * 56:at + 24 + len(table) * 56 + 48] = bound
         for i, (layer, (size, filters, address)) in enumerate(sorted(table.items())):
@@ -152,7 +152,7 @@ def json_number(value):
     return value.item() if isinstance(value, np.integer) else value
 
 
-# --- NRRD, raw, GrADS, OpenDX: one step or several of bare numbers -------------------------------
+# --- NRRD, raw, GrADS, OpenDX: plain numbers of one or several steps ----------------------------
 
 def components(model, t):
     """(z, y, x, component) of the vector, and the scalar, at a step."""
@@ -175,7 +175,7 @@ def first_and_spacing(axis):
 
 
 def nrrd(model):
-    """The vector alone."""
+    """The vector only."""
     values, _ = components(model, 0)
     model.fields = [field for field in model.fields if field.name != "heat"]
     ends = [first_and_spacing(model.axes[a]) for a in "xyz"]
@@ -275,7 +275,7 @@ def grads(model):
 
 
 def opendx(model):
-    """The vector alone; the grid of positions counts x slowest."""
+    """The vector only; in the grid of positions x varies slowest."""
     values, _ = components(model, 0)
     model.fields = [field for field in model.fields if field.name != "heat"]
     values = np.ascontiguousarray(values.transpose(2, 1, 0, 3))
@@ -391,7 +391,7 @@ def vtk_legacy(model):
 
 
 def written(model):
-    """Files by name, and the path that is opened."""
+    """The files by name, and the path to open."""
     kind = model.kind
     if kind in NETCDF_FORMATS:
         return netcdf(model)

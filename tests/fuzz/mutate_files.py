@@ -1,23 +1,24 @@
 #!/usr/bin/env python3
-"""Thousands of spoiled files of every format against one daemon, which must outlive them all.
+"""Opens thousands of mutated files of every format with one daemon, which must survive all of them.
 
     tests/fuzz/mutate_files.py --count 10000              # 7 to 10 minutes on two cores
     tests/fuzz/mutate_files.py --count 300                # a quick round
-    tests/fuzz/mutate_files.py --count 1500 --strace      # and what its processes really opened
+    tests/fuzz/mutate_files.py --count 1500 --strace      # also checks every file opened
     tests/fuzz/mutate_files.py --seed 7 --only 1234 --keep found   # one file again, with answers
 
-Every file is posted to a daemon with --data-root; what loads is described, drawn, probed and
-forgotten. First the seeds as they are: those must load. Then mutated ones. A failure is
- - a daemon that died, does not answer, or outgrows its memory limit by more than 10 %;
- - an answer that is neither what was asked for nor a problem with a reason, or a 5xx other than 503
-   and 507; numbers that are none; a call that takes longer than --patience;
- - a file outside the data root that was opened by anybody (watched by inotify), or came back;
- - with --strace: any file a loader opened by name once it was confined, any socket it made, any
-   file that the daemon opened beyond its own, any connection it made, and libraries looked for in
-   the current folder.
-A loader that died is no failure (that is what it is for), but it is counted and the file kept.
-Files, seeds and order depend on --seed alone, given the same tools (nccopy and grib_filter make
-some seeds if they are there; build/test-data gives real ones). Exit code 0: no failure.
+Every file is posted to a daemon with --data-root; loaded datasets are described, rendered, probed
+and forgotten. First the unmodified seeds, which must load, then mutated files. A failure is
+ - a daemon that exits, does not answer, or exceeds its memory limit by more than 10 %;
+ - an answer that is neither a result nor a problem with a reason, or a 5xx other than 503 and 507;
+   invalid numbers; a call that takes longer than --patience;
+ - a file outside the data root that any process opened (watched by inotify), or whose content was
+   returned;
+ - with --strace: any file that a confined loader opened by name, any socket it created, any
+   unexpected file that the daemon opened, any connection it made, and a search for libraries in the
+   current folder.
+A crashed loader is not a failure (it is confined for that purpose), but it is counted and the file
+kept. Files, seeds and order depend on --seed only, given the same tools (nccopy and grib_filter
+create some seeds if installed; build/test-data supplies real files). Exit code 0: no failure.
 """
 
 import argparse
@@ -46,7 +47,7 @@ ESCAPES_SHARE = 0.1
 
 
 def case_of(number, options, kinds):
-    """The seed and the mutated files of a case: the same whenever it is asked for."""
+    """The seed and the mutated files of a case, reproducibly."""
     dice = random.Random(f"{options.seed}/{number}")
     kind = sorted(kinds)[number % len(kinds)]
     escaping = [seed for seed in kinds[kind] if seed.escapes]
@@ -68,7 +69,7 @@ def case_of(number, options, kinds):
 
 
 class Run:
-    """Outcomes by format, and failures."""
+    """Counts outcomes by format, and records failures."""
 
     def __init__(self, options, daemon, root, watch):
         self.options = options
@@ -91,7 +92,7 @@ class Run:
         except Refused as reason:
             outcome, text = "refused", str(reason)
             if sure:
-                outcome, text = "failed", f"a sound file was refused: {text}"
+                outcome, text = "failed", f"a valid file was refused: {text}"
         except (Failure, KeyError, TypeError, IndexError, AttributeError) as fault:
             outcome, text = "failed", repr(fault) if not isinstance(fault, Failure) else str(fault)
         taken = time.monotonic() - begin
@@ -123,7 +124,7 @@ class Run:
         print(f"failed: {text}", flush=True)
 
     def all(self, cases):
-        """Cases are (name, seed, files, sure), eight at a time, checked every 500."""
+        """Cases are (name, seed, files, sure), eight at a time; the daemon is checked every 500."""
         with concurrent.futures.ThreadPoolExecutor(IN_FLIGHT) as pool:
             done = 0
             while chunk := [case for _, case in zip(range(EVERY), cases)]:
@@ -181,12 +182,12 @@ def parsed_options():
     parser.add_argument("--test-data", type=pathlib.Path, default=default / "test-data")
     parser.add_argument("--count", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, help="this mutated file alone")
-    parser.add_argument("--format", help="this format alone")
+    parser.add_argument("--only", type=int, help="number of the only mutated file to test")
+    parser.add_argument("--format", help="the only format to test")
     parser.add_argument("--strace", action="store_true")
-    parser.add_argument("--keep", help="a folder for files that failed")
+    parser.add_argument("--keep", help="folder for failing files")
     parser.add_argument("--patience", type=float, default=90, help="seconds for a call")
-    parser.add_argument("--reasons", type=int, default=0, help="show so many reasons")
+    parser.add_argument("--reasons", type=int, default=0, help="number of reasons to print")
     options = parser.parse_args()
     if options.strace and not shutil.which("strace"):
         sys.exit("mutate_files: strace is not installed")
@@ -210,7 +211,7 @@ def run_in(folder, options):
     watch = Watch(outside)
     (outside / "mark.txt").read_bytes()
     if not watch.seen():
-        sys.exit("mutate_files: inotify sees nothing here")
+        sys.exit("mutate_files: inotify does not work here")
     daemon = Daemon(options, root, folder)
     check_controls(daemon, root, outside)
     watch.seen()
@@ -222,7 +223,7 @@ def run_in(folder, options):
         run.fail(str(fault))
     code = daemon.stop()
     if code != 0:
-        run.fail(f"the daemon ended with {code}")
+        run.fail(f"the daemon exited with {code}")
     if options.strace:
         judge_log(run, options, root, outside)
     run.table()

@@ -1,4 +1,4 @@
-"""Ways to spoil a file: bytes and a random generator in, other bytes out."""
+"""Mutations of files: bytes and a random generator in, changed bytes out."""
 
 import re
 
@@ -14,7 +14,7 @@ HEAD = 1024
 
 
 def place(data, random):
-    """Half of the time within the first kB."""
+    """A position, half of the time within the first kB."""
     if random.random() < 0.5:
         return random.randrange(min(len(data), HEAD))
     return random.randrange(len(data))
@@ -121,7 +121,7 @@ def text_line(data, random, other):
 
 
 def text_word(data, random, other):
-    """A word taken out, twice, or from elsewhere."""
+    """Removes a word, repeats it, or replaces it by another one."""
     words = list(re.finditer(rb"[A-Za-z_.]{2,}|[\"'<>{}\[\]():,=/]", data[:HEAD]))
     if not words:
         return flip_bits(data, random, other)
@@ -132,7 +132,7 @@ def text_word(data, random, other):
 
 
 def text_value(data, random, other):
-    """What stands in quotes becomes another such thing, or a number: the syntax stays whole."""
+    """Replaces a quoted text by another one or by a number; the syntax remains valid."""
     values = list(re.finditer(rb'"([^"<>\n]*)"', data[:HEAD * 4]))
     if not values:
         return text_number(data, random, other)
@@ -158,7 +158,7 @@ def is_text(data):
 
 
 def mutated(data, random, other):
-    """One to four mutations; `other` is a file to take pieces from."""
+    """One to four mutations; `other` is a file from which pieces may be copied."""
     for _ in range(random.choice((1, 1, 1, 2, 4))):
         if not data:
             break

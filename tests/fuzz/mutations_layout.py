@@ -7,8 +7,8 @@ import model as models
 import model_grib
 from mutations_values import CF, GRIB, NETCDF, is_text, of_type
 
-# Axes whose lengths are further apart may be refused: in a box with the longest edge 2 the squares
-# of the smallest cells (1e-19, server/scene/lattice.cpp) must be floats still.
+# Axes with a greater ratio of lengths may be refused: in a box with the longest edge 2, the squares
+# of the smallest cells (1e-19, server/scene/lattice.cpp) must be representable as float.
 LENGTHS_APART_MAX = 1e15
 
 
@@ -40,7 +40,7 @@ def uneven_axis(model, dice):
 
 
 def scaled_axis(model, dice):
-    """Very fine, very wide, far from zero: plain coordinates only."""
+    """Very fine, very wide or far from zero: plain coordinates only."""
     if model.kind in (*GRIB, "grads"):
         return False
     axes = "z" if model.kind in (*CF, "raw+json") else "xyz"
@@ -69,7 +69,7 @@ def lone_sample(model, dice):
         field.absent = field.absent.take([0], axis=at)
         if field.packing is not None:
             field.packing = field.packing[:, :1]
-            model.placed = False  # a level alone has no axis
+            model.placed = False  # a single level has no axis
     return True
 
 
@@ -113,7 +113,7 @@ def malformed_axis(model, dice):
 
 
 def renamed_axis(model, dice):
-    """Attributes that identify an axis less clearly, or as another one."""
+    """Attributes that identify an axis ambiguously, or as a different one."""
     if model.kind not in CF:
         return False
     for a in "xyz":
@@ -177,7 +177,7 @@ def odd_times(model, dice):
 # --- storage -------------------------------------------------------------------------------------
 
 def stored_otherwise(model, dice):
-    """Codings, byte orders, layouts, orders of dimensions: the same numbers."""
+    """The same numbers in another coding, byte order, layout or order of dimensions."""
     options = model.options
     if model.kind not in ("vtk ascii", "vtk binary"):
         options["endian"] = str(dice.choice(["big", "little"]))
@@ -216,7 +216,7 @@ def transposed(model, dice):
 
 
 def chunk_by_layer(model, dice):
-    """False where the storage has no chunks, or they are in another order."""
+    """False if the storage has no chunks or orders them differently."""
     if model.kind not in ("netcdf-4", "zarr") or "dims" in model.options:
         return False
     chunks = (1, 1, *model.shape[2:])
@@ -227,7 +227,7 @@ def chunk_by_layer(model, dice):
 
 
 def chunks_swapped(model, dice):
-    """Two chunks of each variable change places in a chunk table that has all of them."""
+    """Swaps two chunks of each variable in a complete chunk table."""
     layers = list(np.ndindex(model.shape[:2]))
     if len(layers) < 2 or "tables" in model.options or not chunk_by_layer(model, dice):
         return False
@@ -241,7 +241,7 @@ def chunks_swapped(model, dice):
 
 
 def chunks_missing(model, dice):
-    """What no chunk holds is the fill value."""
+    """Values outside of all chunks are the fill value."""
     if not chunk_by_layer(model, dice):
         return False
     gone = [at for at in np.ndindex(model.shape[:2]) if dice.random() < 0.3]
@@ -278,11 +278,11 @@ def grib_bitmap(model, dice):
 
 
 def grib_scaling(model, dice):
-    """Reference, binary and decimal scale, bits a value: any sound numbers."""
+    """Reference, binary and decimal scale, bits a value: any valid numbers."""
     if model.kind not in GRIB:
         return False
     for field, at in each_message(model, dice, 0.3):
-        # ecCodes takes a constant field for its reference alone, whatever the decimal scale.
+        # ecCodes uses only the reference of a constant field, whatever the decimal scale.
         bits = int(dice.choice([0, 1, 2, 3, 7, 8, 11, 16, 24]))
         reference = model_grib.kept_reference(
             float(dice.choice([0.0, -1.5, 9999.0, -273.15, 1e10, 1e-10, 1e35])),
@@ -294,7 +294,7 @@ def grib_scaling(model, dice):
 
 
 def grib_9999(model, dice):
-    """Values equal to ecCodes' default missing value are values."""
+    """Values equal to ecCodes' default missing value are not masked."""
     if model.kind not in GRIB:
         return False
     edition = model_grib.edition_of(model)
@@ -317,7 +317,7 @@ def grib_scan(model, dice):
 
 
 def grib_points(model, dice):
-    """First and last points: across Greenwich, around the world, over the poles, impossible."""
+    """First and last points: across Greenwich, around the globe, over the poles, impossible."""
     if model.kind not in GRIB:
         return False
     nx, ny = model.shape[3], model.shape[2]
@@ -336,7 +336,7 @@ def grib_points(model, dice):
 
 
 def grib_messages(model, dice):
-    """Left out, in another order."""
+    """Messages omitted or reordered."""
     if model.kind not in GRIB:
         return False
     field = model.fields[-1]

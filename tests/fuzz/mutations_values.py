@@ -1,6 +1,6 @@
-"""Mutations of the values of a Model and of the attributes that say what they mean. Each takes the
-model and a numpy generator, clears the flags of what is no longer known (Model), and returns False
-if it does not apply to the format."""
+"""Mutations of the values of a Model and of the attributes that define their meaning. Each takes
+the model and a numpy generator, clears the flags of properties that are no longer known (Model),
+and returns False if it does not apply to the format."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ GRIB = ("grib 1", "grib 2")
 VTK = ("vti", "vtr", "vts", "vtu", "vtk ascii", "vtk binary")
 BARE = ("nrrd", "raw+json", "grads", "opendx")
 ALL = (*CF, *GRIB, *VTK, *BARE)
-# One step each.
+# Formats with a single step.
 STILL = (*VTK, "nrrd", "opendx")
 
 
@@ -22,7 +22,7 @@ def is_text(model):
 
 
 def some(field, dice, share=0.1):
-    """At least one sample."""
+    """A random selection of at least one sample."""
     mask = dice.random(field.stored.shape) < share
     mask[tuple(int(dice.integers(n)) for n in mask.shape)] = True
     return mask
@@ -50,7 +50,7 @@ def special_values(model, dice):
 
 
 def huge_doubles(model, dice):
-    """Beyond float32, and close to its end."""
+    """Values beyond float32, and close to its maximum."""
     fields = floating(model)
     if model.kind == "grads" or not fields:
         return False
@@ -98,7 +98,7 @@ def one_unmasked(model, dice):
 
 
 def swapped_bytes(model, dice):
-    """Values of the wrong byte order."""
+    """Values with reversed byte order."""
     for field in model.fields:
         if field.stored.dtype.kind == "f" and dice.random() < 0.7:
             field.stored = field.stored.byteswap()
@@ -124,7 +124,7 @@ INTEGERS = {"netcdf-4": "i1 i2 i4 i8 u1 u2 u4", "netcdf cdf5": "i1 i2 i4 i8 u1 u
 
 
 def integers(model, dice):
-    """With the least and the greatest number of the type."""
+    """Values including the least and the greatest number of the type."""
     kinds = INTEGERS.get(model.kind, "u1 i2 i4" if model.kind in VTK else "").split()
     if not kinds:
         return False
@@ -164,7 +164,7 @@ def existing(field, dice):
 
 
 def filled(model, dice):
-    """A fill value that stands in the data."""
+    """A fill value that occurs in the data."""
     for field in model.fields:
         if model.kind in CF:
             special = [-32767, 127, 0] if field.stored.dtype.kind in "iu" else [
@@ -204,7 +204,7 @@ def missing_values(model, dice):
 
 
 def valid_limits(model, dice):
-    """Including limits that no value meets."""
+    """Valid ranges, including ones that no value satisfies."""
     if model.kind not in CF:
         return False
     for field in model.fields:
@@ -221,7 +221,7 @@ def valid_limits(model, dice):
 
 
 def packed(model, dice):
-    """Scales and offsets, also those that make the numbers huge, tiny, negative or all alike."""
+    """Scales and offsets, including ones that make the numbers huge, tiny, negative or equal."""
     if model.kind not in CF:
         return False
     for field in model.fields:
@@ -230,7 +230,8 @@ def packed(model, dice):
                 [0.01, -0.5, 1e-38, 1e35, 0.0, 2.0, -1e-300, 1e300]))
         if dice.random() < 0.6:
             field.attributes["add_offset"] = np.float64(dice.choice([273.15, -1e6, 1e38, 0.0]))
-    # Fractions limit what comes out, if a packing is there: see the reader's own unit tests.
+    # With packing, valid ranges may apply to packed or unpacked values: see the reader's unit
+    # tests.
     if any(k.startswith("valid") for field in model.fields for k in field.attributes):
         model.exact = False
     return True
@@ -250,7 +251,7 @@ def attribute_of_wrong_type(model, dice):
 
 
 def unnamed(model, dice):
-    """Without standard names and units; or with those of another quantity."""
+    """Removes standard names and units, or replaces them by those of another quantity."""
     if model.kind not in CF:
         return False
     for field in model.fields:

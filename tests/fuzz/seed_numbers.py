@@ -1,4 +1,4 @@
-"""What the small files of all formats hold: a seed, its grid and its numbers."""
+"""Common to the small files of all formats: the type Seed, its grid and its numbers."""
 
 import math
 import struct
@@ -8,8 +8,8 @@ COUNT = math.prod(DIMS)
 
 
 class Seed:
-    """Files by name, the first of them the one that is asked for; links by name. `sure`: as it is
-    it must load. `escapes`: it asks for what lies outside."""
+    """Files by name, the first of them the one to open; links by name. `sure`: the unmodified
+    file must load. `escapes`: it refers to files outside the data root."""
 
     def __init__(self, kind, name, files, links=None, path=None, escapes=False, sure=True):
         self.kind = kind
@@ -36,7 +36,7 @@ def as_text(values):
 
 
 def winds(big=False, step=0):
-    """All u, all v, all w."""
+    """Planar order: all u, all v, all w."""
     return b"".join(floats(numbers(c, step), big) for c in range(3))
 
 
@@ -45,7 +45,7 @@ def interleaved(step=0):
 
 
 def lz4_block(data):
-    """Literals alone."""
+    """Literals only, without compression."""
     if len(data) < 15:
         return bytes([len(data) << 4]) + data
     rest = len(data) - 15

@@ -1,6 +1,6 @@
-"""Small files of every format that is read, as Seed objects: from plain python, and where the tools
-are there from nccopy, grib_filter and the real files in build/test-data. VTK is in seeds_vtk.py,
-seeds that try to lead a reader out of the data root are in seeds_escaping.py."""
+"""Small files of every supported format as Seed objects: written in Python, and if the tools are
+installed by nccopy and grib_filter or copied from build/test-data. VTK is in seeds_vtk.py; seeds
+that try to lead a reader out of the data root are in seeds_escaping.py."""
 
 import gzip
 import json
@@ -231,7 +231,8 @@ def grib_seeds(folder):
             if data:
                 yield Seed(f"grib {edition}", packing, {"g.grib": data})
         for path in sorted(samples.glob(f"*_grib{edition}.tmpl")):
-            # Each may be refused, for its grid for example; one of a kind, not every resolution.
+            # Some may be refused, for their grid for example; one of each kind, not every
+            # resolution.
             if path.stat().st_size < 8000 and not re.search(r"_\d+_grib|rotated_gg", path.name):
                 yield Seed(f"grib {edition}", path.name, {"g.grib": path.read_bytes()},
                            sure=False)

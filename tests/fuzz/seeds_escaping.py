@@ -1,4 +1,4 @@
-"""Seeds that try to lead a reader out of the data root, and the files outside that they name."""
+"""Seeds that try to lead a reader out of the data root, and the outside files that they name."""
 
 import zlib
 
@@ -7,12 +7,12 @@ import seeds
 import seeds_vtk
 from seed_numbers import COUNT, DIMS, Seed, as_text, floats, numbers
 
-MARK_NUMBER = 31337.25  # what the files outside hold; exact in 32 bits
+MARK_NUMBER = 31337.25  # a value in the outside files; exact in 32 bits
 MARK_TEXT = "5ENTINEL"
 
 
 def write_outside(folder):
-    """Files that nobody may open, each fit for what the seeds below ask for."""
+    """Files that must not be opened, each in the format that the seeds below require."""
     folder.mkdir()
     mark = [MARK_NUMBER] * (3 * COUNT)
     (folder / "mark.raw").write_bytes(floats(mark) * 2)
@@ -40,7 +40,7 @@ class VtkXmlMark(seeds_vtk.VtkXml):
 
 
 def escape_seeds(outside):
-    """Each by a path relative to its folder, by an absolute one, and by a link."""
+    """Each refers to its target by a relative path, an absolute path and a link."""
     vti = seeds_vtk.vtk_xml("vti", "ascii")
     for how, away in (("relative", "../../" + outside.name), ("absolute", str(outside)),
                       ("doubled", "./..//../" + outside.name), ("link", None)):
@@ -89,7 +89,7 @@ def hdf5_escapes(seed, to):
 
 
 def link_seeds(outside):
-    """What is asked for, its folder, or a part of it is a link."""
+    """The file, its folder, or a part of it is a link."""
     away = f"../../{outside.name}"
     yield Seed("vti", "file is a link", {"other": b"x"}, {"f.vti": f"{away}/mark.vti"}, "f.vti",
                True)

@@ -8,7 +8,7 @@ from seed_numbers import COUNT, DIMS, Seed, as_text, interleaved, lz4_block, num
 
 
 class VtkXml:
-    """Arrays of one file in one way of coding them."""
+    """The arrays of one file in one encoding."""
 
     def __init__(self, coding, compressor=""):
         self.coding = coding

@@ -1,6 +1,6 @@
-"""Inputs whose sizes lie at boundaries: 2^k - 1, 2^k and 2^k + 1, and every limit with its
-neighbours. Coverage guides a fuzzer to no size that only a library's buffer knows: a trailer of
-66 kB ended a server that 627,000 executions had not. Deterministic; yields (target, name, bytes).
+"""Inputs with sizes at boundaries: 2^k - 1, 2^k and 2^k + 1, and every limit with its neighbours.
+Coverage does not lead a fuzzer to sizes that matter only to a library's buffer: a trailer of 66 kB
+crashed a server that 627,000 executions had not. Deterministic; yields (target, name, bytes).
 """
 
 import json
@@ -10,8 +10,8 @@ HEADER_MAX = 8192
 BODY_MAX = 65536
 DEPTH_MAX = 32
 VIEW = {"dataset": "climate", "image": {"width": 8, "height": 6}}
-UPGRADED = b"\0"  # fuzz_websocket: bytes as they are on the wire
-LINES = b"\1"     # messages, one a line
+UPGRADED = b"\0"  # fuzz_websocket: raw bytes on the wire
+LINES = b"\1"     # one message per line
 
 
 def around(*limits, most=17):
@@ -35,13 +35,13 @@ def post(body, length=None, fields=(), target=b"/v1/views"):
 
 
 def padded_view(size):
-    """A view of exactly so many bytes; below its own length: not whole."""
+    """A view of exactly that many bytes; truncated below its minimal length."""
     text = json.dumps(VIEW).encode()
     return text[:size] if size < len(text) else text + b" " * (size - len(text))
 
 
 def http_sizes():
-    """(what grows, bytes); a header's own lines count towards its limit."""
+    """(what grows, bytes); the header's fixed lines count towards its limit."""
     bare = len(get())
     for size in around(HEADER_MAX, HEADER_MAX - bare, HEADER_MAX - bare - 5, most=16):
         yield f"target-{size}", get(b"/" + b"a" * size)
@@ -73,7 +73,7 @@ def http_sizes():
 
 
 def frame(first, payload, length=None, wide=None, mask=b"\0\0\0\0"):
-    """A frame whose length is told as `length`, in 7, 16 or 64 bits (`wide`)."""
+    """A frame with the declared length `length`, in 7, 16 or 64 bits (`wide`)."""
     length = len(payload) if length is None else length
     wide = wide or (7 if length < 126 else 16 if length < 65536 else 64)
     if wide == 7:
@@ -112,7 +112,7 @@ def websocket_sizes():
 
 
 def json_sizes(wrap):
-    """Documents that grow in every direction, each by way of wrap(text)."""
+    """Documents that grow in each direction, passed through wrap(text)."""
     for size in around(BODY_MAX):
         yield f"padded-{size}", wrap(padded_view(size))
         yield f"name-{size}", wrap(json.dumps({"dataset": "n" * size}).encode())
@@ -138,7 +138,7 @@ def json_sizes(wrap):
 
 
 def edges_of_numbers():
-    """Whole numbers and pixels where types and limits end."""
+    """Integers and pixel counts at the limits of types and of the protocol."""
     for value in (0, 1, 8191, 8192, 8193, 65535, 65536, 2**31 - 1, 2**31, 2**32, 2**53, 2**63,
                   2**64):
         for sign in (1, -1):

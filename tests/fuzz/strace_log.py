@@ -1,4 +1,4 @@
-"""Checks a log of strace: which files the daemon and its loaders opened, and which sockets.
+"""Checks a log of strace: the files opened and sockets created by the daemon and its loaders.
 
 A process is the daemon until it becomes a loader (execve of "... load"), and a loader is confined
 from its seccomp call on. Calls that the filter traps show the call's number as their result and a
@@ -9,12 +9,12 @@ import re
 
 CALLS = "%network,openat,openat2,open,creat,execve,prctl,seccomp"
 OPENS = {"open", "openat", "openat2", "creat"}
-# What makes a connection or takes one; talking over a socket that is there is not among them.
+# Calls that create or accept connections, not those that use an existing socket.
 CONNECTS = {"socket", "connect", "bind", "listen", "accept", "accept4", "socketpair"}
 LINE = re.compile(r"(\d+)\s+(.*)")
 CALL = re.compile(r"(\w+)\((.*)\)\s+= (-?\d+|\?)(.*)", re.DOTALL)
 RESULT_PATH = re.compile(r"<(.*?)>")
-# The last two are glibc's allocator's: whether memory is overcommitted, and for how many threads.
+# The last two are read by glibc's allocator.
 OWN = ("/dev/null", "/proc/sys/vm/overcommit_memory", "/sys/devices/system/cpu/online")
 STARTUP = ("/etc/", "/lib", "/usr/", "/proc/", "/sys/", "/dev/null", "/dev/urandom", "/var/lib/")
 
@@ -28,7 +28,8 @@ class Judge:
         self.stage = {}  # of a process: "startup" or "confined"; the daemon's threads have none
         self.serving = False
         self.unfinished = {}
-        self.last_call = {}  # of a process: held back until it is known whether it was trapped
+        # last call of each process, withheld until it is known whether it was trapped
+        self.last_call = {}
         self.counts = collections.Counter()
         self.faults = []
         self.at_startup = set()
@@ -104,7 +105,7 @@ class Judge:
         elif starts:
             self.at_startup.add(path)
             if role == "startup" and not path.startswith(STARTUP) and path != self.program:
-                self.faults.append(f"a loader that starts opened: {text}")
+                self.faults.append(f"a starting loader opened: {text}")
         elif not self.may_open(path):
             self.faults.append(f"the daemon opened: {text}")
 

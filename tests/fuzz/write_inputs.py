@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Writes what every fuzz target begins with, into seeds/TARGET and sizes/TARGET: vectors of the
-protocol, small files of every format (seeds.py), mutated datasets (model_mutations.py), requests,
+"""Writes the initial inputs of every fuzz target into seeds/TARGET and sizes/TARGET: protocol
+vectors, small files of every format (seeds.py), mutated datasets (model_mutations.py), requests,
 and inputs of boundary sizes (sizes.py).
 
     tests/fuzz/write_inputs.py build/fuzz-inputs [--program build/release/windsplat]
 
-The program writes the netCDF files of seeds.py. Needs python3-netcdf4, which writes the mutants'.
+The program writes the netCDF files of seeds.py. Needs python3-netcdf4 for the mutated datasets.
 """
 
 import argparse
@@ -43,7 +43,7 @@ def text_of(case):
 
 
 def vectors():
-    """Read where they are, of whatever kind they are accepted or refused."""
+    """Reads all vectors, whether accepted or refused, of any kind."""
     for path in sorted((ROOT / "protocol/vectors").glob("*/*.json")):
         for i, case in enumerate(json.loads(path.read_text())):
             name = f"{path.parent.name}-{path.stem}-{i}"
@@ -130,7 +130,7 @@ def files(program):
 
 
 def reader_input(name, kind, members, path):
-    """The files of a dataset as one input; nothing if that is too large."""
+    """The files of a dataset as one input; nothing if they are too large."""
     kind = "netcdf" if next(iter(members.values())).startswith(b"CDF") else READERS[kind]
     if kind == "zarr":
         data = b"".join(MARK[1 if not n else 0:] + member.removeprefix("s.zarr/").encode() + b"\n"
@@ -145,7 +145,7 @@ def reader_input(name, kind, members, path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--program", help="windsplat, to write netCDF")
+    parser.add_argument("--program", help="path of windsplat, which writes netCDF files")
     options = parser.parse_args()
     shutil.rmtree(options.out, ignore_errors=True)
     for kind, inputs in (("seed", vectors()), ("seed", requests()),

@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
-"""Compares what the program says of real files with independent readers.
+"""Compares the program's reports on real files with independent readers.
 
     scripts/fetch-test-data
     python3 tests/integration/real_files.py --program=build/release/windsplat
 
-Needs python3-netcdf4 and python3-numpy (netCDF, by the library's own masks), and for files of
-other formats only the parsers below: GrADS, OpenDX, legacy VTK, VTK image data as text. Compared
-are, of each file: the axes' coordinates and units, and of each field its units, its range and count
-of masked samples over the steps that the program looked at, and single values, by the daemon's
-probe, at the corners and at places inside, of the first and the last step. Exits 1 if anything
-differs.
+Needs python3-netcdf4 and python3-numpy (netCDF, with the library's own masks), and for other
+formats only the parsers below: GrADS, OpenDX, legacy VTK, VTK image data as text. For each file
+these are compared: the coordinates and units of the axes, and for each field its units, its range
+and count of masked samples over the steps that the program read, and single values by the daemon's
+probe, at the corners and inside, of the first and the last step. Exits 1 if anything differs.
 """
 
 import argparse
@@ -30,9 +29,9 @@ TOLERANCE = 1e-6  # of float32 and of the shortest decimal text
 
 
 class Independent:
-    """What another reader found. axes: x, y, z -> coordinates as the file has them, or None where
+    """The values of another reader. axes: x, y, z -> coordinates as in the file, or None where
     a grid has no such axis. scalars: name -> masked array (step, z, y, x). vectors: name -> names
-    of its components. units: name of a scalar or an axis -> text, where the file says any."""
+    of its components. units: name of a scalar or an axis -> text, if the file contains it."""
 
     def __init__(self, axes, scalars, vectors, units=None):
         self.axes, self.scalars, self.vectors = axes, scalars, vectors
@@ -40,8 +39,8 @@ class Independent:
 
 
 def read_netcdf(path, inspected):
-    """Each array's order of axes comes from the names that the program gives, its values and masks
-    from the netCDF library."""
+    """The axis order of each array follows the names reported by the program; values and masks
+    come from the netCDF library."""
     file = netCDF4.Dataset(path)
     names = {a: inspected["axes"][a]["name"] for a in "xyz"}
     hybrid = "hyam" in file.variables
@@ -76,7 +75,7 @@ def read_netcdf(path, inspected):
 
 
 def read_model_ctl(path, _):
-    """grads' example: 5 days, little-endian float32, variables one after another."""
+    """The example of grads: 5 days, little-endian float32, variables one after another."""
     levels = [("PS", 0), ("U", 7), ("V", 7), ("Z", 7), ("T", 7), ("Q", 5), ("TS", 0), ("P", 0)]
     raw = np.fromfile(path.with_suffix(".dat"), "<f4").astype(float)
     raw = raw.reshape(5, sum(max(1, n) for _, n in levels), 46, 72)
@@ -178,7 +177,7 @@ class Check:
 
 
 def order_of(ours, theirs):
-    """Which of the file's coordinates each of ours is, longitudes modulo 360."""
+    """For each coordinate of the program the index of the file's one, longitudes modulo 360."""
     distance = np.abs(np.asarray(theirs)[None, :] - np.asarray(ours)[:, None])
     return np.argmin(np.minimum(distance, np.abs(distance - 360)), axis=1)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The bill of materials against what the program really loads and the page really bundles.
+"""Compares the bill of materials with the libraries and modules that are really loaded and bundled.
 
 Usage: sbom.py --program=PATH
 """

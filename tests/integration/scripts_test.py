@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""scripts/run --help changes nothing; scripts/setup names what stands in the way of a package, and
-refuses a node that is too old.
+"""scripts/run --help changes nothing; scripts/setup names the package that prevents an
+installation, and refuses an outdated node.
 
-apt and its helpers are stand-ins on the PATH, so that nothing is installed or asked for."""
+apt and its helpers are replaced by fakes on the PATH, so that nothing is downloaded or
+installed."""
 import os
 import pathlib
 import stat
@@ -40,7 +41,7 @@ esac""",
 
 
 def run(script, *words, more=None):
-    """Runs the script; its outcome and what apt-get was called with. more: further stand-ins."""
+    """Runs the script; returns its outcome and the calls of apt-get. more: further fakes."""
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for program, text in (STANDS_IN | (more or {})).items():
@@ -81,7 +82,7 @@ def conflicts_are_named():
                  "libboost-dev: needs a package that would be removed",
                  "apt-get remove libcurl4-gnutls-dev libboost-dev libboost1.74-dev\n",
                  "deploy/build-image.sh"):
-        need(line in done.stderr, f"setup does not say '{line}':\n{done.stderr}")
+        need(line in done.stderr, f"setup does not print '{line}':\n{done.stderr}")
     changes = [call for call in calls if " install " in f" {call} " and " -s " not in f" {call} "]
     need(not changes, f"setup installs: {changes}")
 

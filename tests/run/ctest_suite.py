@@ -1,5 +1,5 @@
-"""A suite of ctest: its entries are run, their test cases counted, and what failed is run once more
-by itself at the end."""
+"""Runs the entries of a ctest suite, counts their test cases, and repeats failed ones by
+themselves at the end."""
 import dataclasses
 import json
 import re
@@ -10,7 +10,7 @@ import googletest
 from outcome import Outcome
 
 OUTPUT_BYTES_MAX = 100_000_000
-# A race or a misuse of memory rarely shows twice: its first report counts.
+# A race or memory error rarely occurs twice, so its first report counts as a failure.
 REPORTED = re.compile(r"(WARNING|ERROR): \w+Sanitizer|runtime error:")
 
 
@@ -34,7 +34,7 @@ def entries(build, selection):
 
 
 def run_ctest(prefix, build, selection, jobs, emit):
-    """name -> (status, seconds, what it said)."""
+    """name -> (status, seconds, output)."""
     report = build / "Testing/report.xml"
     report.unlink(missing_ok=True)
     limits = [word for kind in ("passed", "failed")
@@ -53,7 +53,7 @@ def run_ctest(prefix, build, selection, jobs, emit):
 
 
 def status(case):
-    """run (it passed), fail, or skip: a missing program counts as failed."""
+    """run (it passed), fail, or skip; a missing program counts as failed."""
     reason = case.find("skipped")
     if reason is None:
         return "fail" if case.get("status") == "fail" else "run"
@@ -66,7 +66,7 @@ class Suite:
         self.build, self.selection, self.jobs = build, selection, jobs
         self.emit, self.prefix = emit, list(prefix)
         self.outcome = Outcome()
-        self.again = []  # (name, what it said, call that is true if it passes this time)
+        self.again = []  # (name, output, function that returns whether it passes now)
 
     def run(self):
         known = entries(self.build, self.selection)
@@ -113,7 +113,7 @@ class Suite:
         reported = REPORTED.search(said) and not REPORTED.search(everywhere)
         if status == "fail" and (reported or all(result in ("ok", "skipped")
                                                  for result, _, _ in found.values())):
-            tail = "\n".join(said.splitlines()[-60:])  # after its tests: a leak, for example
+            tail = "\n".join(said.splitlines()[-60:])  # after the tests: a leak, for example
             self.again.append((name, tail, lambda: self.entry_passes(name)))
 
     def entry_passes(self, name):

@@ -1,4 +1,4 @@
-"""The test cases of a GoogleTest program: what its output says of them, and how some are run."""
+"""The test cases of a GoogleTest program: parses its output and runs selected cases."""
 import os
 import re
 import subprocess
@@ -8,8 +8,8 @@ ENDED = re.compile(r"\[ +(OK|SKIPPED|FAILED) +\] \S+?(?:,.*)? \((\d+) ms\)$")
 
 
 def cases(text):
-    """name -> (result, seconds, what it said); a result is ok, skipped, failed or crashed (it began
-    and did not end). Empty for a program that is not GoogleTest's."""
+    """name -> (result, seconds, output); a result is ok, skipped, failed or crashed (started
+    without end). Empty for a program without GoogleTest."""
     found, name = {}, None
     for line in text.splitlines():
         if begun := BEGUN.search(line):
@@ -25,7 +25,7 @@ def cases(text):
 
 
 def run(command, environment, folder, timeout_s=900):
-    """What the program said, to its end or to the timeout."""
+    """The output of the program, until its end or the timeout."""
     try:
         done = subprocess.run(command, env=os.environ | environment, cwd=folder, check=False,
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=timeout_s)
@@ -39,7 +39,7 @@ def without_shards(environment):
 
 
 def shard(command, environment, folder):
-    """The names of an entry's cases: shards take turns, disabled cases aside."""
+    """The names of an entry's cases: each shard has every n-th one, without disabled cases."""
     suite, names = "", []
     listing = run([*command, "--gtest_list_tests"], without_shards(environment), folder)
     for line in listing.splitlines():
@@ -53,7 +53,7 @@ def shard(command, environment, folder):
 
 
 def run_cases(command, environment, folder, names):
-    """As cases(), of the named ones; one that crashes does not keep the others from running."""
+    """As cases(), of the named ones; after a crash the remaining ones still run."""
     found, left = {}, list(names)
     while left:
         chosen = without_shards(environment) | {"GTEST_FILTER": ":".join(left)}

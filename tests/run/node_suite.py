@@ -1,4 +1,4 @@
-"""Test files of node, some at a time; a file that fails is run once more by itself at the end."""
+"""Runs test files of node concurrently; a file that fails is repeated by itself at the end."""
 import concurrent.futures
 import re
 import subprocess
@@ -11,7 +11,7 @@ FAILED = re.compile(r"^ *not ok \d+ - (.*?)(?: # .*)?$")
 
 
 def failures(text, file):
-    """name -> what it said, of the tests of a file; the file itself where none is named."""
+    """name -> output, of the failed tests of a file; the file itself if none is named."""
     found, name, said = {}, None, []
     for line in text.splitlines():
         if failed := FAILED.match(line):
@@ -38,7 +38,7 @@ def run_file(command, file, emit):
 
 
 def run(emit, commands, jobs):
-    """commands: file -> the words that run it."""
+    """commands: file -> the arguments that run it."""
     outcome = Outcome()
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         first = list(pool.map(lambda item: run_file(item[1], item[0], emit), commands.items()))

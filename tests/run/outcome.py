@@ -1,15 +1,15 @@
-"""What came of a suite of tests, and the words for it in the summary."""
+"""The outcome of a test suite, and its text in the summary."""
 import dataclasses
 
 
 @dataclasses.dataclass
 class Outcome:
     """Counts are of test cases. A test that failed and then passed by itself is unstable: it is
-    listed with what it said first, and counts as passed."""
+    listed with its first output, and counts as passed."""
     passed: int = 0
     skipped: int = 0
-    failed: dict = dataclasses.field(default_factory=dict)    # name -> what it said
-    unstable: dict = dataclasses.field(default_factory=dict)  # name -> what it said at first
+    failed: dict = dataclasses.field(default_factory=dict)    # name -> output
+    unstable: dict = dataclasses.field(default_factory=dict)  # name -> first output
     durations: dict = dataclasses.field(default_factory=dict)  # name -> seconds
     seconds: float = 0
 
@@ -20,13 +20,13 @@ class Outcome:
 
 
 def excerpt(name, said, lines_max=30):
-    """The first lines of what a failing test said, marked off from the suite's own lines."""
+    """The first lines of a failing test's output, marked off from the suite's own lines."""
     lines = [line for line in said.splitlines() if line.strip()][:lines_max]
     return "\n".join([f"{name}:", *(f"  | {line}" for line in lines)])
 
 
 def summary(outcomes, seconds, slowest=0):
-    """The end of a run's output: it alone is enough to know what failed and how."""
+    """The end of a run's output, sufficient to know what failed and how."""
     lines = []
     for suite, outcome in outcomes.items():
         for word, tests in (("unstable", outcome.unstable), ("failed", outcome.failed)):

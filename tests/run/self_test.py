@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A suite of programs that pass, fail, crash or fail once alone must be counted as just that."""
+"""Test programs that pass, fail, crash or fail only once must be counted accordingly."""
 import argparse
 import contextlib
 import io
@@ -14,7 +14,7 @@ import node_suite
 import suites
 from outcome import Outcome, summary
 
-# Speaks as GoogleTest does; FLAKY fails where its file is not there yet, and writes it.
+# Imitates GoogleTest; FLAKY fails if its file does not exist yet, and creates it.
 PROGRAM = """
 import os, pathlib, sys
 cases = ["Case.good", "Case.bad", "Case.flaky", "Case.crash", "Case.after", "Case.skipped"]

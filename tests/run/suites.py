@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Builds, and runs the suites of tests; called by scripts/test, which sets the machine up. What
-computes (the builds after the first, clang-tidy) runs beside the tests, which wait for clocks and
-sockets as long as they compute, and gives way to them. A suite's output is kept in build/test-logs
-and shown as a whole when it ends; the end is a table.
+"""Builds, and runs the test suites; called by scripts/test after the installation of dependencies.
+Later builds and clang-tidy run at low priority during the tests, which often wait for clocks and
+sockets. The output of a suite is stored in build/test-logs and shown as a whole when it ends; the
+last output is a table.
 
-The rule of what is repeated under which sanitizer is in tests/CMakeLists.txt."""
+tests/CMakeLists.txt defines the tests that are repeated under each sanitizer."""
 import argparse
 import concurrent.futures
 import os
@@ -22,25 +22,25 @@ from outcome import Outcome, summary
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build"
 LOGS = BUILD / "test-logs"
-# More than cores: tests wait for clocks and sockets as long as they compute.
+# More than the number of cores, because tests spend much of their time waiting.
 CORES = len(os.sched_getaffinity(0))
 JOBS = min(2 * CORES, CORES + 4)
-# A browser and its daemon keep a core busy; node itself runs one file fewer than cores.
+# A browser and its daemon occupy a core; by default node runs one file fewer than there are cores.
 BROWSERS = min(CORES, 4)
-SEARCH_SECONDS = 30  # a fuzzer
-GIVING_WAY = ("nice", "-n", "19")  # tests have deadlines
+SEARCH_SECONDS = 30  # for each fuzzer
+GIVING_WAY = ("nice", "-n", "19")  # low priority, because tests have deadlines
 SANITIZERS = {
     "ASAN_OPTIONS": "detect_leaks=1:strict_string_checks=1:check_initialization_order=1",
     "UBSAN_OPTIONS": "print_stacktrace=1",
     "TSAN_OPTIONS": "halt_on_error=1:second_deadlock_stack=1"}
-# What commands say of their tests: passed, and failed.
+# Patterns of the summary lines of commands: passed, and failed.
 COUNTS = (re.compile(r"^tidy: (\d+) files clean.* (\d+) files$", re.M),
           re.compile(r"^total: (\d+) targets, .* (\d+) crashed$", re.M))
 
 
 def fixed_addresses():
-    """The thread sanitizer cannot start under the address randomisation of some kernels; where it
-    may be switched off for a process, it is."""
+    """The thread sanitizer cannot start under the address randomisation of some kernels; it is
+    disabled for the process if permitted."""
     words = ["setarch", os.uname().machine, "-R"]
     works = subprocess.run([*words, "true"], stderr=subprocess.DEVNULL, check=False)
     return words if works.returncode == 0 else []
@@ -70,7 +70,7 @@ class Run:
         self.begin = time.monotonic()
 
     def suite(self, name, run, *words, **named):
-        """Runs a suite and keeps its outcome; true if nothing failed for good."""
+        """Runs a suite and stores its outcome; returns whether no test failed permanently."""
         begin = time.monotonic()
         path = LOGS / (name.replace(" ", "-") + ".log")
         print(f"-- {name} begins: {os.path.relpath(path, ROOT)}", flush=True)
@@ -82,7 +82,7 @@ class Run:
 
             try:
                 outcome = run(emit, *words, **named)
-            except Exception:  # of the runner itself: the other suites are still worth running
+            except Exception:  # an error of the runner itself must not stop the other suites
                 outcome = Outcome()
                 outcome.failed[name] = traceback.format_exc()
                 emit(outcome.failed[name])
@@ -108,7 +108,7 @@ class Run:
         thorough = self.options.thorough
         chosen = () if thorough else ("-LE", "thorough")
         plain = fixed_addresses()
-        beside = concurrent.futures.ThreadPoolExecutor(1)  # one at a time, in this order
+        beside = concurrent.futures.ThreadPoolExecutor(1)  # one build at a time, in this order
         try:
             release = beside.submit(self.built, "release")
             dev = beside.submit(self.built, "dev", *GIVING_WAY)

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Whether the built program has the hardening of cmake/hardening.cmake: position-independent, stack
-protected, relocations read-only and bound at start, no executable stack, fortified calls, no search
-path that others could fill. Shadow stacks (-fcf-protection) are not looked for: one object without
-the mark takes it from all, and Debian 12's start files have none.
+"""Checks that the built program has the hardening of cmake/hardening.cmake: position-independent,
+stack protection, relocations read-only and bound at start, no executable stack, fortified calls, no
+writable library search path. Shadow stacks (-fcf-protection) are not checked: one object without
+the mark disables them for the program, and Debian 12's start files lack it.
 
-Usage: check_hardening.py PROGRAM      reads it by readelf, and by checksec where that is installed
+Usage: check_hardening.py PROGRAM      uses readelf, and checksec if it is installed
 """
 import json
 import pathlib
@@ -43,17 +43,17 @@ def by_readelf(program):
     if any({"W", "E"} <= set(flags) for flags in parts.get("LOAD", {"WE"})):
         out.append("a segment can be written and executed")
     if "__stack_chk_fail" not in symbols:
-        out.append("no function guards its stack (-fstack-protector-strong)")
+        out.append("no function has stack protection (-fstack-protector-strong)")
     if not re.search(r"__(memcpy|snprintf|read|memset|memmove|poll)_chk", symbols):
         out.append("no call is fortified (-D_FORTIFY_SOURCE)")
     paths = re.findall(r"\((?:RPATH|RUNPATH)\)\s+Library r\w*path: \[(.*)\]", dynamic)
     if any(not folder.startswith("/") for path in paths for folder in path.split(":")):
-        out.append("it looks for libraries in a folder that is not absolute")
+        out.append("it searches for libraries in a relative folder")
     return out
 
 
 def by_checksec(program):
-    """What checksec (Debian's package of that name) finds missing."""
+    """The protections that checksec (a Debian package) reports as missing."""
     if shutil.which("checksec") is None:
         return None
     text = subprocess.run(["checksec", "--format=json", f"--file={program}"], text=True,
@@ -68,7 +68,7 @@ def check(program):
     complaints = by_readelf(program)
     further = by_checksec(program)
     if further is None:
-        print("hardening: checksec is not installed; readelf alone was asked")
+        print("hardening: checksec is not installed; only readelf was used")
     return complaints + (further or [])
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that includes follow the table of dependencies in docs/design/overview.md, and where each
-outside library may be named. Usage: check_includes.py [ROOT]"""
+"""Checks that includes follow the table of dependencies in docs/design/overview.md, and which
+files include third-party headers. Usage: check_includes.py [ROOT]"""
 import itertools
 import pathlib
 import re
@@ -13,8 +13,8 @@ TABLE_HEAD = "| folder | may include |"
 
 
 def dependencies(text):
-    """The Markdown table after TABLE_HEAD: folder -> what it may include besides itself. A name
-    ending in .hpp allows that header alone."""
+    """The Markdown table after TABLE_HEAD: folder -> permitted includes besides itself. A name
+    ending in .hpp permits only that header."""
     lines = text.partition(TABLE_HEAD + "\n")[2].splitlines()
     rows = itertools.takewhile(lambda line: line.startswith("|"), lines)
     named = [[re.findall(r"`([^`]+)`", cell) for cell in row.split("|")[1:3]] for row in rows]
@@ -23,7 +23,7 @@ def dependencies(text):
 
 MAY_INCLUDE = dependencies((PROJECT / "docs/design/overview.md").read_text())
 
-# outside header -> the files that may name it, or include a header of ours that does
+# third-party header -> the files that may include it, or include a project header that does
 CONFINED = [
     ("nlohmann/", r"nlohmann/",
      r"protocol/codec\w*\.[ch]pp|server/data/formats/(zarr/json|raw/document)\.cpp|tests/.*"),
@@ -56,7 +56,7 @@ def is_allowed(home, included):
 
 
 def resolved(path, included, known):
-    """The included file of ours, named from the project's folder, or by a test beside it."""
+    """The included project file, named from the root folder, or by a test from its own folder."""
     if included in known:
         return included
     beside = f"{path.rpartition('/')[0]}/{included}"
@@ -64,7 +64,7 @@ def resolved(path, included, known):
 
 
 def brought_by(headers, known):
-    """path -> the indexes of CONFINED that including it brings, directly or by way of others."""
+    """path -> the indices of CONFINED that including it brings, directly or indirectly."""
     brought = {path: {index for _, _, included in lines
                       for index, (_, pattern, _) in enumerate(CONFINED)
                       if re.match(pattern, included)}

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that relative links between the documents lead to files and headings that exist, and that
-documents named elsewhere in the project do. Usage: check_links.py [ROOT]"""
+"""Checks that relative links between the documents lead to existing files and headings, and that
+documents named elsewhere in the project exist. Usage: check_links.py [ROOT]"""
 import pathlib
 import posixpath
 import re
@@ -10,7 +10,7 @@ import tree
 
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"#{1,6} +(.*)")
-# Documents and their folders in comments, scripts and messages, named from the project's folder.
+# Names of documents and their folders in comments, scripts and messages.
 MENTION = re.compile(r"(?<![\w./-])(docs/[\w./-]*\w|[A-Z]{4,}\.md\b)")
 
 
@@ -25,7 +25,7 @@ def prose(text):
 
 
 def anchors(text):
-    """The anchors that GitHub gives the headings."""
+    """The anchors that GitHub generates for the headings."""
     found = {}
     for _, line in prose(text):
         if match := HEADING.fullmatch(line.rstrip()):

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Every route of server/api/routes.cpp is a row of the table "Resources" in docs/user/api.md."""
+"""Checks that every route of server/api/routes.cpp is a row of the table "Resources" in
+docs/user/api.md."""
 import pathlib
 import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ROUTE = re.compile(r'Route\{"([A-Z]+)",\s*(?:"([^"]+)"|(route_stream))')
-# Paths of one row that differ in the format of a picture.
+# Paths in one row that differ only in the format of the picture.
 FORMATS = ("frame.jpg", "frame.png", "frame.npy")
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the spelling of code, comments and documents by codespell; words that stand as they are
-meant are in spelling_ignored.txt. Usage: check_spelling.py [ROOT]"""
+"""Checks the spelling of code, comments and documents with codespell; correct words that it
+rejects are in spelling_ignored.txt. Usage: check_spelling.py [ROOT]"""
 import pathlib
 import subprocess
 import sys

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the style rules of CONTRIBUTING.md: long lines, functions, files and folders, classes of
-many members, notes of postponed work, paths of one machine, names of C++ tests, test folders
+"""Checks the style rules of CONTRIBUTING.md: long lines, functions, files and folders, classes
+with many members, notes of postponed work, machine-specific paths, names of C++ tests, test folders
 without a test.
 
 Usage: check_style.py [ROOT]"""
@@ -32,10 +32,10 @@ LARGE_CLASSES = {
 }
 
 CODE = (".cpp", ".hpp", ".h", ".ts", ".mjs", ".js", ".py", ".sh", ".cmake")
-# Written by a program, or read by one only.
+# Files written by a program, or read only by programs.
 GENERATED = re.compile(r"(.*/)?(package-lock\.json|.*\.generated\.\w+|generated/.*)")
 
-# Put together from pieces so that this file may be checked too.
+# Assembled from pieces, so that this file passes its own check.
 PUT_OFF = re.compile(r"\b(" + "|".join(["TO" + "DO", "FIX" + "ME", "X" * 3]) + r")\b")
 MACHINE = re.compile(r"(?<![\w./:$}*-])/(home|root|Users|work|workspace)/")
 
@@ -114,7 +114,7 @@ def complaints_about(path, content):
 
 
 def empty_test_folders(root, files):
-    """CMake silently accepts a folder of tests without a source."""
+    """CMake silently accepts a test folder without sources."""
     listing = root / "tests" / "CMakeLists.txt"
     if listing.exists():
         for name, named in re.findall(r"^windsplat_test\((\w+) (\S+)", listing.read_text(), re.M):
@@ -132,7 +132,7 @@ def empty_test_folders(root, files):
 
 
 def full_folders(files):
-    """Folders of sources in which nothing is found at a glance."""
+    """Reports source folders with too many files for an overview."""
     count = collections.Counter(path.rpartition("/")[0] for path, _ in files if path.endswith(CODE))
     for folder, number in sorted(count.items()):
         if number > MAX_FOLDER_FILES:

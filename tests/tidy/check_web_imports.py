@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the imports of the page (web/src) and of the study's report (web/report): which folder may
-import from which, no circle between files, and how many files a folder holds.
+"""Checks the imports of the page (web/src) and of the study's report (web/report): permitted
+imports between folders, no circular imports between files, and the number of files in a folder.
 Usage: check_web_imports.py [ROOT]"""
 import pathlib
 import posixpath
@@ -10,12 +10,12 @@ import sys
 import tree
 
 # Folder of web/src -> folders it may import from besides itself, lowest first. The order is the
-# page's layering: no folder may name one that stands below it in this table.
+# page's layering: a folder may not import from one listed below it.
 MAY_IMPORT = {
     "base": [],                       # numbers, text, DOM helpers
     "wire": ["base"],                 # HTTP and WebSocket: messages, requests, connection
     "view": ["base", "wire"],         # the view document: state, camera, history, legend entries
-    "viewport": ["base", "wire", "view"],          # the picture and what lies over it
+    "viewport": ["base", "wire", "view"],          # the picture and its overlays
     "panels": ["base", "wire", "view"],            # the controls at the side
     "save": ["base", "wire", "view"],              # pictures, animations, saved views
     "app": ["base", "wire", "view", "viewport", "panels", "save"],
@@ -41,8 +41,8 @@ def folder_of(path):
     return path.split("/")[2]
 
 
-def circles(imports):
-    """Every circle once, as the paths along it."""
+def cycles(imports):
+    """Every import cycle once, as the paths along it."""
     found, finished, trail = [], set(), []
 
     def visit(path):
@@ -100,8 +100,8 @@ def check(root):
         complaints += complaints_about(path + ".ts", found)
     for path, found in report.items():
         complaints += complaints_about_report(path + ".ts", found)
-    complaints += [f"a circle of imports: {' -> '.join(path)}"
-                   for path in circles(imports | report)]
+    complaints += [f"an import cycle: {' -> '.join(path)}"
+                   for path in cycles(imports | report)]
     complaints += [f"web/src/{folder}: {count} files, more than {MAX_FILES}"
                    for folder, count in counts.items() if count > MAX_FILES]
     return complaints

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Plants one violation at a time in a small tree; the checkers must name it, and it alone."""
+"""Creates one violation at a time in a small tree; the checkers must report exactly that one."""
 import pathlib
 import tempfile
 import unittest

@@ -1,5 +1,5 @@
-"""The files of the project as the tidy tests see them: everything but what was built, fetched or
-found by a fuzzer."""
+"""The files of the project for the tidy tests: everything except files that were built, fetched
+or found by a fuzzer."""
 import os
 import pathlib
 
@@ -18,7 +18,7 @@ def files(root):
 
 
 def text(path):
-    """The file's text, or None for a picture or another binary file."""
+    """The file's text, or None for binary files."""
     try:
         content = path.read_bytes()
         return None if b"\0" in content else content.decode("utf-8")
@@ -27,7 +27,7 @@ def text(path):
 
 
 def report(name, complaints):
-    """Prints what was found; the exit code."""
+    """Prints the complaints; returns the exit code."""
     for complaint in complaints:
         print(complaint)
     print(f"{name}: {len(complaints)} complaints")

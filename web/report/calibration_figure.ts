@@ -17,10 +17,10 @@ import { fixed, percent, powerOfTen, scientific, type Known } from "./text";
 const width = 980;
 const height = 560;
 const margins = { marginTop: 40, marginRight: 450, marginBottom: 60, marginLeft: 74 };
-const errorLeast = 1e-5; // as server/quality counts errors
+const errorLeast = 1e-5; // the least error that server/quality distinguishes
 const measuredColor = "#111";
 
-// By the setting classes of the agreement.
+// Colours by setting class.
 const colors: Record<string, string> = {
   kernel: "#d1421f",
   "kernel, fewer pixels": "#e39a1d",

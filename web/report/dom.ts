@@ -1,4 +1,4 @@
-// Elements and tables of the report.
+// Creates elements and tables of the report.
 
 export type Child = Node | string;
 
@@ -14,7 +14,7 @@ export function element<K extends keyof HTMLElementTagNameMap>(
 }
 
 export interface Row {
-  cells: Child[]; // the first is the row's header
+  cells: Child[]; // the first is the header of the row
   className?: string;
 }
 
@@ -34,7 +34,7 @@ export function table(caption: string, heads: string[], rows: Row[]): HTMLElemen
     element("thead", {}, element("tr", {}, ...head)),
     element("tbody", {}, ...body),
   );
-  // Focusable, so that the keyboard scrolls it.
+  // Focusable, so that it can be scrolled by keyboard.
   const region = { class: "scroll", tabindex: "0", role: "region", "aria-label": caption };
   return element("div", region, made);
 }

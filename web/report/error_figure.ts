@@ -86,7 +86,7 @@ export function errorFigure(scene: StudyScene): HTMLElement {
   const times = scene.points.flatMap((point) => [point.msMin, point.ms]);
   const xDomain = logDomain(times);
   const yDomain = logDomain([...stable.map((point) => point.rmse), scene.reconstructionRipple]);
-  // Beyond the axis, points are drawn on its edge.
+  // Points beyond the axis are drawn on its edge.
   const x = (point: StudyPoint) => point.ms ?? xDomain[1];
   const y = (point: StudyPoint) =>
     point.rmse === null ? yDomain[1] : Math.max(point.rmse, yDomain[0]);
@@ -118,7 +118,7 @@ export function errorFigure(scene: StudyScene): HTMLElement {
           curve.points.map((n) => scene.points[n]),
           {
             x,
-            // A gap at a point without an error.
+            // NaN leaves a gap at a point without an error.
             y: (point: StudyPoint) => (isDrawn(point) && drawable(point.rmse) ? point.rmse : NaN),
             stroke: colorOf(curve),
             strokeWidth: 1.6,

@@ -1,4 +1,4 @@
-// What the figures share: logarithmic axes, legends, and the figure element with its caption.
+// Common parts of the figures: logarithmic axes, legends, and the figure element with its caption.
 import {
   dot,
   link,
@@ -13,7 +13,7 @@ export type Domain = [low: number, high: number];
 
 export const drawable = (value: number | null): value is number => value !== null && value > 0;
 
-// Room around the values, at least half a decade.
+// A domain with a margin around the values, at least half a decade wide.
 export function logDomain(values: (number | null)[]): Domain {
   const known = values.filter(drawable);
   const low = known.length > 0 ? Math.min(...known) : 1;
@@ -24,7 +24,8 @@ export function logDomain(values: (number | null)[]): Domain {
   return [low / margin, high * margin];
 }
 
-// Powers of ten within the domain; of few decades also multiples of them, of many not every one.
+// Powers of ten within the domain; multiples of them too if there are few, and fewer if there are
+// many.
 export function logTicks([low, high]: Domain): number[] {
   const decades = Math.log10(high / low);
   const factors = decades > 2.5 ? [1] : decades > 1 ? [1, 2, 5] : [1, 2, 3, 5, 7];
@@ -42,16 +43,16 @@ export function logTicks([low, high]: Domain): number[] {
 
 export interface LegendRow {
   text: string;
-  color?: string; // without: a note
+  color?: string; // without: the row is a note
   symbol?: SymbolType;
   hollow?: boolean;
-  dash?: string; // of a line through the symbol
+  dash?: string; // dash pattern of a line through the symbol
   bold?: boolean;
 }
 
 const rowHeight = 18;
 
-// Marks at the right of the frame, in pixels.
+// The legend to the right of the frame; lengths in pixels.
 export function legend(rows: LegendRow[], left: number, top: number): Markish[] {
   const at = (value: number) => ({ value: [value], scale: null });
   return rows.flatMap((row, n) => {
@@ -107,8 +108,8 @@ function save(svg: Element, name: string): void {
 }
 
 export function figure(svg: Element, caption: string, fileName: string): HTMLElement {
-  // One image to assistive technology, which reads the numbers in the tables: the labels of its
-  // marks are not announced.
+  // The figure is a single image to assistive technology, which finds the numbers in the tables, so
+  // the labels of its marks are hidden.
   svg.setAttribute("role", "img");
   for (const mark of svg.querySelectorAll("[aria-label]")) {
     mark.setAttribute("data-label", mark.getAttribute("aria-label")!);

@@ -1,4 +1,4 @@
-// The report of the command study: the JSON of its page -> figures, tables and pictures.
+// The report of the command study: the JSON in its page -> figures, tables and pictures.
 import type { Study, StudyCalibration, StudyPicture, StudyScene } from "../generated/study";
 import { calibrationFigure } from "./calibration_figure";
 import { details, element } from "./dom";

@@ -1,4 +1,4 @@
-// The tables of the report.
+// Creates the tables of the report.
 import type {
   Study,
   StudyAgreement,

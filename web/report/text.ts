@@ -1,4 +1,4 @@
-// Numbers as text. A number that the study does not know is null.
+// Numbers as text. null: not measured in the study.
 
 export type Known = number | null;
 
@@ -28,7 +28,7 @@ export const yesNo = (value: boolean): string => (value ? "yes" : "no");
 
 const superscripts = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 
-// Of a logarithmic axis: 10⁻³, 2×10⁻³.
+// Label of a logarithmic axis: 10⁻³, 2×10⁻³.
 export function powerOfTen(value: number): string {
   const [factor, exponent = "0"] = value.toExponential(0).split("e");
   const digits = exponent

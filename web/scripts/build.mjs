@@ -1,5 +1,5 @@
-// src/ -> dist/: one script, one style sheet and the icon under names that carry their content's
-// hash, and the index.html that names them; beside each of them NAME.gz, as it is sent.
+// src/ -> dist/: one script, one style sheet and the icon with content hashes in their names, the
+// index.html that refers to them, and a gzipped NAME.gz of each file.
 // Usage: node scripts/build.mjs [--outdir DIR] [--quiet]
 import { mkdir, readdir, readFile, rm, writeFile } from "node:fs/promises";
 import { createHash } from "node:crypto";
@@ -17,8 +17,9 @@ function option(name, fallback) {
   return at < 0 ? fallback : process.argv[at + 1];
 }
 
-// lil-gui's icon font is a data: address, which the content policy forbids, and browsers check that
-// address even if no text uses the font. src/styles/panel.css draws the icons in the page's fonts.
+// lil-gui's icon font is a data: URL, which the content security policy forbids; browsers check
+// that URL even if no text uses the font. src/styles/panel.css draws the icons with the page's
+// fonts.
 const withoutIconFont = {
   name: "without-icon-font",
   setup(setup) {
@@ -67,7 +68,7 @@ async function main() {
   };
   const page = (await readFile(join(web, "index.html"), "utf8"))
     .replace(/%(SCRIPT|STYLE|ICON)%/g, (_, key) => names[key])
-    .replace(/\s+/g, " "); // the page shows no run of spaces anywhere
+    .replace(/\s+/g, " "); // no text of the page needs consecutive spaces
   const files = [
     ["index.html", Buffer.from(page)],
     [names.SCRIPT, program],

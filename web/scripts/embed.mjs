@@ -1,5 +1,6 @@
 // The built page -> an assembly file that includes the gzipped files, and a C++ file that lists
-// them; the page of a study's report likewise, as it is. For web/embed.cmake.
+// them; the page of the study report is embedded likewise, but uncompressed. Used by
+// web/embed.cmake.
 // Usage: node scripts/embed.mjs OUTDIR
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
@@ -36,7 +37,7 @@ function pack(dist, outdir) {
     });
 }
 
-// The digests make the file change whenever what it includes does.
+// The digests change the assembly file whenever an included file changes.
 const assembly = (assets) => `/* Made by web/scripts/embed.mjs. */
     .section .rodata
 ${assets
@@ -105,7 +106,7 @@ const outdir = resolve(process.argv[2]);
 const dist = join(outdir, "dist");
 mkdirSync(dist, { recursive: true });
 installModules();
-// In processes of their own: their modules are installed only now.
+// Run as separate processes, because their modules have only just been installed.
 const run = (script, ...args) =>
   execFileSync(process.execPath, [join(scripts, script), ...args], { stdio: "inherit" });
 const report = join(outdir, "report.html");

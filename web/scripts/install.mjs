@@ -1,6 +1,6 @@
-// package-lock.json -> node_modules, only when they do not match. Uses nothing but node itself.
+// package-lock.json -> node_modules, only if they do not match. Requires only node itself.
 // Usage: node install.mjs [FOLDER]       default: web
-// Several builds may start at once: one installs, the others wait for it.
+// If several builds start at once, one installs and the others wait for it.
 import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readFileSync, rmSync, statSync } from "node:fs";
 import { dirname, join } from "node:path";
@@ -42,7 +42,7 @@ function withLock(path, run) {
 
 export function installModules(folder = web) {
   const lock = join(folder, "package-lock.json");
-  // The copy of the lock file that these modules were installed from.
+  // A copy of the lock file from which the modules were installed.
   const installed = join(folder, "node_modules", ".installed-lock");
   const fits = () => textOf(installed) === textOf(lock);
   if (fits()) return;

@@ -1,5 +1,5 @@
-// report/ -> the page of a study's report in one file: style sheet, script and the licences of the
-// bundled modules; the program puts a study's JSON in place of %STUDY%.
+// report/ -> the page of a study report as one file: style sheet, script and the licences of the
+// bundled modules; the program replaces %STUDY% by the JSON of a study.
 // Usage: node scripts/report.mjs FILE
 import { readdirSync, readFileSync } from "node:fs";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
@@ -33,7 +33,7 @@ async function bundle(entry) {
   return { code: outputFiles[0].text.trim(), modules: modules.filter(Boolean) };
 }
 
-// Modules of the same licence text are listed together.
+// Modules with the same licence text are listed together.
 function licences(modules) {
   const namesByText = new Map();
   for (const module of [...new Set(modules)].sort()) {

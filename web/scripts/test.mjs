@@ -1,5 +1,5 @@
-// Types made anew, the whole page type-checked, the tests bundled (no node runs TypeScript here)
-// and run. Usage: node scripts/test.mjs [node --test options]
+// Generates the types, type-checks the page and its tests, bundles the tests (for node versions
+// that cannot run TypeScript) and runs them. Usage: node scripts/test.mjs [node --test options]
 import { spawnSync } from "node:child_process";
 import { mkdirSync, readdirSync, rmSync } from "node:fs";
 import { dirname, join } from "node:path";

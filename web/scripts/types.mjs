@@ -1,5 +1,5 @@
-// protocol/*.schema.json -> web/generated/*.ts: the page's types are the wire's, never written
-// twice. The files are not committed; every build and test makes them anew.
+// protocol/*.schema.json -> web/generated/*.ts, so that the schemas define the page's types. The
+// files are not committed; every build and test generates them.
 import { mkdir, readFile, rename, writeFile } from "node:fs/promises";
 import { dirname, join } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
@@ -9,7 +9,8 @@ const web = join(dirname(fileURLToPath(import.meta.url)), "..");
 const protocol = join(web, "..", "protocol");
 const schemas = ["view", "messages", "study"];
 
-// json-schema-to-typescript reads drafts before 2020-12: tuples by `items`, no `prefixItems`.
+// json-schema-to-typescript reads drafts before 2020-12, which define tuples by `items` and not by
+// `prefixItems`.
 function toOlderDraft(node) {
   if (Array.isArray(node)) return node.map(toOlderDraft);
   if (node === null || typeof node !== "object") return node;
@@ -32,7 +33,7 @@ async function writeIfChanged(path, text) {
   await rename(temporary, path);
 }
 
-// The numbers that a key may have: pointer without array indices -> least and greatest.
+// The limits of numeric keys: pointer without array indices -> least and greatest value.
 function collectRanges(node, pointer, ranges) {
   for (const [key, child] of Object.entries(node.properties ?? {})) {
     const at = `${pointer}/${key}`;
@@ -53,10 +54,10 @@ export const viewRanges: Readonly<Record<string, readonly [number, number]>> = $
   await writeIfChanged(join(outDir, "view_ranges.ts"), text);
 }
 
-// A value of the shape that the schema tells: of objects the keys that must be there, of lists of
-// any length one entry.
+// A sample value of the schema's shape: objects with their required keys, lists of variable length
+// with one element.
 function sampleOf(schema) {
-  const type = [schema.type ?? "string"].flat()[0]; // enumerations are of texts
+  const type = [schema.type ?? "string"].flat()[0]; // enumerations are of strings
   if (type === "object") {
     const needed = schema.required ?? [];
     return Object.fromEntries(needed.map((key) => [key, sampleOf(schema.properties[key])]));
@@ -68,8 +69,8 @@ function sampleOf(schema) {
   return { string: "", boolean: false, number: 0, integer: 0 }[type];
 }
 
-// Key -> sample, of all that no range tells, but for true and false; a key means the same wherever
-// it stands in a view.
+// Key -> sample, for keys without a numeric range except booleans; a key means the same wherever it
+// occurs in a view.
 function collectKeys(schema, keys) {
   for (const [key, child] of Object.entries(schema.properties ?? {})) {
     const sample = sampleOf(child);
@@ -88,7 +89,7 @@ async function generateKeys(outDir) {
   const entries = Object.entries(collectKeys(schema, {}))
     .filter(([, sample]) => !["0", "{}", "false"].includes(JSON.stringify(sample)))
     .map(([key, sample]) => [JSON.stringify(sample), key]);
-  entries.sort(); // like by like: fewer bytes
+  entries.sort(); // sorted, so that the file compresses better
   const lines = entries.map(([sample, key]) => `  ${key}: ${sample},\n`).join("");
   const text = `// Made from protocol/view.schema.json by web/scripts/types.mjs.
 export const viewKeys: Readonly<Record<string, unknown>> = {\n${lines}};

@@ -1,5 +1,5 @@
-// The page's address: when it follows the view, what becomes of a link to a view that the server
-// keeps, and what Share copies. The server and the browser are played.
+// The page's address: its updates by the view, links to views stored by the server, and the link
+// that Share copies. Server and browser are simulated.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Address } from "../src/app/address";
@@ -63,7 +63,7 @@ class Visit {
     this.follow();
   }
 
-  // The address after what the view is now has rested.
+  // The address after the debounce interval with this view.
   rests(view: View): string {
     this.view = view;
     this.address.save();
@@ -75,7 +75,7 @@ class Visit {
 const short = "#!view=k7";
 const settled = () => new Promise((resolve) => setImmediate(resolve));
 
-test("a link to a stored view stays until that view is loaded", async () => {
+test("a link to a stored view is kept until that view is loaded", async () => {
   const visit = new Visit(short);
   assert.equal(visit.rests({ image: { width: 9, height: 6 } }), short);
   visit.address.edited();
@@ -96,7 +96,11 @@ test("a stored view that fails to load keeps the link until an edit", async () =
     await settled();
     assert.deepEqual(visit.begun, [null]);
     assert.match(visit.alert, /unknown view k7/);
-    assert.equal(visit.rests({ dataset: "gcm", step: 0 }), short, "what the page does by itself");
+    assert.equal(
+      visit.rests({ dataset: "gcm", step: 0 }),
+      short,
+      "the page's own changes keep the link",
+    );
     visit.address.edited();
     assert.equal(visit.rests({ step: 3 }), hashOfView({ step: 3 }));
   }

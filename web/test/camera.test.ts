@@ -1,4 +1,4 @@
-// Camera maths against closed forms.
+// Camera calculations against closed forms.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -37,7 +37,8 @@ const camera: Camera = {
   height: 2,
 };
 
-// Place of a world point in the picture: fractions of the height from its centre, right and up.
+// Position of a world point relative to the centre of the picture: fractions of its height, right
+// and up.
 function project(view: Camera, point: Vec3): [number, number] {
   const frame = cameraFrame(view);
   const p = subtract(point, view.eye);
@@ -130,7 +131,7 @@ test("zooming scales the picture about the target", () => {
     const back = zoom(zoom(view, 1.7), 1 / 1.7);
     nearAll(back.eye, view.eye);
   }
-  assert.ok(distanceOf(zoom(camera, 1e12)) > 0, "never onto the target");
+  assert.ok(distanceOf(zoom(camera, 1e12)) > 0, "the eye never reaches the target");
 });
 
 test("changing the projection keeps the size of the target", () => {

@@ -1,4 +1,4 @@
-// The connection against a socket and a clock that the test plays.
+// The connection with a simulated socket and clock.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
@@ -36,7 +36,7 @@ class FakeSocket implements SocketLike {
     this.readyState = 3;
   }
 
-  says(data: unknown): void {
+  receives(data: unknown): void {
     this.onmessage?.({ data });
   }
 
@@ -141,11 +141,11 @@ test("sends the subprotocol, is live after hello and delivers messages and frame
   assert.equal(last().protocol, "windsplat.v1");
   assert.equal(last().binaryType, "arraybuffer");
   assert.equal(connection.live, false);
-  last().says(hello);
+  last().receives(hello);
   assert.equal(state().name, "live");
   assert.equal(seen.hellos.length, 1);
-  last().says(stats);
-  last().says(frameBytes());
+  last().receives(stats);
+  last().receives(frameBytes());
   assert.equal(seen.messages[0]!.type, "stats");
   assert.equal(seen.frames[0]!.header.seq, 7);
   assert.equal(seen.frames[0]!.picture.byteLength, 3);
@@ -156,7 +156,7 @@ test("nothing is sent before hello or after the end", () => {
   assert.equal(connection.send({ type: "pause" }), false);
   connection.start();
   assert.equal(connection.send({ type: "pause" }), false);
-  last().says(hello);
+  last().receives(hello);
   assert.equal(connection.send({ type: "ack", seq: 1, decodeMs: 2 }), true);
   assert.deepEqual(JSON.parse(last().sent[0]!), { type: "ack", seq: 1, decodeMs: 2 });
   last().dies();
@@ -187,12 +187,12 @@ test("reconnects later after each failure and at once after a frame", () => {
     assert.equal(waiting.name === "waiting" && waiting.delayMs, delay);
     const before = sockets.length;
     clock.advance(delay - 1);
-    assert.equal(sockets.length, before, "not early");
+    assert.equal(sockets.length, before, "no early attempt");
     clock.advance(1);
     assert.equal(sockets.length, before + 1);
   }
-  last().says(hello);
-  last().says(frameBytes());
+  last().receives(hello);
+  last().receives(frameBytes());
   last().dies();
   const waiting = state();
   assert.equal(waiting.name === "waiting" && waiting.delayMs, 625);
@@ -203,7 +203,7 @@ test("a server that fails after hello is not contacted more often", () => {
   connection.start();
   let before = 0;
   for (let n = 0; n < 4; n++) {
-    last().says(hello);
+    last().receives(hello);
     last().dies();
     const waiting = state();
     assert.ok(waiting.name === "waiting" && waiting.delayMs > before);
@@ -229,21 +229,21 @@ test("malformed data close the connection and are reported", () => {
     const { clock, connection, last, seen, sockets, state } = setUp();
     connection.start();
     const first = last();
-    first.says(hello);
-    first.says(bad);
+    first.receives(hello);
+    first.receives(bad);
     assert.equal(first.closed?.code, 4400, String(bad));
     assert.equal(connection.live, false);
     const waiting = state();
     assert.equal(waiting.name, "waiting");
     assert.match(waiting.name === "waiting" ? waiting.reason : "", /server sent/);
     const counts = [seen.messages.length, seen.frames.length];
-    first.says(stats);
-    first.says(frameBytes());
-    assert.deepEqual([seen.messages.length, seen.frames.length], counts, "the rest is not heard");
+    first.receives(stats);
+    first.receives(frameBytes());
+    assert.deepEqual([seen.messages.length, seen.frames.length], counts, "later data are ignored");
     first.dies(1000);
     clock.advance(1_000);
     assert.equal(sockets.length, 2, "one new connection, not two");
-    last().says(hello);
+    last().receives(hello);
     assert.equal(connection.live, true);
   }
 });
@@ -252,7 +252,7 @@ test("messages and frames before hello are protocol errors", () => {
   for (const early of [stats, frameBytes()]) {
     const { connection, last } = setUp();
     connection.start();
-    last().says(early);
+    last().receives(early);
     assert.equal(last().closed?.code, 4400);
   }
 });
@@ -281,7 +281,7 @@ test("after a refused origin or token reconnection is rare", () => {
 test("after long inactivity reconnection waits for the user", () => {
   const { clock, connection, last, sockets, state } = setUp();
   connection.start();
-  last().says(hello);
+  last().receives(hello);
   last().dies(4410);
   assert.equal(state().name, "asleep");
   clock.advance(3_600_000);
@@ -302,7 +302,7 @@ test("reconnects at once when the network returns", () => {
   assert.ok(sockets.slice(1).filter((socket) => socket.closed === null).length <= 1);
   connection.stop();
   connection.retryNow();
-  assert.equal(clock.waiting, 0, "a stopped connection waits for nothing");
+  assert.equal(clock.waiting, 0, "a stopped connection has no timers");
 });
 
 test("the stream's address follows the page's base path and scheme", () => {

@@ -1,4 +1,5 @@
-// What the panel offers of a dataset, what counts under a view, and what legend and HUD say of it.
+// The options that the panel offers for a dataset, the controls that apply to a view, and the texts
+// of legend and HUD.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -60,7 +61,7 @@ const dataset = {
   ],
 } as unknown as Dataset;
 
-test("the offered shapes are those listed by the dataset", () => {
+test("the offered mappings are those listed by the dataset", () => {
   const labels = (mappings: Dataset["mappings"]) =>
     mappingOptions({ ...dataset, mappings, defaultView: { geometry: { mapping: "flat" } } });
   assert.deepEqual(Object.values(labels(["flat"])), ["flat"]);
@@ -115,7 +116,7 @@ test("the ends of the depth cue stay in order", () => {
   }
 });
 
-test("settings without effect are ignored", () => {
+test("controls without effect are hidden or disabled", () => {
   const whole: View = {
     vector: { field: "wind", color: { by: "rise" }, jitter: { center: 0, stride: 0.3 } },
     depthCue: { strength: 0.3 },

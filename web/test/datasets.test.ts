@@ -1,5 +1,5 @@
-// Datasets that cannot be read, lists of them, and files that change while they are shown: what the
-// page says and shows for messages that are made up here.
+// Unreadable datasets, dataset lists, and files that change while displayed: the page's messages
+// and state for simulated server messages.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bestDataset, pickerEntries, withState } from "../src/app/dataset_list";
@@ -42,29 +42,30 @@ test("the initial dataset is one that can be read", () => {
   );
 });
 
-test("the reason why a dataset cannot be shown stays visible", () => {
+test("the reason why a dataset cannot be shown remains visible", () => {
   const storm = described("storm");
-  // The server refuses the request, then the patch, in either order; the page goes back meanwhile.
+  // The server refuses the request and the patch in either order; meanwhile the page restores the
+  // previous view.
   for (const patchFirst of [false, true]) {
     const page = new Page([storm, described("big")]);
     page.opened(storm);
     page.draws();
     page.choose("big");
     const [id, rev] = [page.openId, page.rev];
-    const refuseId = () => page.says({ type: "error", id, problem: problem(tooBig, 507) });
-    const refuseRev = () => page.says({ type: "error", rev, problem: problem(tooBig, 507) });
+    const refuseId = () => page.receives({ type: "error", id, problem: problem(tooBig, 507) });
+    const refuseRev = () => page.receives({ type: "error", rev, problem: problem(tooBig, 507) });
     if (patchFirst) refuseRev();
     refuseId();
     if (!patchFirst) refuseRev();
-    page.says({ type: "unchanged", rev: page.rev, seq: 1 });
+    page.receives({ type: "unchanged", rev: page.rev, seq: 1 });
     assert.equal(page.alert, tooBig);
     assert.equal(page.element("dataset").value, "storm");
     assert.deepEqual(page.entries, ["The storm", "The big — failed"]);
     page.app.change({ step: 1 });
     page.draws();
-    assert.equal(page.alert, tooBig, "until it was seen to");
+    assert.equal(page.alert, tooBig, "the error remains until the next choice");
     page.choose("big");
-    assert.equal(page.alert, null, "asked again");
+    assert.equal(page.alert, null, "a new request clears the error");
     page.opened(described("big"));
     page.draws();
     assert.equal(page.alert, null);
@@ -72,18 +73,18 @@ test("the reason why a dataset cannot be shown stays visible", () => {
   }
 });
 
-test("when nothing can be read each dataset is tried once and the last error stays", () => {
+test("when no dataset can be read each is tried once and the last error remains", () => {
   const page = new Page([described("a"), described("b")]);
-  page.says({ type: "error", id: page.openId, problem: problem("a is damaged") });
+  page.receives({ type: "error", id: page.openId, problem: problem("a is damaged") });
   assert.equal(page.sent("open").at(-1)!.dataset, "b");
-  page.says({ type: "error", id: page.openId, problem: problem("b is damaged") });
+  page.receives({ type: "error", id: page.openId, problem: problem("b is damaged") });
   assert.equal(page.sent("open").length, 2);
   assert.equal(page.alert, "b is damaged");
 });
 
 const camera = { eye: [1, 2, 3], target: [0, 0, 0], up: [0, 0, 1], fovY: 20, height: 1 };
 
-// The view that the server holds after all that was said to it.
+// The view on the server, computed from all patches sent.
 const explicitView = (page: Page): View =>
   page.sent("patch").reduce<View>((view, { patch }) => mergeView(view, patch), {});
 
@@ -99,8 +100,8 @@ test("a dataset that cannot be opened keeps the shown one", () => {
     if (twice) page.choose("other");
     page.choose("big");
     const rev = page.rev;
-    page.says({ type: "error", id: page.openId, problem: problem(tooBig, 507) });
-    page.says({ type: "error", rev, problem: problem(tooBig, 507) });
+    page.receives({ type: "error", id: page.openId, problem: problem(tooBig, 507) });
+    page.receives({ type: "error", rev, problem: problem(tooBig, 507) });
     assert.deepEqual(page.app.explicitView(), before);
     assert.deepEqual(explicitView(page), before);
     assert.equal(page.alert, tooBig);
@@ -121,7 +122,7 @@ test("choosing the shown dataset while another opens keeps it", () => {
     else page.app.restore({ dataset: "storm", step: 2, camera } as View);
     const wanted = back === "picker" ? before : { ...before, step: 2 };
     assert.deepEqual(page.app.explicitView(), wanted);
-    page.opened(big); // too late
+    page.opened(big); // arrives too late
     assert.deepEqual(page.app.explicitView(), wanted);
     assert.equal(page.app.dataset().id, "storm");
     assert.equal(page.element("dataset").value, "storm");

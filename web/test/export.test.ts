@@ -28,7 +28,7 @@ import { problem, server } from "./server";
 
 // --- PNG ------------------------------------------------------------------------------------
 
-// A PNG of one red pixel, put together here after the specification.
+// A PNG of one red pixel, assembled according to the specification.
 function tinyPng(...between: [string, string][]): Bytes {
   const chunk = (type: string, data: Uint8Array): Buffer => {
     const body = Buffer.concat([Buffer.from(type, "latin1"), data]);
@@ -83,7 +83,7 @@ function python(program: string, content: Uint8Array, name: string): unknown {
 }
 
 test("checksums match the specifications", () => {
-  assert.equal(crc32(utf8("IEND")), 0xae426082); // every PNG's last four bytes
+  assert.equal(crc32(utf8("IEND")), 0xae426082); // the last four bytes of every PNG
   assert.equal(crc32(utf8("123456789")), 0xcbf43926); // the usual check value
   assert.equal(crc32(utf8("")), 0);
 });
@@ -183,7 +183,11 @@ test("a picture is n times its displayed size within the limits", () => {
       const fits = w * wanted <= 8192 && h * wanted <= 8192 && w * h * wanted ** 2 <= most;
       assert.equal(scale === wanted, fits);
       if (fits) assert.deepEqual([width, height], [w * wanted, h * wanted]);
-      else assert.ok(Math.max(width, height) > 8000 || width * height > 0.99 * most, "no smaller");
+      else
+        assert.ok(
+          Math.max(width, height) > 8000 || width * height > 0.99 * most,
+          "the picture is as large as the limits permit",
+        );
     }
   }
 });
@@ -213,7 +217,7 @@ const camera: Camera = {
 };
 const animation: Animation = { over: "steps", from: 1, to: 8, every: 3, frames: 12, fps: 10 };
 
-test("an animation over steps takes every n-th, either way", () => {
+test("an animation over steps takes every n-th, in either direction", () => {
   const steps = (one: Animation) =>
     Array.from({ length: frameCount(one) }, (_, n) => frameView({}, camera, one, n).step);
   assert.deepEqual(steps(animation), [1, 4, 7]);
@@ -228,7 +232,7 @@ test("an orbit is one closed turn at constant elevation", () => {
   for (let n = 0; n <= 12; n++) {
     const view = frameView({ camera: { fovY: 20 } }, camera, turn, n);
     const seen = { ...camera, ...(view.camera as Partial<Camera>) };
-    assert.equal(seen.fovY, 20, "what the view says of the camera stays");
+    assert.equal(seen.fovY, 20, "the view's explicit camera keys are preserved");
     assert.ok(Math.abs(anglesOf(seen).elevation - start.elevation) < 1e-9);
     assert.ok(Math.abs(distanceOf(seen) - distanceOf(camera)) < 1e-9);
     const turned = (anglesOf(seen).azimuth - start.azimuth - 30 * n) / 360;
@@ -291,7 +295,7 @@ test("a busy server is retried after its Retry-After time, other errors are fina
   await assert.rejects(drawFrame(gone, "http://host/", {}, never, wait), /cannot be reached/);
 });
 
-test("cancelling ends a wait at once", async () => {
+test("cancelling a wait rejects at once", async () => {
   const job = new AbortController();
   const waiting = waitFor(3_600_000, job.signal);
   job.abort();
@@ -299,7 +303,7 @@ test("cancelling ends a wait at once", async () => {
   await assert.rejects(waitFor(3_600_000, job.signal), { name: "AbortError" });
   const other = new AbortController();
   await waitFor(0, other.signal);
-  assert.equal(getEventListeners(other.signal, "abort").length, 0, "nothing is left behind");
+  assert.equal(getEventListeners(other.signal, "abort").length, 0, "no listener remains");
 });
 
 test("at most two frames are pending, and they are handled in order", async () => {
@@ -379,7 +383,7 @@ test("legend cards never overlap or leave the picture", () => {
       });
       assert.ok(
         cards.every((card) => card.y * shrink >= 0.39 * height),
-        "most of it is free",
+        "most of the picture is uncovered",
       );
       if (width === 1136) assert.equal(shrink, 1);
     }

@@ -1,5 +1,5 @@
-// Files that change, or become unreadable, while they are shown: what the page makes of a second
-// `opened` and of an unsolicited `error`.
+// Files that change or become unreadable while displayed: the page's handling of a second `opened`
+// and of an unsolicited `error`.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { fitView, shapeOf } from "../src/view/fit_view";
@@ -63,10 +63,10 @@ test("fewer steps select the last one and keep the rest", () => {
   page.app.change({ scalars: [{ field: "temperature", stride: 2 }] });
   page.draws();
   const { built } = page;
-  page.says({ type: "error", rev: page.rev, problem: problem(gone, 422, "/step") });
+  page.receives({ type: "error", rev: page.rev, problem: problem(gone, 422, "/step") });
   assert.match(page.alert ?? "", /steps 0 to 2/);
   page.opened(described("storm", { steps: 3 }));
-  assert.equal(page.alert, null, "the step is not asked for any more");
+  assert.equal(page.alert, null, "the step is no longer requested");
   const last = page.sent("patch").at(-1)!.patch as View;
   assert.equal(last.step, 2);
   const { step, vector, scalars } = page.app.view();
@@ -77,11 +77,11 @@ test("fewer steps select the last one and keep the rest", () => {
   assert.equal(page.element("time-step").textContent, "step 2 of 3");
   assert.equal(page.element("time-label").textContent, "2001-01-01 02:00Z");
   assert.equal(page.built, built + 1);
-  // The server may still have tried the old step, without a patch.
-  page.says({ type: "error", problem: problem(gone, 422, "/step") });
+  // The server may already have tried the old step without a patch.
+  page.receives({ type: "error", problem: problem(gone, 422, "/step") });
   page.draws();
   assert.equal(page.alert, null);
-  assert.equal(page.sent("open").length, 1, "nothing is opened again");
+  assert.equal(page.sent("open").length, 1, "no dataset is opened again");
 });
 
 test("the time bar follows the number of steps, and the step is kept", () => {
@@ -90,7 +90,7 @@ test("the time bar follows the number of steps, and the step is kept", () => {
   page.draws();
   const patches = page.sent("patch").length;
   page.opened(described("storm", { steps: 9 }));
-  assert.equal(page.sent("patch").length, patches, "nothing had to change");
+  assert.equal(page.sent("patch").length, patches, "no patch is needed");
   assert.equal(page.element("time-slider").max, "8");
   assert.equal(page.element("time-step").textContent, "step 3 of 9");
   page.opened(described("storm", { steps: 1 }));
@@ -129,36 +129,36 @@ test("a removed field is not requested, and defaults are updated", () => {
 test("the answer to a cancelled request changes nothing", () => {
   const page = shown();
   page.choose("calm");
-  page.says({ type: "opened", id: 1, dataset: described("storm", { steps: 2 }) });
+  page.receives({ type: "opened", id: 1, dataset: described("storm", { steps: 2 }) });
   assert.equal(page.element("time-slider").max, "4");
   page.opened(described("calm", { steps: 7 }));
   assert.equal(page.element("time-slider").max, "6");
-  page.says({ type: "opened", id: 1, dataset: described("storm", { steps: 2 }) });
+  page.receives({ type: "opened", id: 1, dataset: described("storm", { steps: 2 }) });
   assert.equal(page.app.dataset().id, "calm");
 });
 
 test("unreadable changed files show an error and keep the old picture", () => {
   const page = shown();
   const patches = page.sent("patch").length;
-  page.says({ type: "error", id: page.openId, problem: problem(damaged) });
+  page.receives({ type: "error", id: page.openId, problem: problem(damaged) });
   assert.equal(page.alert, damaged);
   assert.deepEqual(page.entries, ["The storm — failed", "The calm"]);
   page.app.change({ step: 1 });
   page.draws();
-  assert.equal(page.alert, damaged, "whatever else is drawn");
+  assert.equal(page.alert, damaged, "other frames do not clear the error");
   assert.equal(page.sent("patch").length, patches + 1);
   assert.deepEqual([page.sent("open").length, page.app.dataset().id], [1, "storm"]);
   const { built } = page;
   page.opened(described("storm"));
   assert.equal(page.alert, null);
-  assert.equal(page.built, built + 1, "of other values, if not of another shape");
+  assert.equal(page.built, built + 1, "rebuilt, because the values may differ");
   assert.deepEqual(page.entries, ["The storm", "The calm"]);
 });
 
 test("files unreadable before the page loads are reported by the server note", () => {
   const failed = described("storm", { state: "failed", notes: ["levels were turned", damaged] });
   const page = new Page([failed, described("calm")]);
-  assert.equal(page.sent("open").at(-1)!.dataset, "calm", "one that can be read goes first");
+  assert.equal(page.sent("open").at(-1)!.dataset, "calm", "a readable dataset is preferred");
   page.opened(described("calm"));
   page.choose("storm");
   page.opened(failed);
@@ -172,10 +172,10 @@ test("files unreadable before the page loads are reported by the server note", (
 test("a failed dataset is reported even after another failed request", () => {
   const page = shown();
   page.choose("calm");
-  page.says({ type: "error", id: page.openId, problem: problem("no") });
+  page.receives({ type: "error", id: page.openId, problem: problem("no") });
   page.opened(described("storm", { steps: 9 }));
-  assert.equal(page.element("time-slider").max, "8", "by the id of the last request");
-  page.says({ type: "error", id: 1, problem: problem(damaged) });
-  assert.equal(page.alert, damaged, "or by that of the one that opened it");
+  assert.equal(page.element("time-slider").max, "8", "accepts the id of the last request");
+  page.receives({ type: "error", id: 1, problem: problem(damaged) });
+  assert.equal(page.alert, damaged, "accepts the id of the request that opened it");
   assert.deepEqual(page.entries, ["The storm — failed", "The calm — failed"]);
 });

@@ -1,16 +1,16 @@
-// The flow of the lines: its pace, what it waits for, and what ends it.
+// The line motion: its pace, its waiting for frames, and its end.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Flow, flowFps, laterTime } from "../src/view/flow";
 
-// A page whose clock stands still until it is moved.
+// A page with a clock that the test advances.
 class Page {
   clock = 0;
   isHidden = false;
   isWanted = true;
   at = 0;
-  sent: number[] = []; // ms at which a move went out
-  ends: boolean[] = []; // of every end that was reported: whether the flow still ran then
+  sent: number[] = []; // times in ms at which a patch was sent
+  ends: boolean[] = []; // for each reported end: whether the motion was still running
   rev = 0;
   private timers = new Map<number, { due: number; run: () => void }>();
   private lastTimer = 0;
@@ -36,7 +36,7 @@ class Page {
     return this.timers.size;
   }
 
-  // Frames of what was asked for come back after `frameMs`; null: never.
+  // Requested frames arrive after `frameMs`; null: never.
   run(ms: number, frameMs: number | null): void {
     const end = this.clock + ms;
     const frames: { due: number; rev: number }[] = [];
@@ -86,12 +86,12 @@ test("slow frames are awaited with at most one pending request", () => {
   const silent = new Page();
   silent.flow.start();
   silent.run(5000, null);
-  assert.equal(silent.sent.length, 1, "without an answer nothing more is asked for");
+  assert.equal(silent.sent.length, 1, "without an answer no further frame is requested");
   assert.equal(silent.waiting, 0);
   silent.flow.seen();
   silent.flow.answered(silent.rev - 1);
   silent.run(1000, null);
-  assert.equal(silent.sent.length, 1, "nor because someone looks or an older frame comes");
+  assert.equal(silent.sent.length, 1, "nor when the page is shown or an older frame arrives");
 });
 
 test("a hidden page requests nothing and continues without a jump", () => {
@@ -131,7 +131,7 @@ test("stop, an error or static lines end the motion", () => {
   page.flow.start();
   page.run(500, 5);
   page.flow.refused(page.rev + 1);
-  assert.equal(page.flow.running, true, "another's refusal is not the flow's");
+  assert.equal(page.flow.running, true, "the refusal of another patch does not end the motion");
 });
 
 test("the page is notified once of an end that it did not request", () => {

@@ -1,4 +1,4 @@
-// Error against time: axes, ticks, text, and the budget's steps.
+// Plot of error against time: axes, ticks, text, and the increments of budget and limit.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
@@ -17,7 +17,7 @@ test("an axis contains its values, omits those without logarithm, and has a mini
   assert.ok(axis.low < 5 && axis.high > 200 && axis.low > 1);
   const narrow = axisOver([10, 10], 30);
   assert.ok(Math.abs(narrow.high / narrow.low - 30) < 1e-9);
-  assert.ok(Math.abs(narrow.high * narrow.low - 100) < 1e-9, "about the middle");
+  assert.ok(Math.abs(narrow.high * narrow.low - 100) < 1e-9, "centred on the values");
   assert.ok(axisOver([], 30).low > 0);
 });
 

@@ -1,5 +1,5 @@
-// What the page says of frames: their errors, sizes and states by the bytes of their headers, and
-// where a picture goes on the canvas.
+// The page's text for frames: errors, sizes and states from the bytes of their headers, and the
+// position of a picture on the canvas.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
@@ -28,7 +28,7 @@ const vectors = JSON.parse(
   readFileSync("../protocol/vectors/valid/frame_headers.json", "utf8"),
 ) as { hex: string }[];
 
-// The first valid vector, with bytes of its own where the test says so.
+// The first valid vector, with the changes given by the test.
 function header(change: Change = {}): FrameHeader {
   const bytes = Uint8Array.from(Buffer.from(vectors[0]!.hex.replaceAll(" ", ""), "hex"));
   const data = new DataView(bytes.buffer);
@@ -47,8 +47,12 @@ test("an error is shown with its kind: bit 4 estimated, bit 2 measured", () => {
   const text = (change: Change) => errorLabel(header(change)).text;
   assert.equal(text({ flags: 4, error: 0.011 }), "error 0.011 est.");
   assert.equal(text({ flags: 2, error: 3.2e-4 }), "error 3.2e-4 measured");
-  assert.equal(text({ flags: 3, error: 0.5 }), "error 0.5 measured", "a final frame's");
-  assert.equal(text({ flags: 6, error: 0.5 }), "error 0.5 measured", "what is measured is known");
+  assert.equal(text({ flags: 3, error: 0.5 }), "error 0.5 measured", "of a final frame");
+  assert.equal(
+    text({ flags: 6, error: 0.5 }),
+    "error 0.5 measured",
+    "measured takes precedence over estimated",
+  );
   assert.equal(text({ flags: 2, error: 0 }), "error 0 measured");
   const said = new Set([
     errorLabel(header({ flags: 4 })).title,
@@ -59,7 +63,7 @@ test("an error is shown with its kind: bit 4 estimated, bit 2 measured", () => {
   for (const title of said) assert.match(title, /root mean square/);
 });
 
-test("an error above what the view allows says so", () => {
+test("an error above the view's limit is shown with the limit", () => {
   const moving = header({ flags: 4, error: 0.045 });
   assert.equal(errorLabel(moving, 0.01).text, "error 0.045 est., above 0.01");
   assert.match(errorLabel(moving, 0.01).title, /exceeds the limit of the view/);
@@ -84,7 +88,7 @@ test("the error metric applies to the page and notifies subscribers", () => {
   const metrics: string[] = [];
   errorMetric.watch((metric) => metrics.push(metric));
   toggleErrorMetric();
-  errorMetric.set("psnr"); // as it is already
+  errorMetric.set("psnr"); // the same value again
   toggleErrorMetric();
   assert.deepEqual(metrics, ["psnr", "rmse"]);
 });
@@ -103,11 +107,7 @@ test("an error without number or kind is unknown", () => {
 
 test("the encoding error is separate, and a PNG has none", () => {
   assert.equal(encodingLabel(header({ jpegError: 4.1e-3 })).text, "JPEG 0.0041");
-  assert.equal(
-    encodingLabel(header({ jpegError: NaN })).text,
-    "",
-    "nothing is better than a guess",
-  );
+  assert.equal(encodingLabel(header({ jpegError: NaN })).text, "", "an unknown error has no text");
   assert.equal(encodingLabel(header({ codec: 2, jpegError: NaN })).text, "PNG lossless");
 });
 
@@ -115,21 +115,21 @@ test("frame size is shown as full, half or a percentage", () => {
   assert.equal(scaleText(1280, 1280), "");
   assert.equal(scaleText(2000, 1280), "");
   assert.equal(scaleText(640, 1280), "1/2");
-  for (const odd of [320, 319]) assert.equal(scaleText(odd, 1279), "1/4", "rounded either way");
+  for (const odd of [320, 319]) assert.equal(scaleText(odd, 1279), "1/4", "rounded up or down");
   assert.equal(scaleText(896, 1280), "70 %");
-  assert.equal(scaleText(1, 1280), "1 %", "never nothing");
+  assert.equal(scaleText(1, 1280), "1 %", "at least 1 %");
 });
 
 test("a frame refines when it shows a displayed view and is not final", () => {
   const moving = header({ flags: 0, rev: 5, step: 3 });
   assert.equal(frameState(moving, null), "moving");
   assert.equal(frameState(moving, header({ flags: 0, rev: 4, step: 3 })), "moving");
-  assert.equal(frameState(moving, header({ flags: 0, rev: 5, step: 2 })), "moving", "time runs");
+  assert.equal(frameState(moving, header({ flags: 0, rev: 5, step: 2 })), "moving", "another step");
   const again = header({ flags: 2, rev: 5, step: 3 });
   assert.equal(frameState(again, moving), "refining");
   assert.equal(frameState(again, again), "refining");
   assert.equal(frameState(header({ flags: 3, rev: 5, step: 3 }), again), "final");
-  // Files that changed under a finished picture: what comes is worse than what was there.
+  // Files changed under a finished picture: the next picture may be worse than the previous one.
   assert.equal(frameState(moving, header({ flags: 1, rev: 5, step: 3 })), "moving");
 });
 
@@ -141,7 +141,11 @@ test("pictures fill a canvas of their aspect ratio, others are letterboxed", () 
     const height = Math.max(1, Math.ceil(720 * share));
     assert.deepEqual(pictureRect(canvas, { width, height }), all, `${width} x ${height}`);
   }
-  assert.deepEqual(pictureRect(canvas, { width: 20, height: 12 }), all, "rounding is no shape");
+  assert.deepEqual(
+    pictureRect(canvas, { width: 20, height: 12 }),
+    all,
+    "rounding is not another aspect ratio",
+  );
   assert.deepEqual(pictureRect(canvas, { width: 360, height: 360 }), [280, 0, 720, 720]);
   assert.deepEqual(pictureRect(canvas, { width: 1280, height: 360 }), [0, 180, 1280, 360]);
 });

@@ -1,18 +1,18 @@
-// Undo and redo: what is one entry, what is none, and that each way leads back.
+// Undo and redo: which changes form an entry, and that undo and redo are inverse.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { differences, ViewHistory } from "../src/view/history";
 import type { View } from "../src/wire/protocol";
 import { mergeView } from "../src/view/view_state";
 
-// A user at a view, with a clock that is set by hand.
+// A user with a view and a clock that is set by the test.
 class Desk {
   readonly history = new ViewHistory();
   now = 0;
 
   constructor(public view: View = { dataset: "storm" }) {}
 
-  // ms later
+  // A change by the user, `ms` later.
   change(patch: object, ms = 10): void {
     this.now += ms;
     const before = this.view;
@@ -20,7 +20,7 @@ class Desk {
     this.history.note(before, this.view, this.now);
   }
 
-  // Not by the user's hand.
+  // A change not made by the user.
   runs(patch: object): void {
     this.view = mergeView(this.view, patch);
   }
@@ -46,7 +46,7 @@ test("everything during one pointer press is one entry", () => {
   for (let n = 1; n <= 500; n++) desk.change(eye(n), n === 250 ? 5000 : 10);
   desk.change({ vector: { length: 2 } });
   desk.history.end();
-  desk.change(eye(501)); // of the display frame after
+  desk.change(eye(501)); // of the next display frame
   assert.deepEqual(desk.view.camera!.eye, [501, -3, 0]);
   desk.undo();
   desk.undo();
@@ -154,7 +154,7 @@ test("entries without effect are skipped", () => {
   desk.change(eye(1), 1000);
   const stands = desk.view;
   desk.change({ vector: { length: 99 } }, 1000);
-  desk.view = stands; // the server refused it
+  desk.view = stands; // the server refused the change
   assert.equal(desk.undo(), "camera");
 });
 

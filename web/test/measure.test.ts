@@ -1,4 +1,4 @@
-// Histograms, places and courses over time; and what the page asks the server for them.
+// Histograms, sample positions and time series, and the page's requests for them.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
@@ -40,9 +40,9 @@ test("quantiles of uniform counts are proportional", () => {
 });
 
 test("samples beyond the range count, masked ones do not", () => {
-  // 100 samples: 30 below, 60 within, 10 above.
+  // 100 samples: 30 below, 60 inside, 10 above.
   const cut = histogram([30, 30], { below: 30, above: 10, masked: 900 });
-  assert.equal(quantile(cut, 0.2), 0, "lies below the range: its low end");
+  assert.equal(quantile(cut, 0.2), 0, "clamped to the low end of the range");
   assert.equal(quantile(cut, 0.45), 0.5);
   assert.equal(quantile(cut, 0.95), 2);
 });
@@ -74,10 +74,10 @@ test("values have the precision of their range", () => {
 test("a drag moves a nearby end, or draws a range elsewhere", () => {
   const end = new RangeDrag(0.21, [0.2, 0.8], 0.05);
   assert.deepEqual(end.to(0.4), [0.4, 0.8]);
-  assert.deepEqual(end.to(0.9), [0.8, 0.9], "beyond the other end they change places");
+  assert.deepEqual(end.to(0.9), [0.8, 0.9], "the ends are swapped when dragged past each other");
   assert.equal(end.end(), null);
   const fresh = new RangeDrag(0.5, [0.2, 0.8], 0.05);
-  assert.equal(fresh.to(0.502), null, "a hand that trembles draws nothing");
+  assert.equal(fresh.to(0.502), null, "a tiny movement draws no range");
   assert.deepEqual(fresh.to(0.6), [0.5, 0.6]);
   assert.deepEqual(fresh.to(0.45), [0.45, 0.5]);
 });
@@ -87,7 +87,11 @@ test("a click moves the nearer end; an inverted range stays inverted", () => {
   assert.deepEqual(new RangeDrag(0.65, [0.2, 0.8], 0.05).end(), [0.2, 0.65]);
   assert.deepEqual(new RangeDrag(0.65, [0.8, 0.2], 0.05).end(), [0.65, 0.2]);
   assert.deepEqual(new RangeDrag(0.2, [0.8, 0.2], 0.05).to(0.4), [0.8, 0.4]);
-  assert.equal(new RangeDrag(0.2, [0.2, 0.8], 0.05).end(), null, "an end that was only touched");
+  assert.equal(
+    new RangeDrag(0.2, [0.2, 0.8], 0.05).end(),
+    null,
+    "a click on an end without movement",
+  );
 });
 
 // --- the server ---------------------------------------------------------------------------
@@ -162,7 +166,7 @@ test("errors show the text of the server or of the page", async () => {
   assert.equal((await dark.api.range("d", "t", null)).range, null);
 });
 
-// --- places -------------------------------------------------------------------------------
+// --- sample positions ---------------------------------------------------------------------
 
 const axis = (coordinates: number[], world: number[]) => ({ coordinates, world });
 const dataset = {
@@ -186,16 +190,16 @@ test("sample coordinates and nearest samples are found on axes of either directi
 test("positions follow the scale of the geometry and are unknown on a curved grid", () => {
   const plain: View = {};
   assert.deepEqual(worldOf(dataset, plain, [3, 1, 0]), [0.75, 0.25, -0.1]);
-  // Twice as high: x keeps the longest edge.
+  // Scaled to twice the height, x is still the longest edge.
   const tall = { geometry: { scale: [1, 1, 2] } } as View;
   assert.deepEqual(worldOf(dataset, tall, [3, 1, 0]), [0.75, 0.25, -0.2]);
-  // y three times as long becomes the longest edge, 2: all else shrinks by 2/3.
+  // Scaled by three, y is the longest edge with length 2, so everything else shrinks by 2/3.
   const long = { geometry: { scale: [1, 3, 1] } } as View;
   const [x, y] = worldOf(dataset, long, [3, 1, 0])!;
   assert.ok(Math.abs(x - 0.5) < 1e-12 && Math.abs(y - 0.5) < 1e-12);
   assert.equal(worldOf(dataset, { geometry: { mapping: "sphere" } } as View, [0, 0, 0]), null);
   assert.deepEqual(sampleAt(dataset, tall, [0.7, -0.3, -0.21]), [3, 0, 0]);
-  assert.equal(sampleAt(dataset, plain, [1.1, 0, 0]), null, "beyond the box");
+  assert.equal(sampleAt(dataset, plain, [1.1, 0, 0]), null, "outside the box");
 });
 
 const camera = (projection: Camera["projection"]): Camera => ({
@@ -227,7 +231,7 @@ test("the target projects to the centre, points behind the eye do not project", 
   assert.ok(Math.abs(x - 0.5) < 1e-12 && Math.abs(y - 0.5) < 1e-12);
   assert.equal(project(c, [2, -8, 5], 1.6), null);
   assert.equal(pointInPlane(c, [0.5, 0.5], 1.6, 2, 5), null, "a plane above the eye");
-  // At the upper edge of the picture a ray is half the angle of view above the middle.
+  // At the upper edge of the picture a ray is half the field of view above the centre.
   const level: Camera = { ...c, eye: [0, -1, 0], target: [0, 0, 0] };
   const top = Math.tan((20 * Math.PI) / 180);
   assert.ok(Math.abs(project(level, [0, 0, top], 1.6)![1]) < 1e-12);

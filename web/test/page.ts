@@ -1,5 +1,5 @@
-// The app with parts that record their calls, in a document of stand-ins: what it sends to the
-// server and shows, for messages that a test makes up. No browser, no server.
+// The app in a simulated document with parts that record their calls: the messages it sends and the
+// state it shows, for the server messages of a test. No browser, no server.
 import { App, type AppParts } from "../src/app/app";
 import { DatasetList } from "../src/app/dataset_list";
 import type {
@@ -76,11 +76,11 @@ class Socket {
   close(): void {}
 }
 
-// Of the newest page: what its clock was asked to run soon, and what wants to know who looks.
+// State of the newest page: pending timers, and handlers of visibility changes.
 let timers: (() => void)[] = [];
 let visibilityHandlers: (() => void)[] = [];
 
-// Of the type that byId asks for, whatever that is.
+// Returns simulated elements that pass byId's type check, whatever type it requests.
 function standIn(): (id: string) => Element {
   const elements = new Map<string, Element>();
   const byId = (id: string): Element => {
@@ -143,7 +143,7 @@ const axisOf = (name: string, count: number) => ({
   world: Array.from({ length: count }, (_, n) => n / count),
 });
 
-// As the server describes one.
+// A dataset description as the server sends it.
 export function described(
   id: string,
   { steps = 5, fields = ["wind", "temperature"], size = 4, ...more }: Described = {},
@@ -213,8 +213,8 @@ export interface Drawing {
 export class Page {
   readonly element = standIn();
   readonly app: App;
-  built = 0; // times that the panels were built
-  cardsShown = 0; // times that the datasets were shown as cards
+  built = 0; // number of times the panels were built
+  cardsShown = 0; // number of times the cards were shown
   private seq = 0;
   private socket: Socket;
 
@@ -234,7 +234,7 @@ export class Page {
   }
 
   private greet(): void {
-    this.says({
+    this.receives({
       type: "hello",
       protocol: "windsplat.v1",
       version: "0.1.0",
@@ -244,12 +244,12 @@ export class Page {
     });
   }
 
-  // The server is gone.
+  // The connection closes with this code.
   lose(code: number): void {
     this.socket.onclose?.({ code, reason: "" });
   }
 
-  // The server is gone and there again.
+  // The connection closes and is reopened.
   again(): void {
     this.socket.onclose?.({ code: 1006, reason: "" });
     for (const run of timers.splice(0)) run();
@@ -258,7 +258,7 @@ export class Page {
     this.greet();
   }
 
-  // So many bytes have not left yet.
+  // This many bytes are still in the send buffer.
   holdUp(bytes: number): void {
     this.socket.bufferedAmount = bytes;
   }
@@ -295,24 +295,30 @@ export class Page {
     } as unknown as AppParts;
   }
 
-  says(message: ServerMessage): void {
+  receives(message: ServerMessage): void {
     this.socket.onmessage?.({ data: JSON.stringify(message) });
   }
 
-  // The `open` that was said last.
+  // The id of the last `open` message.
   get openId(): number {
     return this.sent("open").at(-1)!.id;
   }
 
   opened(dataset: Dataset): void {
-    this.says({ type: "opened", id: this.openId, dataset });
+    this.receives({ type: "opened", id: this.openId, dataset });
   }
 
-  // A frame of the view that was asked for, with its defaults and what the server made of it.
+  // A frame of the requested view, completed with its defaults and the server's own choices.
   draws({ rev = this.rev, final = true, view: own = {} }: Drawing = {}): void {
     this.seq += 1;
     const view = { ...this.app.view(), ...own };
-    this.says({ type: "chosen", seq: this.seq, rev, view, work: {} } as unknown as ServerMessage);
+    this.receives({
+      type: "chosen",
+      seq: this.seq,
+      rev,
+      view,
+      work: {},
+    } as unknown as ServerMessage);
     const header = { seq: this.seq, rev, step: view.step ?? 0, final, t: 0 };
     this.app.onDrawn({ header, decodeMs: 1, arrivedAt: 0, drawnAt: 1 } as DrawnFrame);
   }

@@ -1,4 +1,4 @@
-// The page's smaller pure parts: numbers, legend, links, media, gestures, picture size, times.
+// The smaller pure parts of the page: numbers, legend, links, media, gestures, picture size, times.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
@@ -168,7 +168,7 @@ test("height labels are levels of the vertical axis at their positions", () => {
   const at = Object.fromEntries(entry!.ticks.map((tick) => [tick.text, tick.at]));
   assert.ok(Math.abs(at["1000"]! - (0.24 - 0.12) / 0.39) < 1e-9);
   assert.ok(Math.abs(at["500"]! - 0.24 / 0.39) < 1e-9);
-  assert.ok(at["1000"]! < at["500"]!, "low pressure is high");
+  assert.ok(at["1000"]! < at["500"]!, "low pressure is at the top");
 });
 
 test("round levels are preferred where space is short", () => {
@@ -182,7 +182,7 @@ test("round levels are preferred where space is short", () => {
 test("stretching the volume moves the levels along", () => {
   const stretched: View = { ...vector({}), geometry: { scale: [1, 1, 2] } };
   assert.deepEqual(sampleHeights(dataset, stretched), [-0.24, -0.12, 0, 0.24]);
-  // 20 times as high is higher than wide: 2 x 0.15 x 20 = 6 is now the longest edge.
+  // Scaled by 20, the height exceeds the width: 2 x 0.15 x 20 = 6 is now the longest edge.
   const tower: View = { ...vector({}), geometry: { scale: [1, 1, 20] } };
   assert.ok(Math.abs(sampleHeights(dataset, tower)![3]! - (0.12 * 20 * 2) / 6) < 1e-12);
   const index: View = { ...vector({}), geometry: { vertical: "index" } };
@@ -235,7 +235,7 @@ test("powers in units are superscript", () => {
   for (const [units, text] of rows) assert.equal(unitText(units), text);
 });
 
-test("the legend shows what is rendered only", () => {
+test("the legend shows only what is rendered", () => {
   assert.deepEqual(
     legendEntries(dataset, { dataset: "gcm", vector: { field: null }, scalars: [] }),
     [],
@@ -275,11 +275,11 @@ test("a link restores the view without the window size", () => {
     vector: { field: null },
   };
   const hash = hashOfView(view);
-  assert.match(hash, /^#!\{[!-~]*\}$/, "plain characters only");
+  assert.match(hash, /^#!\{[!-~]*\}$/, "printable ASCII only");
   const { image: _image, ...rest } = view;
   assert.deepEqual(viewOfHash(hash), rest);
   const url = new URL(`http://h/${hash}`);
-  assert.deepEqual(viewOfHash(url.hash), viewOfHash(hash), "an address keeps it");
+  assert.deepEqual(viewOfHash(url.hash), viewOfHash(hash), "an address preserves the view");
   assert.deepEqual(viewOfHash('#!{"dataset":"x","image":{"width":9,"background":"#112233"}}'), {
     dataset: "x",
     image: { background: "#112233" },
@@ -329,7 +329,7 @@ test("density scales the opacity curve, threshold moves its start", () => {
   );
   const top = rampCurve([0, 10], 99, 3);
   for (let n = 1; n < top.length; n++) assert.ok(top[n]![0] > top[n - 1]![0], "values ascend");
-  // From nothing at all there is a way back.
+  // A curve scaled to zero can be scaled back.
   const gone = withDensity(curve, [0, 1], 0);
   assert.equal(densityOf(gone), 0);
   assert.equal(densityOf(withDensity(gone, [0, 1], 5)), 5);
@@ -356,7 +356,7 @@ test("a disabled medium keeps its position and settings", () => {
       ["a", true],
       ["b", true],
     ],
-    "back by another way: not twice",
+    "a medium set elsewhere is not duplicated",
   );
   assert.deepEqual(
     followMedia(layers, []).map((layer) => layer.view.field),
@@ -381,7 +381,7 @@ test("two pointers have a centre and a distance", () => {
   );
 });
 
-// A camera that counts how often it is set, on a page whose display frames come when asked for.
+// A camera that counts its changes, on a page whose display frames the test triggers.
 class Desk {
   camera: Camera = {
     projection: "perspective",
@@ -422,18 +422,18 @@ class Desk {
 test("the first move is sent at once, later ones once per display frame", () => {
   const desk = new Desk();
   desk.grow(50);
-  assert.deepEqual([desk.calls, desk.camera.height], [1, 2], "the first does not wait");
+  assert.deepEqual([desk.calls, desk.camera.height], [1, 2], "the first move is not delayed");
   assert.equal(desk.asked, 1);
   desk.displayFrame();
-  assert.deepEqual([desk.calls, desk.camera.height], [2, 51], "none of the others is lost");
+  assert.deepEqual([desk.calls, desk.camera.height], [2, 51], "the later moves are combined");
   desk.grow(1);
-  assert.equal(desk.calls, 2, "one patch a display frame");
+  assert.equal(desk.calls, 2, "one patch per display frame");
   desk.displayFrame();
   assert.equal(desk.calls, 3);
   desk.displayFrame();
-  assert.deepEqual([desk.calls, desk.asked], [3, 0], "at rest no display frames are asked for");
+  assert.deepEqual([desk.calls, desk.asked], [3, 0], "at rest no display frame is requested");
   desk.grow(1);
-  assert.equal(desk.calls, 4, "and the next one is a first one again");
+  assert.equal(desk.calls, 4, "the next move is not delayed");
 });
 
 test("while patches are held back moves are merged", () => {
@@ -451,7 +451,7 @@ test("while patches are held back moves are merged", () => {
 });
 
 test("the picture uses the pixel density up to a limit", () => {
-  const most = 35_389_440; // of the server
+  const most = 35_389_440; // limit of the server
   assert.deepEqual(pictureSize(800, 600, 1, most), [800, 600]);
   assert.deepEqual(pictureSize(800, 600, 2, most), [1600, 1200]);
   assert.deepEqual(pictureSize(400, 300, 3, most), [800, 600]);

@@ -1,5 +1,5 @@
-// Steps that run, as the page sees them: what it says, when it counts as stopped; the text
-// on their pace; and the media of a view completed by what was drawn.
+// Playback in the page: the messages sent and the end of playback; the text of its pace; and the
+// media of a view completed from the rendered view.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { paceText, stepsText } from "../src/viewport/frame_text";
@@ -84,7 +84,7 @@ test("dragging the slider pauses playback and continues in the same direction", 
   page.playback.pause();
   page.playback.scrub(2);
   page.playback.scrubbed();
-  assert.equal(page.playback.running, false, "at rest it stays at rest");
+  assert.equal(page.playback.running, false, "without playback, dragging the slider starts none");
 });
 
 test("without loop playback ends at its last step", () => {
@@ -97,7 +97,7 @@ test("without loop playback ends at its last step", () => {
     page.playback.play(direction);
     page.frame(3 + direction);
     page.frame(9 - end);
-    assert.equal(page.playback.running, true, "the other end is no end");
+    assert.equal(page.playback.running, true, "the opposite end does not stop playback");
     page.frame(end);
     assert.equal(page.playback.running, false);
   }

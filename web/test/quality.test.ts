@@ -1,5 +1,5 @@
-// Quality as the page says and shows it: what frames tell of the server's choices is not taken for
-// the user's, and what the user takes back is gone at once.
+// Quality requested and displayed by the page: choices of the server do not become the user's, and
+// a removed setting takes effect at once.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { controlStates, hasErrorLimit, qualityHint } from "../src/panels/controls";
@@ -20,10 +20,14 @@ test("the method of a moving frame does not change the view", () => {
   page.draws({ final: false, view: { method: { name: "kernel", slabThickness: 4 } } });
   assert.deepEqual(page.app.view().method, { name: "slab", slabThickness: 1 });
   page.app.change({ method: { name: "kernel" } });
-  assert.equal(page.app.view().method?.name, "kernel", "what the user says is");
+  assert.equal(page.app.view().method?.name, "kernel", "an explicit choice changes the view");
   page.app.change({ method: { name: null } });
   page.draws({ view: { method: { name: "slab", slabThickness: 2 } } });
-  assert.deepEqual(page.app.view().method, { name: "slab", slabThickness: 2 }, "and the default");
+  assert.deepEqual(
+    page.app.view().method,
+    { name: "slab", slabThickness: 2 },
+    "a final frame sets the default",
+  );
 });
 
 test("quality shows the requested values regardless of older frames", () => {
@@ -32,7 +36,7 @@ test("quality shows the requested values regardless of older frames", () => {
   page.draws({ view: { quality: { budgetMs: null, maxError: 0.01, lossless: true } } });
   assert.deepEqual(page.app.view().quality, { maxError: 0.01, lossless: true });
   page.app.change({ quality: { maxError: null } });
-  assert.equal(hasErrorLimit(page.app.view()), false, "before any frame reports");
+  assert.equal(hasErrorLimit(page.app.view()), false, "takes effect before the next frame");
   const [patch] = page.sent("patch").slice(-1);
   assert.deepEqual(patch!.patch, { quality: { maxError: null } });
 });
@@ -52,7 +56,7 @@ test("a frame is acknowledged when decoded, before and without display", () => {
   assert.deepEqual(page.sent("ack").at(-1), { type: "ack", seq: 7, decodeMs: 2.5 });
   const before = page.sent("ack").length;
   page.draws();
-  assert.equal(page.sent("ack").length, before, "not once more when it is shown");
+  assert.equal(page.sent("ack").length, before, "no second acknowledgement when shown");
 });
 
 test("the server is notified when the page is hidden or shown", () => {

@@ -1,4 +1,4 @@
-// The reference's course: what is asked of the server and said, for answers that a test makes up.
+// The sequence of a reference: requests and reported texts for simulated answers.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { errorMetric } from "../src/base/error_text";
@@ -27,7 +27,7 @@ function page(answers: unknown[]) {
     view: () => state.view,
     request: async (method, path, body) => {
       calls.push(`${method} ${path}`);
-      assert.equal(body?.quality, undefined, "how frames are drawn is nothing to a reference");
+      assert.equal(body?.quality, undefined, "a reference request omits `quality`");
       if (method === "DELETE") return null;
       const answer = answers.shift();
       if (answer instanceof Error) throw answer;
@@ -63,7 +63,7 @@ test("progress is formatted as text", () => {
   assert.equal(progressText(job({ progress: 0.346, etaMs: 7100 })), ": 34 %, 8 s left");
 });
 
-test("the first hold requests the reference, the next or a lasting one shows it", async () => {
+test("the first hold requests the reference, a later or continued hold shows it", async () => {
   for (const keeps of [false, true]) {
     const { reference, calls, said, state, wake } = page([
       job({ state: "queued" }),
@@ -74,7 +74,7 @@ test("the first hold requests the reference, the next or a lasting one shows it"
     if (!keeps) reference.release();
     await settled();
     await wake();
-    reference.prepare(); // it is on its way
+    reference.prepare(); // the request is already in progress
     assert.equal(state.shown, false);
     await wake();
     assert.deepEqual(calls, [
@@ -97,7 +97,7 @@ test("the first hold requests the reference, the next or a lasting one shows it"
     assert.equal(state.shown, true);
     reference.release();
     assert.equal(state.shown, false);
-    assert.equal(calls.length, 4, "it is drawn once");
+    assert.equal(calls.length, 4, "the reference is rendered once");
   }
 });
 
@@ -112,17 +112,17 @@ test("a different view discards the reference, an equivalent one does not", asyn
   reference.follow();
   assert.deepEqual(calls.slice(1), ["DELETE v1/jobs/7"]);
   assert.equal(said.at(-1), "");
-  reference.hold(); // the old one has not noticed yet
+  reference.hold(); // the previous request has not been cancelled yet
   await settled();
   assert.equal(calls.length, 2);
   await wake();
-  assert.equal(calls[2], "POST v1/references", "and no look at the old job");
+  assert.equal(calls[2], "POST v1/references", "the old job is not polled");
   await wake();
   assert.equal(calls[3], "GET v1/jobs/8");
   assert.equal(state.shown, true);
   reference.drop();
   assert.equal(state.shown, false);
-  assert.equal(calls.at(-1), "load v1/references/ab.png", "nothing is left to cancel");
+  assert.equal(calls.at(-1), "load v1/references/ab.png", "no request remains to be cancelled");
 });
 
 test("a view that changes before the job id is known cancels the job", async () => {
@@ -132,11 +132,11 @@ test("a view that changes before the job id is known cancels the job", async () 
   reference.prepare();
   reference.drop();
   await settled();
-  assert.deepEqual(calls, [], "nothing was asked yet");
+  assert.deepEqual(calls, [], "no request yet");
   reference.prepare();
   await settled();
   reference.drop();
-  assert.deepEqual(calls, ["POST v1/references"], "its job has no name yet");
+  assert.deepEqual(calls, ["POST v1/references"], "the job id is not known yet");
   answer(job({}));
   await settled();
   assert.deepEqual(calls.slice(1), ["DELETE v1/jobs/7"]);

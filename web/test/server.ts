@@ -1,4 +1,4 @@
-// A server of made-up answers, for the tests of requests.
+// A simulated server for the tests of requests.
 import type { FetchLike } from "../src/wire/frame_request";
 
 export const problem = (status: number, detail: string, headers: Record<string, string> = {}) =>
@@ -7,7 +7,7 @@ export const problem = (status: number, detail: string, headers: Record<string, 
     headers,
   });
 
-// A server that gives these answers, one after the other.
+// A server that returns these answers in order.
 export function server(...answers: (() => Response)[]) {
   const asked: { url: string; options: RequestInit }[] = [];
   const fetch: FetchLike = (url, options) => {

@@ -1,4 +1,4 @@
-// What the page says while it waits, and what it goes back to.
+// The page's state while it waits, and the state it returns to.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { described, Page, problem } from "./page";
@@ -9,7 +9,7 @@ const b = described("b");
 test("minor messages do not replace the reason of a lost connection", async () => {
   const page = new Page([a]);
   page.lose(1013);
-  await new Promise((done) => setImmediate(done)); // the colour maps could not be loaded either
+  await new Promise((done) => setImmediate(done)); // let the colour map request fail
   assert.equal(
     page.element("status").textContent,
     "connection lost: the server has reached its session limit",
@@ -29,7 +29,7 @@ test("cancelling a dataset requests the previous view and ignores late answers",
   page.app.cancelLoading();
   const { patch } = page.sent("patch").at(-1)!;
   assert.deepEqual([patch.dataset, (patch.vector as { opacity: number }).opacity], ["a", 0.25]);
-  page.says({ type: "error", id: page.openId, problem: problem("too late") });
+  page.receives({ type: "error", id: page.openId, problem: problem("too late") });
   page.opened(b);
   assert.deepEqual([page.alert, page.app.dataset().id], [null, "a"]);
 });

@@ -1,4 +1,4 @@
-// The opacity curve's editor and the colours' range, as numbers.
+// The opacity curve editor and the colour range, without the user interface.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { Range } from "../src/wire/api";
@@ -30,12 +30,12 @@ const ramp: Curve = [
 
 test("a point stays between its neighbours and is not negative", () => {
   assert.deepEqual(movePoint(ramp, 1, 0.5, 3)[1], [0.5, 3]);
-  assert.deepEqual(movePoint(ramp, 1, 7, 3)[1], [1, 3], "on its neighbour: a step edge");
+  assert.deepEqual(movePoint(ramp, 1, 7, 3)[1], [1, 3], "at its neighbour: a step");
   assert.deepEqual(movePoint(ramp, 1, -7, -3)[1], [0, 0]);
-  assert.deepEqual(movePoint(ramp, 2, 9, 1e99)[2], [9, 1e30], "what the wire can say");
+  assert.deepEqual(movePoint(ramp, 2, 9, 1e99)[2], [9, 1e30], "clamped to the protocol limit");
   assert.deepEqual(movePoint(ramp, 0, -1e99, 0)[0], [-1e38, 0]);
   assert.deepEqual(movePoint(ramp, 1, Number.NaN, 3), ramp);
-  assert.deepEqual(ramp[1], [0.2, 0], "the old curve is as it was");
+  assert.deepEqual(ramp[1], [0.2, 0], "the old curve is unchanged");
 });
 
 test("points are added in order up to the protocol limit, and the last one is kept", () => {
@@ -66,7 +66,7 @@ test("both scales are invertible", () => {
       assert.ok(Math.abs(extinctionAt(shareOf(value, scale), scale) / value - 1) < 0.01);
     }
   }
-  // Four decades down from the top: half of the height is a hundredth.
+  // The scale spans four decades, so half of the height is a hundredth of the top.
   assert.ok(Math.abs(extinctionAt(0.5, { top: 40, log: true }) - 0.4) < 1e-9);
   assert.equal(extinctionAt(2, { top: 40, log: false }), 80, "above the upper edge");
   assert.ok(extinctionAt(1, { top: 1e30, log: false }) <= 1e30);
@@ -81,7 +81,7 @@ test("the scale extends above any curve", () => {
   assert.equal(roomyTop(ramp, 1), 10);
   assert.equal(roomyTop([[0, 1e-9]], 1), 1.3e-9);
   assert.equal(roomyTop([[0, 1e30]], 1), 1e30);
-  assert.equal(roomyTop([[0, 0]], 7), 7, "a clear medium keeps the scale");
+  assert.equal(roomyTop([[0, 0]], 7), 7, "a transparent medium keeps the scale");
 });
 
 const pairs = (path: string): [number, number][] =>
@@ -96,7 +96,7 @@ test("the curve is linear between points and constant beyond them", () => {
   ]);
   assert.match(path, /H1\.0000$/);
   const bent = pairs(curvePath(ramp, [0, 1], { top: 8, log: true }));
-  // Halfway up in value is 4, log10(2) of four decades below the top.
+  // Halfway in value the extinction is 4, which is log10(2) of four decades below the top.
   const middle = bent.find(([x]) => Math.abs(x - 0.6) < 1e-9)!;
   assert.ok(Math.abs(middle[1] - Math.log10(2) / 4) < 1e-3);
   const step: Curve = [
@@ -129,7 +129,8 @@ test("a point is formatted as text", () => {
 
 // --- ranges -----------------------------------------------------------------------------------
 
-// A view's range with a server behind it: of step n [n, n + 10], of all [-3, 99].
+// A view's range with a simulated server: the range of step n is [n, n + 10], of all steps [-3,
+// 99].
 function source(change: Partial<RangeSource> = {}) {
   const state = {
     range: [0, 1] as Range | null,
@@ -170,7 +171,7 @@ test("the range of a step is read at each step at rest, that of all steps once",
   follower.follow();
   await soon();
   assert.deepEqual(state.range, [4, 14]);
-  assert.deepEqual(state.asked, [0, 4], "not while steps run, nor twice");
+  assert.deepEqual(state.asked, [0, 4], "not read during playback, and read once");
   follower.follow();
   assert.equal(follower.mode, "step");
   follower.set("all");
@@ -190,13 +191,13 @@ test("a range from another source is custom", async () => {
   assert.equal(follower.mode, "custom");
   follower.set("step");
   await soon();
-  state.range = [2, 3]; // a drag
+  state.range = [2, 3]; // by a drag
   follower.follow();
   state.step = 6;
   follower.follow();
   await soon();
   assert.deepEqual([follower.mode, state.range], ["custom", [2, 3]]);
-  assert.equal(new RangeFollower(all, () => {}).mode, "custom", "kept for the next panel");
+  assert.equal(new RangeFollower(all, () => {}).mode, "custom", "preserved for a rebuilt panel");
 });
 
 test("a late answer does not override a later choice, and ends stay reversed", async () => {
@@ -215,7 +216,7 @@ test("a late answer does not override a later choice, and ends stay reversed", a
   assert.deepEqual(state.range, [2, 1]);
 });
 
-// A view with undo: its medium's range by step, as above, and its density.
+// A view with undo, with the range of its medium in mode "step" and its density.
 async function undoable() {
   let view: View = { step: 0, scalars: [{ field: "u" }] };
   const said: string[] = [];
@@ -228,7 +229,7 @@ async function undoable() {
   });
   const page = new EventTarget();
   undoControl.watch(page);
-  // Each an act of its own.
+  // Each edit is a separate gesture.
   const edit = (change: View) => {
     page.dispatchEvent(new Event("pointerdown"));
     undoControl.edit(() => (view = { ...view, ...change }));
@@ -271,7 +272,7 @@ test("a range that follows the step is not undone, its selection is", async () =
   undoControl.undo();
   assert.deepEqual(await rest(), [1, 1, 11, "step"]);
   undoControl.redo();
-  assert.deepEqual(await rest(), [2, 2, 12, "step"], "what was read meanwhile forgets no redo");
+  assert.deepEqual(await rest(), [2, 2, 12, "step"], "a range read meanwhile does not clear redo");
   undoControl.undo();
   undoControl.undo();
   assert.deepEqual(await rest(), [0, 0, 10, "step"]);
@@ -312,10 +313,10 @@ test("outdated answers change nothing", async () => {
     assert.deepEqual(state.range, [0, 1], `${of}`);
   }
   follower.set("step");
-  assert.equal(answers.length, 3, "of nothing nothing is read");
+  assert.equal(answers.length, 3, "without a field no range is read");
   state.of = "storm u";
   follower.set("all");
-  state.range = [2, 3]; // a drag
+  state.range = [2, 3]; // by a drag
   follower.follow();
   answers.at(-1)!([-3, 99]);
   await soon();
@@ -324,7 +325,7 @@ test("outdated answers change nothing", async () => {
 
 test("the default is loaded later if the dataset has none", () => {
   const { state, follower } = source({ defaultRange: () => null });
-  state.range = [7, 9]; // what a first frame was drawn with
+  state.range = [7, 9]; // as drawn by the first frame
   follower.follow();
   assert.equal(follower.mode, "default");
 });

@@ -1,4 +1,4 @@
-// The shared protocol vectors, as the page's parsers and the schemas see them. The C++ tests read
+// The shared protocol vectors, checked with the page's parsers and the schemas. The C++ tests read
 // the same files.
 import assert from "node:assert/strict";
 import { readdirSync, readFileSync } from "node:fs";
@@ -53,7 +53,7 @@ function validator(kind: string, shape?: string) {
 
 const escapeKey = (key: string): string => key.replaceAll("~", "~0").replaceAll("/", "~1");
 
-// A validator reports a key that is missing or unknown at its parent.
+// A validator reports a missing or unknown key at the parent of the key.
 function pointerOf(error: ErrorObject): string {
   const { additionalProperty, missingProperty } = error.params as Record<string, string>;
   const key = additionalProperty ?? missingProperty;
@@ -67,7 +67,7 @@ const bytesOf = (hex: string): Uint8Array =>
   Uint8Array.from(Buffer.from(hex.replaceAll(" ", ""), "hex"));
 
 for (const kind of ["view", "clientMessage", "serverMessage"]) {
-  test(`valid ${kind} vectors fit the schema`, () => {
+  test(`valid ${kind} vectors match the schema`, () => {
     for (const one of cases("valid", kind)) {
       if (one.schema === false || one.bytes !== undefined) continue;
       const validate = validator(kind, one.shape);
@@ -97,7 +97,7 @@ for (const kind of ["view", "clientMessage", "serverMessage"]) {
   });
 }
 
-test("the page understands every valid server message", () => {
+test("the page accepts every valid server message", () => {
   for (const one of cases("valid", "serverMessage")) {
     if (one.shape !== undefined) continue;
     const text = one.text ?? JSON.stringify(one.document);
@@ -184,7 +184,7 @@ test("invalid frame headers are refused", () => {
   }
 });
 
-test("a frame with a picture of another length than its header is refused", () => {
+test("a frame whose picture length differs from its header is refused", () => {
   const header = bytesOf(cases("valid", "frameHeader")[0]!.hex!);
   const size = new DataView(header.buffer).getUint32(52, true);
   for (const extra of [-1, 0, 1]) {

@@ -1,10 +1,10 @@
-// Merge patches, and the fate of patches that are accepted, refused or replaced.
+// Merge patches, and the view after patches are accepted, refused or replaced.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { View } from "../src/wire/protocol";
 import { mergePatch, mergeView, ViewState, withDefaults, type Patch } from "../src/view/view_state";
 
-test("merge patches do what RFC 7396 says", () => {
+test("merge patches follow RFC 7396", () => {
   const rows: [unknown, unknown, unknown][] = [
     [{ a: "b" }, { a: "c" }, { a: "c" }],
     [{ a: "b" }, { b: "c" }, { a: "b", b: "c" }],
@@ -33,7 +33,7 @@ test("null at /vector/field is a value, elsewhere it removes", () => {
   );
 });
 
-test("merging changes neither argument and no prototype", () => {
+test("merging modifies neither argument and no prototype", () => {
   const target = { a: { b: 1 } };
   const patch = JSON.parse('{"a": {"c": 2}, "__proto__": {"polluted": true}}') as Patch;
   const merged = mergePatch(target, patch) as Patch;
@@ -43,7 +43,7 @@ test("merging changes neither argument and no prototype", () => {
   assert.equal(({} as { polluted?: boolean }).polluted, undefined);
 });
 
-test("given values override defaults, and arrays are replaced whole", () => {
+test("explicit values override defaults, and arrays are replaced whole", () => {
   const defaults = { camera: { fovY: 35, eye: [0, 0, 1] }, scalars: [{ field: "cloud" }], step: 0 };
   const said = { camera: { eye: [1, 2, 3] }, scalars: [] };
   assert.deepEqual(withDefaults(defaults, said), {
@@ -56,7 +56,7 @@ test("given values override defaults, and arrays are replaced whole", () => {
   });
 });
 
-test("a refused patch is reverted and the others stay", () => {
+test("a refused patch is reverted and the others remain", () => {
   const state = new ViewState();
   state.change({ dataset: "climate" });
   state.settle(1);
@@ -69,7 +69,7 @@ test("a refused patch is reverted and the others stay", () => {
   assert.equal(state.refuse(bad.rev), false);
   state.settle(4);
   assert.deepEqual(state.document, { dataset: "climate", vector: { length: 0.1 }, step: 3 });
-  assert.equal(state.refuse(4), false, "what a frame has shown cannot be refused any more");
+  assert.equal(state.refuse(4), false, "a patch confirmed by a frame cannot be refused");
 });
 
 test("revisions grow by one and are never used twice", () => {
@@ -88,7 +88,7 @@ test("revisions grow by one and are never used twice", () => {
   state.settle(3);
   const refused = state.change({ step: -1 });
   state.refuse(refused.rev);
-  assert.equal(state.rev, revs.length, "frames of the view before the refused patch are wanted");
+  assert.equal(state.rev, revs.length, "the view before the refused patch is requested");
   assert.equal(state.change({ step: 1 }).rev, refused.rev + 1);
 });
 
@@ -116,10 +116,11 @@ test("without answers pending patches stay bounded and the view correct", () => 
   const state = new ViewState();
   for (let step = 0; step < 1000; step++) state.change({ step });
   assert.equal(state.document.step, 999);
-  assert.equal(state.refuse(1), false, "long ago counts as accepted");
+  assert.equal(state.refuse(1), false, "the oldest patches count as accepted");
 });
 
-// Small views with what makes replacing hard: keys that come, go, turn into objects, the field.
+// Small random views with the cases that complicate replacement: added and removed keys, values
+// that become objects, and /vector/field.
 function randomView(random: () => number): View {
   const pick = <T>(...choices: T[]): T => choices[Math.floor(random() * choices.length)]!;
   const view: View = { dataset: pick("climate", "tornado") };

@@ -1,5 +1,5 @@
-// The page's hands: roll and turns of the camera against closed forms, fingers and wheels, a turn
-// that another hand ends, and what is asked about the value under the cursor, and when.
+// Camera input and hover: roll and rotation against closed forms, fingers and wheel, animations
+// interrupted by other input, and the requests for the value under the cursor.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { Probe } from "../src/wire/api";
@@ -57,7 +57,8 @@ test("orbiting keeps the roll and rotates about the vertical axis", () => {
   const rolled = orbit(roll(from, 33), 40, -35);
   nearAll(rolled.eye, plain.eye);
   near(rollOf(rolled), 33);
-  // Over the pole nothing flips: straight down the picture's turn counts as azimuth.
+  // Orbiting over the pole does not flip: at the vertical, the rotation of the picture counts as
+  // azimuth.
   const down = orbit(roll(from, 33), 0, 70);
   near(anglesOf(down).elevation, 90);
   const { right } = cameraFrame(down);
@@ -72,7 +73,7 @@ test("the other projection keeps the roll", () => {
 });
 
 test("dragging follows the pointer at any roll", () => {
-  const front: Vec3 = [0, -0.2, 0]; // before the target, so that turning moves it
+  const front: Vec3 = [0, -0.2, 0]; // in front of the target, so that an orbit moves it
   for (const angle of [0, 90, -90, 180, 37]) {
     const from = roll(south, angle);
     const [x0, y0] = project(from, front, 1)!;
@@ -81,11 +82,11 @@ test("dragging follows the pointer at any roll", () => {
     const [x2, y2] = project(drag(from, 0, 2), front, 1)!;
     assert.ok(y2 - y0 > 0 && Math.abs(x2 - x0) < 0.1 * (y2 - y0), `down at ${angle}`);
   }
-  // Without roll it is a plain orbit.
+  // Without roll a drag is a plain orbit.
   assert.deepEqual(drag(south, 5, 3), orbit(south, -5, 3));
 });
 
-// --- turns -----------------------------------------------------------------------------------
+// --- camera animation ------------------------------------------------------------------------
 
 test("camera interpolation joins its ends by the shorter rotation", () => {
   const from = roll(lookFrom(south, { azimuth: 170, elevation: 10 }, 2), 30);
@@ -189,13 +190,14 @@ test("wheel zoom is proportional to the scroll in any unit and bounded", () => {
   near(wheel(-100), 1.0015 ** 100);
   near(wheel(3, 1), wheel(90));
   near(wheel(-9999), wheel(-400));
-  assert.ok(wheel(-5, 0, true) > wheel(-5), "a pinch counts finer units");
+  assert.ok(wheel(-5, 0, true) > wheel(-5), "a pinch has a greater zoom per unit");
   assert.ok(wheel(-9999, 0, true) < 1.3);
 });
 
 // --- the value under the cursor --------------------------------------------------------------
 
-// A picture whose samples are whole tenths of its width, and a server that answers when cameras to.
+// A picture whose samples are tenths of its width, and a server that answers when the test calls
+// for it.
 class Glass {
   now = 1000;
   busy = false;
@@ -243,7 +245,7 @@ class Glass {
 test("one hover request at a time for the newest position, at most eight a second", async () => {
   const glass = new Glass();
   for (const x of [0.1, 0.2, 0.3, 0.4]) glass.hover.move([x, 0]);
-  assert.deepEqual(glass.asked, [1], "the rest wait for the answer");
+  assert.deepEqual(glass.asked, [1], "later positions wait for the answer");
   glass.now += 20;
   await glass.answer();
   assert.deepEqual(glass.asked, [1]);
@@ -255,7 +257,7 @@ test("one hover request at a time for the newest position, at most eight a secon
   assert.deepEqual(glass.shown, ["4 at 0"]);
   glass.wait(1000);
   glass.hover.move([0.41, 0]);
-  assert.deepEqual(glass.asked, [1, 4], "the same sample is not asked for again");
+  assert.deepEqual(glass.asked, [1, 4], "the same sample is not requested again");
 });
 
 test("leaving the picture cancels the hover request", async () => {
@@ -269,7 +271,7 @@ test("leaving the picture cancels the hover request", async () => {
   glass.wait(200);
   await glass.answer();
   assert.deepEqual(glass.shown, ["2 at 0"]);
-  glass.hover.move([1.5, 0]); // off the box
+  glass.hover.move([1.5, 0]); // outside the box
   glass.wait(200);
   assert.deepEqual([glass.shown, glass.asked], [[], [1, 2]]);
 });
@@ -287,7 +289,7 @@ test("no hover values during motion, current ones afterwards", async () => {
   glass.busy = false;
   glass.step = 4;
   glass.hover.poke();
-  assert.deepEqual(glass.asked, [1], "not before it rests");
+  assert.deepEqual(glass.asked, [1], "not before the view is at rest");
   glass.wait(150);
   await glass.answer();
   assert.deepEqual([glass.asked, glass.shown], [[1, 3], ["3 at 4"]]);

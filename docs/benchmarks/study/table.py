@@ -9,7 +9,7 @@ TAUS = [1e-30, 0.1, 0.5, 1, 1.5, 2, 3, 10, 50, 1e30]
 
 
 def at_own_knobs(scene):
-    """The points of one scene at its view's own knobs; of the slabs those of thickness 1."""
+    """The points of one scene with the settings of its view; of the slabs, those of thickness 1."""
     view = scene["view"]
     for point in scene["points"]:
         knobs = point["knobs"]

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""windsplat beside VTK: the same file, camera path and picture sizes in one run, as a Markdown
-table on stdout. Where VTK is not installed it says so and exits 0.
+"""Compares windsplat with VTK: the same file, camera path and picture sizes in one run. Prints a
+Markdown table. Without VTK it prints a message and exits 0.
 
 Usage: compare.py [--build=build/release] [--frames=9] [--sizes=640x480,1280x720] [--dims=XxYxZ]
                   [--sample=climate|tornado] [--pictures=DIR] [--slow] [--only=TEXT]
@@ -21,9 +21,9 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 MB = 1e6
 FOV_Y = 35  # degrees
-STEP = 1    # of the camera, degrees a frame
+STEP = 1    # of the camera, degrees per frame
 
-# What is drawn, in world units (windsplat's: the longest edge of the box is 2).
+# The rendered data in world units (windsplat's: the longest edge of the box is 2).
 SAMPLES = {
     "climate": {"dimensions": "(level, lat, lon)", "half_box": [1, 0.5, 0.15],
                 "components": ["u", "v", "w"], "top_magnitude": 100, "line_length": 0.04,
@@ -39,7 +39,7 @@ class Skip(Exception):
 
 
 def vtk_python():
-    """An interpreter that has VTK: this one, or the system's, for which Debian packages it."""
+    """A Python interpreter with VTK: this one, or the system's, for which Debian packages VTK."""
     for python in (sys.executable, "/usr/bin/python3"):
         probe = subprocess.run([python, "-c", "import vtkmodules"], capture_output=True)
         if probe.returncode == 0:
@@ -48,8 +48,8 @@ def vtk_python():
 
 
 class Display:
-    """The X server that Debian's VTK needs: the one at hand, or a virtual one for as long as this
-    lives."""
+    """The X server that Debian's VTK needs: the existing one, or a virtual one that ends with
+    this object."""
 
     def __enter__(self):
         self.server = None
@@ -147,7 +147,7 @@ class Bench:
         return json.loads(done.stdout)
 
 
-# Name, the windsplat scene that it is compared with, what VTK draws.
+# Name, the windsplat scene to compare with, and the parts that VTK draws.
 VTK_CONFIGS = [
     ("fixed-point ray cast", "clouds", {"volume": "fixed-point", "lines": False}),
     ("GPU ray cast on llvmpipe", "clouds", {"volume": "gpu", "lines": False}),
@@ -176,9 +176,9 @@ def row(size, scene, name, result, reference):
 
 
 def table(bench, configs):
-    """Returns one result of each program, for the line that names them."""
-    print("| size | scene | drawn by | wall, ms | processor, ms | peak, MB | wall / kernel's | "
-          "processor / kernel's |\n|---|---|---|---|---|---|---|---|")
+    """Runs both programs once and returns the results, to print their versions."""
+    print("| size | scene | renderer | wall, ms | CPU, ms | peak, MB | wall / kernel | "
+          "CPU / kernel |\n|---|---|---|---|---|---|---|---|")
     ours = peer = None
     for text in bench.options.sizes.split(","):
         size = [int(part) for part in text.split("x")]
@@ -202,7 +202,7 @@ def main():
     parser.add_argument("--sizes", default="640x480,1280x720")
     parser.add_argument("--sample", choices=sorted(SAMPLES), default="climate")
     parser.add_argument("--dims")
-    parser.add_argument("--pictures", help="keep the first frames here")
+    parser.add_argument("--pictures", help="folder for the first frames")
     parser.add_argument("--slow", action="store_true")
     parser.add_argument("--only", default="", help="VTK configurations whose name has this text")
     options = parser.parse_args()
@@ -215,7 +215,7 @@ def main():
         parser.error(f"{options.build} has no {' and no '.join(missing)}: "
                      "./scripts/build release windsplat bench_path")
     if not configs:
-        parser.error(f"no VTK configuration has '{options.only}' in its name; there are: {names}")
+        parser.error(f"no VTK configuration is named '{options.only}'; known are: {names}")
     try:
         python = vtk_python()
         with Display() as display, tempfile.TemporaryDirectory() as folder:
@@ -229,7 +229,7 @@ def main():
           f"{ours['compiler']}, target {ours['target']}; VTK {peer['version']} on {peer['gl']}. "
           f"Sample {options.sample} {options.dims or 'at its own size'}, {peer['lines']} lines in "
           f"the last row. Medians of {options.frames} warm frames, the camera moving {STEP} degree "
-          "each; processor time is of all threads.")
+          "each; CPU time is of all threads.")
 
 
 main()

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""One VTK configuration along a camera path: a job as JSON on stdin -> times of its frames as JSON
+"""Renders one VTK configuration along a camera path: a job as JSON on stdin -> frame times as JSON
 on stdout, and the first frame as a picture. Run by compare.py; needs python3-vtk9 and a display.
 
-A frame is Render() and its pixels read back, as a server that encodes them needs; the camera moves
-before each. Nothing else changes, so that what VTK keeps between frames it may keep."""
+A frame is Render() followed by reading the pixels back, as a server that encodes them must. Only
+the camera changes between frames, so VTK may reuse its data."""
 import json
 import math
 import resource
@@ -26,13 +26,13 @@ from vtkmodules.vtkRenderingCore import (vtkActor, vtkColorTransferFunction, vtk
                                          vtkVolumeProperty, vtkWindowToImageFilter)
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
 
-# Stops of viridis, low to high.
+# Control points of viridis, low to high.
 VIRIDIS = [(0.267, 0.005, 0.329), (0.231, 0.318, 0.545), (0.129, 0.569, 0.549),
            (0.369, 0.788, 0.384), (0.992, 0.906, 0.145)]
 
 
 def read(job):
-    """The file's samples as one image whose points stand where windsplat's samples do."""
+    """The file's samples as one image whose points coincide with windsplat's samples."""
     reader = vtkNetCDFReader()
     reader.SetFileName(job["file"])
     reader.UpdateInformation()
@@ -55,14 +55,14 @@ def volume_of(job, image):
     else:
         mapper = vtkmodules.vtkRenderingVolumeOpenGL2.vtkOpenGLGPUVolumeRayCastMapper()
         mapper.SetUseJittering(0)
-    # One sample a cell and one ray a pixel, at any speed.
+    # Fixed sample distances: one sample per cell and one ray per pixel, at any speed.
     mapper.SetAutoAdjustSampleDistances(0)
     mapper.SetImageSampleDistance(1)
     mapper.SetSampleDistance(min(image.GetSpacing()))
     mapper.SetInputData(image)
     unit = min(image.GetSpacing())
     opacity = vtkPiecewiseFunction()
-    # Extinction is linear between the points; the opacity of a step of that length is not.
+    # Extinction is linear between the points, but the opacity of one sampling step is not.
     points = job["extinction"]
     for (v0, e0), (v1, e1) in zip(points, points[1:]):
         for n in range(33):
@@ -98,7 +98,7 @@ def combine(image, components):
 
 
 def lines_of(job, image):
-    """A line a sample, centred on it, as long as windsplat's; built once."""
+    """One line per sample, centred on it, as long as windsplat's; built once."""
     vectors = combine(image, job["components"])
     points = vtkImageDataToPointSet()
     points.SetInputData(vectors)

@@ -1,6 +1,6 @@
-// The page's address holds the view: view -> `#!{...}`, debounced, and back. If a view is
-// too long for a link, the server stores a copy and `#!view=ID` goes to the clipboard; the page's
-// address always holds the whole view, so that it survives a restart of the server.
+// Keeps the view in the page's address: view -> `#!{...}`, debounced, and back. If a view is too
+// long for a link, the server stores a copy and `#!view=ID` is copied to the clipboard; the page's
+// address always contains the whole view, so that it remains valid after a server restart.
 import { failureText } from "../wire/api";
 import { debounced } from "../base/dom";
 import type { FetchLike } from "../wire/frame_request";
@@ -11,19 +11,21 @@ import type { Status } from "./status";
 
 export interface AddressHost {
   document(): View; // explicit keys only
-  runs(): boolean; // playback or line motion runs: the address waits until it stops
-  restore(view: View): void; // the user has gone to another address
+  // whether playback or line motion is active; the address is updated once both have stopped
+  runs(): boolean;
+  restore(view: View): void; // the user has navigated to another address
 }
 
 const delayMs = 400;
-const deadlineMs = 10_000; // of a stored view: then the page starts without it
+// time limit for fetching a stored view; after it the page starts without the view
+const deadlineMs = 10_000;
 const request: FetchLike = (url, options) => fetch(url, options);
 
 export class Address {
   readonly save = debounced(() => this.write(), delayMs);
   private reads = 0;
-  // The address stays as it is while its view is on the way, and after a failure too, so that a
-  // reload tries again, until the user changes something.
+  // The address is not changed while its view is being fetched, nor after a failed fetch until the
+  // user changes the view, so that reloading the page retries the fetch.
   private link: "loading" | "lost" | "followed" = "loading";
 
   constructor(
@@ -38,8 +40,8 @@ export class Address {
     );
   }
 
-  // Passes on the view of the link that the page was opened with, at once unless the server has to
-  // be asked for it; null: the link has none.
+  // Passes on the view of the link with which the page was opened: synchronously, unless the view
+  // has to be fetched from the server. null: the address contains no link.
   first(begin: (view: View | null) => void): void {
     if (window.location.hash.length > 1) {
       this.read(begin);
@@ -66,7 +68,7 @@ export class Address {
     }
   }
 
-  // The link, and a remark for the status line.
+  // The link, and a note for the status line.
   private async linkOf(view: View): Promise<[link: string, remark: string]> {
     const linkTo = (hash: string): string => new URL(hash, window.location.href).href;
     const href = linkTo(hashOfView(view));
@@ -109,7 +111,7 @@ export class Address {
       this.link = view === null ? "lost" : "followed";
       if (view === null) this.status.error("link", `The link's view: ${why}`);
     } else {
-      view = null; // the user has gone to another address meanwhile
+      view = null; // the user has navigated to another address in the meantime
     }
     begin(view);
   }

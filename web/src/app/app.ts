@@ -1,5 +1,6 @@
-// Application controller: user input -> view document -> patches out; messages and frames in ->
-// picture, legend, panels, time bar and status text. The parts know only this, not each other.
+// Application controller: user input -> view document -> outgoing patches; incoming messages and
+// frames -> picture, legend, panels, time bar and status text. The parts depend only on this class,
+// not on each other.
 import { Address } from "./address";
 import { PatchAnswers } from "./patch_answers";
 import { Api } from "../wire/api";
@@ -55,7 +56,7 @@ export interface AppParts {
   hover: HoverView;
   list: DatasetList;
   cards: Pick<Cards, "show">;
-  facts: HTMLElement; // dims and steps of the dataset
+  facts: HTMLElement; // dimensions and number of steps of the dataset
 }
 
 const presenceMs = 60_000;
@@ -94,7 +95,7 @@ export class App {
         hello: (hello) => this.onHello(hello),
         message: (message) => this.onMessage(message),
         frame: (frame) => {
-          // A frame that cannot be shown still gives its credit back.
+          // A frame that cannot be shown must still return its credit to the server.
           this.parts.viewport.show(frame).catch(() => this.onBroken(frame.header.seq));
         },
       },
@@ -186,17 +187,17 @@ export class App {
 
   // --- user input --------------------------------------------------------------
 
-  // The view with every default that is known.
+  // The view with all known defaults.
   view(): View {
     return this.model.view();
   }
 
-  // With the explicit keys only.
+  // The view with its explicit keys only.
   explicitView(): View {
     return this.model.state.document;
   }
 
-  // The view is of the dataset that is open.
+  // Whether the view refers to the dataset that is open.
   isOpen(): boolean {
     return this.model.open !== null && this.model.open.id === this.explicitView().dataset;
   }
@@ -215,7 +216,7 @@ export class App {
     this.undoControl.edit(() => this.opener.choose(id));
   }
 
-  // The view that was drawn last, instead of one that takes its time.
+  // Returns to the view that was drawn last and cancels the one that is still loading.
   cancelLoading(): void {
     const before = this.model.state.settled;
     if (!this.opener.cancel(before)) this.replace(before);
@@ -240,7 +241,7 @@ export class App {
     if (step >= 0 && step !== this.view().step) this.change({ step });
   }
 
-  // Lets the lines flow or halts them where they are.
+  // Starts the line motion, or stops it at its present phase.
   flow(on: boolean): void {
     if (on) {
       if (!this.linesMove()) this.change({ vector: { motion: { mode: "phase" } } });
@@ -260,13 +261,14 @@ export class App {
     return this.address.copy();
   }
 
-  // The view of a saved picture or a saved view; `quality` stays unless it is part of that.
+  // Opens the view of a saved picture or a saved view. `quality` is preserved unless that view
+  // contains it.
   openView(view: View): void {
     const { quality } = this.explicitView();
     this.undoControl.edit(() => this.restore(quality === undefined ? view : { quality, ...view }));
   }
 
-  // Another view in the place of this one.
+  // Replaces the current view by another one.
   restore(view: View): void {
     this.parts.status.clearError();
     const next = this.firstView(view);
@@ -344,7 +346,7 @@ export class App {
     }
     if (anew) {
       this.parts.panels.build();
-      // The panel is usable without them: a failure is not reported.
+      // The panel is usable without help texts, so a failure is not reported.
       loadHelpTexts(this.baseUri).catch(() => undefined);
     }
     this.refresh();
@@ -362,7 +364,7 @@ export class App {
       this.opener.onRefused(message.rev);
       this.refresh();
     } else {
-      // An error about a step that new files lack ends with the next picture.
+      // An error about a step that the new files lack is cleared by the next picture.
       const ofStep = message.problem.errors?.some(({ pointer }) => pointer === "/step");
       status.error(ofStep ? "view" : "server", text);
     }
@@ -371,11 +373,11 @@ export class App {
   onDrawn(frame: DrawnFrame): void {
     const { header } = frame;
     const { hud, status, viewport } = this.parts;
-    if (!this.opener.waiting) status.loaded(); // what it waited for
+    if (!this.opener.waiting) status.loaded(); // the data that the view was waiting for
     const chosen = this.answers.drawn(header);
     this.flowing.answered(header.rev);
     if (chosen !== null) this.model.drew(chosen, header.final);
-    // Nothing newer was asked for, or time runs by itself: the step is the server's.
+    // The server's step is adopted if no newer view was requested or playback is running.
     if (this.playback.running || header.rev === this.model.state.rev) this.followStep(header.step);
     hud.show(frame, chosen, viewport.canvas.width);
     status.clearError("frame");
@@ -397,7 +399,7 @@ export class App {
     this.refresh();
   }
 
-  // As soon as it is decoded, whether it is shown or not: another frame may come meanwhile.
+  // Sent as soon as the frame is decoded, shown or not, so that the server may send another one.
   acknowledge(seq: number, decodeMs: number): void {
     this.connection.send({ type: "ack", seq, decodeMs });
   }
@@ -407,7 +409,7 @@ export class App {
     this.parts.status.error("frame", "A frame could not be decoded.");
   }
 
-  // --- showing -------------------------------------------------------------------------
+  // --- display -------------------------------------------------------------------------
 
   private describe({ title, source, format, dims, steps, axes }: Dataset): void {
     const { timeBar, gizmo, facts } = this.parts;
@@ -446,7 +448,7 @@ export class App {
     }
   }
 
-  // The frame's state counts only while no newer view was requested.
+  // The frame's state is shown only while no newer view has been requested.
   private showMark(): void {
     const { canvas } = this.parts.viewport;
     const { dataset } = canvas;

@@ -1,5 +1,5 @@
-// The datasets as cards with small pictures: the list -> what is opened. Pictures come one after
-// another, and only of cards that are seen.
+// The datasets as cards with small pictures: dataset list -> the dataset to open. Pictures are
+// loaded one after another, and only for visible cards.
 import { failureText, type Api } from "../wire/api";
 import { failureNote, type DatasetList } from "./dataset_list";
 import { make, whenClosed } from "../base/dom";
@@ -11,7 +11,7 @@ export interface CardsHost {
   open(id: string): void;
 }
 
-const [width, height] = [320, 200]; // of a picture, pixels
+const [width, height] = [320, 200]; // size of a card's picture in pixels
 
 const many = (count: number, what: string): string => `${count} ${what}${count === 1 ? "" : "s"}`;
 
@@ -21,11 +21,12 @@ export function cardText({ fields, steps }: DatasetSummary, dims = ""): string {
 }
 
 interface Card {
-  face: string; // what it shows
+  face: string; // the displayed content, as returned by cardFace
   element: HTMLButtonElement;
 }
 
-// What a card shows of a list entry: other changes (such as memory size) do not rebuild it.
+// The part of a list entry that its card displays. Other changes, such as memory size, do not
+// rebuild the card.
 export const cardFace = (dataset: DatasetSummary): string =>
   JSON.stringify([
     dataset.title || dataset.id,
@@ -34,8 +35,9 @@ export const cardFace = (dataset: DatasetSummary): string =>
   ]);
 
 export class Cards {
-  private cards = new Map<string, Card>(); // by the dataset's id, in order
-  private todo = new Map<Element, () => Promise<void>>(); // pictures of cards not yet seen
+  private cards = new Map<string, Card>(); // by dataset id, in display order
+  // pictures to load once their cards become visible
+  private todo = new Map<Element, () => Promise<void>>();
   private queue: (() => Promise<void>)[] = [];
   private busy = false;
   private seen: IntersectionObserver | null = null;
@@ -50,7 +52,7 @@ export class Cards {
     whenClosed(dialog, () => this.clear());
   }
 
-  // With what the server has now: files may have been added since the hello message.
+  // Refreshes the list first: files may have been added since the hello message.
   show(): void {
     if (this.dialog.open) return;
     const { api, list } = this.host;
@@ -63,7 +65,7 @@ export class Cards {
         list.set(datasets);
         if (this.dialog.open) this.fill(datasets);
       },
-      () => {}, // what is known stays
+      () => {}, // on failure the cards keep the present list
     );
   }
 
@@ -87,7 +89,7 @@ export class Cards {
     });
   }
 
-  // Cards that show the same as before stay as they are, and so does the focus.
+  // Cards with unchanged content are not replaced, and the focus is preserved.
   private fill(datasets: DatasetSummary[]): void {
     const old = this.cards;
     this.cards = new Map(
@@ -105,7 +107,7 @@ export class Cards {
     const focused = [...old].find(([, { element }]) => element === document.activeElement);
     this.box.replaceChildren(...elements);
     for (const element of elements) this.seen!.observe(element);
-    if (old.size > 0 && focused === undefined) return; // it is elsewhere
+    if (old.size > 0 && focused === undefined) return; // the focus is outside the cards
     (this.cards.get(focused?.[0] ?? "")?.element ?? elements[0])?.focus();
   }
 
@@ -132,7 +134,7 @@ export class Cards {
     if (dataset.state === "failed") fail(failureNote(dataset));
     else {
       this.todo.set(card, async () => {
-        if (!card.isConnected) return; // another has taken its place
+        if (!card.isConnected) return; // the card has been replaced
         await this.load(dataset, picture, text).catch((e) => fail(failureText(e)));
       });
     }

@@ -1,5 +1,5 @@
-// What can be opened: the server's list, and later reports on single datasets -> the picker's
-// entries, and which dataset to begin with.
+// The available datasets: the server's list and later reports on single datasets -> the entries of
+// the picker and the dataset to open first.
 import type { Dataset, DatasetSummary } from "../wire/protocol";
 
 export interface PickerEntry {
@@ -10,7 +10,7 @@ export interface PickerEntry {
 
 type Known = Pick<DatasetSummary, "id" | "state" | "notes">;
 
-const firstChoice = "climate"; // of the samples, the one that shows most
+const firstChoice = "climate"; // the sample dataset that shows the most features
 
 // Datasets with the same title are distinguished by id.
 export function pickerEntries(datasets: DatasetSummary[]): PickerEntry[] {
@@ -29,17 +29,17 @@ export function pickerEntries(datasets: DatasetSummary[]): PickerEntry[] {
   });
 }
 
-// undefined: none that is worth a try.
+// undefined: no dataset is likely to open.
 export function bestDataset(datasets: DatasetSummary[]): string | undefined {
   const usable = datasets.filter((dataset) => dataset.state !== "failed");
   return (usable.find((dataset) => dataset.id === firstChoice) ?? usable[0])?.id;
 }
 
-// The server's last note says why a file can no longer be read.
+// The last of the server's notes says why a file can no longer be read.
 export const failureNote = ({ notes }: Pick<Dataset, "notes">): string =>
   notes.at(-1) ?? "The files of this dataset cannot be read any more.";
 
-// The list with one dataset's new state; the same list if nothing changed.
+// The list with the new state of one dataset; the same object if nothing changed.
 export function withState(
   datasets: DatasetSummary[],
   { id, state, notes }: Known,
@@ -73,7 +73,7 @@ export class DatasetList {
     return bestDataset(this.datasets);
   }
 
-  // One that the server calls failed may still be shown as it was.
+  // A dataset in state "failed" may still be displayed as it was before the failure.
   first(): string | undefined {
     return this.best() ?? this.datasets[0]?.id;
   }
@@ -92,7 +92,7 @@ export class DatasetList {
     this.picker.value = id;
   }
 
-  // A failed one may be chosen again: the server then says why, or can read it again.
+  // A failed dataset may be chosen again: the server then reports the reason, or succeeds.
   private write(): void {
     const chosen = this.picker.value;
     this.picker.replaceChildren(

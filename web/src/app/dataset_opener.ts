@@ -1,5 +1,5 @@
-// Which dataset is shown: the user's choice, a link or the server's list -> `open` and the view
-// that goes with it; `opened` and refusals -> what is open, or what takes its place.
+// Selects the displayed dataset: the user's choice, a link or the server's list -> an `open`
+// message and the matching view; `opened` and refusals -> the open dataset or its replacement.
 import { failureNote, type DatasetList } from "./dataset_list";
 import { fitView, shapeOf } from "../view/fit_view";
 import type {
@@ -17,26 +17,28 @@ import type { Outgoing, Patch } from "../view/view_state";
 export interface DatasetOpenerHost {
   sendMessage(message: ClientMessage): void;
   send(outgoing: Outgoing[]): void;
-  firstView(explicit: View): View; // in the window's size
+  firstView(explicit: View): View; // sized for the window
   halt(): void; // stops playback and line motion
-  describe(dataset: Dataset): void; // it is open, though the view may still be of another
-  opened(anew: boolean, changed: boolean): void; // anew: of another shape; changed: its files
+  // the dataset is open, though the view may still refer to another one
+  describe(dataset: Dataset): void;
+  // anew: its shape differs; changed: its files changed
+  opened(anew: boolean, changed: boolean): void;
   refresh(): void;
   mark(): void; // another view was requested
   empty(): void; // nothing to show: the user must choose or add a dataset
 }
 
-const busyCodes = [429, 503]; // the server is busy: says nothing about the dataset
+const busyCodes = [429, 503]; // the server is busy; the dataset itself may be readable
 
 export class DatasetOpener {
   private openId = 0;
-  private shownId = 0; // of the `open` whose dataset is shown
-  private openingId = ""; // the dataset of the newest `open`
-  private before: View | undefined; // of what was shown when another was asked for
-  private abandonedId = 0; // of the newest `open` that was cancelled
-  private waits = false; // `opened` has not come yet
-  private abandonedRev = 0; // the last rev of a view whose dataset could not be opened
-  private restored = new Set<number>(); // revs of the view that took a refused one's place
+  private shownId = 0; // id of the `open` whose dataset is displayed
+  private openingId = ""; // dataset of the newest `open`
+  private before: View | undefined; // view of the displayed dataset when another was requested
+  private abandonedId = 0; // id of the newest cancelled `open`
+  private waits = false; // `opened` has not arrived yet
+  private abandonedRev = 0; // last rev of a view whose dataset could not be opened
+  private restored = new Set<number>(); // revs of the view that replaced a refused one
 
   constructor(
     private readonly host: DatasetOpenerHost,
@@ -59,7 +61,8 @@ export class DatasetOpener {
     this.request(id, this.model.state.replace(this.host.firstView({ dataset: id })));
   }
 
-  // A whole view that may be of another dataset; true if that is asked for.
+  // Applies a whole view, which may name another dataset. Returns true if that dataset is
+  // requested.
   follow(view: View): boolean {
     const id = view.dataset ?? this.model.open?.id ?? this.list.best();
     if (id === undefined) return false;
@@ -71,8 +74,8 @@ export class DatasetOpener {
     return true;
   }
 
-  // Cancels the last request: back to the view before. `settled` is the
-  // newest that was drawn. False: it is of what is open already.
+  // Cancels the last request and restores the previous view. `settled` is the newest view that was
+  // drawn. Returns false if that view belongs to the dataset that is already open.
   cancel(settled: View): boolean {
     const { model, status } = this;
     status.loaded();
@@ -91,12 +94,12 @@ export class DatasetOpener {
     return true;
   }
 
-  // Another dataset than the one that is shown is being opened.
+  // Whether a dataset other than the displayed one is being opened.
   private awaitsOther(): boolean {
     return this.waits && this.openingId !== this.model.open?.id;
   }
 
-  // The open request is abandoned.
+  // Abandons the open request.
   private abandon(): void {
     const { model, status } = this;
     status.loaded();
@@ -107,7 +110,7 @@ export class DatasetOpener {
     status.announce("live");
   }
 
-  // Of what is shown, as it was when another was asked for.
+  // The view of the displayed dataset at the time when another one was requested.
   private viewBefore(id: string): View {
     return this.host.firstView(this.before ?? { dataset: id });
   }
@@ -117,11 +120,11 @@ export class DatasetOpener {
     return id === null || (this.waits && id === this.openId);
   }
 
-  // A new session has no state: it is sent the dataset and the whole view.
+  // A new session has no state, so the dataset and the whole view are sent.
   begin(datasets: DatasetSummary[]): boolean {
     const { model, list } = this;
     list.set(datasets);
-    // A server that came back with other datasets does not have what was shown.
+    // A restarted server may no longer have the displayed dataset.
     if (model.open !== null && !list.has(model.open.id)) model.open = null;
     const wanted = model.state.document.dataset;
     const id = wanted ?? list.first();
@@ -131,13 +134,13 @@ export class DatasetOpener {
       this.host.empty();
       return false;
     }
-    // As large as this server draws and the window is by now.
+    // The limits of the server and the size of the window may have changed.
     model.state.change(this.host.firstView({ dataset: id }) as Patch);
     this.request(id, [model.state.restate()]);
     return true;
   }
 
-  // Comes unasked too, when the files of what is shown have changed.
+  // The server also sends `opened` unsolicited when the files of the displayed dataset change.
   onOpened({ id, dataset }: OpenedMessage): void {
     const { model, status } = this;
     const changed = !this.waits && dataset.id === model.open?.id;
@@ -159,15 +162,15 @@ export class DatasetOpener {
     this.host.opened(anew, changed);
   }
 
-  // Whether the error was of a dataset; then all is done.
+  // Returns whether the error concerned a dataset and has been handled completely.
   onError(message: ErrorMessage, text: string): boolean {
     if (message.id !== undefined && message.id === this.abandonedId) return true;
     if (this.waits && message.id === this.openId) {
       this.failed(text, message.problem.status);
     } else if (message.rev !== undefined && message.rev <= this.abandonedRev) {
-      this.model.state.refuse(message.rev); // reported already: the dataset could not be opened
+      this.model.state.refuse(message.rev); // already reported: the dataset could not be opened
     } else if (message.rev === undefined && this.asked(message.id)) {
-      this.status.error("file", text); // its new files cannot be read; the old picture stays
+      this.status.error("file", text); // the new files cannot be read; the old picture remains
       if (this.model.open !== null) this.list.failed(this.model.open.id, text);
     } else {
       return false;
@@ -179,9 +182,9 @@ export class DatasetOpener {
     return id !== undefined && (id === this.openId || id === this.shownId);
   }
 
-  // A patch of this rev was refused. If that was a whole view (a link with a value of another
-  // release, say), its dataset with the defaults is better than nothing; but if those were refused,
-  // to ask for them again would never end.
+  // A patch of this rev was refused. If the patch was a whole view (such as a link from another
+  // release), the view of its dataset is replaced by the defaults. If the defaults themselves were
+  // refused, they are not requested again, as that would loop forever.
   onRefused(rev: number): void {
     if (!this.waits && !this.restored.has(rev)) this.restore();
   }
@@ -201,8 +204,8 @@ export class DatasetOpener {
     host.refresh();
   }
 
-  // The view goes first, so that the first picture already shows it; `open` only requests what
-  // the dataset holds.
+  // The view is sent before `open`, so that the first picture already shows it; `open` then only
+  // requests the dataset's description.
   private request(id: string, outgoing: Outgoing[]): void {
     const { settled, document } = this.model.state;
     const shown = this.model.open?.id;
@@ -217,7 +220,7 @@ export class DatasetOpener {
     this.host.mark();
   }
 
-  // What the old files were asked for is asked of the new ones, as far as they have it.
+  // Applies the present view to the new files, as far as they support it.
   private followFiles(dataset: Dataset): void {
     for (const topic of ["view", "server"]) this.status.clearError(topic);
     this.model.fitDrawn(dataset);

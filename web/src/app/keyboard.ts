@@ -1,17 +1,18 @@
-// Every key binding of the page in one table: it binds them and the help lists them.
+// All key bindings of the page in one table, which also supplies the help text.
 
 export interface Binding {
-  keys: string[]; // KeyboardEvent.key, after "Mod+" or "Mod+Shift+" for ctrl or cmd
+  keys: string[]; // KeyboardEvent.key, prefixed by "Mod+" or "Mod+Shift+" for ctrl or cmd
   shown: string;
   does: string;
   run(event: KeyboardEvent): void;
-  ends?(): void; // once it is let go of; run() is then not repeated
+  ends?(): void; // called when the key is released; run() is then not repeated
 }
 
-const sliderKey = /^(Arrow|Home|End|Page|Delete|Backspace)/; // our own ones remove points, too
-const listKey = /^[\p{L}\p{N} ]$|^(Arrow|Home|End|Page|Enter|Escape)/u; // its letters, too
+const sliderKey = /^(Arrow|Home|End|Page|Delete|Backspace)/; // Delete and Backspace remove points
+// letters and digits select entries
+const listKey = /^[\p{L}\p{N} ]$|^(Arrow|Home|End|Page|Enter|Escape)/u;
 
-// Elements that have a use of their own for keys.
+// Elements that handle some keys themselves.
 function takesKey(target: EventTarget | null, key: string): boolean {
   if (target instanceof Element && target.matches('[role="slider"]')) return sliderKey.test(key);
   if (!(target instanceof HTMLElement)) return false;
@@ -24,7 +25,7 @@ function takesKey(target: EventTarget | null, key: string): boolean {
   return target.matches("button, a, summary") && (key === " " || key === "Enter");
 }
 
-// As the table has it.
+// The key's name as written in the table.
 function nameOf({ key, ctrlKey, metaKey, shiftKey }: KeyboardEvent): string {
   if (!ctrlKey && !metaKey) return key;
   return `Mod+${shiftKey ? "Shift+" : ""}${key.toLowerCase()}`;
@@ -32,7 +33,7 @@ function nameOf({ key, ctrlKey, metaKey, shiftKey }: KeyboardEvent): string {
 
 const isMac = (): boolean => /Mac|iPhone|iPad/.test(navigator.platform);
 
-// The label of a key with ctrl or cmd.
+// The label of a key combined with ctrl or cmd.
 export const modText = (key: string): string => (isMac() ? `⌘ ${key}` : `ctrl ${key}`);
 
 export function bindKeys(bindings: Binding[], target: EventTarget): void {
@@ -48,13 +49,13 @@ export function bindKeys(bindings: Binding[], target: EventTarget): void {
     held?.binding.ends?.();
     held = null;
   };
-  // By the place of the key: with shift its letter is another.
+  // Compares the physical key: with shift, the reported letter differs.
   const end = (event: Event) => {
     if (event instanceof KeyboardEvent && event.code === held?.code) letGo();
   };
   const run = (event: Event) => {
     if (!(event instanceof KeyboardEvent) || event.altKey) return;
-    // The focus may have fallen to the body, behind the dialog.
+    // The focus may be on the body, behind the dialog.
     if (document.querySelector("dialog[open]") !== null) return;
     const name = nameOf(event);
     if (takesKey(event.target, name)) return;
@@ -68,7 +69,7 @@ export function bindKeys(bindings: Binding[], target: EventTarget): void {
     }
     binding.run(event);
   };
-  // On its way down: the panel's controls let no key come up again.
+  // Uses the capture phase, because the panel's controls stop the propagation of key events.
   target.addEventListener("keydown", run, true);
   target.addEventListener("keyup", end, true);
   window.addEventListener("blur", letGo);

@@ -1,4 +1,4 @@
-// Assembles the page: parts, keys, buttons; then starts the app.
+// Assembles the page (parts, key bindings, buttons) and starts the application.
 import { drag, pan, roll, zoom, type Angles } from "../view/camera";
 import { App } from "./app";
 import { Cards } from "./dataset_cards";

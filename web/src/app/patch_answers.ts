@@ -1,16 +1,16 @@
-// Outcomes of patches: frames drawn, `unchanged` and refusals -> which changes of the view are
-// confirmed, and each frame's `chosen` message.
+// Outcomes of patches: drawn frames, `unchanged` messages and refusals -> the confirmed changes of
+// the view and the `chosen` message of each frame.
 import type { ChosenMessage, FrameHeader, UnchangedMessage } from "../wire/protocol";
 import type { ViewState } from "../view/view_state";
 
-const chosenKept = 8; // `chosen` messages whose frames may still come
+const chosenKept = 8; // number of `chosen` messages stored until their frames arrive
 
 export class PatchAnswers {
   private readonly chosen = new Map<number, ChosenMessage>();
-  private shownSeq = 0; // of the frame on the canvas
+  private shownSeq = 0; // seq of the frame on the canvas
   private unchanged: UnchangedMessage | null = null; // its frame is not shown yet
-  private refusedRev = 0; // of the newest patch that was refused
-  private answeredT = 0; // t of the newest patch that a frame has answered
+  private refusedRev = 0; // rev of the newest refused patch
+  private answeredT = 0; // t of the newest patch answered by a frame
 
   constructor(private readonly state: ViewState) {}
 
@@ -33,12 +33,12 @@ export class PatchAnswers {
     this.state.refuse(rev);
   }
 
-  // Whether a frame or answer of this rev is newer than the last refusal.
+  // Whether a frame or answer with this rev is newer than the last refusal.
   isAfterRefusal(rev: number): boolean {
     return rev > this.refusedRev;
   }
 
-  // A frame is on the canvas: its `chosen` message, if one came.
+  // Called when a frame is on the canvas. Returns its `chosen` message if one was received.
   drawn({ seq, rev }: FrameHeader): ChosenMessage | null {
     this.shownSeq = seq;
     this.state.settle(rev);
@@ -47,7 +47,7 @@ export class PatchAnswers {
     return chosen;
   }
 
-  // Whether the frame is the first that answers its patch: later ones do not measure the latency.
+  // Whether this frame is the first answer to its patch; later frames do not measure the latency.
   isFirst({ t }: FrameHeader): boolean {
     const first = t > 0 && t !== this.answeredT;
     this.answeredT = t;
@@ -58,8 +58,8 @@ export class PatchAnswers {
     this.unchanged = message;
   }
 
-  // A patch changed nothing that shows: once its frame is there, that is the answer to it. The rev
-  // of that patch; null: there is none.
+  // For a patch that changed nothing visible, the frame already shown is the answer once it is on
+  // the canvas. Returns the rev of that patch; null: there is none.
   settleUnchanged(): number | null {
     if (this.unchanged === null || this.shownSeq < this.unchanged.seq) return null;
     const { rev } = this.unchanged;

@@ -1,18 +1,18 @@
-// Playback state and direction. The server keeps the time; the page sends `play` and `pause` and
-// follows the frames that come.
+// Playback state and direction. The server advances the steps; the page sends `play` and `pause`
+// and follows the steps of the arriving frames.
 import type { ClientMessage } from "../wire/protocol";
 import type { Direction } from "./time_bar";
 
 export interface PlaybackHost {
-  send(message: ClientMessage): boolean; // whether it went out
+  send(message: ClientMessage): boolean; // returns whether the message was sent
   settings(): { steps: number; fps: number; loop: boolean; drop: boolean };
   seek(step: number): void;
-  changed(): void; // it runs, or stands still, or runs another way
+  changed(): void; // playback started, stopped or changed direction
 }
 
 export class Playback {
   private way: Direction | 0 = 0;
-  private resume: Direction | 0 = 0; // when the slider is let go
+  private resume: Direction | 0 = 0; // direction to resume in when the slider is released
   private moved = false; // another step was shown since `play`
 
   constructor(private readonly host: PlaybackHost) {}
@@ -25,7 +25,7 @@ export class Playback {
     return this.way !== 0;
   }
 
-  // Also while steps run: then it changes how, from the present step on.
+  // May be called during playback: the settings then change from the present step on.
   play(direction: Direction): void {
     const { steps, fps, loop, drop } = this.host.settings();
     const last = steps - 1;
@@ -37,7 +37,7 @@ export class Playback {
     this.host.changed();
   }
 
-  // Speed, loop or dropping changed.
+  // Restarts playback after a change of speed, loop or step dropping.
   again(): void {
     if (this.way !== 0) this.play(this.way);
   }
@@ -55,7 +55,7 @@ export class Playback {
     this.resume = 0;
   }
 
-  // Time stands still under the slider and runs on when it is let go.
+  // Playback pauses while the slider is dragged and resumes when it is released.
   scrub(step: number): void {
     const running = this.way;
     this.host.seek(step);
@@ -68,8 +68,8 @@ export class Playback {
     if (direction !== 0) this.play(direction);
   }
 
-  // A frame of this step is on the screen. Without loop the last one ends it; but one that was on
-  // its way before `play` may show that step too.
+  // Called when a frame of this step is on the canvas. Without loop, playback ends at the last
+  // step; a frame rendered before `play` may show that step too and does not count.
   shown(step: number, before: number): void {
     if (!this.running) return;
     const { steps, loop } = this.host.settings();

@@ -1,5 +1,5 @@
-// Status text: connection, loading with a bar, and errors. An error stays until it is dismissed or
-// its cause has succeeded; less important messages never overwrite it.
+// Status text: connection, loading with a progress bar, and errors. An error is shown until it is
+// dismissed or the failed operation succeeds; less important messages never overwrite it.
 import type { ConnectionState } from "../wire/connection";
 import { byId } from "../base/dom";
 
@@ -18,11 +18,11 @@ export class Status {
   private alertTopic = "";
   private barTimer: number | undefined;
   private noteTimer: number | undefined;
-  private noted: string | null = null; // the text that a note replaced
+  private noted: string | null = null; // the text that a note has temporarily replaced
   private countdown: number | undefined;
   private readonly offline = byId("offline", HTMLElement);
   private readonly offlineText = byId("offline-text", HTMLElement);
-  private lost = false; // the line shows the lost connection; nothing else may replace it
+  private lost = false; // the line reports the lost connection and must not be overwritten
 
   constructor() {
     byId("alert-close", HTMLButtonElement).addEventListener("click", () => this.clearError());
@@ -35,7 +35,7 @@ export class Status {
     if (!this.lost) this.setLine(text);
   }
 
-  // The same for a few seconds; then the text before it.
+  // Shows the text for a few seconds, then restores the previous text.
   note(text: string): void {
     const before = this.noted ?? this.line.textContent ?? "";
     this.announce(text);
@@ -81,7 +81,7 @@ export class Status {
     this.latency.textContent = `${ms.toFixed(0)} ms`;
   }
 
-  // `topic` names what would have to succeed for the error to be over.
+  // `topic` names the operation whose success clears the error.
   error(topic: string, text: string): void {
     this.alertTopic = topic;
     this.alertText.textContent = text;
@@ -94,7 +94,7 @@ export class Status {
     this.alertText.textContent = "";
   }
 
-  // The error outlives the success of what it was about (something else took its place).
+  // Keeps the error even if its operation succeeds, because another view replaced the failed one.
   holdError(): void {
     this.alertTopic = "";
   }
@@ -102,13 +102,14 @@ export class Status {
   startLoading(text: string): void {
     window.clearTimeout(this.barTimer);
     this.loadingText.textContent = text;
-    this.bar.removeAttribute("value"); // unknown how far
+    this.bar.removeAttribute("value"); // indeterminate progress
     this.barTimer = window.setTimeout(() => (this.loading.hidden = false), barDelayMs);
     this.announce(text);
   }
 
   progress(phase: string, done: number, etaMs: number | null): void {
-    if (phase.startsWith("loading ")) this.loading.hidden = false; // reported for slow loads only
+    // the server reports only slow loads
+    if (phase.startsWith("loading ")) this.loading.hidden = false;
     this.bar.value = done;
     const left = etaMs === null ? "" : `, ${Math.ceil(etaMs / 1000)} s left`;
     this.loadingText.textContent = `${phase}: ${Math.round(100 * done)} %${left}`;

@@ -1,18 +1,18 @@
-// The bar below the picture: time step, play either way, speed. It shows the state it is given
-// and reports what the user asks for; it has no step of its own.
+// The bar below the picture: time step, playback in both directions, speed. It displays the state
+// passed to it and reports the user's input; it stores no step itself.
 import type { Dataset } from "../wire/protocol";
 import { byId } from "../base/dom";
 import { readableTime } from "../base/time_text";
 
-export type Direction = 1 | -1; // of time: forward, backward
+export type Direction = 1 | -1; // forward, backward
 
 export interface TimeBarEvents {
   seek(step: number): void;
-  scrub(step: number): void; // the slider is being moved
-  scrubbed(): void; // and was let go
+  scrub(step: number): void; // the slider is being dragged
+  scrubbed(): void; // the slider was released
   play(direction: Direction): void;
   pause(): void;
-  settings(): void; // loop, speed or dropping changed
+  settings(): void; // loop, speed or step dropping changed
 }
 
 export class TimeBar {
@@ -60,7 +60,7 @@ export class TimeBar {
     return this.loopBox.checked;
   }
 
-  // Whether steps are left out rather than shown late.
+  // Whether late steps are dropped rather than shown late.
   get drop(): boolean {
     return this.keeping.value === "time";
   }
@@ -74,7 +74,7 @@ export class TimeBar {
     return (this.step + by + this.count) % this.count;
   }
 
-  // Plays that way, or stops if it does.
+  // Plays in this direction, or stops if it is already playing in it.
   toggle(direction: Direction = 1): void {
     if (this.count < 2) return;
     if (this.running === direction) this.events.pause();

@@ -1,12 +1,12 @@
-// User interface of undo and redo: keys, two buttons and status text. Pointer and key events of the
-// whole page delimit gestures.
+// User interface of undo and redo: keys, two buttons and status text. Pointer and key events
+// anywhere on the page delimit the undo entries.
 import { ViewHistory } from "../view/history";
 import type { View } from "../wire/protocol";
 
 export interface UndoControlHost {
   document(): View; // explicit keys only
-  busy(): boolean; // a dataset is being opened: its view is not there yet
-  show(view: View): void; // in place of the present one
+  busy(): boolean; // a dataset is being opened and its view is not known yet
+  show(view: View): void; // replaces the present view
   edited(): void; // the user has changed the view
   announce(text: string): void;
 }
@@ -19,7 +19,7 @@ export class UndoControl {
 
   constructor(private readonly host: UndoControlHost) {}
 
-  // Runs a user action; its changes of the view can be undone.
+  // Runs a user action whose changes of the view can be undone.
   edit(run: () => void): void {
     const before = this.host.document();
     run();
@@ -28,7 +28,7 @@ export class UndoControl {
     this.showButtons();
   }
 
-  // Runs a change of the page's own: no entry, and redo stays possible.
+  // Runs a change made by the page itself: it adds no undo entry, and redo remains possible.
   quietly(run: () => void): void {
     this.quiet = true;
     try {
@@ -61,7 +61,7 @@ export class UndoControl {
     on("keydown", (event) => this.keyDown(event as KeyboardEvent));
   }
 
-  // The same key again goes on with what it did; so do the digits of a number.
+  // Pressing the same key again, or further digits of a number, extends the same undo entry.
   private keyDown({ key, repeat, target }: KeyboardEvent): void {
     const again = repeat || key === this.lastKey;
     const types = target instanceof HTMLInputElement && /number|text/.test(target.type);
@@ -80,7 +80,7 @@ export class UndoControl {
     this.showButtons();
   }
 
-  // Not `disabled`: the focus would be lost with the last step.
+  // aria-disabled instead of `disabled`: a disabled button would lose the focus.
   private showButtons(): void {
     const { canUndo, canRedo } = this.history;
     this.buttons?.forEach((button, n) =>

@@ -1,4 +1,4 @@
-// Helpers for the DOM.
+// DOM helpers.
 
 export function byId<T extends HTMLElement>(id: string, type: new () => T): T {
   const element = document.getElementById(id);
@@ -31,7 +31,7 @@ export function makeSvg(tag: string, attributes: Attributes): SVGElement {
   return element;
 }
 
-// `anchor`: start, middle or end of the text lies at x.
+// `anchor`: whether x is the start, middle or end of the text.
 export function svgText(x: number, y: number, text: string, anchor: string): SVGElement {
   const element = makeSvg("text", { x, y, "text-anchor": anchor });
   element.textContent = text;
@@ -54,17 +54,17 @@ export function checkLabel(box: HTMLInputElement, text: string, title = ""): HTM
   return label;
 }
 
-// Runs `run` once the dialog is closed. The browser says so a frame later: by then it may be open
-// again.
+// Calls `run` once the dialog is closed. Browsers fire the close event asynchronously; by then the
+// dialog may be open again.
 export function whenClosed(dialog: HTMLDialogElement, run: () => void): void {
   dialog.addEventListener("close", () => {
     if (!dialog.open) run();
   });
 }
 
-// Reports whether the element is visible, whenever that changes.
+// Calls `report` whenever the visibility of the element changes.
 export function observeVisibility(element: Element, report: (visible: boolean) => void): void {
-  // Several changes may come at once, in order.
+  // Several changes may arrive together; the last one is current.
   new IntersectionObserver((entries) => report(entries.at(-1)!.isIntersecting)).observe(element);
 }
 

@@ -1,6 +1,6 @@
-// Numbers for display: round ticks of a range, and text of a value.
+// Numbers for display: round ticks of a range, and values as text.
 
-// About `count` round values (1, 2 or 5 times a power of ten apart) within [low, high].
+// About `count` round values within [low, high], spaced by 1, 2 or 5 times a power of ten.
 export function niceTicks(low: number, high: number, count: number): number[] {
   if (!Number.isFinite(low) || !Number.isFinite(high) || low === high) return [];
   const least = Math.min(low, high);
@@ -9,7 +9,7 @@ export function niceTicks(low: number, high: number, count: number): number[] {
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((digit) => digit * power).find((s) => s >= rough * 0.999)!;
   const ticks: number[] = [];
-  // Counted in steps, not added up: no 0.30000000000000004.
+  // Multiples of the step instead of repeated additions, which would give 0.30000000000000004.
   const slack = 1e-9;
   for (let n = Math.ceil(least / step - slack); n <= most / step + slack; n++) {
     ticks.push(Number((n * step).toPrecision(12)));
@@ -36,7 +36,7 @@ export function formatBytes(bytes: number): string {
 }
 
 export interface LegendTick {
-  at: number; // 0..1 along the strip
+  at: number; // position along the strip, 0..1
   text: string;
 }
 
@@ -51,8 +51,8 @@ export function linearTicks(range: readonly [number, number], count = 5): Legend
 
 const quarters = ["N", "E", "S", "W"] as const;
 
-// Ticks of a strip over compass bearings, degrees from north by east. Where less than two quarters
-// lie within, degrees.
+// Ticks of a strip over compass bearings, in degrees clockwise from north. If the range contains
+// fewer than two cardinal directions, the ticks are in degrees.
 export function compassTicks(range: readonly [number, number]): LegendTick[] {
   const [low, high] = range;
   const first = Math.ceil(Math.min(low, high) / 90 - 1e-9);
@@ -66,7 +66,7 @@ export function compassTicks(range: readonly [number, number]): LegendTick[] {
   }));
 }
 
-// How round a number is: 1, 10, 100 before 5, then 2, then anything else.
+// Rank of a number's roundness: 1, 10, 100 before 5, then 2, then all others.
 function roughness(value: number): number {
   if (value === 0) return 0;
   const mantissa = Number(
@@ -76,8 +76,8 @@ function roughness(value: number): number {
   return order < 0 ? 3 : order;
 }
 
-// Ticks of a strip over world heights, labelled by the vertical axis's own coordinates: samples
-// that lie within the range, the roundest first, no two nearer than `gap`.
+// Ticks of a strip over world heights, labelled with the coordinates of the vertical axis: samples
+// within the range, the roundest first, no two closer than `gap`.
 export function axisTicks(
   range: readonly [number, number],
   places: number[],

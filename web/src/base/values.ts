@@ -1,6 +1,6 @@
-// Checks and limits of values.
+// Type checks and clamping of values.
 
-// Of JSON: neither a list nor null.
+// Whether a JSON value is an object, not a list or null.
 export const isObject = (value: unknown): value is Record<string, unknown> =>
   typeof value === "object" && value !== null && !Array.isArray(value);
 

@@ -1,11 +1,12 @@
-// Semantics of the panel's controls: which of them apply to a view, what a dataset offers,
-// and the values that keep two of them in order. Pure: (dataset, view) -> options, text, patches.
+// Rules of the panel's controls: which of them apply to a view, the options that a dataset offers,
+// and patches that keep dependent values consistent. Pure: (dataset, view) -> options, text,
+// patches.
 import { unitText } from "../view/legend_entries";
 import type { Dataset, Field, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 import type { Patch } from "../view/view_state";
 
-export type Options = Record<string, string>; // label -> value on the wire
+export type Options = Record<string, string>; // label -> value in the view document
 export type SliceAxis = "x" | "y" | "z";
 
 // One-line explanations of the compositing methods.
@@ -30,7 +31,7 @@ export const methodHints: Readonly<Record<string, string>> = {
   slab: "Slabs of constant depth gather the parts of the kernels within them.",
 };
 
-// `reference` is not offered: streams are refused it.
+// `reference` is not offered, because the server refuses it for streams.
 export const methodOptions: Options = { kernel: "kernel", slab: "slab" };
 
 export const detailHints: Readonly<Record<string, string>> = {
@@ -40,7 +41,7 @@ export const detailHints: Readonly<Record<string, string>> = {
 
 export const detailOptions: Options = { auto: "auto", full: "full" };
 
-// What a picker of fields offers.
+// Options of a field picker.
 export function fieldOptions(dataset: Dataset, kind: Field["kind"]): Options {
   return optionsOf(dataset.fields.filter((field) => field.kind === kind));
 }
@@ -60,14 +61,14 @@ const mappingLabels: Readonly<Record<Dataset["mappings"][number], string>> = {
   curvilinear: "curvilinear map",
 };
 
-// Shapes that the grid can be bent to, as listed by the dataset.
+// Mappings that the dataset supports.
 export function mappingOptions(dataset: Dataset): Options {
   return Object.fromEntries(dataset.mappings.map((mapping) => [mappingLabels[mapping], mapping]));
 }
 
-export const ownHeight = ""; // the option that names no height field
+export const ownHeight = ""; // the option for no height field
 
-// Scalars that can serve as height field; those measured in length units first.
+// Scalars that can serve as height field; those in units of length first.
 export function heightOptions(dataset: Dataset): Options {
   const measuresHeight = (field: Field): boolean =>
     /height|altitude/.test(field.standardName) || /^(k?m|d[ak]m|gpm|feet)$/.test(field.units);
@@ -80,7 +81,7 @@ export const wholeVolume = "all";
 
 const sliceAxes: readonly SliceAxis[] = ["x", "y", "z"];
 
-// A slice across an axis of one sample would be the whole volume.
+// Axes with one sample are omitted: their slice would be the whole volume.
 export function sliceOptions(dataset: Dataset): Options {
   const options: Options = { "off: whole volume": wholeVolume };
   for (const axis of sliceAxes) {
@@ -94,7 +95,7 @@ export function sliceOptions(dataset: Dataset): Options {
 export const sliceIndexMax = (dataset: Dataset, axis: SliceAxis): number =>
   Math.max(0, dataset.dims[axis] - 1);
 
-// Begins in the middle of the axis.
+// A new slice starts in the middle of the axis.
 export function slicePatch(dataset: Dataset, axis: string): Patch {
   const known = sliceAxes.find((one) => one === axis);
   if (known === undefined) return { geometry: { slice: null } };
@@ -102,7 +103,7 @@ export function slicePatch(dataset: Dataset, axis: string): Patch {
   return { geometry: { slice: { axis: known, index } } };
 }
 
-// Position of the layer in its axis's coordinate.
+// Position of the slice in the coordinate of its axis.
 export function sliceText(dataset: Dataset, view: View): string {
   const slice = view.geometry?.slice;
   if (!slice) return "";
@@ -113,19 +114,21 @@ export function sliceText(dataset: Dataset, view: View): string {
   return `${layer}: ${axis.name} ${formatNumber(value)} ${unitText(axis.units)}`.trim() + ".";
 }
 
-// Colour by another quantity: the old range has another unit, and a scalar has to be named.
+// Colours the lines by another quantity: the old range has another unit and is removed, and a
+// scalar field is named.
 export function colorByPatch(dataset: Dataset, view: View, by: string): Patch {
   const color: Patch = { by, range: null };
   if (by === "scalar" && !view.vector?.color?.field) {
     color.field = dataset.fields.find((field) => field.kind === "scalar")?.name ?? null;
   }
-  // North is one colour from either side; for a range with two ends a cyclic map is ambiguous.
+  // Direction needs a cyclic map, so that north has one colour from both sides; for other
+  // quantities a cyclic map would be ambiguous.
   if (by === "direction") color.map = "compass";
   else if (view.vector?.color?.map === "compass") color.map = null;
   return { vector: { color } };
 }
 
-// The field that the lines' colour maps, of a vector its magnitude; null: none.
+// The field that colours the lines; for a vector its magnitude; null: none.
 export function colorField(view: View): string | null {
   const { field = null, color } = view.vector ?? {};
   if (field === null) return null;
@@ -133,7 +136,7 @@ export function colorField(view: View): string | null {
   return color?.by === "scalar" ? (color.field ?? null) : null;
 }
 
-// near and far with at least `gap` between them: the one that moved takes the other along.
+// Keeps at least `gap` between near and far: the changed end moves the other one if necessary.
 export function depthCuePatch(view: View, end: "near" | "far", value: number): Patch {
   const gap = 0.01;
   const { near = 0, far = 1 } = view.depthCue ?? {};
@@ -146,13 +149,13 @@ export function depthCuePatch(view: View, end: "near" | "far", value: number): P
 
 export const hasErrorLimit = (view: View): boolean => (view.quality?.maxError ?? null) !== null;
 
-// What moving frames are drawn for.
+// Describes what moving frames are optimized for.
 export const qualityHint = (view: View): string =>
   hasErrorLimit(view)
     ? "Moving frames: the fastest that is expected to keep the error, within the budget."
     : "Moving frames: the least error that the budget allows.";
 
-// Which controls count under a view; the others are hidden or out of use.
+// Which controls apply to a view; the others are hidden or disabled.
 export function controlStates(view: View) {
   const vector = view.vector ?? {};
   const by = vector.color?.by;
@@ -160,7 +163,7 @@ export function controlStates(view: View) {
   const lines = vector.field !== null;
   return {
     lines,
-    ranged: by !== "constant", // colours along a range, by a map
+    ranged: by !== "constant", // coloured along a range by a map
     counted: colorField(view) !== null,
     constant: by === "constant",
     rise: by === "rise",

@@ -1,4 +1,4 @@
-// Error against time as a picture's numbers: logarithmic axes, their ticks, and text of points.
+// Geometry of the plot of error against time: logarithmic axes, their ticks, and text of points.
 // Pure.
 import { errorName, errorText, type ErrorMetric } from "../base/error_text";
 import { formatNumber } from "../base/ticks";
@@ -12,7 +12,7 @@ export interface Axis {
 
 const usable = (value: number): boolean => Number.isFinite(value) && value > 0;
 
-// All the values that can be on it, with room beside them, and at least `ratio` wide.
+// An axis over all usable values with a margin, spanning at least a factor of `ratio`.
 export function axisOver(values: number[], ratio: number): Axis {
   const known = values.filter(usable);
   if (known.length === 0) return { low: 1, high: ratio };
@@ -22,7 +22,7 @@ export function axisOver(values: number[], ratio: number): Axis {
   return { low: low / wider, high: high * wider };
 }
 
-// 0..1, what is beyond an end at that end.
+// Position 0..1; values beyond an end are placed at that end.
 export function positionOn({ low, high }: Axis, value: number): number {
   if (!(value > low)) return 0;
   return Math.min(1, Math.log(value / low) / Math.log(high / low));
@@ -31,7 +31,7 @@ export function positionOn({ low, high }: Axis, value: number): number {
 export const valueOn = ({ low, high }: Axis, place: number): number =>
   low * (high / low) ** clamp(place, 0, 1);
 
-// 1, 2 and 5 times powers of ten, or, where those are many, the powers only, or some of them.
+// 1, 2 and 5 times powers of ten; if those are too many, only powers of ten, or some of them.
 export function logTicks({ low, high }: Axis, most: number): number[] {
   const first = Math.floor(Math.log10(low));
   const last = Math.ceil(Math.log10(high));
@@ -67,12 +67,12 @@ export function pointText(point: ForecastPoint, metric: ErrorMetric): string {
   );
 }
 
-// What an arrow key makes of the greatest error: a tenth, or (finer) a hundredth.
+// The error limit after an arrow key: changed by a tenth, or if `fine` by a hundredth.
 export function limitAfter(error: number, way: 1 | -1, fine: boolean): number {
   return Number((error * (fine ? 1.01 : 1.1) ** way).toPrecision(fine ? 3 : 2));
 }
 
-// What an arrow key makes of the budget: a twentieth, or (finer) a millisecond.
+// The budget after an arrow key: changed by a twentieth, or if `fine` by a millisecond.
 export function budgetAfter(budget: number, way: 1 | -1, fine: boolean): number {
   const by = fine ? 1 : Math.max(1, Math.round(0.05 * budget));
   return clamp(Math.round(budget) + way * by, 1, 10_000);

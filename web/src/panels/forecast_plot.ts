@@ -1,6 +1,6 @@
-// Error against time in the Quality panel: what the server forecasts for the view's settings, the
-// frame that is shown, and the budget and the greatest error as handles. Asked for while it is seen
-// and the view rests.
+// Plot of error against time in the Quality panel: the server's forecast for the view's settings,
+// the displayed frame, and the budget and error limit as handles. The forecast is requested while
+// the plot is visible and the view is at rest.
 import { failureText, type Forecast } from "../wire/api";
 import { debounced, make, makeSvg, setAttributes, svgText, observeVisibility } from "../base/dom";
 import { errorMetric, errorName, errorText } from "../base/error_text";
@@ -31,15 +31,16 @@ export interface ForecastHost {
   setMaxError(error: number): void;
 }
 
-const restMs = 1000; // without a change, before it is asked for
-const againMs = 5000; // calibration continues while the view rests
+const restMs = 1000; // time without a change before the forecast is requested
+// interval of repeated requests, as calibration continues while the view is at rest
+const againMs = 5000;
 const [width, height, left, right, top, bottom] = [284, 176, 36, 8, 12, 30]; // drawing units
 const [inner, tall] = [width - left - right, height - top - bottom];
 
 interface Handle {
   element: SVGElement;
   name: string;
-  across: boolean; // it moves along x
+  across: boolean; // the handle moves along x
   set(place: number): void;
   step(way: 1 | -1, fine: boolean): void;
 }
@@ -59,10 +60,10 @@ export class ForecastPlot {
   });
   private data: Forecast | null = null;
   private final: FrameHeader | null = null;
-  private asked = ""; // what was asked for last
+  private asked = ""; // key of the last request
   private again = 0; // timer
   private seen = false;
-  private held = false; // a handle is dragged: the axes stay
+  private held = false; // a handle is being dragged; the axes must not change
   private x: Axis = { low: 1, high: 1000 };
   private y: Axis = { low: 1e-4, high: 1 };
   private readonly loadSoon = debounced(() => void this.load(), restMs);
@@ -131,7 +132,7 @@ export class ForecastPlot {
     );
   }
 
-  // The last final frame of what is shown, and the newest of all.
+  // The last final frame of the view, and the newest frame.
   private frames(): FrameHeader[] {
     const now = this.host.frame();
     const { final } = this;
@@ -211,7 +212,7 @@ export class ForecastPlot {
     this.updateAria(this.limit, 1e-6, error, 1, errorText(error, errorMetric.value));
   }
 
-  // A slider must have a value, so it becomes one with its first.
+  // A slider role requires a value, so the role is set with the first value.
   private updateAria(handle: Handle, min: number, now: number, max: number, text: string): void {
     const { element, name } = handle;
     setAttributes(element, {
@@ -230,7 +231,7 @@ export class ForecastPlot {
       class: "plot-handle",
       "aria-orientation": across ? "horizontal" : "vertical",
     });
-    // Wide enough to grab; only the line is visible.
+    // The grab area is wide; only the line is visible.
     const hold = across
       ? { x: -12, y: 0, width: 24, height: height - bottom }
       : { x: left, y: -12, width: inner, height: 24 };
@@ -275,7 +276,7 @@ export class ForecastPlot {
       const up = event.key === "ArrowRight" || event.key === "ArrowUp";
       if (!up && event.key !== "ArrowLeft" && event.key !== "ArrowDown") return;
       event.preventDefault();
-      event.stopPropagation(); // the arrow keys turn the volume
+      event.stopPropagation(); // otherwise the arrow keys would turn the volume
       step(up ? 1 : -1, event.shiftKey);
     });
   }

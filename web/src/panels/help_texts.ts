@@ -1,6 +1,5 @@
-// What the server's schema of the view says about each key -> tooltips of the controls. Fetched
-// when the panel is first built; until it is there, or if it never comes, a control has its label
-// alone.
+// Descriptions of keys in the server's view schema -> tooltips of the controls. Fetched when the
+// panel is first built; until then, or if the request fails, controls have only their labels.
 
 interface Schema {
   description?: string;
@@ -11,7 +10,7 @@ interface Schema {
 const texts = new Map<string, string>();
 let waiting: [HTMLElement, string][] = [];
 
-// Pointers without the indices of arrays.
+// Pointers omit array indices.
 function collect(node: Schema, pointer: string): void {
   for (const [key, child] of Object.entries(node.properties ?? {})) {
     const at = `${pointer}/${key}`;
@@ -33,7 +32,7 @@ export async function loadHelpTexts(baseUri: string): Promise<void> {
     if (answer.ok) collect((await answer.json()) as Schema, "");
   } finally {
     const due = waiting;
-    waiting = []; // without the texts too: each panel that is built waits for them anew
+    waiting = []; // cleared after a failure too: each new panel registers again
     if (texts.size > 0) for (const [element, pointer] of due) explain(element, pointer);
   }
 }

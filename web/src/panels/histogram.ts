@@ -1,8 +1,8 @@
-// Histograms as numbers: bars, shares of the samples, and what a drag over them chooses. Pure.
+// Histogram calculations: bars, quantiles, and ranges chosen by dragging. Pure.
 import type { Histogram, Range } from "../wire/api";
 import { clamp } from "../base/values";
 
-// Outline of the bars, one unit wide each and at most 1 high, y downward: an SVG path.
+// Outline of the bars as an SVG path; each bar is one unit wide and at most 1 high, y downward.
 export function barPath(counts: number[], log: boolean): string {
   const size = (count: number): number => (log ? Math.log1p(count) : count);
   const most = size(counts.reduce((a, b) => Math.max(a, b), 0));
@@ -11,7 +11,8 @@ export function barPath(counts: number[], log: boolean): string {
   return `M0 1${bars.join("")}V1Z`;
 }
 
-// The value with `share` of the unmasked samples below it; within a bin they are taken as even.
+// The value below which the fraction `share` of the unmasked samples lies; samples are assumed
+// uniform within a bin.
 export function quantile({ range, counts, below, above }: Histogram, share: number): number {
   const width = (range[1] - range[0]) / counts.length;
   const total = counts.reduce((sum, count) => sum + count, below + above);
@@ -25,14 +26,14 @@ export function quantile({ range, counts, below, above }: Histogram, share: numb
   return range[1];
 }
 
-// The middle of the samples, without the share `tail` at either end; null where nothing is between.
+// The range without the fraction `tail` of the samples at either end; null if it would be empty.
 export function clipRange(histogram: Histogram, tail: number): Range | null {
   const low = neat(quantile(histogram, tail), histogram.range);
   const high = neat(quantile(histogram, 1 - tail), histogram.range);
   return low < high ? [low, high] : null;
 }
 
-// As many digits as a range of this width needs: a thousandth of it.
+// Rounds to the digits that a range of this width needs: a thousandth of the width.
 export function neat(value: number, range: Range): number {
   const width = Math.abs(range[1] - range[0]);
   if (!(width > 0) || !Number.isFinite(value)) return value;
@@ -46,12 +47,12 @@ export const positionOf = (value: number, range: Range): number =>
 export const valueAt = (place: number, range: Range): number =>
   neat(range[0] + clamp(place, 0, 1) * (range[1] - range[0]), range);
 
-// A drag over the bars, in places 0..1: it takes hold of an end of the chosen range that is near,
-// or else draws a new range; a click draws none and moves the nearer end there. An inverted range
-// (its first end the greater) stays inverted.
+// A drag over the bars, in positions 0..1: near an end of the chosen range it moves that end,
+// elsewhere it draws a new range; a click moves the nearer end. An inverted range (first end
+// greater) remains inverted.
 export class RangeDrag {
-  private readonly fixed: number; // the end that stays
-  private readonly held: 0 | 1 | null; // the end taken hold of
+  private readonly fixed: number; // the end that does not move
+  private readonly held: 0 | 1 | null; // the dragged end
   private moved = false;
 
   constructor(
@@ -71,7 +72,7 @@ export class RangeDrag {
     return this.ordered(place, this.fixed);
   }
 
-  // The drag is over: what a mere click chooses.
+  // Ends the drag; returns the range chosen by a click without movement.
   end(): Range | null {
     if (this.moved || this.held !== null) return null;
     const [a, b] = this.chosen;

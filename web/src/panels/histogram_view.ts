@@ -1,5 +1,5 @@
-// A histogram in the panel: fetched while it is seen and time rests. A drag over it, or over the
-// colours below it, chooses a range; above it a medium's opacity curve is edited.
+// A histogram in the panel: fetched while it is visible and playback is paused. Dragging over it,
+// or over the colours below it, chooses a range; a medium's opacity curve is edited on top of it.
 import { failureText, type Histogram, type Range } from "../wire/api";
 import {
   checkLabel,
@@ -16,17 +16,18 @@ import { TransferView, type CurveSource } from "./transfer_view";
 import { clamp } from "../base/values";
 
 export const histogramBins = 128;
-const restMs = 250; // without a change, before it is fetched anew
+const restMs = 250; // time without a change before it is fetched again
 const clipTail = 0.01;
 const holdPixels = 9;
 
 export interface HistogramSource extends RangeSource {
-  title(): string; // what is counted
+  title(): string; // the quantity counted
   units(): string;
-  dataKey(): string | null; // of the data to show; null: none now
+  dataKey(): string | null; // key of the data to show; null: none at present
   load(): Promise<Histogram>;
-  curve?: CurveSource; // of a medium
-  gradient?(from: number, to: number): string; // of the map, its ends at these places, per cent
+  curve?: CurveSource; // media only
+  // of the map, with its ends at these positions in per cent
+  gradient?(from: number, to: number): string;
 }
 
 export class HistogramView {
@@ -42,11 +43,11 @@ export class HistogramView {
   private readonly choice: RangeChoice;
   private readonly transfer: TransferView | null = null;
   private data: Histogram | null = null;
-  private wanted: string | null = null; // key of what was asked for last
+  private wanted: string | null = null; // key of the last request
   private seen = false;
   private drag: RangeDrag | null = null;
-  private domain: Range = [0, 1]; // values at the two edges
-  private chosen: Range | null = null; // by a drag, not sent yet
+  private domain: Range = [0, 1]; // values at the left and right edge
+  private chosen: Range | null = null; // range of the current drag, not sent yet
   private readonly loadSoon = debounced(() => void this.load(), restMs);
 
   constructor(private readonly source: HistogramSource) {
@@ -155,7 +156,8 @@ export class HistogramView {
     return clamp(positionOf(value, this.domain), 0, 1);
   }
 
-  // All that is counted, the colours' range and the curve's points. It stays during a drag.
+  // The domain contains all counted values, the colour range and the points of the curve. It is
+  // constant during a drag.
   private fitDomain(): void {
     const { data, source } = this;
     if (this.drag !== null || this.transfer?.dragging) return;

@@ -1,5 +1,5 @@
-// The media of a view as the panel handles them: which are on, and the opacity curve by its two
-// handles, density and threshold. Pure.
+// Model of the media panel: which media are on, and the opacity curve with its two parameters,
+// density and threshold. Pure.
 import type { ScalarView } from "../wire/protocol";
 import { clamp } from "../base/values";
 
@@ -7,10 +7,10 @@ export type Curve = [number, number][]; // (value, extinction per world unit), v
 
 export const curveOf = (layer: ScalarView): Curve => (layer.extinction ?? []) as Curve;
 
-// The greatest extinction.
+// The greatest extinction of the curve.
 export const densityOf = (curve: Curve): number => Math.max(0, ...curve.map(([, e]) => e));
 
-// The value up to which the medium is clear; null where it is nowhere clear at its low end.
+// The value up to which the medium is transparent; null if the curve does not start transparent.
 export function thresholdOf(curve: Curve): number | null {
   let clear: number | null = null;
   for (const [value, extinction] of curve) {
@@ -20,7 +20,7 @@ export function thresholdOf(curve: Curve): number | null {
   return clear;
 }
 
-// A ramp from `threshold` up to the range's top.
+// A ramp from `threshold` to the top of the range.
 export function rampCurve(range: [number, number], threshold: number, density: number): Curve {
   const [low, high] = [Math.min(...range), Math.max(...range)];
   const knee = clamp(threshold, low, low + 0.999 * (high - low));
@@ -42,8 +42,8 @@ export interface Layer {
   on: boolean;
 }
 
-// The panel's layers after the view's media changed: those that are on follow the view, those that
-// are off keep their place and settings.
+// Updates the panel's layers after a change of the view's media: layers that are on follow the
+// view; layers that are off keep their position and settings.
 export function followMedia(layers: Layer[], media: ScalarView[]): Layer[] {
   const next: Layer[] = [];
   let taken = 0;
@@ -52,7 +52,7 @@ export function followMedia(layers: Layer[], media: ScalarView[]): Layer[] {
     else if (taken < media.length) next.push({ view: media[taken++]!, on: true });
   }
   while (taken < media.length) next.push({ view: media[taken++]!, on: true });
-  // A medium that came back by another way needs no second, dark copy.
+  // A disabled layer is dropped if its medium is in the view again, for example by a link.
   const shown = new Set(media.map((medium) => medium.field));
   return next.filter((layer) => layer.on || !shown.has(layer.view.field));
 }

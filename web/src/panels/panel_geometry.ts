@@ -1,4 +1,4 @@
-// The panels of space: how the grid stands (shape, heights, slice), and how it is looked at.
+// The geometry panels (mapping, heights, slice) and the camera panel.
 import type GUI from "lil-gui";
 import { withProjection, type Camera } from "../view/camera";
 import {

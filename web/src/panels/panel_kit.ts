@@ -1,5 +1,5 @@
-// Controls of the panels: each shows one key of the view and changes it by a merge patch.
-// Labels are ours; the explanations (titles) and limits come from the view's schema.
+// Controls of the panels: each shows one key of the view and changes it by a merge patch. Labels
+// are defined here; explanations (titles) and limits come from the schema of the view.
 import GUI, { Controller, type NumberController } from "lil-gui";
 import { viewRanges } from "../../generated/view_ranges";
 import { explain } from "./help_texts";
@@ -17,26 +17,26 @@ import type { Patch } from "../view/view_state";
 import { clamp } from "../base/values";
 
 export interface PanelHost {
-  view(): View; // with every default that is known
+  view(): View; // with all known defaults
   change(patch: Patch): void;
-  quietly(run: () => void): void; // its changes are no undo step
+  quietly(run: () => void): void; // runs changes that add no undo entry
   dataset(): Dataset;
   maps: ColorMaps;
   api: Api;
   playing(): boolean;
-  frame(): FrameHeader | null; // on the canvas
+  frame(): FrameHeader | null; // the frame on the canvas
 }
 
-// A histogram of a field, and the range that it chooses.
+// A histogram of a field with a selectable range.
 export interface HistogramOptions {
-  key: string; // of the range, among those of the panel
-  folder?: string; // its title
-  field(): string | null; // null: of none now
+  key: string; // key of the range, unique within the panel
+  folder?: string; // title of the folder
+  field(): string | null; // null: no field at present
   title(): string;
   range(): Range | null;
   defaultRange(): Range | null; // null: not known
   choose(range: Range | null): void; // null: the default
-  map?(): string | undefined; // of the colours that the range is of
+  map?(): string | undefined; // colour map of the range
   curve?: CurveSource;
 }
 
@@ -61,9 +61,9 @@ export function patchAt(pointer: string, value: unknown): Patch {
   return keys.reduceRight<unknown>((inner, key) => ({ [key]: inner }), value) as Patch;
 }
 
-// A value's own read and write, where it is not simply a key.
+// Custom access to a value that is not simply one key.
 export interface Access<T> {
-  pointer: string; // whose explanation to show
+  pointer: string; // pointer of the key whose explanation is shown
   get(view: View): T | null | undefined;
   set(value: T): Patch | null;
 }
@@ -74,11 +74,11 @@ export const keyAccess = <T>(pointer: string): Access<T> => ({
   set: (value) => patchAt(pointer, value),
 });
 
-// Digits that a control shows.
+// Rounds to the digits that a control shows.
 const shownValue = <T>(value: T): T =>
   typeof value === "number" ? (Number(value.toPrecision(6)) as T) : value;
 
-// A box has room for some six signs: 0.000001 would read 0.0000.
+// A box has room for about six characters: 0.000001 would be displayed as 0.0000.
 function shortenSmall(controller: NumberController): void {
   const update = controller.updateDisplay.bind(controller);
   controller.updateDisplay = () => {
@@ -92,7 +92,7 @@ function shortenSmall(controller: NumberController): void {
   controller.updateDisplay();
 }
 
-// A colour, by the browser's own picker.
+// A colour, edited by the browser's own picker.
 class ColorBox extends Controller {
   private readonly input = make("input");
 
@@ -114,7 +114,7 @@ class ColorBox extends Controller {
 export class PanelKit {
   private readonly refreshers: (() => void)[] = [];
 
-  // modes: range modes, preserved while panels are rebuilt.
+  // modes: range modes, preserved when panels are rebuilt.
   constructor(
     readonly host: PanelHost,
     readonly modes: Map<string, RangeMode>,
@@ -146,7 +146,7 @@ export class PanelKit {
     return this.bind(controller, label, model, access);
   }
 
-  // A number of many magnitudes: a box, and a slider along its logarithm that gives two digits.
+  // A number spanning many magnitudes: a box, and a logarithmic slider that yields two digits.
   logarithmic(folder: GUI, label: string, access: Access<number>): Controller {
     const [min = 1e-6, max = 1] = viewRanges[access.pointer] ?? [];
     const within = (value: number): number => clamp(shownValue(value), min, max);
@@ -184,7 +184,7 @@ export class PanelKit {
     return this.bind(folder.add(model, "value"), label, model, access);
   }
 
-  // A value that is not offered is still shown while the view has it.
+  // A value that is not among the options is still listed while the view contains it.
   choice(folder: GUI, label: string, access: Access<string>, options: Options): Controller {
     const withOwn = (value: string): Options =>
       Object.values(options).includes(value) ? options : { ...options, [value]: value };
@@ -205,7 +205,7 @@ export class PanelKit {
     return this.bind(new ColorBox(folder, model, "value"), label, model, access);
   }
 
-  // A colour map's picker, with the map itself in it.
+  // A colour map picker that displays the map itself.
   map(folder: GUI, label: string, access: Access<string>): Controller {
     const names = this.host.maps.names();
     const controller = this.choice(
@@ -224,7 +224,8 @@ export class PanelKit {
     return controller;
   }
 
-  // Two boxes for the ends of a range; both are sent, as the wire takes arrays whole.
+  // Two boxes for the ends of a range; both are sent, because a merge patch replaces arrays as a
+  // whole.
   range(folder: GUI, label: string, access: Access<[number, number]>, units: string): Controller[] {
     const ends = ["from", "to"] as const;
     return ends.map((end, index) => {
@@ -248,7 +249,7 @@ export class PanelKit {
     });
   }
 
-  // In a folder of its own, so that a histogram is computed only where it is visible.
+  // A separate folder, so that the histogram is computed only while visible.
   histogram(parent: GUI, options: HistogramOptions): GUI {
     const folder = parent.addFolder(options.folder ?? "Histogram");
     const { host } = this;
@@ -274,7 +275,7 @@ export class PanelKit {
       of: () => (host.view().dataset === dataset.id ? options.field() : null),
       read: async (at) => {
         const { range } = await host.api.range(dataset.id, options.field()!, at);
-        return view.element.isConnected ? range : null; // else the panel was built anew
+        return view.element.isConnected ? range : null; // null if the panel has been rebuilt
       },
       ...(options.map === undefined
         ? {}
@@ -306,12 +307,12 @@ export class PanelKit {
     write();
   }
 
-  // Shown only while they count.
+  // Shows the controls only while they apply.
   showWhen(counts: (states: ControlStates) => boolean, ...parts: (Controller | GUI)[]): void {
     this.follow(counts, (on) => parts.forEach((part) => part.show(on)));
   }
 
-  // Out of use while they do not count.
+  // Disables the controls while they do not apply.
   enableWhen(counts: (states: ControlStates) => boolean, ...controllers: Controller[]): void {
     this.follow(counts, (on) => controllers.forEach((controller) => controller.enable(on)));
   }

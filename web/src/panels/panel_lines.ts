@@ -1,4 +1,4 @@
-// The panel of the lines: field, length and opacity; their colour, shape, kernels and motion.
+// The lines panel: field, length and opacity; colour, profile, kernels and motion.
 import type GUI from "lil-gui";
 import { colorByPatch, colorField, fieldOptions } from "./controls";
 import type { Range } from "../wire/api";
@@ -92,7 +92,7 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
       {
         pointer: "/vector/color/field",
         get: (view) => view.vector?.color?.field,
-        // Another field, another unit: its own default range.
+        // Another field has another unit, so its default range is used.
         set: (name) => ({ vector: { color: { field: name, range: null } } }),
       },
       scalars,
@@ -156,7 +156,7 @@ function addShape(parent: GUI, kit: PanelKit, per: string): GUI {
   return folder;
 }
 
-// r1 <= r2 always: moving one beyond the other takes it along.
+// r1 <= r2 always: moving one beyond the other moves both.
 function addWidth(folder: GUI, kit: PanelKit): void {
   const r = (key: "r1" | "r2") => kit.host.view().vector?.[key] ?? 1;
   kit.number(

@@ -1,4 +1,4 @@
-// The media's panel: up to four scalar fields, each with its switch, field, colours and opacity.
+// The media panel: up to four scalar fields, each with a switch, field, colours and opacity.
 import type GUI from "lil-gui";
 import type { Range } from "../wire/api";
 import { fieldOptions } from "./controls";
@@ -29,11 +29,11 @@ export function addMedia(gui: GUI, kit: PanelKit): void {
 
 class MediaPanel {
   private layers: Layer[] = [];
-  private shape = ""; // fields and switches that the controls were built for
+  private shape = ""; // fields and switches for which the controls were built
   private controls: PanelKit;
-  private readonly folded = new Set<string>(); // fields whose curve is not shown
+  private readonly folded = new Set<string>(); // fields whose curve editor is folded
 
-  private readonly forms = new Map<string, Curve>(); // by fields, before density scaled them
+  private readonly forms = new Map<string, Curve>(); // curves by field before density scaling
 
   constructor(
     private readonly folder: GUI,
@@ -83,7 +83,7 @@ class MediaPanel {
     layer.view = { ...layer.view, ...change };
     if (layer.on) this.send();
     else this.controls.refresh();
-    return null; // sent already
+    return null; // already sent
   }
 
   private addLayer(index: number): void {
@@ -123,7 +123,7 @@ class MediaPanel {
       {
         pointer: "/scalars/field",
         get: () => this.viewOf(index).field,
-        // Another field's range and opacity would mean nothing: its own defaults.
+        // The range and opacity of another field do not apply, so the defaults are used.
         set: (field) => {
           this.layers[index]!.view = { field };
           this.send();
@@ -165,11 +165,11 @@ class MediaPanel {
       field: () => field,
       range: () => (color()?.range ?? null) as Range | null,
       defaultRange: () => (known?.color?.range ?? null) as Range | null,
-      // A medium without a range gets its default.
+      // For a medium without a range the server supplies the default.
       choose: (range) => this.update(index, { color: { ...color(), range: range ?? undefined } }),
       map: () => color()?.map ?? undefined,
       ...(this.viewOf(index).extinction == null
-        ? {} // the server has not sent its default yet
+        ? {} // the server has not sent the default curve yet
         : {
             curve: {
               curve: () => curveOf(this.viewOf(index)),
@@ -212,14 +212,15 @@ class MediaPanel {
   }
 
   private addOpacity(folder: GUI, index: number, units: string): void {
-    if (this.viewOf(index).extinction == null) return; // the server has not sent its default yet
+    // the server has not sent the default curve yet
+    if (this.viewOf(index).extinction == null) return;
     const curve = () => curveOf(this.viewOf(index));
     const low = () => Math.min(curve()[0]![0], ...(this.viewOf(index).color?.range ?? []));
     const ends = (): Range => [low(), curve().at(-1)![0]];
     const density: Access<number> = {
       pointer: "/scalars/extinction",
       get: () => densityOf(curve()),
-      // A curve that was scaled to nothing comes back in its form.
+      // A curve scaled to zero regains its shape.
       set: (value) => {
         const { field } = this.viewOf(index);
         const form = densityOf(curve()) > 0 ? curve() : (this.forms.get(field) ?? curve());
@@ -242,7 +243,7 @@ class MediaPanel {
       },
       { min: ends()[0], max: ends()[1] },
     );
-    // A curve of another form has no foot to move.
+    // "clear below" applies only to ramps and to curves scaled to zero.
     const follow = () => clear.enable(densityOf(curve()) === 0 || isRamp(curve()));
     this.controls.onRefresh(follow);
     follow();

@@ -1,5 +1,5 @@
-// The probe's panel: a position in the axes' own coordinates -> values of every field there, and of
-// one field over time. Open means that the probe is on: its place is then marked on the picture.
+// The probe panel: a position in the coordinates of the axes -> the values of all fields there, and
+// of one field over time. While the folder is open the probe is on and marked on the picture.
 import type GUI from "lil-gui";
 import { failureText, type Series } from "../wire/api";
 import { checkLabel, debounced, make, makeSvg, numberBox } from "../base/dom";
@@ -31,13 +31,14 @@ export class ProbePanel {
   private readonly picker = make("select");
   private readonly plot = makeSvg("svg", { class: "course", role: "img" });
   private series: Series | null = null;
-  private wanted = ""; // what was asked for last
+  private wanted = ""; // key of the last request
   private readonly readSoon = debounced(() => void this.read(), restMs);
 
   constructor(
     gui: GUI,
     private readonly kit: PanelKit,
-    private readonly changed: () => void, // the place, or whether the probe is on
+    // the position changed, or the probe was switched on or off
+    private readonly changed: () => void,
     place: Sample,
   ) {
     this.folder = gui.addFolder(probeTitle);
@@ -117,7 +118,7 @@ export class ProbePanel {
       if (Number.isFinite(number.valueAsNumber)) {
         move(nearestIndex(coordinates, number.valueAsNumber));
       }
-      this.showPlace(); // of the sample, not of what was typed
+      this.showPlace(); // shows the position of the sample instead of the typed one
     });
     this.rows.push({ slider, number });
     row.append(label, slider, number);

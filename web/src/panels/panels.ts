@@ -1,5 +1,5 @@
-// The panels at the picture's side: lines, media, geometry, camera, method and quality. Built anew
-// for each dataset.
+// The panels beside the picture: lines, media, geometry, camera, method and quality. Rebuilt for
+// each dataset.
 import GUI from "lil-gui";
 import {
   compositingHints,
@@ -21,12 +21,12 @@ import { ProbePanel, probeTitle } from "./panel_probe";
 import { addCamera, addGeometry, type CameraSwitch } from "./panel_geometry";
 import type { RangeMode } from "./range_choice";
 
-const streamBudgetMs = 33; // of a stream whose view names none
-const firstLimit = 0.01; // of the error, when one is switched on; linear RMSE
+const streamBudgetMs = 33; // for streams whose view names no budget
+const firstLimit = 0.01; // initial error limit when one is switched on; linear RMSE
 
 export interface PanelActions extends CameraSwitch, FlowSwitch {
-  reset(): void; // back to the dataset's defaults
-  probed(): void; // the probe was moved, or went on or off
+  reset(): void; // restores the dataset's defaults
+  probed(): void; // the probe was moved or switched
 }
 
 export class Panels {
@@ -34,7 +34,7 @@ export class Panels {
   private kit: PanelKit | null = null;
   probe: ProbePanel | null = null;
   private readonly rangeModes = new Map<string, RangeMode>();
-  private of = ""; // the dataset that they were built for
+  private of = ""; // id of the dataset for which the panels were built
   private readonly closed = new Set<string>([
     "Line shape",
     "Kernels and jitter",
@@ -60,7 +60,7 @@ export class Panels {
     const gui = new GUI({
       container: this.container,
       title: "View",
-      injectStyles: false, // they are part of the style sheet
+      injectStyles: false, // the page's style sheet includes lil-gui's styles
     });
     const kit = new PanelKit(this.host, this.rangeModes);
     this.gui = gui;
@@ -84,7 +84,7 @@ export class Panels {
     }
   }
 
-  // The place of the dataset's last panels.
+  // The last probe position in this dataset.
   private probePlace(): Sample {
     const dataset = this.host.dataset();
     const before = this.of === dataset.id ? this.probe : null;

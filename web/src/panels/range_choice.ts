@@ -1,27 +1,27 @@
-// What the colours' range goes by: the dataset's default, the step that is shown, all steps, or
-// numbers of the user's own. A picker; what it reads becomes the view's range.
+// Source of the colour range: the dataset's default, the displayed step, all steps, or numbers
+// entered by the user. The picker's choice determines the range in the view.
 import { failureText, type Range } from "../wire/api";
 import { make } from "../base/dom";
 
 export type RangeMode = "default" | "step" | "all" | "custom";
 
 export interface RangeSource {
-  range(): Range | null; // as the view has it
+  range(): Range | null; // as in the view
   defaultRange(): Range | null; // null: not known
   choose(range: Range | null): void; // null: the default
-  quietly(run: () => void): void; // what it chooses is no step of undo
-  of(): string | null; // what the range is of: of anything else an answer is too late
-  read(step: number | null): Promise<Range | null>; // of that step, or of all
-  step(): number | null; // that is shown; null: steps run
-  modes: Map<string, RangeMode>; // what was chosen before the panel was built anew
-  key: string; // of this range in there
+  quietly(run: () => void): void; // runs a change that adds no undo entry
+  of(): string | null; // identifies the field and dataset; an answer for another one is discarded
+  read(step: number | null): Promise<Range | null>; // range of that step; null: of all steps
+  step(): number | null; // the displayed step; null: during playback
+  modes: Map<string, RangeMode>; // modes by key, preserved when the panel is rebuilt
+  key: string; // key of this range in `modes`
   steps: number;
 }
 
 const near = (a: number, b: number): boolean =>
   Math.abs(a - b) <= 1e-5 * (Math.abs(a) + Math.abs(b));
 
-// Whichever end comes first.
+// Compares ranges regardless of their orientation.
 export function sameRange(a: Range | null, b: Range | null): boolean {
   if (a === null || b === null) return a === b;
   return near(Math.min(...a), Math.min(...b)) && near(Math.max(...a), Math.max(...b));
@@ -30,15 +30,15 @@ export function sameRange(a: Range | null, b: Range | null): boolean {
 export const oriented = (range: Range, like: Range | null): Range =>
   like !== null && like[0] > like[1] ? [range[1], range[0]] : range;
 
-// Keeps the mode consistent: a range from elsewhere (a drag, a number, a link) is the user's own,
-// and of a step it is read again when another step is shown.
+// Keeps the mode consistent with the view: a range set elsewhere (drag, number, link) switches to
+// "custom", and in mode "step" the range is read again for each new step.
 export class RangeFollower {
   mode: RangeMode;
-  private stands: Range | null; // the range that the mode has brought; null: not yet
-  private readFor: number | null = null; // the step that was asked for last
+  private stands: Range | null; // the range last set by the mode; null: none yet
+  private readFor: number | null = null; // the step last requested
   private asked = 0;
   private byHand = false; // the user chose the mode, and its range is pending
-  private readonly known = new Map<number | null, Range>(); // what the mode has brought so far
+  private readonly known = new Map<number | null, Range>(); // ranges the mode has set so far
 
   constructor(
     private readonly source: RangeSource,
@@ -46,7 +46,8 @@ export class RangeFollower {
   ) {
     this.stands = null;
     this.mode = source.modes.get(source.key) ?? "default";
-    if (this.mode === "all") void this.read(null); // it may have been on its way
+    // a request of the previous panel may have been lost
+    if (this.mode === "all") void this.read(null);
     this.follow();
   }
 
@@ -82,10 +83,11 @@ export class RangeFollower {
     this.source.modes.set(this.source.key, mode);
   }
 
-  // The default replaces the old range once the server has sent it.
+  // Whether the mode explains this range. The default replaces the old range once the server has
+  // sent it.
   private expects(now: Range): boolean {
     if (sameRange(now, this.stands)) return true;
-    // Undo has brought an earlier step's back: the present one's is read again.
+    // Undo has restored the range of an earlier step; that of the present step is read again.
     if ([...this.known.values()].some((range) => sameRange(now, range))) {
       this.stands = now;
       this.readFor = null;
@@ -97,7 +99,7 @@ export class RangeFollower {
       return true;
     }
     if (this.stands !== null || this.mode === "default") return false;
-    this.stands = now; // built anew
+    this.stands = now; // the panel was rebuilt
     return true;
   }
 

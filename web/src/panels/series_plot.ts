@@ -1,4 +1,4 @@
-// One value over the time steps: numbers -> an SVG with gaps where there are none.
+// One value over the time steps: numbers -> an SVG with gaps at missing values.
 import type { SeriesTime } from "../wire/api";
 import { makeSvg, svgText } from "../base/dom";
 import { formatNumber } from "../base/ticks";
@@ -10,7 +10,7 @@ export interface SeriesCurve {
   high: number;
 }
 
-// null: no value at any step. A value between gaps is a dash as long as a quarter of a step.
+// null: no value at any step. A value between gaps is drawn as a dash a quarter of a step long.
 export function seriesCurve(values: (number | null)[]): SeriesCurve | null {
   const known = values.filter((value) => value !== null);
   if (known.length === 0) return null;
@@ -33,7 +33,7 @@ export function timeEnds(times: SeriesTime[]): [string, string] {
   return [readableTime(times[0]?.text ?? ""), readableTime(times.at(-1)?.text ?? "")];
 }
 
-// Fills `svg` with the course, its least and greatest value, its ends in time and the present step.
+// Draws the curve, its least and greatest value, the first and last time, and the present step.
 export function drawSeries(
   svg: SVGElement,
   values: (number | null)[],
@@ -41,7 +41,7 @@ export function drawSeries(
   ends: [string, string],
   step: number,
 ): void {
-  const [width, height, top, bottom] = [280, 96, 14, 14]; // the drawing's units
+  const [width, height, top, bottom] = [280, 96, 14, 14]; // drawing units
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   const course = seriesCurve(values);
   const unit = units === "" ? "" : ` ${units}`;

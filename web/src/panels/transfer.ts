@@ -1,5 +1,5 @@
-// A medium's opacity curve as its editor handles it: points moved, added and removed, their places
-// on a linear or logarithmic scale, and the curve between them as a path. Pure.
+// Model of a medium's opacity curve editor: points moved, added and removed, their positions on a
+// linear or logarithmic scale, and the curve as a path. Pure.
 import type { Range } from "../wire/api";
 import { neat } from "./histogram";
 import { densityOf, type Curve } from "./media";
@@ -7,38 +7,38 @@ import { formatNumber } from "../base/ticks";
 import { clamp } from "../base/values";
 
 export const pointsMax = 64;
-const valueMax = 1e38; // the wire's limits
+const valueMax = 1e38; // limits of the protocol
 const extinctionMax = 1e30;
-const decades = 4; // of a logarithmic scale, down from its top
+const decades = 4; // range of the logarithmic scale below its top
 
 export interface Scale {
   top: number; // extinction at the upper edge, > 0
   log: boolean;
 }
 
-// 0 at the lower edge, 1 at the upper one.
+// Vertical position: 0 at the lower edge, 1 at the upper edge.
 export function shareOf(extinction: number, { top, log }: Scale): number {
   if (!log) return extinction / top;
   return extinction > 0 ? Math.max(0, 1 + Math.log10(extinction / top) / decades) : 0;
 }
 
-// The lower edge is clear, on a logarithmic scale too.
+// The lower edge means zero extinction, on a logarithmic scale too.
 export function extinctionAt(share: number, { top, log }: Scale): number {
   if (!(share > 0)) return 0;
   const value = log ? top * 10 ** (decades * (share - 1)) : top * share;
   return Number(Math.min(value, extinctionMax).toPrecision(3));
 }
 
-// How far above the plot a drag may go: there too a decade is as many pixels as within.
+// How far above the plot a drag may extend; the scale continues unchanged there.
 export const dragShareMax = ({ log }: Scale): number => (log ? 1.25 : 4);
 
-// A scale with room above the curve; `last` where the curve is clear throughout.
+// The top of a scale with a margin above the curve; `last` if the curve is zero throughout.
 export function roomyTop(curve: Curve, last: number): number {
   const most = densityOf(curve);
   return most > 0 ? Math.min(Number((1.25 * most).toPrecision(2)), extinctionMax) : last;
 }
 
-// Between its neighbours; on one of them it makes a step edge.
+// The point stays between its neighbours; at the value of a neighbour it forms a step.
 export function movePoint(curve: Curve, index: number, value: number, extinction: number): Curve {
   if (curve[index] === undefined || Number.isNaN(value + extinction)) return curve;
   const low = curve[index - 1]?.[0] ?? -valueMax;
@@ -47,7 +47,7 @@ export function movePoint(curve: Curve, index: number, value: number, extinction
   return curve.map((point, n) => (n === index ? moved : point));
 }
 
-// The curve with one more point, and that point's index; null: it has as many as it may.
+// The curve with one more point, and the index of that point; null: the maximum is reached.
 export function addPoint(
   curve: Curve,
   value: number,
@@ -60,11 +60,11 @@ export function addPoint(
   return { curve: movePoint(next, index, value, extinction), index };
 }
 
-// The last point stays: a curve has at least one.
+// The last point cannot be removed: a curve has at least one.
 export const removePoint = (curve: Curve, index: number): Curve =>
   curve.length < 2 ? curve : curve.filter((_, n) => n !== index);
 
-// The middle of the widest gap, on the curve.
+// The middle of the widest gap between points, on the curve.
 export function freePosition(curve: Curve): [number, number] {
   let widest = 1;
   const gap = (n: number): number => curve[n]![0] - curve[n - 1]![0];
@@ -74,7 +74,7 @@ export function freePosition(curve: Curve): [number, number] {
   return [neat((a[0] + b[0]) / 2, [a[0], b[0]]), (a[1] + b[1]) / 2];
 }
 
-// The curve over a domain of values, both edges 0..1, y downward. Straight pieces bend on a
+// The curve over a domain of values, both axes 0..1, y downward. Linear segments are curved on a
 // logarithmic scale.
 export function curvePath(curve: Curve, domain: [number, number], scale: Scale): string {
   const x = (value: number): number => (value - domain[0]) / (domain[1] - domain[0]);
@@ -93,12 +93,13 @@ export function curvePath(curve: Curve, domain: [number, number], scale: Scale):
   return parts.join("");
 }
 
-// Clear up to one value, from there a ramp: the form that "clear below" moves.
+// Whether the curve is zero up to one value and a ramp from there: the shape that "clear below"
+// edits.
 export const isRamp = (curve: Curve): boolean =>
   (curve.length === 2 || curve.length === 3) &&
   curve.every(([, extinction], n) => extinction > 0 === (n === curve.length - 1));
 
-// The table's numbers: a value to about a millionth of the domain, however far it is from zero.
+// The numbers in the table: a value to about a millionth of the domain, whatever its magnitude.
 export const shownPoint = ([value, extinction]: Curve[0], [low, high]: Range): Curve[0] => [
   neat(value, [0, (high - low) / 1000]),
   Number(extinction.toPrecision(6)),

@@ -1,5 +1,5 @@
-// The opacity curve's editor over a histogram: points to drag, add and remove, and the same as a
-// table of numbers. While a point is dragged at most one change a display frame goes out.
+// The opacity curve editor over a histogram: points to drag, add and remove, and the same as a
+// table of numbers. During a drag at most one change per display frame is sent.
 import type { Range } from "../wire/api";
 import { checkLabel, make, makeSvg, numberBox, setAttributes } from "../base/dom";
 import { neat, positionOf } from "./histogram";
@@ -39,10 +39,10 @@ export class TransferView {
   private readonly add = make("button", "", "Add a point");
   private scale: Scale = { top: 1, log: false };
   private ownTop = false; // entered by the user
-  private held: number | null = null; // the point that is dragged
+  private held: number | null = null; // index of the dragged point
   private moving: Curve | null = null; // not sent yet
   private domain: Range = [0, 1];
-  private added = [false, false]; // a point, by the last two presses
+  private added = [false, false]; // whether each of the last two presses added a point
 
   constructor(
     private readonly source: CurveSource,
@@ -58,7 +58,7 @@ export class TransferView {
     return this.held !== null;
   }
 
-  // With all of the curve that was chosen; `domain` are the plot's two edges.
+  // Draws the whole curve; `domain` holds the values at the two edges of the plot.
   draw(domain: Range): void {
     const curve = this.curve();
     this.domain = domain;
@@ -131,7 +131,7 @@ export class TransferView {
     return [...this.points.children].indexOf(target as Element);
   }
 
-  // A pointer's value and extinction; it may leave the plot at its top.
+  // Value and extinction under the pointer, which may be above the plot.
   private under(event: PointerEvent): [number, number] {
     const box = this.points.getBoundingClientRect();
     const place = clamp((event.clientX - box.left) / box.width, 0, 1);
@@ -162,7 +162,7 @@ export class TransferView {
     points.addEventListener("pointerdown", ({ clientX, clientY }) => (from = [clientX, clientY]));
     points.addEventListener("pointermove", (event) => {
       if (this.held === null) return;
-      // A click that is slightly off a point does not move it.
+      // A click slightly off a point does not move it.
       if (from[0] >= 0 && Math.hypot(event.clientX - from[0], event.clientY - from[1]) < 3) return;
       from = [-1, -1];
       this.setSoon(movePoint(this.curve(), this.held, ...this.under(event)));
@@ -174,8 +174,8 @@ export class TransferView {
         this.changed();
       });
     }
-    // With the pointer captured the points' frame is its target. What the first click of two has
-    // added stays.
+    // With pointer capture the container of the points is the event target. A point added by the
+    // first click of a double click remains.
     points.addEventListener("dblclick", (event) => {
       if (this.added.includes(true)) return;
       const under = document.elementFromPoint(event.clientX, event.clientY);
@@ -200,7 +200,7 @@ export class TransferView {
     const removes = event.key === "Delete" || event.key === "Backspace";
     if (!removes && x === 0 && y === 0) return;
     event.preventDefault();
-    event.stopPropagation(); // the arrow keys turn the volume
+    event.stopPropagation(); // otherwise the arrow keys would turn the volume
     if (removes) {
       this.remove(index);
       return;
@@ -253,7 +253,8 @@ export class TransferView {
         const next = [...this.curve()[index]!] as [number, number];
         next[column] = input.valueAsNumber;
         this.set(movePoint(this.curve(), index, ...next));
-        input.value = this.shown(this.curve()[index]!, column); // in focus it is left alone
+        // a focused input is not overwritten
+        input.value = this.shown(this.curve()[index]!, column);
       });
       const cell = make("td");
       cell.append(input);

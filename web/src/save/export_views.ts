@@ -1,22 +1,21 @@
-// Export: (explicit view, choices) -> views to render, their size and progress text.
-// Pure.
+// Export: (explicit view, choices) -> views to render, their size and progress text. Pure.
 import { orbit, type Camera } from "../view/camera";
 import type { View } from "../wire/protocol";
 
-const edgeMax = 8192; // pixels, the view's schema's
+const edgeMax = 8192; // pixels, as in the schema of the view
 export const framesMax = 2000;
 
 export interface ExportSize {
   width: number; // pixels
   height: number;
-  scale: number; // pixels a CSS pixel, less than what was asked for where a limit is in the way
+  scale: number; // pixels per CSS pixel, reduced if a limit applies
 }
 
 export function exportSize(
   cssWidth: number,
   cssHeight: number,
   wanted: number,
-  pixelsMax: number, // the server's
+  pixelsMax: number, // limit of the server
 ): ExportSize {
   const [w, h] = [Math.max(1, cssWidth), Math.max(1, cssHeight)];
   const scale = Math.min(wanted, edgeMax / Math.max(w, h), Math.sqrt(pixelsMax / (w * h)));
@@ -24,8 +23,8 @@ export function exportSize(
   return { width: pixels(w), height: pixels(h), scale };
 }
 
-// The view that a saved picture shows and contains: without `quality`, which is a preference of the
-// viewer and would leave settings to the server.
+// The view that a saved picture shows and contains, without `quality`: that is a preference of the
+// user, and would let the server choose settings.
 export function pictureView(explicit: View, { width, height }: ExportSize): View {
   const { quality: _quality, ...view } = explicit;
   return { ...view, step: explicit.step ?? 0, image: { ...explicit.image, width, height } };
@@ -35,10 +34,10 @@ export type AnimationKind = "steps" | "turn" | "flow";
 
 export interface Animation {
   over: AnimationKind;
-  from: number; // steps
+  from: number; // first step
   to: number;
   every: number;
-  frames: number; // of turn and flow
+  frames: number; // for turn and flow
   fps: number;
 }
 
@@ -55,7 +54,7 @@ export function frameView(view: View, camera: Camera, animation: Animation, n: n
     return { ...view, camera: { ...view.camera, eye, target, up } };
   }
   const motion = view.vector?.motion;
-  const time = Number(((motion?.time ?? 0) + n / fps).toFixed(3)); // a step a second
+  const time = Number(((motion?.time ?? 0) + n / fps).toFixed(3)); // one step per second
   return { ...view, vector: { ...view.vector, motion: { ...motion, time } } };
 }
 

@@ -1,12 +1,12 @@
-// The legend drawn into a saved picture, where and as large as the page shows it: what it says and
-// the canvas -> pixels. Lengths are CSS pixels until the context's scale makes them the picture's.
+// Draws the legend into a saved picture with the position and size that it has on the page: legend
+// entries and canvas -> pixels. Lengths are in CSS pixels; the scale of the context converts them.
 import { curvePoints, type LegendEntry } from "../view/legend_entries";
 
 export interface LegendPicture {
-  caption: string; // the dataset and the step's time
+  caption: string; // the dataset and the time of the step
   entries: LegendEntry[];
   stops(map: string): [at: number, color: string][];
-  font: string; // family
+  font: string; // font family
   cardWidth: number;
 }
 
@@ -17,13 +17,13 @@ export interface Card {
   height: number;
 }
 
-const edge = 10; // to the picture's
+const edge = 10; // distance from the edge of the picture
 const gap = 8;
 const pad = 14;
 const captionHeight = 26;
 const stripTop = 28;
 const stripHeight = 14;
-const heightShare = 0.6; // more of a small picture is not covered
+const heightShare = 0.6; // greatest fraction of a small picture's height that the legend covers
 
 const glass = "rgb(10 13 18 / 68%)";
 const covered = "rgb(10 13 18 / 72%)";
@@ -36,8 +36,8 @@ const notesOf = (entry: LegendEntry): string[] =>
 const heightOf = (entry: LegendEntry): number =>
   stripTop + stripHeight + (entry.range === null ? 0 : 21) + 18 * notesOf(entry).length + 6;
 
-// Cards in rows from the lower left, the caption above them (first of all). `shrink` is what they
-// are drawn smaller by; the places are before it.
+// Cards in rows from the lower left, preceded by the caption above them. `shrink` is the factor by
+// which the cards are drawn smaller; the positions are in unshrunk pixels.
 export function layoutCards(
   entries: LegendEntry[],
   cardWidth: number,
@@ -46,7 +46,7 @@ export function layoutCards(
 ): { cards: Card[]; shrink: number } {
   const wide = Math.min(cardWidth, width - 2 * edge);
   const columns = Math.max(1, Math.floor((width - 2 * edge + gap) / (cardWidth + gap)));
-  const rows: number[] = []; // the highest card of each
+  const rows: number[] = []; // the greatest card height in each row
   entries.forEach((entry, n) => {
     const row = Math.floor(n / columns);
     rows[row] = Math.max(rows[row] ?? 0, heightOf(entry));
@@ -68,7 +68,7 @@ export function layoutCards(
 export function drawLegend(
   context: CanvasRenderingContext2D,
   { caption, entries, stops, font, cardWidth }: LegendPicture,
-  scale: number, // pixels a CSS pixel
+  scale: number, // pixels per CSS pixel
 ): void {
   const { width, height } = context.canvas;
   const { cards, shrink } = layoutCards(entries, cardWidth, width / scale, height / scale);

@@ -1,5 +1,5 @@
-// Texts inside PNG pictures: (bytes of a PNG, texts) -> bytes with one iTXt chunk each, and back.
-// Pure. After the PNG specification (ISO/IEC 15948): chunks 5.3, iTXt 11.3.4.5, CRC annex D.
+// Texts inside PNG pictures: (bytes of a PNG, texts) -> bytes with one iTXt chunk per text, and
+// back. Pure. Source: PNG specification (ISO/IEC 15948), chunks 5.3, iTXt 11.3.4.5, CRC annex D.
 
 export type Bytes = Uint8Array<ArrayBuffer>;
 
@@ -9,7 +9,7 @@ const table = Uint32Array.from({ length: 256 }, (_, n) => {
   return c;
 });
 
-// Of PNG and ZIP alike.
+// The CRC of both PNG and ZIP.
 export function crc32(bytes: Uint8Array): number {
   let c = -1;
   for (const byte of bytes) c = table[(c ^ byte) & 255]! ^ (c >>> 8);
@@ -31,7 +31,7 @@ export const utf8 = (text: string): Bytes => new TextEncoder().encode(text);
 const latin = (bytes: Uint8Array): string => String.fromCharCode(...bytes);
 
 const signature = "\x89PNG\r\n\x1a\n";
-const headEnd = 33; // the signature and IHDR, which is first
+const headEnd = 33; // end of the signature and IHDR, the first chunk
 
 function chunk(type: string, data: Uint8Array): Bytes {
   const body = join(utf8(type), data);
@@ -48,17 +48,18 @@ function check(png: Uint8Array): void {
   }
 }
 
-// Keywords are Latin letters, 1 to 79 of them; texts are stored as they stand, in UTF-8.
+// Keywords have 1 to 79 Latin-1 characters; texts are stored in UTF-8, uncompressed.
 export function withTexts(png: Uint8Array, texts: Record<string, string>): Bytes {
   check(png);
   const chunks = Object.entries(texts).map(([keyword, text]) =>
-    // An end; not compressed, by method 0; no language and no translated keyword.
+    // The five zero bytes: end of the keyword, not compressed, method 0, no language, no translated
+    // keyword.
     chunk("iTXt", join(utf8(keyword), new Uint8Array(5), utf8(text))),
   );
   return join(png.subarray(0, headEnd), ...chunks, png.subarray(headEnd));
 }
 
-// null: there is none of this keyword.
+// null: no text has this keyword.
 export function textOf(png: Uint8Array, keyword: string): string | null {
   check(png);
   const data = new DataView(png.buffer, png.byteOffset, png.byteLength);

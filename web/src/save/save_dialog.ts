@@ -1,5 +1,5 @@
 // The Save dialog: choices -> pictures, animations and saved views, rendered by the server and
-// downloaded by the browser. One job at a time, with its progress and error.
+// downloaded by the browser. One job at a time, with progress and error text.
 import { byId } from "../base/dom";
 import {
   exportSize,
@@ -27,7 +27,7 @@ const input = (id: string) => byId(`save-${id}`, HTMLInputElement);
 const select = (id: string) => byId(`save-${id}`, HTMLSelectElement);
 const fields = (id: string) => byId(`save-${id}`, HTMLFieldSetElement);
 
-// Defaults for another dataset.
+// Sets the defaults for another dataset.
 function fill(host: SaveHost, dialog: HTMLElement): void {
   const { id, steps } = host.dataset();
   const filled = `${id} ${steps.count}`;
@@ -119,7 +119,7 @@ export function saveDialog(host: SaveHost, baseUri: string): () => void {
   chooser.addEventListener("change", () => {
     dialog.close();
     void openFile(chooser.files?.[0], host.files);
-    chooser.value = ""; // the same file may be chosen again
+    chooser.value = ""; // allows choosing the same file again
   });
 
   return () => {

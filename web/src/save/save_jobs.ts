@@ -5,7 +5,7 @@ import { formatBytes } from "../base/ticks";
 
 export type ReportProgress = (text: string, done?: number) => void; // done: 0 to 1, if known
 
-// Makes the file of this name.
+// Creates the file with this name.
 export interface Job {
   name: string;
   work(signal: AbortSignal, report: ReportProgress): Promise<Blob>;
@@ -22,7 +22,7 @@ function download(file: Blob, name: string): void {
   window.setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
-// One job at a time, with its progress bar and result text.
+// Runs one job at a time and shows its progress bar and result text.
 export class Jobs {
   private job: AbortController | null = null;
 
@@ -34,7 +34,7 @@ export class Jobs {
     button("save-cancel").addEventListener("click", stop);
     whenClosed(dialog, stop);
     dialog.addEventListener("cancel", (event) => {
-      if (this.running) event.preventDefault(); // Escape ends the job first
+      if (this.running) event.preventDefault(); // Escape cancels the job first
       stop();
     });
   }
@@ -71,7 +71,7 @@ export class Jobs {
     } catch (failure) {
       if (job.signal.aborted) part("said").textContent = "Cancelled.";
       else this.fail(failure);
-      job.abort(); // what else is under way
+      job.abort(); // cancels the requests still active
     }
     this.show(null);
     if (this.dialog.open) button("save-close").focus();

@@ -1,5 +1,5 @@
-// The jobs of the Save dialog: the view and what was chosen -> a picture, or the frames
-// of an animation in one file, drawn by the server.
+// The jobs of the Save dialog: view and choices -> a picture, or the frames of an animation in one
+// file, rendered by the server.
 import type { Camera } from "../view/camera";
 import type { ColorMaps } from "../wire/color_maps";
 import {
@@ -19,14 +19,14 @@ import { recordVideo } from "./video";
 import { Zip } from "./zip";
 
 export interface SaveHost {
-  isOpen(): boolean; // there is a dataset, and the view is of it
+  isOpen(): boolean; // a dataset is open and the view refers to it
   explicitView(): View;
-  view(): View; // with every default
+  view(): View; // with all defaults
   camera(): Camera | null;
   dataset(): Dataset;
   maps: ColorMaps;
   size(): [width: number, height: number]; // CSS pixels
-  pixelsMax(): number; // of a picture that the server draws
+  pixelsMax(): number; // the server's limit for one picture
   files: FileTarget;
 }
 
@@ -42,7 +42,7 @@ export interface SaveSetting {
 const draw = (baseUri: string, view: View, signal: AbortSignal): Promise<Blob> =>
   drawFrame((url, options) => fetch(url, options), baseUri, view, signal);
 
-// `scale`: as it was chosen, for the name.
+// `scale`: the chosen scale, for the file name.
 export function pictureJob({ host, baseUri, pixels, legend }: SaveSetting, scale: string): Job {
   const view = pictureView(host.explicitView(), pixels);
   return {

@@ -1,5 +1,5 @@
-// Saved pictures: view -> the server's lossless picture, with the legend and the view in it; and a
-// picture that is dropped on the page or chosen -> its view.
+// Saved pictures: view -> the server's lossless picture with the legend drawn in and the view
+// embedded; and a picture that is dropped on the page or chosen -> its view.
 import type { ColorMaps } from "../wire/color_maps";
 import type { ExportSize } from "./export_views";
 import { legendEntries } from "../view/legend_entries";
@@ -12,13 +12,13 @@ import { completeView } from "../view/view_state";
 
 const keyword = "windsplat-view";
 const fileBytesMax = 400e6;
-const cardWidthMin = 228; // CSS pixels; a phone's legend is narrower than its text
+const cardWidthMin = 228; // CSS pixels; on a phone the legend is narrower than its text
 
 const bytesOf = async (blob: Blob): Promise<Bytes> => new Uint8Array(await blob.arrayBuffer());
 
 export interface Shown {
   dataset: Dataset;
-  view: View; // with every default, for what the legend says
+  view: View; // with all defaults, for the legend
   maps: ColorMaps;
 }
 
@@ -95,13 +95,13 @@ export async function openFile(file: Blob | undefined, target: FileTarget): Prom
   );
 }
 
-// Files may be dropped anywhere on the page; `hint` is shown while one is above it.
+// Accepts files dropped anywhere on the page; `hint` is shown while a file is dragged over it.
 export function takeDrops(hint: HTMLElement, target: FileTarget): void {
   const handle = (type: "dragover" | "dragleave" | "drop", run: (event: DragEvent) => void) =>
     window.addEventListener(type, (event) => {
       if (!event.dataTransfer?.types.includes("Files")) return;
       event.preventDefault();
-      // Not while a dialog is open.
+      // Ignored while a dialog is open.
       if (document.querySelector("dialog[open]") === null) run(event);
       else event.dataTransfer.dropEffect = "none";
     });

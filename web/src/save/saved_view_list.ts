@@ -51,7 +51,7 @@ export function savedViewList(
       remove.ariaLabel = `Delete ${name.value}`;
     };
     label();
-    // The row stays, with the focus and what the mouse is about to press.
+    // The row is not rebuilt, which preserves the focus and the target of a pending click.
     name.addEventListener("change", () =>
       change(() => {
         views.rename(id, name.value);

@@ -4,7 +4,7 @@ import type { View } from "../wire/protocol";
 import { isView } from "../wire/view_shape";
 
 export interface SavedView {
-  id: string; // permanent: other tabs of the page change the same list
+  id: string; // permanent, because other tabs change the same list
   name: string;
   view: View;
   date: number; // ms since 1970
@@ -22,14 +22,14 @@ function looksRight(entry: unknown): entry is SavedView {
   return named && isView(view) && Number.isFinite(date);
 }
 
-// Entries of earlier releases have none: theirs is made of what they began with.
+// Entries of earlier releases have no id; it is derived from their original date and name.
 const withId = (entry: Omit<SavedView, "id">): SavedView => ({
   id: `${entry.date} ${entry.name}`,
   ...entry,
 });
 
 export class SavedViews {
-  // The storage itself may be forbidden: it is asked for only when it is used.
+  // Access to the storage may be forbidden, so it is requested only when needed.
   constructor(
     private readonly store: () => Store,
     private readonly key: string,
@@ -46,7 +46,7 @@ export class SavedViews {
     }
   }
 
-  // Throws an Error with a message where the browser refuses storage.
+  // Throws an Error with a message if the browser refuses storage.
   add(name: string, view: View, date: number): void {
     const list = this.list();
     if (list.length >= savedViewsMax)
@@ -55,7 +55,7 @@ export class SavedViews {
     this.write([withId({ name: name.slice(0, nameMax), view, date }), ...list]);
   }
 
-  // One that another tab has deleted stays so.
+  // An entry that another tab has deleted is not restored.
   rename(id: string, name: string): void {
     this.write(this.list().map((saved) => (saved.id === id ? { ...saved, name } : saved)));
   }

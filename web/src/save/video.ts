@@ -1,5 +1,5 @@
-// Pictures -> a WebM video, by the browser's recorder, which records in real time: the frames are
-// painted on a canvas one by one.
+// Pictures -> a WebM video by the browser's MediaRecorder, which records in real time: the frames
+// are painted on a canvas one after another.
 import { waitFor } from "../wire/frame_request";
 import { clamp } from "../base/values";
 
@@ -27,7 +27,7 @@ export async function recordVideo(
     context.drawImage(bitmap, 0, 0);
     bitmap.close();
   };
-  await paint(frames[0]!); // the stream takes the canvas's size
+  await paint(frames[0]!); // the stream adopts the canvas size
   const stream = canvas.captureStream(0);
   const track = stream.getVideoTracks()[0] as CanvasCaptureMediaStreamTrack;
   const bits = canvas.width * canvas.height * fps * 0.25;

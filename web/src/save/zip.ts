@@ -1,8 +1,8 @@
-// Files -> one ZIP file, stored as they are (PNG gains nothing from another compression). What is
-// added leaves the heap at once: a list of blobs. After APPNOTE.TXT 6.3, sections 4.3.7 to 4.3.16.
+// Files -> one uncompressed ZIP file, as PNG data does not compress further. Added data is stored
+// as a list of blobs, outside of the heap. Source: APPNOTE.TXT 6.3, sections 4.3.7 to 4.3.16.
 import { crc32, utf8, type Bytes } from "./png_text";
 
-const bytesMax = 0xffff_ffff; // beyond it, and beyond 65,535 files, ZIP64 would be needed
+const bytesMax = 0xffff_ffff; // larger files, or more than 65,535 of them, would require ZIP64
 export const filesMax = 5000;
 
 // Little-endian numbers of 2 or 4 bytes.
@@ -35,7 +35,8 @@ export class Zip {
   add(name: string, content: Bytes): void {
     const path = utf8(name);
     const length = content.length;
-    // Version 2.0, names in UTF-8, stored; time, CRC, both sizes, the name's length, no extras.
+    // Version 2.0, names in UTF-8, stored; time, CRC, both sizes, length of the name, no extra
+    // field.
     const about = numbers(
       [2, 20],
       [2, 0x800],
@@ -51,7 +52,8 @@ export class Zip {
     this.directory.push(
       numbers([4, 0x02014b50], [2, 20]),
       about,
-      numbers([2, 0], [2, 0], [2, 0], [4, 0], [4, this.size]), // no comment; where it stands
+      // no comment; offset of the local header
+      numbers([2, 0], [2, 0], [2, 0], [4, 0], [4, this.size]),
       path,
     );
     const part = new Blob(local);

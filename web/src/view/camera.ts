@@ -30,7 +30,7 @@ export interface Box {
 }
 
 export const degree = Math.PI / 180;
-const uprightElevation = 89.9; // beyond it `up` cannot be the world's
+const uprightElevation = 89.9; // at greater elevations `up` cannot be the world's vertical
 const distanceMin = 1e-3;
 const distanceMax = 1e4;
 const margin = 1.04; // the picture is this much wider than the box
@@ -45,7 +45,7 @@ export function orbitFrame({ azimuth, elevation }: Angles): Frame3 {
   return { right, up: cross(right, forward), forward };
 }
 
-// Right, up and forward of the camera as the server draws it.
+// Right, up and forward vectors of the camera, as the server computes them.
 export function cameraFrame(camera: Camera): Frame3 {
   const forward = unit(subtract(camera.target, camera.eye));
   const right = unit(cross(forward, camera.up));
@@ -60,7 +60,7 @@ export function anglesOf(camera: Camera): Angles {
   if (Math.abs(elevation) < uprightElevation) {
     return { azimuth: Math.atan2(x, -y) / degree, elevation };
   }
-  // Straight up or down the azimuth follows from `up` alone.
+  // For a vertical view direction the azimuth follows from `up` alone.
   const sign = elevation > 0 ? 1 : -1;
   return { azimuth: Math.atan2(-sign * camera.up[0], sign * camera.up[1]) / degree, elevation };
 }
@@ -76,7 +76,7 @@ export function lookFrom(camera: Camera, angles: Angles, distance = distanceOf(c
   };
 }
 
-// Turns the picture clockwise, in its plane.
+// Turns the picture clockwise in its plane.
 export function roll(camera: Camera, degrees: number): Camera {
   if (degrees === 0) return camera;
   const { right, up } = cameraFrame(camera);
@@ -84,8 +84,8 @@ export function roll(camera: Camera, degrees: number): Camera {
   return { ...camera, up: subtract(times(up, Math.cos(angle)), times(right, Math.sin(angle))) };
 }
 
-// How far the picture is turned clockwise from upright, -180..180. Straight up or down there is no
-// upright: what turns there counts as azimuth.
+// Clockwise rotation of the picture from upright, -180..180. For a vertical view direction upright
+// is undefined, and the rotation counts as azimuth.
 export function rollOf(camera: Camera): number {
   const angles = anglesOf(camera);
   if (Math.abs(angles.elevation) >= uprightElevation) return 0;
@@ -93,22 +93,22 @@ export function rollOf(camera: Camera): number {
   return Math.atan2(-dot(camera.up, frame.right), dot(camera.up, frame.up)) / degree;
 }
 
-// About the world's vertical axis and up or down, whatever the roll, which stays.
+// Orbits about the world's vertical axis and in elevation; the roll is preserved.
 export function orbit(camera: Camera, dAzimuth: number, dElevation: number): Camera {
   const { azimuth, elevation } = anglesOf(camera);
   const next = { azimuth: azimuth + dAzimuth, elevation: elevation + dElevation };
   return roll(lookFrom(camera, next), rollOf(camera));
 }
 
-// A drag: degrees by which the near side moves right and down on the screen.
+// Orbits as in a drag: degrees by which the near side moves right and down on the screen.
 export function drag(camera: Camera, right: number, down: number): Camera {
   const angle = rollOf(camera) * degree;
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
-  // The volume follows: to the right means that the eye goes west.
+  // The volume follows the pointer: moving it right moves the eye west.
   return orbit(camera, -(right * c + down * s), down * c - right * s);
 }
 
-// From one camera to another, at t from 0 to 1: by the shorter way round, evenly in the angles.
+// Interpolates two cameras at t from 0 to 1: the shorter way round, linear in the angles.
 export function between(from: Camera, to: Camera, t: number): Camera {
   const mix = (a: number, b: number): number => a + (b - a) * t;
   const mixAngle = (a: number, b: number): number =>
@@ -133,7 +133,7 @@ export const heightAtTarget = (camera: Camera): number =>
     ? camera.height
     : 2 * distanceOf(camera) * Math.tan(0.5 * camera.fovY * degree);
 
-// Moves the picture by fractions of its height, to the right and down, as in a drag.
+// Moves the picture right and down by fractions of its height, as in a drag.
 export function pan(camera: Camera, dx: number, dy: number): Camera {
   const frame = cameraFrame(camera);
   const scale = heightAtTarget(camera);
@@ -141,8 +141,8 @@ export function pan(camera: Camera, dx: number, dy: number): Camera {
   return { ...camera, eye: add(camera.eye, shift), target: add(camera.target, shift) };
 }
 
-// factor > 1: nearer, larger. Distance and height go together, so that changing the projection
-// keeps the size.
+// factor > 1: closer, larger. Distance and height change together, so that switching the projection
+// preserves the size.
 export function zoom(camera: Camera, factor: number): Camera {
   const before = distanceOf(camera);
   const distance = clamp(before / factor, distanceMin, distanceMax);
@@ -155,8 +155,8 @@ export function zoom(camera: Camera, factor: number): Camera {
   };
 }
 
-// Where a point lies on the picture: fractions of its width and height from the upper left corner;
-// null behind the eye.
+// Position of a point on the picture as fractions of its width and height from the upper left
+// corner; null behind the eye.
 export function project(camera: Camera, point: Vec3, aspect: number): [number, number] | null {
   const frame = cameraFrame(camera);
   const p = subtract(point, camera.eye);
@@ -167,8 +167,8 @@ export function project(camera: Camera, point: Vec3, aspect: number): [number, n
   return [0.5 + dot(p, frame.right) / (height * aspect), 0.5 - dot(p, frame.up) / height];
 }
 
-// The point that shows at this place of the picture and lies in the plane where the world's
-// coordinate `axis` is `value`; null: there is none before the eye.
+// The point that is visible at this position of the picture and lies in the plane where the world
+// coordinate `axis` equals `value`; null: there is none in front of the eye.
 export function pointInPlane(
   camera: Camera,
   [x, y]: [number, number],
@@ -188,7 +188,7 @@ export function pointInPlane(
   return add(from, times(way, distance));
 }
 
-// The other projection, with the target's surroundings at the same size.
+// Changes the projection; objects at the target keep their size.
 export function withProjection(camera: Camera, projection: Camera["projection"]): Camera {
   if (camera.projection === projection) return camera;
   const height = heightAtTarget(camera);
@@ -202,8 +202,9 @@ export function withProjection(camera: Camera, projection: Camera["projection"])
   return roll(moved, rollOf(camera));
 }
 
-// Looks at the box's centre from these angles so that all of it is in the picture. Every corner p
-// (relative to the centre) needs distance >= |p.x| / slope - p.forward, and height >= 2 |p.y|.
+// Views the centre of the box from these angles so that the whole box is in the picture. Each
+// corner p (relative to the centre) requires distance >= |p.x| / slope - p.forward and height >= 2
+// |p.y|.
 export function frameBox(camera: Camera, box: Box, angles: Angles, aspect: number): Camera {
   const target = times(add(box.min, box.max), 0.5);
   const frame = orbitFrame(angles);
@@ -230,7 +231,7 @@ export function frameBox(camera: Camera, box: Box, angles: Angles, aspect: numbe
   return lookFrom({ ...camera, target, height }, angles, clamp(distance, distanceMin, distanceMax));
 }
 
-// geometry.scale stretches each edge, then the whole is scaled so that the longest edge is 2.
+// geometry.scale stretches each edge; then the whole box is scaled so that its longest edge is 2.
 export function scaledBox(box: Box, scale: Vec3): Box {
   const edges = subtract(box.max, box.min).map((edge, axis) => edge * scale[axis]!);
   const half = edges.map((edge) => edge / Math.max(...edges)) as Vec3;

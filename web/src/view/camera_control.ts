@@ -1,19 +1,20 @@
-// The camera of the view: what the user wants to look at -> patches.
+// The camera of the view: the user's camera commands -> patches.
 import { frameBox, scaledBox, withProjection, type Angles, type Box } from "./camera";
 import type { Camera } from "./camera";
 import type { Vec3 } from "../base/vec3";
 import type { ViewModel } from "./view_model";
 import type { Patch } from "./view_state";
 
-const globe: Box = { min: [-1, -1, -1], max: [1, 1, 1] }; // of a grid that is bent to a sphere
+// bounds of a grid that is mapped to a sphere
+const globe: Box = { min: [-1, -1, -1], max: [1, 1, 1] };
 
 const round = (v: number): number => Number(v.toFixed(6));
 const roundAll = (v: Vec3): Vec3 => [round(v[0]), round(v[1]), round(v[2])];
 
 export interface CameraControlHost {
   change(patch: Patch): void;
-  size(): [number, number]; // of the picture, pixels
-  ready(): boolean; // a patch would go out without waiting for earlier ones
+  size(): [number, number]; // size of the picture in pixels
+  ready(): boolean; // whether a patch would be sent without waiting for earlier ones
 }
 
 export class CameraControl {
@@ -42,12 +43,12 @@ export class CameraControl {
     this.host.change({ camera: patch });
   }
 
-  // The server frames the whole box anew, whatever the window's shape.
+  // Resets the camera; the server then frames the whole box for the present picture size.
   reset(): void {
     this.host.change({ camera: { eye: null, target: null, up: null, height: null } });
   }
 
-  // All of the volume from there, upright; null: there is nothing to look at yet.
+  // Views the whole volume from these angles, upright; null: there is no volume yet.
   viewFrom(angles: Angles): Camera | null {
     const camera = this.camera();
     if (camera === null) return null;

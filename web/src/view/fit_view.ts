@@ -1,11 +1,11 @@
-// Files that change while they are shown: (view, new description) -> the same view as far as the
-// new files allow it.
+// Adapts a view to files that changed while displayed: (view, new description) -> the same view as
+// far as the new files support it.
 import type { Dataset, View } from "../wire/protocol";
 
 type Vector = NonNullable<View["vector"]>;
 type Geometry = NonNullable<View["geometry"]>;
 
-// Keys that no longer apply return to their defaults; all others stay.
+// Keys that no longer apply return to their defaults; all others are preserved.
 export function fitView(view: View, dataset: Dataset): View {
   const fitted: View = { ...view };
   const last = Math.max(0, dataset.steps.count - 1);
@@ -20,7 +20,7 @@ export function fitView(view: View, dataset: Dataset): View {
   return fitted;
 }
 
-// What the panels are built from.
+// The part of a description that determines the panels.
 export const shapeOf = ({ id, dims, axes, mappings, fields, steps }: Dataset): string =>
   JSON.stringify([
     id,
@@ -40,7 +40,7 @@ function fitVector(vector: Vector, dataset: Dataset): Vector {
   const color = fitted.color ?? {};
   if (vector.field && !has(dataset, "vector", vector.field)) {
     delete fitted.field;
-    delete fitted.magnitudeRange; // another field has other magnitudes
+    delete fitted.magnitudeRange; // the replacing field has other magnitudes
     delete fitted.minMagnitude;
     if (color.by === "magnitude") delete color.range;
   }

@@ -1,25 +1,25 @@
-// Animates the lines: advances /vector/motion/time while it runs, at most `flowFps` times a second
-// and never before the frame of the last patch has arrived. Time, timers and the
-// page's state are injected.
+// Animates the lines: advances /vector/motion/time while the motion is on, at most `flowFps` times
+// a second and never before the frame of the last patch has arrived. Time, timers and the page's
+// state are injected.
 import { clamp } from "../base/values";
 
 export const flowFps = 15;
 const intervalMs = 1000 / flowFps;
-const gapMsMax = 250; // a stall does not make the lines jump
-const timeMax = 1e6; // the wire's limit, steps
+const gapMsMax = 250; // limit, so that the lines do not jump after a stall
+const timeMax = 1e6; // limit of the protocol, in steps
 
 export interface FlowHost {
   now(): number; // ms
   setTimeout(run: () => void, ms: number): number;
   clearTimeout(timer: number): void;
   hidden(): boolean; // the page is hidden
-  wanted(): boolean; // the view's lines are there and move
-  time(): number; // of the view, steps
-  send(time: number): number; // the rev of the patch
-  ended(): void; // the flow stopped of itself, not because stop() was called
+  wanted(): boolean; // whether the view has lines with motion
+  time(): number; // motion time of the view, in steps
+  send(time: number): number; // returns the rev of the patch
+  ended(): void; // the motion ended by itself, not by stop()
 }
 
-// The view's time `ms` later: one step a second, so that `rate` is cycles a second.
+// The view's time `ms` later: one step per second, so that `rate` is in cycles per second.
 export function laterTime(time: number, ms: number): number {
   const next = time + clamp(ms, 0, gapMsMax) / 1000;
   return next > timeMax ? 0 : Number(next.toFixed(3));
@@ -28,7 +28,7 @@ export function laterTime(time: number, ms: number): number {
 export class Flow {
   private on = false;
   private timer: number | null = null;
-  private movedAt: number | null = null; // null: begins anew
+  private movedAt: number | null = null; // null: restarts at the next frame
   private sentRev = 0;
   private answeredRev = 0;
 
@@ -42,7 +42,7 @@ export class Flow {
     if (this.on) return;
     this.on = true;
     this.movedAt = null;
-    this.sentRev = this.answeredRev; // what was asked for before is not waited for
+    this.sentRev = this.answeredRev; // earlier patches are not waited for
     this.plan();
   }
 
@@ -63,7 +63,7 @@ export class Flow {
     this.plan();
   }
 
-  // The server refused what this rev asked for: a flow that asked for it ends.
+  // The server refused the patch with this rev. If the motion sent it, the motion ends.
   refused(rev: number): void {
     if (this.on && rev === this.sentRev) this.end();
   }
@@ -86,7 +86,7 @@ export class Flow {
   }
 
   private move(): void {
-    if (!this.on || this.host.hidden()) return; // seen() goes on
+    if (!this.on || this.host.hidden()) return; // seen() resumes
     if (!this.host.wanted()) {
       this.end();
       return;

@@ -1,7 +1,7 @@
-// Undo and redo of the view document, bounded. Pure: documents, times and gestures in, documents
-// out. What belongs to the window (the picture's size) and what time does by itself (played steps,
-// flowing lines) is no part of it: of each entry only what the user's change touched is put back,
-// so undoing a turn of the camera leaves a step that was played to where it is.
+// Bounded undo and redo of the view document. Pure: documents, times and gestures in, documents
+// out. The picture size, played steps and flowing lines are not part of the history. Each entry
+// restores only what the user's change affected, so undoing a camera change does not affect the
+// current step.
 import { withoutSize } from "./link";
 import type { View } from "../wire/protocol";
 import { isObject } from "../base/values";
@@ -21,15 +21,15 @@ interface Entry {
 
 export interface Undone {
   view: View;
-  what: string; // as text: "camera", "lines and media"
+  what: string; // the change as text: "camera", "lines and media"
 }
 
 const entriesMax = 200;
-const restMs = 600; // changes of the same things that follow closer are one
+const restMs = 600; // changes of the same keys within this time form one entry
 
 const same = (a: unknown, b: unknown): boolean => JSON.stringify(a) === JSON.stringify(b);
 
-// Leaf by leaf; arrays are taken whole.
+// Compares all leaves; an array counts as one leaf.
 export function differences(before: unknown, after: unknown, path: string[] = []): Difference[] {
   if (!isObject(before) || !isObject(after)) {
     return same(before, after) ? [] : [{ path, before, after }];
@@ -50,7 +50,7 @@ function withValue(node: unknown, [key, ...rest]: string[], value: unknown): unk
 const apply = (view: View, changes: Difference[], side: "before" | "after"): View =>
   changes.reduce<unknown>((next, one) => withValue(next, one.path, one[side]), view) as View;
 
-// Paths of all that changed, to the leaves, also where a whole part came or went.
+// Paths of all changed leaves, including those of added and removed objects.
 function leavesOf({ path, before, after }: Difference): string[] {
   const part = isObject(after) ? after : before;
   if (!isObject(part)) return [path.join("/")];
@@ -78,8 +78,9 @@ function whatOf(changes: Difference[]): string {
 export class ViewHistory {
   private readonly past: Entry[] = [];
   private future: Entry[] = [];
-  private open = new Set<string>(); // what the newest entry is of, while more may join it
-  private held = false; // a pointer is down: whatever it does is one entry
+  // leaves of the newest entry while changes may still be merged into it
+  private open = new Set<string>();
+  private held = false; // a pointer is down: all its changes form one entry
   private lastAt = 0;
 
   get canUndo(): boolean {
@@ -90,18 +91,18 @@ export class ViewHistory {
     return this.future.length > 0;
   }
 
-  // A pointer went down, or another key: what comes now is an entry of its own.
+  // A pointer or another key was pressed: following changes form a new entry.
   begin(held: boolean): void {
     this.open.clear();
     this.held = held;
   }
 
-  // The pointer is up; what it caused may still be on its way.
+  // The pointer was released; its last change may not have arrived yet.
   end(): void {
     this.held = false;
   }
 
-  // The user may have changed the view; true if so. now: ms.
+  // Records a possible change by the user; returns whether the view changed. now: ms.
   note(before: View, after: View, now: number): boolean {
     const changes = differences(withoutSize(before), withoutSize(after));
     if (changes.length === 0) return false;
@@ -114,7 +115,7 @@ export class ViewHistory {
     this.future = [];
     if (joins && entry !== undefined) {
       entry.after = apply(entry.after, changes, "after");
-      if (changesOf(entry).length === 0) this.past.pop(); // there and back
+      if (changesOf(entry).length === 0) this.past.pop(); // the change was reversed
       return true;
     }
     this.past.push({ before: withoutSize(before), after: withoutSize(after) });
@@ -122,8 +123,8 @@ export class ViewHistory {
     return true;
   }
 
-  // What takes the place of `view`; null: there is nothing to undo. An entry that makes no
-  // difference any more (the server refused it, say) is passed over.
+  // The document that replaces `view`; null: there is nothing to undo. Entries without an effect,
+  // such as changes refused by the server, are skipped.
   undo(view: View): Undone | null {
     return this.turn(view, this.past, this.future, "before");
   }

@@ -1,9 +1,9 @@
-// Whether the value under the cursor is shown, for the browser's session.
+// Setting for the browser's session: whether the value under the cursor is shown.
 import { Observable } from "../base/observable";
 
 const storageKey = "windsplat.hover";
 
-// A browser may refuse storage; then the setting lasts until a reload.
+// If the browser refuses storage, the setting lasts until a reload.
 function orNull<T>(run: () => T): T | null {
   try {
     return run();

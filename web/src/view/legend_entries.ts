@@ -8,19 +8,19 @@ export interface LegendEntry {
   kind: "lines" | "medium";
   title: string;
   units: string;
-  range: [number, number] | null; // null: one colour
+  range: [number, number] | null; // null: a single colour
   map: string | null;
-  color: string | null; // where there is no map
+  color: string | null; // the colour if there is no map
   ticks: LegendTick[];
-  extinction: [number, number][]; // (place 0..1, share of the greatest), medium only
+  extinction: [number, number][]; // (position 0..1, fraction of the maximum), medium only
   note: string;
-  leftOut: string; // what is not drawn; empty: nothing is left out
+  leftOut: string; // text on values that are not drawn; empty: none
 }
 
 const fieldNamed = (dataset: Dataset, name: string): Field | undefined =>
   dataset.fields.find((field) => field.name === name);
 
-const titleMax = 30; // characters; what is longer does not fit over a strip
+const titleMax = 30; // characters; longer titles do not fit over a strip
 
 export function fieldTitle(field: Field | undefined, name: string): string {
   const text = field?.longName ? field.longName : name.replaceAll("_", " ");
@@ -30,7 +30,7 @@ export function fieldTitle(field: Field | undefined, name: string): string {
 const raised: Record<string, string> = { "-": "⁻" };
 [..."⁰¹²³⁴⁵⁶⁷⁸⁹"].forEach((sign, digit) => (raised[String(digit)] = sign));
 
-// "m s-1" -> "m s⁻¹". "1" is CF's word for a plain number.
+// "m s-1" -> "m s⁻¹". In CF, "1" means dimensionless.
 export function unitText(units: string | undefined): string {
   if (units === undefined || units === "1") return "";
   return units.replace(/(?<=[A-Za-z])-?\d+(?=$|[ ./*])/g, (power) =>
@@ -38,7 +38,8 @@ export function unitText(units: string | undefined): string {
   );
 }
 
-// World heights of the samples under a view's geometry: known where only the box was stretched.
+// World heights of the samples under a view's geometry; null unless the geometry only stretches the
+// box.
 export function sampleHeights(dataset: Dataset, view: View): number[] | null {
   const { vertical = "auto", mapping = "flat", heightField = null } = view.geometry ?? {};
   if (vertical !== "auto" || mapping !== "flat" || heightField !== null) return null;
@@ -68,7 +69,7 @@ function heightEntry(dataset: Dataset, view: View, range: [number, number]) {
 
 const speeds = /^([ckm]?m|mi|ft) ?(s⁻¹|h⁻¹|\/ ?s|\/ ?h)$|^knots?$|^kt$/i;
 
-// Vectors too short to be drawn.
+// Text on vectors that are too short to be drawn.
 function leftOutText(least: number, units: string): string {
   if (!(least > 0)) return "";
   const what = speeds.test(units) ? "slower" : "weaker";
@@ -79,7 +80,7 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const vector = view.vector;
   if (!vector?.field) return null;
   const field = fieldNamed(dataset, vector.field);
-  const name = vector.field.replaceAll("_", " "); // the colour's quantity is appended
+  const name = vector.field.replaceAll("_", " "); // the quantity of the colour is appended
   const color = vector.color ?? {};
   const range = (color.range ?? [0, 1]) as [number, number];
   const units = unitText(field?.units);
@@ -157,8 +158,8 @@ function mediumEntry(dataset: Dataset, layer: ScalarView): LegendEntry {
   };
 }
 
-// The curve of a medium's extinction on its strip: fractions of the strip's width and, from above,
-// of its height.
+// The extinction curve of a medium on its strip, as fractions of the strip's width and of its
+// height from the top.
 export function curvePoints(points: [number, number][]): [x: number, y: number][] {
   const inside = points.map(([at, share]) => [clamp(at, -1, 2), share] as const);
   const first = inside[0]!;

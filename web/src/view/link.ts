@@ -1,5 +1,5 @@
-// View <-> the part of the address after `#`: `#!{...}`, so that a link restores the view.
-// The picture's size belongs to the window and stays out.
+// View <-> the part of the address after `#`: `#!{...}`, so that a link restores the view. The
+// picture size depends on the window and is omitted.
 import type { View } from "../wire/protocol";
 import { isView } from "../wire/view_shape";
 
@@ -16,7 +16,7 @@ export function viewOfHash(hash: string): View | null {
 }
 
 export function hashOfView(view: View): string {
-  // Signs that are harmless in a fragment stay readable.
+  // Characters that are safe in a fragment are not percent-encoded.
   const readable = encodeURIComponent(JSON.stringify(withoutSize(view))).replace(
     /%(?:7B|7D|3A|2C|5B|5D)/g,
     decodeURIComponent,

@@ -6,7 +6,7 @@ import type { Dataset, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 
 export const axisNames = ["x", "y", "z"] as const;
-export type Sample = Vec3; // indexes along x, y, z
+export type Sample = Vec3; // indices along x, y, z
 
 export const middleSample = (dataset: Dataset): Sample =>
   axisNames.map((axis) => Math.floor((dataset.dims[axis] - 1) / 2)) as Sample;
@@ -14,7 +14,7 @@ export const middleSample = (dataset: Dataset): Sample =>
 export const sampleWithin = (dataset: Dataset, sample: Sample): Sample =>
   axisNames.map((axis, n) => Math.min(sample[n]!, dataset.dims[axis] - 1)) as Sample;
 
-// Coordinates of a sample, each in its axis's own unit.
+// Coordinates of a sample, each in the unit of its axis.
 export const coordinatesOf = (dataset: Dataset, sample: Sample): Vec3 =>
   axisNames.map((axis, n) => dataset.axes[axis].coordinates[sample[n]!] ?? 0) as Vec3;
 
@@ -26,8 +26,8 @@ export function nearestIndex(coordinates: number[], value: number): number {
   return best;
 }
 
-// What a world coordinate of the dataset is multiplied by under the view's geometry; null where the
-// grid is bent or its vertical axis is another one: the page does not know its places then.
+// Factors from the dataset's world coordinates to the view's; null for a mapped grid or another
+// vertical axis, as the page cannot compute those positions.
 export function worldFactors(dataset: Dataset, view: View): Vec3 | null {
   const { vertical = "auto", mapping = "flat", heightField = null, scale } = view.geometry ?? {};
   if (vertical !== "auto" || mapping !== "flat" || heightField !== null) return null;
@@ -45,7 +45,7 @@ export function worldOf(dataset: Dataset, view: View, sample: Sample): Vec3 | nu
   ) as Vec3;
 }
 
-// The sample nearest to a point of the world; null outside of the box.
+// The sample nearest to a world position; null outside the box.
 export function sampleAt(dataset: Dataset, view: View, point: Vec3): Sample | null {
   const factors = worldFactors(dataset, view);
   if (factors === null) return null;
@@ -89,8 +89,8 @@ function coordinateText(dataset: Dataset, n: number, value: number, called?: str
   return unit.startsWith("°") ? text : `${name} ${text}`;
 }
 
-// Lines of a probe beside the cursor: the fields that are drawn, or else all, and where that is;
-// `axis` is the one across which the place was looked for.
+// Lines of a probe beside the cursor: the drawn fields, or all fields if none is drawn, and the
+// position; `axis` is normal to the plane in which the position was sought.
 export function hoverLines(dataset: Dataset, view: View, probe: Probe, axis: number): string[] {
   const drawn = [view.vector?.field, ...(view.scalars ?? []).map(({ field }) => field)];
   const { values } = probe;

@@ -1,5 +1,5 @@
-// The page's view: its explicit keys, the dataset that is open and what was drawn
-// last -> the view with every default that is known, and its camera.
+// The page's view: its explicit keys, the open dataset and the view drawn last -> the view with all
+// known defaults, and its camera.
 import type { Camera } from "./camera";
 import { fitView } from "./fit_view";
 import type { ChosenMessage, Dataset, View } from "../wire/protocol";
@@ -7,10 +7,10 @@ import { completeView, ViewState } from "./view_state";
 
 export class ViewModel {
   readonly state = new ViewState();
-  open: Dataset | null = null; // what is shown
-  private drawn: View | null = null; // as the server completed it
+  open: Dataset | null = null; // the displayed dataset
+  private drawn: View | null = null; // as completed by the server
 
-  // The view of the newest frame, under the explicit keys set since.
+  // The view of the newest frame, overridden by the explicit keys set since.
   view(): View {
     const explicit = this.state.document;
     const drawn = this.drawn?.dataset === explicit.dataset ? this.drawn : undefined;
@@ -36,21 +36,21 @@ export class ViewModel {
     };
   }
 
-  // The method of a moving frame may be the server's own choice for its budget, and is not what
-  // the final one will be drawn with. Of `quality` only explicit keys count: its defaults
-  // are the wire's, and what was taken back is not to live on in an older frame.
+  // For a moving frame the server may choose the method, which can differ from that of the final
+  // frame. Only explicit keys of `quality` count: its defaults come from the protocol, and a
+  // removed key must not survive from an older frame.
   drew(chosen: ChosenMessage, final: boolean): void {
     const { quality: _quality, ...view } = chosen.view as View;
     const method = final ? view.method : (this.view().method ?? view.method);
     this.drawn = { ...view, method };
   }
 
-  // What the frame on the canvas shows of the dataset that is open; null: nothing.
+  // The view drawn on the canvas if it belongs to the open dataset; null otherwise.
   drawnView(): View | null {
     return this.open !== null && this.drawn?.dataset === this.open.id ? this.drawn : null;
   }
 
-  // The files of what is open have changed.
+  // The files of the open dataset have changed.
   fitDrawn(dataset: Dataset): void {
     if (this.drawn?.dataset !== dataset.id) return;
     this.drawn = completeView(dataset.defaultView ?? {}, fitView(this.drawn, dataset));

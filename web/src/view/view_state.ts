@@ -1,12 +1,11 @@
-// The page's view document: explicit keys only, no defaults.
-// Changes go in as merge patches, stay pending until a frame or an error settles them, and
-// come out as (rev, patch) to send.
+// The page's view document: explicit keys only, no defaults. Changes are entered as merge patches,
+// are pending until a frame or an error answers them, and are sent as (rev, patch).
 import type { View } from "../wire/protocol";
 import { isObject } from "../base/values";
 
 export type Patch = Record<string, unknown>;
 
-// RFC 7396, with the wire's exception: null at /vector/field is a value ("no lines").
+// RFC 7396 with one exception of the protocol: null at /vector/field is a value ("no lines").
 export function mergePatch(target: unknown, patch: unknown, pointer = ""): unknown {
   if (!isObject(patch)) return patch;
   const merged: Patch = isObject(target) ? { ...target } : {};
@@ -24,7 +23,7 @@ export function mergePatch(target: unknown, patch: unknown, pointer = ""): unkno
 
 export const mergeView = (view: View, patch: unknown): View => mergePatch(view, patch) as View;
 
-// Explicit values over defaults. Arrays are taken whole.
+// Explicit values over defaults. Arrays are replaced as a whole.
 export function withDefaults(defaults: unknown, explicit: unknown): unknown {
   if (explicit === undefined) return defaults;
   if (!isObject(explicit) || !isObject(defaults)) return explicit;
@@ -34,7 +33,7 @@ export function withDefaults(defaults: unknown, explicit: unknown): unknown {
   return filled;
 }
 
-// The same for a view, and for its media too: one that is of the same field in the same place.
+// The same for a view; its media are merged if field and position in the list agree.
 export function completeView(defaults: View, explicit: View): View {
   const view = withDefaults(defaults, explicit) as View;
   if (!explicit.scalars || !defaults.scalars) return view;
@@ -45,8 +44,8 @@ export function completeView(defaults: View, explicit: View): View {
   return { ...view, scalars };
 }
 
-// The merge patch that turns `old`, or any part of it, into `next`: nulls for what must go, and all
-// that shall be there, whether it is there already or not.
+// The merge patch that turns `old`, or any part of it, into `next`: null for each key to remove,
+// and every key of `next`, whether already present or not.
 function replacement(old: Patch, next: Patch): Patch {
   const patch: Patch = {};
   for (const key of Object.keys(old)) if (!(key in next)) patch[key] = null;
@@ -73,20 +72,21 @@ export class ViewState {
   private confirmed: View = {};
   private pending: Pending[] = [];
   private explicit: View = {};
-  private lastRev = 0; // never used twice
+  private lastRev = 0; // never reused
   private confirmedRev = 0;
 
-  // The newest view with its explicit keys. Not to be changed in place.
+  // The newest view with its explicit keys. Callers must not modify it.
   get document(): View {
     return this.explicit;
   }
 
-  // The newest view that has been answered by a picture.
+  // The newest view that a frame has answered.
   get settled(): View {
     return this.confirmed;
   }
 
-  // Of the newest patch that stands: frames of this rev show what is wanted.
+  // The rev of the newest patch that has not been refused: frames with this rev show the requested
+  // view.
   get rev(): number {
     return this.pending.at(-1)?.rev ?? this.confirmedRev;
   }
@@ -94,14 +94,15 @@ export class ViewState {
   change(patch: Patch): Outgoing {
     this.lastRev += 1;
     this.pending.push({ rev: this.lastRev, patch });
-    // Without an answer for long (a hidden page, a lost connection) the oldest count as accepted.
+    // If answers are missing for long (hidden page, lost connection), the oldest patches count as
+    // accepted.
     while (this.pending.length > pendingMax) this.settle(this.pending[0]!.rev);
     this.recompute();
     return { rev: this.lastRev, patch };
   }
 
-  // Replaces the whole document. A merge patch can do it all but one thing: null at /vector/field
-  // is a value, so a field that was set goes only with the whole of `vector`, by a patch before.
+  // Replaces the whole document. One merge patch suffices except for /vector/field, where null is a
+  // value: a field that was set is removed by an earlier patch that removes the whole of `vector`.
   replace(next: View): Outgoing[] {
     const outgoing: Outgoing[] = [];
     const old = this.explicit;
@@ -112,7 +113,7 @@ export class ViewState {
     return outgoing;
   }
 
-  // After a new session was opened the server knows nothing: the whole view is one patch.
+  // A new session has no view on the server, so the whole view is sent as one patch.
   restate(): Outgoing {
     const whole = this.explicit;
     this.confirmed = {};
@@ -120,7 +121,7 @@ export class ViewState {
     return this.change(whole as Patch);
   }
 
-  // A frame of this rev arrived: the patches up to it are confirmed.
+  // A frame of this rev arrived: all patches up to it are confirmed.
   settle(rev: number): void {
     const done = this.pending.filter((entry) => entry.rev <= rev);
     if (done.length === 0) return;
@@ -132,7 +133,8 @@ export class ViewState {
     this.pending = this.pending.filter((entry) => entry.rev > rev);
   }
 
-  // The server refused this patch; the others stand. True if there was such a patch.
+  // The server refused this patch; other patches remain valid. Returns whether the patch was
+  // pending.
   refuse(rev: number): boolean {
     const kept = this.pending.filter((entry) => entry.rev !== rev);
     if (kept.length === this.pending.length) return false;
@@ -141,7 +143,7 @@ export class ViewState {
     return true;
   }
 
-  // While time runs by itself the server moves the step; nothing is sent back.
+  // During playback the server advances the step; nothing is sent back.
   follow(step: number): void {
     this.confirmed = { ...this.confirmed, step };
     this.recompute();

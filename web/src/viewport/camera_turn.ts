@@ -1,16 +1,16 @@
-// Animates the camera to a preset, or jumps where reduced motion is preferred. Any other change of
-// the camera stops the animation.
+// Animates the camera to a preset, or sets it at once if reduced motion is preferred. Any other
+// change of the camera stops the animation.
 import { between, type Camera } from "../view/camera";
 import { length, subtract } from "../base/vec3";
 import type { MoveQueue } from "./input";
 
 const turnMs = 250;
-const near = 1e-5; // coordinates on the wire are rounded
+const near = 1e-5; // tolerance, because coordinates on the wire are rounded
 
 export interface TurnHost {
   now(): number; // ms
   requestFrame(run: () => void): void;
-  still(): boolean; // reduced motion is preferred
+  still(): boolean; // whether reduced motion is preferred
 }
 
 const isAt = (camera: Camera, place: Camera): boolean =>
@@ -40,7 +40,7 @@ export class Turn {
     const start = this.host.now();
     let from: Camera | null = null;
     let last: Camera | null = null;
-    let left = false; // something else moved the camera
+    let left = false; // whether something else moved the camera
     const step = () => {
       if (turn !== this.turns || left) return;
       const t = Math.min(1, (this.host.now() - start) / turnMs);

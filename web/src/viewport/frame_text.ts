@@ -6,7 +6,7 @@ import { formatNumber } from "../base/ticks";
 
 export interface LabelText {
   text: string;
-  title: string; // what it means
+  title: string; // explanation
 }
 
 const meaning =
@@ -19,8 +19,8 @@ const estimated =
   "or of other data while there are none.";
 const unknown = `${meaning} Unknown for this frame.`;
 
-// The drawing's error, beside the limit that the view sets where it is above that; the encoding's
-// error is separate, in encodingLabel.
+// The rendering error, with the view's error limit if it exceeds that limit. The encoding error is
+// separate, in encodingLabel.
 export function errorLabel(
   header: FrameHeader,
   limit: number | null = null,
@@ -28,10 +28,10 @@ export function errorLabel(
 ): LabelText {
   const known = header.errorMeasured || header.errorEstimated;
   if (!Number.isFinite(header.error) || !known) return { text: "error unknown", title: unknown };
-  // The header has single precision.
+  // Tolerance: the header stores the error in single precision.
   const above = limit !== null && header.error > limit * (1 + 1e-6);
   const kind = header.errorMeasured ? "measured" : "est.";
-  // A greater error is a smaller PSNR.
+  // A greater error means a lower PSNR.
   const beyond = metric === "rmse" ? "above" : "below";
   const allowed = above ? `, ${beyond} ${errorText(limit, metric)}` : "";
   return {
@@ -42,7 +42,7 @@ export function errorLabel(
   };
 }
 
-// text empty: not known.
+// An empty text: not known.
 export function encodingLabel(
   { codec, jpegError }: FrameHeader,
   metric: ErrorMetric = "rmse",
@@ -57,7 +57,7 @@ export function encodingLabel(
   return { text: `JPEG ${errorText(jpegError, metric)}`, title };
 }
 
-// A frame's width against that of the whole picture: "" full, else 1/2, 1/4 ... or a percentage.
+// Width of a frame relative to the whole picture: "" for full, else 1/2, 1/4 ... or a percentage.
 export function scaleText(width: number, full: number): string {
   if (width >= full) return "";
   for (let n = 2; n <= 32; n *= 2) if (Math.abs(width * n - full) < n) return `1/${n}`;
@@ -66,7 +66,7 @@ export function scaleText(width: number, full: number): string {
 
 export type FrameState = "moving" | "refining" | "final";
 
-// A further frame of a view that was shown already and is not final: the server refines it while
+// A non-final frame of a view that was already shown is "refining": the server improves it while
 // the view rests.
 export function frameState(header: FrameHeader, before: FrameHeader | null): FrameState {
   if (header.final) return "final";
@@ -74,8 +74,8 @@ export function frameState(header: FrameHeader, before: FrameHeader | null): Fra
   return again && !before.final ? "refining" : "moving";
 }
 
-// What the way took besides the server's own work, ms: from the patch's departure to the frame's
-// arrival. Only the first frame that echoes a patch measures it: later ones waited longer.
+// Latency beyond the server's own work, in ms, from sending the patch to receiving the frame. Only
+// the first frame that echoes a patch measures it; later frames waited longer.
 export function networkMs(header: FrameHeader, arrivedAt: number, lastT: number): number | null {
   if (header.t === lastT || header.t <= 0) return null;
   const serverMs = (header.queueUs + header.renderUs + header.encodeUs) / 1000;
@@ -101,7 +101,7 @@ export class FrameRate {
 
 export const paceText = (fps: number): string => `${fps.toFixed(fps < 10 ? 1 : 0)} steps/s`;
 
-// Steps that did not come as they should; empty: all did.
+// Steps that were dropped or not ready in time; empty: none.
 export function stepsText({ stepsDropped, stepsNotReady }: StatsMessage): string {
   const dropped = stepsDropped === 0 ? [] : [`${many(stepsDropped)} dropped`];
   const late = stepsNotReady === 0 ? [] : [`${many(stepsNotReady)} loaded late`];
@@ -109,7 +109,7 @@ export function stepsText({ stepsDropped, stepsNotReady }: StatsMessage): string
   return parts.length === 0 ? "" : `steps: ${parts.join(" · ")}`;
 }
 
-// The method, and what is particular to it.
+// The method and its parameters.
 export function methodText({ method, compositing, slabThickness }: ChosenMessage): string {
   const slabs = slabThickness === null ? "" : ` of ${formatNumber(slabThickness, 3)} cells`;
   return method === "reference" ? method : `${method}${slabs} ${compositing}`;
@@ -121,7 +121,7 @@ const many = (n: number): string => {
   return n < 1e9 ? `${(n / 1e6).toFixed(1)} M` : `${(n / 1e9).toFixed(1)} G`;
 };
 
-// What was drawn and what was left out, and what it cost.
+// The work drawn, the work left out, and the cost.
 export function workLines(work: ChosenMessage["work"]): [string, string, string] {
   const drawn = work.samples - work.culled - work.skippedBoth;
   return [

@@ -1,16 +1,16 @@
-// The axis gizmo shows the orientation of the volume. Its six ends are buttons that view from
-// there: east, north and up (or x, y, z), and what is opposite.
+// The axis gizmo shows the orientation of the volume. Its six ends are buttons that set the view
+// direction: east, north and up (or x, y, z) and their opposites.
 import { cameraFrame, type Angles, type Camera } from "../view/camera";
 import { dot, type Vec3 } from "../base/vec3";
 import { make, makeSvg } from "../base/dom";
 
-const reach = 36; // of the longest arm, percent of the whole
+const reach = 36; // length of the longest arm, percent of the gizmo's size
 
 export interface Look {
   name: string; // "from the south"
   key: string;
-  sign: string; // on the gizmo; empty for what is behind
-  way: Vec3 | null; // where its end points to; null: is no end of an axis
+  sign: string; // label on the gizmo; empty for the opposite ends
+  way: Vec3 | null; // direction of the axis end; null: not an axis end
   angles: Angles;
 }
 
@@ -109,7 +109,7 @@ export class Gizmo {
       const { x, y, depth } = armOf(camera, look.way!);
       button.style.left = `${(50 + x * reach).toFixed(2)}%`;
       button.style.top = `${(50 - y * reach).toFixed(2)}%`;
-      button.style.zIndex = String(Math.round(10 - 9 * depth)); // the nearest lies on top
+      button.style.zIndex = String(Math.round(10 - 9 * depth)); // the nearest is drawn on top
       button.classList.toggle("away", depth > 0.02);
     }
   }

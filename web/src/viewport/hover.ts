@@ -1,7 +1,7 @@
-// The value under the cursor: mouse position on the picture -> the sample there -> a request to
-// the server, at most one at a time and `everyMs` apart, for the newest position only -> text
-// beside the cursor. Nothing is requested while the view moves; failures are not shown. Timers and
-// the server are injected.
+// The value under the cursor: mouse position on the picture -> the sample there -> a request to the
+// server -> text beside the cursor. At most one request is active, requests are `everyMs` apart,
+// and only the newest position is requested. Nothing is requested while the view moves; failures
+// are not shown. Timers and the server are injected.
 
 export interface HoverTarget<S> {
   sample: S;
@@ -12,22 +12,22 @@ export interface HoverHost<S> {
   now(): number; // ms
   setTimeout(run: () => void, ms: number): number;
   clearTimeout(timer: number): void;
-  busy(): boolean; // the view moves or the page is hidden; poke() when that may have changed
-  find(at: [number, number]): HoverTarget<S> | null; // null: nothing is there
+  busy(): boolean; // the view moves or the page is hidden; call poke() when this may have changed
+  find(at: [number, number]): HoverTarget<S> | null; // null: no sample at this position
   request(sample: S, signal: AbortSignal): Promise<string[]>; // lines to show
-  show(lines: string[], at: [number, number]): void; // no lines: nothing to show
+  show(lines: string[], at: [number, number]): void; // no lines: hide the text
 }
 
 export const everyMs = 125;
-const restMs = 150; // the view has not changed for so long
+const restMs = 150; // the view is at rest if unchanged for this long
 
 export class Hover<S> {
-  private at: [number, number] | null = null; // of the cursor, fractions of the picture
+  private at: [number, number] | null = null; // cursor position as fractions of the picture
   private asking: AbortController | null = null;
   private askedAt = -Infinity;
-  private changedAt = -Infinity; // of the view
+  private changedAt = -Infinity; // time of the last change of the view
   private timer: number | null = null;
-  private shown = ""; // key of what is shown; empty: nothing
+  private shown = ""; // key of the displayed target; empty: none
 
   constructor(private readonly host: HoverHost<S>) {}
 
@@ -36,7 +36,7 @@ export class Hover<S> {
     this.plan();
   }
 
-  // The cursor is gone: so is what it asked for.
+  // The cursor has left the picture: cancels the request and hides the text.
   leave(): void {
     this.at = null;
     this.asking?.abort();
@@ -91,7 +91,7 @@ export class Hover<S> {
       .request(target.sample, asking.signal)
       .catch(() => [])
       .then((lines) => {
-        if (this.asking !== asking) return; // the cursor has left
+        if (this.asking !== asking) return; // the cursor has left the picture
         this.asking = null;
         this.showAnswer(target, lines, at);
       });
@@ -100,7 +100,7 @@ export class Hover<S> {
   private showAnswer(target: HoverTarget<S>, lines: string[], at: [number, number]): void {
     const here = this.at === null || this.host.busy() ? null : this.host.find(this.at);
     if (here?.key === target.key) {
-      // A failed request counts as answered: it is not repeated.
+      // A failed request counts as answered and is not repeated.
       this.shown = target.key;
       this.host.show(lines, at);
     } else if (here !== null) {

@@ -1,5 +1,5 @@
-// The value under the cursor on the page: the mouse on the picture -> text beside it. On or off
-// for the session; on touch screens a tap probes instead.
+// The value under the cursor on the page: mouse position on the picture -> text beside the cursor.
+// It can be switched on or off for the session; on touch screens a tap probes instead.
 import type { Api } from "../wire/api";
 import { make } from "../base/dom";
 import { Hover } from "./hover";
@@ -47,7 +47,7 @@ export class HoverView {
     hoverOn.watch(() => this.hover.poke());
   }
 
-  // The view may have changed.
+  // Call when the view may have changed.
   refresh(): void {
     this.hover.poke();
   }
@@ -84,7 +84,7 @@ export class HoverView {
     );
     element.style.left = `${100 * x}%`;
     element.style.top = `${100 * y}%`;
-    // On the side where there is room.
+    // Places the text on the side with more room.
     const aside = (at: number) => (at < 0.6 ? `${gap}px` : `calc(-100% - ${gap}px)`);
     element.style.transform = `translate(${aside(x)}, ${aside(y)})`;
   }

@@ -1,5 +1,5 @@
-// Times, sizes and errors of the frames that are drawn: the table in the picture's corner (key \).
-// Not announced to screen readers.
+// Times, sizes and errors of the drawn frames: the table in the corner of the picture (key \). It
+// is not announced to screen readers.
 import { byId } from "../base/dom";
 import { errorMetric } from "../base/error_text";
 import {
@@ -61,7 +61,7 @@ export class Hud {
     return !this.element.classList.contains("folded");
   }
 
-  // Whether the picture is final for the requested view; else its scale, as from scaleText.
+  // `scale` is the text from scaleText; it is shown unless the picture is final.
   mark(state: FrameState | "offline", scale: string): void {
     const text = state === "final" || scale === "" ? state : `${state} ${scale}`;
     if (this.markElement.textContent === text) return;
@@ -71,14 +71,14 @@ export class Hud {
     this.markElement.classList.toggle("is-refining", state === "refining");
   }
 
-  // How steps run, or ran.
+  // Statistics of the current or last playback.
   steps(stats: StatsMessage): void {
     const { playFps } = stats;
     this.pace.textContent = playFps === null ? "" : paceText(playFps);
     this.stepCounts.textContent = stepsText(stats);
   }
 
-  // fullWidth: of the whole picture, pixels.
+  // fullWidth: width of the full-resolution picture in pixels.
   show(frame: DrawnFrame, chosen: ChosenMessage | null, fullWidth: number): void {
     const { header } = frame;
     this.rate.add(frame.drawnAt, header.payloadBytes + frameHeaderBytes);

@@ -1,30 +1,31 @@
-// Mouse, wheel and touch on the picture -> camera moves, at most one patch a display frame.
+// Mouse, wheel and touch input on the picture -> camera moves, at most one patch per display frame.
 import { drag, pan, roll, zoom, type Camera } from "../view/camera";
 import { clamp } from "../base/values";
 
 export interface CameraHost {
-  camera(): Camera | null; // null: nothing to move yet
+  camera(): Camera | null; // null: no camera yet
   setCamera(camera: Camera): void;
-  ready(): boolean; // the last camera is not held up on its way
+  ready(): boolean; // earlier patches have left the send buffer
 }
 
 type Move = (camera: Camera) => Camera;
 
-const orbitDegrees = 240; // for a drag as long as the picture is high
-const clickPixels = 5; // what moves no farther is a click
-const twistDegrees = 5; // fingers that turn less only pinch
-const wheelFactor = 1.0015; // zoom a pixel of the wheel, whose notch is about 100
-const wheelPixelsMax = 400; // of one event: a torn-off swipe must not jump
-const pinchFactor = 1.01; // the same for a trackpad's pinch, which comes as a wheel with ctrl
+const orbitDegrees = 240; // for a drag over the height of the picture
+const clickPixels = 5; // a shorter movement is a click
+const twistDegrees = 5; // a smaller rotation of the fingers does not roll the camera
+const wheelFactor = 1.0015; // zoom per wheel pixel; one notch is about 100 pixels
+const wheelPixelsMax = 400; // limit per event, so that a fast swipe does not jump
+// zoom per pixel for a trackpad pinch, reported as a wheel event with ctrl
+const pinchFactor = 1.01;
 const pinchPixelsMax = 25;
-const linePixels = 30; // of a wheel that counts lines
+const linePixels = 30; // pixels per line of a wheel that reports lines
 
-// Sends a move at once, and what comes until the next display frame together with that frame:
-// however fast the device reports, one patch a frame goes out, and the first without a wait. While
-// the link holds patches up, moves are gathered until it is free.
+// Sends the first move at once and combines later ones until the next display frame, so that at
+// most one patch per frame is sent whatever the device's event rate. While earlier patches are
+// still in the send buffer, moves are accumulated.
 export class MoveQueue {
   private moves: Move[] = [];
-  private waits = false; // for the next display frame
+  private waits = false; // a display frame callback is pending
 
   constructor(
     private readonly host: CameraHost,
@@ -61,7 +62,7 @@ export function gesture(fingers: Finger[]): { x: number; y: number; spread: numb
   return { x, y, spread };
 }
 
-// Degrees by which fingers have turned about their centre, clockwise.
+// Degrees by which the fingers have turned about their centre, clockwise.
 export function twist(before: Finger[], after: Finger[]): number {
   const [a, b] = [gesture(before), gesture(after)];
   let along = 0;
@@ -75,19 +76,19 @@ export function twist(before: Finger[], after: Finger[]): number {
   return (Math.atan2(across, along) * 180) / Math.PI;
 }
 
-// One finger (or the left button) orbits; two fingers, another button or shift pan, two also zoom
-// and turn the picture in its plane.
+// One finger or the left button orbits; two fingers, another button or shift pan; two fingers also
+// zoom and roll.
 export class PointerInput {
   private readonly fingers = new Map<number, Finger>();
   private panning = false;
-  private travelled = 0; // pixels since the first finger went down, at most
-  private twisted = 0; // degrees that were not followed yet
-  private twisting = false; // since a finger came or went
+  private travelled = 0; // greatest distance in pixels from the first contact
+  private twisted = 0; // degrees not applied yet
+  private twisting = false; // rolling has begun since a finger was added or lifted
 
   constructor(
     private readonly element: HTMLElement,
     private readonly moves: MoveQueue,
-    // A click or tap that moved nothing: fractions of the element's width and height.
+    // Called for a click or tap that moved nothing; positions are fractions of the element's size.
     private readonly clicked: (x: number, y: number, alt: boolean) => void,
   ) {
     element.addEventListener("pointerdown", (event) => this.down(event));
@@ -168,7 +169,7 @@ export class PointerInput {
   }
 }
 
-// How much nearer a turn of the wheel brings the volume: the target stays where it is.
+// Zoom factor of a wheel event; the target does not move.
 export function wheelZoom({ deltaY, deltaMode, ctrlKey }: WheelEvent): number {
   const [factor, most] = ctrlKey ? [pinchFactor, pinchPixelsMax] : [wheelFactor, wheelPixelsMax];
   const pixels = deltaY * (deltaMode === 0 ? 1 : linePixels);

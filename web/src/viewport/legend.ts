@@ -1,9 +1,10 @@
-// Legend entries -> elements over the picture. Rebuilt only when what it says has changed.
+// Legend entries -> elements over the picture. They are rebuilt only when their content has
+// changed.
 import { make, makeSvg } from "../base/dom";
 import { curvePoints, type LegendEntry } from "../view/legend_entries";
 import type { ColorMaps } from "../wire/color_maps";
 
-const stripHeight = 10; // of the curve's own coordinates
+const stripHeight = 10; // height in the coordinates of the curve
 
 export class Legend {
   private shown = "";
@@ -55,8 +56,8 @@ export class Legend {
   }
 }
 
-// How opaque the medium is along its strip: the colours show below the curve, what is above it is
-// covered.
+// Opacity of the medium along its strip: the colours are visible below the curve and covered above
+// it.
 function extinctionCurve(points: [number, number][]): SVGElement {
   const at = curvePoints(points);
   const path = at

@@ -1,17 +1,18 @@
-// The probe on the picture: clicks -> its position, its position -> a mark. It is on while its
-// folder in the panel is open.
+// The probe on the picture: clicks -> probe position, probe position -> a mark. The probe is on
+// while its folder in the panel is open.
 import { cameraFrame, degree, pointInPlane, project, type Camera } from "../view/camera";
 import { axisNames, sampleAt, worldOf, type Sample } from "../view/sample_position";
 import type { Dataset, View } from "../wire/protocol";
 
-const edgewiseMax = Math.sin(8 * degree); // below this angle a level has no usable positions
+// below this angle positions in a horizontal plane are too inaccurate
+const edgewiseMax = Math.sin(8 * degree);
 
 export interface Found {
   sample: Sample;
-  axis: 0 | 1 | 2; // it was looked for in the plane across this one
+  axis: 0 | 1 | 2; // the position lies in the plane perpendicular to this axis
 }
 
-// The probe's controls, which hold its position.
+// The probe's controls, which store its position.
 export interface ProbeControls {
   readonly on: boolean;
   readonly place: Sample;
@@ -25,7 +26,7 @@ export interface ProbeHost {
   camera(): Camera | null;
   view(): View;
   dataset(): Dataset;
-  aspect(): number; // of the picture, width over height
+  aspect(): number; // width / height of the picture
 }
 
 export class Probe {
@@ -48,8 +49,9 @@ export class Probe {
     controls.open();
   }
 
-  // A position on the picture has no depth: it is taken in the slice, or else in the probe's level;
-  // where that is viewed edge-on, in the vertical section through the probe that faces the eye.
+  // A position on the picture has no depth, so the sample is sought in the slice, or without a
+  // slice in the probe's level. If that plane is seen edge-on, the vertical section through the
+  // probe that faces the eye is used.
   find(at: [number, number]): Found | null {
     const controls = this.host.controls();
     const camera = this.host.camera();

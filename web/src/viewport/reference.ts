@@ -1,5 +1,5 @@
-// The reference picture of the view: requested by the first hold, rendered by a job of the server,
-// shown while held, discarded when the view changes. Pure but for its host.
+// The reference picture of the view: requested by the first press, rendered by a job of the server,
+// shown while the key is held, discarded when the view changes. Pure except for its host.
 import { failureText } from "../wire/api";
 import { errorMetric, errorName, errorText } from "../base/error_text";
 import type { View } from "../wire/protocol";
@@ -14,21 +14,21 @@ export interface Job {
 }
 
 export interface ReferenceHost {
-  view(): View; // with every default
-  // Parsed answers of the server; a failure throws an Error with a message.
+  view(): View; // with all defaults
+  // Returns parsed answers of the server; a failure throws an Error with a message.
   request(method: "GET" | "POST" | "DELETE", path: string, body?: View): Promise<unknown>;
   sleep(ms: number): Promise<void>;
-  load(path: string): Promise<void>; // until the picture can be shown at once
+  load(path: string): Promise<void>; // resolves when the picture can be shown without delay
   show(on: boolean): void;
-  // Text for the status region, and progress outside of it; empty: nothing.
+  // Text for the status region, and the progress outside of it; empty: nothing.
   report(text: string, progress: string): void;
 }
 
 const pollMs = 500;
-const pixelsMax = 1e6; // each takes some 50 microseconds
+const pixelsMax = 1e6; // each pixel takes about 50 microseconds
 
-// The view at the size that is asked for: its own, as long as that is not too much. Without
-// `quality`, which says how frames are drawn, not what they show.
+// The view at the size requested for the reference: its own size, up to `pixelsMax`. `quality` is
+// omitted, as it affects only how frames are drawn, not their content.
 export function referenceView(explicit: View): View {
   const { quality: _quality, ...view } = explicit;
   const { width = 0, height = 0 } = view.image ?? {};
@@ -50,11 +50,11 @@ export function progressText({ state, progress, etaMs }: Job): string {
 const isOpen = ({ state }: Job): boolean => state === "queued" || state === "running";
 
 export class Reference {
-  private asked: { view: string } | null = null; // what it is of; each request is a new object
+  private asked: { view: string } | null = null; // the requested view; each request is a new object
   private ready: { name: string; error: number } | null = null;
   private held = false;
-  private job: string | null = null; // that is under way
-  private last = Promise.resolve(); // a server draws one at a time for a page
+  private job: string | null = null; // the active job
+  private last = Promise.resolve(); // the server renders one reference at a time for a page
 
   constructor(private readonly host: ReferenceHost) {
     errorMetric.watch(() => this.reportReady());
@@ -71,7 +71,7 @@ export class Reference {
     this.host.show(false);
   }
 
-  // Requests the reference unless it is ready or under way.
+  // Requests the reference unless it is ready or in progress.
   prepare(): void {
     if (this.asked !== null) return;
     const view = referenceView(this.host.view());
@@ -79,7 +79,7 @@ export class Reference {
     this.last = this.last.then(() => this.fetch(asked, view));
   }
 
-  // The view may have changed.
+  // Call when the view may have changed.
   follow(): void {
     if (this.asked === null) return;
     if (JSON.stringify(referenceView(this.host.view())) !== this.asked.view) this.drop();
@@ -95,10 +95,11 @@ export class Reference {
     this.host.report("", "");
   }
 
-  // Cancels the job under way.
+  // Cancels the active job.
   abandon(): void {
     if (this.job === null) return;
-    void this.host.request("DELETE", `v1/jobs/${this.job}`).catch(() => {}); // it may be finished
+    // the job may have finished
+    void this.host.request("DELETE", `v1/jobs/${this.job}`).catch(() => {});
     this.job = null;
   }
 
@@ -136,7 +137,7 @@ export class Reference {
       this.host.show(this.held);
     } catch (failure) {
       if (!wanted()) return;
-      this.asked = null; // another hold tries again
+      this.asked = null; // the next press tries again
       this.job = null;
       this.host.report(`${name}: ${failureText(failure)}`, "");
     }

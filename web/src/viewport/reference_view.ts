@@ -1,5 +1,5 @@
-// The reference on the page: its picture over the shown one, its status in the corner, and
-// the button that is held like the key.
+// The reference on the page: its picture over the current one, its status in the corner, and the
+// button with the same function as the key.
 import { byId } from "../base/dom";
 import type { View } from "../wire/protocol";
 import { Reference } from "./reference";
@@ -8,7 +8,7 @@ import { posted, refusalText } from "../wire/requests";
 async function request(method: string, path: string, body?: View): Promise<unknown> {
   const response = await fetch(new URL(path, document.baseURI), {
     ...(body === undefined ? { method } : posted(body)),
-    keepalive: method === "DELETE", // it may be sent while the page unloads
+    keepalive: method === "DELETE", // the request may be sent while the page unloads
   });
   if (!response.ok) throw new Error(await refusalText(response));
   return response.json().catch(() => null);
@@ -26,8 +26,8 @@ function holdByButton(button: HTMLElement, reference: Reference): void {
     if (!repeat && (key === " " || key === "Enter")) reference.hold();
   });
   on("pointerup pointercancel keyup blur", () => reference.release());
-  on("contextmenu", (event) => event.preventDefault()); // of a long touch
-  on("click", () => reference.prepare()); // assistive technology cannot hold
+  on("contextmenu", (event) => event.preventDefault()); // suppresses the menu of a long press
+  on("click", () => reference.prepare()); // assistive technology cannot hold a button
 }
 
 export function makeReference(canvas: HTMLElement, view: () => View): Reference {

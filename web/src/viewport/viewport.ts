@@ -1,8 +1,7 @@
-// Encoded frames -> canvas. Always the newest: a frame that is decoded after a newer one was drawn
-// is not shown, and one that a newer overtakes before its turn is not decoded, so that however fast
-// frames come no more than three are held. Frames of any size fill the canvas. What is shown is
-// also published as data attributes of the canvas (seq, rev, step, state, level, width, height),
-// for tests and style sheets.
+// Encoded frames -> canvas. Only the newest is shown: a frame decoded after a newer one was drawn
+// is discarded, and a frame replaced while waiting is not decoded, so at most three are in memory.
+// Frames of any size fill the canvas. The displayed state is also published as data attributes of
+// the canvas (seq, rev, step, state, level, width, height) for tests and style sheets.
 import { frameState } from "./frame_text";
 import type { Frame, FrameHeader } from "../wire/protocol";
 import { clamp } from "../base/values";
@@ -11,22 +10,23 @@ export interface DrawnFrame {
   header: FrameHeader;
   decodeMs: number;
   arrivedAt: number; // performance.now()
-  drawnAt: number; // the same clock
+  drawnAt: number; // on the same clock
 }
 
 export interface ViewportEvents {
-  decoded(header: FrameHeader, decodeMs: number): void; // since it came, shown or not
+  // decodeMs: time since arrival; called for every decoded frame, shown or not
+  decoded(header: FrameHeader, decodeMs: number): void;
   drawn(frame: DrawnFrame): void;
-  broken(header: FrameHeader): void; // could not be decoded
-  resized(): void; // size() may be another
+  broken(header: FrameHeader): void; // the frame could not be decoded
+  resized(): void; // size() may have changed
 }
 
-const pixelsMax = 3.7e6; // a picture of 2560 x 1440; more is not worth its time
+const pixelsMax = 3.7e6; // a picture of 2560 x 1440; more would not justify the rendering time
 const edgeMax = 4096;
 const densityMax = 2;
-const decodesMax = 2; // at a time; as many as the server sends without an answer
+const decodesMax = 2; // concurrent decodes; as many as the server sends without an acknowledgement
 
-// Pixels to render for an element of this size; never more than it can show.
+// Pixels to render for an element of this size; never more than the element can display.
 export function pictureSize(
   cssWidth: number,
   cssHeight: number,
@@ -49,9 +49,9 @@ export interface Size {
   height: number;
 }
 
-// Where a picture goes on the canvas: all over it if it is of the same shape, but for what rounding
-// to whole pixels does to a coarse one; otherwise in its own shape in the middle. x, y, width,
-// height.
+// Rectangle (x, y, width, height) of a picture on the canvas: the whole canvas if both have the
+// same aspect ratio, allowing for the rounding of coarse pictures to whole pixels; otherwise
+// centred with the picture's own aspect ratio.
 export function pictureRect(canvas: Size, picture: Size): [number, number, number, number] {
   const { width, height } = canvas;
   const expected = (picture.width * height) / width;
@@ -65,12 +65,13 @@ export function pictureRect(canvas: Size, picture: Size): [number, number, numbe
 }
 
 export class Viewport {
-  pixelsMax = pixelsMax; // what the server draws
-  private drawn: FrameHeader | null = null; // of this session
+  pixelsMax = pixelsMax; // limit of the server
+  private drawn: FrameHeader | null = null; // newest drawn frame of this session
   private readonly context: CanvasRenderingContext2D;
   private session = 0;
   private decoding = 0;
-  private waiting: Frame | null = null; // the newest, while as many as may be are decoded
+  // the newest frame while decodesMax others are being decoded
+  private waiting: Frame | null = null;
 
   constructor(
     readonly canvas: HTMLCanvasElement,
@@ -84,7 +85,7 @@ export class Viewport {
     this.watchDensity();
   }
 
-  // Another screen or another zoom of the page; the query holds for one density only.
+  // Watches for another screen or page zoom; each media query matches one pixel density only.
   private watchDensity(): void {
     const query = window.matchMedia(`(resolution: ${window.devicePixelRatio}dppx)`);
     const changed = () => {
@@ -94,7 +95,7 @@ export class Viewport {
     query.addEventListener("change", changed, { once: true });
   }
 
-  // Of the frame on the canvas; null: none of this session.
+  // Header of the frame on the canvas; null: none of this session.
   get frame(): FrameHeader | null {
     return this.drawn;
   }
@@ -104,7 +105,7 @@ export class Viewport {
     return pictureSize(clientWidth, clientHeight, window.devicePixelRatio, this.pixelsMax);
   }
 
-  // seq begins anew with each session.
+  // seq restarts with each session.
   newSession(serverPixelsMax: number): void {
     this.pixelsMax = serverPixelsMax;
     this.session += 1;
@@ -112,7 +113,7 @@ export class Viewport {
     this.waiting = null;
   }
 
-  // What is overtaken gets no answer of its own: answers count for every frame before them.
+  // A replaced frame is not acknowledged itself: an acknowledgement covers all earlier frames.
   async show(frame: Frame): Promise<void> {
     if (this.decoding >= decodesMax) {
       this.waiting = frame;
@@ -158,13 +159,14 @@ export class Viewport {
     const { canvas, context } = this;
     const [width, height] = this.size();
     if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width; // empties the canvas, which is not seen before the picture is on it
+      canvas.width = width; // clears the canvas; the picture is drawn before the next repaint
       canvas.height = height;
     }
     const place = pictureRect(canvas, bitmap);
     if (place[2] < width || place[3] < height) context.clearRect(0, 0, width, height);
     context.imageSmoothingEnabled = true;
-    // Without a GPU the better one takes as long as a display frame: only at rest.
+    // Without a GPU, high-quality scaling takes as long as a display frame, so it is used only at
+    // rest.
     const state = frameState(header, this.drawn);
     context.imageSmoothingQuality = state === "moving" ? "low" : "high";
     context.drawImage(bitmap, ...place);

@@ -11,7 +11,7 @@ export interface Histogram {
   range: Range; // ends of the first and the last bin
   counts: number[];
   masked: number; // samples without a value
-  below: number; // samples beyond the range
+  below: number; // samples outside the range
   above: number;
   log: boolean;
 }
@@ -31,7 +31,7 @@ export interface Position {
 export type Value = number | (number | null)[] | null; // null: masked
 
 export interface Probe {
-  position: Position; // of the sample that was read
+  position: Position; // position of the sample that was read
   values: Record<string, { value: Value; units: string }>;
 }
 
@@ -42,8 +42,8 @@ export interface SeriesTime {
 
 export interface Series {
   position: Position;
-  times: SeriesTime[]; // one a step
-  values: Value[]; // one a step
+  times: SeriesTime[]; // one per step
+  values: Value[]; // one per step
   units: string;
 }
 
@@ -52,13 +52,13 @@ export interface ForecastPoint {
   slabThickness: number | null; // grid cells; null: no slabs
   width: number; // pixels, as rendered
   height: number;
-  coarser: number; // halvings of the data beyond what the picture needs
+  coarser: number; // levels that the data is coarser than the picture needs
   ms: number;
   error: number; // linear RMSE
   errorLow: number; // the 90 % interval of the error
   errorHigh: number;
   kind: "measured" | "estimated";
-  pareto: boolean; // no setting as fast has less error
+  pareto: boolean; // whether no setting of at most this time has a smaller error
 }
 
 export interface Forecast {
@@ -93,7 +93,7 @@ export class Api {
     return this.get<Histogram>(path, (a) => isRange(a.range) && Array.isArray(a.counts));
   }
 
-  // Of one step, or (null) of all: that reads every step and may take long.
+  // The range of one step, or with null of all steps, which may take long.
   async range(id: string, field: string, step: number | null): Promise<FieldRange> {
     const path = `${this.field(id, field)}/range?${step === null ? "of=all" : `step=${step}`}`;
     return this.get<FieldRange>(path, (a) => a.range === null || isRange(a.range));
@@ -104,13 +104,13 @@ export class Api {
     return this.get<Probe>(path, (a) => isObject(a.position) && isObject(a.values), { signal });
   }
 
-  // Reads every step: it may take long.
+  // Reads every step, so it may take long.
   async series(id: string, field: string, at: Vec3): Promise<Series> {
     const path = `${this.field(id, field)}/series?${place(at)}`;
     return this.get<Series>(path, (a) => areTimes(a.times) && Array.isArray(a.values));
   }
 
-  // What the server expects of the settings that it may choose for a view.
+  // The server's forecast for the settings that it may choose for a view.
   async forecast(view: View): Promise<Forecast> {
     return this.get<Forecast>("v1/forecasts", (a) => Array.isArray(a.points), posted(view));
   }
@@ -124,7 +124,7 @@ export class Api {
     return this.get<Dataset>(this.dataset(id), (a) => isObject(a.dims));
   }
 
-  // A small picture of it, by its default view.
+  // A small picture of the dataset in its default view.
   async preview(id: string, width: number, height: number): Promise<Blob> {
     const path = `${this.dataset(id)}/frame.jpg?width=${width}&height=${height}`;
     return (await this.answer(path)).blob();

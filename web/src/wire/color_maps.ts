@@ -1,5 +1,5 @@
-// GET v1/colormaps -> names and CSS gradients. Until they are there, or if they never come, a name
-// has no gradient and the pickers hold only what the view says.
+// GET v1/colormaps -> names and CSS gradients. Until the maps are loaded, or if loading fails, no
+// name has a gradient and the pickers list only the name in the view.
 
 interface ColorMap {
   name: string;
@@ -24,11 +24,11 @@ export class ColorMaps {
     return this.maps.map((map) => map.name);
   }
 
-  // Places (0..1) and colours; none where the map is not known.
+  // Positions (0..1) and colours; empty for an unknown map.
   stops(name: string): [at: number, color: string][] {
     const map = this.maps.find((candidate) => candidate.name === name);
     if (map === undefined) return [];
-    // 16 stops are enough for the eye; the last one is always the map's end.
+    // About 16 stops suffice visually; the last one is always the end of the map.
     const step = Math.max(1, Math.floor((map.colors.length - 1) / 16));
     const last = map.colors.length - 1;
     const stops: [number, string][] = [];
@@ -37,7 +37,8 @@ export class ColorMaps {
     return stops;
   }
 
-  // With the map's ends at two places, per cent; what lies beyond them has the ends' colours.
+  // A gradient with the ends of the map at two positions in per cent; beyond them the end colours
+  // continue.
   gradient(name: string, from = 0, to = 100): string {
     const place = (at: number): string => (from + (to - from) * at).toFixed(1);
     const stops = this.stops(name).map(([at, color]) => `${color} ${place(at)}%`);

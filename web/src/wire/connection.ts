@@ -1,6 +1,6 @@
-// One WebSocket to /v1/stream that is made again whenever it is lost.
-// Bytes in -> typed messages and frames out to `events`; messages in -> text out.
-// Sockets, timers and random numbers are injected, so that tests can simulate the network.
+// One WebSocket to /v1/stream, reopened whenever it is lost. Received bytes -> typed messages and
+// frames passed to `events`; outgoing messages -> text. Sockets, timers and random numbers are
+// injected, so that tests can simulate the network.
 import {
   encodeClientMessage,
   parseFrame,
@@ -25,7 +25,7 @@ export interface CloseLike {
 export interface SocketLike {
   binaryType: string;
   readyState: number;
-  bufferedAmount: number; // bytes that have not left yet
+  bufferedAmount: number; // bytes not sent yet
   send(text: string): void;
   close(code?: number, reason?: string): void;
   onmessage: ((event: MessageLike) => void) | null;
@@ -42,7 +42,7 @@ export type ConnectionState =
   | { name: "connecting"; attempt: number }
   | { name: "live" }
   | { name: "waiting"; attempt: number; delayMs: number; reason: string }
-  | { name: "asleep"; reason: string } // closed as idle: input or showing the page reconnects
+  | { name: "asleep"; reason: string } // closed as idle; input or showing the page reconnects
   | { name: "stopped" };
 
 export interface ConnectionEvents {
@@ -59,8 +59,8 @@ const socketOpen = 1;
 const waitingBytesMax = 2048; // a few patches
 const idleCode = 4410;
 
-// Milliseconds before attempt n (from 0): doubling, spread by a fifth to either side so that the
-// viewers of a restarted server do not come back in one moment; always within 500..15000.
+// Milliseconds before attempt n (from 0): doubling each time, randomized by 20 % so that the
+// clients of a restarted server do not all reconnect at once; always within 500..15000.
 export function reconnectDelayMs(attempt: number, random: number): number {
   const base = Math.min(delayLastMs, delayFirstMs * 2 ** Math.min(attempt, 30));
   return Math.round(base * (0.8 + 0.4 * random));
@@ -104,7 +104,8 @@ export class Connection {
     return this.greeted;
   }
 
-  // Whether what is sent now goes out at once. Without a connection nothing waits either.
+  // Whether a message would be sent at once. Also true without a connection, when nothing is
+  // queued.
   get ready(): boolean {
     return !this.greeted || (this.socket?.bufferedAmount ?? 0) <= waitingBytesMax;
   }
@@ -122,20 +123,20 @@ export class Connection {
     this.events.state({ name: "stopped" });
   }
 
-  // Whether the message went out; while the connection is lost nothing is queued, as the whole
-  // view is sent again after the next hello.
+  // Returns whether the message was sent. While the connection is lost nothing is queued, because
+  // the whole view is sent after the next hello.
   send(message: ClientMessage): boolean {
     if (!this.greeted || this.socket?.readyState !== socketOpen) return false;
     this.socket.send(encodeClientMessage(message));
     return true;
   }
 
-  // The network is back: skip the delay.
+  // Reconnects without the remaining delay, as the network is available again.
   retryNow(): void {
     if (this.retryTimer !== null || this.asleep) this.connect();
   }
 
-  // Input, or the page is visible again.
+  // Reconnects an idle connection on input or when the page becomes visible.
   wake(): void {
     if (this.asleep) this.connect();
   }
@@ -192,7 +193,7 @@ export class Connection {
   // Closes on a protocol error at once; later messages are ignored.
   private fail(code: number, reason: string): void {
     this.fault = reason;
-    // A close reason has at most 123 bytes.
+    // A close reason is limited to 123 bytes.
     this.drop(code, reason.replace(/[^ -~]/g, "?").slice(0, 100));
     this.lost(code, reason);
   }
@@ -217,7 +218,8 @@ export class Connection {
       this.events.state({ name: "asleep", reason: closeReason(code, reason) });
       return;
     }
-    if (code === 1008) this.attempt = Math.max(this.attempt, 5); // a retry will hardly help
+    // policy violation: an early retry is unlikely to succeed
+    if (code === 1008) this.attempt = Math.max(this.attempt, 5);
     const delayMs = reconnectDelayMs(this.attempt, this.clock.random());
     this.attempt += 1;
     const why = this.fault ?? closeReason(code, reason);
@@ -234,7 +236,7 @@ export class Connection {
   }
 }
 
-// ws(s)://... of the stream beside the page, wherever it is mounted.
+// URL ws(s)://... of the stream, relative to the page's base URL.
 export function streamUrl(baseUri: string): string {
   const url = new URL("v1/stream", baseUri);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";

@@ -1,5 +1,5 @@
-// Views -> lossless pictures by POST v1/frames, one by one, in order, at most two under way. A
-// server that is busy is asked again when it says so.
+// Views -> lossless pictures by POST v1/frames, in order, at most two requests at a time. If the
+// server is busy, the request is repeated after the delay given in its answer.
 import type { View } from "./protocol";
 import { posted, refusalText } from "./requests";
 import { clamp } from "../base/values";
@@ -48,7 +48,7 @@ export async function drawFrame(
   }
 }
 
-// `start` is called for every n in order, but at most `ahead` are begun and not yet taken.
+// Calls `start` for each n in order; at most `ahead` results are pending or not yet consumed.
 export async function inOrder<T>(
   count: number,
   start: (n: number) => Promise<T>,
@@ -60,7 +60,7 @@ export async function inOrder<T>(
   for (let n = 0; n < count; n++) {
     while (next < count && begun.length < ahead) {
       const one = start(next++);
-      one.catch(() => {}); // reported when its turn comes
+      one.catch(() => {}); // reported when this result is consumed
       begun.push(one);
     }
     await take(await begun.shift()!, n);

@@ -1,5 +1,5 @@
-// The wire: bytes of a binary message -> frame header and picture; text -> typed server message.
-// Everything here is pure; what is malformed is a WireError.
+// The wire format: bytes of a binary message -> frame header and picture; text -> typed server
+// message. All functions are pure; malformed input throws a WireError.
 import type { ClientMessage, Dataset, ServerMessage } from "../../generated/messages";
 import { isObject } from "../base/values";
 
@@ -25,7 +25,7 @@ export const frameHeaderBytes = 64;
 
 export interface FrameHeader {
   seq: number;
-  rev: number; // of the view drawn
+  rev: number; // rev of the view drawn
   step: number;
   final: boolean;
   errorMeasured: boolean;
@@ -44,7 +44,7 @@ export interface FrameHeader {
   renderUs: number;
   encodeUs: number;
   payloadBytes: number;
-  t: number; // echo of the newest patch's t, ms of this page's clock
+  t: number; // t of the newest patch, in ms of this page's clock
 }
 
 export interface Frame {
@@ -130,7 +130,7 @@ const isDataset = (value: unknown): value is Dataset =>
 const isProblem = (value: unknown): boolean =>
   isObject(value) && typeof value.detail === "string" && typeof value.title === "string";
 
-// What the page reads of each message; keys that it does not read are not its business.
+// Checks of the keys that the page reads from each message; other keys are ignored.
 const looksRight: Record<ServerMessage["type"], (message: Json) => boolean> = {
   hello: (m) => m.protocol === subprotocol && Array.isArray(m.datasets) && isObject(m.limits),
   opened: (m) => Number.isInteger(m.id) && isDataset(m.dataset),

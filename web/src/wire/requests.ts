@@ -1,11 +1,11 @@
-// Requests that post a view, and the text of refusals.
+// Requests that post a view, and the text of error answers.
 import type { Problem, View } from "./protocol";
 
 export function problemText(problem: Problem): string {
   const details = problem.errors?.map((e) =>
     e.pointer === "" ? e.detail : `${e.pointer}: ${e.detail}`,
   );
-  // The detail repeats the first value's text in many cases; the list says it better.
+  // The detail often repeats the first entry; the complete list is more useful.
   if (details !== undefined && details.length > 0) return details.join("; ");
   return problem.detail === "" ? problem.title : problem.detail;
 }
@@ -16,7 +16,7 @@ export const posted = (view: View, headers = {}): RequestInit => ({
   body: JSON.stringify(view),
 });
 
-// The server's own text of a refusal.
+// The server's own text of an error answer.
 export async function refusalText(response: Pick<Response, "status" | "json">): Promise<string> {
   const problem = (await response.json().catch(() => null)) as Problem | null;
   return (problem && problemText(problem)) || `The server answered with HTTP ${response.status}.`;

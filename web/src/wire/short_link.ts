@@ -4,11 +4,11 @@ import type { View } from "./protocol";
 import { notUnderstood, posted, refusalText } from "./requests";
 import { isView } from "./view_shape";
 
-export const linkMax = 2000; // characters; mail and chat break or cut longer ones
+export const linkMax = 2000; // characters; mail and chat programs break longer links
 
 export const shortLinkHash = (id: string): string => `#!view=${encodeURIComponent(id)}`;
 
-// null: the link is none to a saved view.
+// null: not a link to a stored view.
 export function shortLinkId(hash: string): string | null {
   const id = /^#!view=([\w.~-]{1,128})$/.exec(hash);
   return id === null ? null : id[1]!;

@@ -1,12 +1,12 @@
-// Whether what a link, a file or the storage holds has the shape of a view: arrays, objects, texts
-// and finite numbers where the page expects them. What they may be is the server's to judge, as are
-// keys that are not known here.
+// Checks whether a value from a link, a file or the storage has the shape of a view: arrays,
+// objects, texts and finite numbers where the page expects them. Permitted values and unknown keys
+// are checked by the server.
 import { viewKeys } from "../../generated/view_keys";
 import { viewRanges } from "../../generated/view_ranges";
 import type { View } from "./protocol";
 import { isObject } from "../base/values";
 
-// Numeric keys and their parents come from the ranges.
+// Numeric keys and their parents are taken from the ranges.
 const samples = new Map<string, unknown>();
 for (const pointer of Object.keys(viewRanges)) {
   const [key, ...around] = pointer.split("/").reverse();
@@ -15,8 +15,8 @@ for (const pointer of Object.keys(viewRanges)) {
 }
 for (const [key, sample] of Object.entries(viewKeys)) samples.set(key, sample);
 
-// `sample`: a value of the right shape. Lists of one stand for lists of any length, the keys of an
-// object are those that it must have.
+// `sample` is a value of the right shape. A list of one element represents lists of any length; the
+// keys of an object are the required ones.
 function fits(value: unknown, sample: unknown): boolean {
   if (Array.isArray(sample)) {
     return (
@@ -31,7 +31,7 @@ function fits(value: unknown, sample: unknown): boolean {
   return (
     isObject(value) &&
     Object.keys(sample).every((key) => (value[key] ?? null) !== null) &&
-    // null: the default.
+    // null stands for the default.
     Object.entries(value).every(
       ([key, one]) => one === null || !samples.has(key) || fits(one, samples.get(key)),
     )
