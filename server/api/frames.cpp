@@ -137,7 +137,8 @@ http::Response unchanged_response(const std::string& etag) {
   return {304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
 }
 
-// Returns null if the client already has the picture: `reply` is then called with 304.
+// Null if the client has the picture already: `reply` is called with 304. Its tag is that of the
+// completed view, for which data may have to be read: it is not known before.
 Result<work::PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
                                   work::ViewCompletion& completion, data::Dataset& dataset,
                                   work::Loading loading, const http::Reply& reply) {
