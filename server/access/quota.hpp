@@ -3,35 +3,28 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
-#include <list>
 #include <optional>
 #include <string>
-#include <unordered_map>
 
+#include "server/access/address_table.hpp"
+#include "server/access/handshake_quota.hpp"
 #include "server/access/limits.hpp"
-#include "server/metrics/limit_kind.hpp"
+#include "server/access/refusal.hpp"
+#include "server/access/token_bucket.hpp"
 
 namespace windsplat::access {
 
-struct Refusal {
-  metrics::LimitKind kind = metrics::LimitKind::connections;
-  double limit = 0;       // as in Limits
-  int retry_after_s = 1;  // estimated time until admission
-};
-
 class Quota {
  public:
-  using Micros = std::int64_t;  // of a monotonic clock
+  using Micros = TokenBucket::Micros;
 
-  static constexpr std::size_t addresses_max = 4096;  // tracked at a time
   // Size of the reserve: connections above the limits that serve health only. One address may use a
   // quarter of it.
   static constexpr std::size_t reserve_max = 64;
   static constexpr std::size_t reserve_per_address = reserve_max / 4;
   static constexpr double tls_arrivals = 5;  // cost of a handshake in plain connections
 
-  explicit Quota(const Limits& limits) : limits_(limits) {}
+  explicit Quota(const Limits& limits) : limits_(limits), addresses_(limits), handshakes_(limits) {}
 
   // Decision on a new connection: ordinary, in the reserve (with the reason), or refused.
   enum class Slot { ordinary, reserve, none };
@@ -72,58 +65,15 @@ class Quota {
   // Refused above the limit of recent failures; otherwise the failure is only counted.
   std::optional<Refusal> failed_login(const std::string& address, Micros now);
 
-  [[nodiscard]] std::size_t known() const { return entries_.size(); }
+  [[nodiscard]] std::size_t known() const { return addresses_.size(); }
   [[nodiscard]] std::size_t connections() const { return connections_; }
   [[nodiscard]] std::size_t reserved() const { return reserved_; }
 
  private:
-  // A token bucket that refills at a constant rate. May be overdrawn.
-  struct Rate {
-    double a_second = 0;  // 0: unlimited
-    double at_once = 0;
-  };
-  struct Bucket {
-    double taken = 0;  // net of refill; 0 is full
-    Micros at = 0;
-    void refill(const Rate& rate, Micros now);
-  };
-  struct Entry {
-    std::string address;
-    std::size_t connections = 0;
-    std::size_t reserved = 0;
-    std::size_t sessions = 0;
-    bool authenticated = false;
-    Bucket arrivals, handshakes, requests, health, messages, received, bytes, render, logins;
-    Micros seen = 0;
-  };
-  using Entries = std::list<Entry>;  // least recently seen first
-
-  [[nodiscard]] static Rate rate_for_ten_seconds(double a_second);
-  [[nodiscard]] Rate request_rate() const;
-  std::optional<Refusal> may_handshake(Entry& entry, bool trusted, Micros now);
-  // The bucket for an address's handshakes besides its own; null: none.
-  Bucket* shared_handshakes(const Entry* entry, bool trusted);
-  [[nodiscard]] Rate byte_rate() const;
-  [[nodiscard]] Rate render_rate() const;
-  [[nodiscard]] Rate login_rate() const;
-  static std::optional<Refusal> take_one(Bucket& bucket, const Rate& rate, metrics::LimitKind kind,
-                                         double limit, Micros now);
-  static Micros wait_for(Bucket& bucket, const Rate& rate, double room, Micros now);
-
-  // Strong exception guarantee if an allocation fails.
-  Entry& entry(const std::string& address, Micros now);
-  // For an address with connections or sessions, which has an entry. Does not allocate.
-  Entry* known_entry(const std::string& address);
-  void forget(Entries::iterator entry);
-  void forget_idle(Micros now);
-  bool is_idle(Entry& entry, Micros now) const;
-  void make_room();
-
   Limits limits_;
-  Entries entries_;
-  std::unordered_map<std::string, Entries::iterator> by_address_;
-  Bucket arrivals_;  // of all addresses
-  Bucket stranger_handshakes_, known_handshakes_;
+  AddressTable addresses_;
+  HandshakeQuota handshakes_;
+  TokenBucket arrivals_;  // of all addresses
   std::size_t connections_ = 0;
   std::size_t reserved_ = 0;
 };

@@ -15,7 +15,7 @@
 namespace windsplat::api {
 namespace {
 
-Result<protocol::View> read_view(Services& services, const std::string& body) {
+Result<protocol::View> read_view(work::Backend& backend, const std::string& body) {
   const auto document = protocol::ViewDocument::parse(body);
   if (!document) return document.error();
   protocol::View view = document->view();
@@ -26,7 +26,7 @@ Result<protocol::View> read_view(Services& services, const std::string& body) {
     return make_error_at(ErrorKind::invalid, "/method/name",
                          "reference has a single setting; forecasts apply to kernel and slab");
   }
-  if (const auto drawable = services.backend.check(view); !drawable) return drawable.error();
+  if (const auto drawable = backend.check(view); !drawable) return drawable.error();
   return view;
 }
 
@@ -47,26 +47,26 @@ Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const pr
 
 }  // namespace
 
-void post_forecast(Services& services, const http::Request& request, http::Reply reply) {
+void post_forecast(work::Backend& backend, const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
                                  "Content-Type must be application/json"));
     return;
   }
-  auto view = read_view(services, request.body);
+  auto view = read_view(backend, request.body);
   if (!view) {
     reply(http::problem_response(view.error()));
     return;
   }
-  const auto dataset = services.backend.catalogue.find(view->dataset);
+  const auto dataset = backend.catalogue.find(view->dataset);
   if (!dataset) {
     reply(http::problem_response(dataset.error()));
     return;
   }
   // No dataset id: the job reads none, so it waits only while all loading threads are busy.
-  run_later(services.backend.loads, request, std::move(reply), "a forecast", nullptr,
-            [&services, view = std::move(*view), dataset = *dataset]() -> http::Response {
-              const auto made = forecast(services.backend.quality, view, dataset->resident_only());
+  run_later(backend.loads, request, std::move(reply), "a forecast", nullptr,
+            [&backend, view = std::move(*view), dataset = *dataset]() -> http::Response {
+              const auto made = forecast(backend.quality, view, dataset->resident_only());
               return made ? json_response(protocol::encode_forecast(*made))
                           : http::problem_response(made.error());
             });

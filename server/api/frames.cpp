@@ -157,20 +157,18 @@ Result<work::PreparedPtr> prepare(quality::Tables& tables, const Picture& pictur
                                dataset, loading);
 }
 
-Result<http::Response> draw(Services& services, const Picture& picture,
+Result<http::Response> draw(work::Backend& backend, const Picture& picture,
                             const work::PreparedPicture& prepared, data::Dataset& dataset,
                             std::int64_t queue_us, work::Loading loading,
                             const CancelToken& cancel) {
-  auto drawn = frame::produce(prepared.frame, dataset, *services.backend.pool, cancel,
-                              services.backend.frames);
+  auto drawn = frame::produce(prepared.frame, dataset, *backend.pool, cancel, backend.frames);
   if (!drawn) return drawn.error();
   protocol::FrameInfo info = frame::frame_info(*drawn, drawn->view);
   work::report_error(*drawn, work::observed_in(*drawn, prepared.frame.setting),
-                     prepared.frame.setting, prepared.frame.encoding, services.backend.quality,
-                     info);
-  services.metrics.stage_took(metrics::Metrics::Stage::queue, queue_us);
-  services.metrics.stage_took(metrics::Metrics::Stage::render, drawn->render_us);
-  services.metrics.stage_took(metrics::Metrics::Stage::encode, drawn->encode_us);
+                     prepared.frame.setting, prepared.frame.encoding, backend.quality, info);
+  backend.metrics.stage_took(metrics::Metrics::Stage::queue, queue_us);
+  backend.metrics.stage_took(metrics::Metrics::Stage::render, drawn->render_us);
+  backend.metrics.stage_took(metrics::Metrics::Stage::encode, drawn->encode_us);
   http::Response response;
   if (is_chosen(drawn->view)) {
     response.headers = {{"Cache-Control", "no-store"}};
@@ -180,9 +178,8 @@ Result<http::Response> draw(Services& services, const Picture& picture,
     // Settings chosen by the server reduce the work below the estimate; the scene of a picture that
     // waited for data was built elsewhere.
     if (loading == work::Loading::none) {
-      services.backend.request_times.learn(drawn->view.dataset, drawn->view.method.name,
-                                           picture.cost.kernels,
-                                           drawn->render_us + drawn->encode_us);
+      backend.request_times.learn(drawn->view.dataset, drawn->view.method.name,
+                                  picture.cost.kernels, drawn->render_us + drawn->encode_us);
     }
   }
   response.content_type = media_type(picture.encoding.format);
@@ -198,15 +195,16 @@ Result<http::Response> draw(Services& services, const Picture& picture,
   return response;
 }
 
-void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dataset> dataset,
-                    const http::Request& request, http::Reply reply) {
-  if (auto refusal = services.admission.picture(request.address)) {
+void submit_picture(work::Backend& backend, access::Admission& admission, Picture asked,
+                    std::shared_ptr<data::Dataset> dataset, const http::Request& request,
+                    http::Reply reply) {
+  if (auto refusal = admission.picture(request.address)) {
     reply(std::move(*refusal));
     return;
   }
-  const double estimate_ms = services.backend.request_times.estimate_ms(
+  const double estimate_ms = backend.request_times.estimate_ms(
       asked.view.dataset, asked.view.method.name, asked.cost.kernels);
-  if (const auto fits = services.admission.check_estimate(asked.cost, estimate_ms); !fits) {
+  if (const auto fits = admission.check_estimate(asked.cost, estimate_ms); !fits) {
     reply(http::problem_response(fits.error()));
     return;
   }
@@ -219,26 +217,25 @@ void submit_picture(Services& services, Picture asked, std::shared_ptr<data::Dat
       request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
   work::Drawing drawing{
       work::RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
-  drawing.prepare = [&tables = services.backend.quality, picture, answer, cancel,
+  drawing.prepare = [&tables = backend.quality, picture, answer, cancel,
                      completion = std::make_shared<work::ViewCompletion>(),
                      id = request.id](data::Dataset& available, work::Loading loading) {
     return work::run_guarded<work::PreparedPtr>(
         "preparing a picture", cancel,
         [&] { return prepare(tables, *picture, *completion, available, loading, *answer); }, id);
   };
-  drawing.draw = [&services, picture, answer, cancel, id = request.id](
+  drawing.draw = [&backend, picture, answer, cancel, id = request.id](
                      const work::PreparedPicture& prepared, data::Dataset& resident,
                      std::int64_t queue_us, work::Loading loading) {
     auto response = work::run_guarded<http::Response>(
         "a picture", cancel,
-        [&] { return draw(services, *picture, prepared, resident, queue_us, loading, cancel); },
-        id);
+        [&] { return draw(backend, *picture, prepared, resident, queue_us, loading, cancel); }, id);
     (*answer)(response ? std::move(*response) : http::problem_response(response.error()));
   };
   drawing.payer = request.address;
   drawing.cost_ms = estimate_ms;
   drawing.fail = [answer](const Error& error) { (*answer)(http::problem_response(error)); };
-  if (const auto queued = work::submit(services.backend, std::move(drawing)); !queued) {
+  if (const auto queued = work::submit(backend, std::move(drawing)); !queued) {
     (*answer)(http::problem_response(queued.error()));
   }
 }
@@ -306,9 +303,9 @@ Result<Picture> read_view(const http::Request& request, frame::Format format) {
 
 }  // namespace
 
-void get_frame(Services& services, const std::string& id, frame::Format format,
-               const http::Request& request, http::Reply reply) {
-  auto dataset = services.backend.catalogue.find(id);
+void get_frame(work::Backend& backend, access::Admission& admission, frame::Format format,
+               const std::string& id, const http::Request& request, http::Reply reply) {
+  auto dataset = backend.catalogue.find(id);
   if (!dataset) {
     reply(http::problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
     return;
@@ -319,16 +316,18 @@ void get_frame(Services& services, const std::string& id, frame::Format format,
     return;
   }
   picture->view.dataset = id;
-  auto checked = services.backend.check(picture->view);
+  auto checked = backend.check(picture->view);
   if (!checked) {
     reply(http::problem_response(checked.error()));
     return;
   }
   picture->cost = std::move(checked->cost);
-  submit_picture(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
+  submit_picture(backend, admission, std::move(*picture), std::move(*dataset), request,
+                 std::move(reply));
 }
 
-void post_frame(Services& services, const http::Request& request, http::Reply reply) {
+void post_frame(work::Backend& backend, access::Admission& admission, const http::Request& request,
+                http::Reply reply) {
   constexpr std::array<frame::Format, 3> formats{frame::Format::jpeg, frame::Format::png,
                                                  frame::Format::npy};
   constexpr std::array<std::string_view, 3> types{"image/jpeg", "image/png", "application/x-npy"};
@@ -348,18 +347,19 @@ void post_frame(Services& services, const http::Request& request, http::Reply re
     reply(http::problem_response(picture.error()));
     return;
   }
-  auto checked = services.backend.check(picture->view);
+  auto checked = backend.check(picture->view);
   if (!checked) {
     reply(http::problem_response(checked.error()));
     return;
   }
   picture->cost = std::move(checked->cost);
-  auto dataset = services.backend.catalogue.find(picture->view.dataset);
+  auto dataset = backend.catalogue.find(picture->view.dataset);
   if (!dataset) {
     reply(http::problem_response(dataset.error()));
     return;
   }
-  submit_picture(services, std::move(*picture), std::move(*dataset), request, std::move(reply));
+  submit_picture(backend, admission, std::move(*picture), std::move(*dataset), request,
+                 std::move(reply));
 }
 
 }  // namespace windsplat::api

@@ -38,22 +38,22 @@ struct Subject {
   CancelToken cancel;
 };
 
-Result<DatasetPtr> find_dataset(const Services& services, const std::string& id) {
-  auto dataset = services.backend.catalogue.find(id);
+Result<DatasetPtr> find_dataset(const work::Catalogue& catalogue, const std::string& id) {
+  auto dataset = catalogue.find(id);
   if (!dataset) return make_error(ErrorKind::not_found, dataset.error().message);
   return dataset;
 }
 
-Result<Subject> find_subject(Services& services, const std::string& id, const std::string& field,
-                             const http::Request& request) {
-  auto dataset = find_dataset(services, id);
+Result<Subject> find_subject(work::Catalogue& catalogue, const std::string& id,
+                             const std::string& field, const http::Request& request) {
+  auto dataset = find_dataset(catalogue, id);
   if (!dataset) return dataset.error();
   const data::FieldInfo* found = (*dataset)->info().find(field);
   if (found == nullptr) {
     return make_error(ErrorKind::not_found,
                       "dataset '" + printable(id) + "' has no field '" + printable(field) + "'");
   }
-  return Subject{&services.backend.catalogue, std::move(*dataset), *found, request.cancel};
+  return Subject{&catalogue, std::move(*dataset), *found, request.cancel};
 }
 
 Result<std::shared_ptr<const data::Volume>> load(work::Catalogue& catalogue,
@@ -134,15 +134,15 @@ Result<std::optional<http::Response>> take_turn(Pass& pass) {
 }
 
 // Resubmits itself, so that other loads run in between. Only the first job may be refused.
-void go_on(Services& services, const std::shared_ptr<Pass>& pass, bool admitted) {
-  const auto run = [&services, pass] {
+void go_on(work::TaskExecutor& loads, const std::shared_ptr<Pass>& pass, bool admitted) {
+  const auto run = [&loads, pass] {
     auto answer = work::run_guarded<std::optional<http::Response>>(
         "a pass over all steps", pass->cancel, [&] { return take_turn(*pass); });
     if (!answer) return (*pass->reply)(http::problem_response(answer.error()));
     if (*answer) return (*pass->reply)(std::move(**answer));
-    go_on(services, pass, true);
+    go_on(loads, pass, true);
   };
-  const auto queued = services.backend.loads.submit(
+  const auto queued = loads.submit(
       {pass->cancel, run, admitted, pass->subject.dataset->shared_info(), pass->payer});
   if (!queued) (*pass->reply)(http::problem_response(queued.error()));
 }
@@ -241,28 +241,29 @@ http::Response step_range(const Subject& subject, std::size_t step) {
   return range_response(range, "step");
 }
 
-void answer_range_of_all(Services& services, Subject subject, const http::Request& request,
+void answer_range_of_all(work::Backend& backend, Subject subject, const http::Request& request,
                          http::Reply reply) {
   auto of = subject.dataset->shared_info();
-  if (const auto known = services.backend.ranges.find(of, subject.field.name)) {
+  if (const auto known = backend.ranges.find(of, subject.field.name)) {
     reply(range_response(*known, "all"));
     return;
   }
   const auto pass = pass_over(std::move(subject), request, std::move(reply));
   const auto range = std::make_shared<data::FieldRange>();
   pass->take = [range](const data::Volume& volume) { range->add(volume); };
-  pass->finish = [&services, range, of = std::move(of), field = pass->subject.field.name] {
-    services.backend.ranges.keep(of, field, *range);
+  pass->finish = [&ranges = backend.ranges, range, of = std::move(of),
+                  field = pass->subject.field.name] {
+    ranges.keep(of, field, *range);
     return range_response(*range, "all");
   };
-  go_on(services, pass, false);
+  go_on(backend.loads, pass, false);
 }
 
 }  // namespace
 
-void get_histogram(Services& services, const std::string& id, const std::string& field,
-                   const http::Request& request, http::Reply reply) {
-  auto subject = find_subject(services, id, field, request);
+void get_histogram(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+                   const std::string& field, const http::Request& request, http::Reply reply) {
+  auto subject = find_subject(catalogue, id, field, request);
   if (!subject) {
     reply(http::problem_response(subject.error()));
     return;
@@ -272,15 +273,15 @@ void get_histogram(Services& services, const std::string& id, const std::string&
     reply(http::problem_response(query.error()));
     return;
   }
-  run_later(services.backend.loads, request, std::move(reply), "a histogram",
-            subject->dataset.get(), [subject = *subject, query = *query, cancel = request.cancel] {
+  run_later(loads, request, std::move(reply), "a histogram", subject->dataset.get(),
+            [subject = *subject, query = *query, cancel = request.cancel] {
               return histogram_response(subject, query, cancel);
             });
 }
 
-void get_probe(Services& services, const std::string& id, const http::Request& request,
-               http::Reply reply) {
-  auto dataset = find_dataset(services, id);
+void get_probe(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+               const http::Request& request, http::Reply reply) {
+  auto dataset = find_dataset(catalogue, id);
   if (!dataset) {
     reply(http::problem_response(dataset.error()));
     return;
@@ -292,16 +293,16 @@ void get_probe(Services& services, const std::string& id, const http::Request& r
     reply(http::problem_response(ok.error()));
     return;
   }
-  run_later(
-      services.backend.loads, request, std::move(reply), "a probe", dataset->get(),
-      [&catalogue = services.backend.catalogue, dataset = *dataset, at, step,
-       cancel = request.cancel] { return probe_response(catalogue, *dataset, at, step, cancel); });
+  run_later(loads, request, std::move(reply), "a probe", dataset->get(),
+            [&catalogue, dataset = *dataset, at, step, cancel = request.cancel] {
+              return probe_response(catalogue, *dataset, at, step, cancel);
+            });
 }
 
-void get_series(Services& services, const std::string& id, const std::string& field,
-                const http::Request& request, http::Reply reply) {
+void get_series(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+                const std::string& field, const http::Request& request, http::Reply reply) {
   const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
-  auto subject = find_subject(services, id, field, request);
+  auto subject = find_subject(catalogue, id, field, request);
   if (!subject) return refuse(subject.error());
   const data::DatasetInfo& info = subject->dataset->info();
   http::QueryReader query(request.query);
@@ -326,13 +327,13 @@ void get_series(Services& services, const std::string& id, const std::string& fi
     series->values.push_back(data::value_at(volume, (*place)->index));
   };
   pass->finish = [series] { return json_response(protocol::encode_series(*series)); };
-  go_on(services, pass, false);
+  go_on(loads, pass, false);
 }
 
-void get_range(Services& services, const std::string& id, const std::string& field,
+void get_range(work::Backend& backend, const std::string& id, const std::string& field,
                const http::Request& request, http::Reply reply) {
   const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
-  auto subject = find_subject(services, id, field, request);
+  auto subject = find_subject(backend.catalogue, id, field, request);
   if (!subject) return refuse(subject.error());
   http::QueryReader query(request.query);
   const std::string of = query.text("of").value_or("step");
@@ -343,7 +344,7 @@ void get_range(Services& services, const std::string& id, const std::string& fie
                              "query parameter 'of' must be step or all, not " + printable(of, 40)));
   }
   if (of == "step") {
-    run_later(services.backend.loads, request, std::move(reply), "a range", subject->dataset.get(),
+    run_later(backend.loads, request, std::move(reply), "a range", subject->dataset.get(),
               [subject = *subject, step = step.value_or(0)] {
                 return step_range(subject, static_cast<std::size_t>(step));
               });
@@ -352,7 +353,7 @@ void get_range(Services& services, const std::string& id, const std::string& fie
   if (step)
     return refuse(make_error(ErrorKind::invalid, "query parameter 'step' requires of=step"));
   if (const auto ok = check_steps(subject->dataset->info()); !ok) return refuse(ok.error());
-  answer_range_of_all(services, std::move(*subject), request, std::move(reply));
+  answer_range_of_all(backend, std::move(*subject), request, std::move(reply));
 }
 
 }  // namespace windsplat::api

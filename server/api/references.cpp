@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view suffix = ".png";
 
-Result<protocol::View> read_view(Services& services, const http::Request& request) {
+Result<protocol::View> read_view(work::Backend& backend, const http::Request& request) {
   const auto document = protocol::ViewDocument::parse(request.body);
   if (!document) return document.error();
   protocol::View view = document->view();
@@ -32,43 +32,43 @@ Result<protocol::View> read_view(Services& services, const http::Request& reques
     detail += " pixels; draw larger ones with `windsplat render`";
     return make_error_at(ErrorKind::too_large, "/image", std::move(detail));
   }
-  if (const auto drawable = services.backend.check(view); !drawable) return drawable.error();
+  if (const auto drawable = backend.check(view); !drawable) return drawable.error();
   return view;
 }
 
 }  // namespace
 
-void post_reference(Services& services, const http::Request& request, http::Reply reply) {
+void post_reference(work::Backend& backend, access::Admission& admission,
+                    const std::string& base_path, const http::Request& request, http::Reply reply) {
   const http::Reply answer = std::move(reply);
   if (!is_json(request.header("Content-Type"))) {
     answer(http::problem_response(415, "Unsupported Media Type",
                                   "Content-Type must be application/json"));
     return;
   }
-  auto view = read_view(services, request);
+  auto view = read_view(backend, request);
   if (!view) return answer(http::problem_response(view.error()));
-  const auto dataset = services.backend.catalogue.find(view->dataset);
+  const auto dataset = backend.catalogue.find(view->dataset);
   if (!dataset) return answer(http::problem_response(dataset.error()));
-  if (auto refusal = services.admission.picture(request.address)) return answer(*refusal);
+  if (auto refusal = admission.picture(request.address)) return answer(*refusal);
   work::Jobs::Terms terms;
   terms.slow = true;
-  auto ticket = services.backend.references.admit(request.address, terms.cancel);
+  auto ticket = backend.references.admit(request.address, terms.cancel);
   if (!ticket) return answer(http::problem_response(ticket.error()));
-  const auto work = [&services, view = std::move(*view), dataset = *dataset,
+  const auto work = [&backend, &base_path, view = std::move(*view), dataset = *dataset,
                      address = request.address,
                      ticket = std::move(*ticket)](const work::Jobs::Handle& handle) {
-    return work::draw_reference(services.backend, view, *dataset, handle, address,
-                                services.options.base_path);
+    return work::draw_reference(backend, view, *dataset, handle, address, base_path);
   };
-  answer(job_response(services, services.backend.jobs.submit("reference", work, terms)));
+  answer(job_response(backend.metrics, base_path, backend.jobs.submit("reference", work, terms)));
 }
 
 // The content of an id never changes.
-http::Response get_reference(Services& services, const std::string& name,
+http::Response get_reference(work::References& references, const std::string& name,
                              const http::Request& request) {
   const bool is_png = name.size() > suffix.size() && name.ends_with(suffix);
   const std::string id = is_png ? name.substr(0, name.size() - suffix.size()) : "";
-  const auto kept = services.backend.references.find(id);
+  const auto kept = references.find(id);
   if (!kept) {
     return http::problem_response(
         make_error(ErrorKind::not_found, "unknown or expired reference: post its view again"));

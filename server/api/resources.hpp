@@ -1,75 +1,86 @@
-// Handlers of the API resources. The router has checked path and method.
+// Handlers of the API resources, each with the parts of the server that it uses. The router has
+// checked path and method.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 
-#include "server/api/router.hpp"
+#include "server/access/admission.hpp"
+#include "server/api/server_options.hpp"
 #include "server/frame/frame.hpp"
 #include "server/http/exchange.hpp"
+#include "server/metrics/metrics.hpp"
+#include "server/work/backend.hpp"
 
 namespace windsplat::api {
 
-http::Response get_service(const Services& services);
+http::Response get_service(const ServerOptions& options);
 http::Response get_color_maps();
 http::Response get_presets();
 http::Response get_view_schema(const http::Request& request);
 http::Response get_livez();
-http::Response get_readyz(const Services& services);
-http::Response get_metrics(const Services& services);
+http::Response get_readyz(const std::atomic<bool>& draining);
+http::Response get_metrics(const metrics::Metrics& metrics, const work::Catalogue& catalogue);
 
-// Runs `make` on a thread of the service and replies with its value or error. `what` names the work
-// in the log; `of`: the dataset that it reads, if any.
-void run_later(work::TaskExecutor& service, const http::Request& request, http::Reply reply,
+// Runs `make` on a thread of the executor and replies with its value or error. `what` names the
+// work in the log; `of`: the dataset that it reads, if any.
+void run_later(work::TaskExecutor& executor, const http::Request& request, http::Reply reply,
                const char* what, const data::Dataset* of, std::function<http::Response()> make);
 bool is_json(std::string_view content_type);
 bool is_merge_patch(std::string_view content_type);
 
-http::Response get_datasets(const Services& services);
-void get_dataset(Services& services, const std::string& id, const http::Request& request,
-                 http::Reply reply);
+http::Response get_datasets(const work::Catalogue& catalogue);
+void get_dataset(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+                 const http::Request& request, http::Reply reply);
 
 // Opens a file below a root given by --data-root, in a job.
-void post_dataset(Services& services, const http::Request& request, http::Reply reply);
-http::Response delete_dataset(Services& services, const std::string& id,
+void post_dataset(const ServerOptions& options, work::TaskExecutor& look_ups,
+                  work::Backend& backend, const http::Request& request, http::Reply reply);
+http::Response delete_dataset(work::Catalogue& catalogue, const std::string& id,
                               const http::Request& request);
 // 202 with the location of the job, or the error.
-http::Response job_response(Services& services, const Result<protocol::JobDescription>& job);
-http::Response get_jobs(const Services& services);
-http::Response get_job(const Services& services, const std::string& id);
-http::Response delete_job(Services& services, const std::string& id);
+http::Response job_response(metrics::Metrics& metrics, const std::string& base_path,
+                            const Result<protocol::JobDescription>& job);
+http::Response get_jobs(const work::Jobs& jobs);
+http::Response get_job(const work::Jobs& jobs, const std::string& id);
+http::Response delete_job(work::Jobs& jobs, const std::string& id);
 
-void get_probe(Services& services, const std::string& id, const http::Request& request,
-               http::Reply reply);
-void get_histogram(Services& services, const std::string& id, const std::string& field,
-                   const http::Request& request, http::Reply reply);
-void get_series(Services& services, const std::string& id, const std::string& field,
-                const http::Request& request, http::Reply reply);
-void get_range(Services& services, const std::string& id, const std::string& field,
+void get_probe(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+               const http::Request& request, http::Reply reply);
+void get_histogram(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+                   const std::string& field, const http::Request& request, http::Reply reply);
+void get_series(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+                const std::string& field, const http::Request& request, http::Reply reply);
+void get_range(work::Backend& backend, const std::string& id, const std::string& field,
                const http::Request& request, http::Reply reply);
 
-void get_frame(Services& services, const std::string& id, frame::Format format,
-               const http::Request& request, http::Reply reply);
-void post_frame(Services& services, const http::Request& request, http::Reply reply);
+void get_frame(work::Backend& backend, access::Admission& admission, frame::Format format,
+               const std::string& id, const http::Request& request, http::Reply reply);
+void post_frame(work::Backend& backend, access::Admission& admission, const http::Request& request,
+                http::Reply reply);
 
 // The reference of a view: drawn by a job, then cached.
-void post_reference(Services& services, const http::Request& request, http::Reply reply);
-http::Response get_reference(Services& services, const std::string& name,
+void post_reference(work::Backend& backend, access::Admission& admission,
+                    const std::string& base_path, const http::Request& request, http::Reply reply);
+http::Response get_reference(work::References& references, const std::string& name,
                              const http::Request& request);
 // Estimated time and error of a picture of a posted view.
-void post_forecast(Services& services, const http::Request& request, http::Reply reply);
+void post_forecast(work::Backend& backend, const http::Request& request, http::Reply reply);
 
-void post_saved_view(Services& services, const http::Request& request, http::Reply reply);
-http::Response get_view(const Services& services, const std::string& id,
+// `view_io` runs the changes.
+void post_saved_view(views::SavedViews& views, work::TaskExecutor& view_io,
+                     const std::string& base_path, const http::Request& request, http::Reply reply);
+http::Response get_view(const views::SavedViews& views, const std::string& id,
                         const http::Request& request);
-void put_view(Services& services, const std::string& id, const http::Request& request,
-              http::Reply reply);
-void patch_view(Services& services, const std::string& id, const http::Request& request,
-                http::Reply reply);
-void delete_view(Services& services, const std::string& id, const http::Request& request,
-                 http::Reply reply);
+void put_view(views::SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+              const http::Request& request, http::Reply reply);
+void patch_view(views::SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+                const http::Request& request, http::Reply reply);
+void delete_view(views::SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+                 const http::Request& request, http::Reply reply);
 
 // An embedded file of the page; `path` as in web_assets().
 bool has_page(const std::string& path);

@@ -2,6 +2,7 @@
 #include "server/api/router.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -9,7 +10,6 @@
 #include <vector>
 
 #include "server/api/resources.hpp"
-#include "server/api/routes.hpp"
 #include "server/base/log.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
@@ -44,54 +44,19 @@ bool matches(std::string_view path, const Segments& given, PathValues& values) {
   return true;
 }
 
-// The routes of one path, and the values of its placeholders.
-struct Resource {
-  const char* name = route_other;
-  std::vector<Route> routes;
-  PathValues values;
-
-  [[nodiscard]] std::string allow() const {
-    std::string methods;
-    for (const Route& route : routes) {
-      methods += route.method;
-      methods += route.method == std::string_view("GET") ? ", HEAD, " : ", ";
-    }
-    return methods + "OPTIONS";
-  }
-  [[nodiscard]] const Route* find(const std::string& method) const {
-    for (const Route& route : routes) {
-      if (method == route.method) return &route;
-      if (method == "HEAD" && route.method == std::string_view("GET")) return &route;
-    }
-    return nullptr;
-  }
-};
-
 // Files of the page. Links to them may have query parameters added by other sites.
-std::optional<Resource> find_page(const Segments& path) {
-  std::string file;
-  for (const std::string& segment : path) file += (file.empty() ? "" : "/") + segment;
-  if (path.empty()) file = "index.html";
-  if (!has_page(file)) return std::nullopt;
-  const auto get = [](Services& /*services*/, const PathValues& values,
-                      const http::Request& request,
-                      const http::Reply& reply) { reply(get_page(request, values[0])); };
-  return Resource{route_page, {{"GET", "", get, Query::taken}}, {std::move(file)}};
+const Route& page_route() {
+  static const Route route{"GET", "",
+                           [](const PathValues& values, const http::Request& request,
+                              const http::Reply& reply) { reply(get_page(request, values[0])); },
+                           Query::taken};
+  return route;
 }
 
-std::optional<Resource> find_resource(const http::Request& request) {
-  Resource found;
-  for (const Route& route : routes()) {
-    if (route.place == Place::base && !request.below_base) continue;
-    PathValues values;
-    if (!matches(route.path, request.path, values)) continue;
-    found.name = route.name;
-    found.routes.push_back(route);
-    found.values = std::move(values);
-  }
-  if (!found.routes.empty()) return found;
-  if (!request.below_base) return std::nullopt;
-  return find_page(request.path);
+std::string page_file(const Segments& path) {
+  std::string file;
+  for (const std::string& segment : path) file += (file.empty() ? "" : "/") + segment;
+  return path.empty() ? "index.html" : file;
 }
 
 http::Response method_not_allowed(const std::string& method, const std::string& allow) {
@@ -102,19 +67,66 @@ http::Response method_not_allowed(const std::string& method, const std::string& 
 }
 
 // Redirects "/a" to "/a/": relative links of the page need the slash.
-bool lacks_slash(const Services& services, const http::Request& request) {
-  return request.below_base && request.path.empty() && !request.ends_in_slash &&
-         services.options.base_path != "/";
+bool lacks_slash(const std::string& base_path, const http::Request& request) {
+  return request.below_base && request.path.empty() && !request.ends_in_slash && base_path != "/";
 }
 
-std::optional<http::Response> refused_by_quota(Services& services, const Route& route,
+std::optional<http::Response> refused_by_quota(access::Admission& admission, const Route& route,
                                                const http::Request& request) {
   if (route.charge != Charge::picture) return std::nullopt;
-  return services.admission.picture(request.address);
+  return admission.picture(request.address);
 }
 
-void answer(Services& services, const http::Request& request,
-            const std::optional<Resource>& resource, const http::Reply& reply) {
+}  // namespace
+
+// The routes of one path, and the values of its placeholders.
+struct Router::Resource {
+  const char* name = route_other;
+  std::vector<const Route*> routes;
+  PathValues values;
+
+  [[nodiscard]] std::string allow() const {
+    std::string methods;
+    for (const Route* route : routes) {
+      methods += route->method;
+      methods += route->method == std::string_view("GET") ? ", HEAD, " : ", ";
+    }
+    return methods + "OPTIONS";
+  }
+  [[nodiscard]] const Route* find(const std::string& method) const {
+    for (const Route* route : routes) {
+      if (method == route->method) return route;
+      if (method == "HEAD" && route->method == std::string_view("GET")) return route;
+    }
+    return nullptr;
+  }
+};
+
+Router::Router(std::vector<Route> routes, const std::string& base_path,
+               access::Admission& admission, const std::atomic<bool>& draining)
+    : routes_(std::move(routes)),
+      base_path_(base_path),
+      admission_(admission),
+      draining_(draining) {}
+
+std::optional<Router::Resource> Router::find(const http::Request& request) const {
+  Resource found;
+  for (const Route& route : routes_) {
+    if (route.place == Place::base && !request.below_base) continue;
+    PathValues values;
+    if (!matches(route.path, request.path, values)) continue;
+    found.name = route.name;
+    found.routes.push_back(&route);
+    found.values = std::move(values);
+  }
+  if (!found.routes.empty()) return found;
+  std::string file = page_file(request.path);
+  if (!request.below_base || !has_page(file)) return std::nullopt;
+  return Resource{route_page, {&page_route()}, {std::move(file)}};
+}
+
+void Router::answer(const http::Request& request, const std::optional<Resource>& resource,
+                    const http::Reply& reply) const {
   if (request.method == "OPTIONS" && !request.below_base && request.path == Segments{"*"}) {
     reply({204, "", {{"Allow", "GET, HEAD, POST, PUT, PATCH, DELETE, OPTIONS"}}, {}});
     return;
@@ -129,23 +141,21 @@ void answer(Services& services, const http::Request& request,
     reply({204, "", {{"Allow", allow}}, {}});
   } else if (route == nullptr) {
     reply(method_not_allowed(request.method, allow));
-  } else if (lacks_slash(services, request)) {
-    reply({308, "", {{"Location", services.options.base_path}}, {}});
+  } else if (lacks_slash(base_path_, request)) {
+    reply({308, "", {{"Location", base_path_}}, {}});
   } else if (route->query == Query::refused && !request.query.empty()) {
     const auto unknown = http::QueryReader(request.query).finish();
     reply(http::problem_response(unknown.error()));
-  } else if (auto refusal = refused_by_quota(services, *route, request)) {
+  } else if (auto refusal = refused_by_quota(admission_, *route, request)) {
     reply(std::move(*refusal));
   } else {
-    route->handler(services, resource->values, request, reply);
+    route->handler(resource->values, request, reply);
   }
 }
 
-}  // namespace
-
-bool names_health(const http::Request& request) {
+bool Router::names_health(const http::Request& request) const {
   return request.path.size() == 1 &&
-         std::any_of(routes().begin(), routes().end(), [&](const Route& route) {
+         std::any_of(routes_.begin(), routes_.end(), [&](const Route& route) {
            return route.place == Place::root && route.path + 1 == request.path[0];
          });
 }
@@ -154,14 +164,22 @@ bool names_stream(const http::Request& request) {
   return request.below_base && request.path == Segments{"v1", "stream"};
 }
 
-const char* route(Services& services, const http::Request& request, const http::Reply& reply) {
-  const auto resource = find_resource(request);
-  if (services.draining && !names_health(request)) {
+const char* Router::route(const http::Request& request, const http::Reply& reply) const {
+  const auto resource = find(request);
+  if (draining_ && !names_health(request)) {
     reply(http::problem_response(make_error(ErrorKind::draining, "the server is shutting down")));
   } else {
-    answer(services, request, resource, reply);
+    answer(request, resource, reply);
   }
   return resource ? resource->name : route_other;
+}
+
+std::vector<const char*> Router::route_names() const {
+  std::vector<const char*> names{route_login, route_page, route_other};
+  for (const Route& route : routes_) {
+    if (std::strcmp(names.back(), route.name) != 0) names.push_back(route.name);
+  }
+  return names;
 }
 
 }  // namespace windsplat::api

@@ -1,18 +1,44 @@
 // Maps requests to resources. Resources reply at once or, after a render job, later.
 #pragma once
 
-#include "server/api/services.hpp"
+#include <atomic>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/access/admission.hpp"
+#include "server/api/routes.hpp"
 #include "server/http/exchange.hpp"
 
 namespace windsplat::api {
 
-// Whether the path is answered under any load: /livez, /readyz, /metrics.
-bool names_health(const http::Request& request);
 // Whether the path is that of the stream.
 bool names_stream(const http::Request& request);
 
-// Calls `reply` once: now, or later from the renderer's thread. Does not throw after the reply.
-// Returns the route name (routes.hpp).
-const char* route(Services& services, const http::Request& request, const http::Reply& reply);
+class Router {
+ public:
+  // While `draining` only health is answered.
+  Router(std::vector<Route> routes, const std::string& base_path, access::Admission& admission,
+         const std::atomic<bool>& draining);
+
+  // Whether the path is answered under any load: /livez, /readyz, /metrics.
+  [[nodiscard]] bool names_health(const http::Request& request) const;
+  // Calls `reply` once: now, or later from the renderer's thread. Does not throw after the reply.
+  // Returns the route name (routes.hpp).
+  const char* route(const http::Request& request, const http::Reply& reply) const;
+  // All values of route(), without repetition: a bounded set.
+  [[nodiscard]] std::vector<const char*> route_names() const;
+
+ private:
+  struct Resource;
+  [[nodiscard]] std::optional<Resource> find(const http::Request& request) const;
+  void answer(const http::Request& request, const std::optional<Resource>& resource,
+              const http::Reply& reply) const;
+
+  const std::vector<Route> routes_;
+  const std::string& base_path_;
+  access::Admission& admission_;
+  const std::atomic<bool>& draining_;
+};
 
 }  // namespace windsplat::api

@@ -1,20 +1,23 @@
 // The table of routes: every path and method of the API, what it takes, and its handler.
 #pragma once
 
-#include <span>
+#include <atomic>
+#include <functional>
 #include <string>
 #include <vector>
 
-#include "server/api/services.hpp"
+#include "server/access/admission.hpp"
+#include "server/api/server_options.hpp"
 #include "server/http/exchange.hpp"
+#include "server/work/backend.hpp"
 
 namespace windsplat::api {
 
 // Values of the placeholders of a path, in order.
 using PathValues = std::vector<std::string>;
 // Replies once, now or later. Does not throw after the reply.
-using Handler = void (*)(Services& services, const PathValues& values, const http::Request& request,
-                         const http::Reply& reply);
+using Handler = std::function<void(const PathValues& values, const http::Request& request,
+                                   const http::Reply& reply)>;
 
 enum class Query { refused, taken };
 enum class Charge {
@@ -37,15 +40,16 @@ struct Route {
   const char* name = path;  // by which requests are logged and counted
 };
 
-// In the order of methods that Allow states. Documented in docs/user/api.md.
-std::span<const Route> routes();
+// The table, with each handler bound to the parts of the server that it uses. In the order of
+// methods that Allow states. Documented in docs/user/api.md. `look_ups` resolve posted names,
+// `view_io` changes saved views.
+std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
+                          access::Admission& admission, work::Backend& backend,
+                          work::TaskExecutor& look_ups, work::TaskExecutor& view_io);
 
 // What requests are counted by besides the paths of routes().
 inline constexpr const char* route_stream = "/v1/stream";
 inline constexpr const char* route_login = "/login";
 inline constexpr const char* route_page = "page";
 inline constexpr const char* route_other = "other";  // unknown or unparsed path
-// All of them, without repetition: a bounded set.
-std::vector<const char*> route_names();
-
 }  // namespace windsplat::api

@@ -45,7 +45,7 @@ bool is_merge_patch(std::string_view content_type) {
                                   "application/merge-patch+json");
 }
 
-void run_later(work::TaskExecutor& service, const http::Request& request, http::Reply reply,
+void run_later(work::TaskExecutor& executor, const http::Request& request, http::Reply reply,
                const char* what, const data::Dataset* of, std::function<http::Response()> make) {
   const auto answer = std::make_shared<const http::Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;
@@ -53,7 +53,7 @@ void run_later(work::TaskExecutor& service, const http::Request& request, http::
     auto response = work::run_guarded<http::Response>(what, cancel, make, id);
     (*answer)(response ? std::move(*response) : http::problem_response(response.error()));
   };
-  const auto queued = service.submit(
+  const auto queued = executor.submit(
       {cancel, run, false, of == nullptr ? nullptr : of->shared_info(), request.address});
   if (!queued) (*answer)(http::problem_response(queued.error()));
 }
@@ -80,23 +80,23 @@ http::Response tagged_response(const http::Request& request, std::string_view co
 
 http::Response get_livez() { return health(200, "live"); }
 
-http::Response get_readyz(const Services& services) {
-  return services.draining ? health(503, "draining") : health(200, "ready");
+http::Response get_readyz(const std::atomic<bool>& draining) {
+  return draining ? health(503, "draining") : health(200, "ready");
 }
 
-http::Response get_metrics(const Services& services) {
+http::Response get_metrics(const metrics::Metrics& metrics, const work::Catalogue& catalogue) {
   http::Response response;
   response.content_type = "text/plain; version=0.0.4; charset=utf-8";
   response.headers = {{"Cache-Control", "no-store"}};
-  response.body = http::Body::of(services.metrics.text(services.backend.catalogue.counts()));
+  response.body = http::Body::of(metrics.text(catalogue.counts()));
   return response;
 }
 
-http::Response get_service(const Services& services) {
+http::Response get_service(const ServerOptions& options) {
   protocol::ServiceDescription service;
   service.version = WINDSPLAT_VERSION;
-  service.image_pixels_max = services.options.limits.pixels_max_reported();
-  const std::string& base = services.options.base_path;
+  service.image_pixels_max = options.limits.pixels_max_reported();
+  const std::string& base = options.base_path;
   service.links = {{"page", base},
                    {"datasets", base + "v1/datasets"},
                    {"frames", base + "v1/frames"},
@@ -130,22 +130,22 @@ http::Response get_view_schema(const http::Request& request) {
   return tagged_response(request, "application/schema+json", view_schema_json());
 }
 
-http::Response get_datasets(const Services& services) {
-  const auto list = services.backend.catalogue.list();
+http::Response get_datasets(const work::Catalogue& catalogue) {
+  const auto list = catalogue.list();
   if (!list) return http::problem_response(list.error());
   return json_response(protocol::encode_dataset_list(*list));
 }
 
-void get_dataset(Services& services, const std::string& id, const http::Request& request,
-                 http::Reply reply) {
-  const auto dataset = services.backend.catalogue.find(id);
+void get_dataset(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+                 const http::Request& request, http::Reply reply) {
+  const auto dataset = catalogue.find(id);
   if (!dataset) {
     reply(http::problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
     return;
   }
-  run_later(services.backend.loads, request, std::move(reply), "a description", dataset->get(),
-            [&services, id, cancel = request.cancel]() -> http::Response {
-              const auto description = services.backend.catalogue.describe(id, cancel);
+  run_later(loads, request, std::move(reply), "a description", dataset->get(),
+            [&catalogue, id, cancel = request.cancel]() -> http::Response {
+              const auto description = catalogue.describe(id, cancel);
               return description ? json_response(protocol::encode_dataset(*description))
                                  : http::problem_response(description.error());
             });

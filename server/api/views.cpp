@@ -19,8 +19,8 @@ using protocol::SavedView;
 using protocol::ViewDocument;
 using views::SavedViews;
 
-std::string text_of(const Services& services, const SavedView& saved) {
-  return protocol::encode_saved_view(saved, services.options.views->on_disk() ? "disk" : "memory");
+std::string text_of(const SavedViews& views, const SavedView& saved) {
+  return protocol::encode_saved_view(saved, views.on_disk() ? "disk" : "memory");
 }
 
 std::string utc_now() {
@@ -32,8 +32,8 @@ std::string utc_now() {
   return text.data();
 }
 
-http::Response saved_response(const Services& services, const SavedView& saved) {
-  std::string text = text_of(services, saved);
+http::Response saved_response(const SavedViews& views, const SavedView& saved) {
+  std::string text = text_of(views, saved);
   const std::string etag = etag_of(text);
   http::Response response = json_response(std::move(text));
   response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
@@ -42,17 +42,17 @@ http::Response saved_response(const Services& services, const SavedView& saved) 
 
 // Whether the saved view satisfies If-Match and If-None-Match (RFC 9110, 13.1).
 struct Unchanged {
-  Unchanged(const Services& of, const http::Request& request)
-      : services(of),
+  Unchanged(const SavedViews& of, const http::Request& request)
+      : views(of),
         if_match(request.header("If-Match")),
         if_none_match(request.header("If-None-Match")) {}
   bool operator()(const SavedView& now) const {
-    const std::string etag = etag_of(text_of(services, now));
+    const std::string etag = etag_of(text_of(views, now));
     return http::allows_change(if_match, etag) &&
            (if_none_match.empty() || !http::matches_etag(if_none_match, etag));
   }
 
-  const Services& services;
+  const SavedViews& views;
   std::string if_match;
   std::string if_none_match;
 };
@@ -63,19 +63,20 @@ http::Response changed_meanwhile() {
       "the saved view does not satisfy If-Match or If-None-Match; read it again");
 }
 
-void replace_later(Services& services, const std::string& id, const http::Request& request,
-                   http::Reply reply, SavedViews::Change change) {
-  run_later(services.view_io, request, std::move(reply), "a change of a saved view", nullptr,
-            [&services, id, may = Unchanged(services, request), change = std::move(change)] {
-              const auto saved = services.options.views->replace(id, may, change);
+void replace_later(SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+                   const http::Request& request, http::Reply reply, SavedViews::Change change) {
+  run_later(view_io, request, std::move(reply), "a change of a saved view", nullptr,
+            [&views, id, may = Unchanged(views, request), change = std::move(change)] {
+              const auto saved = views.replace(id, may, change);
               if (!saved) return http::problem_response(saved.error());
-              return *saved ? saved_response(services, **saved) : changed_meanwhile();
+              return *saved ? saved_response(views, **saved) : changed_meanwhile();
             });
 }
 
 }  // namespace
 
-void post_saved_view(Services& services, const http::Request& request, http::Reply reply) {
+void post_saved_view(SavedViews& views, work::TaskExecutor& view_io, const std::string& base_path,
+                     const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
                                  "Content-Type must be application/json"));
@@ -86,27 +87,26 @@ void post_saved_view(Services& services, const http::Request& request, http::Rep
     reply(http::problem_response(view.error()));
     return;
   }
-  run_later(services.view_io, request, std::move(reply), "saving a view", nullptr,
-            [&services, view = std::move(*view)] {
-              const auto saved = services.options.views->add(view, utc_now());
+  run_later(view_io, request, std::move(reply), "saving a view", nullptr,
+            [&views, &base_path, view = std::move(*view)] {
+              const auto saved = views.add(view, utc_now());
               if (!saved) return http::problem_response(saved.error());
-              http::Response response = saved_response(services, *saved);
+              http::Response response = saved_response(views, *saved);
               response.status = 201;
-              response.headers.emplace_back("Location",
-                                            services.options.base_path + "v1/views/" + saved->id);
+              response.headers.emplace_back("Location", base_path + "v1/views/" + saved->id);
               return response;
             });
 }
 
-http::Response get_view(const Services& services, const std::string& id,
+http::Response get_view(const SavedViews& views, const std::string& id,
                         const http::Request& request) {
-  const auto saved = services.options.views->find(id);
+  const auto saved = views.find(id);
   if (!saved) return http::problem_response(saved.error());
-  return tagged_response(request, "application/json", text_of(services, *saved));
+  return tagged_response(request, "application/json", text_of(views, *saved));
 }
 
-void put_view(Services& services, const std::string& id, const http::Request& request,
-              http::Reply reply) {
+void put_view(SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+              const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
                                  "Content-Type must be application/json"));
@@ -117,12 +117,12 @@ void put_view(Services& services, const std::string& id, const http::Request& re
     reply(http::problem_response(view.error()));
     return;
   }
-  replace_later(services, id, request, std::move(reply),
+  replace_later(views, view_io, id, request, std::move(reply),
                 [view = std::move(*view)](const ViewDocument&) { return view; });
 }
 
-void patch_view(Services& services, const std::string& id, const http::Request& request,
-                http::Reply reply) {
+void patch_view(SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+                const http::Request& request, http::Reply reply) {
   const std::string type = request.header("Content-Type");
   if (!is_json(type) && !is_merge_patch(type)) {
     http::Response response = http::problem_response(
@@ -131,15 +131,15 @@ void patch_view(Services& services, const std::string& id, const http::Request& 
     reply(std::move(response));
     return;
   }
-  replace_later(services, id, request, std::move(reply),
+  replace_later(views, view_io, id, request, std::move(reply),
                 [patch = request.body](const ViewDocument& now) { return now.patched(patch); });
 }
 
-void delete_view(Services& services, const std::string& id, const http::Request& request,
-                 http::Reply reply) {
-  run_later(services.view_io, request, std::move(reply), "removing a saved view", nullptr,
-            [&services, id, may = Unchanged(services, request)]() -> http::Response {
-              const auto removed = services.options.views->remove(id, may);
+void delete_view(SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+                 const http::Request& request, http::Reply reply) {
+  run_later(view_io, request, std::move(reply), "removing a saved view", nullptr,
+            [&views, id, may = Unchanged(views, request)]() -> http::Response {
+              const auto removed = views.remove(id, may);
               if (!removed) return http::problem_response(removed.error());
               if (!*removed) return changed_meanwhile();
               return {204, "", {{"Cache-Control", "no-store"}}, {}};

@@ -121,95 +121,105 @@ void add_process(Families& out) {
   add_gauge(out, "process_open_fds", "Open file descriptors of this process.", open_files());
 }
 
-}  // namespace
+// Registers metrics under their names.
+struct Registrar {
+  prometheus::Registry& registry;
 
-struct Metrics::State {
-  Counter& counter(const char* name, const char* help, const prometheus::Labels& labels = {}) {
+  Counter& counter(const char* name, const char* help,
+                   const prometheus::Labels& labels = {}) const {
     return prometheus::BuildCounter().Name(name).Help(help).Register(registry).Add(labels);
   }
-  Gauge& gauge(const char* name, const char* help, const prometheus::Labels& labels = {}) {
+  Gauge& gauge(const char* name, const char* help, const prometheus::Labels& labels = {}) const {
     return prometheus::BuildGauge().Name(name).Help(help).Register(registry).Add(labels);
   }
-  Histogram& stage(const char* name) {
+  Histogram& stage(const char* name) const {
     return prometheus::BuildHistogram()
         .Name("windsplat_stage_seconds")
         .Help("Time of a picture in each stage.")
         .Register(registry)
         .Add({{"stage", name}}, second_bounds());
   }
-  Counter& frame(const char* tier) {
+  Counter& frame(const char* tier) const {
     return counter("windsplat_frames_total", "Frames sent to sessions.", {{"tier", tier}});
   }
-  Counter& bytes(const char* over) {
+  Counter& bytes(const char* over) const {
     return counter("windsplat_sent_bytes_total", "Bytes sent to sockets, without framing.",
                    {{"over", over}});
   }
-  Histogram& error(const char* kind) {
+  Histogram& error(const char* kind) const {
     return prometheus::BuildHistogram()
         .Name("windsplat_frame_error")
         .Help("Linear RMSE of frames sent, where it is known.")
         .Register(registry)
         .Add({{"kind", kind}}, error_bounds());
   }
-  Counter& background(const char* result) {
+  Counter& background(const char* result) const {
     return counter("windsplat_background_jobs_total",
                    "Calibration measurements made while the renderer was idle.",
                    {{"result", result}});
   }
-  Counter& limit(const char* name) {
+  Counter& limit(const char* name) const {
     return counter("windsplat_refused_total", "Refused work, by the limit exceeded.",
                    {{"limit", name}});
   }
-  Counter& opened(const char* result) {
+  Counter& opened(const char* result) const {
     return counter("windsplat_dataset_opens_total", "Datasets opened by POST.",
                    {{"result", result}});
   }
+};
 
-  explicit State(const std::vector<const char*>& routes) {
-    gauge("windsplat_build_info", "1, labelled with the version.", {{"version", WINDSPLAT_VERSION}})
+}  // namespace
+
+struct Metrics::State {
+  State() {
+    add.gauge("windsplat_build_info", "1, labelled with the version.",
+              {{"version", WINDSPLAT_VERSION}})
         .Set(1);
-    for (const char* route : routes) count_requests_of(route);
     count_requests_of(route_other);
-    for (std::size_t i = 0; i < limit_names.size(); ++i) limits[i] = &limit(limit_names[i]);
+    for (std::size_t i = 0; i < limit_names.size(); ++i) limits[i] = &add.limit(limit_names[i]);
   }
 
   void count_requests_of(const char* route) {
     for (std::size_t i = 0; i < status_classes.size(); ++i) {
-      requests[route][i] = &counter("windsplat_http_requests_total", "HTTP requests answered.",
-                                    {{"route", route}, {"status", status_classes[i]}});
+      requests[route][i] = &add.counter("windsplat_http_requests_total", "HTTP requests answered.",
+                                        {{"route", route}, {"status", status_classes[i]}});
     }
   }
 
   prometheus::Registry registry;
-  std::array<Histogram*, 4> stages{&stage("queue"), &stage("render"), &stage("encode"),
-                                   &stage("write")};
-  std::array<Counter*, 4> frames{&frame(tier_names[0]), &frame(tier_names[1]),
-                                 &frame(tier_names[2]), &frame(tier_names[3])};
-  std::array<Counter*, 2> sent{&bytes("http"), &bytes("stream")};
-  Histogram& estimated = error("estimated");
-  Histogram& measured = error("measured");
-  Counter& dropped = counter("windsplat_frames_dropped_total",
-                             "Frames drawn but not sent because the view had changed.");
+  const Registrar add{registry};
+  std::array<Histogram*, 4> stages{&add.stage("queue"), &add.stage("render"), &add.stage("encode"),
+                                   &add.stage("write")};
+  std::array<Counter*, 4> frames{&add.frame(tier_names[0]), &add.frame(tier_names[1]),
+                                 &add.frame(tier_names[2]), &add.frame(tier_names[3])};
+  std::array<Counter*, 2> sent{&add.bytes("http"), &add.bytes("stream")};
+  Histogram& estimated = add.error("estimated");
+  Histogram& measured = add.error("measured");
+  Counter& dropped = add.counter("windsplat_frames_dropped_total",
+                                 "Frames drawn but not sent because the view had changed.");
   Counter& cancelled =
-      counter("windsplat_renders_cancelled_total", "Frames cancelled before they were drawn.");
-  Gauge& sessions = gauge("windsplat_sessions", "Open sessions.");
-  Gauge& unsent = gauge("windsplat_unsent_bytes", "Bytes of queued messages.");
-  Counter& sessions_opened = counter("windsplat_sessions_opened_total", "Sessions opened.");
+      add.counter("windsplat_renders_cancelled_total", "Frames cancelled before they were drawn.");
+  Gauge& sessions = add.gauge("windsplat_sessions", "Open sessions.");
+  Gauge& unsent = add.gauge("windsplat_unsent_bytes", "Bytes of queued messages.");
+  Counter& sessions_opened = add.counter("windsplat_sessions_opened_total", "Sessions opened.");
   Counter& accept_failures =
-      counter("windsplat_accept_failures_total", "Connections that could not be accepted.");
+      add.counter("windsplat_accept_failures_total", "Connections that could not be accepted.");
   Counter& handshakes =
-      counter("windsplat_tls_handshake_seconds_total", "Processor time of TLS handshakes.");
-  Counter& closed = counter("windsplat_connections_refused_total",
-                            "Connections closed without a response because of a limit.");
-  std::array<Counter*, 2> opens{&opened("failed"), &opened("ok")};
-  std::array<Counter*, 2> studies{&background("done"), &background("cancelled")};
+      add.counter("windsplat_tls_handshake_seconds_total", "Processor time of TLS handshakes.");
+  Counter& closed = add.counter("windsplat_connections_refused_total",
+                                "Connections closed without a response because of a limit.");
+  std::array<Counter*, 2> opens{&add.opened("failed"), &add.opened("ok")};
+  std::array<Counter*, 2> studies{&add.background("done"), &add.background("cancelled")};
   std::map<std::string, std::array<Counter*, 5>, std::less<>> requests;
   std::array<Counter*, limit_names.size()> limits{};
 };
 
-Metrics::Metrics(const std::vector<const char*>& routes)
-    : state_(std::make_unique<State>(routes)) {}
+Metrics::Metrics() : state_(std::make_unique<State>()) {}
 Metrics::~Metrics() = default;
+
+void Metrics::count_routes(const std::vector<const char*>& routes) {
+  for (const char* route : routes) state_->count_requests_of(route);
+}
 
 void Metrics::stage_took(Stage stage, std::int64_t us) {
   state_->stages[static_cast<std::size_t>(stage)]->Observe(static_cast<double>(us) / us_per_s);

@@ -23,12 +23,13 @@ class Metrics {
   enum class Stage { queue, render, encode, write };
   enum class Over { http, stream };
 
-  // Responses are counted by route: one of `routes`, else "other".
-  explicit Metrics(const std::vector<const char*>& routes = {});
+  Metrics();
   ~Metrics();
   Metrics(const Metrics&) = delete;
   Metrics& operator=(const Metrics&) = delete;
 
+  // Responses are counted by these routes, others as "other". Call before events arrive.
+  void count_routes(const std::vector<const char*>& routes);
   void stage_took(Stage stage, std::int64_t us);
   // A frame written completely to the socket.
   void frame_sent(session::Tier tier, const protocol::FrameHeader& header);

@@ -18,10 +18,8 @@
 #include <utility>
 
 #include "server/access/address.hpp"
-#include "server/api/services.hpp"
 #include "server/base/log.hpp"
 #include "server/transport/guarded.hpp"
-#include "server/transport/http/http_session.hpp"
 #include "server/transport/post_or_retry.hpp"
 #include "server/transport/tls_context.hpp"
 #include "server/transport/wire.hpp"
@@ -119,35 +117,34 @@ class TlsTask final : public HandshakeTask {
 
 class Handshake : public Connection, public std::enable_shared_from_this<Handshake> {
  public:
-  Handshake(asio::ip::tcp::socket socket, api::Services& services, Connections& connections,
-            HandshakeThread& thread, access::Visitor visitor)
-      : services_(services),
-        connections_(connections),
-        id_(connections.next_id()),
+  Handshake(const HttpContext& context, asio::ip::tcp::socket socket, HandshakeThread& thread,
+            access::Visitor visitor)
+      : context_(context),
+        id_(context.connections.next_id()),
         visitor_(std::move(visitor)),
         address_(access::counted_address(visitor_.peer)),
         deadline_(socket.get_executor()),
-        task_(std::make_shared<TlsTask>(std::move(socket), services.options.tls, thread,
-                                        services.admission, visitor_)) {}
-  ~Handshake() override { connections_.remove(id_); }
+        task_(std::make_shared<TlsTask>(std::move(socket), context.options.tls, thread,
+                                        context.admission, visitor_)) {}
+  ~Handshake() override { context_.connections.remove(id_); }
   Handshake(const Handshake&) = delete;
   Handshake& operator=(const Handshake&) = delete;
 
   void start() {
-    late_ = services_.draining;
-    connections_.add(id_, weak_from_this(), false, late_);
+    late_ = context_.draining;
+    context_.connections.add(id_, weak_from_this(), false, late_);
     deadline_.expires_after(visitor_.reserve ? tls_reserve_timeout : tls_timeout);
     deadline_.async_wait(guarded(shared_from_this(), [this](ErrorCode fault) {
       if (!fault) abort();
     }));
     if (!visitor_.trusted) {
-      (void)connections_.end_longest(
+      (void)context_.connections.end_longest(
           [this](const Connection& other) {
             return other.address() == address_ ? other.handshaking_since() : std::nullopt;
           },
           handshakes_per_address_max);
     }
-    (void)connections_.end_handshake(tls_handshakes_max);
+    (void)context_.connections.end_handshake(tls_handshakes_max);
     if (!task_) return;  // already completed
     task_->start([weak = weak_from_this()](ErrorCode fault) {
       const auto self = weak.lock();
@@ -178,10 +175,10 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
     // From here on the wire owns the descriptor and may close it.
     Wire wire = std::exchange(task_, nullptr)->take_wire();
     if (!fault) {
-      start_http_session(std::move(wire), services_, connections_, std::move(visitor_), late_);
+      start_http_session(context_, std::move(wire), std::move(visitor_), late_);
     } else if (is_plain_http(fault)) {
       wire.forgo_tls();
-      refuse_plain_http(std::move(wire), services_, connections_, std::move(visitor_), late_);
+      refuse_plain_http(context_, std::move(wire), std::move(visitor_), late_);
     } else {
       log::debug("TLS handshake failed", {{"fault", fault.message()}});
     }
@@ -194,8 +191,7 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
     visitor_.place.reset();  // free the place at once
   }
 
-  api::Services& services_;
-  Connections& connections_;
+  const HttpContext& context_;
   const std::uint64_t id_;
   access::Visitor visitor_;
   const std::string address_;
@@ -207,17 +203,14 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
 
 }  // namespace
 
-void start_connection(asio::ip::tcp::socket socket, api::Services& services,
-                      Connections& connections, HandshakeThread* handshakes,
-                      access::Visitor visitor) {
+void start_connection(const HttpContext& context, asio::ip::tcp::socket socket,
+                      HandshakeThread* handshakes, access::Visitor visitor) {
   if (handshakes == nullptr) {
-    start_http_session(Wire(std::move(socket), nullptr), services, connections, std::move(visitor),
-                       services.draining);
+    start_http_session(context, Wire(std::move(socket), nullptr), std::move(visitor),
+                       context.draining);
     return;
   }
-  std::make_shared<Handshake>(std::move(socket), services, connections, *handshakes,
-                              std::move(visitor))
-      ->start();
+  std::make_shared<Handshake>(context, std::move(socket), *handshakes, std::move(visitor))->start();
 }
 
 }  // namespace windsplat::transport

@@ -3,15 +3,14 @@
 
 #include <boost/asio/ip/tcp.hpp>
 
-#include "server/api/router.hpp"
-#include "server/transport/connections.hpp"
+#include "server/access/admission.hpp"
 #include "server/transport/handshake_thread.hpp"
+#include "server/transport/http/http_session.hpp"
 
 namespace windsplat::transport {
 
 // `handshakes` null: plain TCP. Stop it before the socket's io_context ends.
-void start_connection(boost::asio::ip::tcp::socket socket, api::Services& services,
-                      Connections& connections, HandshakeThread* handshakes,
-                      access::Visitor visitor);
+void start_connection(const HttpContext& context, boost::asio::ip::tcp::socket socket,
+                      HandshakeThread* handshakes, access::Visitor visitor);
 
 }  // namespace windsplat::transport

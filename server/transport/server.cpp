@@ -12,13 +12,12 @@
 #include <thread>
 #include <utility>
 
-#include "server/api/router.hpp"
 #include "server/base/check.hpp"
 #include "server/base/log.hpp"
-#include "server/transport/connections.hpp"
 #include "server/transport/handshake.hpp"
 #include "server/transport/listener.hpp"
 #include "server/transport/post_or_retry.hpp"
+#include "server/transport/server_parts.hpp"
 #include "server/work/run_guarded.hpp"
 
 namespace windsplat::transport {
@@ -35,25 +34,25 @@ constexpr std::chrono::milliseconds after_a_fault{10};
 struct Server::State {
   State(api::ServerOptions options, std::shared_ptr<data::Store> store,
         std::shared_ptr<ThreadPool> pool)
-      : services(std::move(options), std::move(store), std::move(pool)),
+      : parts(std::move(options), std::move(store), std::move(pool)),
         listener(
             io, [this](asio::ip::tcp::socket socket) { accepted(std::move(socket)); },
-            [this] { services.metrics.accept_failed(); }),
+            [this] { parts.metrics.accept_failed(); }),
         look_timer(io),
         cancel_timer(io),
         abort_timer(io) {
-    connections.on_empty([this] {
-      if (services.draining) end();
+    parts.connections.on_empty([this] {
+      if (parts.draining) end();
     });
   }
 
   ~State() {
-    connections.on_empty(nullptr);
-    connections.each([](Connection& connection) { connection.abort(); });
-    services.backend.renderer.cancel_all();
+    parts.connections.on_empty(nullptr);
+    parts.connections.each([](Connection& connection) { connection.abort(); });
+    parts.backend.renderer.cancel_all();
     if (ending.joinable()) ending.join();
-    services.backend.catalogue.end();  // ends reads, so that no service thread blocks in one
-    services.end();                    // ends the service threads
+    parts.backend.catalogue.end();  // ends reads, so that no service thread blocks in one
+    parts.end();                    // ends the service threads
     if (handshakes) handshakes->stop();
     // Releases handlers that were pending when the loop stopped.
     io.restart();
@@ -72,25 +71,24 @@ struct Server::State {
     const auto peer = socket.remote_endpoint(fault);
     const std::string address = fault ? "" : peer.address().to_string();
     auto visitor = admit(address);
-    if (!visitor) return services.metrics.connection_refused();
-    start_connection(std::move(socket), services, connections, handshakes.get(),
-                     std::move(*visitor));
+    if (!visitor) return parts.metrics.connection_refused();
+    start_connection(parts.http, std::move(socket), handshakes.get(), std::move(*visitor));
   }
 
   // Frees a place by closing the connection that is idle longest, or in the reserve the longest one
   // without a request.
   std::optional<access::Visitor> admit(const std::string& address) {
-    access::Admission& admission = services.admission;
-    if (!admission.arrive(address, services.options.tls != nullptr)) return std::nullopt;
+    access::Admission& admission = parts.admission;
+    if (!admission.arrive(address, parts.options.tls != nullptr)) return std::nullopt;
     auto visitor = admission.connect(address);
     const auto& reason = visitor ? visitor->reserve : std::nullopt;
     if (visitor && reason && reason->kind == metrics::LimitKind::connections &&
-        connections.end_longest(&Connection::idle_since)) {
+        parts.connections.end_longest(&Connection::idle_since)) {
       visitor.reset();
       visitor = admission.connect(address);
     }
     if (!visitor && admission.is_kept_out_by_others(address) &&
-        connections.end_longest(&Connection::unasked_since)) {
+        parts.connections.end_longest(&Connection::unasked_since)) {
       visitor = admission.connect(address);
     }
     return visitor;
@@ -102,11 +100,11 @@ struct Server::State {
     look_timer.expires_after(look_every);
     look_timer.async_wait([this](boost::system::error_code fault) {
       checking_files = false;
-      if (!fault) services.admission.log_refused_handshakes();
-      if (fault || services.draining) return;
+      if (!fault) parts.admission.log_refused_handshakes();
+      if (fault || parts.draining) return;
       const auto look = [this] {
         auto found = work::run_guarded<std::vector<std::string>>(
-            "file check", never, [this] { return services.backend.catalogue.look_after(); });
+            "file check", never, [this] { return parts.backend.catalogue.look_after(); });
         std::vector<std::string> changed;
         if (found) changed = std::move(*found);
         const auto go_on_looking = [this, changed = std::move(changed)] {
@@ -114,10 +112,10 @@ struct Server::State {
           tell_changes(changed);
           check_data_files();
         };
-        while (!post_or_retry(io.get_executor(), go_on_looking) && !services.draining) {
+        while (!post_or_retry(io.get_executor(), go_on_looking) && !parts.draining) {
         }
       };
-      if (!services.file_watch.submit({never, look, true})) return check_data_files();
+      if (!parts.file_checks.submit({never, look, true})) return check_data_files();
       checking_files = true;
     });
     checking_files = true;
@@ -125,23 +123,23 @@ struct Server::State {
 
   void tell_changes(const std::vector<std::string>& datasets) {
     for (const std::string& dataset : datasets) {
-      services.backend.quality.forget(dataset);
-      connections.each([&](Connection& connection) { connection.on_changed(dataset); });
+      parts.backend.quality.forget(dataset);
+      parts.connections.each([&](Connection& connection) { connection.on_changed(dataset); });
     }
   }
 
   // Periodic operations that schedule themselves; one that failed to allocate its next step is
   // restarted here.
   void go_on() {
-    if (services.draining && !drain_timers_set) begin_drain();
-    if (services.draining) return;
+    if (parts.draining && !drain_timers_set) begin_drain();
+    if (parts.draining) return;
     listener.start();
     if (!checking_files) check_data_files();
   }
 
   // On the io thread.
   void change(Access access) {
-    api::ServerOptions& options = services.options;
+    api::ServerOptions& options = parts.options;
     WINDSPLAT_CHECK((access.tls == nullptr) == (options.tls == nullptr));
     const bool other_token = access::is_other_token(options.token.get(), access.token.get());
     options.allow_origins = std::move(access.allow_origins);
@@ -150,7 +148,7 @@ struct Server::State {
     options.known_hosts_only = access.known_hosts_only;
     options.allow_hosts = std::move(access.allow_hosts);
     if (!other_token) return;
-    connections.each([](Connection& connection) {
+    parts.connections.each([](Connection& connection) {
       try {
         connection.on_new_token();
       } catch (const std::exception&) {
@@ -161,41 +159,41 @@ struct Server::State {
 
   // On the io thread.
   void begin_drain() {
-    services.draining = true;
+    parts.draining = true;
     if (drain_timers_set) return;
-    cancel_timer.expires_after(services.options.drain_cancel_after);
+    cancel_timer.expires_after(parts.options.drain_cancel_after);
     cancel_timer.async_wait([this](boost::system::error_code fault) {
       if (fault) return;
-      services.backend.renderer.cancel_all();
+      parts.backend.renderer.cancel_all();
       ending = std::thread([this] {
         try {
-          services.backend.catalogue.end();
+          parts.backend.catalogue.end();
         } catch (const std::exception& failure) {
           work::log_fault("pending reads could not be ended", failure);
         }
       });
     });
-    abort_timer.expires_after(services.options.drain_abort_after);
+    abort_timer.expires_after(parts.options.drain_abort_after);
     abort_timer.async_wait([this](boost::system::error_code fault) {
       if (fault) return;
-      connections.each([](Connection& connection) { connection.abort(); });
+      parts.connections.each([](Connection& connection) { connection.abort(); });
       end();
     });
     drain_timers_set = true;
-    services.backend.jobs.cancel_all();
-    connections.each([](Connection& connection) {
+    parts.backend.jobs.cancel_all();
+    parts.connections.each([](Connection& connection) {
       try {
         connection.drain();
       } catch (const std::exception&) {
         connection.abort();
       }
     });
-    if (connections.size() == 0) end();
+    if (parts.connections.size() == 0) end();
   }
 
   void end() {
     listener.close();
-    connections.each(
+    parts.connections.each(
         [](Connection& connection) { connection.abort(); });  // accepted during the drain
     look_timer.cancel();
     cancel_timer.cancel();
@@ -207,16 +205,15 @@ struct Server::State {
     }
   }
 
-  // Declared before io: sessions left in its queue deregister when it is destroyed. Service threads
-  // post to io and end before it, in ~State.
-  Connections connections;
-  api::Services services;
+  // Before io: sessions left in its queue deregister when it is destroyed. Service threads post to
+  // io and end before it, in ~State.
+  ServerParts parts;
   asio::io_context io{1};
   // The loop ends by stop() only, not when all pending operations failed to allocate.
   asio::executor_work_guard<asio::io_context::executor_type> work{io.get_executor()};
   // Null: plain TCP. Its thread posts to io, too.
   const std::unique_ptr<HandshakeThread> handshakes{
-      services.options.tls ? std::make_unique<HandshakeThread>() : nullptr};
+      parts.options.tls ? std::make_unique<HandshakeThread>() : nullptr};
   Listener listener;
   asio::steady_timer look_timer;
   asio::steady_timer cancel_timer;
@@ -234,7 +231,7 @@ Server::Server(api::ServerOptions options, std::shared_ptr<data::Store> store,
 Server::~Server() = default;
 
 Result<void> Server::listen() {
-  const api::ServerOptions& options = state_->services.options;
+  const api::ServerOptions& options = state_->parts.options;
   return state_->listener.listen(options.address, options.port);
 }
 
@@ -248,8 +245,8 @@ std::string Server::url() const {
   } else if (address.is_v6()) {
     host = '[' + host + ']';
   }
-  const char* const scheme = state_->services.options.tls != nullptr ? "https://" : "http://";
-  return scheme + host + ':' + std::to_string(port()) + state_->services.options.base_path;
+  const char* const scheme = state_->parts.options.tls != nullptr ? "https://" : "http://";
+  return scheme + host + ':' + std::to_string(port()) + state_->parts.options.base_path;
 }
 
 void Server::run() {

@@ -3,15 +3,7 @@
 
 #include <utility>
 
-#include "protocol/limits.hpp"
-
 namespace windsplat::work {
-namespace {
-
-constexpr std::size_t load_threads = 2;
-constexpr std::size_t load_threads_spare = 4;  // for loads that hang or wait for memory
-
-}  // namespace
 
 Backend::Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> threads,
                  metrics::Metrics& metrics_of_server, BackendOptions options)
@@ -19,17 +11,14 @@ Backend::Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool>
       metrics(metrics_of_server),
       pool(std::move(threads)),
       request_times(pool->size()),
-      jobs(static_cast<std::size_t>(protocol::limits::jobs_max),
-           static_cast<std::size_t>(protocol::limits::jobs_running_max)),
+      jobs(job_settings),
       renderer({requests_waiting_max,
                 options.requests_waiting_ms_max,
                 {},
                 options.wait_ms,
                 std::move(options.charge),
                 [this] { metrics.refused(metrics::LimitKind::waiting); }}),
-      loads(
-          load_threads, requests_waiting_max, "loads",
-          [this] { metrics.refused(metrics::LimitKind::waiting); }, load_threads_spare),
+      loads(load_settings, [this] { metrics.refused(metrics::LimitKind::waiting); }),
       check_cost_(std::move(options.check_cost)) {}
 
 Result<Catalogue::Checked> Backend::check(const protocol::View& view) {

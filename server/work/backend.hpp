@@ -32,9 +32,6 @@ struct BackendOptions {
 
 // Outlives all connections; owned by the server.
 struct Backend {
-  // Limit of waiting requests for pictures and descriptions.
-  static constexpr std::size_t requests_waiting_max = 16;
-
   Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool> threads,
           metrics::Metrics& metrics_of_server, BackendOptions options);
 

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "server/work/run_guarded.hpp"
-#include "server/work/task_executor.hpp"
 
 namespace windsplat::work {
 
@@ -80,8 +79,8 @@ Result<protocol::JobResult> run_work(const Jobs::Work& work, const std::shared_p
 struct Jobs::State {
   using Shared = std::shared_ptr<Job>;
 
-  State(std::size_t listed_max, std::size_t running_max)
-      : known_max(listed_max), threads(running_max, listed_max, "jobs") {}
+  explicit State(const TaskExecutor::Settings& settings)
+      : known_max(settings.tasks_max), threads(settings) {}
 
   void run(const Shared& job) {
     Work task;
@@ -146,8 +145,7 @@ struct Jobs::State {
   TaskExecutor threads;  // last: its threads use the members above
 };
 
-Jobs::Jobs(std::size_t known_max, std::size_t running_max)
-    : state_(std::make_unique<State>(known_max, running_max)) {}
+Jobs::Jobs(const TaskExecutor::Settings& settings) : state_(std::make_unique<State>(settings)) {}
 
 Jobs::~Jobs() { end(); }
 

@@ -12,6 +12,7 @@
 #include "protocol/measurements.hpp"
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
+#include "server/work/task_executor.hpp"
 
 namespace windsplat::work {
 
@@ -30,8 +31,8 @@ class Jobs {
     bool slow = false;        // slow jobs run one at a time
   };
 
-  // `known_max`: limit of listed jobs; a new one replaces the oldest finished one.
-  Jobs(std::size_t known_max, std::size_t running_max);
+  // `tasks_max` is the limit of listed jobs; a new one replaces the oldest finished one.
+  explicit Jobs(const TaskExecutor::Settings& settings);
   ~Jobs();  // calls end()
   Jobs(const Jobs&) = delete;
   Jobs& operator=(const Jobs&) = delete;

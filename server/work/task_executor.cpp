@@ -19,8 +19,11 @@ namespace windsplat::work {
 struct TaskExecutor::State {
   using Clock = std::chrono::steady_clock;
 
-  State(std::size_t at_a_time, std::size_t most, const char* name, std::function<void()> told)
-      : places(at_a_time), tasks_max(most), what(name), refused(std::move(told)) {}
+  State(const Settings& settings, std::function<void()> told)
+      : places(settings.threads),
+        tasks_max(settings.tasks_max),
+        what(settings.what),
+        refused(std::move(told)) {}
 
   // Cannot throw: its bookkeeping was allocated before.
   void work() {
@@ -117,12 +120,12 @@ struct TaskExecutor::State {
   std::vector<std::thread> threads;
 };
 
-TaskExecutor::TaskExecutor(std::size_t threads, std::size_t tasks_max, const char* what,
-                           std::function<void()> refused, std::size_t spare)
-    : state_(std::make_unique<State>(threads, tasks_max, what, std::move(refused))) {
-  state_->busy.reserve(threads + spare);
-  state_->running.reserve(threads + spare);
-  for (std::size_t i = 0; i < threads + spare; ++i) {
+TaskExecutor::TaskExecutor(const Settings& settings, std::function<void()> refused)
+    : state_(std::make_unique<State>(settings, std::move(refused))) {
+  const std::size_t threads = settings.threads + settings.threads_spare;
+  state_->busy.reserve(threads);
+  state_->running.reserve(threads);
+  for (std::size_t i = 0; i < threads; ++i) {
     state_->threads.emplace_back([state = state_.get()] { state->work(); });
   }
 }

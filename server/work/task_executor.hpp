@@ -11,6 +11,7 @@
 #include <memory>
 #include <string>
 
+#include "protocol/limits.hpp"
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 
@@ -30,14 +31,16 @@ class TaskExecutor {
     std::string payer = {};  // address of the client; empty: none
   };
 
-  // `tasks_max`: limit of waiting tasks per key; the total limit is keys_full times as many. One
-  // payer may use half of either. `what`: the tasks' name in error messages ("loads"). `refused` is
-  // called for each refusal. `spare`: threads beyond `threads`, which limits the tasks started less
-  // than `long_run` ago.
   static constexpr std::size_t keys_full = 4;
   static constexpr std::chrono::milliseconds long_run{500};
-  TaskExecutor(std::size_t threads, std::size_t tasks_max, const char* what,
-               std::function<void()> refused = {}, std::size_t spare = 0);
+  struct Settings {
+    const char* what;       // the tasks' name in error messages
+    std::size_t threads;    // limits the tasks started less than `long_run` ago
+    std::size_t tasks_max;  // waiting per key, keys_full times as many in total; half per payer
+    std::size_t threads_spare = 0;  // beyond `threads`
+  };
+  // `refused` is called for each refusal.
+  explicit TaskExecutor(const Settings& settings, std::function<void()> refused = {});
   ~TaskExecutor();
   TaskExecutor(const TaskExecutor&) = delete;
   TaskExecutor& operator=(const TaskExecutor&) = delete;
@@ -51,5 +54,20 @@ class TaskExecutor {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+// Limit of waiting requests for pictures and of loads for one dataset.
+inline constexpr std::size_t requests_waiting_max = 16;
+
+// All executors of the server (docs/design/overview.md). The spare threads are for loads that hang
+// or wait for memory.
+inline constexpr TaskExecutor::Settings load_settings{"loads", 2, requests_waiting_max, 4};
+inline constexpr TaskExecutor::Settings job_settings{"jobs", protocol::limits::jobs_running_max,
+                                                     protocol::limits::jobs_max};
+// Resolves posted names: a slow disk delays no other executor.
+inline constexpr TaskExecutor::Settings look_up_settings{"files to open", 1, requests_waiting_max};
+// Changes saved views; each change may take one disk sync.
+inline constexpr TaskExecutor::Settings view_io_settings{"changes of saved views", 1, 64};
+// Checks files for changes and reopens them.
+inline constexpr TaskExecutor::Settings file_check_settings{"file checks", 1, 1};
 
 }  // namespace windsplat::work

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Checks the style rules of CONTRIBUTING.md: long lines, functions, files and folders, notes of
-postponed work, paths of one machine, names of C++ tests, test folders without a test.
+"""Checks the style rules of CONTRIBUTING.md: long lines, functions, files and folders, classes of
+many members, notes of postponed work, paths of one machine, names of C++ tests, test folders
+without a test.
 
 Usage: check_style.py [ROOT]"""
 import collections
@@ -8,12 +9,27 @@ import pathlib
 import re
 import sys
 
+import classes
 import tree
 
 MAX_LINE = 100
 MAX_FUNCTION_LINES = 80  # "about 70"
 MAX_FILE_LINES = 500
 MAX_FOLDER_FILES = 30
+MAX_CLASS_MEMBERS = 25  # of the server
+
+ONE_FORMAT = "half of the members implement an interface, the others read one file format"
+LARGE_CLASSES = {
+    ("server/data/cf/series.hpp", "SeriesFile"): ONE_FORMAT,
+    ("server/data/cf/source.cpp", "ArraySource"): ONE_FORMAT,
+    ("server/data/formats/grib/file.hpp", "File"): ONE_FORMAT,
+    ("server/data/formats/netcdf/file.hpp", "File"): ONE_FORMAT,
+    ("server/data/formats/vtk/source.cpp", "VtkSource"): ONE_FORMAT,
+    ("server/data/formats/vtk/legacy.cpp", "Reader"): "a function for each section of the format",
+    ("server/data/resident/budget.hpp", "Budget"): "all is guarded by one mutex",
+    ("server/data/resident/dataset.hpp", "Dataset"): "the handle of a dataset: short queries",
+    ("server/engine/slabs.cpp", "SlabSweep"): "the state of one hot loop",
+}
 
 CODE = (".cpp", ".hpp", ".h", ".ts", ".mjs", ".js", ".py", ".sh", ".cmake")
 # Written by a program, or read by one only.
@@ -60,6 +76,14 @@ def long_functions(path, lines):
             statement = []
 
 
+def large_classes(path, content):
+    for number, name, members in classes.sizes(content):
+        if members > MAX_CLASS_MEMBERS and (path, name) not in LARGE_CLASSES:
+            yield f"{path}:{number}: {name} has {members} members"
+        if members <= MAX_CLASS_MEMBERS and (path, name) in LARGE_CLASSES:
+            yield f"{path}:{number}: {name} is no longer an exception: mend LARGE_CLASSES"
+
+
 def test_names(path, content):
     for match in TEST_NAME.finditer(content):
         suite, name = match.groups()
@@ -85,6 +109,8 @@ def complaints_about(path, content):
     if path.endswith((".cpp", ".hpp")):
         yield from long_functions(path, lines)
         yield from test_names(path, content)
+        if path.startswith("server/"):
+            yield from large_classes(path, content)
 
 
 def empty_test_folders(root, files):

@@ -163,6 +163,26 @@ class Planted(unittest.TestCase):
         self.plant("server/extra/more.hpp", "#pragma once\n")
         self.expect(check_style, "server/extra: 31 files")
 
+    def test_class_of_many_members(self):
+        # Not counted: constructors, deleted functions, constants, nested types, bodies.
+        begin = ("template <class T>\nclass C final : public B {\n public:\n  explicit C(int a)"
+                 " : a_{a}, b_(a) {}\n  ~C() override = default;\n  C(const C&) = delete;\n"
+                 "  using X = int;\n  static constexpr int most = 3;\n  enum class K { a, b };\n"
+                 "  struct Plain {\n    int x = 0;\n  };\n"
+                 "  int get() const {\n    return '}' + a_;  // };\n  }\n private:\n")
+        data = "  std::function<void(int, K)> f{};\n" * (check_style.MAX_CLASS_MEMBERS - 2)
+        operator = "  bool operator==(const C&) const = default;\n"
+        self.plant("server/base/a.hpp", begin + data + operator + "};\n")
+        self.plant("server/base/b.hpp", "struct Document {\n" + data * 2 + "};\n")
+        self.expect(check_style)
+        self.plant("server/base/a.hpp", begin + data + operator + "  int a_ = g({1});\n};\n")
+        self.expect(check_style, "a.hpp:2: C has 26 members")
+
+    def test_exception_for_a_class_that_is_no_longer_large(self):
+        path, name = next(iter(check_style.LARGE_CLASSES))
+        self.plant(path, f"class {name} {{\n  void f();\n}};\n")
+        self.expect(check_style, f"{name} is no longer an exception")
+
     def test_short_functions_in_a_long_namespace_pass(self):
         body = "void f() {\n" + "  g();\n" * 40 + "}\n"
         self.plant("server/base/a.cpp", "namespace a {\n" + body * 10 + "}  // namespace a\n")

@@ -41,6 +41,55 @@ std::uint64_t bytes_of(const DatasetInfo& info) {
   return bytes;
 }
 
+std::uint64_t values_of(const DatasetInfo& info, std::size_t field) {
+  return info.grid.samples() * info.fields[field].components.size();
+}
+
+// Fields without duplicates.
+std::uint64_t bytes_at_a_step(const DatasetInfo& info, const std::vector<std::string>& fields) {
+  std::set<std::string> counted;
+  std::uint64_t bytes = 0;
+  for (const std::string& name : fields) {
+    const FieldInfo* const field = info.find(name);
+    if (field == nullptr || !counted.insert(name).second) continue;
+    bytes += info.grid.samples() * field->components.size() * sizeof(float);
+  }
+  return bytes;
+}
+
+// Measured upper bound of the memory of a loader, in addition to the volumes, while it reads
+// these fields. Chunks needed again are cached, 128 MiB in all or one chunk.
+std::uint64_t reading_bytes(const DatasetInfo& info, const std::vector<std::string>& fields) {
+  constexpr std::uint64_t mib = std::uint64_t{1} << 20;
+  std::uint64_t bytes = 32 * mib;
+  for (const std::string& name : fields) {
+    const FieldInfo* const field = info.find(name);
+    if (field == nullptr || field->chunk_bytes <= sizeof(double)) continue;  // no chunks
+    const std::uint64_t kept = std::min(128 * mib, field->decoded_bytes / field->components.size());
+    bytes = std::max(bytes, 64 * mib + std::max(kept, 2 * field->chunk_bytes));
+  }
+  return bytes;
+}
+
+// Runs a function that makes a volume; exceptions become errors.
+template <class Make>
+Result<Resident> guarded(const FieldInfo& field, const Make& make) {
+  try {
+    Result<Volume> volume = make();
+    if (!volume) {
+      return volume.error();
+    }
+    return Resident(std::make_shared<const Volume>(std::move(*volume)));
+  } catch (const std::bad_alloc&) {
+    return make_error(ErrorKind::out_of_memory,
+                      "the machine has no memory left for " + in_quotes(field.name));
+  } catch (const std::exception& fault) {
+    // The text of an internal error is for the log only: it may name source locations.
+    log::error("loading failed", {{"field", field.name}, {"fault", fault.what()}});
+    return make_error(ErrorKind::internal, "loading " + in_quotes(field.name) + " failed");
+  }
+}
+
 }  // namespace
 
 struct Dataset::State {
@@ -76,40 +125,9 @@ struct Dataset::State {
     return static_cast<std::size_t>(found - info.fields.data());
   }
 
-  [[nodiscard]] std::uint64_t values(std::size_t field) const {
-    return info.grid.samples() * info.fields[field].components.size();
-  }
-
-  // Fields without duplicates.
-  [[nodiscard]] std::uint64_t bytes_at_a_step(const std::vector<std::string>& fields) const {
-    std::set<std::string> counted;
-    std::uint64_t bytes = 0;
-    for (const std::string& name : fields) {
-      const FieldInfo* const field = info.find(name);
-      if (field == nullptr || !counted.insert(name).second) continue;
-      bytes += info.grid.samples() * field->components.size() * sizeof(float);
-    }
-    return bytes;
-  }
-
   // Bytes reserved in the limit while a field is read.
   [[nodiscard]] std::uint64_t bytes_beside(std::uint64_t loader_bytes) const {
     return charged.bytes() + (info.stored_bytes > 0 ? loader_bytes : 0);
-  }
-
-  // Measured upper bound of the memory of a loader, in addition to the volumes, while it reads
-  // these fields. Chunks needed again are cached, 128 MiB in all or one chunk.
-  [[nodiscard]] std::uint64_t reading_bytes(const std::vector<std::string>& fields) const {
-    constexpr std::uint64_t mib = std::uint64_t{1} << 20;
-    std::uint64_t bytes = 32 * mib;
-    for (const std::string& name : fields) {
-      const FieldInfo* const field = info.find(name);
-      if (field == nullptr || field->chunk_bytes <= sizeof(double)) continue;  // no chunks
-      const std::uint64_t kept =
-          std::min(128 * mib, field->decoded_bytes / field->components.size());
-      bytes = std::max(bytes, 64 * mib + std::max(kept, 2 * field->chunk_bytes));
-    }
-    return bytes;
   }
 
   [[nodiscard]] Error not_resident(std::size_t field, std::size_t step) const {
@@ -122,14 +140,14 @@ struct Dataset::State {
     const ResidentKey twin{owner, field, step, packed_variant};
     if (const Resident packed = budget->find_now(twin)) {
       add(&Counts::unpacked);
-      return guarded(field, [&]() -> Result<Volume> {
+      return guarded(info.fields[field], [&]() -> Result<Volume> {
         return unpack(*std::static_pointer_cast<const PackedVolume>(packed));
       });
     }
     auto volume = read(field, step, urgency);
     if (volume && storage == Storage::packed16) {
       // Where it does not fit, only the volume itself is kept.
-      (void)budget->get(twin, values(field) * sizeof(std::uint16_t), Urgency::prefetch,
+      (void)budget->get(twin, values_of(info, field) * sizeof(std::uint16_t), Urgency::prefetch,
                         [&] { return pack_volume(field, *volume); });
     }
     return volume;
@@ -147,7 +165,7 @@ struct Dataset::State {
       counts.prefetched += urgency == Urgency::prefetch ? 1 : 0;
       loading = Loading{info.fields[field].name, step, 0};
     }
-    auto volume = guarded(field, [&] { return source->read(field, step); });
+    auto volume = guarded(info.fields[field], [&] { return source->read(field, step); });
     {
       const std::lock_guard lock(mutex);
       loading.reset();
@@ -186,26 +204,6 @@ struct Dataset::State {
       errors[field] = std::max(errors[field], packed->error(c));
     }
     return Resident(std::make_shared<const PackedVolume>(std::move(*packed)));
-  }
-
-  // Runs a function that makes a volume; exceptions become errors.
-  template <class Make>
-  Result<Resident> guarded(std::size_t field, const Make& make) const {
-    try {
-      Result<Volume> volume = make();
-      if (!volume) {
-        return volume.error();
-      }
-      return Resident(std::make_shared<const Volume>(std::move(*volume)));
-    } catch (const std::bad_alloc&) {
-      return make_error(ErrorKind::out_of_memory,
-                        "the machine has no memory left for " + in_quotes(info.fields[field].name));
-    } catch (const std::exception& fault) {
-      // The text of an internal error is for the log only: it may name source locations.
-      log::error("loading failed", {{"field", info.fields[field].name}, {"fault", fault.what()}});
-      return make_error(ErrorKind::internal,
-                        "loading " + in_quotes(info.fields[field].name) + " failed");
-    }
   }
 
   void add(std::uint64_t Counts::*count) {
@@ -279,7 +277,7 @@ Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
-  return get(key, state_->values(*index) * sizeof(float),
+  return get(key, values_of(state_->info, *index) * sizeof(float),
              [&] { return state_->load(*index, step, urgency()); });
 }
 
@@ -313,7 +311,7 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
   }
   auto level = get(key, bytes, [&] {
     state_->add(&Counts::averages);
-    return state_->guarded(*index, [&]() -> Result<Volume> { return coarsen(**fine, how); });
+    return guarded(info.fields[*index], [&]() -> Result<Volume> { return coarsen(**fine, how); });
   });
   if (own_) own_->erase(own_->find(fine->get()));  // not yet shared
   return level;
@@ -415,7 +413,7 @@ std::optional<Dataset::Loading> Dataset::loading() const {
 Result<void> Dataset::check_room(const std::vector<std::string>& fields) const {
   const Budget& budget = *state_->budget;
   for (const std::string& field : fields) {
-    const std::uint64_t bytes = state_->bytes_at_a_step({field});
+    const std::uint64_t bytes = bytes_at_a_step(state_->info, {field});
     if (bytes + state_->bytes_beside(loader_bytes_min) <= budget.bytes_max()) continue;
     return make_error(ErrorKind::out_of_memory, in_quotes(field) + " needs " + megabytes(bytes) +
                                                     " at a step; " + budget.limit_text() +
@@ -426,8 +424,8 @@ Result<void> Dataset::check_room(const std::vector<std::string>& fields) const {
 
 std::string Dataset::beyond_limit(const std::vector<std::string>& fields) const {
   const Budget& budget = *state_->budget;
-  const std::uint64_t bytes = state_->bytes_at_a_step(fields);
-  const std::uint64_t all = bytes + state_->bytes_beside(state_->reading_bytes(fields));
+  const std::uint64_t bytes = bytes_at_a_step(state_->info, fields);
+  const std::uint64_t all = bytes + state_->bytes_beside(reading_bytes(state_->info, fields));
   if (all <= budget.bytes_max() || !budget.name().raised) return "";
   std::string text = "; ";
   if (fields.size() > 1) {

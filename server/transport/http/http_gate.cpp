@@ -6,7 +6,6 @@
 
 #include "server/access/auth.hpp"
 #include "server/access/login.hpp"
-#include "server/api/router.hpp"
 #include "server/http/http_checks.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
@@ -40,7 +39,7 @@ std::optional<http::Response> check_form(const api::ServerOptions& options, http
 
 std::optional<http::Response> check_access(const api::ServerOptions& options,
                                            access::Admission& admission,
-                                           const http::Request& request, bool upgrade,
+                                           const http::Request& request, bool health, bool upgrade,
                                            bool secure) {
   const access::Token* const token = options.token.get();
   if (token != nullptr && access::shows_token(request, upgrade)) {
@@ -51,10 +50,21 @@ std::optional<http::Response> check_access(const api::ServerOptions& options,
   if (verdict == access::Verdict::wrong_token) admission.failed_login(request.address);
   if (verdict != access::Verdict::allowed)
     return access::turned_away(verdict, request, options.base_path);
-  if (token != nullptr && !api::names_health(request) && !access::is_login(request)) {
+  if (token != nullptr && !health && !access::is_login(request)) {
     admission.authenticated(request.address);
   }
   return std::nullopt;
+}
+
+std::optional<http::Response> answer_login(const api::ServerOptions& options,
+                                           access::Admission& admission,
+                                           const http::Request& request, bool secure) {
+  if (options.token == nullptr || !access::is_login(request)) return std::nullopt;
+  if (auto over = admission.may_try_login(request.address)) return over;
+  http::Response answer =
+      access::log_in(request, *options.token, options.base_path, secure, std::time(nullptr));
+  if (answer.status == 401) admission.failed_login(request.address);
+  return answer;
 }
 
 }  // namespace windsplat::transport

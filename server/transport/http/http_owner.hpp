@@ -7,6 +7,7 @@
 
 #include "server/http/exchange.hpp"
 #include "server/transport/guarded.hpp"
+#include "server/transport/stream.hpp"
 
 namespace windsplat::transport {
 
@@ -18,7 +19,13 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
   HttpOwner& operator=(const HttpOwner&) = delete;
 
   [[nodiscard]] virtual const std::string& request_id() const = 0;
+  virtual void on_header() = 0;   // of a request, without its body
+  virtual void on_request() = 0;  // complete
   virtual void on_reply(http::Response response) = 0;
+  virtual void on_written(ErrorCode fault) = 0;  // the response
+  virtual void on_end() = 0;                     // end of stream or a connection error
+  // Sends a response after which the connection is closed.
+  virtual void refuse(http::Response response) = 0;
   virtual void abort() = 0;  // end now
   virtual void close() = 0;  // the connection's time is over, or it has failed
 

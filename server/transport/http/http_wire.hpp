@@ -18,6 +18,7 @@ class HttpWire {
 
   [[nodiscard]] Wire& wire() { return wire_; }
   [[nodiscard]] bool secure() const { return wire_.secure(); }
+  [[nodiscard]] bool is_of_reserve() const { return reserve_; }
   // Whether the peer has closed its side, even behind unread data.
   [[nodiscard]] bool peer_has_left();
 

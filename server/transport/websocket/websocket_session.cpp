@@ -8,8 +8,8 @@
 
 #include "protocol/limits.hpp"
 #include "server/api/routes.hpp"
-#include "server/api/services.hpp"
 #include "server/http/exchange.hpp"
+#include "server/http/request_id.hpp"
 #include "server/session/session.hpp"
 #include "server/transport/websocket/session_driver.hpp"
 #include "server/transport/websocket/stream_owner.hpp"
@@ -36,52 +36,52 @@ bool offers_protocol(const UpgradeRequest& request) {
   return false;
 }
 
-std::optional<session::Reading> what_is_read(const api::Services& services, const std::string& id) {
-  const auto dataset = services.backend.catalogue.find(id);
+std::optional<session::Reading> what_is_read(const work::Catalogue& catalogue,
+                                             const std::string& id) {
+  const auto dataset = catalogue.find(id);
   const auto loading = dataset ? (*dataset)->loading() : std::nullopt;
   if (!loading) return std::nullopt;
   return session::Reading{loading->field, loading->done};
 }
 
-session::Session new_session(api::Services& services) {
+session::Session new_session(const api::ServerOptions& server_options, work::Backend& backend) {
   session::Options options;
-  options.idle_timeout_us = session::Micros{services.options.idle_timeout_s} * 1'000'000;
+  options.idle_timeout_us = session::Micros{server_options.idle_timeout_s} * 1'000'000;
   return {
       options,
-      {[&services](const protocol::View& view) -> Result<int> {
-         const auto checked = services.backend.check(view);
+      {[&backend](const protocol::View& view) -> Result<int> {
+         const auto checked = backend.check(view);
          if (!checked) return checked.error();
          return checked->steps;
        },
-       [&services](const std::string& id) { return what_is_read(services, id); },
-       [&services](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
-         return services.backend.quality.forecasts(signature, viewpoint);
+       [&backend](const std::string& id) { return what_is_read(backend.catalogue, id); },
+       [&backend](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
+         return backend.quality.forecasts(signature, viewpoint);
        }},
       now_us()};
 }
 
 class WebSocketSession final : public Connection, public StreamOwner {
  public:
-  WebSocketSession(Wire wire, std::string request_id, api::Services& services,
-                   Connections& connections, Guest guest)
-      : StreamOwner(connections.next_id(), std::move(request_id)),
+  WebSocketSession(const StreamContext& context, Wire wire, std::string request_id, Guest guest)
+      : StreamOwner(context.connections.next_id(), std::move(request_id)),
         socket_(std::move(wire)),
-        services_(services),
-        connections_(connections),
+        context_(context),
         guest_(std::move(guest)),
-        token_(services.options.token),
+        token_(context.options.token),
         close_timer_(socket_.get_executor()),
-        driver_(*this, socket_, new_session(services), services.backend, services.metrics,
-                services.admission, guest_.address),
-        reader_(*this, socket_, services.admission, guest_.address, driver_.queue(), driver_) {}
-  ~WebSocketSession() override { connections_.remove(id_); }
+        driver_(*this, socket_, new_session(context.options, context.backend), context.backend,
+                context.backend.metrics, context.admission, guest_.address),
+        reader_(*this, socket_, context.admission, guest_.address, driver_.queue(), driver_) {}
+  ~WebSocketSession() override { context_.connections.remove(id_); }
   WebSocketSession(const WebSocketSession&) = delete;
   WebSocketSession& operator=(const WebSocketSession&) = delete;
 
   void start(const UpgradeRequest& request) {
     const bool full =
-        connections_.streams() >= static_cast<std::size_t>(services_.options.sessions_max);
-    connections_.add(id_, std::static_pointer_cast<WebSocketSession>(shared_from_this()), !full);
+        context_.connections.streams() >= static_cast<std::size_t>(context_.options.sessions_max);
+    context_.connections.add(id_, std::static_pointer_cast<WebSocketSession>(shared_from_this()),
+                             !full);
     websocket::stream_base::timeout timeout{};
     timeout.handshake_timeout = handshake_timeout;
     timeout.idle_timeout = silence_timeout;
@@ -149,24 +149,23 @@ class WebSocketSession final : public Connection, public StreamOwner {
  private:
   void on_open(bool full) {
     open_ = true;
-    if (access::is_other_token(token_.get(), services_.options.token.get())) return on_new_token();
-    services_.metrics.answered(api::route_stream, 101);
+    if (access::is_other_token(token_.get(), context_.options.token.get())) return on_new_token();
+    context_.backend.metrics.answered(api::route_stream, 101);
     if (full) {
-      services_.metrics.refused(metrics::LimitKind::sessions);
+      context_.backend.metrics.refused(metrics::LimitKind::sessions);
       return close(close_full, "the server is full");
     }
-    if (services_.draining) return drain();
-    const auto datasets = services_.backend.catalogue.list();
+    if (context_.draining) return drain();
+    const auto datasets = context_.backend.catalogue.list();
     if (!datasets) return close(close_fault, "cannot list the datasets");
     driver_.begin({WINDSPLAT_VERSION, "session-" + std::to_string(id_), *datasets,
-                   services_.options.limits.pixels_max_reported()});
+                   context_.options.limits.pixels_max_reported()});
     log::info("session opened", {{"session", id_}, {"request", request_id_}});
     reader_.start();
   }
 
   WebSocketStream socket_;
-  api::Services& services_;
-  Connections& connections_;
+  const StreamContext& context_;
   const Guest guest_;
   const std::shared_ptr<const access::Token> token_;  // token that authorised it
   asio::steady_timer close_timer_;
@@ -176,9 +175,9 @@ class WebSocketSession final : public Connection, public StreamOwner {
 
 }  // namespace
 
-void start_websocket_session(Wire wire, const UpgradeRequest& request, std::string request_id,
-                             api::Services& services, Connections& connections, Guest guest) {
-  std::make_shared<WebSocketSession>(std::move(wire), std::move(request_id), services, connections,
+void start_websocket_session(const StreamContext& context, Wire wire, const UpgradeRequest& request,
+                             std::string request_id, Guest guest) {
+  std::make_shared<WebSocketSession>(context, std::move(wire), std::move(request_id),
                                      std::move(guest))
       ->start(request);
 }

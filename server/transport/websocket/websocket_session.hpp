@@ -2,13 +2,27 @@
 // one frame is written at a time.
 #pragma once
 
+#include <atomic>
 #include <string>
 
-#include "server/api/router.hpp"
+#include "server/access/admission.hpp"
+#include "server/api/server_options.hpp"
 #include "server/transport/connections.hpp"
-#include "server/transport/wire.hpp"
+#include "server/transport/stream.hpp"
+#include "server/work/backend.hpp"
 
 namespace windsplat::transport {
+
+class Wire;
+
+// What the sessions of a server share; outlives them.
+struct StreamContext {
+  const api::ServerOptions& options;
+  work::Backend& backend;
+  access::Admission& admission;
+  const std::atomic<bool>& draining;
+  Connections& connections;
+};
 
 // Client of the session: the address charged, and its places among connections and sessions.
 struct Guest {
@@ -18,7 +32,7 @@ struct Guest {
 };
 
 // `request` is an authorised upgrade (auth.hpp); `request_id` names it in the response and the log.
-void start_websocket_session(Wire wire, const UpgradeRequest& request, std::string request_id,
-                             api::Services& services, Connections& connections, Guest guest);
+void start_websocket_session(const StreamContext& context, Wire wire, const UpgradeRequest& request,
+                             std::string request_id, Guest guest);
 
 }  // namespace windsplat::transport

@@ -8,8 +8,8 @@
 #include <future>
 #include <thread>
 
-#include "server/api/router.hpp"
 #include "server/data/open/open.hpp"
+#include "server/transport/server_parts.hpp"
 #include "server/work/drawing.hpp"
 #include "server/work/viewer.hpp"
 #include "tests/integration/server/slow_source.hpp"
@@ -265,7 +265,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
   std::promise<void> cancelled_ran;
   std::promise<void> other_ran;
   std::promise<void> last_ran;
-  work::TaskExecutor loads(2, 16, "loads");  // last: its threads use all of these until they end
+  work::TaskExecutor loads({"loads", 2, 16});  // last: its threads use all of these until they end
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
   ASSERT_TRUE(gate.wait_for(1));
   const CancelToken unwanted;
@@ -286,7 +286,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
 // The queue of one dataset is full: others are still admitted.
 TEST(Loads, EveryDatasetHasItsOwnQueue) {
   Gate gate;
-  work::TaskExecutor loads(2, 2, "loads");
+  work::TaskExecutor loads({"loads", 2, 2});
   const auto one = std::make_shared<int>(1);
   const auto two = std::make_shared<int>(2);
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
@@ -309,9 +309,9 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   const std::string vector = dataset->info().first(data::FieldKind::vector)->name;
   Gate gate;
   std::promise<void> done;
-  api::Services services({}, store, std::make_shared<ThreadPool>(2));
+  transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
   for (int i = 0; i < 2; ++i) {
-    ASSERT_TRUE(services.backend.loads.submit({{}, [&] { gate.pass(); }}));
+    ASSERT_TRUE(parts.backend.loads.submit({{}, [&] { gate.pass(); }}));
   }
   ASSERT_TRUE(gate.wait_for(2)) << "both threads are busy";
   protocol::View of_scalar;
@@ -321,12 +321,12 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   of_scalar.scalars.emplace(1);
   of_scalar.scalars->front().field = scalar;
   of_vector.scalars.emplace();
-  work::Viewer viewer(services.backend, 1, "192.0.2.1");
+  work::Viewer viewer(parts.backend, 1, "192.0.2.1");
   for (int i = 0; i < 1000; ++i) {
     viewer.start(session::Prefetch{i < 999 ? of_scalar : of_vector, {1}, {}});
   }
   ASSERT_TRUE(
-      services.backend.loads.submit({{}, [&] { done.set_value(); }, true, dataset->shared_info()}));
+      parts.backend.loads.submit({{}, [&] { done.set_value(); }, true, dataset->shared_info()}));
   gate.open();
   done.get_future().wait();
   EXPECT_FALSE(dataset->seen(scalar, 0)) << "the prefetch request was withdrawn";
@@ -334,10 +334,10 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
 }
 
 TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
-  Gate gate;  // before the services, whose threads use it until they end
+  Gate gate;  // before the parts, whose threads use it until they end
   std::promise<std::string> told;
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
-  api::Services services({}, store, std::make_shared<ThreadPool>(1));
+  transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(1));
   work::Drawing drawing;
   drawing.dataset = store->add("climate:8x8x4").value();
   drawing.draw = [&](const work::PreparedPicture& /*picture*/, data::Dataset& /*dataset*/,
@@ -350,14 +350,14 @@ TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
     if (loading == work::Loading::none) return make_error(ErrorKind::not_resident, "not loaded");
     const auto hold = [&](std::int64_t /*queue_us*/) { gate.pass(); };
     const work::RenderService::Job job{work::RenderService::Kind::request, 1, {}, hold, false, 0};
-    EXPECT_TRUE(services.backend.renderer.submit(job));
+    EXPECT_TRUE(parts.backend.renderer.submit(job));
     EXPECT_TRUE(gate.wait_for(1));
-    while (services.backend.renderer.submit(job)) {
+    while (parts.backend.renderer.submit(job)) {
     }
     return work::prepare_picture(frame::complete({}, dataset).value(), {}, {}, dataset, loading);
   };
   drawing.fail = [&](const Error& error) { told.set_value(error.message); };
-  ASSERT_TRUE(work::submit(services.backend, std::move(drawing)));
+  ASSERT_TRUE(work::submit(parts.backend, std::move(drawing)));
   ASSERT_TRUE(gate.wait_for(1));
   gate.open();
   EXPECT_EQ(told.get_future().get(), "drawn");

@@ -20,9 +20,9 @@
 #include <thread>
 #include <utility>
 
-#include "server/api/router.hpp"
 #include "server/transport/connections.hpp"
 #include "server/transport/handshake.hpp"
+#include "server/transport/server_parts.hpp"
 #include "server/transport/tls.hpp"
 #include "tests/integration/certificate.hpp"
 #include "tests/integration/server/test_server.hpp"
@@ -40,7 +40,7 @@ class HandshakePlaces : public testing::Test {
  protected:
   // The server's order of destruction (server.cpp).
   ~HandshakePlaces() override {
-    connections.each([](windsplat::transport::Connection& one) { one.abort(); });
+    parts.connections.each([](windsplat::transport::Connection& one) { one.abort(); });
     gate_.set_value();
     thread.stop();
     go_on();
@@ -57,7 +57,7 @@ class HandshakePlaces : public testing::Test {
   Tcp::socket& come(const std::string& address, bool known = false) {
     Tcp::socket& client = clients.emplace_back(io);
     client.connect(acceptor.local_endpoint());
-    windsplat::transport::start_connection(acceptor.accept(), services, connections, &thread,
+    windsplat::transport::start_connection(parts.http, acceptor.accept(), &thread,
                                            Visitor{address, nullptr, std::nullopt, false, known});
     return client;
   }
@@ -118,8 +118,7 @@ class HandshakePlaces : public testing::Test {
     return hello;
   }
 
-  windsplat::transport::Connections connections;
-  windsplat::api::Services services{
+  windsplat::transport::ServerParts parts{
       over_tls(), std::make_shared<windsplat::data::Store>(std::uint64_t{1} << 20),
       std::make_shared<windsplat::ThreadPool>(1)};
   boost::asio::io_context io{1};
@@ -175,7 +174,7 @@ TEST_F(HandshakePlaces, OfAuthenticatedAddressesAreNotTakenByOthers) {
 TEST_F(HandshakePlaces, AreChargedForComputationBeforeTheClose) {
   const std::string hello = client_hello();
   ASSERT_FALSE(hello.empty());
-  const auto took = [&] { return services.metrics.text({}); };
+  const auto took = [&] { return parts.metrics.text({}); };
   const std::string nothing = "windsplat_tls_handshake_seconds_total 0\n";
   EXPECT_THAT(took(), HasSubstr(nothing));
   // The clock of the thread may be coarse, so that some seem to take no time.
@@ -186,7 +185,7 @@ TEST_F(HandshakePlaces, AreChargedForComputationBeforeTheClose) {
       go_on();
       return client.available() > 0;
     }));
-    connections.each([](windsplat::transport::Connection& one) { one.abort(); });
+    parts.connections.each([](windsplat::transport::Connection& one) { one.abort(); });
     clients.clear();
   }
   EXPECT_THAT(took(), Not(HasSubstr(nothing)));

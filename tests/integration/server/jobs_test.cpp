@@ -66,7 +66,7 @@ protocol::JobDescription finished(const Jobs& jobs, const std::string& id) {
 }
 
 TEST(Jobs, ResultErrorAndExceptionEachEndTheirJobOnly) {
-  Jobs jobs(8, 2);
+  Jobs jobs({"jobs", 2, 8});
   const auto good = submitted(jobs, [](const Jobs::Handle&) { return Result<std::string>("gcm"); });
   const auto bad = submitted(jobs, [](const Jobs::Handle&) -> Result<std::string> {
     return make_error(ErrorKind::bad_data, "not a file of ours");
@@ -97,7 +97,7 @@ TEST(Jobs, ResultErrorAndExceptionEachEndTheirJobOnly) {
 
 TEST(Jobs, ConcurrencyIsLimitedAndOthersWait) {
   Gate gate;
-  Jobs jobs(8, 2);
+  Jobs jobs({"jobs", 2, 8});
   std::vector<std::string> ids;
   for (int i = 0; i < 5; ++i) {
     ids.push_back(submitted(jobs, [&](const Jobs::Handle& handle) {
@@ -121,7 +121,7 @@ TEST(Jobs, ConcurrencyIsLimitedAndOthersWait) {
 
 TEST(Jobs, SlowJobsLeaveAThreadToOthers) {
   Gate gate;
-  Jobs jobs(8, 2);
+  Jobs jobs({"jobs", 2, 8});
   const auto pass = [&](const Jobs::Handle&) {
     gate.pass();
     return Result<protocol::JobResult>("x");
@@ -142,7 +142,7 @@ TEST(Jobs, SlowJobsLeaveAThreadToOthers) {
 
 TEST(Jobs, WaitingAndRunningJobsCanBeCancelled) {
   Gate gate;
-  Jobs jobs(8, 1);
+  Jobs jobs({"jobs", 1, 8});
   std::atomic<bool> second_ran{false};
   const auto running = submitted(jobs, [&](const Jobs::Handle& handle) -> Result<std::string> {
     gate.pass();
@@ -170,7 +170,7 @@ TEST(Jobs, WaitingAndRunningJobsCanBeCancelled) {
 
 TEST(Jobs, OldestFinishedJobIsForgottenUnfinishedOnesAreKept) {
   Gate gate;
-  Jobs jobs(3, 1);
+  Jobs jobs({"jobs", 1, 3});
   const auto pass = [&](const Jobs::Handle&) {
     gate.pass();
     return Result<std::string>("x");
@@ -192,7 +192,7 @@ TEST(Jobs, OldestFinishedJobIsForgottenUnfinishedOnesAreKept) {
 TEST(Jobs, ShutdownCancelsRunningAndWaitingJobs) {
   std::atomic<int> ran{0};
   {
-    Jobs jobs(8, 1);
+    Jobs jobs({"jobs", 1, 8});
     Gate started;
     started.open();
     for (int i = 0; i < 3; ++i) {

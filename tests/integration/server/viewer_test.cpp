@@ -10,9 +10,9 @@
 #include <thread>
 #include <vector>
 
-#include "server/api/services.hpp"
 #include "server/frame/frame.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/transport/server_parts.hpp"
 #include "tests/integration/server/test_server.hpp"
 
 namespace server_test {
@@ -45,8 +45,8 @@ protocol::View view_of_small(int width, int height) {
 TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
-  api::Services services({}, store, std::make_shared<ThreadPool>(2));
-  work::Viewer viewer(services.backend, 1, "192.0.2.1");
+  transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
+  work::Viewer viewer(parts.backend, 1, "192.0.2.1");
   protocol::View view = view_of_small(16, 12);
   view.method.detail = protocol::Detail::full;
   EXPECT_TRUE(prepared(viewer, 1, view));
@@ -65,15 +65,15 @@ TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
 TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
-  api::Services services({}, store, std::make_shared<ThreadPool>(2));
-  work::Viewer viewer(services.backend, 1, "192.0.2.1");
+  transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
+  work::Viewer viewer(parts.backend, 1, "192.0.2.1");
   protocol::View view = view_of_small(96, 72);
   const std::uint64_t before = scene::completions();
   EXPECT_TRUE(prepared(viewer, 1, view));
   EXPECT_FALSE(prepared(viewer, 2, view, {protocol::MethodName::kernel, 2}));
   viewer.start(session::Calibrate{view});
   std::promise<void> calibrated;
-  ASSERT_TRUE(services.backend.loads.submit(
+  ASSERT_TRUE(parts.backend.loads.submit(
       {{}, [&] { calibrated.set_value(); }, true, dataset->shared_info()}));
   calibrated.get_future().wait();
   EXPECT_EQ(scene::completions() - before, 1U);
@@ -88,13 +88,13 @@ TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   constexpr std::uint64_t step_bytes = std::uint64_t{32} * 16 * 6 * sample_bytes;
   const auto store = std::make_shared<data::Store>(step_bytes * 3 / 2);
   ASSERT_TRUE(store->add(small_file()));
-  api::Services services({}, store, std::make_shared<ThreadPool>(2));
+  transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
   constexpr int viewers_count = 8;
   constexpr int rounds = 5;
   std::vector<std::unique_ptr<work::Viewer>> viewers;
   for (int v = 0; v < viewers_count; ++v) {
     viewers.push_back(std::make_unique<work::Viewer>(
-        services.backend, static_cast<std::uint64_t>(v + 1), "192.0.2.1"));
+        parts.backend, static_cast<std::uint64_t>(v + 1), "192.0.2.1"));
   }
   for (int round = 0; round < rounds; ++round) {
     std::vector<std::promise<std::string>> faults(viewers_count);
@@ -133,8 +133,8 @@ class LargePictures : public testing::Test {
     store_ = std::make_shared<data::Store>(
         frame::bytes_beyond_kept(2048, 1104, frame::Format::jpeg) + step_bytes * 3 / 2);
     EXPECT_TRUE(store_->add(small_file()));
-    services_ = std::make_unique<api::Services>(api::ServerOptions{}, store_,
-                                                std::make_shared<ThreadPool>(2));
+    parts_ = std::make_unique<transport::ServerParts>(api::ServerOptions{}, store_,
+                                                      std::make_shared<ThreadPool>(2));
   }
   // Why there is no frame; empty if there is one.
   std::future<std::string> fault_of(work::Viewer& viewer, const protocol::View& view) {
@@ -148,12 +148,12 @@ class LargePictures : public testing::Test {
 
   protocol::View view_;
   std::shared_ptr<data::Store> store_;
-  std::unique_ptr<api::Services> services_;
+  std::unique_ptr<transport::ServerParts> parts_;
   std::uint64_t tickets_ = 0;
 };
 
 TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
-  work::Viewer viewer(services_->backend, 1, "192.0.2.1");
+  work::Viewer viewer(parts_->backend, 1, "192.0.2.1");
   ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
   auto others = store_->reserve(step_bytes);
   while (!others) {  // memory is released shortly after the reply
@@ -167,8 +167,8 @@ TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
 }
 
 TEST_F(LargePictures, OfTwoSessionsAreRenderedInTurnWhenOneFits) {
-  work::Viewer one(services_->backend, 1, "192.0.2.1");
-  work::Viewer other(services_->backend, 2, "192.0.2.2");
+  work::Viewer one(parts_->backend, 1, "192.0.2.1");
+  work::Viewer other(parts_->backend, 2, "192.0.2.2");
   for (int round = 0; round < 4; ++round) {
     view_.step = round % small_steps;
     auto first = fault_of(one, view_);
@@ -181,7 +181,7 @@ TEST_F(LargePictures, OfTwoSessionsAreRenderedInTurnWhenOneFits) {
 }
 
 TEST_F(LargePictures, ThatNeverFitAreRefusedAtOnce) {
-  work::Viewer viewer(services_->backend, 1, "192.0.2.1");
+  work::Viewer viewer(parts_->backend, 1, "192.0.2.1");
   view_.image.height = 2048;
   const std::string fault = fault_of(viewer, view_).get();
   EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: what is beside the fields"),

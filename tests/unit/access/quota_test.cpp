@@ -317,27 +317,28 @@ TEST(Quota, NumberOfAddressesIsBounded) {
   limits.connections_per_address = 1;
   Quota quota(limits);
   quota.connect(here, false, 0);
-  for (std::size_t n = 0; n < 3 * Quota::addresses_max; ++n) {
+  for (std::size_t n = 0; n < 3 * AddressTable::addresses_max; ++n) {
     quota.request("2001:db8:0:" + std::to_string(n) + "::/64", false, 1);
   }
-  EXPECT_EQ(quota.known(), Quota::addresses_max);
+  EXPECT_EQ(quota.known(), AddressTable::addresses_max);
   EXPECT_EQ(quota.connect(here, false, 2).place, Quota::Slot::reserve) << "a known address";
 }
 
 TEST(Quota, UnauthenticatedClientsDoNotEvictAuthenticatedAddresses) {
   Quota quota(none());
   quota.authenticated(here, 0);
-  for (std::size_t n = 0; n < 3 * Quota::addresses_max; ++n) {
+  for (std::size_t n = 0; n < 3 * AddressTable::addresses_max; ++n) {
     quota.arrive("2001:db8:0:" + std::to_string(n) + "::/64", false, true, 1);
   }
-  EXPECT_EQ(quota.known(), Quota::addresses_max);
+  EXPECT_EQ(quota.known(), AddressTable::addresses_max);
   EXPECT_TRUE(quota.connect(here, false, 2).known);
   EXPECT_FALSE(quota.connect(there, false, 2).known);
   EXPECT_TRUE(quota.connect(there, true, 2).known) << "as a proxy";
-  for (std::size_t n = 0; n < 2 * Quota::addresses_max; ++n) {
+  for (std::size_t n = 0; n < 2 * AddressTable::addresses_max; ++n) {
     quota.authenticated("2001:db8:1:" + std::to_string(n) + "::/64", 3);
   }
-  EXPECT_EQ(quota.known(), Quota::addresses_max) << "authenticated addresses are bounded, too";
+  EXPECT_EQ(quota.known(), AddressTable::addresses_max)
+      << "authenticated addresses are bounded, too";
 }
 
 TEST(Admission, LogsRefusedHandshakesOncePerMinute) {

@@ -155,7 +155,7 @@ TEST(NoMemory, FailedAttemptIsReportedWithoutAllocating) {
 
 // The thread cannot allocate from the first job on.
 TEST(NoMemory, ThreadsOfServicesContinue) {
-  TaskExecutor loads(1, 4, "loads");
+  TaskExecutor loads({"loads", 1, 4});
   std::promise<void> loaded;
   EXPECT_TRUE(loads.submit({{}, [] {
                               allocations_left = 0;
@@ -181,7 +181,7 @@ TEST(NoMemory, ThreadsOfServicesContinue) {
 }
 
 TEST(NoMemory, ClientJobThatCannotAllocateIsAFailedJob) {
-  Jobs jobs(4, 1);
+  Jobs jobs({"jobs", 1, 4});
   const auto ask = [&] {
     return jobs
         .submit("test",

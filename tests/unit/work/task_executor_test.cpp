@@ -18,7 +18,7 @@ TEST(TaskExecutor, LimitsWaitingJobsPerDatasetAndInTotal) {
   std::promise<void> begun;
   std::atomic<int> ran{0};
   int refusals = 0;
-  TaskExecutor loads(1, most, "loads", [&] { ++refusals; });
+  TaskExecutor loads({"loads", 1, most}, [&] { ++refusals; });
   ASSERT_TRUE(loads.submit({{}, [&] {
                               begun.set_value();
                               gone.wait();
@@ -50,7 +50,7 @@ TEST(TaskExecutor, LimitsWaitingJobsPerDatasetAndInTotal) {
 TEST(TaskExecutor, OnePayerMayUseHalfOfTheSlots) {
   std::promise<void> let_go;
   std::promise<void> begun;
-  TaskExecutor loads(1, 4, "loads");
+  TaskExecutor loads({"loads", 1, 4});
   ASSERT_TRUE(loads.submit({{}, [&] {
                               begun.set_value();
                               let_go.get_future().wait();
@@ -78,7 +78,7 @@ TEST(TaskExecutor, LongRunningJobsReleaseTheirSlotsToSpareThreads) {
   std::promise<void> let_go;
   const std::shared_future<void> gone = let_go.get_future().share();
   std::atomic<std::size_t> hanging{0};
-  TaskExecutor loads(places, 16, "loads", {}, spare);
+  TaskExecutor loads({"loads", places, 16, spare});
   const auto hang = [&] {
     EXPECT_TRUE(loads.submit({{},
                               [&hanging, gone] {

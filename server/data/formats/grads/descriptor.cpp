@@ -46,6 +46,19 @@ std::string units_in(std::string_view description) {
   return !brackets && place ? std::string() : std::string(inside);
 }
 
+struct Line {
+  std::size_t number;
+  std::string_view text;
+  std::vector<std::string_view> words;
+  std::string key;
+};
+
+std::string rest(const Line& line, std::size_t words) {
+  if (line.words.size() <= words) return {};
+  return std::string(
+      line.text.substr(static_cast<std::size_t>(line.words[words].data() - line.text.data())));
+}
+
 class Parser {
  public:
   explicit Parser(const InputFile& file) : file_(file) {}
@@ -66,13 +79,6 @@ class Parser {
   }
 
  private:
-  struct Line {
-    std::size_t number;
-    std::string_view text;
-    std::vector<std::string_view> words;
-    std::string key;
-  };
-
   void complain(const Line& line, const std::string& what) {
     if (!problem_.empty()) return;
     problem_ = "is refused: line " + std::to_string(line.number) + " (";
@@ -93,12 +99,6 @@ class Parser {
   }
 
   // The rest of a line after the first `words` words.
-  static std::string rest(const Line& line, std::size_t words) {
-    if (line.words.size() <= words) return {};
-    return std::string(
-        line.text.substr(static_cast<std::size_t>(line.words[words].data() - line.text.data())));
-  }
-
   std::int64_t integer(const Line& line, std::size_t word, std::int64_t least, std::int64_t most) {
     if (line.words.size() > word) {
       const auto value = bytes::to_integer(line.words[word]);

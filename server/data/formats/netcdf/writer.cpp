@@ -150,6 +150,17 @@ Error with_room_left(Error error, const std::string& path) {
   return error;
 }
 
+// One step and as many levels as fit, because data are read step by step.
+std::vector<std::size_t> chunk_of(const std::array<int, 3>& dims, bool has_time) {
+  const std::size_t row = static_cast<std::size_t>(dims[0]) * sizeof(float);
+  const auto y = std::clamp<std::size_t>(chunk_bytes / row, 1, static_cast<std::size_t>(dims[1]));
+  const auto z =
+      std::clamp<std::size_t>(chunk_bytes / (row * y), 1, static_cast<std::size_t>(dims[2]));
+  const auto x = static_cast<std::size_t>(dims[0]);
+  if (has_time) return {1, z, y, x};
+  return {z, y, x};
+}
+
 class Writer {
  public:
   Writer(Source& source, std::string path, const CancelToken& cancel)
@@ -267,23 +278,9 @@ class Writer {
     dimensions_.push_back(dimension);
   }
 
-  // One step and as many levels as fit, because data are read step by step.
-  [[nodiscard]] std::vector<std::size_t> chunk() const {
-    const auto dims = info_.grid.dims();
-    const std::size_t row = static_cast<std::size_t>(dims[0]) * sizeof(float);
-    const auto y = std::clamp<std::size_t>(chunk_bytes / row, 1, static_cast<std::size_t>(dims[1]));
-    const auto z =
-        std::clamp<std::size_t>(chunk_bytes / (row * y), 1, static_cast<std::size_t>(dims[2]));
-    std::vector<std::size_t> out{z, y, static_cast<std::size_t>(dims[0])};
-    if (time_ >= 0) {
-      out.insert(out.begin(), 1);
-    }
-    return out;
-  }
-
   void define_variable(OutVariable& variable) {
     const FieldInfo& field = info_.fields.at(variable.field);
-    const std::vector<std::size_t> chunks = chunk();
+    const std::vector<std::size_t> chunks = chunk_of(info_.grid.dims(), time_ >= 0);
     int& id = variable.id;
     then([&] {
       return nc_def_var(ncid_, variable.name.c_str(), NC_FLOAT,
@@ -371,7 +368,7 @@ class Writer {
     const auto dims = info_.grid.dims();
     const auto layer = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]);
     const auto levels = static_cast<std::size_t>(dims[2]);
-    const std::vector<std::size_t> chunks = chunk();
+    const std::vector<std::size_t> chunks = chunk_of(info_.grid.dims(), time_ >= 0);
     const std::size_t z = chunks.size() - 3;
     for (std::size_t first = 0; first < levels; first += chunks[z]) {
       if (cancel_.cancelled()) {

@@ -75,6 +75,11 @@ constexpr auto type_names = std::to_array<TypeName>({
 constexpr auto ignored_fields = std::to_array<std::string_view>(
     {"number", "min", "max", "old min", "oldmin", "old max", "oldmax", "thicknesses"});
 
+bool is_data_file(const Line& line) {
+  const std::string key = lower(line.key);
+  return key == "data file" || key == "datafile";
+}
+
 class Parser {
  public:
   explicit Parser(const InputFile& file) : file_(file) {}
@@ -137,11 +142,6 @@ class Parser {
       if (is_data_file(last) && last.value.starts_with("LIST")) list(last);
     }
     header_.end = at;
-  }
-
-  static bool is_data_file(const Line& line) {
-    const std::string key = lower(line.key);
-    return key == "data file" || key == "datafile";
   }
 
   void list(const Line& line) {

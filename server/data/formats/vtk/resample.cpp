@@ -39,6 +39,30 @@ Box box_of(const Point* points, std::size_t count) {
   return box;
 }
 
+Error refuse(const std::string& what) { return make_error(ErrorKind::bad_data, what); }
+
+// Sums of the extents of cells of one rank along the world axes.
+struct Extents {
+  std::uint64_t cells = 0;
+  Box all;
+  Point across{0, 0, 0};               // of bounding boxes
+  std::array<Point, 3> along_index{};  // of hexahedra: edges along i, j, k
+};
+
+void add(Extents& to, const Corners& corners, std::size_t count) {
+  const Box box = box_of(corners.data(), count);
+  if (to.cells++ == 0) to.all = box;
+  constexpr std::array<std::size_t, 3> next{1, 3, 4};  // from corner 0 along i, j, k
+  for (std::size_t d = 0; d < 3; ++d) {
+    to.all.low[d] = std::min(to.all.low[d], box.low[d]);
+    to.all.high[d] = std::max(to.all.high[d], box.high[d]);
+    to.across[d] += box.high[d] - box.low[d];
+    for (std::size_t a = 0; a < 3 && count == 8; ++a) {
+      to.along_index[a][d] += std::abs(corners[next[a]][d] - corners[0][d]);
+    }
+  }
+}
+
 class Resampler {
  public:
   explicit Resampler(const Mesh& mesh) : mesh_(mesh) {}
@@ -57,8 +81,6 @@ class Resampler {
   }
 
  private:
-  static Error refuse(const std::string& what) { return make_error(ErrorKind::bad_data, what); }
-
   // The corners of a cell, permuted such that the axes of a plane come first; Shape::none if
   // skipped.
   Shape corners_of_cell(std::uint64_t cell, Corners& out) const {
@@ -71,28 +93,6 @@ class Resampler {
       }
     }
     return shape;
-  }
-
-  // Sums of the extents of cells of one rank along the world axes.
-  struct Extents {
-    std::uint64_t cells = 0;
-    Box all;
-    Point across{0, 0, 0};               // of bounding boxes
-    std::array<Point, 3> along_index{};  // of hexahedra: edges along i, j, k
-  };
-
-  static void add(Extents& to, const Corners& corners, std::size_t count) {
-    const Box box = box_of(corners.data(), count);
-    if (to.cells++ == 0) to.all = box;
-    constexpr std::array<std::size_t, 3> next{1, 3, 4};  // from corner 0 along i, j, k
-    for (std::size_t d = 0; d < 3; ++d) {
-      to.all.low[d] = std::min(to.all.low[d], box.low[d]);
-      to.all.high[d] = std::max(to.all.high[d], box.high[d]);
-      to.across[d] += box.high[d] - box.low[d];
-      for (std::size_t a = 0; a < 3 && count == 8; ++a) {
-        to.along_index[a][d] += std::abs(corners[next[a]][d] - corners[0][d]);
-      }
-    }
   }
 
   // Computes the mean extent of cells and the number of layers along each axis. For a structured

@@ -201,10 +201,10 @@ class ArrayReader::Stream {
   Result<void> stored(unsigned char* out, std::size_t count) {
     if (array_.encoding == Encoding::raw) return bytes_.read(out, count);
     while (count > 0) {
-      if (quad_used_ == quad_size_) {
+      if (quad_.used == quad_.size) {
         if (auto done = next_quad(); !done) return done;
       }
-      *out++ = quad_[quad_used_++];
+      *out++ = quad_.bytes[quad_.used++];
       --count;
     }
     return {};
@@ -226,10 +226,10 @@ class ArrayReader::Stream {
       bits = bits << 6 | (value & 63U);
       ++letters;
     }
-    quad_ = {static_cast<unsigned char>(bits >> 16), static_cast<unsigned char>(bits >> 8),
-             static_cast<unsigned char>(bits)};
-    quad_size_ = 3 - padding;
-    quad_used_ = 0;
+    quad_.bytes = {static_cast<unsigned char>(bits >> 16), static_cast<unsigned char>(bits >> 8),
+                   static_cast<unsigned char>(bits)};
+    quad_.size = 3 - padding;
+    quad_.used = 0;
     return {};
   }
 
@@ -297,6 +297,11 @@ class ArrayReader::Stream {
     return {};
   }
 
+  struct Quad {  // four characters of base64, decoded
+    std::array<unsigned char, 3> bytes{};
+    std::size_t size = 0;
+    std::size_t used = 0;
+  };
   struct Block {
     std::uint64_t packed = 0;
     std::uint64_t plain = 0;
@@ -307,9 +312,7 @@ class ArrayReader::Stream {
   std::size_t value_bytes_;
   std::uint64_t left_;
   FileBytes bytes_;
-  std::array<unsigned char, 3> quad_{};
-  std::size_t quad_size_ = 0;
-  std::size_t quad_used_ = 0;
+  Quad quad_;
   std::vector<Block> blocks_;
   std::size_t next_block_ = 0;
   std::vector<unsigned char> packed_;

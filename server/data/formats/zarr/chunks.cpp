@@ -19,7 +19,6 @@ namespace {
 // Cache limits: the first always, the second for the chunks of one block.
 constexpr std::size_t kept_bytes_least = std::size_t{64} << 20;
 constexpr std::size_t kept_bytes_most = std::size_t{512} << 20;
-constexpr std::size_t bookkeeping_bytes = 256;  // overhead of a cached chunk
 
 std::uint64_t chunks_along(const ArrayMetadata& array, std::size_t d) {
   return array.shape[d] / array.chunks[d] + (array.shape[d] % array.chunks[d] != 0 ? 1 : 0);
@@ -199,22 +198,16 @@ std::vector<std::size_t> Store::chunk(int variable) const {
 
 void Store::forget_chunks(int variable) const {
   const std::lock_guard lock(mutex_);
-  if (variable == kept_variable_) forget_all();
+  kept_.forget(variable);
 }
 
-void Store::forget_all() const {
-  kept_by_number_.clear();
-  kept_.clear();
-  kept_bytes_ = 0;
-}
-
-Result<std::vector<unsigned char>> Store::load(const Array& array, const std::string& path) const {
+Result<ChunkBytes> Store::load(const Array& array, const std::string& path) const {
   const auto fault = [&](const std::string& what) {
     return make_error(ErrorKind::bad_data,
-                      in_quotes(name_) + ": the chunk " + in_quotes(path) + " " + what);
+                      in_quotes(contents_.name) + ": the chunk " + in_quotes(path) + " " + what);
   };
   auto input = files_->open(path);
-  if (!input && input.error().kind == ErrorKind::not_found) return std::vector<unsigned char>();
+  if (!input && input.error().kind == ErrorKind::not_found) return ChunkBytes();
   if (!input) return input.error();
   if ((*input)->size() > stored_bytes_max(array.metadata)) {
     return fault("has more bytes than its array can need");
@@ -226,32 +219,19 @@ Result<std::vector<unsigned char>> Store::load(const Array& array, const std::st
   return bytes;
 }
 
-Result<const Store::Chunk*> Store::chunk_at(int variable, const std::vector<std::size_t>& place,
-                                            std::size_t kept_bytes_max) const {
+Result<const ChunkBytes*> Store::chunk_at(int variable, const std::vector<std::size_t>& place,
+                                          std::size_t kept_bytes_max) const {
   const Array& array = array_of(variable);
-  if (variable != kept_variable_) forget_all();
-  kept_variable_ = variable;
+  kept_.select(variable);
   std::uint64_t number = 0;
   for (std::size_t d = 0; d < place.size(); ++d) {
     number = number * chunks_along(array.metadata, d) + place[d];
   }
-  const auto at = kept_by_number_.find(number);
-  if (at != kept_by_number_.end()) {
-    kept_.splice(kept_.begin(), kept_, at->second);
-    return &kept_.front();
-  }
-  const std::size_t bytes = array.metadata.chunk_items() * array.metadata.dtype.bytes;
-  while (!kept_.empty() && kept_bytes_ + bytes > kept_bytes_max) {
-    kept_bytes_ -= kept_.back().bytes.size() + bookkeeping_bytes;
-    kept_by_number_.erase(kept_.back().number);
-    kept_.pop_back();
-  }
+  if (const ChunkBytes* const kept = kept_.find(number)) return kept;
+  kept_.evict_for(array.metadata.chunk_items() * array.metadata.dtype.bytes, kept_bytes_max);
   auto loaded = load(array, array.path + chunk_key(array.metadata, number));
   if (!loaded) return loaded.error();
-  kept_bytes_ += loaded->size() + bookkeeping_bytes;
-  kept_.push_front({number, std::move(*loaded)});
-  kept_by_number_.emplace(number, kept_.begin());
-  return &kept_.front();
+  return kept_.add(number, std::move(*loaded));
 }
 
 template <class Out>
@@ -260,7 +240,7 @@ Result<void> Store::read_block(int variable, const std::vector<std::size_t>& sta
   const ArrayMetadata& array = array_of(variable).metadata;
   std::vector<std::size_t> first;
   std::vector<std::size_t> last;
-  std::size_t needed = array.chunk_items() * array.dtype.bytes + bookkeeping_bytes;
+  std::size_t needed = array.chunk_items() * array.dtype.bytes + ChunkCache::bookkeeping_bytes;
   for (std::size_t d = 0; d < start.size(); ++d) {
     if (count[d] == 0) return {};
     first.push_back(start[d] / array.chunks[d]);
@@ -273,7 +253,7 @@ Result<void> Store::read_block(int variable, const std::vector<std::size_t>& sta
   do {
     const auto chunk = chunk_at(variable, place, std::max(needed, kept_bytes_least));
     if (!chunk) return chunk.error();
-    copy_overlap(array, (*chunk)->bytes, overlap_of(array, place, start, count), count, out);
+    copy_overlap(array, **chunk, overlap_of(array, place, start, count), count, out);
   } while (advance(place, first, last, place.size()));
   return {};
 }

@@ -1,19 +1,18 @@
-// A folder that is a Zarr v2 store. Files -> metadata -> FileContents; chunks -> blocks of numbers.
+// A folder that is a Zarr v2 store. Chunks -> blocks of numbers.
 #pragma once
 
-#include <cstdint>
-#include <list>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "server/base/error.hpp"
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/cf/array_file.hpp"
 #include "server/data/files/files.hpp"
-#include "server/data/formats/zarr/metadata.hpp"
+#include "server/data/formats/zarr/chunk_cache.hpp"
+#include "server/data/formats/zarr/scan.hpp"
 
 namespace windsplat::data::zarr {
 
@@ -27,11 +26,10 @@ class Store final : public cf::ArrayFile {
   // Errors: bad_data, also for version 3.
   static Result<std::unique_ptr<Store>> open(std::shared_ptr<Files> files);
 
-  [[nodiscard]] const FileContents& contents() const override { return contents_; }
-  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] const FileContents& contents() const override { return contents_.file; }
+  [[nodiscard]] const std::string& name() const override { return contents_.name; }
   [[nodiscard]] std::string format() const override { return "Zarr v2"; }
-  // By the metadata and all chunks, or 4096 evenly distributed ones if there are more.
-  [[nodiscard]] std::string identity() const override { return identity_; }
+  [[nodiscard]] std::string identity() const override { return contents_.identity; }
 
   [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
   [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
@@ -47,57 +45,21 @@ class Store final : public cf::ArrayFile {
                     const std::vector<std::size_t>& count, float* out) const override;
 
  private:
-  struct Array {
-    std::string path;  // below the store, empty or ending in '/'
-    std::string name;
-    Json attributes;
-    ArrayMetadata metadata;
-    std::vector<std::string> dimensions;
-    bool named_dimensions = false;  // by _ARRAY_DIMENSIONS
-  };
-  // A decoded chunk; without bytes if absent.
-  struct Chunk {
-    std::uint64_t number = 0;
-    std::vector<unsigned char> bytes;
-  };
+  Store(std::shared_ptr<Files> files, StoreContents contents)
+      : files_(std::move(files)), contents_(std::move(contents)) {}
 
-  explicit Store(std::shared_ptr<Files> files);
-  Result<void> find_arrays();
-  Result<void> find_consolidated();
-  Result<void> find_below_root();
-  Result<Json> read_json(const std::string& path);
-  Result<Json> read_attributes(const std::string& path);
-  Result<void> add_array(const std::string& name, const std::string& path, const Json& json,
-                         Json attributes);
-  void forget_all() const;
-  void name_dimensions(Array& array) const;
-  void describe_all();
-  [[nodiscard]] Result<void> check_any_field() const;
-  void describe(const Array& array, bool coordinate);
-  void identify();
-  [[nodiscard]] bool is_fill_a_number(const Array& array) const;
   [[nodiscard]] const Array& array_of(int variable) const;
-
   template <class Out>
   Result<void> read_block(int variable, const std::vector<std::size_t>& start,
                           const std::vector<std::size_t>& count, Out* out) const;
-  Result<const Chunk*> chunk_at(int variable, const std::vector<std::size_t>& place,
-                                std::size_t kept_bytes_max) const;
-  Result<std::vector<unsigned char>> load(const Array& array, const std::string& path) const;
+  Result<const ChunkBytes*> chunk_at(int variable, const std::vector<std::size_t>& place,
+                                     std::size_t kept_bytes_max) const;
+  Result<ChunkBytes> load(const Array& array, const std::string& path) const;
 
   std::shared_ptr<Files> files_;
-  std::string name_;
-  std::string identity_;
-  Json attributes_;
-  std::vector<Array> found_;   // in the order of their names
-  std::vector<Array> arrays_;  // parallel to the variables
-  FileContents contents_;
-
+  StoreContents contents_;
   mutable std::mutex mutex_;  // guards the cached chunks
-  mutable int kept_variable_ = -1;
-  mutable std::size_t kept_bytes_ = 0;
-  mutable std::list<Chunk> kept_;  // most recently used first
-  mutable std::unordered_map<std::uint64_t, std::list<Chunk>::iterator> kept_by_number_;
+  mutable ChunkCache kept_;
 };
 
 }  // namespace windsplat::data::zarr

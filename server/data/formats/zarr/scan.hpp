@@ -1,0 +1,46 @@
+// The metadata of a Zarr v2 store: files -> arrays, dimensions, attributes.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/contents.hpp"
+#include "server/data/files/files.hpp"
+#include "server/data/formats/zarr/metadata.hpp"
+
+namespace windsplat::data::zarr {
+
+struct Array {
+  std::string path;  // below the store, empty or ending in '/'
+  std::string name;
+  Json attributes;
+  ArrayMetadata metadata;
+  std::vector<std::string> dimensions;
+  bool named_dimensions = false;  // by _ARRAY_DIMENSIONS
+
+  [[nodiscard]] bool is_coordinate() const {
+    return dimensions.size() == 1 && dimensions[0] == name;
+  }
+  // The default fill_value of Zarr is 0; only xarray uses it for missing values.
+  [[nodiscard]] bool is_fill_a_number() const {
+    return metadata.fill_value && *metadata.fill_value == 0 && !named_dimensions;
+  }
+};
+
+struct StoreContents {
+  std::string name;
+  // By the metadata and all chunks, or 4096 evenly distributed ones if there are more.
+  std::string identity;
+  std::vector<Array> arrays;  // parallel to the variables
+  FileContents file;
+};
+
+// Errors: bad_data, also for version 3.
+Result<StoreContents> scan_store(Files& files);
+
+// An attribute, trimmed; empty if absent or no text.
+std::string text_in(const Json& attributes, std::string_view key);
+
+}  // namespace windsplat::data::zarr

@@ -1,0 +1,252 @@
+// Daemon side: sends a call, serves the loader's requests, validates its answer.
+// Any other event ends the loader and is an error of the call.
+#include "server/data/loader/running_loader.hpp"
+
+#include <fcntl.h>
+#include <linux/openat2.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <mutex>
+#include <utility>
+
+#include "server/data/bytes/decode_limits.hpp"
+#include "server/data/loader/bytes.hpp"
+
+namespace windsplat::data::loader {
+
+namespace {
+
+struct Program {
+  std::mutex mutex;
+  std::string path;
+};
+
+Program& program() {
+  static Program the_one;
+  return the_one;
+}
+
+std::string program_path() {
+  const std::lock_guard lock(program().mutex);
+  return program().path;
+}
+
+// A regular file below one of the folders where libraries keep their tables.
+Descriptor open_of_library(const std::vector<std::string>& folders, const std::string& path) {
+  for (const std::string& folder : folders) {
+    if (!path.starts_with(folder + '/') || path.find('\0') != std::string::npos) continue;
+    const std::size_t below = path.find_first_not_of('/', folder.size());
+    if (below == std::string::npos) continue;  // the folder itself
+    const Descriptor root(::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    open_how how{};
+    how.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
+    how.resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS;
+    Descriptor file(static_cast<int>(
+        ::syscall(SYS_openat2, root.number(), path.c_str() + below, &how, sizeof how)));
+    struct stat status {};
+    if (file && ::fstat(file.number(), &status) == 0 && S_ISREG(status.st_mode)) return file;
+  }
+  return Descriptor();
+}
+
+std::string seconds_text(std::chrono::milliseconds time) {
+  const auto tenths = (time.count() + 50) / 100;
+  return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10) + " s";
+}
+
+}  // namespace
+
+void set_program(std::string path) {
+  const std::lock_guard lock(program().mutex);
+  program().path = std::move(path);
+}
+
+// Remaining time of a call.
+struct RunningLoader::Patience {
+  Clock::time_point end;
+  Clock::time_point moved = Clock::now();  // time of the last message or progress of the loader
+  Clock::time_point looked = Clock::now();
+  std::chrono::nanoseconds cpu{};
+};
+
+RunningLoader::RunningLoader(Location location, const Limits& limits)
+    : location_(std::move(location)), limits_(limits), memory_(limits.budget) {}
+
+Result<std::string> RunningLoader::open() {
+  release();
+  const std::string path = program_path();
+  if (path.empty()) return make_error(ErrorKind::internal, "no program is set to load files");
+  if (auto room = memory_.resize(loader_bytes_min); !room) return room.error();
+  if (auto started = process_.start(path); !started) {
+    release();
+    return started.error();
+  }
+  files_ = direct_files(location_);
+  Task task;
+  task.memory_bytes = limits_.memory_bytes;
+  task.library_folders = limits_.library_folders;
+  task.location.kind = location_.kind;
+  task.location.companions = location_.companions;
+  task.location.stem = location_.stem;
+  task.location.inside = location_.inside;
+  task.location.pattern = location_.pattern.substr(location_.pattern.find_last_of('/') + 1);
+  for (const Location::Member& member : location_.members) {
+    task.location.members.push_back({member.name, {}});
+  }
+  auto answer =
+      call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits_.open_time});
+  if (!answer) {
+    Error error = answer.error();
+    // Without files the loader has already ended for lack of memory.
+    if (files_ && error.kind == ErrorKind::out_of_memory) error.message += opening_limit();
+    release();
+    return error;
+  }
+  files_->stop_counting();
+  opened_bytes_ = files_->opened_bytes();
+  companions_ = files_->companions();
+  if (limits_.reads_take_all) process_.allow_memory(limits_.memory_bytes);
+  return std::move(answer->payload);
+}
+
+Result<Message> RunningLoader::call(const Call& what) {
+  Patience patience{Clock::now() + what.time};
+  process_.allow_cpu(std::chrono::ceil<std::chrono::seconds>(what.time));
+  Fate fate = send_message(process_.socket(), what.kind, what.payload, what.descriptor,
+                           next_deadline(patience));
+  std::size_t questions = 0;
+  while (fate == Fate::done) {
+    Message heard;
+    const std::size_t bytes_max = what.answer == Kind::opened
+                                      ? std::min<std::size_t>(info_bytes_max, limits_.memory_bytes)
+                                      : std::size_t{question_bytes_max};
+    const Result<Fate> waited = wait(patience);
+    if (!waited) return crowded_out(waited.error(), what);
+    fate = *waited;
+    if (fate == Fate::done) {
+      fate = receive_message(process_.socket(), heard, bytes_max, Descriptors::refused,
+                             next_deadline(patience));
+    }
+    if (fate != Fate::done) break;
+    if (heard.kind == what.answer) return heard;
+    if (heard.kind == Kind::failed) return decode_error(heard.payload);
+    fate = heard.kind == Kind::progress ? hear_progress(heard.payload)
+           : ++questions > 2 * limits_.opens_max
+               ? Fate::broken
+               : answer(heard, what.kind, next_deadline(patience));
+    patience.moved = Clock::now();
+  }
+  return ended(fate, what, patience);
+}
+
+Deadline RunningLoader::next_deadline(const Patience& patience) const {
+  return std::min(patience.end, Clock::now() + limits_.stall_time);
+}
+
+// Waits for the next message. Processor time counts as progress, since a reader may compute for
+// long. Errors: out_of_memory, since readers allocate while they read.
+Result<Fate> RunningLoader::wait(Patience& patience) {
+  constexpr std::chrono::milliseconds look_every{50};
+  constexpr std::chrono::seconds pause_min{1};
+  patience.looked = Clock::now();
+  for (;;) {
+    const auto now = Clock::now();
+    const auto cpu = process_.cpu_time();
+    if (cpu != patience.cpu) patience.moved = now;
+    patience.cpu = cpu;
+    // Time during which this process was stopped as well does not count as a stall.
+    if (now - patience.looked > pause_min) patience.moved += now - patience.looked;
+    patience.looked = now;
+    const auto end = std::min(patience.end, patience.moved + limits_.stall_time);
+    if (now >= end) return wait_for_message(process_.socket(), now);
+    if (auto room = count_memory(); !room) return room.error();
+    const Fate fate = wait_for_message(process_.socket(), std::min(end, now + look_every));
+    if (fate != Fate::late) return fate;
+  }
+}
+
+std::string RunningLoader::opening_limit() const {
+  const std::uint64_t bytes =
+      std::min(opening_memory_bytes(files_->opened_bytes()), limits_.memory_bytes);
+  return "; the limit of memory to open files of " + std::to_string(files_->opened_bytes()) +
+         " bytes is " + megabytes(bytes);
+}
+
+Result<void> RunningLoader::count_memory() {
+  return memory_.resize(std::max(loader_bytes_min, process_.private_bytes()));
+}
+
+Fate RunningLoader::hear_progress(const std::string& payload) const {
+  Reader in(payload);
+  const auto done = in.number<double>();
+  if (!in.complete() || !(done >= 0 && done <= 1)) return Fate::broken;
+  if (progress_) progress_(done);
+  return Fate::done;
+}
+
+// During a call of that kind.
+Fate RunningLoader::answer(const Message& question, Kind during, const Deadline& deadline) {
+  const auto say = [&](Kind kind, std::string_view payload, int descriptor = -1) {
+    return send_message(process_.socket(), kind, payload, descriptor, deadline);
+  };
+  const std::string& name = question.payload;
+  if (name.size() > question_bytes_max) return Fate::broken;
+  if (question.kind == Kind::ask_open) {
+    const auto file = files_->open(name);
+    if (during == Kind::open) process_.allow_memory(opening_memory_bytes(files_->opened_bytes()));
+    return file ? say(Kind::descriptor, {}, (*file)->descriptor())
+                : say(Kind::no, encode_error(file.error()));
+  }
+  if (question.kind == Kind::ask_list) {
+    const auto names = files_->list(name);
+    return names ? say(Kind::names, encode_names(*names))
+                 : say(Kind::no, encode_error(names.error()));
+  }
+  if (question.kind == Kind::ask_exists) {
+    return say(files_->exists(name) ? Kind::yes : Kind::no, {});
+  }
+  if (question.kind == Kind::ask_library) {
+    const Descriptor file = open_of_library(limits_.library_folders, name);
+    return file ? say(Kind::descriptor, {}, file.number()) : say(Kind::no, {});
+  }
+  return Fate::broken;
+}
+
+Error RunningLoader::crowded_out(const Error& error, const Call& what) {
+  release();
+  return make_error(error.kind,
+                    whose_loader() + " was ended while " + what.doing + ": " + error.message);
+}
+
+// Why no answer was received. The loader has ended after this.
+Error RunningLoader::ended(Fate fate, const Call& what, const Patience& patience) {
+  constexpr std::chrono::milliseconds time_to_end{500};
+  std::string how = process_.end(fate == Fate::closed ? time_to_end : std::chrono::milliseconds(0));
+  release();
+  if (fate == Fate::late && Clock::now() < patience.end) {
+    how = "made no progress for " + seconds_text(limits_.stall_time) + " and was ended";
+  } else if (fate == Fate::late) {
+    how = "was ended after " + seconds_text(what.time);
+  } else if (fate != Fate::closed) {
+    how = "violated the protocol and was ended";
+  }
+  return make_error(ErrorKind::bad_data, whose_loader() + ' ' + how + " while " + what.doing);
+}
+
+std::string RunningLoader::whose_loader() const {
+  return "the loader of " +
+         in_quotes(location_.members.empty() ? location_.stem : location_.members.front().name);
+}
+
+void RunningLoader::release() {
+  process_.end();
+  files_.reset();
+  static_cast<void>(memory_.resize(0));
+}
+
+}  // namespace windsplat::data::loader

@@ -1,0 +1,47 @@
+// The parts of the server, constructed and ended in order of dependency. Only the server sees them
+// all: sessions and handlers take what they use.
+#pragma once
+
+#include <atomic>
+#include <memory>
+
+#include "server/access/admission.hpp"
+#include "server/api/router.hpp"
+#include "server/api/server_options.hpp"
+#include "server/http/request_id.hpp"
+#include "server/metrics/metrics.hpp"
+#include "server/transport/connections.hpp"
+#include "server/transport/http/http_session.hpp"
+#include "server/transport/websocket/websocket_session.hpp"
+#include "server/work/backend.hpp"
+#include "server/work/task_executor.hpp"
+
+namespace windsplat::transport {
+
+struct ServerParts {
+  ServerParts(api::ServerOptions server_options, std::shared_ptr<data::Store> store,
+              std::shared_ptr<ThreadPool> threads);
+  ~ServerParts() { end(); }
+  ServerParts(const ServerParts&) = delete;
+  ServerParts& operator=(const ServerParts&) = delete;
+
+  // Ends the service threads: no reply is called after it returns.
+  void end();
+
+  Connections connections;
+  api::ServerOptions options;  // base_path normalised, views set
+  metrics::Metrics metrics;    // before the members that count
+  access::Admission admission;
+  std::atomic<bool> draining{false};
+  work::Backend backend;
+  work::TaskExecutor look_ups{work::look_up_settings};
+  work::TaskExecutor view_io{work::view_io_settings};
+  work::TaskExecutor file_checks{work::file_check_settings};
+  http::RequestIds request_ids;  // used by the io thread only
+  const api::Router router;
+  const StreamContext streams{options, backend, admission, draining, connections};
+  const HttpContext http{options,     router,   admission,   metrics,
+                         request_ids, draining, connections, streams};
+};
+
+}  // namespace windsplat::transport
