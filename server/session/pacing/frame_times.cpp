@@ -23,11 +23,7 @@ quality::Forecasts FrameTimes::uncorrected(const protocol::View& view) const {
   }
   const quality::Viewpoint viewpoint = quality::viewpoint_of(view, viewpoint_);
   if (forecaster_) return forecaster_(signature, viewpoint);
-  quality::Forecasts out;
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i] = quality::prior(signature.kind, quality::settings[i], viewpoint);
-  }
-  return out;
+  return quality::Table(signature.kind).forecasts(viewpoint);
 }
 
 bool FrameTimes::Correction::is_recent(Micros now) const {

@@ -72,7 +72,8 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   constexpr int usual = JpegRate::quality_usual;
   const auto [known, cost, guessed] = times_.forecast(view, now);
   if (guessed || cost <= long_in_coming || is_reference(view)) return std::nullopt;
-  const auto next = quality::pick(view, known, {1e-3 * static_cast<double>(cost / 4), {}});
+  const Micros budget = cost / 4;
+  const auto next = quality::pick(view, known, {1e-3 * static_cast<double>(budget), {}});
   if (!next.fits || !(known[next.setting].error < better * shown_error)) return std::nullopt;
   FramePlan plan;
   plan.setting = quality::settings[next.setting];
