@@ -130,7 +130,7 @@ test("lines that are switched off hide their controls", () =>
     assert.equal(await isShown(page, "colour by"), true);
   }));
 
-test("without overlap there is no span, without jitter no pattern", () =>
+test("the span control needs overlap, and the pattern control needs jitter", () =>
   withPage(async (page) => {
     await unfold(page, "Kernels and jitter");
     const disabled = (label) => control(page, label, "input").isDisabled();

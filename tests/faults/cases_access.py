@@ -213,5 +213,5 @@ def tls_all(world, _count):
     need("TLS 1.3" in done.stdout, f"cannot parse the output of testssl.sh: {done.stdout[-200:]}")
     need(not found, f"{found[:3]}")
     check_alive = over_tls(daemon.port, GET)
-    need(status_of(check_alive) == 200, "no answer after it")
+    need(status_of(check_alive) == 200, "no answer after the test")
     return "no vulnerability; only files of the page are compressed"
