@@ -167,9 +167,9 @@ test("slab thickness is offered for slabs only, and each compositing is explaine
     await choose(page, "method", /^kernel$/);
     for (const [option, word, hint] of [
       [/^cd \(/, "cd", /no seams/],
-      [/^cd-naive/, "cd-naive", /seams about/],
+      [/^cd-naive/, "cd-naive", /seams around/],
       [/^cd-euler/, "cd-euler", /unstable/],
-      [/^simple/, "simple", /behind all/],
+      [/^simple/, "simple", /behind its/],
       [/^analytic/, "analytic", /exactly/],
     ]) {
       await choose(page, "compositing", option);

@@ -134,7 +134,7 @@ class Kinds:
             name = self.letters(size)
             yield self.document("a name", size, json.dumps({"dataset": name}), {"404", "422"})
             yield self.document("a key", size, json.dumps({name: 1}), {"422"})
-            yield self.document("letters of 4 bytes", size, json.dumps(
+            yield self.document("characters of 4 bytes", size, json.dumps(
                 {"dataset": "\U0001f32a" * (size // 4)}, ensure_ascii=False), {"404", "422"})
             yield self.document("escapes", size, '{"dataset":"' + "\\u0041" * (size // 6) + '"}',
                                 {"404", "422"})

@@ -96,7 +96,7 @@ def remote(world, count):
     return "refuses to start, with the reason"
 
 
-@case("root behind a remote address", 3, 1)
+@case("running as root on a remote address", 3, 1)
 def remote_root(world, count):
     if os.geteuid() != 0:
         raise Untried("not root")

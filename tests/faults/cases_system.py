@@ -94,7 +94,7 @@ def full_disk(world, count):
                  "a saved view is lost")
             check_good(daemon.port)
         need(ask(daemon.port, "DELETE", f"/v1/views/{saved.pop()}").status == 204, "cannot delete")
-        need(ask(daemon.port, "POST", "/v1/views", view).status == 201, "there is room again")
+        need(ask(daemon.port, "POST", "/v1/views", view).status == 201, "no room after a deletion")
         need(not list(folder.rglob("*.part")), "an incomplete file was left")
         need(daemon.stop() == 0, "it did not end with 0")
         again = world.start("--state-dir", str(folder), SAMPLE)
