@@ -279,7 +279,7 @@ def check_controls(daemon, root, outside):
         try:
             try_file(daemon, name)
         except (Failure, Refused) as outcome:
-            if "came back" not in str(outcome):
+            if "was returned" not in str(outcome):
                 sys.exit(f"checked_daemon: {name} is not recognised: {outcome}")
         else:
             sys.exit(f"checked_daemon: {name} is not recognised")
