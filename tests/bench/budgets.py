@@ -165,7 +165,7 @@ def main():
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
     print("| data | aim | render ms, median | p95 | p95 / budget | with encoding, p95 | "
-          "error told | drawn by |")
+          "reported error | setting |")
     print("|---|---|---|---|---|---|---|---|")
     fine = [measure(options, dataset) for dataset in options.datasets or ["climate"]]
     if options.check and not all(fine):

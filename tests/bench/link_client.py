@@ -11,7 +11,7 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "edge"))
 from wire_client import BINARY, TEXT, Closed, Target, WebSocket  # noqa: E402
 
-FINAL = 1  # of a frame header's flags
+FINAL = 1  # bit of the frame header's flags
 FRAME_HEADER_BYTES = 64
 
 

@@ -58,7 +58,7 @@ def measure(options, how, mbit, trip_ms):
         width, height = map(int, options.size.split("x"))
         viewer.patch({"dataset": options.dataset, "image": {"width": width, "height": height}})
         if viewer.wait_for_final(120) is None:
-            raise RuntimeError("no final frame came")
+            raise RuntimeError("no final frame was received")
         begin, end = drag(viewer, options.seconds)
         final = viewer.wait_for_final(60)
         viewer.close()

@@ -163,7 +163,7 @@ def report(options, counts, samples, before, after, failures):
         failures.append(f"memory grows by {rise:.2f} +- {error:.2f} MB/hour")
     asks = "normal" in options.kinds and not options.smoke
     if counts.frames == 0 or counts.requests == 0 and asks:
-        failures.append("no viewer was ever served")
+        failures.append("no session was served")
 
 
 def parsed_options():

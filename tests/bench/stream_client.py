@@ -8,7 +8,7 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "edge"))
 from wire_client import TEXT, Daemon, Target, WebSocket, status_bytes  # noqa: E402, F401
 
-FINAL = 1  # of a frame header's flags
+FINAL = 1  # bit of the frame header's flags
 
 
 class Viewer(WebSocket):
@@ -16,7 +16,7 @@ class Viewer(WebSocket):
 
     def __init__(self, port, receive_buffer=0):
         super().__init__(Target("127.0.0.1", port), 120, receive_buffer)
-        self.final_bytes = {}  # by seq, of the newest final frame
+        self.final_bytes = {}  # payload size of the newest final frame, by seq
 
     def final_frame(self, rev):
         """Receives frames until the final one of that revision; returns its payload size."""

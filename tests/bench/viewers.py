@@ -29,7 +29,7 @@ from stream_client import Daemon, Viewer
 MB = 1e6
 KIB = 1024
 BIG, DEAF_VIEW = (1920, 1080), (2560, 1440)
-DISTANCE = 2.4  # of the eye from the centre of the data
+DISTANCE = 2.4  # distance of the eye from the centre of the data
 
 
 def camera(angle):

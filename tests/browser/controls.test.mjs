@@ -130,7 +130,7 @@ test("lines that are switched off hide their controls", () =>
     assert.equal(await isShown(page, "colour by"), true);
   }));
 
-test("without overlap there is no span, without jitter no pattern", () =>
+test("the span control needs overlap, and the pattern control needs jitter", () =>
   withPage(async (page) => {
     await unfold(page, "Kernels and jitter");
     const disabled = (label) => control(page, label, "input").isDisabled();
@@ -167,9 +167,9 @@ test("slab thickness is offered for slabs only, and each compositing is explaine
     await choose(page, "method", /^kernel$/);
     for (const [option, word, hint] of [
       [/^cd \(/, "cd", /no seams/],
-      [/^cd-naive/, "cd-naive", /seams about/],
+      [/^cd-naive/, "cd-naive", /seams around/],
       [/^cd-euler/, "cd-euler", /unstable/],
-      [/^simple/, "simple", /behind all/],
+      [/^simple/, "simple", /behind its/],
       [/^analytic/, "analytic", /exactly/],
     ]) {
       await choose(page, "compositing", option);

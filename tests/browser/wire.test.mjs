@@ -92,7 +92,7 @@ const record = () => {
   };
 };
 
-// Runs before the page's scripts: a socket that replays the tape, answers to the page's first
+// Runs before the page's scripts: a socket that replays the tape: answers to the page's first
 // messages once those are sent, everything else without delay. Counts concurrent picture decodes.
 const replay = (tape) => {
   window.played = { acks: [], sent: 0, frames: 0, decodes: 0, decodesMost: 0, decoded: 0 };

@@ -52,7 +52,7 @@ class Canary(threading.Thread):
 
     def check_itself(self):
         socket.create_connection(("127.0.0.1", self.port)).close()
-        require(self.came.wait(5), "the canary does not hear")
+        require(self.came.wait(5), "the canary does not accept connections")
         self.visitors = 0
 
 

@@ -134,7 +134,7 @@ class Kinds:
             name = self.letters(size)
             yield self.document("a name", size, json.dumps({"dataset": name}), {"404", "422"})
             yield self.document("a key", size, json.dumps({name: 1}), {"422"})
-            yield self.document("letters of 4 bytes", size, json.dumps(
+            yield self.document("characters of 4 bytes", size, json.dumps(
                 {"dataset": "\U0001f32a" * (size // 4)}, ensure_ascii=False), {"404", "422"})
             yield self.document("escapes", size, '{"dataset":"' + "\\u0041" * (size // 6) + '"}',
                                 {"404", "422"})
@@ -200,14 +200,14 @@ class Kinds:
         for size in around(18, message_max, message_max // 2):
             good = "answered" if size <= message_max else "1009"
             yield self.session("message", size, frame(TEXT, b" " * size), good)
-            yield self.session("message of one letter", size, frame(
+            yield self.session("message of one repeated letter", size, frame(
                 TEXT, b'"' + self.letters(size).encode()[2:] + b'"'), good if size > 1 else None)
             half = size // 2
             yield self.session("message in two fragments", size, frame(TEXT, b" " * half, fin=False)
                                + frame(0, b" " * (size - half)), good)
         for size in around(63, message_max):
             if size > message_max:
-                yield self.session("length told in 64 bits", size, frame(
+                yield self.session("length in 64 bits", size, frame(
                     TEXT, b"x", length=size, width=64), "1009" if size < 1 << 63 else None)
         for count in around(12):
             yield self.session("empty fragments", count, frame(TEXT, fin=False) + frame(

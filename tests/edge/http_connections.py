@@ -72,7 +72,7 @@ def pipeline(target, count, kind):
         for number, (method, path) in enumerate(asked):
             answer = connection.answer(method)
             require(answer.header("X-Request-Id") == f"pipelined-{number}",
-                    f"answer {number} is that of {answer.header('X-Request-Id')}")
+                    f"answer {number} belongs to {answer.header('X-Request-Id')}")
             require(answer.status == (404 if path == "nothing" else 200),
                     f"{path}: {answer.status}")
 
@@ -239,7 +239,7 @@ def refused_dripping(target, data):
             if not connection.raw_or_lost(b" "):
                 return
             time.sleep(0.3)
-        require(False, "not ended in 12 s")
+        require(False, "not closed within 12 s")
 
 
 def crowd(target, count):
@@ -292,7 +292,7 @@ def leaving_cases():
                    functools.partial(half_closed, data=data, statuses=statuses))
         for reset in (False, True):
             yield Case(f"http.leave.{name}.{'reset' if reset else 'end'}", where,
-                       f"gone after the {name}", "the daemon lives",
+                       f"disconnected after the {name}", "the daemon runs",
                        functools.partial(left, data=data, reset=reset))
 
 
@@ -382,5 +382,5 @@ def negotiation_cases():
 def groups():
     return [("sizes of headers", list(size_cases())), ("pipelines", list(pipeline_cases())),
             ("expectations", list(expect_cases())), ("slow headers and bodies", list(slow_cases())),
-            ("half-closed and gone", list(leaving_cases())),
+            ("half-closed and disconnected", list(leaving_cases())),
             ("conditions and negotiation", list(negotiation_cases()))]

@@ -41,9 +41,9 @@ def one(target, data, statuses, closed, method):
 
 
 def row(name, section, what, data, *statuses, closed=True, method="GET"):
-    told = " or ".join(map(str, statuses))
-    told += {True: ", closed", False: ", open", None: ""}[closed]
-    return Case("http." + name, section, what, told, functools.partial(
+    outcome = " or ".join(map(str, statuses))
+    outcome += {True: ", closed", False: ", open", None: ""}[closed]
+    return Case("http." + name, section, what, outcome, functools.partial(
         one, data=data, statuses=statuses, closed=closed, method=method))
 
 
@@ -130,7 +130,7 @@ def method_cases():
         yield row(f"not-allowed.{method}", "RFC 9110 15.5.6", f"{method} of what can only be got",
                   line(f"{method} BASElivez HTTP/1.1",
                        "Host: HOST\r\nAUTHContent-Length: 0\r\n\r\n"), 405, closed=False)
-    yield row("head", "RFC 9110 9.3.2", "HEAD: no body, the connection goes on",
+    yield row("head", "RFC 9110 9.3.2", "HEAD: no body, the connection stays open",
               get().replace("GET", "HEAD"), 200, closed=False, method="HEAD")
     yield row("head.404", "RFC 9110 9.3.2", "HEAD of nothing: no body",
               line("HEAD BASEnothing HTTP/1.1"), 404, closed=False, method="HEAD")

@@ -148,7 +148,7 @@ def utf8_cases():
     for size in (1, 2, 3, 5):
         yield living(f"utf8.json.{size}", where, f"non-ASCII names, {size} bytes a fragment",
                      in_fragments(name, size), 1)
-    yield living("utf8.ping", where, "a ping within a letter", frame(TEXT, b"\xe2\x82", fin=False)
+    yield living("utf8.ping", where, "a ping in a character", frame(TEXT, b"\xe2\x82", fin=False)
                  + frame(PING, b"\xff") + frame(CONTINUE, b"\xac"), 1)
     yield closing("utf8.resumed", where, "a character divided between two messages",
                   frame(TEXT, b"\xe2\x82") + frame(TEXT, b"\xac"), 1007)

@@ -69,8 +69,8 @@ def run_living(target, data, errors):
 
 
 def closing(name, section, what, data, *codes):
-    told = " or ".join("the end" if code is None else str(code) for code in codes)
-    return Case("ws." + name, section, what, f"closed with {told}",
+    outcome = " or ".join("the end" if code is None else str(code) for code in codes)
+    return Case("ws." + name, section, what, f"closed with {outcome}",
                 functools.partial(run_closing, data=data, codes=codes))
 
 
@@ -154,7 +154,7 @@ def length_cases():
     for width, sizes in ((16, (0, 1, 124, 125)), (64, (0, 1, 125, 126, 127, 1000, 65535))):
         for size in sizes:
             yield closing(f"length.wide.{width}.{size}", where,
-                          f"{size} bytes, told in {width} bits",
+                          f"{size} bytes, length in {width} bits",
                           frame(TEXT, b" " * size, width=width), 1002)
 
 
@@ -344,8 +344,8 @@ def ended_within(viewer, seconds, data, every):
         except TimeoutError:
             time.sleep(every)
             continue
-        except Closed as told:
-            require(told.code in codes, str(told))
+        except Closed as outcome:
+            require(outcome.code in codes, str(outcome))
             return
         require(viewer.ended(5), "TCP stays open behind the close frame")
         return

@@ -48,7 +48,7 @@ def refused(target, statuses, version=False, **how):
         if version and answer.status == 426:
             require(answer.header("Sec-WebSocket-Version") == "13", "no supported version named")
         if answer.header("Connection") == "close":
-            require(connection.ended(), "says close and stays open")
+            require(connection.ended(), "announces close but stays open")
 
 
 def good(name, section, what, check=None, **how):
@@ -194,7 +194,7 @@ def offer_cases():
     where = "RFC 6455 4.2.2 5"
     named = names_protocol("windsplat.v1")
     none = names_protocol("")
-    yield good("protocol.none", where, "no protocol asked for", none)
+    yield good("protocol.none", where, "no protocol requested", none)
     for name, value in (
             ("one", "windsplat.v1"), ("list", "other, windsplat.v1"),
             ("first", "windsplat.v1, other"), ("tight", "a,windsplat.v1,b")):

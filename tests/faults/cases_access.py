@@ -96,7 +96,7 @@ def remote(world, count):
     return "refuses to start, with the reason"
 
 
-@case("root behind a remote address", 3, 1)
+@case("running as root on a remote address", 3, 1)
 def remote_root(world, count):
     if os.geteuid() != 0:
         raise Untried("not root")
@@ -213,5 +213,5 @@ def tls_all(world, _count):
     need("TLS 1.3" in done.stdout, f"cannot parse the output of testssl.sh: {done.stdout[-200:]}")
     need(not found, f"{found[:3]}")
     check_alive = over_tls(daemon.port, GET)
-    need(status_of(check_alive) == 200, "no answer after it")
+    need(status_of(check_alive) == 200, "no answer after the test")
     return "no vulnerability; only files of the page are compressed"

@@ -37,7 +37,7 @@ def hostile_watched(world, count):
     if not shutil.which("strace"):
         raise Untried("strace is not installed: opens and sockets of loaders were not watched")
     if world.quick:
-        raise Untried("under strace every seed takes its time: not in a quick round")
+        raise Untried("the seeds take too long under strace for a quick round")
     return mutate(world, count, "--strace") + "; no loader opened a file by name or made a socket"
 
 

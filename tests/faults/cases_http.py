@@ -39,8 +39,8 @@ def by_size(world, count, make, allowed):
         seen[status] = seen.get(status, 0) + 1
     more = rss(daemon.pid) - before
     need(more <= MIB, f"the daemon's memory grew by {more / MIB:.1f} MiB")
-    told = ", ".join(f"{status or 'no answer'} {n} times" for status, n in sorted(seen.items()))
-    return f"{told}; closed; memory +{max(0, more) / MIB:.2f} MiB"
+    result = ", ".join(f"{status or 'no answer'} {n} times" for status, n in sorted(seen.items()))
+    return f"{result}; closed; memory +{max(0, more) / MIB:.2f} MiB"
 
 
 def head(more):
@@ -144,7 +144,7 @@ def slow_by_tool(world, count):
     if not shutil.which("slowhttptest"):
         raise Untried("slowhttptest is not installed: no slow headers, bodies by that tool")
     daemon = world.daemon()
-    told = []
+    result = []
     for how in ("-H", "-B"):
         seconds = str(CUT_S + SLACK_S)
         done = subprocess.run(
@@ -157,8 +157,9 @@ def slow_by_tool(world, count):
         need(ended and available, f"cannot parse the output of slowhttptest: {text[-200:]}")
         need(set(available) == {"YES"}, f"slowhttptest {how} found the service not available")
         need("No open connections left" in ended[0][1], f"connections are still held: {ended[0]}")
-        told.append(f"{'headers' if how == '-H' else 'bodies'}: all closed by second {ended[0][0]}")
-    return "; ".join(told) + "; service available throughout"
+        part = "headers" if how == "-H" else "bodies"
+        result.append(f"{part}: all closed by second {ended[0][0]}")
+    return "; ".join(result) + "; service available throughout"
 
 
 @case("clients that disconnect in the middle of a request", 200, 20)

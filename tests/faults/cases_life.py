@@ -13,6 +13,6 @@ def kill(world, count):
     return signals.kill(world.program, world.new_folder(), count, world.slack)
 
 
-@case("SIGHUP with a spoiled config", 39, 13)
+@case("SIGHUP with an invalid configuration", 39, 13)
 def hang_up(world, count):
     return signals.hang_up(world.program, world.new_folder(), count, world.slack)

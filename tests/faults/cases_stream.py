@@ -61,7 +61,7 @@ def deflate(world, count):
 @case("endless fragments", 6, 2)
 def fragments(world, count):
     daemon = world.daemon()
-    told = []
+    outcome = []
     for n in range(count):
         with Stream(daemon.port, timeout=MESSAGE_CUT_S + 20) as one:
             one.send(1, b"", fin=False)
@@ -87,8 +87,8 @@ def fragments(world, count):
             took = time.monotonic() - since
             need(took < MESSAGE_CUT_S + SLACK_S, f"held open for {took:.1f} s")
             need(code in (0, 1009, 1002), f"ended by {code}")
-            told.append(f"{sent} of {size} bytes in {took:.1f} s")
-    return "given up after " + ", ".join(told[:3])
+            outcome.append(f"{sent} of {size} bytes in {took:.1f} s")
+    return "given up after " + ", ".join(outcome[:3])
 
 
 def deaf(daemon, count, size):
@@ -122,17 +122,17 @@ def never_read(world, count):
     need(each <= room + 2 * MIB / count,
          f"{each / KIB:.0f} KiB each, a frame has {frame / KIB:.0f}")
     need(held <= room, f"{held / KIB:.0f} KiB wait for each")
-    told = (f"{max(0, each) / KIB:.0f} KiB each (two frames and 256 KiB are {room / KIB:.0f}), "
+    outcome = (f"{max(0, each) / KIB:.0f} KiB each (two frames and 256 KiB are {room / KIB:.0f}), "
             f"{held / KIB:.0f} KiB of them unsent")
     if not world.quick:
         # The deadline of a frame is 15 s plus its size at 64 KiB/s. A frame that fits the kernel's
         # buffers is not blocked, and its session ends after 60 s without an answer to a ping.
         wait_for(lambda: metric(daemon.port, "windsplat_sessions") == 0, 90 + PATIENCE_S,
                  "sessions that never read are still open")
-        told += "; gone by the deadline"
+        outcome += "; closed by the deadline"
     for one in first + many:
         one.close()
-    return told
+    return outcome
 
 
 def crawl(daemon, port, seconds):
@@ -162,16 +162,16 @@ def crawl(daemon, port, seconds):
 @case("a slow link", 3, 1)
 def slow_link(world, count):
     seconds = 3 if world.quick else 10
-    ways, told = [], []
+    ways, outcome = [], []
     if os.geteuid() == 0 and shutil.which("tc") and can_shape():
         ways.append("tc")
     ways.append("proxy")
     for _ in range(count):
         for way in ways:
-            told.append(by_tc(world, seconds) if way == "tc" else by_proxy(world, seconds))
+            outcome.append(by_tc(world, seconds) if way == "tc" else by_proxy(world, seconds))
     if "tc" not in ways:
-        told.append("tc in a network namespace was not tried (needs root and iproute2)")
-    return "; ".join(told[-2:])
+        outcome.append("tc in a network namespace was not tried (needs root and iproute2)")
+    return "; ".join(outcome[-2:])
 
 
 def by_proxy(world, seconds):
@@ -208,7 +208,7 @@ def can_shape():
 
 
 def by_tc(world, seconds):
-    """The daemon and its viewer in a network namespace whose loopback is slow."""
+    """Runs the daemon and its client in a network namespace whose loopback is slow."""
     done = subprocess.run(
         ["unshare", "--net", "sh", "-c", f'{SHAPE} && exec "$@"', "sh", sys.executable,
          str(pathlib.Path(__file__)), world.program, str(seconds)],

@@ -91,10 +91,10 @@ def full_disk(world, count):
             got = ask(daemon.port, "POST", "/v1/views", view)
             need(got.status == 507, f"a full disk is answered by {got.status}")
             need(ask(daemon.port, "GET", f"/v1/views/{saved[n % len(saved)]}").status == 200,
-                 "a view that was saved is gone")
+                 "a saved view is lost")
             check_good(daemon.port)
         need(ask(daemon.port, "DELETE", f"/v1/views/{saved.pop()}").status == 204, "cannot delete")
-        need(ask(daemon.port, "POST", "/v1/views", view).status == 201, "there is room again")
+        need(ask(daemon.port, "POST", "/v1/views", view).status == 201, "no room after a deletion")
         need(not list(folder.rglob("*.part")), "an incomplete file was left")
         need(daemon.stop() == 0, "it did not end with 0")
         again = world.start("--state-dir", str(folder), SAMPLE)
@@ -138,7 +138,7 @@ def read_only_state(world, count):
                                    ("DELETE", f"/{name}", None)):
             got = ask(daemon.port, method, f"/v1/views{path}", body)
             need(got.status == 507 and b"Read-only" in got.body, f"{method}: {got.status}")
-        need(ask(daemon.port, "GET", f"/v1/views/{name}").status == 200, "the view is gone")
+        need(ask(daemon.port, "GET", f"/v1/views/{name}").status == 200, "the view is lost")
 
     try:
         for _ in range(count):
@@ -194,8 +194,8 @@ def no_descriptors(world, count):
     """More connections than descriptors; the listening socket must not be polled in a loop."""
     limit = 40
     if is_sanitized(world.program):
-        raise Untried("a build with sanitizers: UBSan asks by a pipe whether memory can be read, "
-                      "and takes it for invalid where there is no descriptor for one")
+        raise Untried("a build with sanitizers: UBSan tests by a pipe whether memory is readable, "
+                      "and reports it as invalid if no descriptor is available")
 
     def prepare():
         resource.setrlimit(resource.RLIMIT_NOFILE, (limit, limit))
@@ -215,7 +215,7 @@ def no_descriptors(world, count):
     need(failures < 200, f"{failures:.0f} attempts: it does not back off")
     check_good_stream(daemon.port)
     need(daemon.stop() == 0, "it did not end with 0")
-    return f"{failures:.0f} attempts, {100 * share:.1f} % of a processor; then it goes on"
+    return f"{failures:.0f} attempts, {100 * share:.1f} % of a processor; then it continues"
 
 
 def answers(port):

@@ -84,13 +84,13 @@ def giants(world, count):
             "/camera/eye": ("[1e300, 0, 0]",), "/quality/budgetMs": ("0", "1e9"),
             "/quality/maxError": ("0", "-1")}.items():
         spoiled += [(with_value(pointer, value), bad, pointer.split("/")[1]) for value in values]
-    told = refused_views(world, count, spoiled)
+    outcome = refused_views(world, count, spoiled)
     daemon = world.daemon()
     for query in ("width=65536&height=65536", "width=4294967297&height=1", "width=-1", "width=1e9",
                   "azimuth=nan", "zoom=inf", "step=99999999999999999999", "quality=-3"):
         got = ask(daemon.port, "GET", f"/v1/datasets/{SAMPLE}/frame.jpg?{query}")
         need(got.status in bad, f"?{query} is answered by {got.status}")
-    return told
+    return outcome
 
 
 # --- disconnected clients ------------------------------------------------------------------------

@@ -31,10 +31,10 @@ from support import CASES, Failed, Untried, World, check_good  # noqa: E402
 def run_case(world, one, count):
     """Runs a case; returns the result and the verdict."""
     try:
-        told = one.call(world, count)
+        outcome = one.call(world, count)
         daemon = world.daemon()
         check_good(daemon.port)
-        return told, "ok"
+        return outcome, "ok"
     except Untried as why:
         return str(why), "NOT TRIED"
     except Failed as fault:
@@ -60,12 +60,12 @@ def run(options, world):
         count = options.count or (one.quick if options.quick else one.count)
         since = time.monotonic()
         before = world.shared
-        told, verdict = run_case(world, one, count)
+        outcome, verdict = run_case(world, one, count)
         if before is not None and not before.alive():
-            told, verdict = f"the daemon exited ({before.child.returncode}); {told}", "FAILED"
+            outcome, verdict = f"the daemon exited ({before.child.returncode}); {outcome}", "FAILED"
         verdicts.append(verdict)
         tried = "-" if verdict == "NOT TRIED" else str(count)
-        print(f"| {one.name} | {tried} | {cell(told)} | {verdict} |", flush=True)
+        print(f"| {one.name} | {tried} | {cell(outcome)} | {verdict} |", flush=True)
         print(f"{one.name}: {time.monotonic() - since:.1f} s", file=sys.stderr)
     return verdicts
 

@@ -194,7 +194,7 @@ class Sweep:
                           "--threads", "2", SAMPLE]
         self.shim = Shim(options.shim, folder)
         self.daemon = self.bystander = None
-        self.guards = None  # of phase guarded: options, TLS context, token
+        self.guards = None  # only in phase guarded: options, TLS context, token
         self.door = None
         self.turn = self.bystanders_ended = 0
         self.failures = []
@@ -326,12 +326,12 @@ class Sweep:
             lost += session.lost
             bursts += 1
             self.judge(f"{kind}, {BURST} calls in a row", session, failed, log_from)
-        told = "every call site reached" if all_met else "stopped at its limit"
+        result = "every call site reached" if all_met else "stopped at its limit"
         phase = "guarded" if self.guards else "serve"
         self.must_have_failed(kind, phase, hit)
         if self.bystanders_ended > max(BYSTANDERS_MAX, (rounds + bursts) * BYSTANDERS_SHARE):
             self.fail(f"{kind}, {phase}: the bystander ended {self.bystanders_ended} times")
-        return (f"| {kind} | {phase} | {calls} | {self.shim.get(kind, 'known')} ({told}) | {hit} "
+        return (f"| {kind} | {phase} | {calls} | {self.shim.get(kind, 'known')} ({result}) | {hit} "
                 f"| {lost} of {len(session.steps) * (rounds + bursts)} steps, "
                 f"the bystander ended {self.bystanders_ended} times |")
 
@@ -376,9 +376,9 @@ class Sweep:
                 self.fail(f"{kind} at the start: {fault}")
                 if self.daemon.alive():
                     self.daemon.stop(signal.SIGKILL)
-        told = "every call site reached" if quiet >= QUIET_ROUNDS else "stopped at its limit"
+        result = "every call site reached" if quiet >= QUIET_ROUNDS else "stopped at its limit"
         self.must_have_failed(kind, "start", hit)
-        return (f"| {kind} | start | - | {self.shim.get(kind, 'known')} ({told}) | {hit} "
+        return (f"| {kind} | start | - | {self.shim.get(kind, 'known')} ({result}) | {hit} "
                 f"| {ended} ended with a message, {started} started, {aborts} were ended by "
                 "ecCodes' own checks |")
 
@@ -402,9 +402,9 @@ class Sweep:
             slowest = max(slowest, took)
             if code != 0 or took > DRAIN_S * self.options.slack:
                 self.fail(f"{kind} in a drain: ended with {code} after {took:.1f} s")
-        told = "every call site reached" if quiet >= QUIET_ROUNDS else "stopped at its limit"
+        result = "every call site reached" if quiet >= QUIET_ROUNDS else "stopped at its limit"
         self.must_have_failed(kind, "drain", hit)
-        return (f"| {kind} | drain | - | {self.shim.get(kind, 'known')} ({told}) | {hit} "
+        return (f"| {kind} | drain | - | {self.shim.get(kind, 'known')} ({result}) | {hit} "
                 f"| {rounds} drains, the longest {slowest:.1f} s |")
 
     def run(self):

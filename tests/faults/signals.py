@@ -126,7 +126,7 @@ def terminate(program, folder, rounds, slack=1):
         since = time.monotonic()
         daemon.child.send_signal(signal.SIGTERM)
         status = wait_for(lambda at=daemon.port, one=held: not_ready(one, at), SEEN_S * slack,
-                          "/readyz goes on saying 200")
+                          "/readyz still returns 200")
         held.close()
         # No further signal is sent: a second one would terminate the daemon at once.
         code = daemon.stop(0, patience=3 * DRAIN_S * slack)
@@ -203,9 +203,9 @@ def kill(program, folder, rounds, _slack=1):
     code = last.stop()
     need(code == 0, f"ended with {code}")
     left = [p.name for p in state.rglob("*") if p.is_file() and not p.name.endswith(".json")]
-    need(kept > 0, "no view was ever saved")
+    need(kept > 0, "no view was saved")
     need(not left, f"left behind: {left[:3]}")
-    return (f"{kept} looks at saved views, none lost or half written; the viewer's picture is the "
+    return (f"{kept} checks of saved views, none lost or incomplete; the client's picture is the "
             f"same each time; {parts} incomplete files removed")
 
 
@@ -284,14 +284,14 @@ def main():
         rounds = QUICK_ROUNDS[name] if options.quick else options.rounds
         with tempfile.TemporaryDirectory(prefix="windsplat-signals-") as folder:
             try:
-                told = LOOPS[name](options.program, pathlib.Path(folder), rounds, options.slack)
+                outcome = LOOPS[name](options.program, pathlib.Path(folder), rounds, options.slack)
                 verdict = "ok"
             except Untried as why:
-                told, verdict, rounds = str(why), "NOT TRIED", "-"
+                outcome, verdict, rounds = str(why), "NOT TRIED", "-"
             except Failed as fault:
-                told, verdict = str(fault), "FAILED"
+                outcome, verdict = str(fault), "FAILED"
         failed += verdict == "FAILED"
-        print(f"| SIG{name} | {rounds} | {told} | {verdict} |", flush=True)
+        print(f"| SIG{name} | {rounds} | {outcome} | {verdict} |", flush=True)
     return 1 if failed else 0
 
 

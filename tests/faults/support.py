@@ -18,7 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tests" / "edge"))
 from wire_client import NO_MASK, frame, new_key, upgrade_request  # noqa: E402
 
-FINAL = 1  # of a frame header's flags
+FINAL = 1  # bit of the frame header's flags
 KIB, MIB = 1024, 1024 * 1024
 SAMPLE = "tornado:24x24x24"  # a dataset, and its id
 START_S = 60  # sanitizers and a loaded machine start slowly

@@ -278,9 +278,9 @@ def check_controls(daemon, root, outside):
         shutil.copy(outside / name, root / name)
         try:
             try_file(daemon, name)
-        except (Failure, Refused) as told:
-            if "came back" not in str(told):
-                sys.exit(f"checked_daemon: {name} is not recognised: {told}")
+        except (Failure, Refused) as outcome:
+            if "was returned" not in str(outcome):
+                sys.exit(f"checked_daemon: {name} is not recognised: {outcome}")
         else:
             sys.exit(f"checked_daemon: {name} is not recognised")
         (root / name).unlink()

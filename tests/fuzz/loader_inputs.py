@@ -33,7 +33,7 @@ def field(name, components, derived=0):
     kind = bytes([0 if len(components) == 1 else 1])
     units = texts([b"m/s"] * len(components))
     names = text(b"") + text(b"") + text(b"float32")
-    sizes_decoded = struct.pack("<QQ", 1024, 256)  # of a step, of a chunk
+    sizes_decoded = struct.pack("<QQ", 1024, 256)  # sizes of a step and of a chunk
     return (text(name) + kind + texts(components) + text(b"m/s") + units + names +
             bytes([derived]) + sizes_decoded)
 

@@ -40,7 +40,7 @@ class Field:
         self.absent = np.zeros(self.stored.shape, bool)
         # the numbers in the file if they differ from `stored`, because of a chunk table
         self.in_file = None
-        self.packing = None  # of GRIB only
+        self.packing = None  # GRIB only
 
     def written(self):
         return self.stored if self.in_file is None else self.in_file
@@ -121,7 +121,7 @@ class Model:
         self.axes = axes
         self.fields = fields
         self.vectors = vectors or {}
-        self.options = {}  # of the writer: coding, chunks, byte order
+        self.options = {}  # options of the writer: coding, chunks, byte order
         self.must_open = self.exact = self.placed = self.timed = True
         self.resampled = False  # values lie between those of the file
         self.applied = []  # names of mutations

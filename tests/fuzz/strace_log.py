@@ -25,7 +25,8 @@ class Judge:
         self.outside = str(outside)
         self.libraries = libraries
         self.program = str(program)
-        self.stage = {}  # of a process: "startup" or "confined"; the daemon's threads have none
+        # process id -> "startup" or "confined"; the daemon's threads are not included
+        self.stage = {}
         self.serving = False
         self.unfinished = {}
         # last call of each process, withheld until it is known whether it was trapped

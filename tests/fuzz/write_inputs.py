@@ -26,7 +26,7 @@ import sizes  # noqa: E402
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MARK = b"\n#!file "
 INPUT_BYTES_MAX = 300_000
-MUTANTS = 340  # of datasets, over all formats
+MUTANTS = 340  # number of mutated datasets, over all formats
 READERS = {"nrrd": "nrrd", "raw+json": "raw", "grads": "grads", "opendx": "opendx", "zarr": "zarr",
            "vti": "vtk_xml", "vtr": "vtk_xml", "vts": "vtk_xml", "vtu": "vtk_xml", "pvd": "vtk_xml",
            "vtk ascii": "vtk_legacy", "vtk binary": "vtk_legacy", "hdf5": "hdf5",

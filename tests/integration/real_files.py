@@ -25,7 +25,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 
-TOLERANCE = 1e-6  # of float32 and of the shortest decimal text
+TOLERANCE = 1e-6  # precision of float32 and of the shortest decimal text
 
 
 class Independent:

@@ -60,7 +60,7 @@ def by_checksec(program):
                           capture_output=True, check=False).stdout
     found = next(iter(json.loads(text).values()))
     wanted = {"relro": "full", "canary": "yes", "nx": "yes", "pie": "yes", "fortify_source": "yes"}
-    return [f"checksec says {key} {found.get(key)}" for key, value in wanted.items()
+    return [f"checksec reports {key} {found.get(key)}" for key, value in wanted.items()
             if found.get(key) != value]
 
 

@@ -132,7 +132,7 @@ def empty_test_folders(root, files):
 
 
 def full_folders(files):
-    """Reports source folders with too many files for an overview."""
+    """Reports source folders with too many files."""
     count = collections.Counter(path.rpartition("/")[0] for path, _ in files if path.endswith(CODE))
     for folder, number in sorted(count.items()):
         if number > MAX_FOLDER_FILES:

@@ -23,7 +23,7 @@ MAY_IMPORT = {
 }
 REPORT = "web/report"                 # the report of a study; imports nothing of the page
 GENERATED = "web/generated"           # types of the protocol; any folder may import them
-MAX_FILES = 30                        # of one folder
+MAX_FILES = 30                        # per folder
 
 IMPORT = re.compile(r"""(?:\bfrom|\bimport)\s*\(?\s*["']([^"']+)["']""")
 
@@ -69,7 +69,7 @@ def complaints_about_report(path, imports):
 def complaints_about(path, imports):
     folder = folder_of(path)
     if folder not in MAY_IMPORT:
-        yield f"{path}: no rule tells what this folder may import"
+        yield f"{path}: no rule for the imports of this folder"
         return
     for line, imported in imports:
         if imported.startswith(GENERATED + "/"):

@@ -269,7 +269,7 @@ test("a server that never sends hello is disconnected", () => {
   assert.ok(sockets.length >= 2);
 });
 
-test("after a refused origin or token reconnection is rare", () => {
+test("after a refused origin or token, attempts to reconnect are rare", () => {
   const { connection, last, state } = setUp();
   connection.start();
   last().dies(1008);

@@ -122,7 +122,7 @@ test("an invalid or truncated PNG is an error", () => {
     const found = textOf(png.slice(0, length), "a");
     assert.equal(found, length < 33 + 12 + 6 + 5 ? null : "value");
   }
-  png[png.indexOf(0x76, 33)]! ^= 1; // the v of value
+  png[png.indexOf(0x76, 33)]! ^= 1; // the first letter of "value"
   assert.throws(() => textOf(png, "a"), /damaged/);
 });
 

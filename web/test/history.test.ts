@@ -46,7 +46,7 @@ test("everything during one pointer press is one entry", () => {
   for (let n = 1; n <= 500; n++) desk.change(eye(n), n === 250 ? 5000 : 10);
   desk.change({ vector: { length: 2 } });
   desk.history.end();
-  desk.change(eye(501)); // of the next display frame
+  desk.change(eye(501)); // sent with the next display frame
   assert.deepEqual(desk.view.camera!.eye, [501, -3, 0]);
   desk.undo();
   desk.undo();

@@ -191,7 +191,7 @@ test("a range from another source is custom", async () => {
   assert.equal(follower.mode, "custom");
   follower.set("step");
   await soon();
-  state.range = [2, 3]; // by a drag
+  state.range = [2, 3]; // set by a drag
   follower.follow();
   state.step = 6;
   follower.follow();
@@ -316,7 +316,7 @@ test("outdated answers change nothing", async () => {
   assert.equal(answers.length, 3, "without a field no range is read");
   state.of = "storm u";
   follower.set("all");
-  state.range = [2, 3]; // by a drag
+  state.range = [2, 3]; // set by a drag
   follower.follow();
   answers.at(-1)!([-3, 99]);
   await soon();
@@ -325,7 +325,7 @@ test("outdated answers change nothing", async () => {
 
 test("the default is loaded later if the dataset has none", () => {
   const { state, follower } = source({ defaultRange: () => null });
-  state.range = [7, 9]; // as drawn by the first frame
+  state.range = [7, 9]; // range drawn by the first frame
   follower.follow();
   assert.equal(follower.mode, "default");
 });

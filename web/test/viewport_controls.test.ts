@@ -66,7 +66,7 @@ test("orbiting keeps the roll and rotates about the vertical axis", () => {
   near(right[0] * upright.right[0] + right[1] * upright.right[1], Math.cos((33 * Math.PI) / 180));
 });
 
-test("the other projection keeps the roll", () => {
+test("changing the projection keeps the roll", () => {
   const flat = withProjection(roll(south, 20), "orthographic");
   near(rollOf(flat), 20);
   near(rollOf(withProjection(flat, "perspective")), 20);

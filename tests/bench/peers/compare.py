@@ -21,7 +21,7 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 MB = 1e6
 FOV_Y = 35  # degrees
-STEP = 1    # of the camera, degrees per frame
+STEP = 1    # camera movement, degrees per frame
 
 # The rendered data in world units (windsplat's: the longest edge of the box is 2).
 SAMPLES = {

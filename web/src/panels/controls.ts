@@ -11,10 +11,10 @@ export type SliceAxis = "x" | "y" | "z";
 
 // One-line explanations of the compositing methods.
 export const compositingHints: Readonly<Record<string, string>> = {
-  analytic: "Line and medium mixed exactly along their common piece.",
-  cd: "Colour times density added, corrected: no seams about lines.",
-  simple: "A line lies behind all of its piece of medium.",
-  "cd-naive": "Colour times density added as it is: seams about lines.",
+  analytic: "Line and medium are mixed exactly along their common piece.",
+  cd: "Colour times density added, corrected: no seams around lines.",
+  simple: "A line is composited behind its whole piece of medium.",
+  "cd-naive": "Colour times density added uncorrected: seams around lines.",
   "cd-euler": "Rates of cd in one explicit step: unstable where the medium is dense.",
 };
 

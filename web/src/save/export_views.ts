@@ -37,7 +37,7 @@ export interface Animation {
   from: number; // first step
   to: number;
   every: number;
-  frames: number; // for turn and flow
+  frames: number; // number of frames, for turn and flow
   fps: number;
 }
 

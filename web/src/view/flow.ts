@@ -52,13 +52,13 @@ export class Flow {
     this.timer = null;
   }
 
-  // A frame of this rev has been drawn.
+  // Call when a frame of this rev has been drawn.
   answered(rev: number): void {
     this.answeredRev = Math.max(this.answeredRev, rev);
     this.plan();
   }
 
-  // The page is visible again.
+  // Call when the page is visible again.
   seen(): void {
     this.plan();
   }

@@ -10,7 +10,7 @@ export interface CameraHost {
 
 type Move = (camera: Camera) => Camera;
 
-const orbitDegrees = 240; // for a drag over the height of the picture
+const orbitDegrees = 240; // rotation for a drag over the height of the picture
 const clickPixels = 5; // a shorter movement is a click
 const twistDegrees = 5; // a smaller rotation of the fingers does not roll the camera
 const wheelFactor = 1.0015; // zoom per wheel pixel; one notch is about 100 pixels
