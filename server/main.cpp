@@ -3,6 +3,7 @@
 
 #ifdef __GLIBC__
 #include <malloc.h>
+#include <sys/resource.h>
 #endif
 
 #include "server/cli/cli.hpp"
@@ -20,9 +21,22 @@ void return_large_blocks() {
 #endif
 }
 
+// glibc reserves 64 MiB of addresses for each thread that allocates. Where addresses are limited
+// (ulimit -v), threads share one heap: otherwise the reserves alone reach the limit, and the
+// allocations of other threads fail.
+void share_heap_if_addresses_are_limited() {
+#ifdef __GLIBC__
+  rlimit addresses{};
+  if (getrlimit(RLIMIT_AS, &addresses) == 0 && addresses.rlim_cur != RLIM_INFINITY) {
+    mallopt(M_ARENA_MAX, 1);
+  }
+#endif
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   return_large_blocks();
+  share_heap_if_addresses_are_limited();
   return windsplat::cli::run(argc, argv);
 }
