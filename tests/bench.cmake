@@ -64,7 +64,7 @@ windsplat_smoke(peers python3 ${bench_dir}/peers/compare.py --build=${PROJECT_BI
   --frames=1 --sizes=64x48 --dims=32x16x8 --slow)
 windsplat_smoke(peers_only python3 ${bench_dir}/peers/compare.py --only=nothing-matches)
 set_tests_properties(bench.peers_only PROPERTIES
-  PASS_REGULAR_EXPRESSION "no VTK configuration has 'nothing-matches'")
+  PASS_REGULAR_EXPRESSION "no VTK configuration is named 'nothing-matches'")
 windsplat_smoke(soak python3 ${bench_dir}/soak.py --program=$<TARGET_FILE:windsplat> --smoke)
 windsplat_smoke(overload python3 ${bench_dir}/load.py --program=$<TARGET_FILE:windsplat> --smoke)
 windsplat_smoke(soak_tls python3 ${bench_dir}/soak.py --program=$<TARGET_FILE:windsplat> --smoke

@@ -18,7 +18,7 @@ class Quota {
  public:
   using Micros = TokenBucket::Micros;
 
-  // Size of the reserve: connections above the limits that serve health only. One address may use a
+  // Size of the reserve: connections beyond the limits, which serve health requests only. One
   // quarter of it.
   static constexpr std::size_t reserve_max = 64;
   static constexpr std::size_t reserve_per_address = reserve_max / 4;

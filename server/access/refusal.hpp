@@ -7,7 +7,7 @@ namespace windsplat::access {
 
 struct Refusal {
   metrics::LimitKind kind = metrics::LimitKind::connections;
-  double limit = 0;       // as in Limits
+  double limit = 0;       // limit as in Limits
   int retry_after_s = 1;  // estimated time until admission
 };
 

@@ -9,7 +9,7 @@
 namespace windsplat::access {
 
 struct TokenBucket {
-  using Micros = std::int64_t;  // of a monotonic clock
+  using Micros = std::int64_t;  // time of a monotonic clock
   struct Rate {
     double a_second = 0;  // 0: unlimited
     double at_once = 0;
@@ -25,7 +25,7 @@ struct TokenBucket {
   std::optional<Refusal> take_one(const Rate& rate, metrics::LimitKind kind, double limit,
                                   Micros now);
 
-  double taken = 0;  // net of refill; 0 is full
+  double taken = 0;  // after refill; 0 is full
   Micros at = 0;
 };
 

@@ -29,7 +29,7 @@ http::Response open_in_job(work::Backend& backend, const std::string& base_path,
   return job_response(backend.metrics, base_path, job);
 }
 
-// Only resolves the name; reads nothing.
+// Resolves only the name; reads nothing.
 http::Response locate_and_open(const ServerOptions& options, work::Backend& backend,
                                const std::string& path) {
   const auto located = data::locate_beneath(options.data_root, path);

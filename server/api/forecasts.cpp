@@ -63,7 +63,7 @@ void post_forecast(work::Backend& backend, const http::Request& request, http::R
     reply(http::problem_response(dataset.error()));
     return;
   }
-  // No dataset id: the job reads none, so it waits only while all loading threads are busy.
+  // No dataset id: the job reads no data, so it waits only while all loading threads are busy.
   run_later(backend.loads, request, std::move(reply), "a forecast", nullptr,
             [&backend, view = std::move(*view), dataset = *dataset]() -> http::Response {
               const auto made = forecast(backend.quality, view, dataset->resident_only());

@@ -25,7 +25,7 @@ using Check = std::function<Result<int>(const protocol::View&)>;
 // Progress of the current read of a dataset, if any. Must not block.
 struct Reading {
   std::string field;
-  double done = 0;  // 0 to 1
+  double done = 0;  // fraction, 0 to 1
 };
 using WhatIsRead = std::function<std::optional<Reading>(const std::string& dataset)>;
 

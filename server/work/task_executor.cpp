@@ -25,7 +25,7 @@ struct TaskExecutor::State {
         what(settings.what),
         refused(std::move(told)) {}
 
-  // Cannot throw: its bookkeeping was allocated before.
+  // Cannot throw: memory for its bookkeeping was allocated before.
   void work() {
     std::unique_lock lock(mutex);
     for (;;) {
@@ -144,7 +144,7 @@ Result<void> TaskExecutor::submit(Task task) {
     }
     state_->tasks.push_back(std::move(task));
   }
-  state_->wake.notify_all();  // every waiting thread checks for a free place
+  state_->wake.notify_all();  // every waiting thread checks for a free slot
   return {};
 }
 

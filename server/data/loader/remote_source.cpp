@@ -21,9 +21,9 @@ struct RemoteSource::State {
   std::string digest;  // of the info as received
   RunningLoader loader;
   std::optional<Transfer> transfer;  // as mapped by the loader
-  Reservation transfer_memory;  // of a transfer that is reused; otherwise it belongs to the volume
-                                // being read
-  std::mutex mutex;             // of the two below
+  // Memory of a transfer that is reused; otherwise it belongs to the volume that is being read.
+  Reservation transfer_memory;
+  std::mutex mutex;  // guards the next two members
   bool under_way = false;
   bool cancelled = false;
 
@@ -76,7 +76,7 @@ struct RemoteSource::State {
     static_cast<void>(transfer_memory.resize(0));
   }
 
-  // Reusing the transfer memory is faster, but only where volumes do not need the room.
+  // Reusing the transfer memory is faster, but only if volumes do not need the space.
   bool is_worth_keeping(std::uint64_t bytes) {
     constexpr std::uint64_t share = 8;
     if (bytes > Transfer::kept_bytes_max) return false;
@@ -114,7 +114,7 @@ struct RemoteSource::State {
     what.time += std::chrono::milliseconds(bytes * 1000 / limits.read_bytes_per_second);
     if (auto done = loader.call(what); !done) {
       if (loader.is_released()) drop_transfer();  // has ended
-      // Pages written by the loader are released with the loader unless the transfer is reused.
+      // Pages written by the loader are freed with the loader unless the transfer is reused.
       if (transfer && !transfer->is_kept()) release();
       if (is_new) drop_transfer();  // the loader may or may not have mapped it
       return done.error();

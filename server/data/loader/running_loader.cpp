@@ -1,5 +1,5 @@
-// Daemon side: sends a call, serves the loader's requests, validates its answer.
-// Any other event ends the loader and is an error of the call.
+// Daemon side: sends a call, serves the requests of the loader and validates its answer. Any other
+// event ends the loader and becomes an error of the call.
 #include "server/data/loader/running_loader.hpp"
 
 #include <fcntl.h>
@@ -41,7 +41,7 @@ Descriptor open_of_library(const std::vector<std::string>& folders, const std::s
   for (const std::string& folder : folders) {
     if (!path.starts_with(folder + '/') || path.find('\0') != std::string::npos) continue;
     const std::size_t below = path.find_first_not_of('/', folder.size());
-    if (below == std::string::npos) continue;  // the folder itself
+    if (below == std::string::npos) continue;  // the folder itself is not a file
     const Descriptor root(::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
     open_how how{};
     how.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
@@ -80,7 +80,7 @@ RunningLoader::RunningLoader(Location location, const Limits& limits)
 Result<std::string> RunningLoader::open() {
   release();
   const std::string path = program_path();
-  if (path.empty()) return make_error(ErrorKind::internal, "no program is set to load files");
+  if (path.empty()) return make_error(ErrorKind::internal, "no loader executable is set");
   if (auto room = memory_.resize(loader_bytes_min); !room) return room.error();
   if (auto started = process_.start(path); !started) {
     release();
@@ -102,7 +102,7 @@ Result<std::string> RunningLoader::open() {
       call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits_.open_time});
   if (!answer) {
     Error error = answer.error();
-    // Without files the loader has already ended for lack of memory.
+    // Without files, the loader has already exited because of lack of memory.
     if (files_ && error.kind == ErrorKind::out_of_memory) error.message += opening_limit();
     release();
     return error;
@@ -159,7 +159,7 @@ Result<Fate> RunningLoader::wait(Patience& patience) {
     const auto cpu = process_.cpu_time();
     if (cpu != patience.cpu) patience.moved = now;
     patience.cpu = cpu;
-    // Time during which this process was stopped as well does not count as a stall.
+    // A period in which this process was suspended too does not count as a stall.
     if (now - patience.looked > pause_min) patience.moved += now - patience.looked;
     patience.looked = now;
     const auto end = std::min(patience.end, patience.moved + limits_.stall_time);
@@ -189,7 +189,7 @@ Fate RunningLoader::hear_progress(const std::string& payload) const {
   return Fate::done;
 }
 
-// During a call of that kind.
+// Answers a question of the loader during a call of that kind.
 Fate RunningLoader::answer(const Message& question, Kind during, const Deadline& deadline) {
   const auto say = [&](Kind kind, std::string_view payload, int descriptor = -1) {
     return send_message(process_.socket(), kind, payload, descriptor, deadline);
@@ -220,10 +220,10 @@ Fate RunningLoader::answer(const Message& question, Kind during, const Deadline&
 Error RunningLoader::crowded_out(const Error& error, const Call& what) {
   release();
   return make_error(error.kind,
-                    whose_loader() + " was ended while " + what.doing + ": " + error.message);
+                    loader_text() + " was ended while " + what.doing + ": " + error.message);
 }
 
-// Why no answer was received. The loader has ended after this.
+// Returns why no answer was received. The loader has ended afterwards.
 Error RunningLoader::ended(Fate fate, const Call& what, const Patience& patience) {
   constexpr std::chrono::milliseconds time_to_end{500};
   std::string how = process_.end(fate == Fate::closed ? time_to_end : std::chrono::milliseconds(0));
@@ -235,10 +235,10 @@ Error RunningLoader::ended(Fate fate, const Call& what, const Patience& patience
   } else if (fate != Fate::closed) {
     how = "violated the protocol and was ended";
   }
-  return make_error(ErrorKind::bad_data, whose_loader() + ' ' + how + " while " + what.doing);
+  return make_error(ErrorKind::bad_data, loader_text() + ' ' + how + " while " + what.doing);
 }
 
-std::string RunningLoader::whose_loader() const {
+std::string RunningLoader::loader_text() const {
   return "the loader of " +
          in_quotes(location_.members.empty() ? location_.stem : location_.members.front().name);
 }

@@ -34,7 +34,7 @@ class RunningLoader {
   Result<std::string> open();
   // Serves the loader's requests until it answers. Any other event ends the loader and is an error.
   Result<Message> call(const Call& what);
-  // Private memory of the loader counts in the limit.
+  // Private memory of the loader counts in the memory limit.
   Result<void> count_memory();
   void release();
   void on_progress(Progress progress) { progress_ = std::move(progress); }
@@ -53,7 +53,7 @@ class RunningLoader {
   Fate answer(const Message& question, Kind during, const Deadline& deadline);
   Error crowded_out(const Error& error, const Call& what);
   Error ended(Fate fate, const Call& what, const Patience& patience);
-  [[nodiscard]] std::string whose_loader() const;
+  [[nodiscard]] std::string loader_text() const;
   [[nodiscard]] std::string opening_limit() const;
 
   const Location location_;

@@ -58,7 +58,7 @@ std::uint64_t bytes_at_a_step(const DatasetInfo& info, const std::vector<std::st
 }
 
 // Measured upper bound of the memory of a loader, in addition to the volumes, while it reads
-// these fields. Chunks needed again are cached, 128 MiB in all or one chunk.
+// these fields. Chunks that are needed again are cached, up to 128 MiB or one chunk.
 std::uint64_t reading_bytes(const DatasetInfo& info, const std::vector<std::string>& fields) {
   constexpr std::uint64_t mib = std::uint64_t{1} << 20;
   std::uint64_t bytes = 32 * mib;
@@ -84,7 +84,7 @@ Result<Resident> guarded(const FieldInfo& field, const Make& make) {
     return make_error(ErrorKind::out_of_memory,
                       "the machine has no memory left for " + in_quotes(field.name));
   } catch (const std::exception& fault) {
-    // The text of an internal error is for the log only: it may name source locations.
+    // The text of an internal error is logged only, because it may contain source locations.
     log::error("loading failed", {{"field", field.name}, {"fault", fault.what()}});
     return make_error(ErrorKind::internal, "loading " + in_quotes(field.name) + " failed");
   }
@@ -146,7 +146,7 @@ struct Dataset::State {
     }
     auto volume = read(field, step, urgency);
     if (volume && storage == Storage::packed16) {
-      // Where it does not fit, only the volume itself is kept.
+      // If the packed form does not fit too, only the volume itself is kept.
       (void)budget->get(twin, values_of(info, field) * sizeof(std::uint16_t), Urgency::prefetch,
                         [&] { return pack_volume(field, *volume); });
     }

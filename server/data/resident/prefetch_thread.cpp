@@ -102,7 +102,7 @@ PrefetchThread::~PrefetchThread() {
 }
 
 void PrefetchThread::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
-  if (requests.empty()) {  // as destructors say it: without memory, which an empty deque has
+  if (requests.empty()) {  // without allocation, as destructors require
     state_->budget->request_prefetch(owner, {});
     const std::lock_guard lock(state_->mutex);
     state_->queues.erase(owner);

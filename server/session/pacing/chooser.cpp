@@ -8,7 +8,7 @@ namespace {
 
 // Time constant of retrying a setting that did not fit.
 constexpr Micros retry_us = 4'000'000;
-// A slower setting must also fit this share of the budget.
+// A slower setting must also fit this fraction of the budget.
 constexpr double headroom_to_change = 0.92;
 
 }  // namespace
@@ -22,7 +22,7 @@ void Chooser::restart() {
 std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts& forecasts,
                             const quality::Aim& aim, double pixels_most, Micros now) {
   const quality::Choice wanted = quality::pick(view, forecasts, aim, pixels_most);
-  // Hysteresis avoids flicker during motion; after a rest the choice starts anew.
+  // Hysteresis avoids flicker during motion; after a rest the choice starts again.
   constexpr Micros rest = 1'000'000;
   if (now - chosen_at_ > rest) chosen_.reset();
   chosen_at_ = now;

@@ -36,7 +36,7 @@ class Chooser {
                                     const quality::Forecasts& forecasts, Micros now);
 
   bool measured_ = false;
-  std::optional<std::size_t> chosen_;  // for the newest frame; reset after a rest
+  std::optional<std::size_t> chosen_;  // setting of the newest frame; reset after a rest
   Micros chosen_at_ = 0;
   int slack_ = 0;  // consecutive frames that would have allowed a slower setting
   std::optional<Micros> tried_at_;

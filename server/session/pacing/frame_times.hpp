@@ -56,8 +56,8 @@ class FrameTimes {
   [[nodiscard]] quality::Forecasts uncorrected(const protocol::View& view) const;
 
   Forecaster forecaster_;
-  std::string drawn_key_;              // of the view drawn last, before completion
-  quality::SceneSignature signature_;  // after completion
+  std::string drawn_key_;              // key of the view drawn last, before completion
+  quality::SceneSignature signature_;  // known after completion
   quality::Viewpoint viewpoint_;
   Measured measured_;
   std::optional<double> final_factor_;  // time of the last final frame over that of its setting

@@ -26,8 +26,8 @@ class HttpOwner : public std::enable_shared_from_this<HttpOwner> {
   virtual void on_end() = 0;                     // end of stream or a connection error
   // Sends a response after which the connection is closed.
   virtual void refuse(http::Response response) = 0;
-  virtual void abort() = 0;  // end now
-  virtual void close() = 0;  // the connection's time is over, or it has failed
+  virtual void abort() = 0;  // end immediately
+  virtual void close() = 0;  // the deadline has passed, or the connection has failed
 
   // A completion handler that keeps the session alive.
   template <class Body>

@@ -16,8 +16,8 @@ namespace {
 namespace limits = protocol::limits;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds first_timeout{5};  // for a connection's first byte
-constexpr std::chrono::seconds idle_timeout{60};  // for the next request of a connection
+constexpr std::chrono::seconds first_timeout{5};  // deadline for the first byte of a connection
+constexpr std::chrono::seconds idle_timeout{60};  // deadline for the next request of a connection
 constexpr std::chrono::seconds drain_idle_timeout{2};
 
 }  // namespace
@@ -49,7 +49,7 @@ void RequestReader::read_some() {
       return owner_.on_end();
     }
     if (idle_since_) return begin_header();
-    // Otherwise the client's next request stays in the buffer.
+    // Otherwise the next request of the client stays in the buffer.
     if (in_header_) find_header_end();
   });
 }

@@ -23,8 +23,8 @@ class RequestReader {
   void next(bool draining);
   void read_body();
   // While a request is answered, detects a peer that disconnects. The read continues after the
-  // response, since a TLS record must not be abandoned; the data is the next request. Skipped if
-  // the next request is already buffered.
+  // response, since a TLS record must not be abandoned; the data belong to the next request.
+  // Skipped if the next request is already buffered.
   void watch();
   void stop();  // ignores what still arrives
 

@@ -24,7 +24,7 @@ struct StreamContext {
   Connections& connections;
 };
 
-// Client of the session: the address charged, and its places among connections and sessions.
+// Client of the session: the address charged, and its slots among connections and sessions.
 struct Guest {
   std::string address;
   access::Ticket connection;

@@ -1,4 +1,4 @@
-// Costs of pictures, learnt from those that were drawn.
+// Costs of pictures, learned from those that were drawn.
 #include "server/work/request_times.hpp"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ TEST(RequestTimes, AreAboveMostMeasuredCosts) {
   RequestTimes times(2);
   int above = 0;
   for (int i = 0; i < 1000; ++i) {
-    const std::int64_t took_us = 1000 + 100 * (i * 7 % 41);  // 1 to 5 ms, evenly
+    const std::int64_t took_us = 1000 + 100 * (i * 7 % 41);  // 1 to 5 ms, uniformly distributed
     if (times.estimate_ms("a", slab, 1e6) * 1000 >= static_cast<double>(took_us)) ++above;
     times.learn("a", slab, 1e6, took_us);
   }
@@ -42,7 +42,7 @@ TEST(RequestTimes, AreAboveMostMeasuredCosts) {
   EXPECT_LT(above, 950);
 }
 
-// A machine that slept in the middle of a picture has none refused for good.
+// A suspension of the machine during a picture must not cause pictures to be refused permanently.
 TEST(RequestTimes, IgnoreOutliers) {
   RequestTimes times(2);
   times.learn("a", slab, 1e6, 3'600'000'000);

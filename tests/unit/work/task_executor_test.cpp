@@ -40,7 +40,7 @@ TEST(TaskExecutor, LimitsWaitingJobsPerDatasetAndInTotal) {
   }
   EXPECT_EQ(taken, static_cast<int>(most * TaskExecutor::keys_full));
   EXPECT_FALSE(ask(std::make_shared<const int>(0))) << "the limit of all datasets";
-  EXPECT_TRUE(ask(nullptr, true)) << "admitted before";
+  EXPECT_TRUE(ask(nullptr, true)) << "was admitted before";
   EXPECT_EQ(refusals, static_cast<int>(TaskExecutor::keys_full) + 1);
   let_go.set_value();
   loads.end();

@@ -85,7 +85,7 @@ LibraryLock::~LibraryLock() { library_mutex().unlock(); }
 Result<std::string> writable_path(const std::string& path) {
   namespace fs = std::filesystem;
   if (path.empty() || path.find('\0') != std::string::npos) {
-    return make_error(ErrorKind::not_found, "no file name is given");
+    return make_error(ErrorKind::not_found, "no file name given");
   }
   std::error_code fault;
   fs::path plain = fs::weakly_canonical(end_of_links(path), fault);

@@ -46,14 +46,14 @@ Error refuse(const std::string& what) { return make_error(ErrorKind::bad_data, w
 struct Extents {
   std::uint64_t cells = 0;
   Box all;
-  Point across{0, 0, 0};               // of bounding boxes
-  std::array<Point, 3> along_index{};  // of hexahedra: edges along i, j, k
+  Point across{0, 0, 0};               // extents of bounding boxes
+  std::array<Point, 3> along_index{};  // for hexahedra: edges along i, j, k
 };
 
 void add(Extents& to, const Corners& corners, std::size_t count) {
   const Box box = box_of(corners.data(), count);
   if (to.cells++ == 0) to.all = box;
-  constexpr std::array<std::size_t, 3> next{1, 3, 4};  // from corner 0 along i, j, k
+  constexpr std::array<std::size_t, 3> next{1, 3, 4};  // edges from corner 0 along i, j, k
   for (std::size_t d = 0; d < 3; ++d) {
     to.all.low[d] = std::min(to.all.low[d], box.low[d]);
     to.all.high[d] = std::max(to.all.high[d], box.high[d]);

@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint64_t json_bytes_max = std::uint64_t{8} << 20;
 constexpr std::size_t arrays_max = 8192;
 constexpr std::size_t text_max = 4096;
-constexpr const char* group_reason = "group: to see it, name its folder";
+constexpr const char* group_reason = "group: to see it, open its folder";
 constexpr std::uint64_t stamped_chunks_max = 4096;
 
 Error broken_store(const std::string& place, const std::string& what) {
@@ -33,7 +33,7 @@ bool is_plain_name(std::string_view name) {
 
 std::string type_name(const Dtype& type) {
   const char* const base = type.kind == 'f' ? "float" : type.kind == 'i' ? "int" : "uint";
-  // Half floats are widened as they are read.
+  // Half floats are converted to float32 on reading.
   const std::size_t bytes = type.kind == 'f' ? std::max<std::size_t>(4, type.bytes) : type.bytes;
   return base + std::to_string(bytes * 8);
 }
@@ -120,7 +120,7 @@ class StoreScan {
     }
     if (!files_.exists(".zgroup")) {
       return make_error(ErrorKind::bad_data,
-                        "is a Zarr store of version 3, which is not read; version 2 is");
+                        "is a Zarr store of version 3, which is not supported; version 2 is");
     }
     return find_below_root();
   }
@@ -256,7 +256,7 @@ class StoreScan {
       if (array.metadata.problem.empty()) chunks += chunk_count(array.metadata);
     }
     const std::uint64_t step = std::max<std::uint64_t>(1, chunks / stamped_chunks_max);
-    std::uint64_t next = 0;  // counted from the current array
+    std::uint64_t next = 0;  // numbered from the current array
     for (const Array& array : out_.arrays) {
       if (!array.metadata.problem.empty()) continue;
       const std::uint64_t here = chunk_count(array.metadata);

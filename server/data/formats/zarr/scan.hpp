@@ -18,7 +18,7 @@ struct Array {
   Json attributes;
   ArrayMetadata metadata;
   std::vector<std::string> dimensions;
-  bool named_dimensions = false;  // by _ARRAY_DIMENSIONS
+  bool named_dimensions = false;  // whether _ARRAY_DIMENSIONS is present
 
   [[nodiscard]] bool is_coordinate() const {
     return dimensions.size() == 1 && dimensions[0] == name;
