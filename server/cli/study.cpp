@@ -189,7 +189,7 @@ int study_command(const StudyArguments& arguments) {
   const auto written = study::write_report(*report, arguments.output);
   if (!written) return answer(written.error());
   const auto printed = write_stdout(summary(*report, arguments.output));
-  return printed ? exit_ok : answer(written.error());
+  return printed ? exit_ok : answer(printed.error());
 }
 
 }  // namespace

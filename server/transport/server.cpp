@@ -51,8 +51,8 @@ struct Server::State {
     parts.connections.each([](Connection& connection) { connection.abort(); });
     parts.backend.renderer.cancel_all();
     if (ending.joinable()) ending.join();
-    parts.backend.catalogue.end();  // ends reads, so that no service thread blocks in one
-    parts.end();                    // ends the service threads
+    parts.backend.catalogue.end();  // ends reads, so that no executor blocks in one
+    parts.end();                    // ends the threads of the executors
     if (handshakes) handshakes->stop();
     // Releases handlers that were pending when the loop stopped.
     io.restart();
@@ -115,7 +115,7 @@ struct Server::State {
         while (!post_or_retry(io.get_executor(), go_on_looking) && !parts.draining) {
         }
       };
-      if (!parts.file_checks.submit({never, look, true})) return check_data_files();
+      if (!parts.file_checks.submit({never, look})) return check_data_files();
       checking_files = true;
     });
     checking_files = true;
@@ -205,7 +205,7 @@ struct Server::State {
     }
   }
 
-  // Before io: sessions left in its queue deregister when it is destroyed. Service threads post to
+  // Before io: sessions left in its queue deregister when it is destroyed. Executors post to
   // io and end before it, in ~State.
   ServerParts parts;
   asio::io_context io{1};

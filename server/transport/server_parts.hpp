@@ -25,7 +25,7 @@ struct ServerParts {
   ServerParts(const ServerParts&) = delete;
   ServerParts& operator=(const ServerParts&) = delete;
 
-  // Ends the service threads: no reply is called after it returns.
+  // Ends the threads of the executors: no reply is called after it returns.
   void end();
 
   Connections connections;

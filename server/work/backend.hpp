@@ -38,7 +38,7 @@ struct Backend {
   // Checks whether the view can be drawn (Catalogue::check) within the cost limit. Loads nothing.
   Result<Catalogue::Checked> check(const protocol::View& view);
 
-  // Ends the service threads: no reply is called after it returns.
+  // Ends the threads of the executors: no reply is called after it returns.
   void end();
 
   Catalogue catalogue;

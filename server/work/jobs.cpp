@@ -45,6 +45,7 @@ struct Job {
   Jobs::Work work;  // empty once started or cancelled
   CancelToken cancel;
   Stage stage = Stage::queued;
+  bool in_queue = true;  // of the executor, also after it was cancelled
   Clock::time_point since;
   std::atomic<double> progress{0};
   std::optional<protocol::JobResult> result;
@@ -87,6 +88,7 @@ struct Jobs::State {
     Work task;
     {
       const std::lock_guard lock(mutex);
+      job->in_queue = false;
       if (job->stage != Stage::queued) return;  // cancelled
       job->stage = Stage::running;
       job->since = Clock::now();
@@ -122,10 +124,12 @@ struct Jobs::State {
     return *at;
   }
 
+  // A cancelled job is listed until it has left the queue, so that the list bounds the queue.
   [[nodiscard]] bool make_room() {
     if (jobs.size() < known_max) return true;
-    const auto oldest =
-        std::find_if(jobs.begin(), jobs.end(), [](const Shared& job) { return job->finished(); });
+    const auto oldest = std::find_if(jobs.begin(), jobs.end(), [](const Shared& job) {
+      return job->finished() && !job->in_queue;
+    });
     if (oldest == jobs.end()) return false;
     jobs.erase(oldest);
     return true;

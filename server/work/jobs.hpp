@@ -37,7 +37,7 @@ class Jobs {
   Jobs(const Jobs&) = delete;
   Jobs& operator=(const Jobs&) = delete;
 
-  // Errors: busy if every listed job is unfinished.
+  // Errors: busy if every listed job is unfinished or still in the queue of the executor.
   Result<protocol::JobDescription> submit(std::string kind, Work work) {
     return submit(std::move(kind), std::move(work), Terms());
   }

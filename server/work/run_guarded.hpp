@@ -1,4 +1,4 @@
-// Runs the work of a service thread: catches all exceptions and skips cancelled work.
+// Runs a task of an executor: catches all exceptions and skips cancelled work.
 #pragma once
 
 #include <exception>

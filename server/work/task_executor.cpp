@@ -125,8 +125,14 @@ TaskExecutor::TaskExecutor(const Settings& settings, std::function<void()> refus
   const std::size_t threads = settings.threads + settings.threads_spare;
   state_->busy.reserve(threads);
   state_->running.reserve(threads);
-  for (std::size_t i = 0; i < threads; ++i) {
-    state_->threads.emplace_back([state = state_.get()] { state->work(); });
+  state_->threads.reserve(threads);
+  try {
+    for (std::size_t i = 0; i < threads; ++i) {
+      state_->threads.emplace_back([state = state_.get()] { state->work(); });
+    }
+  } catch (...) {  // a thread could not be started: the destructor does not run
+    end();
+    throw;
   }
 }
 

@@ -36,7 +36,8 @@ class TaskExecutor {
   struct Settings {
     const char* what;       // the tasks' name in error messages
     std::size_t threads;    // limits the tasks started less than `long_run` ago
-    std::size_t tasks_max;  // waiting per key, keys_full times as many in total; half per payer
+    std::size_t tasks_max;  // waiting per key, keys_full times as many in total, half per payer;
+                            // for client jobs the length of their list
     std::size_t threads_spare = 0;  // beyond `threads`
   };
   // `refused` is called for each refusal.
@@ -67,7 +68,7 @@ inline constexpr TaskExecutor::Settings job_settings{"jobs", protocol::limits::j
 inline constexpr TaskExecutor::Settings look_up_settings{"files to open", 1, requests_waiting_max};
 // Changes saved views; each change may take one disk sync.
 inline constexpr TaskExecutor::Settings view_io_settings{"changes of saved views", 1, 64};
-// Checks files for changes and reopens them.
+// Checks files for changes and reopens them; the server submits one check at a time.
 inline constexpr TaskExecutor::Settings file_check_settings{"file checks", 1, 1};
 
 }  // namespace windsplat::work

@@ -4,6 +4,7 @@
 import { Daemon, finalPicture, freePort, launch, openPage, pictureBox } from "./support.mjs";
 
 const size = { width: 1280, height: 720 };
+const viewport = { width: 1440, height: 900 }; // the picture and the panel beside it
 const quick = process.argv.includes("--quick");
 const counts = quick
   ? { visits: 2, single: 5, drag: 30, echo: 5 }
@@ -185,7 +186,7 @@ function report(title, log, echo) {
 async function visits(count) {
   const times = [];
   for (let n = 0; n < count; n++) {
-    const page = await openPage(browser, daemon.url, { initScript: watchWay });
+    const page = await openPage(browser, daemon.url, { initScript: watchWay, viewport });
     await finalPicture(page);
     times.push(
       await page.evaluate(() => {
@@ -204,7 +205,7 @@ const daemon = new Daemon(await freePort());
 const browser = await launch();
 try {
   await daemon.start();
-  const page = await openPage(browser, daemon.url, { initScript: watchWay });
+  const page = await openPage(browser, daemon.url, { initScript: watchWay, viewport });
   await finalPicture(page);
   const box = await pictureBox(page);
   const window = page.viewportSize();

@@ -168,6 +168,56 @@ TEST(Jobs, WaitingAndRunningJobsCanBeCancelled) {
   EXPECT_FALSE(second_ran);
 }
 
+TEST(Jobs, CancelledSlowJobLeavesTheQueueWithoutRunning) {
+  Gate gate;
+  Jobs jobs({"jobs", 2, 8});
+  std::atomic<bool> cancelled_ran{false};
+  const auto pass = [&](const Jobs::Handle&) {
+    gate.pass();
+    return Result<protocol::JobResult>("x");
+  };
+  const auto at_once = [](const Jobs::Handle&) { return Result<protocol::JobResult>("x"); };
+  Jobs::Terms slow;
+  slow.slow = true;
+  const auto first = jobs.submit("reference", pass, slow)->id;
+  gate.wait_for_inside(1);
+  const auto second = jobs.submit(
+                              "reference",
+                              [&](const Jobs::Handle&) {
+                                cancelled_ran = true;
+                                return Result<protocol::JobResult>("x");
+                              },
+                              slow)
+                          ->id;
+  EXPECT_TRUE(jobs.cancel(second));
+  EXPECT_EQ(finished(jobs, submitted(jobs, at_once)).state, "done");
+  EXPECT_EQ(jobs.find(first)->state, "running");
+  const auto third = jobs.submit("reference", at_once, slow)->id;
+  EXPECT_EQ(finished(jobs, submitted(jobs, at_once)).state, "done");
+  EXPECT_EQ(jobs.find(third)->state, "queued") << "slow jobs run one at a time";
+  gate.open();
+  EXPECT_EQ(finished(jobs, third).state, "done");
+  EXPECT_EQ(jobs.find(second)->state, "cancelled");
+  EXPECT_FALSE(cancelled_ran);
+}
+
+TEST(Jobs, CancelledJobsAreListedUntilTheyLeaveTheQueue) {
+  Gate gate;
+  Jobs jobs({"jobs", 1, 3});
+  const auto pass = [&](const Jobs::Handle&) {
+    gate.pass();
+    return Result<protocol::JobResult>("x");
+  };
+  const auto running = submitted(jobs, pass);
+  gate.wait_for_inside(1);
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(jobs.cancel(submitted(jobs, pass)));
+  const auto refused = jobs.submit("test", pass);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::busy);
+  gate.open();
+  EXPECT_EQ(finished(jobs, running).state, "done");
+}
+
 TEST(Jobs, OldestFinishedJobIsForgottenUnfinishedOnesAreKept) {
   Gate gate;
   Jobs jobs({"jobs", 1, 3});

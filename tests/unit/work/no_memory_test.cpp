@@ -1,4 +1,4 @@
-// Allocation failures in services: no partial state remains, and no service thread ends.
+// Allocation failures in executors: no partial state remains, and no thread of theirs ends.
 // Allocations of a thread fail from a given one on.
 #include <gtest/gtest.h>
 #include <signal.h>

@@ -426,7 +426,8 @@ class Parser {
          n += *step) {
       add_file(line, *bytes::numbered_name(words[0], n));
     }
-    if (header_.data_files.empty()) complain(line, "the pattern matches no file");
+    if (header_.data_files.empty())
+      complain(line, "the range from the first to the last number is empty");
     if (words.size() == 5) file_dimension(line, words[4]);
   }
 
