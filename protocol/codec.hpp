@@ -47,6 +47,16 @@ Result<ViewDocument> set_all(const ViewDocument& document,
 
 std::string encode_view(const View& view);  // every key; canonical
 
+// The view of query parameters. Numbers are copied as text, so that the errors of the parser quote
+// them.
+std::string view_text(const std::optional<std::string>& step,
+                      const std::optional<std::string>& width,
+                      const std::optional<std::string>& height);
+
+// Patches that a session applies for its client.
+std::string step_patch(int step);
+std::string dataset_patch(const std::string& dataset);  // resets all but picture size and budget
+
 Result<ClientMessage> parse_client_message(std::string_view json);
 
 // The id and rev of a message that parse_client_message rejected, as far as they can be read.
@@ -58,7 +68,10 @@ MessageTag message_tag(std::string_view json);
 
 std::string encode(const ServerMessage& message);
 
-std::string encode_problem(const Problem& problem);                                // RFC 9457
+std::string encode_problem(const Problem& problem);  // RFC 9457
+// Adds an id that needs no escaping to an encoded problem.
+std::string with_request_id(std::string_view problem_json, std::string_view request_id);
+std::string encode_health(std::string_view state);
 std::string encode_dataset(const DatasetDescription& dataset);                     // the long form
 std::string encode_dataset_list(const std::vector<DatasetDescription>& datasets);  // short forms
 std::string encode_frame_info(const FrameInfo& info);  // Windsplat-Frame

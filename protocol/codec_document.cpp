@@ -175,4 +175,26 @@ Result<ViewDocument> set_at(const ViewDocument& document, std::string_view point
   return set_all(document, {{std::string(pointer), std::string(value)}});
 }
 
+std::string view_text(const std::optional<std::string>& step,
+                      const std::optional<std::string>& width,
+                      const std::optional<std::string>& height) {
+  std::string image;
+  if (width) image += "\"width\":" + *width;
+  if (height) image += (image.empty() ? "\"height\":" : ",\"height\":") + *height;
+  std::string json = "{\"image\":{" + image + '}';
+  if (step) json += ",\"step\":" + *step;
+  return json + '}';
+}
+
+std::string step_patch(int step) { return dump(Json{{"step", step}}); }
+
+std::string dataset_patch(const std::string& dataset) {
+  Json patch{{"dataset", dataset}};
+  for (const char* key :
+       {"step", "camera", "geometry", "vector", "scalars", "depthCue", "method"}) {
+    patch[key] = nullptr;
+  }
+  return dump(patch);
+}
+
 }  // namespace windsplat::protocol

@@ -258,6 +258,15 @@ Json dataset_json(const DatasetDescription& dataset) {
 
 std::string encode_problem(const Problem& problem) { return dump(problem_json(problem)); }
 
+std::string with_request_id(std::string_view problem_json, std::string_view request_id) {
+  std::string json = "{\"requestId\":\"";
+  json += request_id;
+  json += "\",";
+  return json.append(problem_json.substr(1));  // a problem has other members
+}
+
+std::string encode_health(std::string_view state) { return dump(Json{{"status", state}}); }
+
 std::string encode_dataset(const DatasetDescription& dataset) {
   return dump(dataset_json(dataset));
 }

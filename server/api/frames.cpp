@@ -243,18 +243,6 @@ void submit_picture(work::Backend& backend, access::Admission& admission, Pictur
 
 // --- GET /v1/datasets/{id}/frame.* --------------------------------------------------------------
 
-// Numbers are copied as text, so that errors of the view parser quote them.
-std::string view_json(const std::optional<std::string>& step,
-                      const std::optional<std::string>& width,
-                      const std::optional<std::string>& height) {
-  std::string image;
-  if (width) image += "\"width\":" + *width;
-  if (height) image += (image.empty() ? "\"height\":" : ",\"height\":") + *height;
-  std::string json = "{\"image\":{" + image + '}';
-  if (step) json += ",\"step\":" + *step;
-  return json + '}';
-}
-
 std::optional<Orbit> read_orbit(http::QueryReader& query) {
   const auto azimuth = query.number("azimuth", -angle_max, angle_max);
   const auto elevation = query.number("elevation", -90, 90);
@@ -281,7 +269,7 @@ Result<Picture> read_query(const http::Request& request, frame::Format format) {
     picture.encoding.quality = query.integer("quality", 1, 100).value_or(jpeg_quality_default);
   }
   if (const auto ok = query.finish(); !ok) return ok.error();
-  const auto document = protocol::ViewDocument::parse(view_json(step, width, height));
+  const auto document = protocol::ViewDocument::parse(protocol::view_text(step, width, height));
   if (!document) return document.error();
   picture.view = document->view();
   return picture;

@@ -22,7 +22,7 @@ http::Response health(int status, const char* state) {
   response.status = status;
   response.content_type = "application/json";
   response.headers = {{"Cache-Control", "no-store"}};
-  response.body = http::Body::of(std::string("{\"status\":\"") + state + "\"}");
+  response.body = http::Body::of(protocol::encode_health(state));
   return response;
 }
 

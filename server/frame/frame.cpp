@@ -70,8 +70,8 @@ Result<scene::CompletedView> complete(const protocol::View& view, data::Dataset&
                                       bool allow_reference) {
   if (view.method.name == protocol::MethodName::reference && !allow_reference) {
     return make_error_at(ErrorKind::invalid, "/method/name",
-                         "reference takes too long to share a server: draw it with "
-                         "`windsplat render`");
+                         "reference takes too long for a shared renderer: use "
+                         "`POST /v1/references` or `windsplat render`");
   }
   auto completed = scene::complete(view, dataset);
   if (!completed) return with_need(completed.error(), view, dataset);

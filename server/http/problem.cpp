@@ -42,13 +42,8 @@ Response problem_response(int status, std::string title, std::string detail, int
 void name_request(Response& response, const std::string& request_id) {
   response.headers.emplace_back(request_id_header, request_id);
   if (response.content_type != problem_type) return;
-  // The id needs no escaping, and a problem has other members.
-  std::string json = "{\"requestId\":\"";
-  json += request_id;
-  json += "\",";
-  const auto rest = response.body.bytes.subspan(1);
-  json.append(rest.begin(), rest.end());
-  response.body = Body::of(std::move(json));
+  const std::string problem(response.body.bytes.begin(), response.body.bytes.end());
+  response.body = Body::of(protocol::with_request_id(problem, request_id));
 }
 
 }  // namespace windsplat::http

@@ -4,29 +4,10 @@
 #include <string>
 #include <utility>
 
+#include "protocol/codec.hpp"
 #include "server/session/view_changes.hpp"
 
 namespace windsplat::session {
-namespace {
-
-std::string json_string(const std::string& text) {
-  std::string out(1, '"');
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c;
-  }
-  out += '"';
-  return out;
-}
-
-// Opening another dataset resets everything but picture size and budget.
-std::string open_patch(const std::string& dataset) {
-  return "{\"dataset\":" + json_string(dataset) +
-         ",\"step\":null,\"camera\":null,\"geometry\":null,\"vector\":null,\"scalars\":null,"
-         "\"depthCue\":null,\"method\":null}";
-}
-
-}  // namespace
 
 void MessageHandler::operator()(const protocol::OpenMessage& message) {
   if (state_.openings.full()) {
@@ -44,7 +25,7 @@ void MessageHandler::operator()(const protocol::OpenMessage& message) {
   }
   std::uint64_t version = 0;
   if (state_.view.view().dataset != message.dataset) {
-    std::string patch = open_patch(message.dataset);
+    std::string patch = protocol::dataset_patch(message.dataset);
     auto next = state_.view.document().patched(patch);
     if (!next) {
       state_.refuse(next.error(), message.id, std::nullopt);

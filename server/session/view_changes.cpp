@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "protocol/codec.hpp"
+
 namespace windsplat::session {
 namespace {
 
@@ -27,7 +29,7 @@ void change_view(SessionState& state, protocol::ViewDocument next,
 }
 
 void change_step(SessionState& state, int step, Micros now) {
-  std::string patch = "{\"step\":" + std::to_string(step) + '}';
+  std::string patch = protocol::step_patch(step);
   if (auto next = state.view.document().patched(patch)) {
     change_view(state, std::move(*next), std::move(patch), now);
   }
