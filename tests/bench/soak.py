@@ -18,7 +18,7 @@ samples after the first quarter (the warm-up), with its 95 % confidence interval
 takes about 15 MB for a moment, which a sample hits by chance; minima show what remains allocated.
 The line through the means of the intervals is printed beside it.
 
-Failures: a daemon that dies, stops answering /livez or ends with another code than 0; a slope
+Failures: a daemon that crashes, stops answering /livez or exits with a code other than 0; a slope
 above its interval's half width and above --max-slope MB/hour; descriptors, threads or sessions that
 do not return to their initial number after all clients have disconnected. --smoke: some seconds,
 without the slope. Exit code 0: no failure."""

@@ -22,7 +22,7 @@ def session(target):
 
 
 def question(number=5, size=0):
-    """A text of that many bytes, or the fewest possible, whose answer contains its number."""
+    """A text message, padded to `size` bytes, whose answer contains its number."""
     text = json.dumps({"type": "open", "id": number, "dataset": "nowhere"})
     return text.encode().ljust(size)
 

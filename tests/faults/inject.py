@@ -273,7 +273,8 @@ class Sweep:
         it end."""
         try:
             self.bystander.final_frame(small_view(turn=0.01 * self.next_turn(), size=(32, 24)))
-            self.bystander.round_trip()  # so that no pending work of it meets the next failing call
+            self.bystander.round_trip()  # so that the next failing call does not hit its pending
+                                         # work
         except (Closed, ConnectionError, ssl.SSLError) as end:
             need(failed, f"no call failed, but the bystander's stream ended: {end!r}")
             wait_for(lambda: self.says_why(log_from), LOG_S,

@@ -165,7 +165,7 @@ TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
   }
 }
 
-// Two estimates of the same error: a calibration run uses another reference than a frame.
+// Two estimates of the same error: a calibration run and a frame use different references.
 TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
   auto found = calibrated();
   const auto error_of = [&](const quality::Setting& setting) {
