@@ -40,7 +40,7 @@ struct StoreContents {
 // Errors: bad_data, also for version 3.
 Result<StoreContents> scan_store(Files& files);
 
-// An attribute, trimmed; empty if absent or no text.
+// An attribute, trimmed; empty if absent or not a string.
 std::string text_in(const Json& attributes, std::string_view key);
 
 }  // namespace windsplat::data::zarr
