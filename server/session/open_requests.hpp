@@ -28,7 +28,7 @@ class OpenRequests {
   // Why the last view could not be shown.
   void failed(const Error& error) { failure_ = error; }
   void succeeded() { failure_.reset(); }
-  // The error for a client that wants to play or draw without a dataset.
+  // The error of a request to play or draw without a dataset.
   [[nodiscard]] Error nothing_open() const;
 
  private:

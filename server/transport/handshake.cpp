@@ -172,7 +172,7 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
  private:
   void on_done(ErrorCode fault) {
     if (!task_) return;
-    if (task_->is_abandoned()) return abort();  // a dropped step may still hold its wire
+    if (task_->is_abandoned()) return abort();  // its step may still use the connection
     // From here on the wire owns the descriptor and may close it.
     Wire wire = std::exchange(task_, nullptr)->take_wire();
     if (!fault) {

@@ -1,4 +1,4 @@
-// The datasets as the API sees them: lookup by id, descriptions, and checks of views.
+// The datasets of the API: lookup by id, descriptions, and checks of views.
 #pragma once
 
 #include <map>

@@ -237,7 +237,8 @@ class UnrolledStore final : public ByteStore {
   Result<void> read(std::uint64_t offset, unsigned char* out, std::size_t count) override {
     WINDSPLAT_CHECK(offset <= bytes_ && count <= bytes_ - offset);
     offset += drop_;
-    // Text is decoded to whole numbers: align both ends to them.
+    // Text is decoded one complete number at a time: align both ends to multiples of a number's
+    // size.
     const std::uint64_t ahead = offset % sizeof(double);
     go_back_to(offset - ahead);
     std::vector<unsigned char> scratch(window_max);
