@@ -286,7 +286,7 @@ def flood(viewer):
 
 
 def binary_cases():
-    where = "the stream: texts only"
+    where = "the stream: text messages only"
     for name, data in (
             ("empty", frame(BINARY)), ("short", frame(BINARY, b"\0\1\2")),
             ("long", frame(BINARY, bytes(60000))), ("json", frame(BINARY, question())),

@@ -94,14 +94,14 @@ struct Shown {
   bool final = false;
   int quality = 0;
   double pixels = 0;
-  double wire_bytes = 0;  // with its texts; t of the newest patch at the start
+  double wire_bytes = 0;  // with its text messages; t of the newest patch at the start
   Micros t = 0;           // t of the newest patch when the render was started
   Micros arrived = 0;
   Micros shown = 0;  // decoded
 };
 
-// A client, its link, and the server's edge: texts before frames, one message at a time, of which
-// the kernel buffers at most `unsent` bytes.
+// A client, its link, and the server's edge: text messages before frames, one message at a time, of
+// which the kernel buffers at most `unsent` bytes.
 class Viewer {
  public:
   Viewer(Clock& clock, Renderer& renderer, LinkOptions options)

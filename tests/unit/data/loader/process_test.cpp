@@ -32,7 +32,7 @@ TEST_F(Loader, CrashIsAnErrorAndTheNextReadStartsAnother) {
   ASSERT_TRUE(first);
   const pid_t id = source->process();
   ASSERT_GT(id, 0);
-  ASSERT_EQ(::kill(id, SIGSTOP), 0);  // so that it ends while it should read
+  ASSERT_EQ(::kill(id, SIGSTOP), 0);  // so that it is killed during the read
   std::thread killer([id] {
     std::this_thread::sleep_for(milliseconds(100));
     ::kill(id, SIGKILL);
