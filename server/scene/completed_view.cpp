@@ -116,7 +116,8 @@ Result<void> complete_magnitudes(View& view, const Lattice& lattice,
   if (!vector.magnitude_range) vector.magnitude_range = Range{0, 1};
   const Range& range = *vector.magnitude_range;
   if (!vector.min_magnitude && named) {
-    // Checks the default lines only: a view that changes one of their keys changes nothing else.
+    // The check uses default lines, so that it does not depend on the other keys of the view's
+    // lines.
     protocol::VectorView plain;
     plain.length = default_length(lattice, plain.stride, slice);
     plain.magnitude_range = vector.magnitude_range;

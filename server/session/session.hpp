@@ -69,7 +69,7 @@ class Session {
                        Micros now);
   Effects on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros now);
   Effects on_written(Micros now);  // the frame was written completely
-  // The pong of the ping sent directly before the frame of that seq and its texts.
+  // The pong of the ping sent directly before the frame of that seq and its text messages.
   void on_pong(std::uint32_t seq, Micros now) { state_.flow.answered(seq, now); }
   Effects on_time(Micros now);
   Effects on_drain(Micros now);

@@ -31,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds tls_timeout{5};
 constexpr std::chrono::seconds tls_reserve_timeout{2};  // for connections of the reserve
-// Limit of concurrent handshakes; above it another one is ended.
+// Limit of concurrent handshakes; above it, an existing one is ended.
 constexpr std::size_t tls_handshakes_max = 256;
 constexpr std::size_t handshakes_per_address_max = 64;
 // Limit of bytes read. A ClientHello has about 500 bytes, 2 KB with a post-quantum key share;
@@ -50,7 +50,7 @@ class TlsTask final : public HandshakeTask {
         io_(wire_.get_executor()),
         admission_(admission),
         trusted_(visitor.trusted) {}
-  // Processor time still to be charged if an allocation failed on the way back.
+  // Processor time that is not yet charged if an allocation failed on completion.
   ~TlsTask() override { charge(); }
   TlsTask(const TlsTask&) = delete;
   TlsTask& operator=(const TlsTask&) = delete;

@@ -1,4 +1,4 @@
-// Builds an OpenSSL context with the accepted protocol versions and ciphers from PEM texts.
+// Builds an OpenSSL context with the accepted protocol versions and ciphers from PEM files.
 #include "server/transport/tls.hpp"
 
 #include <openssl/ssl.h>

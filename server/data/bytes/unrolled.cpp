@@ -23,7 +23,7 @@ constexpr std::size_t window_max = std::size_t{1} << 16;
 constexpr std::size_t places_max = 64;
 constexpr std::uint64_t first_spacing = std::uint64_t{4} << 20;
 
-// The encoded bytes from an offset on, partly buffered. A copy has its own buffer.
+// The encoded bytes starting at an offset, partly buffered. A copy has its own buffer.
 class Input {
  public:
   Input(std::shared_ptr<const InputFile> file, std::uint64_t at)

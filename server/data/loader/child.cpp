@@ -105,7 +105,7 @@ Result<void> fill(FileSource& source, std::size_t field, std::size_t step, const
   const std::size_t components = info.fields[field].components.size();
   const std::size_t samples = info.grid.samples();
   if (samples * components > memory.floats()) {
-    return make_error(ErrorKind::internal, "the memory of a volume has another size");
+    return make_error(ErrorKind::internal, "the memory of a volume has the wrong size");
   }
   std::fill_n(memory.data(), samples * components, 0.0F);  // overwrites numbers of the previous
                                                            // volume
