@@ -41,7 +41,8 @@ from stream_client import Daemon, status_bytes
 
 MB = 1e6
 WARM_UP_SHARE, STRETCHES = 0.25, 12
-LEAVE_S = 100  # a client that never reads is given up after its write deadline or 60 s of silence
+LEAVE_S = 100  # a client that never reads is disconnected after its write deadline or 60 s of
+               # silence
 # Student's t for 95 %, by degrees of freedom: 1, 2, ...
 STUDENT_T = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23]
 

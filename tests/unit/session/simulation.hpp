@@ -123,7 +123,7 @@ class Viewer {
     clock_.at(clock_.now() + options_.delay,
               [this, message] { take(session_.on_message(message, clock_.now())); });
   }
-  // A message answered by an error at once; returns the time of arrival of the error.
+  // A message answered with an error at once; returns the time of arrival of the error.
   void ask(std::function<void(Micros)> answered) {
     clock_.at(clock_.now() + options_.delay, [this, answered = std::move(answered)] {
       answers_.push_back(answered);

@@ -42,7 +42,7 @@ TEST_F(Loader, CrashIsAnErrorAndTheNextReadStartsAnother) {
   ASSERT_FALSE(broken);
   EXPECT_EQ(broken.error().kind, ErrorKind::bad_data);
   EXPECT_EQ(broken.error().message,
-            "the loader of 'a.nc' was ended by signal 9 while reading 'wind'");
+            "the loader of 'a.nc' was terminated by signal 9 while reading 'wind'");
   EXPECT_EQ(source->process(), -1);
   const auto again = source->read(0, 1);
   ASSERT_TRUE(again) << again.error().message;
