@@ -1,4 +1,4 @@
-// What is known of each address, for a bounded number of them: idle ones are evicted.
+// The state of each address, for a bounded number of addresses: idle ones are evicted.
 #pragma once
 
 #include <cstddef>

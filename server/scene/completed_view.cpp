@@ -331,7 +331,7 @@ Result<ViewOutline> outline(const View& view, const data::DatasetInfo& info) {
   out.view = view;
   if (auto ok = check(view, info); !ok) return ok.error();
   out.bent = is_bent(view.geometry);
-  // Mapping the grid takes long and may read a field.
+  // Mapping the grid takes a long time and may read a field.
   out.view.geometry.mapping = protocol::GeometryMapping::flat;
   out.view.geometry.height_field.reset();
   auto lattice = place_lattice(info.grid, out.view.geometry);

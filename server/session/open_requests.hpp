@@ -17,7 +17,7 @@ class OpenRequests {
   [[nodiscard]] bool pending() const { return !pending_.empty(); }
   [[nodiscard]] bool full() const { return pending_.size() >= pending_max; }
 
-  // `version`: that of the change of the view made by the request; 0 if it made none.
+  // `version`: the version of the view after the change made by the request; 0 if it made none.
   void add(std::uint32_t id, std::uint64_t version);
   // Ends the request and returns its version; nullopt if it is not pending.
   std::optional<std::uint64_t> take(std::uint32_t id);

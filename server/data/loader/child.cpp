@@ -210,7 +210,7 @@ bool end_with_daemon() {
 int run() {
   std::signal(SIGIO, SIG_DFL);
   if (!end_with_daemon()) {
-    std::fputs("windsplat: 'load' is internal: windsplat runs it by itself\n", stderr);
+    std::fputs("windsplat: 'load' is internal and cannot be run directly\n", stderr);
     return 2;
   }
   static_cast<void>(::setpriority(PRIO_PROCESS, 0, niceness));

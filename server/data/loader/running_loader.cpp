@@ -148,8 +148,8 @@ Deadline RunningLoader::next_deadline(const Patience& patience) const {
   return std::min(patience.end, Clock::now() + limits_.stall_time);
 }
 
-// Waits for the next message. Processor time counts as progress, since a reader may compute for
-// long. Errors: out_of_memory, since readers allocate while they read.
+// Waits for the next message. Processor time counts as progress, since a reader may compute for a
+// long time. Errors: out_of_memory, since readers allocate while they read.
 Result<Fate> RunningLoader::wait(Patience& patience) {
   constexpr std::chrono::milliseconds look_every{50};
   constexpr std::chrono::seconds pause_min{1};
