@@ -76,7 +76,7 @@ TEST_F(Loader, TimeoutEndsIt) {
   ASSERT_FALSE(late);
   EXPECT_EQ(late.error().kind, ErrorKind::bad_data);
   EXPECT_EQ(late.error().message,
-            "the loader of 'a.nc' was ended after 0.2 s while reading 'wind'");
+            "the loader of 'a.nc' was terminated after 0.2 s while reading 'wind'");
   EXPECT_EQ(::kill(id, 0), -1);
   const auto again = source->read(0, 0);
   EXPECT_TRUE(again) << again.error().message;
@@ -100,8 +100,9 @@ TEST_F(Loader, StoppedLoaderIsEndedWhileOthersAreRead) {
     over = true;
     ASSERT_FALSE(stopped);
     EXPECT_EQ(stopped.error().kind, ErrorKind::bad_data);
-    EXPECT_EQ(stopped.error().message,
-              "the loader of 'a.nc' made no progress for 3.0 s and was ended while reading 'wind'");
+    EXPECT_EQ(
+        stopped.error().message,
+        "the loader of 'a.nc' made no progress for 3.0 s and was terminated while reading 'wind'");
   });
   EXPECT_TRUE(other->read(0, 0));
   EXPECT_FALSE(over) << "the other one is read while this one hangs";
