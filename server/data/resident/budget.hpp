@@ -105,7 +105,8 @@ class Budget {
 
   // Longer than the slowest frames, which reference volumes during rendering.
   static constexpr std::chrono::seconds patience{20};
-  // Loaders of other datasets and large pictures end either within moments or not soon.
+  // Loaders of other datasets and large pictures usually end within moments; waiting longer rarely
+  // helps.
   static constexpr std::chrono::seconds reservation_patience{12};
 
  private:

@@ -31,7 +31,7 @@ struct Array {
 
 struct StoreContents {
   std::string name;
-  // By the metadata and all chunks, or 4096 evenly distributed ones if there are more.
+  // Derived from the metadata and all chunks, or 4096 evenly distributed ones if there are more.
   std::string identity;
   std::vector<Array> arrays;  // parallel to the variables
   FileContents file;
