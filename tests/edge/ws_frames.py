@@ -28,7 +28,7 @@ def question(number=5, size=0):
 
 
 def require_life(viewer, errors=None):
-    """A request is answered; before the answer arrive that many errors, if given."""
+    """A request is answered, preceded by that many errors, if given."""
     viewer.send(TEXT, question(4242))
     before = 0
     while viewer.text("error").get("id") != 4242:
