@@ -32,7 +32,7 @@ struct PatchMessage {
 };
 struct StillMessage {
   std::uint32_t id = 0;
-  std::optional<int> width;  // pixels; default: that of the view
+  std::optional<int> width;  // pixels; default: from the view
   std::optional<int> height;
   std::string format = "png";  // png | jpeg
   double scale = 1;            // 1..4

@@ -50,7 +50,7 @@ if(WINDSPLAT_SANITIZE)
 endif()
 windsplat_program_test(spoiled python3 tests/fuzz/mutate_files.py --program=$<TARGET_FILE:windsplat>
   --count=${spoiled_count})
-# Mutated datasets: opened, compared with the truth, rendered.
+# Mutated datasets: opened, compared with the known values, rendered.
 windsplat_program_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py
   --program=$<TARGET_FILE:windsplat> ${drawn_options})
 # Well-formed files; the fuzzers replay small ones of every format.

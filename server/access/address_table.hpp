@@ -1,4 +1,4 @@
-// What is known of each address, for a bounded number of them: idle ones are evicted.
+// The state of each address, for a bounded number of addresses: idle ones are evicted.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +36,7 @@ class AddressTable {
   AddressUsage* find(const std::string& address);
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
 
-  // Of each address; the rate of rendering in seconds.
+  // Rates granted to each address; the rate of rendering is in seconds.
   [[nodiscard]] TokenBucket::Rate byte_rate() const { return byte_rate_; }
   [[nodiscard]] TokenBucket::Rate render_rate() const { return render_rate_; }
 

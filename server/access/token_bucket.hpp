@@ -19,9 +19,9 @@ struct TokenBucket {
 
   void refill(const Rate& rate, Micros now);
   void take(const Rate& rate, double tokens, Micros now);
-  // Time until so many tokens are there.
+  // Time until `tokens` tokens are available.
   Micros wait_for(const Rate& rate, double tokens, Micros now);
-  // Takes one if it is there.
+  // Takes one token if available.
   std::optional<Refusal> take_one(const Rate& rate, metrics::LimitKind kind, double limit,
                                   Micros now);
 

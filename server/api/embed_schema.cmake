@@ -2,7 +2,7 @@
 set(schema_file ${PROJECT_SOURCE_DIR}/protocol/view.schema.json)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${schema_file})
 file(READ ${schema_file} schema_hex HEX)
-# Bytes, not a literal: no compiler limits their number and no content can end them early.
+# An array of bytes: compilers limit the length of a string literal, and the content might end it.
 string(REGEX REPLACE "(..)" "'\\\\x\\1'," schema_bytes "${schema_hex}")
 set(byte "'[^']*',")
 string(REGEX REPLACE "(${byte}${byte}${byte}${byte}${byte}${byte}${byte}${byte})" "\\1\n    "

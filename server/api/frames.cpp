@@ -137,8 +137,8 @@ http::Response unchanged_response(const std::string& etag) {
   return {304, "", {{"Cache-Control", "no-cache"}, {"ETag", etag}}, {}};
 }
 
-// Null if the client has the picture already: `reply` is called with 304. Its tag is that of the
-// completed view, for which data may have to be read: it is not known before.
+// Null if the client has the picture already: `reply` is called with 304. Its tag identifies the
+// completed view, which may require reading data, so it is not known earlier.
 Result<work::PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
                                   work::ViewCompletion& completion, data::Dataset& dataset,
                                   work::Loading loading, const http::Reply& reply) {

@@ -181,7 +181,8 @@ Result<HistogramQuery> read_histogram(const http::Request& request, const data::
   if (const auto ok = query.finish(); !ok) return ok.error();
   out.request.clip = clip.value_or(0);
   if (out.request.range && clip) {
-    return make_error(ErrorKind::invalid, "query parameters 'range' and 'clip' exclude each other");
+    return make_error(ErrorKind::invalid,
+                      "query parameters 'range' and 'clip' are mutually exclusive");
   }
   return out;
 }

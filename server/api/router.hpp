@@ -12,7 +12,7 @@
 
 namespace windsplat::api {
 
-// Whether the path is that of the stream.
+// Whether the path identifies the stream.
 bool names_stream(const http::Request& request);
 
 class Router {

@@ -1,6 +1,6 @@
 // A loop is a gate that is open while indices may remain. Workers that find it open enter and take
 // indices from an atomic counter; late workers find it closed, so that short loops do not wait for
-// idle threads. Threads wait by a short spin, then on a condition variable.
+// idle threads. Threads spin briefly, then wait on a condition variable.
 #include "server/base/thread_pool.hpp"
 
 #include <algorithm>

@@ -115,7 +115,7 @@ Result<std::vector<study::Subject>> subjects_of(const StudyArguments& arguments,
   if (!arguments.dataset.empty()) {
     if (arguments.standard || !arguments.scenes.empty()) {
       return make_error(ErrorKind::malformed,
-                        "a DATASET and --standard or --scene exclude each other");
+                        "DATASET cannot be combined with --standard or --scene");
     }
     auto subject = given_subject(arguments, store);
     if (!subject) return subject.error();

@@ -386,7 +386,7 @@ void begin_pass(int stride, PassPlan& pass) {
   pass.kernel = kernels::Pass{};
 }
 
-// One pass per stride; that of the lines is the first.
+// One pass per stride; the pass of the lines is the first.
 void choose_passes(const Scene& scene, std::vector<PassPlan>& passes) {
   std::size_t used = 0;
   const auto with_stride = [&](int stride) -> PassPlan& {

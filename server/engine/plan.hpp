@@ -17,8 +17,8 @@ namespace windsplat::engine {
 // crosses most cells, |forward_a| / mean spacing_a largest; the first of equals.
 int major_axis(const scene::Camera& camera, const scene::Lattice& lattice);
 
-// A kernel position along one axis: it represents `stride` samples from `first` on, the last
-// position the remaining ones, and lies at the middle sample (the lower of two).
+// A kernel position along one axis: it represents `stride` samples starting at `first` (the last
+// position: the remaining ones) and lies at the middle sample (the lower of two).
 struct AxisKernel {
   int sample = 0;
   int group = 1;    // number of samples represented
@@ -98,7 +98,7 @@ struct RenderPlan {
   ~RenderPlan() = default;
 };
 
-// Replaces the plan by that of `scene`, which must outlive it. Only the storage is reused, and
+// Replaces the plan by one for `scene`, which must outlive it. Only the storage is reused, and
 // `ways` if the curved lattice is the same.
 void make_plan(const scene::Scene& scene, RenderPlan& plan);
 

@@ -68,7 +68,8 @@ class Splats {
     --of_.count;
   }
 
-  // Queues a record for slab `wanted`, or for the last slab that the queues cover from `now` on.
+  // Queues a record for slab `wanted`, or for the last slab that the queues, starting at `now`,
+  // cover.
   void await(std::uint32_t record, std::int64_t wanted, std::int64_t now) {
     const auto reach = static_cast<std::int64_t>(WaitingSplats::slabs) - 1;
     const std::size_t slab = modulo(std::min(wanted, now + reach), WaitingSplats::slabs);

@@ -40,7 +40,7 @@ struct WorkReport {
   std::int64_t pixel_updates = 0;
   std::int64_t exponentials = 0;
   std::int64_t tiles = 0;
-  std::int64_t tiles_stopped = 0;  // tiles ended early because of the stop transmittance
+  std::int64_t tiles_stopped = 0;  // tiles ended by early ray termination
   // Upper bounds: mean over the picture of the alphas skipped by tolerances, and the largest change
   // of a pixel by early termination.
   double skipped_bound = 0;

@@ -12,7 +12,7 @@ namespace windsplat::frame {
 
 // Work is counted in kernels: one for each kernel position of the lines and each sample of a
 // medium, and one per pixels_a_kernel pixels that a kernel covers, that slabs cross, or that the
-// picture has. The fixed work of a kernel is about that of so many pixels.
+// picture has. The fixed work of a kernel is about that of pixels_a_kernel pixels.
 struct Cost {
   static constexpr double pixels_a_kernel = 16;
 

@@ -37,8 +37,8 @@ void name_field(const data::Volume& volume, const std::string& name, engine::Wor
   name_field(name, static_cast<std::int64_t>(volume.bytes()), work);
 }
 
-// The engine knows volumes, not names: the layers of the scene are those of the view, in the same
-// order, without media of zero extinction. A field drawn twice counts once.
+// The engine has volumes without names: the layers of the scene correspond to those of the view, in
+// the same order, without media of zero extinction. A field drawn twice counts once.
 void name_fields(const scene::Scene& scene, const protocol::View& completed,
                  engine::WorkReport& work) {
   work.fields.clear();

@@ -104,7 +104,7 @@ Result<void> stitch(std::span<const std::span<const std::uint8_t>> strips,
     if (!layout) return layout.error();
     if (s == 0) first = *layout;
     if (!same_header(strips[0], first, strip, *layout)) {
-      return broken("has another header than the first");
+      return broken("has a header that differs from the first");
     }
     if (s == 0) {
       append(bytes, strip.first(layout->scan));

@@ -18,8 +18,8 @@ constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // largest IDAT
 
 enum class Fate { done, cancelled, failed };
 
-// libpng reports errors by longjmp, which skips destructors. Functions from write() on therefore
-// have no objects with destructors; the output and the error message are members.
+// libpng reports errors by longjmp, which skips destructors. write() and the functions below it
+// therefore have no objects with destructors; the output and the error message are members.
 class PngWriter {
  public:
   PngWriter()

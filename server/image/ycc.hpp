@@ -47,7 +47,7 @@ class YccPicture {
   [[nodiscard]] const std::array<Plane, 3>& planes() const { return planes_; }
 
  private:
-  // Converts `count` pixels of `part` from its column x on, and writes `stored` columns.
+  // Converts `count` pixels of `part`, starting at its column x, and writes `stored` columns.
   void put_full(const Part& part, int x, int count, int stored);
   void put_halved(const Part& part, int x, int count, int stored);
   void repeat_last_row(int x, int x_end);

@@ -23,7 +23,7 @@ struct Expected {
 // are reported as this value.
 inline constexpr double error_least = 1e-5;
 
-// Whether the setting draws the view in its own size and level, but that level already averages
+// Whether the setting draws the view at its own size and level, but that level already averages
 // samples.
 bool is_averaged(const Setting& setting, const Viewpoint& viewpoint);
 

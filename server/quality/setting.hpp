@@ -21,8 +21,8 @@ struct Setting {
   bool operator==(const Setting&) const = default;
 };
 
-// Strides and other stop transmittances are not included: at equal time their error is larger
-// (docs/benchmarks/error.md).
+// Strides and other thresholds of early ray termination are not included: at equal time their error
+// is larger (docs/benchmarks/error.md).
 inline constexpr std::array<Setting, 26> settings{{
     {protocol::MethodName::kernel, 0, 0},  {protocol::MethodName::kernel, 1, 0},
     {protocol::MethodName::kernel, 2, 0},  {protocol::MethodName::kernel, 3, 0},
@@ -49,7 +49,8 @@ inline std::uint8_t wire_level(int half_level) { return static_cast<std::uint8_t
 // picture size is left to the encoder.
 protocol::View at_setting(protocol::View view, const Setting& setting);
 
-// Index of the setting that renders the view unchanged; for method reference that of kernel.
+// Index of the setting that renders the view unchanged; for method reference the index of the same
+// view with method kernel.
 std::size_t own_setting(const protocol::View& view);
 std::optional<std::size_t> index_of(const Setting& setting);
 

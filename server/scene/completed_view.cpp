@@ -116,7 +116,8 @@ Result<void> complete_magnitudes(View& view, const Lattice& lattice,
   if (!vector.magnitude_range) vector.magnitude_range = Range{0, 1};
   const Range& range = *vector.magnitude_range;
   if (!vector.min_magnitude && named) {
-    // Checks the default lines only: a view that changes one of their keys changes nothing else.
+    // The check uses default lines, so that it does not depend on the other keys of the view's
+    // lines.
     protocol::VectorView plain;
     plain.length = default_length(lattice, plain.stride, slice);
     plain.magnitude_range = vector.magnitude_range;
@@ -330,7 +331,7 @@ Result<ViewOutline> outline(const View& view, const data::DatasetInfo& info) {
   out.view = view;
   if (auto ok = check(view, info); !ok) return ok.error();
   out.bent = is_bent(view.geometry);
-  // Mapping the grid takes long and may read a field.
+  // Mapping the grid takes a long time and may read a field.
   out.view.geometry.mapping = protocol::GeometryMapping::flat;
   out.view.geometry.height_field.reset();
   auto lattice = place_lattice(info.grid, out.view.geometry);

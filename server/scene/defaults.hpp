@@ -65,8 +65,8 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
 // those of the axes in its plane.
 double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice);
 
-// The default: by height if the vertical axis has another unit than the horizontal ones (as in the
-// atmosphere), otherwise by magnitude.
+// The default: by height if the unit of the vertical axis differs from that of the horizontal ones
+// (as in the atmosphere), otherwise by magnitude.
 protocol::ColorBy default_color_by(const data::Grid& grid);
 
 }  // namespace windsplat::scene

@@ -17,7 +17,7 @@ class OpenRequests {
   [[nodiscard]] bool pending() const { return !pending_.empty(); }
   [[nodiscard]] bool full() const { return pending_.size() >= pending_max; }
 
-  // `version`: that of the change of the view made by the request; 0 if it made none.
+  // `version`: the version of the view after the change made by the request; 0 if it made none.
   void add(std::uint32_t id, std::uint64_t version);
   // Ends the request and returns its version; nullopt if it is not pending.
   std::optional<std::uint64_t> take(std::uint32_t id);
@@ -28,7 +28,7 @@ class OpenRequests {
   // Why the last view could not be shown.
   void failed(const Error& error) { failure_ = error; }
   void succeeded() { failure_.reset(); }
-  // The error for a client that wants to play or draw without a dataset.
+  // The error of a request to play or draw without a dataset.
   [[nodiscard]] Error nothing_open() const;
 
  private:

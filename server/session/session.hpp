@@ -7,15 +7,15 @@
 // chooser finds for quality.budgetMs (33 ms if it and maxError are null, less under contention for
 // the renderer) and quality.maxError. A moving frame is always finished and sent, even when the
 // view has changed, so that a steady flow of patches cannot starve the client. After `quiet`
-// without a change the view is refined: if its final frame takes long, first at settings with half
-// the error of the frame shown; then as specified at high quality, with its error measured, flagged
-// final. With maxError, slabs are halved until the measured error is within it. The next change
-// cancels these renders. A calibration run is requested after the final frame.
+// without a change the view is refined: if its final frame takes a long time, first at settings
+// with half the error of the frame shown; then as specified at high quality, with its error
+// measured, flagged final. With maxError, slabs are halved until the measured error is within it.
+// The next change cancels these renders. A calibration run is requested after the final frame.
 //
 // The link. A render starts no sooner than its frame will find link and client free (link.hpp), so
 // that it shows the newest view and does not queue. Quality and size of a moving frame follow the
-// rate of the link (jpeg_rate.hpp). A final frame blocks a slow link: there the view must be at
-// rest for half the transfer time first, up to `quiet_most`.
+// rate of the link (jpeg_rate.hpp). Because a final frame blocks a slow link, the view must first
+// be at rest for half the transfer time, up to `quiet_most`.
 //
 // A final frame remains valid for every later view with the same picture: an equivalent view, a
 // return to it before another frame was sent, or another camera on a scene that is empty before and
@@ -69,7 +69,7 @@ class Session {
                        Micros now);
   Effects on_rendered(std::uint64_t ticket, Result<Drawn> drawn, Micros now);
   Effects on_written(Micros now);  // the frame was written completely
-  // The pong of the ping sent directly before the frame of that seq and its texts.
+  // The pong of the ping sent directly before the frame of that seq and its text messages.
   void on_pong(std::uint32_t seq, Micros now) { state_.flow.answered(seq, now); }
   Effects on_time(Micros now);
   Effects on_drain(Micros now);

@@ -49,8 +49,8 @@ struct Compared {
   quality::Forecast prior;  // forecast without calibration
 };
 
-// A frame of a held-out view by the method of the view, with its error measured relative to a finer
-// rendering.
+// A frame of a held-out view, rendered by the view's own method, with its error measured relative
+// to a finer rendering.
 struct MeasuredFrame {
   std::size_t variant = 0;
   bool slab = true;

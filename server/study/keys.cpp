@@ -1,4 +1,4 @@
-// Subject, setting, machine and precision as a text -> its hash.
+// Subject, setting, machine and precision as a string -> its hash.
 #include "server/study/keys.hpp"
 
 #include <array>

@@ -17,7 +17,7 @@ namespace windsplat::study {
 // FNV-1a, 64 bits.
 std::uint64_t hash_of(std::string_view bytes);
 
-// Hash of a text that lists everything on which a result depends: 16 hexadecimal digits.
+// Hash of a string that lists everything on which a result depends: 16 hexadecimal digits.
 std::string key_of(std::string_view text);
 
 class PointsFile {

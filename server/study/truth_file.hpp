@@ -15,7 +15,7 @@ struct KeptTruth {
   double tolerance = 0;  // tolerance of the integral
 };
 
-// nullopt if the file is missing or damaged, not finite, or of another size or tolerance.
+// nullopt if the file is missing or damaged, not finite, or of a different size or tolerance.
 std::optional<KeptTruth> read_truth(const std::filesystem::path& path, int width, int height,
                                     double tolerance);
 

@@ -55,7 +55,7 @@ struct Curve {
   scene::Compositing compositing = scene::Compositing::analytic;
   Knob knob = Knob::stride;
   std::vector<std::size_t> points;
-  double order = 0;  // slope of log rmse over log parameter; NaN below three stable points
+  double order = 0;  // slope of log rmse over log parameter; NaN for fewer than 3 stable points
 };
 
 // A picture in double precision.

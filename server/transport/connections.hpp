@@ -25,7 +25,7 @@ class Connection {
   // The access token has changed.
   virtual void on_new_token() {}
 
-  // Used to admit a new connection in place of this one: the time since when it is in a state;
+  // Used to admit a new connection in place of this one: the time at which it entered a state;
   // nullopt in other states, or after its slot was freed.
   using Since = std::optional<std::chrono::steady_clock::time_point>;
   virtual Since idle_since() const { return {}; }     // waiting for the first byte of a request

@@ -25,8 +25,8 @@ void end_failed(Session& session, const char* fault) noexcept {
 }
 
 // A completion handler that keeps its session alive and ends only that session when something
-// throws, also when an operation throws internally and destroys the handler uncalled: the session
-// would then wait forever.
+// throws, also when an operation throws internally and destroys the handler without calling it: the
+// session would otherwise wait forever.
 template <class Session, class Body>
 class Guarded {
  public:
@@ -38,7 +38,7 @@ class Guarded {
   Guarded& operator=(Guarded&&) = delete;
   ~Guarded() {
     if (session_ == nullptr || std::uncaught_exceptions() == 0) return;
-    end_failed(*session_, "completion handler destroyed uncalled");
+    end_failed(*session_, "completion handler destroyed without a call");
   }
 
   template <class... Results>

@@ -31,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds tls_timeout{5};
 constexpr std::chrono::seconds tls_reserve_timeout{2};  // for connections of the reserve
-// Limit of concurrent handshakes; above it another one is ended.
+// Limit of concurrent handshakes; above it, an existing one is ended.
 constexpr std::size_t tls_handshakes_max = 256;
 constexpr std::size_t handshakes_per_address_max = 64;
 // Limit of bytes read. A ClientHello has about 500 bytes, 2 KB with a post-quantum key share;
@@ -50,7 +50,7 @@ class TlsTask final : public HandshakeTask {
         io_(wire_.get_executor()),
         admission_(admission),
         trusted_(visitor.trusted) {}
-  // Processor time still to be charged if an allocation failed on the way back.
+  // Processor time that is not yet charged if an allocation failed on completion.
   ~TlsTask() override { charge(); }
   TlsTask(const TlsTask&) = delete;
   TlsTask& operator=(const TlsTask&) = delete;
@@ -172,7 +172,7 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
  private:
   void on_done(ErrorCode fault) {
     if (!task_) return;
-    if (task_->is_abandoned()) return abort();  // a dropped step may still hold its wire
+    if (task_->is_abandoned()) return abort();  // its step may still use the connection
     // From here on the wire owns the descriptor and may close it.
     Wire wire = std::exchange(task_, nullptr)->take_wire();
     if (!fault) {

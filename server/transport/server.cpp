@@ -221,7 +221,7 @@ struct Server::State {
   const CancelToken never;        // for work that cannot be cancelled
   bool checking_files = false;    // a file check is scheduled or running
   bool drain_timers_set = false;  // the timers of a drain run
-  std::thread ending;             // ends pending reads when a drain takes long
+  std::thread ending;             // ends pending reads when a drain takes a long time
 };
 
 Server::Server(api::ServerOptions options, std::shared_ptr<data::Store> store,

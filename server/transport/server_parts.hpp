@@ -1,5 +1,5 @@
-// The parts of the server, constructed and ended in order of dependency. Only the server sees them
-// all: sessions and handlers take what they use.
+// The parts of the server, constructed and ended in order of dependency. Only the server has access
+// to all of them; sessions and handlers are given those that they use.
 #pragma once
 
 #include <atomic>

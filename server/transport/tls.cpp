@@ -1,4 +1,4 @@
-// Builds an OpenSSL context with the accepted protocol versions and ciphers from PEM texts.
+// Builds an OpenSSL context with the accepted protocol versions and ciphers from PEM files.
 #include "server/transport/tls.hpp"
 
 #include <openssl/ssl.h>
@@ -83,7 +83,7 @@ Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std
   if (fault) return pem_error("is not a PEM certificate", fault);
   // Also checks that the key matches the certificate.
   tls->context.use_private_key(asio::buffer(key), asio::ssl::context::pem, fault);
-  if (fault) return pem_error("is not the private key of that certificate", fault);
+  if (fault) return pem_error("does not match the certificate", fault);
   return tls;
 }
 

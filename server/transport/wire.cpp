@@ -20,9 +20,8 @@ struct Wire::Tls {
   asio::ssl::stream<TcpStream&> stream;
   std::unique_ptr<Record> record;
   std::size_t bytes_read = 0;
-  // Asio makes an operation wait for another one by a timer that closing the socket does not end:
-  // if the other one is lost by an allocation failure, the waiting one would keep its session
-  // alive.
+  // A second TLS operation waits for the first on a timer that closing the socket does not cancel:
+  // if an allocation failure loses the first, the second would keep its session alive.
   asio::cancellation_signal stop_reading;
   asio::cancellation_signal stop_writing;
 };

@@ -1,4 +1,4 @@
-// The datasets as the API sees them: lookup by id, descriptions, and checks of views.
+// The datasets of the API: lookup by id, descriptions, and checks of views.
 #pragma once
 
 #include <map>
@@ -35,7 +35,7 @@ class Catalogue {
 
   // Opens a located dataset and lists it, so that forget() can remove it; the value is its id. All
   // callers that open a dataset share it. Errors: those of opening; cancelled, in which case the
-  // dataset is listed only if another caller still holds it. May block for long.
+  // dataset is listed only if another caller still holds it. May block for a long time.
   Result<std::string> open(const data::Location& location, const CancelToken& cancel);
   // Replaces the prefetch requests of a session; see data::Store::request_prefetch.
   void request_prefetch(std::uint64_t owner, std::vector<data::PrefetchRequest> requests) {

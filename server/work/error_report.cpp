@@ -33,7 +33,7 @@ void report_error(const frame::Frame& drawn, const Observation& observed,
     tables.add_encoding(observed.signature, encoding.quality, observed.viewpoint,
                         *drawn.jpeg_error);
   }
-  // The measured error does not include the loss by chroma subsampling.
+  // The measured error does not include the loss from chroma subsampling.
   info.jpeg_error = drawn.jpeg_error && full_chroma
                         ? *drawn.jpeg_error
                         : tables.encoding_error(observed.signature, encoding.quality, full_chroma,

@@ -1,8 +1,8 @@
 // Threads that run tasks which may block, so that neither the renderer nor the network thread waits
 // for a disk: loads, client jobs, look-ups of files, changes of saved views. Tasks run in order of
 // arrival, one at a time per key, which is the dataset they read: a dataset whose files hang
-// occupies one thread only. A task that runs for long, because its files hang or it waits for
-// memory, gives its place to the next one while there are spare threads.
+// occupies one thread only. A task that runs for a long time, because its files hang or it waits
+// for memory, gives its place to the next one while there are spare threads.
 #pragma once
 
 #include <chrono>

@@ -22,7 +22,7 @@ class ViewCompletion {
  private:
   struct Latest {
     protocol::View view;
-    std::weak_ptr<const data::DatasetInfo> info;  // a reopened dataset has another
+    std::weak_ptr<const data::DatasetInfo> info;  // a reopened dataset has a new info
     scene::CompletedView completed;
   };
   std::mutex mutex_;

@@ -48,7 +48,7 @@ class LinkViewer(WebSocket):
         self.say({"type": "patch", "rev": self.rev, "t": time.monotonic() * 1e3, "patch": patch})
 
     def ask(self):
-        """Sends a request that is answered at once, by an error that names the id."""
+        """Sends a request that is answered at once, with an error that contains the id."""
         number = 1000 + len(self.answers) + len(self.waits)
         self.waits[number] = time.monotonic()
         self.say({"type": "open", "id": number, "dataset": "nowhere"})

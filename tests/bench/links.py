@@ -7,9 +7,9 @@ Usage: links.py [--program=windsplat] [--how=auto|tunnel|proxy] [--mbit=0.5,2,..
 
 The client changes the camera every 16 ms and acknowledges frames as they arrive. A frame's age
 is its arrival time minus the time of the newest change it shows. The link time is the round trip
-plus the bytes of the frame and of the texts before it, divided by the rate. The render interval
-is the mean time between moving frames. A link is within bounds if the 99th percentile of age
-minus link time is at most two render intervals; --check exits 1 if any link is not. Frames of
+plus the bytes of the frame and of the text messages before it, divided by the rate. The render
+interval is the mean time between moving frames. A link is within bounds if the 99th percentile of
+age minus link time is at most two render intervals; --check exits 1 if any link is not. Frames of
 the first two seconds do not count, because the daemon and TCP are still adapting to the link."""
 import argparse
 import math

@@ -18,7 +18,7 @@ samples after the first quarter (the warm-up), with its 95 % confidence interval
 takes about 15 MB for a moment, which a sample hits by chance; minima show what remains allocated.
 The line through the means of the intervals is printed beside it.
 
-Failures: a daemon that dies, stops answering /livez or ends with another code than 0; a slope
+Failures: a daemon that crashes, stops answering /livez or exits with a code other than 0; a slope
 above its interval's half width and above --max-slope MB/hour; descriptors, threads or sessions that
 do not return to their initial number after all clients have disconnected. --smoke: some seconds,
 without the slope. Exit code 0: no failure."""
@@ -41,7 +41,8 @@ from stream_client import Daemon, status_bytes
 
 MB = 1e6
 WARM_UP_SHARE, STRETCHES = 0.25, 12
-LEAVE_S = 100  # a client that never reads is given up after its write deadline or 60 s of silence
+LEAVE_S = 100  # a client that never reads is disconnected after its write deadline or 60 s of
+               # silence
 # Student's t for 95 %, by degrees of freedom: 1, 2, ...
 STUDENT_T = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23]
 

@@ -9,8 +9,8 @@ Usage: viewers.py [--program=windsplat] [--dataset=climate] [--viewers=16] [--se
 A session sends the next camera with every frame it receives. --mixed adds one session at 1920x1080
 and one that never reads. --deaf: sessions that request frames of 2560x1440 and never read, for the
 memory of each. --ended: short sessions, for the memory that they leave allocated. 0: none.
-Exit 1 if Jain's index of the frame rates, (sum x)^2 / (n sum x^2), is below --min-jain, or a deaf
-session takes more than two frames and 256 KiB.
+Exit 1 if Jain's index of the frame rates, (sum x)^2 / (n sum x^2), is below --min-jain, or a
+session that never reads takes more than two frames and 256 KiB.
 --smoke: small and short; fails only if nothing works."""
 import argparse
 import json

@@ -3,7 +3,7 @@
 as documented, keep running, and serve a well-behaved client after every hundred.
 
     tests/edge/boundaries.py                      # starts build/release/windsplat; every shot
-    tests/edge/boundaries.py --count=1000 --seed=7 # so many, drawn and ordered by the seed
+    tests/edge/boundaries.py --count=1000 --seed=7 # 1000 shots, chosen and ordered by the seed
     tests/edge/boundaries.py --kind=trailer        # kinds whose name holds that
     tests/edge/boundaries.py --url=https://127.0.0.1:8443/ --ca=cert.pem --token-file=token
 

@@ -4,7 +4,7 @@
     tests/edge/http11.py                             # starts build/release/windsplat
     tests/edge/http11.py --program=build/dev/windsplat --growth-kib=0
     tests/edge/http11.py --url=https://127.0.0.1:8443/ --ca=cert.pem --token-file=token
-    tests/edge/http11.py --only=http.coding --verbose # some of them; --list prints all as a table
+    tests/edge/http11.py --only=http.coding --verbose # selected cases; --list prints all as a table
 
 After each group the daemon must run, serve a well-behaved client and hold at most one megabyte
 more. Exit code 0: every case passed."""

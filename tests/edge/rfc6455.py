@@ -4,7 +4,7 @@
     tests/edge/rfc6455.py                           # starts build/release/windsplat
     tests/edge/rfc6455.py --program=build/dev/windsplat --growth-kib=0
     tests/edge/rfc6455.py --url=https://127.0.0.1:8443/ --ca=cert.pem --token-file=token
-    tests/edge/rfc6455.py --only=ws.utf8 --verbose   # some of them; --list prints all as a table
+    tests/edge/rfc6455.py --only=ws.utf8 --verbose   # selected cases; --list prints all as a table
 
 After each group the daemon must run, serve a well-behaved client and hold at most one megabyte
 more. Exit code 0: every case passed."""

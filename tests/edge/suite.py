@@ -88,7 +88,7 @@ class Watched:
         return status_bytes(self.pid, "VmHWM") if self.pid else 0
 
     def settled_growth(self, before):
-        """Memory and descriptors that remain once closed connections have been noticed."""
+        """Memory and descriptors that remain after the daemon has detected closed connections."""
         end = time.monotonic() + (3 if self.growth_max else 0)
         while self.resident() - before > self.growth_max and time.monotonic() < end:
             time.sleep(0.1)

@@ -211,7 +211,7 @@ def accept_of(key):
 
 
 class WebSocket(Connection):
-    """A session of the stream: handshake, frames, texts as JSON."""
+    """A session of the stream: handshake, frames, text messages as JSON."""
 
     def __init__(self, target, timeout=20, receive_buffer=0):
         super().__init__(target, timeout, receive_buffer)
@@ -265,7 +265,7 @@ class WebSocket(Connection):
                 return kind, whole
 
     def text(self, kind):
-        """The next text of that type; frames and other texts are skipped."""
+        """The next text message of that type; frames and other messages are skipped."""
         while True:
             opcode, payload = self.message()
             if opcode == TEXT:

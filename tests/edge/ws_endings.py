@@ -114,7 +114,7 @@ def failing_then_text(viewer):
 
 
 def in_fragments(data, size=1):
-    """A text in fragments of that many bytes."""
+    """A text message in fragments of `size` bytes."""
     parts = [data[at:at + size] for at in range(0, len(data), size)]
     return b"".join(frame(CONTINUE if number else TEXT, part, fin=number == len(parts) - 1)
                     for number, part in enumerate(parts))

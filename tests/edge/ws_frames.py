@@ -22,13 +22,13 @@ def session(target):
 
 
 def question(number=5, size=0):
-    """A text of that many bytes, or the fewest possible, whose answer contains its number."""
+    """A text message, padded to `size` bytes, whose answer contains its number."""
     text = json.dumps({"type": "open", "id": number, "dataset": "nowhere"})
     return text.encode().ljust(size)
 
 
 def require_life(viewer, errors=None):
-    """A request is answered; before the answer arrive that many errors, if given."""
+    """A request is answered, preceded by that many errors, if given."""
     viewer.send(TEXT, question(4242))
     before = 0
     while viewer.text("error").get("id") != 4242:
@@ -286,7 +286,7 @@ def flood(viewer):
 
 
 def binary_cases():
-    where = "the stream: texts only"
+    where = "the stream: text messages only"
     for name, data in (
             ("empty", frame(BINARY)), ("short", frame(BINARY, b"\0\1\2")),
             ("long", frame(BINARY, bytes(60000))), ("json", frame(BINARY, question())),

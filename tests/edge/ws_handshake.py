@@ -224,7 +224,8 @@ def origin_cases():
         if name == "empty":
             continue  # equivalent to an absent field
         yield bad("origin." + name, where, f"Origin: {value}", (403,), more=["Origin: " + value])
-    yield Case("ws.open.origin.twice", where, "the own Origin and another one", "400 or 403",
+    yield Case("ws.open.origin.twice", where, "the server's own Origin and a foreign one",
+               "400 or 403",
                lambda target: refused(target, (400, 403), more=[
                    f"Origin: http://{target.authority()}", "Origin: http://evil.example"]))
     yield bad("host.other", "the Host check", "a name that resolved to this machine", (421,),

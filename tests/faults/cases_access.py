@@ -29,7 +29,7 @@ def origins(world, count):
         need(one.status == 101, "the page's own origin is refused")
     with Stream(daemon.port) as one:
         need(one.status == 101, "a program without an origin is refused")
-    return "403; the page's own and a program's go through"
+    return "403; the page's own origin and requests of programs are accepted"
 
 
 @case("foreign host names that resolve to this machine", 60, 6)
@@ -139,7 +139,7 @@ def over_tls(port, request, cut=False):
 GET = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
 
 
-@case("TLS cut short, spoken badly or not at all", 60, 10)
+@case("TLS handshakes that are cut off, malformed or absent", 60, 10)
 def tls_faults(world, count):
     daemon = with_tls(world)
     hello = bytes.fromhex("1603010200010001fc0303") + bytes(32)

@@ -204,7 +204,7 @@ def little_cgroup(world, count):
         world.end_case()
         time.sleep(0.1)
         group.rmdir()
-    return "507 or drawn; nothing was ended by the kernel"
+    return "507 or drawn; the kernel killed no process"
 
 
 def read_or_nothing(path):

@@ -69,7 +69,7 @@ def large_headers(world, count):
     return by_size(world, count, make, {431})
 
 
-@case("Content-Length of 2^63 and its like", 60, 6)
+@case("Content-Length of 2^63 and similar values", 60, 6)
 def lengths(world, count):
     daemon = world.daemon()
     wrong = ["9223372036854775808", "9223372036854775807", "18446744073709551616",
@@ -173,7 +173,7 @@ def leave(world, count):
             one.sendall(request[:1 + n * 7 % len(request)])
     quiet = wait_for(lambda: picture(daemon.port).status in (200, 429), PATIENCE_S, "no picture")
     need(quiet, "no picture")
-    return "none is waited for"
+    return "a new request is served at once"
 
 
 @case("control characters in request ids and targets", 60, 12)

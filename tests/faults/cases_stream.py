@@ -88,7 +88,7 @@ def fragments(world, count):
             need(took < MESSAGE_CUT_S + SLACK_S, f"held open for {took:.1f} s")
             need(code in (0, 1009, 1002), f"ended by {code}")
             outcome.append(f"{sent} of {size} bytes in {took:.1f} s")
-    return "given up after " + ", ".join(outcome[:3])
+    return "disconnected after " + ", ".join(outcome[:3])
 
 
 def deaf(daemon, count, size):
@@ -217,9 +217,9 @@ def by_tc(world, seconds):
     return done.stdout.strip()
 
 
-@case("messages that are none", 200, 40)
+@case("malformed messages", 200, 40)
 def no_messages(world, count):
-    """Broken JSON and unknown types are answered by errors; binary messages and invalid UTF-8
+    """Broken JSON and unknown types are answered with errors; binary messages and invalid UTF-8
     close the stream."""
     daemon = world.daemon()
     answered = [b"{", b"[]", b"null", b'{"type": "nothing"}', b'{"type": "ack", "seq": 99}',
@@ -239,7 +239,8 @@ def no_messages(world, count):
             code = one.until_closed()
             need(code in codes, f"opcode {opcode} is answered by {code}")
             closed += 1
-    return f"{errors} answered by an error and lived, then {closed} closed by 4400, 1007 or 1002"
+    return (f"{errors} answered with an error and kept open, then {closed} closed by 4400, 1007 "
+            "or 1002")
 
 
 @case("streams cut off without a close frame", 100, 20)
@@ -255,7 +256,7 @@ def cut_off(world, count):
         one.close()
     wait_for(lambda: metric(daemon.port, "windsplat_sessions") == 0, PATIENCE_S,
              "sessions of disconnected peers")
-    return "no session is left"
+    return "every session is closed"
 
 
 @case("more sessions than allowed", 20, 5)

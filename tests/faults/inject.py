@@ -9,7 +9,7 @@ Usage: inject.py [--program=build/release/windsplat] [--shim=build/release/tests
 
 The session: the page, a picture, values, a histogram, a file loaded by a job, a saved view
 created, changed and deleted, a stream with frames, a still and an invalid patch, the metrics.
-While it runs one call fails; the affected request may be answered by an error or be cut off, but
+While it runs one call fails; the affected request may be answered with an error or be cut off, but
 must not hang. Afterwards a stream opened before must continue, unless the log says that its own
 connection failed, and a new request must succeed. --count and --seconds end a sweep early; the
 table gives the number of call sites. Phase guarded: the same on [::1] over TLS, with a token,
@@ -273,7 +273,8 @@ class Sweep:
         it end."""
         try:
             self.bystander.final_frame(small_view(turn=0.01 * self.next_turn(), size=(32, 24)))
-            self.bystander.round_trip()  # so that no pending work of it meets the next failing call
+            self.bystander.round_trip()  # so that the next failing call does not hit its pending
+                                         # work
         except (Closed, ConnectionError, ssl.SSLError) as end:
             need(failed, f"no call failed, but the bystander's stream ended: {end!r}")
             wait_for(lambda: self.says_why(log_from), LOG_S,

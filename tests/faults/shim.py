@@ -56,14 +56,14 @@ class Shim:
         return 8 * (2 + KINDS.index(kind) * len(FIELDS) + FIELDS.index(field))
 
     def arm(self, kind, at, times=1, fault=None):
-        """Lets the calls from the at-th on fail."""
+        """Makes the at-th and all later calls fail."""
         self.disarm(kind)
         self.set(kind, "fault", FAULTS[kind] if fault is None else fault)
         self.set(kind, "times", times)
         self.set(kind, "at", at)
 
     def arm_sites(self, kind, times=1):
-        """Lets the next call from each new call site fail."""
+        """Makes the next call from each new call site fail."""
         self.disarm(kind)
         self.set(kind, "fault", FAULTS[kind])
         self.set(kind, "times", times)

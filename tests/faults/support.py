@@ -39,7 +39,7 @@ Door = collections.namedtuple("Door", "host port tls token", defaults=(None, Non
 
 
 def door_of(port):
-    """The Door for what the functions below call a port: a Door, or a port number on 127.0.0.1."""
+    """The Door of a `port` argument, which is a Door or a port number on 127.0.0.1."""
     return port if isinstance(port, Door) else Door("127.0.0.1", port)
 
 

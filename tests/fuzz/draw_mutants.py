@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Mutates small datasets whose values are all known, and compares the reports and pictures of two
-daemons with that truth.
+daemons with them.
 
     tests/fuzz/draw_mutants.py --count 340                # the short form, in ctest
     tests/fuzz/draw_mutants.py --count 10000 --reasons 20
@@ -12,11 +12,11 @@ the mutation changes the dataset (model.py): values, attributes, axes, times, pa
 model_grib.py), so most files open, and their contents are known without reading them.
 
 Two daemons open every file, with one render thread and with three. The following are compared with
-the truth: the range and the count of masked samples of each field, over all steps and at the last
-one, the values at some samples, the coordinates of the axes and the dates. Both rendering methods
-render the last step; each picture must be finite, within [0, 1], premultiplied, and empty if all
-samples are masked. Both daemons must give the same bytes. CPU time per file and peak memory are
-bounded.
+the known values: the range and the count of masked samples of each field, over all steps and at the
+last one, the values at some samples, the coordinates of the axes and the dates. Both rendering
+methods render the last step; each picture must be finite, within [0, 1], premultiplied, and empty
+if all samples are masked. Both daemons must give the same bytes. CPU time per file and peak memory
+are bounded.
 
 Needs python3-netcdf4. The files depend on --seed only. Exit code 0: no assertion failed, and at
 least half of the files of each format were opened and rendered by both methods.

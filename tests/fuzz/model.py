@@ -1,5 +1,5 @@
 """A small dataset whose values are all known, and the meaning of its stored numbers by the
-conventions of the format. Nothing here reads a file: the truth comes from the written values."""
+conventions of the format. The expected values are those written; no file is read."""
 
 import warnings
 

@@ -96,8 +96,8 @@ class Run:
         except (Failure, KeyError, TypeError, IndexError, AttributeError) as fault:
             outcome, text = "failed", repr(fault) if not isinstance(fault, Failure) else str(fault)
         taken = time.monotonic() - begin
-        died = outcome == "refused" and re.search(r"the loader of .* (was ended|ended with|said)",
-                                                  text)
+        died = outcome == "refused" and re.search(
+            r"the loader of .* (was terminated|ended with|said)", text)
         self.note(name, seed, outcome, "died" if died else "", text, taken)
         if self.options.keep and (died or outcome == "failed" or self.options.only is not None):
             shutil.copytree(folder, pathlib.Path(self.options.keep) / name, symlinks=True,

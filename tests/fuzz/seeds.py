@@ -231,7 +231,7 @@ def grib_seeds(folder):
             if data:
                 yield Seed(f"grib {edition}", packing, {"g.grib": data})
         for path in sorted(samples.glob(f"*_grib{edition}.tmpl")):
-            # Some may be refused, for their grid for example; one of each kind, not every
+            # Some may be refused, for example because of their grid; one of each kind, not every
             # resolution.
             if path.stat().st_size < 8000 and not re.search(r"_\d+_grib|rotated_gg", path.name):
                 yield Seed(f"grib {edition}", path.name, {"g.grib": path.read_bytes()},

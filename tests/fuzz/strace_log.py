@@ -1,7 +1,7 @@
 """Checks a log of strace: the files opened and sockets created by the daemon and its loaders.
 
 A process is the daemon until it becomes a loader (execve of "... load"), and a loader is confined
-from its seccomp call on. Calls that the filter traps show the call's number as their result and a
+after its seccomp call. Calls that the filter traps show the call's number as their result and a
 SIGSYS behind them: they were not executed."""
 
 import collections

@@ -106,7 +106,8 @@ class Process {
   std::string read_until(char stop) { return read_stdout(&stop); }
   std::string read_all() { return read_stdout(nullptr); }
 
-  // The exit code; 128 + n if ended by signal n. Kills a program that runs for more than a minute.
+  // The exit code; 128 + n if terminated by signal n. Kills a program that runs for more than a
+  // minute.
   int wait() {
     if (pid_ <= 0) {
       ADD_FAILURE() << "the program is not running";

@@ -100,12 +100,12 @@ class StreamClient {
   std::optional<Message> next(int timeout_ms = patience_ms);
   // The next text message of that type; others are skipped.
   std::optional<std::string> next_text(const std::string& type, int timeout_ms = patience_ms);
-  // The next frame; texts are skipped and kept in `texts`.
+  // The next frame; text messages are skipped and kept in `texts`.
   std::optional<std::string> next_frame(int timeout_ms = patience_ms);
   // The code of the next close, skipping earlier messages; 0 if there is none.
   int close_code(int timeout_ms = patience_ms);
 
-  std::vector<std::string> texts;  // all texts so far
+  std::vector<std::string> texts;  // all text messages so far
   Socket socket;
 
  private:

@@ -177,7 +177,7 @@ class Check:
 
 
 def order_of(ours, theirs):
-    """For each coordinate of the program the index of the file's one, longitudes modulo 360."""
+    """For each coordinate of the program the index in the file; longitudes are modulo 360."""
     distance = np.abs(np.asarray(theirs)[None, :] - np.asarray(ours)[:, None])
     return np.argmin(np.minimum(distance, np.abs(distance - 360)), axis=1)
 

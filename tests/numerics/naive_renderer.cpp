@@ -315,8 +315,8 @@ class Renderer {
     Real tau = 0;
     Real closest = centre_[2];  // the view depth at which the ray is nearest to the sample
     if (medium.drawn) {
-      // From the eye in perspective, from the point of the pixel in the plane of the eye in
-      // orthographic projection.
+      // Origin of the ray: the eye in perspective projection, otherwise the pixel's point in the
+      // eye's plane.
       Vec<Real> o{};
       for (int a = 0; a < 3; ++a) {
         Real from = from_eye_[a];

@@ -152,7 +152,7 @@ TEST_F(Reuse, EverySceneChangeTakesEffectAtOnce) {
   });
 }
 
-// Preparations of another kind of scene must not persist.
+// Data prepared for a different kind of scene must not persist.
 TEST_F(Reuse, EverySceneKindTakesEffectAtOnce) {
   expect_to_show({
       {"nothing",

@@ -56,7 +56,7 @@ def is_allowed(home, included):
 
 
 def resolved(path, included, known):
-    """The included project file, named from the root folder, or by a test from its own folder."""
+    """The included project file: a path relative to the root folder, or in tests to the file."""
     if included in known:
         return included
     beside = f"{path.rpartition('/')[0]}/{included}"

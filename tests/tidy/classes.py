@@ -11,7 +11,8 @@ NO_MEMBER = re.compile(r"(using|friend|typedef|static_assert|enum|class|struct|u
 
 
 def declarations(text):
-    """Those of the class body that `text` begins with, without what is in their braces."""
+    """The declarations of the class body at the start of `text`, without the contents of their
+    braces."""
     braces = parentheses = 0
     declared = ""
     for at, char in enumerate(text):

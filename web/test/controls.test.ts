@@ -1,4 +1,4 @@
-// The options that the panel offers for a dataset, the controls that apply to a view, and the texts
+// The options that the panel offers for a dataset, the controls that apply to a view, and the text
 // of legend and HUD.
 import assert from "node:assert/strict";
 import { test } from "node:test";

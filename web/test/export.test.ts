@@ -1,4 +1,4 @@
-// Export: texts in PNG, ZIP files, sizes and views of pictures and animations, repeated requests.
+// Export: text in PNG, ZIP files, sizes and views of pictures and animations, repeated requests.
 // The formats are checked against their specifications and by python's own readers.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";

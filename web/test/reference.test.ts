@@ -1,4 +1,4 @@
-// The sequence of a reference: requests and reported texts for simulated answers.
+// The sequence of a reference: requests and reported text for simulated answers.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { errorMetric } from "../src/base/error_text";

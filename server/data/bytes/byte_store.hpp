@@ -23,7 +23,7 @@ class ByteStore {
   [[nodiscard]] virtual Result<void> check_unchanged() const = 0;
 };
 
-// The bytes of a file from an offset on.
+// The bytes of a file starting at an offset.
 std::shared_ptr<ByteStore> file_store(std::shared_ptr<const InputFile> file, std::uint64_t skip);
 
 // Part of a joined store: a file or, if the file is absent, bytes 0xff (NaN as float).

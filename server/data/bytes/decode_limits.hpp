@@ -41,7 +41,7 @@ constexpr std::uint64_t range_memory_max(std::uint64_t stored_bytes) {
   return (std::uint64_t{128} << 20) + 32 * stored_bytes;
 }
 
-// Private memory of a loader that has files of so many bytes open.
+// Private memory of a loader that has files of `stored_bytes` bytes open.
 constexpr std::uint64_t opening_memory_bytes(std::uint64_t stored_bytes) {
   return (std::uint64_t{144} << 20) + 32 * stored_bytes;
 }

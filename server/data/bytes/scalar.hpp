@@ -23,8 +23,8 @@ void decode(Scalar type, bool big_endian, const unsigned char* from, std::size_t
 void decode(Scalar type, bool big_endian, const unsigned char* from, std::size_t stride,
             std::size_t count, double* out);
 
-// Coordinates as given by a header: evenly spaced, or listed. Evenly spaced ones take no memory
-// until the size of the data has been checked.
+// Coordinates as given by a header: evenly spaced, or listed. Evenly spaced coordinates take no
+// memory until the size of the data has been checked.
 struct Spaced {
   std::size_t count = 0;
   double first = 0;

@@ -23,7 +23,7 @@ constexpr std::size_t window_max = std::size_t{1} << 16;
 constexpr std::size_t places_max = 64;
 constexpr std::uint64_t first_spacing = std::uint64_t{4} << 20;
 
-// The encoded bytes from an offset on, partly buffered. A copy has its own buffer.
+// The encoded bytes starting at an offset, partly buffered. A copy has its own buffer.
 class Input {
  public:
   Input(std::shared_ptr<const InputFile> file, std::uint64_t at)
@@ -237,7 +237,8 @@ class UnrolledStore final : public ByteStore {
   Result<void> read(std::uint64_t offset, unsigned char* out, std::size_t count) override {
     WINDSPLAT_CHECK(offset <= bytes_ && count <= bytes_ - offset);
     offset += drop_;
-    // Text is decoded to whole numbers: align both ends to them.
+    // Text is decoded one complete number at a time: align both ends to multiples of a number's
+    // size.
     const std::uint64_t ahead = offset % sizeof(double);
     go_back_to(offset - ahead);
     std::vector<unsigned char> scratch(window_max);

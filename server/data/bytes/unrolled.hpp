@@ -18,12 +18,12 @@ enum class Encoding {
          // byte order
 };
 
-// Whether a declared size is impossible for so few encoded bytes. encoded: bytes of the file from
-// the start of the data on; claim: declared decoded bytes.
+// Whether the encoded bytes can decode to the declared size. encoded: bytes of the file from the
+// start of the data to its end; claim: declared decoded bytes.
 bool can_hold(Encoding encoding, std::uint64_t encoded, std::uint64_t claim);
 
-// The encoded data of a file from `skip` on, of which `bytes` decoded bytes are used after the
-// first `drop` ones.
+// The encoded data of a file, starting at `skip`; the first `drop` decoded bytes are skipped and
+// the next `bytes` are used.
 std::shared_ptr<ByteStore> unrolled_store(std::shared_ptr<const InputFile> file, Encoding encoding,
                                           std::uint64_t skip, std::uint64_t bytes,
                                           std::uint64_t drop = 0);

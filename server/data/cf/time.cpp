@@ -470,7 +470,7 @@ std::optional<std::vector<double>> convert_times(const std::vector<double>& valu
   const auto source = parse_scale(from.units, from.calendar, ignored);
   const auto target = parse_scale(to.units, to.calendar, ignored);
   if (!source || !target || target->unit_months > 0) return std::nullopt;
-  // Both calendars agree from the first Gregorian day on.
+  // Both calendars agree from the first Gregorian day onwards.
   const auto gregorian = [](const Scale& scale) {
     return scale.calendar == Calendar::proleptic_gregorian || scale.calendar == Calendar::standard;
   };

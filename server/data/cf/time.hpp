@@ -35,12 +35,12 @@ Date date_of(std::int64_t day_number, Calendar calendar);
 
 struct DecodedTime {
   std::vector<TimeStep> steps;
-  std::string reason;  // why the texts are plain numbers; empty if they are dates
+  std::string reason;  // why times are given as plain numbers; empty if they are dates
 };
 
-// values: one per step, in `units` ("hours since 2001-01-01 00:00"). Texts are rounded to the
+// values: one per step, in `units` ("hours since 2001-01-01 00:00"). Times are rounded to the
 // millisecond. Months and years are calendar months and years; fractions are relative to the length
-// of their month. If unit, epoch or calendar is not supported, the texts are numbers.
+// of their month. If unit, epoch or calendar is not supported, the strings are plain numbers.
 DecodedTime decode_time(const std::vector<double>& values, std::string_view units,
                         std::string_view calendar);
 

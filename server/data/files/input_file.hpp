@@ -29,7 +29,7 @@ class InputFile {
 
   // Name, size and modification time, so independent of the folder of the file.
   [[nodiscard]] std::string identity() const;
-  // Errors: bad_data if size or time of change differ from those on opening.
+  // Errors: bad_data if size or time of change differs from that at opening.
   [[nodiscard]] Result<void> check_unchanged() const;
   // A path through which a library can open this open file.
   [[nodiscard]] std::string library_path() const;

@@ -105,7 +105,7 @@ Result<void> fill(FileSource& source, std::size_t field, std::size_t step, const
   const std::size_t components = info.fields[field].components.size();
   const std::size_t samples = info.grid.samples();
   if (samples * components > memory.floats()) {
-    return make_error(ErrorKind::internal, "the memory of a volume has another size");
+    return make_error(ErrorKind::internal, "the memory of a volume has the wrong size");
   }
   std::fill_n(memory.data(), samples * components, 0.0F);  // overwrites numbers of the previous
                                                            // volume
@@ -210,7 +210,7 @@ bool end_with_daemon() {
 int run() {
   std::signal(SIGIO, SIG_DFL);
   if (!end_with_daemon()) {
-    std::fputs("windsplat: 'load' is internal: windsplat runs it by itself\n", stderr);
+    std::fputs("windsplat: 'load' is internal and cannot be run directly\n", stderr);
     return 2;
   }
   static_cast<void>(::setpriority(PRIO_PROCESS, 0, niceness));

@@ -32,8 +32,8 @@ struct Limits {
   std::chrono::milliseconds open_time{60'000};
   std::chrono::milliseconds read_time{60'000};  // additional time:
   std::uint64_t read_bytes_per_second = 10'000'000;
-  // A loader that sends no message and uses no processor time for so long has stalled, for example
-  // on a disk that does not respond.
+  // A loader that sends no message and uses no processor time for this long has stalled, for
+  // example on a disk that does not respond.
   std::chrono::milliseconds stall_time{15'000};
   // Budget for its private memory and that of the transfer; null: not counted.
   std::shared_ptr<Budget> budget = nullptr;

@@ -33,8 +33,8 @@ Error decode_error(std::string_view bytes);
 
 std::string encode_info(const DatasetInfo& info);
 // Errors: bad_data for malformed info, or for info that no reader returns: axes that are not finite
-// and strictly monotonic, fields without components, no steps, or more than the limits of cf. Texts
-// are made printable.
+// and strictly monotonic, fields without components, no steps, or more than the limits of cf.
+// Strings are made printable.
 Result<DatasetInfo> decode_info(std::string_view bytes);
 
 std::string encode_names(const std::vector<std::string>& names);

@@ -116,7 +116,7 @@ int spawn(const std::string& program, int null, int socket, int life, pid_t& id)
 }
 
 std::string how_it_ended(int status) {
-  if (WIFSIGNALED(status)) return "was ended by signal " + std::to_string(WTERMSIG(status));
+  if (WIFSIGNALED(status)) return "was terminated by signal " + std::to_string(WTERMSIG(status));
   return "ended with code " + std::to_string(WEXITSTATUS(status));
 }
 

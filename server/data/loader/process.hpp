@@ -31,7 +31,7 @@ class Process {
   // Kills the process, from any thread; end() must still be called. No effect if there is none.
   void kill();
   // Waits briefly for a process that is about to exit, kills it otherwise; closes its resources.
-  // Returns the cause: "was ended by signal 11", "ended with code 1"; empty if there was none.
+  // Returns the cause: "was terminated by signal 11", "ended with code 1"; empty if there was none.
   std::string end(std::chrono::milliseconds patience = std::chrono::milliseconds(0));
   // Processor time used, and private memory; 0 if there is no process.
   [[nodiscard]] std::chrono::nanoseconds cpu_time() const;

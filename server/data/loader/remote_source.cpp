@@ -18,7 +18,7 @@ struct RemoteSource::State {
 
   const Limits limits;
   DatasetInfo info;
-  std::string digest;  // of the info as received
+  std::string digest;  // digest of the info as received
   RunningLoader loader;
   std::optional<Transfer> transfer;  // as mapped by the loader
   // Memory of a transfer that is reused; otherwise it belongs to the volume that is being read.

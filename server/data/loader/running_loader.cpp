@@ -148,8 +148,8 @@ Deadline RunningLoader::next_deadline(const Patience& patience) const {
   return std::min(patience.end, Clock::now() + limits_.stall_time);
 }
 
-// Waits for the next message. Processor time counts as progress, since a reader may compute for
-// long. Errors: out_of_memory, since readers allocate while they read.
+// Waits for the next message. Processor time counts as progress, since a reader may compute for a
+// long time. Errors: out_of_memory, since readers allocate while they read.
 Result<Fate> RunningLoader::wait(Patience& patience) {
   constexpr std::chrono::milliseconds look_every{50};
   constexpr std::chrono::seconds pause_min{1};
@@ -220,7 +220,7 @@ Fate RunningLoader::answer(const Message& question, Kind during, const Deadline&
 Error RunningLoader::crowded_out(const Error& error, const Call& what) {
   release();
   return make_error(error.kind,
-                    loader_text() + " was ended while " + what.doing + ": " + error.message);
+                    loader_text() + " was terminated while " + what.doing + ": " + error.message);
 }
 
 // Returns why no answer was received. The loader has ended afterwards.
@@ -229,11 +229,11 @@ Error RunningLoader::ended(Fate fate, const Call& what, const Patience& patience
   std::string how = process_.end(fate == Fate::closed ? time_to_end : std::chrono::milliseconds(0));
   release();
   if (fate == Fate::late && Clock::now() < patience.end) {
-    how = "made no progress for " + seconds_text(limits_.stall_time) + " and was ended";
+    how = "made no progress for " + seconds_text(limits_.stall_time) + " and was terminated";
   } else if (fate == Fate::late) {
-    how = "was ended after " + seconds_text(what.time);
+    how = "was terminated after " + seconds_text(what.time);
   } else if (fate != Fate::closed) {
-    how = "violated the protocol and was ended";
+    how = "violated the protocol and was terminated";
   }
   return make_error(ErrorKind::bad_data, loader_text() + ' ' + how + " while " + what.doing);
 }

@@ -41,7 +41,7 @@ class RunningLoader {
 
   [[nodiscard]] bool is_released() const { return files_ == nullptr; }
   [[nodiscard]] Process& process() { return process_; }
-  // Of the files read to open the dataset.
+  // Total size of the files read to open the dataset.
   [[nodiscard]] std::uint64_t opened_bytes() const { return opened_bytes_; }
   [[nodiscard]] const std::vector<Companion>& companions() const { return companions_; }
 

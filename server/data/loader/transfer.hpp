@@ -38,7 +38,7 @@ class Transfer {
   // by the loader before it answers, freed while the volume is copied, and closed.
   static constexpr std::size_t kept_bytes_max = std::size_t{32} << 20;
 
-  // Allocates memory for so many floats, sealed against resizing. Errors: out_of_memory.
+  // Allocates memory for `floats` floats, sealed against resizing. Errors: out_of_memory.
   static Result<Transfer> make(std::size_t floats, bool kept);
 
   [[nodiscard]] int descriptor() const { return memory_.number(); }

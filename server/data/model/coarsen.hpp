@@ -17,7 +17,7 @@ struct Coarsening {
   std::array<std::vector<double>, 3> widths;
 };
 
-// Number of samples along an axis after so many halvings.
+// Number of samples along an axis after `halvings` halvings.
 int halved(int samples, int halvings);
 
 // Mean of the unmasked samples of each group, weighted by the volumes of their cells, per

@@ -9,7 +9,7 @@
 
 namespace windsplat::data {
 
-// 64-bit FNV-1a as 16 hexadecimal digits: not cryptographic; different texts are unlikely to have
+// 64-bit FNV-1a as 16 hexadecimal digits: not cryptographic; different strings are unlikely to have
 // equal digests.
 inline std::string digest_of(std::string_view text) {
   std::uint64_t hash = 0xcbf29ce484222325U;

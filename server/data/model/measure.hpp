@@ -14,7 +14,7 @@
 
 namespace windsplat::data {
 
-// The value of a field is that of a scalar, or the magnitude of a vector.
+// The value of a field is its scalar, or the magnitude of its vector.
 
 struct HistogramRequest {
   int bins = 64;  // at least 1

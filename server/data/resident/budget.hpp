@@ -44,7 +44,7 @@ struct BudgetCounts {
   std::uint64_t hits = 0;       // found resident
   std::uint64_t misses = 0;     // had to be loaded or computed
   std::uint64_t evictions = 0;  // volumes evicted to make room
-  std::uint64_t refusals = 0;   // loads that failed for lack of room
+  std::uint64_t refusals = 0;   // loads that failed for lack of memory
   std::uint64_t reads = 0;      // volumes read from a source, and how many of them were prefetched
   std::uint64_t reads_failed = 0;
 };
@@ -52,7 +52,7 @@ struct BudgetCounts {
 // The name of the limit in messages.
 struct LimitName {
   std::string text = "the memory limit";
-  // The limit that would leave so many bytes for data, as it is configured; nullopt: not
+  // The limit, as the operator would configure it, that leaves `bytes` for data; null: not
   // configurable.
   std::function<std::string(std::uint64_t bytes)> raised = nullptr;
 };
@@ -105,7 +105,8 @@ class Budget {
 
   // Longer than the slowest frames, which reference volumes during rendering.
   static constexpr std::chrono::seconds patience{20};
-  // Loaders of other datasets and large pictures end either within moments or not soon.
+  // Loaders of other datasets and large pictures usually end within moments; waiting longer rarely
+  // helps.
   static constexpr std::chrono::seconds reservation_patience{12};
 
  private:
@@ -196,7 +197,7 @@ class Reservation {
   Reservation(const Reservation&) = delete;
   Reservation& operator=(const Reservation&) = delete;
 
-  // Reserves so many bytes by the rules of Budget::get(): in_turn waits for volumes that others
+  // Reserves `bytes` by the rules of Budget::get(): in_turn waits for volumes that others
   // reference, and others get only room beside a waiting load in turn. Errors: out_of_memory,
   // cancelled.
   Result<void> take(std::uint64_t bytes, Urgency urgency, const OwnPins& own,

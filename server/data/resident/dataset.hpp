@@ -57,9 +57,9 @@ class Dataset {
   // A handle for prefetching: it gives precedence to demanded loads and does not evict volumes with
   // prefetch requests.
   [[nodiscard]] Dataset prefetching() const;
-  // Reserves so many bytes of working memory in addition to the volumes while the result lives. A
-  // handle in_turn() waits for room; meanwhile others get only the room that it does not need.
-  // Errors: out_of_memory, cancelled.
+  // Reserves `bytes` of working memory in addition to the volumes while the result exists. A handle
+  // in_turn() waits for room; meanwhile others get only the room that it does not need. Errors:
+  // out_of_memory, cancelled.
   [[nodiscard]] Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) const;
   // The keys under which level() stores its result and the original volume; empty: no such field or
   // step.
@@ -85,7 +85,7 @@ class Dataset {
   // see loading().
   void end();
 
-  // Frees the read caches of the source if nothing was read for so long.
+  // Frees the read caches of the source if nothing was read for `idle_s`.
   void release_idle(double idle_s);
 
   // Range and masked count of a field at a step that was loaded before; nullopt: never loaded.

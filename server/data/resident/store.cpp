@@ -84,7 +84,7 @@ struct Store::State {
                                  [&](const FailedEntry& one) { return one.listed.id == id; });
     return at == failed.end() ? nullptr : &*at;
   }
-  // `key`: that of a failed dataset that is replaced, whose id becomes free; empty: none.
+  // `key`: key of a failed dataset to be replaced, whose id becomes free; empty: none.
   [[nodiscard]] std::string unique_id(const std::string& wanted, const std::string& key) {
     std::string id = wanted;
     const auto is_taken = [&] {

@@ -93,7 +93,7 @@ class Store {
   std::vector<std::string> look_for_changes(double rest_s = 1);
   // Ends all present and future datasets; returns when no read is running. Resident volumes stay.
   void end();
-  // Frees read caches of sources that were idle for so long.
+  // Frees the read caches of sources that were idle for `idle_s`.
   void release_idle(double idle_s = 10);
   // Why the changed files of a dataset could not be reopened; empty: no error.
   [[nodiscard]] std::string problem(const std::string& id) const;
@@ -106,8 +106,7 @@ class Store {
   // too. Empty if cancelled while waiting.
   using Turn = std::shared_ptr<const void>;
   [[nodiscard]] Turn take_turn(const Dataset& dataset, const CancelToken& cancel = {});
-  // Reserves so many bytes of working memory in the limit while the result lives. Errors:
-  // out_of_memory.
+  // Reserves `bytes` of working memory in the limit while the result exists. Errors: out_of_memory.
   Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes);
   // Number of bytes that can be reserved now.
   [[nodiscard]] std::uint64_t room() const;

@@ -34,8 +34,8 @@ KERNEL_INLINE V short_absorbed(V t) {
 }
 
 // tau = n ln2 + r, |r| <= ln2 / 2. For n = 0 there is no cancellation, so tau = 1e-30 absorbs
-// 1e-30; from tau = 17 on exactly 1 is absorbed. Most splats are thin in every pixel; the shortcut
-// for n = 0 gives identical bits.
+// 1e-30; for tau >= 17 exactly 1 is absorbed. Most splats are thin in every pixel; the shortcut for
+// n = 0 gives identical bits.
 template <class V>
 KERNEL_INLINE Attenuation<V> attenuation(V tau) {
   const V one = all<V>(1.0F);

@@ -29,7 +29,7 @@ struct Rows {
   int consecutive;  // rows are full, and their samples are consecutive in memory
 };
 
-// Broadcasts the values of one kernel position of an axis to the row of lanes from First on.
+// Broadcasts the values of one kernel position of an axis to the row of lanes starting at First.
 template <int First>
 KERNEL_INLINE void fill_row(const Pass& pass, int a, int index, Rows& rows) {
   const Axis& axis = pass.axis[a];
@@ -165,7 +165,7 @@ void place_curved_pair(const Camera& camera, const Pass& pass, int pair, const R
   }
 }
 
-// Values at the samples of a pair of consecutive rows from lane i on.
+// Values at the samples of a pair of consecutive rows, starting at lane i.
 KERNEL_INLINE Kernel fetch_consecutive(const float* values, const Rows& rows, int i) {
 #if HWY_TARGET != HWY_SCALAR
   if constexpr (kernel_lanes == pair_kernels) {
@@ -177,7 +177,7 @@ KERNEL_INLINE Kernel fetch_consecutive(const float* values, const Rows& rows, in
   return load_unaligned<Kernel>(values + rows.offset[i / brick_side] + i % brick_side);
 }
 
-// Values of a field at the kernel positions of a pair from lane i on.
+// Values of a field at the kernel positions of a pair, starting at lane i.
 KERNEL_INLINE Kernel fetch(const float* values, const Rows& rows, int i) {
   if (rows.consecutive != 0) return fetch_consecutive(values, rows, i);
   alignas(64) float lanes[pair_kernels];
@@ -359,7 +359,8 @@ inline bool partly_closed(const Tile& tile, const Brick& brick) {
   return (open & blocks.columns) != blocks.columns;
 }
 
-// The i-th position of the rows from row j on, one lane per row; lanes beyond the last repeat it.
+// The i-th position of the rows starting at row j, one lane per row; lanes beyond the last repeat
+// it.
 KERNEL_INLINE Kernel across_rows(const float* positions, int i, int j, int v_count) {
   alignas(64) float lanes[kernel_lanes];
   for (int k = 0; k < kernel_lanes; ++k) {

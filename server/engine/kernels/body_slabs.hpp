@@ -255,7 +255,7 @@ inline void sort_met(const MetLine* met, int count, MetLine* sorted) {
   }
 }
 
-// Whether all lines from `from` on lie behind a depth, so that they can be skipped if the
+// Whether all lines starting at `from` lie behind a depth, so that they can be skipped if the
 // transmittance there is low enough.
 inline bool rest_is_behind(const Closing& with, int from, float depth) {
   for (int h = from; h < with.count; ++h) {

@@ -13,7 +13,7 @@ using scene::ColorTable;
 using scene::ScalarLayer;
 using scene::Scene;
 
-// As in the engine: opaque over any distance, with finite sums.
+// The same bound as in the engine: opaque over any distance, with finite sums.
 constexpr double extinction_max = 1e30;
 
 double extinction(const ScalarLayer& layer, double value) {

@@ -149,7 +149,8 @@ class Painter {
  public:
   Painter(const Frame& frame, const Profile& profile) : frame_(frame), medium_(profile) {}
 
-  // Storage for a pixel that so many kernels may cover; sorting surfaces needs a second copy.
+  // Storage for a pixel that `splats` and `ribbons` may cover; sorting surfaces needs a second
+  // copy.
   static std::uint64_t bytes_for(std::uint64_t splats, std::uint64_t ribbons) {
     return SplatMedium::bytes_for(splats) + 2 * ribbons * sizeof(Surface);
   }

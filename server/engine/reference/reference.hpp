@@ -69,7 +69,7 @@ class Painting {
 };
 
 // K(r), r in cells: the 3-D kernel whose integral along a line at distance r from its centre is the
-// footprint g(r) of the splat (inverse Abel transform of g). K >= 0, and 0 from r = 1.37 on.
+// footprint g(r) of the splat (inverse Abel transform of g). K >= 0, and 0 for r >= 1.37.
 double kernel_3d(double r);
 
 }  // namespace windsplat::engine::reference

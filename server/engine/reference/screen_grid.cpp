@@ -1,4 +1,5 @@
-// Counts by 2-D differences, which costs the same for large boxes as for small ones, then fills.
+// Counts by 2-D differences, which costs the same for large boxes as for small ones, then fills the
+// lists.
 #include "server/engine/reference/screen_grid.hpp"
 
 #include <algorithm>

@@ -33,7 +33,7 @@ class DisplayedFrame {
   // The view cannot be drawn: wait for a change.
   void failed(std::uint64_t version);
 
-  // Frames displayed are invalid: the dataset was reopened.
+  // Call when the dataset was reopened, which invalidates the frames displayed.
   void forget() { standing_.reset(); }
   // Whether the final frame displayed is valid for the view: it is equivalent, or both scenes are
   // blank and the views differ in the camera only.

@@ -21,7 +21,7 @@ class FlowControl {
   [[nodiscard]] Micros rest(const Options& options) const;
 
   struct Sent {
-    std::size_t bytes = 0;  // including preceding texts
+    std::size_t bytes = 0;  // including preceding text messages
     Micros begun = 0;       // start of its render
     bool moving = false;
     bool final = false;  // drawn as a final frame

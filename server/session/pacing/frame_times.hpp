@@ -45,7 +45,7 @@ class FrameTimes {
     std::optional<Micros> at;
     [[nodiscard]] bool is_recent(Micros now) const;
   };
-  // Of times measured over forecast.
+  // Ratios of measured to forecast times.
   struct Measured {
     bool any = false;
     bool timed = false;  // against calibrated times

@@ -21,7 +21,7 @@ class WindowedLeast {
  private:
   Micros window_us_;
   Micros since_ = 0;
-  Micros current_ = 0;  // minimum from since_ on
+  Micros current_ = 0;  // minimum of the window begun at since_
   Micros least_ = 0;    // including the previous window
   int count_ = 0;
 };
@@ -38,7 +38,7 @@ class Link {
  public:
   struct Sent {
     std::uint32_t seq = 0;
-    std::size_t bytes = 0;  // including preceding texts
+    std::size_t bytes = 0;  // including preceding text messages
     Micros begun = 0;       // start of its render
     bool moving = false;
   };

@@ -40,7 +40,7 @@ class RenderSlot {
 
   // Assigns a ticket to the render and requests it.
   void start(Render render, const protocol::View& view, Effects& effects);
-  // Ends the render. nullopt: the ticket is not that of a render in progress.
+  // Ends the render. nullopt: the ticket does not belong to a render in progress.
   std::optional<Render> take(std::uint64_t ticket);
 
   // Cancels the render, unless it is a still.

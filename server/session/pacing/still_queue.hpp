@@ -24,8 +24,8 @@ class StillQueue {
   static constexpr std::size_t waiting_max = 2;
 
   [[nodiscard]] bool empty() const { return waiting_.empty(); }
-  // Sets the size of the picture: that of the message or else of the view, times the scale of the
-  // message. Errors: too many stills wait, or it is too large.
+  // Sets the size of the picture: the size in the message, otherwise that of the view, times the
+  // scale in the message. Errors: too many stills wait, or it is too large.
   Result<void> add(Still still);
   Still take();
 

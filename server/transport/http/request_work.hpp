@@ -16,7 +16,7 @@ class RequestWork {
  public:
   RequestWork(HttpOwner& owner, HttpWire& wire);
 
-  // Ends in HttpOwner::on_reply(), or in on_end() if the client has left.
+  // Ends in HttpOwner::on_reply(), or in on_end() if the client has disconnected.
   void start(const api::Router& router, CurrentRequest& current);
   // The reply has arrived, or is awaited no longer. False: none is awaited.
   bool finish();

@@ -23,7 +23,7 @@ class ResponseWriter {
 
   // Ends in HttpOwner::on_written(). Decides whether the connection is kept alive.
   void send(http::Response response);
-  // The client has left before the response: counts and logs the request.
+  // Call when the client disconnects before the response: counts and logs the request.
   void send_nothing();
   [[nodiscard]] bool is_sending() const { return sending_; }
 

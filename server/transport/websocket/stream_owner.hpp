@@ -23,7 +23,7 @@ class StreamOwner : public std::enable_shared_from_this<StreamOwner> {
   [[nodiscard]] bool is_open() const { return open_; }
   [[nodiscard]] bool has_ended() const { return ended_; }
 
-  // Closes within a time limit; queued texts are dropped.
+  // Closes within a time limit; queued text messages are dropped.
   virtual void close(int code, const std::string& reason) = 0;
   virtual void abort() = 0;  // end immediately
   virtual void on_disconnected() = 0;

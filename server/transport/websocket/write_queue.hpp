@@ -1,5 +1,5 @@
-// What a session has to send: texts in order, which precede frames, and at most one frame. The
-// metrics count its bytes.
+// What a session has to send: text messages in order, which precede frames, and at most one frame.
+// The metrics count its bytes.
 #pragma once
 
 #include <array>

@@ -33,7 +33,7 @@ void expect_info(const DatasetInfo& info) {
     expect(!field.name.empty() && field.components.size() <= 3 && !field.components.empty(),
            "a field has a name and one to three components");
   }
-  // Texts are printable after the first round.
+  // Strings are printable after the first round.
   const std::string once = loader::encode_info(info);
   const auto again = loader::decode_info(once);
   expect(again.has_value(), "accepted info is accepted again");

@@ -1,7 +1,7 @@
 // Complete calls to a compromised loader. The input is its turns, separated by lines "#!turn": each
 // is the reply to one received message. A turn starts with the kind of message, followed by the
-// payload; from 0x80 on the rest is sent unframed. Memory to fill receives the bytes of the turn
-// repeatedly.
+// payload; for 0x80 and above the rest is sent unframed. Memory to fill receives the bytes of the
+// turn repeatedly.
 #include <unistd.h>
 
 #include <chrono>

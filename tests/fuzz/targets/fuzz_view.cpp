@@ -59,7 +59,7 @@ void expect_within_limits(const windsplat::protocol::View& view) {
          "a kernel is within the limits");
 }
 
-// Everything but the number of pixels is that of the view.
+// Everything but the number of pixels is taken from the view.
 void draw(windsplat::protocol::View view) {
   Surroundings& all = surroundings();
   constexpr int edge_max = 24;

@@ -50,7 +50,7 @@ void expect_close(std::string_view payload) {
   expect(payload.size() >= 2, "a close frame has a code");
   const int code =
       (static_cast<unsigned char>(payload[0]) << 8) | static_cast<unsigned char>(payload[1]);
-  // RFC 6455 does not define codes from 5000 on; the server returns them unchanged.
+  // RFC 6455 does not define codes of 5000 and above; the server returns them unchanged.
   const bool sendable =
       (code >= 1000 && code <= 1003) || (code >= 1007 && code <= 1013) || code >= 3000;
   expect(sendable, "a close frame has a code that may be sent", std::to_string(code));

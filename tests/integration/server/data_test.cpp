@@ -334,7 +334,7 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
 }
 
 TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
-  Gate gate;  // before the parts, whose threads use it until they end
+  Gate gate;  // declared before the parts: their threads use it until they end
   std::promise<std::string> told;
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(1));

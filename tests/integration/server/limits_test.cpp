@@ -377,8 +377,8 @@ TEST(Limits, PicturesWaitingForASlowDiskAreBounded) {
 }
 
 // The renderer is free soon after the client of an expensive picture disconnects, even if a byte of
-// another request precedes the close, and for a stream. The requirement is 100 ms; machines that
-// run many tests at once get thirty times that.
+// another request precedes the close; likewise for a stream. The requirement is 100 ms; machines
+// that run many tests at once get thirty times that.
 TEST(Cancel, DisconnectCancelsTheRendering) {
   TestServer server;
   const std::string view = R"({"dataset":"small","image":{"width":4096,"height":4096},)"

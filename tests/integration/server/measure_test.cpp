@@ -45,7 +45,7 @@ class Measures : public testing::Test {
   std::shared_ptr<const windsplat::data::Volume> volume(const std::string& name, int step) {
     return dataset_->volume(name, static_cast<std::size_t>(step)).value();
   }
-  // A query for a position slightly off that of the sample.
+  // A query for a position slightly off the sample.
   std::string near(int i, int j, int k) {
     std::string query = "?";
     const std::array<int, 3> index{i, j, k};
@@ -114,7 +114,7 @@ TEST_F(Measures, HistogramCountsEverySampleOnce) {
   }
 }
 
-// A fraction of 0.1 excludes as many whole values at either end as a tenth of all contains.
+// A clip of 0.1 excludes a tenth of the values, rounded down, at either end.
 TEST_F(Measures, HistogramClipOmitsBothEnds) {
   const std::string name = field(windsplat::data::FieldKind::scalar).name;
   const auto there = volume(name, 2);

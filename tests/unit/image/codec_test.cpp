@@ -165,8 +165,8 @@ TEST(Png, StopsWhenCancelled) {
   EXPECT_EQ(stopped.error().kind, ErrorKind::cancelled);
 }
 
-// NPY 1.0: "\x93NUMPY", 1, 0, u16 header length, a Python dict ending with a line feed, values from
-// a multiple of 64 on.
+// NPY 1.0: "\x93NUMPY", 1, 0, u16 header length, a Python dict ending with a line feed, values
+// starting at a multiple of 64.
 TEST(Npy, HeaderAndValuesFollowTheFormat) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 67}, {67, 1}, {1280, 720}}) {
     std::vector<float> rgba(4 * static_cast<std::size_t>(width * height));

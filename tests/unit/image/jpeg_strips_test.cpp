@@ -176,7 +176,7 @@ TEST(JpegStrips, AnyThreadCountGivesTheSameBytes) {
   }
 }
 
-// The frame loop keeps its memory: neither the output nor the planes are reallocated.
+// The frame loop reuses its memory: neither the output nor the planes are reallocated.
 TEST(JpegStrips, StorageIsReused) {
   ThreadPool pool(2);
   JpegEncoder encoder;

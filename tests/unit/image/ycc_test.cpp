@@ -247,7 +247,7 @@ TEST(Ycc, InstructionSetsAgree) {
   for (const Bytes& samples : fused) EXPECT_EQ(samples, fused.front());
 }
 
-// A second picture with another size and background contains nothing of the first.
+// A second picture with a different size and background contains nothing of the first.
 TEST(Ycc, ReusedStorageStartsAsBackground) {
   YccPicture picture;
   picture.reset(64, 64, Subsampling::s420, {1, 1, 1});

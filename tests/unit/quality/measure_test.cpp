@@ -165,7 +165,7 @@ TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
   }
 }
 
-// Two estimates of the same error: a calibration run uses another reference than a frame.
+// Two estimates of the same error: a calibration run and a frame use different references.
 TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
   auto found = calibrated();
   const auto error_of = [&](const quality::Setting& setting) {
@@ -192,7 +192,7 @@ TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   EXPECT_NEAR(error_of(4) / error_of(1), 1, 0.1);
 }
 
-// The reported detail is that by which scenes are built.
+// Scenes are built with the reported detail.
 TEST_F(Measure, ViewUsesAveragesWhereItsDetailIsBelowOne) {
   const scene::CompletedView first = completed();
   int averaged = 0;

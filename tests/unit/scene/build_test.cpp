@@ -39,7 +39,7 @@ TEST(BuildScene, LoadsOnlyWhatIsShown) {
   Scene scene = built(view, *dataset);
   EXPECT_TRUE(scene.vector);
   EXPECT_EQ(scene.scalars.size(), 1U);
-  // Ranges are those of step 0, the picture is that of step 2; the temperature is not used.
+  // Ranges are taken from step 0, the picture shows step 2; the temperature is not used.
   EXPECT_EQ(*reads, (Reads{{"wind@0", 1}, {"wind@2", 1}, {"cloud@0", 1}, {"cloud@2", 1}}));
 
   reads = std::make_shared<Reads>();

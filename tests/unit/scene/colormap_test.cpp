@@ -79,7 +79,7 @@ TEST(ColorMap, EqualValueDifferencesAreEqualColorDifferences) {
       steps.push_back(std::hypot(after[0] - before[0], after[1] - before[1], after[2] - before[2]));
     }
     const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
-    // Published maps are uniform in another colour space (CAM02-UCS).
+    // Published maps are uniform in a different colour space (CAM02-UCS).
     const bool published =
         std::set<std::string>{"viridis", "magma", "inferno", "plasma", "cividis"}.count(map.name) !=
         0;

@@ -21,7 +21,7 @@ constexpr double no_limit = std::numeric_limits<double>::infinity();
 constexpr Micros frame_us = 33'000;
 const quality::Viewpoint viewpoint{1, {0, 1, 0}, 1280, 720};
 
-// Pixels decide the time, the prior decides the error.
+// Pixels determine the time, the prior determines the error.
 Forecasts calibrated(double full_ms) {
   Forecasts out = quality::Table(quality::Kind{}).forecasts(viewpoint);
   for (std::size_t i = 0; i < out.size(); ++i) {

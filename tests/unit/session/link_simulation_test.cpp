@@ -1,8 +1,9 @@
 // Pacing on simulated links: age of frames on arrival, frame rate, queueing.
 //  The age of a frame is its arrival less t of the newest patch it shows, on the client's clock.
 //  Link time is the transmission time of that patch and of the frame: 2 delay, plus the bytes of
-//  the frame and its texts over the rate. A render interval is the median time between the starts
-//  of consecutive renders of moving frames. Then p99(age - link time) <= 2 render intervals.
+//  the frame and its text messages divided by the rate. A render interval is the median time
+//  between the starts of consecutive renders of moving frames. Then
+//  p99(age - link time) <= 2 render intervals.
 #include <gtest/gtest.h>
 
 #include "simulation.hpp"

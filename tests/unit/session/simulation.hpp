@@ -94,14 +94,14 @@ struct Shown {
   bool final = false;
   int quality = 0;
   double pixels = 0;
-  double wire_bytes = 0;  // with its texts; t of the newest patch at the start
+  double wire_bytes = 0;  // with its text messages; t of the newest patch at the start
   Micros t = 0;           // t of the newest patch when the render was started
   Micros arrived = 0;
   Micros shown = 0;  // decoded
 };
 
-// A client, its link, and the server's edge: texts before frames, one message at a time, of which
-// the kernel buffers at most `unsent` bytes.
+// A client, its link, and the server's edge: text messages before frames, one message at a time, of
+// which the kernel buffers at most `unsent` bytes.
 class Viewer {
  public:
   Viewer(Clock& clock, Renderer& renderer, LinkOptions options)
@@ -123,7 +123,7 @@ class Viewer {
     clock_.at(clock_.now() + options_.delay,
               [this, message] { take(session_.on_message(message, clock_.now())); });
   }
-  // A message answered by an error at once; returns the time of arrival of the error.
+  // A message answered with an error at once; returns the time of arrival of the error.
   void ask(std::function<void(Micros)> answered) {
     clock_.at(clock_.now() + options_.delay, [this, answered = std::move(answered)] {
       answers_.push_back(answered);

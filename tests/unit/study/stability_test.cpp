@@ -63,7 +63,7 @@ TEST(Stability, ChordOfCorrectedDeviatesByAtMostAnEighthOfTheSquare) {
 }
 
 // The transmittance of n layers is (1 - tau)^n: above tau = 1 the first layer leaves [0, 1], below
-// 2 later layers correct that, from 2 on they do not.
+// 2 later layers correct that, for 2 and above they do not.
 TEST(Stability, EulerLeavesTheUnitIntervalAboveOneAndDivergesFromTwo) {
   for (const Stiffness& s : sweep_of(Compositing::cd_euler)) {
     EXPECT_EQ(s.bounded, s.tau <= 1) << s.tau;

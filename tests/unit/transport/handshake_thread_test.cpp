@@ -17,7 +17,7 @@
 namespace windsplat::transport {
 namespace {
 
-// Steps are queued behind a blocked one, so that the thread alone decides the order.
+// Steps are queued behind a blocked one, so that the thread alone determines the order.
 class Held {
  public:
   Held() {

@@ -240,7 +240,7 @@ TEST_F(SavedViewsOnDisk, CountAgainstTheLimitsAfterARestart) {
   EXPECT_FALSE(set_step(*views, id, 10));
 }
 
-// A lower limit than before: views above it stay on the disk.
+// A lower limit than before: views above it remain on disk.
 TEST_F(SavedViewsOnDisk, NoneIsRemovedToMeetALimit) {
   {
     const auto views = open().value();

@@ -1,5 +1,5 @@
-// Allocation failures in executors: no partial state remains, and no thread of theirs ends.
-// Allocations of a thread fail from a given one on.
+// Allocation failures in executors: no partial state remains, and none of their threads ends.
+// Allocations of a thread fail, beginning with the n-th.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -153,7 +153,7 @@ TEST(NoMemory, FailedAttemptIsReportedWithoutAllocating) {
   EXPECT_EQ(third, ErrorKind::out_of_memory) << "no memory for the message";
 }
 
-// The thread cannot allocate from the first job on.
+// The thread cannot allocate, beginning with the first job.
 TEST(NoMemory, ThreadsOfServicesContinue) {
   TaskExecutor loads({"loads", 1, 4});
   std::promise<void> loaded;

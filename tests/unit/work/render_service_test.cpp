@@ -185,8 +185,8 @@ TEST(RenderService, BoundsTheWaitForOthers) {
   EXPECT_EQ(charged["a"], 40'000 + 90'000);
 }
 
-// When many are refused, new requests arrive soon: one is admitted when the running job is nearly
-// done.
+// Under overload a refused request is soon followed by another, so a request is admitted when the
+// running job is nearly done.
 TEST(RenderService, UnderOverloadNoJobWaitsForAWholePicture) {
   std::atomic<std::int64_t> now_us{0};
   RenderService::Options options;

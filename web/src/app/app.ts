@@ -346,7 +346,7 @@ export class App {
     }
     if (anew) {
       this.parts.panels.build();
-      // The panel is usable without help texts, so a failure is not reported.
+      // The panel is usable without its help, so a failure is not reported.
       loadHelpTexts(this.baseUri).catch(() => undefined);
     }
     this.refresh();

@@ -25,7 +25,7 @@ export class Playback {
     return this.way !== 0;
   }
 
-  // May be called during playback: the settings then change from the present step on.
+  // May be called during playback: the settings then change, starting at the present step.
   play(direction: Direction): void {
     const { steps, fps, loop, drop } = this.host.settings();
     const last = steps - 1;

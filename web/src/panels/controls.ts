@@ -114,7 +114,7 @@ export function sliceText(dataset: Dataset, view: View): string {
   return `${layer}: ${axis.name} ${formatNumber(value)} ${unitText(axis.units)}`.trim() + ".";
 }
 
-// Colours the lines by another quantity: the old range has another unit and is removed, and a
+// Colours the lines by a different quantity: the old range has the wrong unit and is removed, and a
 // scalar field is named.
 export function colorByPatch(dataset: Dataset, view: View, by: string): Patch {
   const color: Patch = { by, range: null };

@@ -92,7 +92,7 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
       {
         pointer: "/vector/color/field",
         get: (view) => view.vector?.color?.field,
-        // Another field has another unit, so its default range is used.
+        // The units of the new field may differ, so its default range is used.
         set: (name) => ({ vector: { color: { field: name, range: null } } }),
       },
       scalars,

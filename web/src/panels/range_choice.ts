@@ -10,7 +10,7 @@ export interface RangeSource {
   defaultRange(): Range | null; // null: not known
   choose(range: Range | null): void; // null: the default
   quietly(run: () => void): void; // runs a change that adds no undo entry
-  of(): string | null; // identifies the field and dataset; an answer for another one is discarded
+  of(): string | null; // identifies the field and dataset; an answer for any other is discarded
   read(step: number | null): Promise<Range | null>; // range of that step; null: of all steps
   step(): number | null; // the displayed step; null: during playback
   modes: Map<string, RangeMode>; // modes by key, preserved when the panel is rebuilt

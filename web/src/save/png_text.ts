@@ -1,5 +1,6 @@
-// Texts inside PNG pictures: (bytes of a PNG, texts) -> bytes with one iTXt chunk per text, and
-// back. Pure. Source: PNG specification (ISO/IEC 15948), chunks 5.3, iTXt 11.3.4.5, CRC annex D.
+// Text in PNG files: (bytes of a PNG, keywords and strings) -> bytes with one iTXt chunk for each,
+// and back. Pure. Source: PNG specification (ISO/IEC 15948), chunks 5.3, iTXt 11.3.4.5, CRC annex
+// D.
 
 export type Bytes = Uint8Array<ArrayBuffer>;
 
@@ -48,7 +49,7 @@ function check(png: Uint8Array): void {
   }
 }
 
-// Keywords have 1 to 79 Latin-1 characters; texts are stored in UTF-8, uncompressed.
+// Keywords have 1 to 79 Latin-1 characters; values are stored in UTF-8, uncompressed.
 export function withTexts(png: Uint8Array, texts: Record<string, string>): Bytes {
   check(png);
   const chunks = Object.entries(texts).map(([keyword, text]) =>

@@ -94,8 +94,8 @@ export class ViewState {
   change(patch: Patch): Outgoing {
     this.lastRev += 1;
     this.pending.push({ rev: this.lastRev, patch });
-    // If answers are missing for long (hidden page, lost connection), the oldest patches count as
-    // accepted.
+    // If answers are missing for a long time (hidden page, lost connection), the oldest patches
+    // count as accepted.
     while (this.pending.length > pendingMax) this.settle(this.pending[0]!.rev);
     this.recompute();
     return { rev: this.lastRev, patch };

@@ -93,7 +93,7 @@ export class Api {
     return this.get<Histogram>(path, (a) => isRange(a.range) && Array.isArray(a.counts));
   }
 
-  // The range of one step, or with null of all steps, which may take long.
+  // The range of one step, or with null of all steps, which may take a long time.
   async range(id: string, field: string, step: number | null): Promise<FieldRange> {
     const path = `${this.field(id, field)}/range?${step === null ? "of=all" : `step=${step}`}`;
     return this.get<FieldRange>(path, (a) => a.range === null || isRange(a.range));
@@ -104,7 +104,7 @@ export class Api {
     return this.get<Probe>(path, (a) => isObject(a.position) && isObject(a.values), { signal });
   }
 
-  // Reads every step, so it may take long.
+  // Reads every step, so it may take a long time.
   async series(id: string, field: string, at: Vec3): Promise<Series> {
     const path = `${this.field(id, field)}/series?${place(at)}`;
     return this.get<Series>(path, (a) => areTimes(a.times) && Array.isArray(a.values));

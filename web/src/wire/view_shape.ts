@@ -1,6 +1,6 @@
 // Checks whether a value from a link, a file or the storage has the shape of a view: arrays,
-// objects, texts and finite numbers where the page expects them. Permitted values and unknown keys
-// are checked by the server.
+// objects, strings and finite numbers where the page expects them. Permitted values and unknown
+// keys are checked by the server.
 import { viewKeys } from "../../generated/view_keys";
 import { viewRanges } from "../../generated/view_ranges";
 import type { View } from "./protocol";

@@ -410,7 +410,7 @@ Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& r
     }
   }
   // Dimensions of length 1 get the remaining roles, the last ones first, because time follows the
-  // reference time of a forecast. Further ones need no role.
+  // reference time of a forecast. Any further dimensions need no role.
   for (auto d = variable.dims.rbegin(); d != variable.dims.rend(); ++d) {
     const Role role = roles.at(static_cast<std::size_t>(*d)).role;
     if (length_of(*d) == 1 && role != Role::unknown && role != Role::other) {

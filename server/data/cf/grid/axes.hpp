@@ -48,8 +48,8 @@ struct Layout {
 };
 
 // Dimensions of unknown role are assigned to free axes, the last one to x, then y, then z; an
-// unlimited first one is time. Other dimensions must have length 1. Of two candidates for one axis,
-// one of length 1 is ignored.
+// unlimited first one is time. Other dimensions must have length 1. If two dimensions are
+// candidates for one axis, one of length 1 is ignored.
 Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& roles,
                const FileVariable& variable);
 

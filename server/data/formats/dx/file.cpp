@@ -84,8 +84,8 @@ class Opener {
     sequence->name = free_name(name.empty() || bytes::to_integer(name) ? own_name(found) : name);
     if (!sequences_.empty() && (!(sequences_.front().grid == sequence->grid) ||
                                 sequences_.front().positions != sequence->positions)) {
-      return leave_out(sequence->name,
-                       input_->fault("shows one grid and series; this is another one"));
+      return leave_out(sequence->name, input_->fault("shows one grid and series; this field has "
+                                                     "a different one"));
     }
     sequences_.push_back(std::move(*sequence));
   }

@@ -93,7 +93,7 @@ class Builder {
     if (!whole) return fault("counts, origin and deltas are inconsistent");
     for (std::size_t d = 0; d < rank; ++d) {
       const auto& delta = object.deltas[d];
-      // Cells are fewer than positions: by half in each of three dimensions at most.
+      // There are fewer cells than positions: at least half as many along each of three dimensions.
       left_ /= std::max<std::uint64_t>(1, object.counts[d]);
       if (left_ == 0 && object.counts[d] <= axis_max) return fault("more than there are values");
       if (object.counts[d] < 1 || object.counts[d] > axis_max) {

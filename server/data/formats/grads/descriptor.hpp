@@ -33,7 +33,7 @@ struct Descriptor {
   bool sequential = false;
   bool is_template = false;
   bool pascals = false;
-  std::uint64_t file_header = 0;  // bytes before a file, a time and a grid; bytes after
+  std::uint64_t file_header = 0;  // bytes of the headers and trailers of a file,
   std::uint64_t time_header = 0;  // a time and a grid
   std::uint64_t time_trailer = 0;
   std::uint64_t grid_header = 0;

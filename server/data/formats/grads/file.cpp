@@ -55,7 +55,7 @@ class Opener {
            ctl_.grid_trailer + (ctl_.sequential ? 2 * marker : 0);
   }
 
-  // Computes the bytes of a time; all products below are smaller than that of a whole file.
+  // Computes the bytes of a time; all products below are smaller than the size of a whole file.
   Result<void> measure() {
     // With Fortran records, the header of a time is a separate record.
     if (ctl_.sequential && ctl_.time_header > 0) ctl_.time_header += 2 * marker;

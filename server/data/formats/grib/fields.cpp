@@ -132,7 +132,7 @@ void find_coordinates(const Message& message, Grid& grid) {
     grid.latitude = grid.type == "regular_ll" ? even_latitudes(message, grid.rows)
                                               : gaussian_latitudes(message, grid.rows);
   } else if (odd) {
-    grid.problem = "its projected grid is scanned in another order than row by row";
+    grid.problem = "its projected grid is not scanned row by row";
     return;
   } else {
     grid.projected = true;

@@ -154,7 +154,7 @@ Result<void> File::look_before_opening() {
     return magic == hdf4 ? fault("is HDF4, which is not supported; convert it by h4toh5")
                          : fault(
                                "is not a netCDF file, nor of another supported format: its first "
-                               "bytes are no known signature");
+                               "bytes match no known signature");
   }
   Window window(*input_);
   const auto expected =

@@ -143,7 +143,7 @@ class StorageScan {
     auto& scan = *static_cast<StorageScan*>(self);
     try {
       return scan.visit_link(group, name, *about) ? 0 : -1;
-    } catch (const std::exception&) {  // must not pass the library's frames, which are C
+    } catch (const std::exception&) {  // must not unwind the library's C frames
       scan.out_of_memory_ = true;
       return -1;
     }

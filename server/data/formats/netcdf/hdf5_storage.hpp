@@ -47,7 +47,7 @@ struct DatasetStorage {
 };
 
 // The datasets of an HDF5 file by path ("/group/name"), without decoding. Errors: bad_data for
-// files on which the netCDF library would fail without a reason or not terminate: external and
+// files on which the netCDF library would fail without a reason or loop forever: external and
 // dangling links, cyclic groups, more objects than the file can contain. Requires the LibraryLock.
 Result<std::map<std::string, DatasetStorage>> scan_storage(const InputFile& input);
 

@@ -312,7 +312,8 @@ void File::look_at_storage(const Place& place, FileVariable& variable) {
       nc_inq_grpname_full(place.group, nullptr, path.data());
     }
     if (path == "/") path.clear();
-    // A variable with the name of a dimension that is not its coordinate has another name in HDF5.
+    // A variable with the name of a dimension that is not its coordinate has a different name in
+    // HDF5.
     const std::string other = path + "/_nc4_non_coord_" + variable.name;
     path += '/' + variable.name;
     if (storage_.count(other) > 0) path = other;

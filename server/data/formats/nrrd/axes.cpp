@@ -232,7 +232,7 @@ class Placer {
     }
     if (dimension > 4 || (!header_.origin.empty() && header_.origin.size() != dimension)) {
       return bad("has space directions of " + std::to_string(dimension) +
-                 " dimensions, which is more than 4 or not that of its origin");
+                 " dimensions, which exceeds 4 or differs from its origin");
     }
     return fill_directed(axes, dimension);
   }

@@ -65,7 +65,7 @@ void bilinear(double r, double s, double scale, Basis& out) {
   }
 }
 
-// The first `count` corners are a face at t = 0, the next ones the same at t = 1.
+// The first `count` corners are a face at t = 0, the next `count` the opposite face at t = 1.
 void extrude(Basis& out, std::size_t count, double t) {
   for (std::size_t i = 0; i < count; ++i) {
     const double value = out.value[i];

@@ -297,7 +297,8 @@ class Resampler {
     return out;
   }
 
-  // Tests `count` samples from `index` on along the first axis that have no cell yet.
+  // Tests those of the `count` samples along the first axis, starting at `index`, that have no cell
+  // yet.
   void scan_row(std::uint64_t cell, Shape shape, const Corners& corners, const SlantedBox& slanted,
                 std::array<std::size_t, 3> index, std::size_t count) {
     const auto [from, to] = slanted.along_row(place_of(index), spacing_[0], count);

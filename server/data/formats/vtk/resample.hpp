@@ -24,8 +24,8 @@ struct Resampling {
   std::uint64_t shown = 0;       // cells examined
   std::uint64_t broken = 0;      // cells without volume, or with hidden or non-finite points
   std::uint64_t other_rank = 0;  // surface cells in a mesh with volumes
-  // Number of cells along each world axis: that of the index for a structured grid aligned with the
-  // axes, otherwise by the mean extent of cells.
+  // Number of cells along each world axis: the number along an index for a structured grid aligned
+  // with the axes, otherwise estimated from the mean extent of cells.
   std::array<double, 3> layers{0, 0, 0};
 };
 inline constexpr std::uint32_t no_cell = 0xffffffffU;

@@ -105,7 +105,7 @@ Result<void> check_geometry(const std::shared_ptr<const InputFile>& file, const 
     const StoredArray& array = piece.coordinates[a];
     const std::uint64_t wanted = by_axis ? static_cast<std::uint64_t>(counts.at(a)) : piece.points;
     if (array.tuples != wanted || array.components != (by_axis ? 1 : 3)) {
-      return file->fault("has coordinates of another size than its grid");
+      return file->fault("has coordinates whose size differs from its grid");
     }
     if (auto reader = ArrayReader::open(file, array); !reader) return reader.error();
   }

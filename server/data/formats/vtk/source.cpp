@@ -303,8 +303,9 @@ class VtkSource final : public FileSource {
                    static_cast<std::size_t>(array->components) == field.components.size();
           });
       if (!common) {
-        info_.left_out.push_back({field.name, "is missing, or has another type, in a piece of " +
-                                                  in_quotes(file_->name())});
+        info_.left_out.push_back(
+            {field.name,
+             "is missing, or has a different type, in a piece of " + in_quotes(file_->name())});
       }
       return !common;
     });

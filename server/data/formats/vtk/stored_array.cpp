@@ -182,7 +182,7 @@ class ArrayReader::Stream {
       return fault("has a table of blocks that exceeds the file or the limit of 256 MiB per block");
     }
     if ((count - (last != 0 ? 1 : 0)) * size + last != wanted) {
-      return fault("has blocks of another size than its values");
+      return fault("has blocks whose total size differs from its values");
     }
     std::uint64_t packed = (3 + count) * width;
     for (std::uint64_t b = 0; b < count; ++b) {

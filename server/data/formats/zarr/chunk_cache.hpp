@@ -20,7 +20,7 @@ class ChunkCache {
   void forget(int variable);
   // Null if absent; valid until the next call.
   const ChunkBytes* find(std::uint64_t number);
-  // Until so many more bytes fit, or nothing is left.
+  // Evicts chunks until `bytes` more fit, or none is left.
   void evict_for(std::size_t bytes, std::size_t bytes_max);
   const ChunkBytes* add(std::uint64_t number, ChunkBytes bytes);
 

@@ -31,7 +31,7 @@ struct Array {
 
 struct StoreContents {
   std::string name;
-  // By the metadata and all chunks, or 4096 evenly distributed ones if there are more.
+  // Derived from the metadata and all chunks, or 4096 evenly distributed ones if there are more.
   std::string identity;
   std::vector<Array> arrays;  // parallel to the variables
   FileContents file;
@@ -40,7 +40,7 @@ struct StoreContents {
 // Errors: bad_data, also for version 3.
 Result<StoreContents> scan_store(Files& files);
 
-// An attribute, trimmed; empty if absent or no text.
+// An attribute, trimmed; empty if absent or not a string.
 std::string text_in(const Json& attributes, std::string_view key);
 
 }  // namespace windsplat::data::zarr

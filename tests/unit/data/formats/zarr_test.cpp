@@ -242,7 +242,7 @@ TEST(Zarr, MissingChunkIsTheFillValueAndNeverZeroByChance) {
   // fill value.
   expect_same(without_second("<i2", "0", named), {7, kMasked, kMasked, kMasked});
   expect_same(without_second("<i2", "0", "{}"), {7, 0, 0, 0});
-  // Default fill values of netCDF do not apply here: -32767 is that of a short.
+  // Default fill values of netCDF do not apply here: -32767 is the default of a short.
   const Store store;
   store.put("f/.zarray", array_json("[1,2]", "[1,2]", "<i2"));
   store.put("f/0.0", bytes_of_items<std::int16_t>({-32767, 1}));

@@ -160,18 +160,18 @@ TEST_F(FaultyLoader, ExitIsAnError) {
 TEST_F(FaultyLoader, EndlessLoopIsTerminated) {
   limits_.open_time = milliseconds(300);
   start_program("#!/bin/sh\nwhile :; do :; done\n");
-  expect_not_opened("the loader of 'some.nc' was ended after 0.3 s while opening it");
+  expect_not_opened("the loader of 'some.nc' was terminated after 0.3 s while opening it");
 }
 
 TEST_F(FaultyLoader, SingleByteMessagesAreRead) {
   limits_.open_time = milliseconds(700);
   respond_with("while True: s.send(b'\\x01\\0\\0\\0'[:1]); time.sleep(0.06)\n");
-  expect_not_opened("the loader of 'some.nc' was ended after 0.7 s while opening it");
+  expect_not_opened("the loader of 'some.nc' was terminated after 0.7 s while opening it");
 }
 
 TEST_F(FaultyLoader, MalformedMessagesAreRefused) {
   const std::string message =
-      "the loader of 'some.nc' violated the protocol and was ended while opening it";
+      "the loader of 'some.nc' violated the protocol and was terminated while opening it";
   respond_with("s.sendall(b'x' * 1000)\nreceive()\n");
   expect_not_opened(message);
   respond_with("s.sendall(struct.pack('<IIQ', K['opened'], 0, 1 << 60))\nreceive()\n");
@@ -188,10 +188,10 @@ TEST_F(FaultyLoader, MalformedMessagesAreRefused) {
 TEST_F(FaultyLoader, TooManyMessagesAreRefused) {
   respond_with("send_info()\nsend('progress', b'x' * 100000)\nreceive()\n");
   expect_not_read(
-      "the loader of 'some.nc' violated the protocol and was ended while reading 'wind'");
+      "the loader of 'some.nc' violated the protocol and was terminated while reading 'wind'");
 }
 
-// Memory written by a loader and not reused is freed with it.
+// Memory written by a loader and not reused is freed when the loader exits.
 TEST_F(FaultyLoader, FailingToFillMuchMemoryIsTerminated) {
   describe_much();
   respond_with("fd = send_info()\nos.pwrite(fd, b'x' * 1000, 0)\nfail('no')\nreceive()\n");
@@ -220,7 +220,8 @@ TEST_F(FaultyLoader, KeepingMuchMemoryMappedIsTerminated) {
 TEST_F(FaultyLoader, EndlessRequestsAreRefused) {
   limits_.opens_max = 100;
   respond_with("while True: ask('ask_exists', b'some.nc')\n");
-  expect_not_opened("the loader of 'some.nc' violated the protocol and was ended while opening it");
+  expect_not_opened(
+      "the loader of 'some.nc' violated the protocol and was terminated while opening it");
 }
 
 TEST_F(FaultyLoader, RequestsForOtherFilesAreRefused) {

@@ -44,8 +44,8 @@ TEST_F(Loader, ExceedingTheBudgetWhileOpeningIsAnError) {
   limits.budget = std::make_shared<Budget>((std::uint64_t{8} << 20) + (std::uint64_t{64} << 10));
   for (int n = 0; n < 3; ++n) {
     const auto source = open_path(path, limits);
-    // The loader may have opened the file between two measurements: then it has ended, and its
-    // result is valid.
+    // The loader may have opened the file between two measurements: the loader has then exited, and
+    // its result is valid.
     if (source) {
       EXPECT_EQ((*source)->process(), -1);
       EXPECT_GT((*source)->info().stored_bytes, 0U);

@@ -32,7 +32,7 @@ TEST_F(Loader, CrashIsAnErrorAndTheNextReadStartsAnother) {
   ASSERT_TRUE(first);
   const pid_t id = source->process();
   ASSERT_GT(id, 0);
-  ASSERT_EQ(::kill(id, SIGSTOP), 0);  // so that it ends while it should read
+  ASSERT_EQ(::kill(id, SIGSTOP), 0);  // so that it is killed during the read
   std::thread killer([id] {
     std::this_thread::sleep_for(milliseconds(100));
     ::kill(id, SIGKILL);
@@ -42,7 +42,7 @@ TEST_F(Loader, CrashIsAnErrorAndTheNextReadStartsAnother) {
   ASSERT_FALSE(broken);
   EXPECT_EQ(broken.error().kind, ErrorKind::bad_data);
   EXPECT_EQ(broken.error().message,
-            "the loader of 'a.nc' was ended by signal 9 while reading 'wind'");
+            "the loader of 'a.nc' was terminated by signal 9 while reading 'wind'");
   EXPECT_EQ(source->process(), -1);
   const auto again = source->read(0, 1);
   ASSERT_TRUE(again) << again.error().message;
@@ -76,7 +76,7 @@ TEST_F(Loader, TimeoutEndsIt) {
   ASSERT_FALSE(late);
   EXPECT_EQ(late.error().kind, ErrorKind::bad_data);
   EXPECT_EQ(late.error().message,
-            "the loader of 'a.nc' was ended after 0.2 s while reading 'wind'");
+            "the loader of 'a.nc' was terminated after 0.2 s while reading 'wind'");
   EXPECT_EQ(::kill(id, 0), -1);
   const auto again = source->read(0, 0);
   EXPECT_TRUE(again) << again.error().message;
@@ -100,8 +100,9 @@ TEST_F(Loader, StoppedLoaderIsEndedWhileOthersAreRead) {
     over = true;
     ASSERT_FALSE(stopped);
     EXPECT_EQ(stopped.error().kind, ErrorKind::bad_data);
-    EXPECT_EQ(stopped.error().message,
-              "the loader of 'a.nc' made no progress for 3.0 s and was ended while reading 'wind'");
+    EXPECT_EQ(
+        stopped.error().message,
+        "the loader of 'a.nc' made no progress for 3.0 s and was terminated while reading 'wind'");
   });
   EXPECT_TRUE(other->read(0, 0));
   EXPECT_FALSE(over) << "the other one is read while this one hangs";

@@ -95,7 +95,7 @@ TEST(Samples, AreReproducibleAndChangeWithTheStep) {
     auto second = sample(name, {24, 20, 16});
     EXPECT_EQ(first->info().digest, second->info().digest);
     EXPECT_NE(first->info().digest, sample(name, {24, 20, 15})->info().digest);
-    // Read in another order, to detect dependence on earlier reads.
+    // Read in a different order, to detect dependence on earlier reads.
     const Volume later = *second->read(1, 1);
     const Volume a = *first->read(0, 0);
     const Volume b = *second->read(0, 0);

@@ -67,8 +67,8 @@ TEST(NetcdfRefusals, UrlsAndLibraryDirectives) {
   expect_refused("[mode=bytes]https://127.0.0.1:9/a.nc", ErrorKind::bad_data, "URL");
   write_good(folder / "a.nc", 0);
   expect_refused((folder / "a.nc") + "#mode=zarr", ErrorKind::not_found, "no such file");
-  // The library never sees a file name: a name that resembles its directives is that of an ordinary
-  // file.
+  // File names are never passed to the library, so a name that resembles its directives is an
+  // ordinary name.
   std::filesystem::copy_file(folder / "a.nc", folder / "a.nc#mode=zarr");
   std::filesystem::create_symlink(folder / "a.nc#mode=zarr", folder / "innocent.nc");
   for (const char* name : {"a.nc#mode=zarr", "innocent.nc"}) {

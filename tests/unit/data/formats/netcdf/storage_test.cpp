@@ -231,8 +231,8 @@ TEST(Storage, ChunkLargerThanTheLibraryCacheIsReadWhole) {
   EXPECT_EQ(volume.range[1], 0);
 }
 
-// Chunks with several steps are cached for the next step, for all variables as far as they fit
-// together.
+// Chunks with several steps are cached for the next step, for all variables whose chunks fit within
+// one limit.
 TEST(Storage, MetadataOfAllVariablesShareOneLimit) {
   const Folder folder;
   const Lengths chunk{2, 4, 1024, 1024};  // 32 MiB

@@ -43,9 +43,9 @@ std::string terrain_vts(const Terrain& terrain, VtkXml& xml) {
   return xml.file("StructuredGrid", "WholeExtent=\"" + extent + "\"", inner);
 }
 
-// 460 km long and 15 km high: with the same spacing along all axes, three samples would be above
-// each other. Half as many samples as points and cells is about one sample per cell, hence as many
-// layers.
+// 460 km long and 15 km high: with the same spacing along all axes, there would be only three
+// samples vertically. Half as many samples as points and cells is about one sample per cell, hence
+// as many layers.
 TEST_F(VtkResampling, LayersOfAShallowGridStayResolved) {
   const Terrain terrain{30};
   VtkXml xml({"appended-raw", "", false, 8});
