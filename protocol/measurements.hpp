@@ -17,7 +17,7 @@
 
 namespace windsplat::protocol {
 
-// Histogram of a field at a step; for vectors of the magnitude.
+// Histogram of a field at a step; for vectors, of their magnitudes.
 struct HistogramDescription {
   std::optional<Range> range;  // absent if there are no values
   std::vector<std::int64_t> counts;

@@ -97,7 +97,7 @@ struct DatasetDescription {
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason
   std::vector<std::string> notes;  // conversions of the data, problems found
   std::vector<StepDescription> steps;
-  std::size_t step_count = 0;  // number of steps, also if `steps` is omitted
+  std::size_t step_count = 0;  // number of steps, even if `steps` is omitted
   std::string time_units;
   std::uint64_t resident_bytes = 0;
   std::uint64_t bytes_when_resident = 0;  // every field at every step

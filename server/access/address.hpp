@@ -10,9 +10,9 @@
 
 namespace windsplat::access {
 
-// Address as counted by quotas: IPv4 unchanged, also if mapped into IPv6; of IPv6 the network of 64
-// bits ("2001:db8:1:2::/64"), which one host may own entirely. Text that is not an address is
-// returned unchanged.
+// Address as counted by quotas: IPv4 unchanged, including IPv4 mapped into IPv6; of IPv6 the
+// network of 64 bits ("2001:db8:1:2::/64"), which one host may own entirely. Text that is not an
+// address is returned unchanged.
 std::string counted_address(std::string_view address);
 
 // ADDRESS or ADDRESS/BITS.

@@ -10,7 +10,7 @@
 namespace windsplat {
 
 // Writes a temporary file in the same folder and renames it, so that readers see either the old or
-// the new file, and a failure leaves the old one. Follows symbolic links, also dangling ones.
+// the new file, and a failure leaves the old one. Follows symbolic links, including dangling ones.
 // Devices, pipes and descriptors of this process (/dev/stdout) are written directly and never
 // removed.
 // Errors: internal; out_of_memory if the disk is full.

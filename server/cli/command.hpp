@@ -41,7 +41,8 @@ void add_threads_option(CLI::App& command, unsigned& threads);
 // --memory-limit BYTES, or WINDSPLAT_MEMORY_LIMIT; `bytes` holds the default and must outlive the
 // command.
 void add_memory_option(CLI::App& command, std::string& bytes);
-// Errors: malformed, also below memory_bytes_min and above memory_bytes_max (open_store.hpp).
+// Errors: malformed, including values below memory_bytes_min or above memory_bytes_max
+// (open_store.hpp).
 Result<std::uint64_t> memory_limit(const std::string& text);
 
 // Prints one line to stderr.

@@ -14,7 +14,7 @@
 namespace windsplat::engine {
 
 // The axis along which sheets of kernels are stacked: the one along which the view direction
-// crosses most cells, |forward_a| / mean spacing_a largest; the first of equals.
+// crosses most cells, |forward_a| / mean spacing_a largest; the first one on a tie.
 int major_axis(const scene::Camera& camera, const scene::Lattice& lattice);
 
 // A kernel position along one axis: it represents `stride` samples starting at `first` (the last

@@ -23,7 +23,7 @@
 // proves that a scene is empty: an empty moving frame may be too coarse, so it is withheld and the
 // final frame decides.
 //
-// Every accepted patch is answered by a frame of its rev or a later one, or by `unchanged`, also if
+// Every accepted patch is answered by a frame of its rev or a later one, or by `unchanged`, even if
 // a client repeats a rev.
 //
 // Stills. `still` draws the current view apart from the stream. Its picture is one binary frame of

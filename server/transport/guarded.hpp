@@ -25,7 +25,7 @@ void end_failed(Session& session, const char* fault) noexcept {
 }
 
 // A completion handler that keeps its session alive and ends only that session when something
-// throws, also when an operation throws internally and destroys the handler without calling it: the
+// throws, even when an operation throws internally and destroys the handler without calling it: the
 // session would otherwise wait forever.
 template <class Session, class Body>
 class Guarded {

@@ -9,7 +9,7 @@
 
 namespace windsplat::transport {
 
-// Opaque: only the network sources see OpenSSL (tls_context.hpp).
+// Opaque: only the network sources include OpenSSL (tls_context.hpp).
 struct TlsContext;
 
 inline constexpr std::size_t pem_bytes_max = std::size_t{1} << 20;

@@ -183,8 +183,8 @@ def masked(payload, mask):
 
 
 def frame(opcode, payload=b"", fin=True, rsv=0, mask=None, length=None, width=None):
-    """The bytes of a frame. `mask`: 4 bytes; None: random; b"": unmasked. `length` is the
-    declared length, `width` 7, 16 or 64 bits for it (None: the fewest)."""
+    """The bytes of a frame. `mask`: 4 bytes; None: random; b"": unmasked. `length` is the declared
+    length, encoded in `width` bits: 7, 16 or 64 (None: the fewest possible)."""
     length = len(payload) if length is None else length
     width = width or (7 if length < 126 else 16 if length < 65536 else 64)
     mask = os.urandom(4) if mask is None else mask

@@ -103,7 +103,8 @@ def deaf(daemon, count, size):
 
 @case("peers that never read", 20, 4)
 def never_read(world, count):
-    """Several at once. Each may hold two frames and 256 KiB; they are closed at the deadline."""
+    """Several such peers connect at once. Each may hold two frames and 256 KiB; they are closed at
+    the deadline."""
     daemon = world.start("--max-sessions", "64", SAMPLE)
     with Stream(daemon.port) as reader:
         frame = len(reader.final_frame(small_view(size=LARGE)))

@@ -175,8 +175,8 @@ def picture(daemon, view):
 
 
 def view_of(about, step, method, dice):
-    """A view from any direction, also from within: every line, however weak, and the last scalar
-    as a medium over its whole range."""
+    """A view from any direction, including from within: every line, however weak, and the last
+    scalar as a medium over its whole range."""
     view = {"dataset": about["id"], "step": step, "image": {"width": 64, "height": 48},
             "method": {"name": method, "detail": str(dice.choice(["auto", "full"]))},
             "camera": {"projection": str(dice.choice(["perspective", "orthographic"])),

@@ -64,7 +64,7 @@ def resolved(path, included, known):
 
 
 def brought_by(headers, known):
-    """path -> the indices of CONFINED that including it brings, directly or indirectly."""
+    """path -> the indices of the CONFINED headers that it includes, directly or indirectly."""
     brought = {path: {index for _, _, included in lines
                       for index, (_, pattern, _) in enumerate(CONFINED)
                       if re.match(pattern, included)}

@@ -59,8 +59,8 @@ class ArrayFile {
   [[nodiscard]] virtual std::size_t chunk_cost_bytes(int /*variable*/) const { return 0; }
 
   // Reads a block of a numeric variable as stored. start, count: one per dimension, slowest first.
-  // `out` holds the product of the counts, last dimension fastest. Errors: bad_data, also if a file
-  // changed since it was opened.
+  // `out` holds the product of the counts, last dimension fastest. Errors: bad_data, including a
+  // file that changed since it was opened.
   virtual Result<void> read(int variable, const std::vector<std::size_t>& start,
                             const std::vector<std::size_t>& count, double* out) const = 0;
   // The same for a variable of type float32, without conversion.

@@ -17,7 +17,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 // Runs `command` in a shell, where $W is the program; returns stdout, stderr and the exit code as
-// one text.
+// one string.
 std::string shell(const std::string& command) {
   const std::string line = "W='" WINDSPLAT_PROGRAM "'; { " + command + "; echo \"exit $?\"; } 2>&1";
   FILE* pipe = popen(line.c_str(), "r");

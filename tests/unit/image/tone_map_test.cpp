@@ -93,7 +93,7 @@ TEST(ToneMap, PremultipliedPixelsAreCompositedOverTheBackground) {
   }
 }
 
-// Pixels are processed in blocks: every size must process each pixel once, in its position.
+// Pixels are processed in blocks: every size must process each pixel once, at its position.
 TEST(ToneMap, EverySizeKeepsEveryPixelPosition) {
   for (const auto& [width, height] :
        {std::pair{1, 1}, {1, 67}, {67, 1}, {255, 1}, {256, 1}, {257, 1}, {33, 31}, {0, 5}}) {

@@ -330,7 +330,7 @@ TEST_F(SavedViewsOnDisk, FailedWriteChangesNothing) {
   EXPECT_FALSE(views->add(view_of_step(3), time_of_all));
 }
 
-// Both folders can be read but not written, also by root.
+// Both folders can be read but not written, even by root.
 class ReadOnly {
  public:
   explicit ReadOnly(const fs::path& root) : root_(root), user_(::geteuid()) {

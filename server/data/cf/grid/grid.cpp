@@ -168,7 +168,7 @@ std::string grid_text(const FileContents& contents, const std::array<int, 3>& sp
   return text + ")";
 }
 
-// The time dimension of most members; the first of equals.
+// The time dimension of most members; the first one on a tie.
 int common_time(const std::vector<Candidate>& members) {
   int best = -1;
   std::ptrdiff_t best_count = 0;

@@ -232,7 +232,7 @@ Result<Grid> read_grid(const std::vector<unsigned char>& bytes) {
   const long rows = message.whole(latitudes ? "Nj" : "Ny", -1);
   if (columns < 1 || rows < 1 || columns > points_max / rows ||
       message.whole("numberOfDataPoints", -1) != columns * rows) {
-    grid.problem = "its grid's numbers of rows, columns and points do not fit together";
+    grid.problem = "its grid's numbers of rows, columns and points are inconsistent";
     return grid;
   }
   grid.columns = static_cast<std::size_t>(columns);

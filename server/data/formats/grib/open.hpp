@@ -16,7 +16,7 @@ bool is_grib(const InputFile& input);
 // The folders of tables that ecCodes reads at run time, separated by ':'. Empty without ecCodes.
 std::string definitions_folder();
 
-// Errors: bad_data, also if windsplat was built without ecCodes.
+// Errors: bad_data, including a build without ecCodes.
 Result<std::unique_ptr<cf::ArrayFile>> open(std::shared_ptr<const InputFile> input);
 
 }  // namespace windsplat::data::grib

@@ -22,7 +22,7 @@ struct RegularGrid {
   bool operator==(const RegularGrid&) const = default;
 };
 
-// The grid of an image or a rectilinear grid. Errors: bad_data, also for an image whose axes are
+// The grid of an image or a rectilinear grid. Errors: bad_data, including an image whose axes are
 // not parallel to those of the world.
 Result<RegularGrid> regular_grid(const std::shared_ptr<const InputFile>& file,
                                  const Snapshot& snapshot);

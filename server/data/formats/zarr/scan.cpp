@@ -246,7 +246,7 @@ class StoreScan {
     if (!array.is_coordinate() && array.metadata.problem.empty() && array.is_fill_a_number()) {
       out_.file.notes.push_back(in_quotes(array.name) +
                                 " has fill_value 0 and no dimension names: zeros are shown as "
-                                "values, also in absent chunks");
+                                "values, even in absent chunks");
     }
   }
 

@@ -37,7 +37,7 @@ struct StoreContents {
   FileContents file;
 };
 
-// Errors: bad_data, also for version 3.
+// Errors: bad_data, including version 3.
 Result<StoreContents> scan_store(Files& files);
 
 // An attribute, trimmed; empty if absent or not a string.

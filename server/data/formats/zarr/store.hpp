@@ -23,7 +23,7 @@ bool is_store(Files& files);
 // https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html
 class Store final : public cf::ArrayFile {
  public:
-  // Errors: bad_data, also for version 3.
+  // Errors: bad_data, including version 3.
   static Result<std::unique_ptr<Store>> open(std::shared_ptr<Files> files);
 
   [[nodiscard]] const FileContents& contents() const override { return contents_.file; }

@@ -134,7 +134,7 @@ TEST(Histogram, LogarithmicBinsOfAGeometricSeriesAreEven) {
   EXPECT_THAT(own.counts, ElementsAre(5, 5, 6));
 }
 
-// A bin contains the values between its edges, also where bin arithmetic would round otherwise.
+// A bin contains the values between its edges, even where bin arithmetic would round otherwise.
 TEST(Histogram, CountsMatchTheReturnedEdges) {
   std::vector<float> values;
   for (int i = 0; i <= 3000; ++i) values.push_back(static_cast<float>(i) / 1000.0F + 0.1F);

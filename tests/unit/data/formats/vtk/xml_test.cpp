@@ -63,7 +63,7 @@ TEST(VtkXmlFile, ValuesAreTheSameInEveryEncoding) {
   }
 }
 
-// Some writers pad the base64 of the header separately, also without a compressor.
+// Some writers pad the base64 of the header separately, even without a compressor.
 TEST(VtkXmlFile, SeparatelyEncodedHeaderIsRead) {
   const VtkFolder folder;
   const std::string bytes = packed("Float32", even_ramp(samples), false);
