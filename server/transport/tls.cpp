@@ -83,7 +83,7 @@ Result<std::shared_ptr<TlsContext>> make_tls(const std::string& chain, const std
   if (fault) return pem_error("is not a PEM certificate", fault);
   // Also checks that the key matches the certificate.
   tls->context.use_private_key(asio::buffer(key), asio::ssl::context::pem, fault);
-  if (fault) return pem_error("does not match the certificate", fault);
+  if (fault) return pem_error("is not the private key of the certificate", fault);
   return tls;
 }
 

@@ -177,9 +177,9 @@ TEST(Jobs, CancelledSlowJobLeavesTheQueueWithoutRunning) {
     return Result<protocol::JobResult>("x");
   };
   const auto at_once = [](const Jobs::Handle&) { return Result<protocol::JobResult>("x"); };
-  Jobs::Terms slow;
-  slow.slow = true;
-  const auto first = jobs.submit("reference", pass, slow)->id;
+  // A token of its own for each job.
+  const auto slow = [] { return Jobs::Terms{CancelToken(), true}; };
+  const auto first = jobs.submit("reference", pass, slow())->id;
   gate.wait_for_inside(1);
   const auto second = jobs.submit(
                               "reference",
@@ -192,7 +192,7 @@ TEST(Jobs, CancelledSlowJobLeavesTheQueueWithoutRunning) {
   EXPECT_TRUE(jobs.cancel(second));
   EXPECT_EQ(finished(jobs, submitted(jobs, at_once)).state, "done");
   EXPECT_EQ(jobs.find(first)->state, "running");
-  const auto third = jobs.submit("reference", at_once, slow)->id;
+  const auto third = jobs.submit("reference", at_once, slow())->id;
   EXPECT_EQ(finished(jobs, submitted(jobs, at_once)).state, "done");
   EXPECT_EQ(jobs.find(third)->state, "queued") << "slow jobs run one at a time";
   gate.open();
