@@ -187,7 +187,7 @@ TEST(Jobs, CancelledSlowJobLeavesTheQueueWithoutRunning) {
                                 cancelled_ran = true;
                                 return Result<protocol::JobResult>("x");
                               },
-                              slow)
+                              slow())
                           ->id;
   EXPECT_TRUE(jobs.cancel(second));
   EXPECT_EQ(finished(jobs, submitted(jobs, at_once)).state, "done");
