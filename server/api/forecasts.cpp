@@ -23,8 +23,9 @@ Result<protocol::View> read_view(work::Backend& backend, const std::string& body
     return make_error_at(ErrorKind::invalid, "/dataset", "must name a dataset");
   }
   if (view.method.name == protocol::MethodName::reference) {
-    return make_error_at(ErrorKind::invalid, "/method/name",
-                         "reference has a single setting; forecasts apply to kernel and slab");
+    return make_error_at(
+        ErrorKind::invalid, "/method/name",
+        "the method reference has a single setting; forecasts apply to kernel and slab");
   }
   if (const auto drawable = backend.check(view); !drawable) return drawable.error();
   return view;

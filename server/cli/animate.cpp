@@ -187,7 +187,7 @@ Result<Plan> plan_of(const AnimateArguments& arguments, const data::DatasetInfo&
   }
   if (plan.steps.last >= step_count) {
     return make_error(ErrorKind::invalid,
-                      "--steps: the last step is " + std::to_string(step_count - 1));
+                      "--steps: the dataset's last step is " + std::to_string(step_count - 1));
   }
   plan.per_step = arguments.per_step;
   const bool moves = view.vector.motion == protocol::MotionMode::phase && draws_lines(view, info);

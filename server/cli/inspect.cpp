@@ -71,7 +71,7 @@ Choice choose_ranges(const data::DatasetInfo& info, std::uint64_t bytes_when_res
     const bool by_size = cost.decoded > decoded_max;
     return {scene::RangesOf::none,
             "ranges are not read: a step " +
-                (by_size ? "decodes " + size_text(cost.decoded) + beyond + size_text(decoded_max)
+                (by_size ? "decodes to " + size_text(cost.decoded) + beyond + size_text(decoded_max)
                          : "takes " + size_text(cost.memory) + " of memory" + beyond +
                                size_text(memory_max)) +
                 files + "; --ranges first or all reads them"};
@@ -81,8 +81,8 @@ Choice choose_ranges(const data::DatasetInfo& info, std::uint64_t bytes_when_res
   if (info.steps.size() == 1) return {scene::RangesOf::first_step, ""};
   return {
       scene::RangesOf::first_step,
-      "ranges are over the first step: all " + std::to_string(info.steps.size()) +
-          (by_size ? " decode " + size_text(cost.decoded * steps) + beyond +
+      "ranges cover the first step only: all " + std::to_string(info.steps.size()) +
+          (by_size ? " decode to " + size_text(cost.decoded * steps) + beyond +
                          size_text(decoded_max) + files
                    : " have " + size_text(static_cast<double>(bytes_when_resident)) + " of values" +
                          beyond + size_text(static_cast<double>(whole_series_bytes_max))) +

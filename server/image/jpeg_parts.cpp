@@ -37,9 +37,9 @@ bool is_marker(std::span<const std::uint8_t> jpeg, std::size_t at, std::uint8_t 
 }
 
 Result<Layout> layout_of(std::span<const std::uint8_t> jpeg) {
-  if (!is_marker(jpeg, 0, start_of_image)) return broken("does not begin");
+  if (!is_marker(jpeg, 0, start_of_image)) return broken("has no start marker");
   if (jpeg.size() < 4 || !is_marker(jpeg, jpeg.size() - 2, end_of_image)) {
-    return broken("does not end");
+    return broken("has no end marker");
   }
   Layout layout;
   for (std::size_t at = 2; at + 4 <= jpeg.size();) {
@@ -104,7 +104,7 @@ Result<void> stitch(std::span<const std::span<const std::uint8_t>> strips,
     if (!layout) return layout.error();
     if (s == 0) first = *layout;
     if (!same_header(strips[0], first, strip, *layout)) {
-      return broken("has a header that differs from the first");
+      return broken("has a header that differs from that of the first");
     }
     if (s == 0) {
       append(bytes, strip.first(layout->scan));

@@ -19,7 +19,7 @@ void give_again(const CLI::App& given, CLI::App& command);
 // wrong type or out of range.
 Result<void> apply_config(CLI::App& command, const std::string& path);
 
-// Names, without dashes, of options with different values.
+// Names, without leading dashes, of options with different values.
 std::vector<std::string> changed_options(const CLI::App& before, const CLI::App& after);
 
 }  // namespace windsplat::cli

@@ -108,7 +108,7 @@ void add_serve_options(CLI::App& command, ServeArguments& arguments) {
       ->type_name("DATASET");
   command
       .add_option("--config", arguments.config,
-                  "JSON file with these options, without dashes. The command line and the "
+                  "JSON file of these options, without leading dashes. The command line and the "
                   "environment take precedence. Read again on SIGHUP")
       ->envname("WINDSPLAT_CONFIG")
       ->type_name("FILE");

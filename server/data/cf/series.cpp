@@ -177,7 +177,8 @@ Result<void> SeriesFile::check_values(const ArrayFile& file) const {
     }
     if (!file.contents().variables[at(other)].numeric ||
         dimension_names(contents, static_cast<int>(v)) != dimension_names(file.contents(), other)) {
-      return misfit(file, *first_, in_quotes(variable.name) + " is a variable of another kind");
+      return misfit(file, *first_,
+                    in_quotes(variable.name) + " is not numeric or has other dimensions");
     }
     auto own = unpacked_values(*first_, static_cast<int>(v));
     auto others = unpacked_values(file, other);

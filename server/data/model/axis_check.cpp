@@ -27,9 +27,9 @@ std::string axis_fault(const std::vector<double>& at) {
   for (std::size_t i = 1; i < at.size(); ++i) {
     const double step = rises ? at[i] - at[i - 1] : at[i - 1] - at[i];
     if (!(step > 0)) return "is not strictly monotonic";
-    if (step < least) return "has steps below 1e-290 or below 1e-18 of its extent";
+    if (step < least) return "has coordinates closer than 1e-290 or 1e-18 of its extent";
     if (step < rounding * std::max(std::abs(at[i]), std::abs(at[i - 1]))) {
-      return "has steps below the rounding error of its coordinates";
+      return "has coordinates closer than their rounding error";
     }
   }
   return {};

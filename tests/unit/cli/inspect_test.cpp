@@ -71,7 +71,7 @@ TEST(Inspect, ExplainsWhyRangesCoverTheFirstStepOnly) {
   EXPECT_EQ(one["fields"][0]["rangeOf"], "step");
   EXPECT_EQ(one["fields"][0]["range"], (json{0, 4095}));
   EXPECT_TRUE(has_note(one,
-                       "ranges are over the first step: all 8 decode 128.0 MiB, beyond the "
+                       "ranges cover the first step only: all 8 decode to 128.0 MiB, beyond the "
                        "limit of"));
   const json all = described(path, "all");
   EXPECT_EQ(all["fields"][0]["rangeOf"], "all");
@@ -85,7 +85,8 @@ TEST(Inspect, ReadsRangesAboveTheLimitOnRequest) {
   write_steps(path, 8192);  // chunks of 128 MiB
   const json none = described(path);
   EXPECT_TRUE(none["fields"][0]["range"].is_null());
-  EXPECT_TRUE(has_note(none, "ranges are not read: a step decodes 128.0 MiB, beyond the limit of"));
+  EXPECT_TRUE(
+      has_note(none, "ranges are not read: a step decodes to 128.0 MiB, beyond the limit of"));
   EXPECT_TRUE(has_note(none, "; --ranges first or all reads them"));
   const json first = described(path, "first");
   EXPECT_EQ(first["fields"][0]["range"], (json{0, 4095}));

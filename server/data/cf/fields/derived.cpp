@@ -243,8 +243,8 @@ class DerivedFinder {
     notes_.push_back(std::move(note));
     notes_.push_back(
         "the vertical part of " + in_quotes(plan.info.name) + " is in " +
-        in_quotes(plan.info.component_units[2]) + ": its lines point up where air rises, " +
-        "its magnitude mixes units, which " + in_quotes(field.info.name) + " does not");
+        in_quotes(plan.info.component_units[2]) + ": its lines point up where air rises, but " +
+        "its magnitude mixes units; that of " + in_quotes(field.info.name) + " does not");
     found_.push_back(std::move(field));
     return {};
   }

@@ -170,7 +170,7 @@ class Parser {
     }
     if (words_.fault()) return *words_.fault();
     if (problem_) return *problem_;
-    if (out_.objects.empty()) return out_.file->fault("has no object");
+    if (out_.objects.empty()) return out_.file->fault("contains no objects");
     return std::move(out_);
   }
 

@@ -104,8 +104,8 @@ class Parser {
       const auto value = bytes::to_integer(line.words[word]);
       if (value && *value >= least && *value <= most) return *value;
     }
-    complain(line, "a number from " + std::to_string(least) + " to " + std::to_string(most) +
-                       " is needed as word " + std::to_string(word + 1));
+    complain(line, "word " + std::to_string(word + 1) + " must be a number from " +
+                       std::to_string(least) + " to " + std::to_string(most));
     return least;
   }
 
@@ -114,7 +114,7 @@ class Parser {
       const auto value = bytes::to_double(line.words[word]);
       if (value && std::isfinite(*value)) return *value;
     }
-    complain(line, "a finite number is needed as word " + std::to_string(word + 1));
+    complain(line, "word " + std::to_string(word + 1) + " must be a finite number");
     return 0;
   }
 
@@ -171,7 +171,7 @@ class Parser {
     } else if (line.key != "vectorpairs" && line.key != "cachesize" && line.key != "endvars" &&
                line.key != "index") {
       out_.notes.push_back("line " + std::to_string(line.number) + " of the descriptor (" +
-                           printable(line.key, 40) + ") is not known and not used");
+                           printable(line.key, 40) + ") is unknown and ignored");
     }
   }
 
@@ -372,8 +372,8 @@ class Parser {
       }
       if (problem_.empty() && variable.levels > out_.z.count) {
         problem_ = "is invalid: the variable " + in_quotes(variable.name) + " has ";
-        problem_ +=
-            std::to_string(variable.levels) + " levels, zdef has " + std::to_string(out_.z.count);
+        problem_ += std::to_string(variable.levels) + " levels, but zdef has " +
+                    std::to_string(out_.z.count);
       }
     }
   }

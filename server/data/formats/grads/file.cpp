@@ -88,7 +88,7 @@ class Opener {
       const std::shared_ptr<const InputFile>& file, std::size_t times) const {
     const std::uint64_t needed = ctl_.file_header + times * time_bytes_;
     if (file->size() < needed) {
-      return file->fault("is truncated: it has " + std::to_string(file->size()) + " bytes, " +
+      return file->fault("is truncated: it has " + std::to_string(file->size()) + " bytes, but " +
                          in_quotes(input_->name()) + " requires " + std::to_string(needed));
     }
     if (ctl_.sequential) {

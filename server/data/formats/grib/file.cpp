@@ -96,7 +96,7 @@ Result<void> File::scan() {
   auto places = find_fields(*input_);
   if (!places) return places.error();
   places_ = std::move(*places);
-  if (places_.empty()) return input_->fault("has no GRIB field");
+  if (places_.empty()) return input_->fault("contains no GRIB fields");
   std::set<int> editions;
   std::map<std::string, std::size_t> unread;
   for (std::size_t f = 0; f < places_.size(); ++f) {

@@ -126,7 +126,7 @@ class Placer {
                    std::to_string(size) + "; such axes have size 1");
       }
       if (size > axis_max) {
-        return bad("has an axis of " + std::to_string(size) + "; at most " +
+        return bad("has an axis of size " + std::to_string(size) + "; at most " +
                    std::to_string(axis_max) + " are supported");
       }
     }

@@ -300,7 +300,7 @@ class Reader {
     } else if (key != "global_ids" && key != "pedigree_ids") {
       return fault(in_quotes(key) + " instead of a section");
     }
-    if (array.components < 1) return fault("a number of components that is not 1 to 9");
+    if (array.components < 1) return fault("a number of components outside 1 to 9");
     const auto taken = take_typed(array, type);
     if (!taken) return taken.error();
     if (*taken) return add(*into_, std::move(array));

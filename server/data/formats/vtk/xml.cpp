@@ -247,7 +247,7 @@ class Document {
     const auto components = bytes::to_integer(node.attribute("NumberOfComponents").as_string("1"));
     if (!components || *components < 1 || *components > 1024) {
       return file_->fault("is malformed: the array " + in_quotes(array.name) +
-                          " has a number of components that is not 1 to 1024");
+                          " has a number of components outside 1 to 1024");
     }
     array.components = static_cast<int>(*components);
     for (int c = 0; c < array.components && c < 3; ++c) {
@@ -311,7 +311,7 @@ class Document {
       const auto points = bytes::to_integer(node.attribute("NumberOfPoints").value());
       const auto cells = bytes::to_integer(node.attribute("NumberOfCells").value());
       if (!points || !cells || *points < 0 || *cells < 0) {
-        return file_->fault("has a piece without its numbers of points and cells");
+        return file_->fault("has a piece without valid numbers of points and cells");
       }
       piece.points = static_cast<std::uint64_t>(*points);
       piece.cells = static_cast<std::uint64_t>(*cells);

@@ -320,7 +320,7 @@ INSTANTIATE_TEST_SUITE_P(
     All, GradsRefusal,
     testing::Values(
         BadGradsCase{"short", "tdef 3 linear jan2000 1mo", one_u,
-                     "has 96 bytes, 'd.ctl' requires 144"},
+                     "has 96 bytes, but 'd.ctl' requires 144"},
         BadGradsCase{"huge",
                      "tdef 10000000 linear jan2000 1mn\nxdef 16777216 linear 0 1\n"
                      "ydef 16777216 linear 0 1",
@@ -334,7 +334,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadGradsCase{"pdef", two_days + "\npdef 9 9 lcc 1 2 3", one_u, "map projection"},
         BadGradsCase{"ensemble", two_days + "\nedef 4 names 1 2 3 4", one_u, "ensemble"},
         BadGradsCase{"gauss", two_days + "\nydef 2 mom32 1", one_u, "'mom32' is none of"},
-        BadGradsCase{"levels", two_days, "1\nu 3 99 u", "has 3 levels, zdef has 2"},
+        BadGradsCase{"levels", two_days, "1\nu 3 99 u", "has 3 levels, but zdef has 2"},
         BadGradsCase{"count", two_days, "3\nu 2 99 u", "1 of 3 variables"},
         BadGradsCase{"sequential", two_days + "\noptions sequential\ntdef 1 linear jan2000 1mo",
                      one_u, "is not sequential"},

@@ -153,7 +153,7 @@ TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
       {"equal coordinates", [](DatasetInfo& i) { i.grid.axes[2].coordinates[1] = 1000; }},
       {"a change of direction", [](DatasetInfo& i) { i.grid.axes[2].coordinates[3] = 2000; }},
       {"an infinite coordinate", [](DatasetInfo& i) { i.grid.axes[0].coordinates[2] = infinity; }},
-      {"steps below the resolution",
+      {"coordinates too close together",
        [](DatasetInfo& i) {
          i.grid.axes[0].coordinates = {0, 5e-324, 1e-323};
        }},

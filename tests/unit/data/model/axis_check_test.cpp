@@ -45,16 +45,16 @@ TEST(AxisCheck, AxesWithoutRoomForCellsAreRefused) {
       {{0, HUGE_VAL}, "missing values"},
       {{0, 1, 1}, "not strictly monotonic"},
       {{0, 2, 1}, "not strictly monotonic"},
-      {{0, 5e-324, 1e-323}, "steps below"},
-      {{0, 1e-20, 1}, "steps below"},
+      {{0, 5e-324, 1e-323}, "coordinates closer"},
+      {{0, 1e-20, 1}, "coordinates closer"},
       {{-1.7e308, 1.7e308}, "beyond 1e290"},
-      {{1e16, 1e16 + 2, 1e16 + 4}, "below the rounding error"}};
+      {{1e16, 1e16 + 2, 1e16 + 4}, "closer than their rounding error"}};
   for (const auto& [axis, fault] : axes) EXPECT_THAT(axis_fault(axis), HasSubstr(fault));
 }
 
 TEST(AxisCheck, RefusedAxisIsNamedForEveryFormat) {
   const VtkFolder vtk;
-  EXPECT_THAT(refusal(vtk.write("a.vti", spaced("5e-324 1 1"))), HasSubstr("steps below"));
+  EXPECT_THAT(refusal(vtk.write("a.vti", spaced("5e-324 1 1"))), HasSubstr("coordinates closer"));
   EXPECT_THAT(refusal(vtk.write("b.vti", spaced("1 1e300 1"))), HasSubstr("beyond 1e290"));
   EXPECT_EQ(refusal(vtk.write("c.vti", spaced("1 1e-200 1"))), "");
 
