@@ -80,7 +80,7 @@ double scale_at(const kernels::Camera& camera, double depth) {
   return camera.inverse_pixel / std::max<double>(depth, camera.near);
 }
 
-// Upper bound of the alphas, summed over the picture, of the lines and splats of a brick that are
+// Upper bound on the alphas, summed over the picture, of the lines and splats of a brick that are
 // below tolerance: a line covers its length times r1 + r2 and two half discs, a splat its
 // extinction times its volume. All are assumed at the nearest depth of the brick, with `scale`
 // pixels per world unit. The sampling factors bound the ratio of the sum over pixels to the area,
@@ -119,7 +119,7 @@ void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick)
   brick.block_y_last = block(r.y1, camera.height);
 }
 
-// Upper bound of the area that thin splats of a brick cover at `scale` pixels per world unit, as a
+// Upper bound on the area that thin splats of a brick cover at `scale` pixels per world unit, as a
 // multiple of that at a scale of 0: the largest of the three terms of splat_cover of the kernels,
 // divided by the third. Uses the widest cells of the brick.
 double splat_cover(const Pass& pass, const Brick& brick, double scale) {

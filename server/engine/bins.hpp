@@ -33,7 +33,7 @@ struct BrickCounts {
   std::int64_t without_line = 0;
   std::int64_t without_splat = 0;
   std::int64_t without_both = 0;
-  double left_out = 0;  // upper bound of the alphas skipped by tolerances, summed over pixels
+  double left_out = 0;  // upper bound on the alphas skipped by tolerances, summed over pixels
 
   BrickCounts& operator+=(const BrickCounts& other);
 };

@@ -1,4 +1,4 @@
-// Upper bound of the work of a picture, from its view and the description of its dataset, before
+// Upper bound on the work of a picture, from its view and the description of its dataset, before
 // any data are read or the picture is queued.
 #pragma once
 

@@ -62,7 +62,7 @@ struct Workspace {
   std::array<float, 3> background{};  // linear
 };
 
-// Upper bound of the memory for drawing and encoding a picture, beyond that for one of
+// Upper bound on the memory for drawing and encoding a picture, beyond that for one of
 // retained_pixels (base/trim_storage.hpp).
 std::uint64_t bytes_beyond_kept(int width, int height, Format format);
 

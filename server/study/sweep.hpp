@@ -51,7 +51,7 @@ Result<Extrapolated> extrapolate(const Subject& subject, ThreadPool& pool,
 // RMSE over RGBA of a uniform white medium, of optical depth 1 through the middle, on the lattice
 // of the subject and from its view direction, relative to -expm1(-rho L): the ripple of overlapping
 // footprints. It is not part of the errors relative to the integral, which has the same footprints,
-// nor a lower bound of them. NaN for a bent lattice and for a slice, which are not boxes with a
+// nor a lower bound on them. NaN for a bent lattice and for a slice, which are not boxes with a
 // uniform medium.
 Result<double> reconstruction_ripple(const Subject& subject, ThreadPool& pool,
                                      const CancelToken& cancel);

@@ -96,7 +96,7 @@ class Budget {
   // Ends all waits for room: later calls return resident volumes or an error.
   void end();
   [[nodiscard]] BudgetCounts counts() const;
-  // Upper bound of a request that can be met now: free bytes and those that can be evicted.
+  // Size of the largest request that can be met now: free bytes and those that can be evicted.
   [[nodiscard]] std::uint64_t room() const;
   [[nodiscard]] std::uint64_t bytes_max() const { return bytes_max_; }
   [[nodiscard]] const LimitName& name() const { return name_; }

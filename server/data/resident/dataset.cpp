@@ -57,7 +57,7 @@ std::uint64_t bytes_at_a_step(const DatasetInfo& info, const std::vector<std::st
   return bytes;
 }
 
-// Measured upper bound of the memory of a loader, in addition to the volumes, while it reads
+// Measured upper bound on the memory of a loader, in addition to the volumes, while it reads
 // these fields. Chunks that are needed again are cached, up to 128 MiB or one chunk.
 std::uint64_t reading_bytes(const DatasetInfo& info, const std::vector<std::string>& fields) {
   constexpr std::uint64_t mib = std::uint64_t{1} << 20;

@@ -82,7 +82,7 @@ inline float least_magnitude(const LineStyle& line) {
   return larger(line.min_magnitude, magnitude_least);
 }
 
-// Upper bound of the width of the cell over all view directions: its longest edge.
+// Upper bound on the width of the cell over all view directions: its longest edge.
 KERNEL_INLINE Kernel cell_longest(const Rows& rows, int i) {
   const Kernel x = load<Kernel>(rows.cell[0] + i);
   const Kernel y = load<Kernel>(rows.cell[1] + i);
@@ -143,7 +143,7 @@ void color_density(const Pass& pass, std::int64_t offset, float* color) {
   for (int c = 0; c < 3; ++c) color[c] *= inverse;
 }
 
-// Upper bound of the optical depth summed over pixels of a splat of unit extinction: the volume of
+// Upper bound on the optical depth summed over pixels of a splat of unit extinction: the volume of
 // the cell if it is no narrower than a pixel. A narrower splat is bounded by one that is a pixel
 // wide with the same peak, hence by a section of the cell or its longest chord. `scale` is pixels
 // per world unit. The extents of a curved cell bound all three.

@@ -145,7 +145,7 @@ struct BrickSummary {
   std::int64_t without_splat;
   std::int64_t without_both;
   // Skipped by tolerance: the number of lines, the sum of their lengths relative to full length,
-  // and an upper bound of the optical depths of the splats summed over pixels.
+  // and an upper bound on the optical depths of the splats summed over pixels.
   int weak_lines;
   float weak_parts;
   float thin_medium;

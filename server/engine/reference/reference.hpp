@@ -43,7 +43,7 @@ using Reserve = std::function<Result<std::shared_ptr<const void>>(std::uint64_t 
 class Painting {
  public:
   // Lists the kernels; the scene need not outlive the call. `workers`: largest number of concurrent
-  // draw calls. `reserve` is called before the kernels are listed, for an upper bound of their
+  // draw calls. `reserve` is called before the kernels are listed, for an upper bound on their
   // size, and before they are listed by tile; if empty, memory is not limited.
   // Errors: cancelled; those of `reserve`.
   static Result<std::unique_ptr<Painting>> begin(const scene::Scene& scene, unsigned workers,

@@ -30,7 +30,7 @@ class WindowedLeast {
 // packets: the round trip is the minimum observed and the rate the maximum, since disturbances only
 // lengthen and slow measurements. Data arrives no sooner than a round trip after sending (there and
 // back), and each frame adds its bytes over the rate; the excess of a frame over the round trip,
-// alone or with the frame in flight before it, is a lower bound of the rate.
+// alone or with the frame in flight before it, is a lower bound on the rate.
 //
 // The client is a second stage: it takes `decodeMs` per frame, one after the other, and then
 // acknowledges.
@@ -61,9 +61,9 @@ class Link {
   // Time when the data in flight have passed the bottleneck; in the past if there are none.
   [[nodiscard]] Micros free_at() const;
 
-  // Earliest time to start the next frame such that it finds the link free and the client ready,
-  // and frames are evenly spaced if the credit of two is the limit. Never later than the last
-  // acknowledgement.
+  // Earliest time to start the next frame such that the link is idle and the client ready once it
+  // is encoded, and frames are evenly spaced if the credit of two is the limit. Never later than
+  // the last acknowledgement.
   [[nodiscard]] Micros may_start_at() const;
 
  private:

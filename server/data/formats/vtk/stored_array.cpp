@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t part_bytes_max = std::size_t{1} << 18;
 constexpr std::uint64_t block_bytes_max = std::uint64_t{256} << 20;
-// Upper bound of the compression ratio: deflate 1032, LZ4 255.
+// Upper bound on the compression ratio: deflate 1032, LZ4 255.
 constexpr std::uint64_t growth_max = 1040;
 constexpr std::size_t token_max = 128;
 
