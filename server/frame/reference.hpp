@@ -44,7 +44,7 @@ class ReferenceDrawing {
   void draw(ThreadPool& pool, const CancelToken& cancel, const std::function<bool()>& enough);
   [[nodiscard]] double done() const;  // fraction drawn, 0 to 1
 
-  // The picture of the view at full size compared with the finished reference. Errors: those of the
+  // Compares the view's picture at full size with the finished reference. Errors: those of the
   // engine.
   Result<Difference> compare(ThreadPool& pool, const CancelToken& cancel, Workspace& workspace);
   // Errors: those of encoding.

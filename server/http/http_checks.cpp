@@ -67,7 +67,7 @@ bool is_port(std::string_view text) {
          (text.size() < 5 || text <= "65535");
 }
 
-// uri-host [ ":" port ] (RFC 9110, 7.2); of a bracketed address only the characters are checked.
+// uri-host [ ":" port ] (RFC 9110, 7.2); of an address in brackets only the characters are checked.
 bool is_host(std::string_view host) {
   std::size_t end = 0;
   if (host.starts_with('[')) {

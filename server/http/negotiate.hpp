@@ -33,8 +33,8 @@ bool origin_allowed(std::string_view origin, std::string_view host,
 // localhost, 127.x.y.z or [::1], with or without a port.
 bool names_loopback(std::string_view host);
 
-// An IPv4 address or a bracketed one, with or without port: unlike a name, it cannot be rebound to
-// this machine.
+// An IPv4 address or a bracketed IPv6 address, with or without port: unlike a name, it cannot be
+// rebound to this machine.
 bool is_address(std::string_view host);
 
 // Whether a Host is a loopback name, the host of an allowed origin or one of `names` (without

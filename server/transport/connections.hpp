@@ -94,7 +94,7 @@ class Connections {
   }
 
   // If more than `most` handshakes are in progress, closes one: of unknown addresses if there are
-  // any, the oldest of the address with most handshakes.
+  // any, the oldest of the address with the most handshakes.
   bool end_handshake(std::size_t most) const {
     struct Held {
       std::size_t count = 0;

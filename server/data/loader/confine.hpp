@@ -15,8 +15,8 @@ namespace windsplat::data::loader {
 inline constexpr std::uint64_t room_of_libraries = std::uint64_t{32} << 20;
 
 struct Confinement {
-  std::uint64_t memory_bytes = 0;  // maximum of private memory
-  // the initial part of it, until the daemon allows more (Process::allow_memory())
+  std::uint64_t memory_bytes = 0;  // maximum private memory
+  // a lower maximum until the daemon allows all of it (Process::allow_memory())
   std::uint64_t opening_bytes = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t files = 0;  // maximum number of open files
   int socket = -1;          // socket to the daemon, which opens the files of libraries

@@ -35,7 +35,7 @@ Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const
 int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables);
 
 // Longitudes and latitudes of a rotated-pole grid (CF 1.8, appendix F). mapping: the grid mapping
-// variable. Null if it has no position of the pole.
+// variable. Null if it does not give the position of the pole.
 std::shared_ptr<const Columns> columns_about_pole(const ArrayFile& file, int mapping,
                                                   const Grid& grid);
 

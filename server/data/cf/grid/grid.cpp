@@ -106,7 +106,7 @@ std::string misplaced(const FileContents& contents, const FileVariable& variable
   return {};
 }
 
-// Error text for a file without fields, explained by the variable with most dimensions.
+// Error text for a file without fields, explained by the variable with the most dimensions.
 std::string nothing_to_show(const FileContents& contents, const std::vector<LeftOut>& left_out) {
   std::string text =
       "there is no numeric variable with two or three spatial dimensions; cells and stations in a "

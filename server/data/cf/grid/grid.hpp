@@ -23,7 +23,7 @@ struct GridChoice {
   std::vector<LeftOut> left_out;
 };
 
-// Prefers grids with three spatial dimensions, then the one with most samples over all its
+// Prefers grids with three spatial dimensions, then the one with the most samples over all its
 // variables. Errors: bad_data if there is none, or if it exceeds samples_max.
 Result<GridChoice> choose_grid(const FileContents& contents,
                                const std::vector<DimensionRole>& roles);

@@ -97,8 +97,8 @@ class Resampler {
   }
 
   // Computes the mean extent of cells and the number of layers along each axis. For a structured
-  // grid aligned with the axes, index steps are more accurate than bounding boxes, which are higher
-  // than sloping layers are thick.
+  // grid aligned with the axes, index steps are more accurate than bounding boxes, whose height
+  // exceeds the thickness of sloping layers.
   void measure_extents(const Extents& sum) {
     const auto cells = static_cast<double>(sum.cells);
     std::array<std::size_t, 3> index_of{3, 3, 3};
