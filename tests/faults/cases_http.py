@@ -28,7 +28,7 @@ def refused(port, request, allowed):
 
 
 def by_size(world, count, make, allowed):
-    """Sizes around the limits, repeatedly; the daemon's memory must not grow with them."""
+    """Sends sizes around the limits repeatedly; the daemon's memory must not grow with them."""
     daemon = world.daemon()
     for size in SIZES:
         refused(daemon.port, make(size), allowed)

@@ -171,7 +171,7 @@ def grib_model(kind, dice):
 
 
 def pack(field, at, values, bits, decimal, edition):
-    """Chooses reference and binary scale as encoders do."""
+    """Chooses the reference value and the binary scale factor as encoders do."""
     reference = kept_reference(values.min() * 10.0**decimal, edition)
     span = max((values * 10.0**decimal - reference).max(), 1e-30)
     binary = int(np.ceil(np.log2(span / (2**bits - 1)))) if bits else 0

@@ -63,7 +63,8 @@ def mutate(model, dice):
 
 
 def mutant(seed, number, kind=None):
-    """The Model of a number, reproducibly; of one format, or of each in turn."""
+    """The mutated Model that seed and number determine; its format is `kind` or, if that is None,
+    follows from the number."""
     dice = np.random.default_rng([seed, number])
     model = model_of(kind or values.ALL[number % len(values.ALL)], dice)
     mutate(model, dice)

@@ -7,7 +7,7 @@ import seeds
 import seeds_vtk
 from seed_numbers import COUNT, DIMS, Seed, as_text, floats, numbers
 
-MARK_NUMBER = 31337.25  # a value in the outside files; exact in 32 bits
+MARK_NUMBER = 31337.25  # a value in the files outside; exactly representable in 32 bits
 MARK_TEXT = "5ENTINEL"
 
 

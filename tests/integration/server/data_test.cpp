@@ -300,7 +300,7 @@ TEST(Loads, EveryDatasetHasItsOwnQueue) {
   gate.open();
 }
 
-// Views without ranges of their fields, so that completing them reads the shown field; all but one
+// The views do not specify ranges, so completing each would read the field it shows; all but one
 // are superseded.
 TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);

@@ -55,7 +55,7 @@ Told tell(const Viewer& viewer, const LinkOptions& link) {
 
 constexpr double whole = 1280 * 720;  // pixels
 
-// Median cost of frames.
+// Median render time of the moving frames.
 Micros drawing_time(const Told& told, Micros full) {
   std::vector<Micros> costs;
   for (const Shown& frame : told.moving) {
@@ -66,7 +66,7 @@ Micros drawing_time(const Told& told, Micros full) {
 
 struct Case {
   LinkOptions link;
-  Micros full = 0;  // cost of a whole picture
+  Micros full = 0;  // render time of a whole picture
 };
 
 std::vector<Case> cases() {

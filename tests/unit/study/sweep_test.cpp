@@ -109,7 +109,7 @@ TEST(Scene, HasTheNamedOpticalDepth) {
   }
 }
 
-// A reference equal to the picture of the setting except for a known amount in one channel.
+// The reference is the picture of the setting itself, then with a known offset in one channel.
 TEST(Measure, IsTheDistanceFromTheGivenReference) {
   const Subject subject = standard_subject("soft", true).value();
   const Setting setting{Method::kernel, Compositing::analytic, own_knobs(subject)};

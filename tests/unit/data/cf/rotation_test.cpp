@@ -121,7 +121,7 @@ TEST(Rotation, EastNorthWindsAreRotatedToTheGridAxes) {
 }
 
 // The rendered direction of the components: their sum along the unit vectors of the map's rows and
-// columns. A map of degrees is not conformal: rows at an angle a from east have the direction (cos
+// columns. A map in degrees is not conformal: rows at an angle a from east have the direction (cos
 // a / cos phi, sin a) on it, columns (-sin a / cos phi, cos a); normalising both turns an eastward
 // wind by about 4 degrees at 45 N.
 TEST(Rotation, EastWindPointsEastOnALatitudeLongitudeMap) {

@@ -200,7 +200,7 @@ std::vector<Attempt> all_attempts() {
 }
 const std::vector<Attempt> attempts = all_attempts();
 
-// Runs all attempts confined; the errno of each.
+// Runs all attempts in a confined child process. Returns the errno of each, 0 if it succeeded.
 std::vector<int> outcomes(const std::string& path) {
   int ends[2];
   EXPECT_EQ(::pipe(ends), 0);
