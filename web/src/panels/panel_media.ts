@@ -31,7 +31,7 @@ class MediaPanel {
   private layers: Layer[] = [];
   private shape = ""; // fields and switches for which the controls were built
   private controls: PanelKit;
-  private readonly folded = new Set<string>(); // fields whose curve editor is folded
+  private readonly folded = new Set<string>(); // fields whose curve editor is collapsed
 
   private readonly forms = new Map<string, Curve>(); // curves by field before density scaling
 
