@@ -32,7 +32,7 @@ class AddressTable {
 
   // Added if absent, which may evict another. Strong exception guarantee if an allocation fails.
   AddressUsage& entry(const std::string& address, Micros now);
-  // Null if absent, which no address with connections or sessions is. Does not allocate.
+  // Null if absent; an address with connections or sessions is never absent. Does not allocate.
   AddressUsage* find(const std::string& address);
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
 

@@ -37,7 +37,7 @@ struct Limits {
   std::int64_t pixels = protocol::limits::image_pixels_max;  // maximum of a picture
   double kernels = 1e10;                                     // maximum of a picture
                                                              // (frame/cost.hpp)
-  double render_s = 120;  // estimated time of a picture requested by HTTP
+  double render_s = 120;  // estimated time of a picture requested over HTTP
   // Limit in milliseconds on how long requests of other addresses may delay a picture requested by
   // HTTP that is itself shorter; above it the picture is refused, which bounds the delay of
   // admitted ones.

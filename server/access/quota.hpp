@@ -19,7 +19,7 @@ class Quota {
   using Micros = TokenBucket::Micros;
 
   // Size of the reserve: connections beyond the limits, which serve health requests only. One
-  // quarter of it.
+  // address may hold a quarter of it.
   static constexpr std::size_t reserve_max = 64;
   static constexpr std::size_t reserve_per_address = reserve_max / 4;
   static constexpr double tls_arrivals = 5;  // cost of a handshake in plain connections

@@ -26,7 +26,7 @@ struct ServerOptions {
   bool local_hosts_only = false;
   // Allow IP addresses as Host, too, when other machines reach the server.
   bool known_hosts_only = false;
-  std::vector<std::string> allow_hosts;  // additional names for both, without port
+  std::vector<std::string> allow_hosts;  // additional names for both, without a port
   // The folder below which POST /v1/datasets opens files, absolute; empty: none.
   std::string data_root;
   std::shared_ptr<views::SavedViews> views;  // null: in memory only

@@ -60,7 +60,8 @@ void run_later(work::TaskExecutor& executor, const http::Request& request, http:
 
 std::string etag_of(std::string_view text) {
   const std::string first = data::digest_of(text);
-  // The second half is computed from the first, so that both do not collide together.
+  // The second half is computed from the first, so that a collision of the first does not imply one
+  // of the second.
   return '"' + first + data::digest_of(first + std::string(text)) + '"';
 }
 

@@ -31,7 +31,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments);
 // The view file, overridden by --step, --size and --set in this order.
 Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments);
 
-// The format by the extension of a file name. Errors: invalid.
+// The format that the extension of a file name denotes. Errors: invalid.
 Result<frame::Format> format_of(const std::string& output);
 
 // Encoding of a picture file, `quality` 1..100 for a JPEG; the reference is allowed.

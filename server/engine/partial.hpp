@@ -1,5 +1,5 @@
-// Table of the fraction of a splat's footprint that lies before a point of a ray; the slab method
-// distributes splats over slabs by it. Built once.
+// Table of the fraction of a splat's footprint that lies in front of a point of a ray; the slab
+// method uses it to distribute splats over slabs. Built once.
 #pragma once
 
 #include <cstdint>

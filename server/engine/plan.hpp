@@ -98,7 +98,7 @@ struct RenderPlan {
   ~RenderPlan() = default;
 };
 
-// Replaces the plan by one for `scene`, which must outlive it. Only the storage is reused, and
+// Replaces the plan with one for `scene`, which must outlive it. Only the storage is reused, and
 // `ways` if the curved lattice is the same.
 void make_plan(const scene::Scene& scene, RenderPlan& plan);
 

@@ -10,8 +10,8 @@ namespace windsplat::engine {
 namespace {
 
 // Interval of pixels that a box may cover along one axis of the screen, widened by a margin. If a
-// corner lies before the near plane, the box is tested against the planes through the eye and the
-// two edges of the screen instead.
+// corner lies in front of the near plane, the box is tested against the planes through the eye and
+// the two edges of the screen instead.
 struct Span {
   double low = 0, high = -1;
   bool behind = false;
@@ -21,7 +21,7 @@ struct Span {
 struct Corners {
   std::array<std::array<double, 8>, 3> at;
   std::array<double, 8> inverse_z;  // depths clamped to the near plane; orthographic: 1
-  bool behind = false;              // a corner lies before the near plane
+  bool behind = false;              // a corner lies in front of the near plane
 };
 
 Span screen_span(const Corners& corners, int across, const kernels::Camera& camera, double half,

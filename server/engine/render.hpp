@@ -24,7 +24,7 @@ struct Image {
 
 // Finished pixels of an image in the format of Image, with `stride` floats from row to row.
 struct TilePixels {
-  int x = 0;  // position of the left upper pixel in the image; even
+  int x = 0;  // position of the upper left pixel in the image; even
   int y = 0;
   int width = 0;
   int height = 0;

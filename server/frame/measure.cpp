@@ -25,15 +25,15 @@ double samples_of(const scene::Lattice& lattice) {
   return samples;
 }
 
-// Whether pictures by thinner slabs converge to the reference, by the compositing rules of the
-// scene.
+// Whether pictures drawn with thinner slabs converge to the reference under the compositing rules
+// of the scene.
 bool is_exact(const scene::Scene& scene) {
   return scene.compositing == scene::Compositing::analytic &&
          scene.stop_transmittance <= quality::stop_of_the_truth;
 }
 
-// The view by analytic slabs of its thickness divided by `thinner`, from every sample if possible.
-// The second value: whether every sample is used.
+// The view with analytic slabs of its thickness divided by `thinner`, from every sample if
+// possible. The second value: whether every sample is used.
 Result<std::pair<scene::Scene, bool>> finer_scene(const scene::CompletedView& completed,
                                                   data::Dataset& dataset, int thinner,
                                                   double samples_max) {

@@ -32,8 +32,8 @@ struct WorkMemory {
 class ReferenceDrawing {
  public:
   // Loads the data of the view and lists its kernels, which takes up to seconds: do not call it on
-  // the renderer's thread. The picture by the method of the view is compared with the reference.
-  // Errors: those of the scene; cancelled; out_of_memory at /image.
+  // the renderer's thread. The picture drawn with the method of the view is compared with the
+  // reference. Errors: those of the scene; cancelled; out_of_memory at /image.
   static Result<std::unique_ptr<ReferenceDrawing>> begin(const scene::CompletedView& completed,
                                                          data::Dataset& dataset, unsigned workers,
                                                          const CancelToken& cancel,

@@ -1,4 +1,4 @@
-// Percent-decoding by Boost.URL; numbers by from_chars, whole text only.
+// Percent-decoding with Boost.URL; numbers with from_chars, whole text only.
 #include "server/http/request_target.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// 8-bit RGB or planes of YCbCr -> JPEG by libjpeg-turbo.
+// 8-bit RGB or planes of YCbCr -> JPEG with libjpeg-turbo.
 #include <turbojpeg.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// JPEG -> 8-bit RGB by libjpeg-turbo.
+// JPEG -> 8-bit RGB with libjpeg-turbo.
 #include <turbojpeg.h>
 
 #include <memory>

@@ -1,4 +1,4 @@
-// 8-bit RGB -> PNG by libpng, with fast compression.
+// 8-bit RGB -> PNG with libpng and fast compression.
 #include <png.h>
 
 #include <array>
@@ -18,8 +18,8 @@ constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // largest IDAT
 
 enum class Fate { done, cancelled, failed };
 
-// libpng reports errors by longjmp, which skips destructors. write() and the functions below it
-// therefore have no objects with destructors; the output and the error message are members.
+// libpng reports errors through longjmp, which skips destructors. write() and the functions below
+// it therefore have no objects with destructors; the output and the error message are members.
 class PngWriter {
  public:
   PngWriter()

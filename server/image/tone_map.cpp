@@ -1,4 +1,4 @@
-// Premultiplied linear RGBA over a linear background -> 8-bit sRGB, by a table with the exact
+// Premultiplied linear RGBA over a linear background -> 8-bit sRGB, from a table with the exact
 // rounding of the formula.
 #include "server/image/tone_map.hpp"
 

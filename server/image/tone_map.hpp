@@ -10,7 +10,7 @@ namespace windsplat::image {
 // Encoded value in [0, 1] of a linear one; clamped, NaN is 0.
 double srgb_from_linear(double linear);
 
-// round(255 srgb_from_linear(x)) of `count` values, by table: the same codes as the formula's.
+// round(255 srgb_from_linear(x)) of `count` values, from a table: the same codes as the formula's.
 void srgb_codes(const float* linear, std::uint8_t* codes, std::size_t count);
 
 }  // namespace windsplat::image

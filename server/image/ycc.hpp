@@ -13,7 +13,7 @@ namespace windsplat::image {
 
 // Pixels of a picture: linear premultiplied RGBA, 4 floats per pixel, `stride` floats per row.
 struct Part {
-  int x = 0;  // position of its left upper pixel in the picture
+  int x = 0;  // position of its upper left pixel in the picture
   int y = 0;
   int width = 0;
   int height = 0;

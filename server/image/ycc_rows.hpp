@@ -1,4 +1,4 @@
-// Rows of linear pixels -> YCbCr codes, by SIMD in the width of the processor.
+// Rows of linear pixels -> YCbCr codes, with SIMD in the width of the processor.
 #pragma once
 
 #include <array>

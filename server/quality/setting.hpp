@@ -21,8 +21,8 @@ struct Setting {
   bool operator==(const Setting&) const = default;
 };
 
-// Strides and other thresholds of early ray termination are not included: at equal time their error
-// is larger (docs/benchmarks/error.md).
+// Strides and other thresholds of early ray termination are not included: at the same run time
+// their error is larger (docs/benchmarks/error.md).
 inline constexpr std::array<Setting, 26> settings{{
     {protocol::MethodName::kernel, 0, 0},  {protocol::MethodName::kernel, 1, 0},
     {protocol::MethodName::kernel, 2, 0},  {protocol::MethodName::kernel, 3, 0},
@@ -54,7 +54,7 @@ protocol::View at_setting(protocol::View view, const Setting& setting);
 std::size_t own_setting(const protocol::View& view);
 std::optional<std::size_t> index_of(const Setting& setting);
 
-// Whether the server may use the setting for the view. A view of method kernel is rendered by slabs
+// Whether the server may use the setting for the view. A view of method kernel is drawn with slabs
 // only if it limits the error; slabs below the protocol's least thickness are excluded, as are
 // reduced pictures with an edge below 64 pixels, and coarser data if the view requires full detail.
 bool is_allowed(const Setting& setting, const protocol::View& view);

@@ -50,7 +50,7 @@ struct ScalarStyle {
 ScalarStyle scalar_style(const data::FieldInfo& field);
 
 // Names of the scalars shown by default: the best match of a cloud or density, and solid bodies in
-// the flow; in a dataset without vector field at least the first scalar.
+// the flow; in a dataset without a vector field at least the first scalar.
 std::vector<std::string> default_scalars(const data::DatasetInfo& info);
 
 protocol::Range default_scalar_range(const data::FieldInfo& field, const data::Volume& volume);

@@ -1,4 +1,4 @@
-// The data of the study's standard scenes: smooth blobs in a swirl, 24 samples an edge.
+// The data of the study's standard scenes: smooth blobs in a swirl, 24 samples per edge.
 #pragma once
 
 #include <memory>

@@ -49,7 +49,7 @@ struct Compared {
   quality::Forecast prior;  // forecast without calibration
 };
 
-// A frame of a held-out view, rendered by the view's own method, with its error measured relative
+// A frame of a held-out view, rendered with the view's own method, with its error measured relative
 // to a finer rendering.
 struct MeasuredFrame {
   std::size_t variant = 0;

@@ -43,7 +43,7 @@ scene::ColorTable one_color(const std::array<float, 3>& rgb) {
 scene::Scene make_scene(int layers, double tau, scene::Compositing compositing, bool with_line) {
   scene::Scene scene;
   scene.compositing = compositing;
-  // Disables early termination, even at a negative transmittance of an unstable compositing.
+  // Disables early termination, even at a negative transmittance of an unstable operator.
   scene.stop_transmittance = -1e30;
   scene.lattice.dims = {1, layers, 1};
   for (int a = 0; a < 3; ++a) {

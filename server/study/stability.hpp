@@ -23,15 +23,15 @@ struct Stiffness {
   bool bounded = true;    // within [0, 1] except for 1e-3
   bool monotone = true;   // alpha is at least that at the next smaller tau, at every depth of the
                           // line
-  double layers_min = 0;  // for stiff_layers cells one behind the other, without line
+  double layers_min = 0;  // for stiff_layers cells one behind the other, without a line
   double layers_max = 0;
   bool diverges = false;  // the layers do not reduce the excess of one cell over [0, 1]
 };
 
 inline constexpr int stiff_layers = 17;  // odd: an even number of sign changes cancels
 
-// Every compositing of method kernel at every optical depth of stiffness(). Exact for one kernel
-// (medium c_s, line c_v of opacity a at the fraction x of the cell's depth):
+// Every compositing operator of method kernel at every optical depth of stiffness(). Exact for one
+// kernel (medium c_s, line c_v of opacity a at the fraction x of the cell's depth):
 // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau x) (c_v - c_s).
 Result<std::vector<Stiffness>> stiffness_sweep(ThreadPool& pool, const CancelToken& cancel);
 

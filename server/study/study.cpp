@@ -158,8 +158,8 @@ class Study {
     return {};
   }
 
-  // The reference, every compositing of method kernel, and method slab, with the parameters of the
-  // view.
+  // The reference, every compositing operator of method kernel, and method slab, with the
+  // parameters of the view.
   Result<void> draw_pictures(const Subject& subject, const Picture& truth, SceneReport& scene) {
     const auto base = scene_at(
         subject, {scene::Method::kernel, scene::Compositing::analytic, own_knobs(subject)});

@@ -21,8 +21,9 @@ struct Sweep {
   std::vector<Curve> curves;      // points are indices of settings
 };
 
-// Method kernel and method slab, each with every compositing, over their parameters; without lines
-// no span, without a medium one compositing (all yield the same picture). `quick`: fewer of each.
+// Method kernel and method slab, each with every compositing operator, over their parameters;
+// without lines no span, without a medium one operator (all yield the same picture). `quick`: fewer
+// of each.
 Sweep plan_sweep(const Subject& subject, bool quick);
 
 // One rendering of the setting, at its own size. Errors: those of scene_at() and the engine.

@@ -1,4 +1,4 @@
-// Posts a handler to the io thread from another thread; retries when memory is short.
+// Posts a handler to the io thread from another thread; retries when memory runs out.
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>

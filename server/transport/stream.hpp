@@ -1,5 +1,5 @@
-// The TCP stream of HTTP and WebSocket sessions: deadlines by Beast, with a count of received
-// bytes. Include it in session sources only, because it includes all of Beast.
+// The TCP stream of HTTP and WebSocket sessions, with the deadlines of Beast and a count of
+// received bytes. Include it in session sources only, because it includes all of Beast.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>

@@ -17,7 +17,7 @@ namespace windsplat::work {
 
 enum class RenderKind {
   stream,      // frames of sessions
-  request,     // pictures requested by HTTP
+  request,     // pictures requested over HTTP
   background,  // work without a waiting client: runs while the renderer is otherwise idle
 };
 

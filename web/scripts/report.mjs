@@ -1,5 +1,5 @@
 // report/ -> the page of a study report as one file: style sheet, script and the licences of the
-// bundled modules; the program replaces %STUDY% by the JSON of a study.
+// bundled modules; the program replaces %STUDY% with the JSON of a study.
 // Usage: node scripts/report.mjs FILE
 import { readdirSync, readFileSync } from "node:fs";
 import { mkdir, readFile, writeFile } from "node:fs/promises";

@@ -49,7 +49,7 @@ std::string kind_fault(const CLI::Option& option, ConfigEntry::Kind kind) {
   return kind == Kind::text ? "" : "must be a string";
 }
 
-// Validates by the option's own rules. Errors: CLI::Error.
+// Validates against the option's own rules. Errors: CLI::Error.
 void give(CLI::Option& option, const std::vector<std::string>& words) {
   option.clear();
   option.add_result(words);

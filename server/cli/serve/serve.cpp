@@ -95,7 +95,7 @@ class Control {
   }
 
  private:
-  // All or nothing, even when memory or threads are short.
+  // All or nothing, even when memory or threads run out.
   void reload_now(const std::function<void(transport::Access)>& change) {
     try {
       take_over(change);

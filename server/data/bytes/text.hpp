@@ -20,8 +20,8 @@ std::optional<double> to_sample(std::string_view text);
 // 0 to 15; -1 if it is not a hexadecimal digit.
 int hex_digit(char c);
 
-// Replaces the only %d, %4d or %04d of a name by a number. nullopt unless there is exactly one such
-// conversion and none of another kind.
+// Replaces the only %d, %4d or %04d of a name with a number. nullopt unless there is exactly one
+// such conversion and none of another kind.
 std::optional<std::string> numbered_name(std::string_view pattern, std::int64_t number);
 
 }  // namespace windsplat::data::bytes

@@ -1,4 +1,4 @@
-// Compares members with the first one and combines their times in one axis.
+// Compares members with the first one and combines their times into one axis.
 #include "server/data/cf/series.hpp"
 
 #include <algorithm>

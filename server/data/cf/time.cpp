@@ -1,4 +1,4 @@
-// Calendars by integer arithmetic on day numbers, and the "<unit> since <epoch>" grammar.
+// Calendars in integer arithmetic on day numbers, and the "<unit> since <epoch>" grammar.
 #include "server/data/cf/time.hpp"
 
 #include <algorithm>

@@ -79,7 +79,7 @@ class Files {
   std::uint64_t opened_bytes_ = 0;
 };
 
-// Opens files within a location; companions by openat2 with RESOLVE_BENEATH.
+// Opens files within a location; companions through openat2 with RESOLVE_BENEATH.
 std::shared_ptr<Files> direct_files(Location location);
 
 }  // namespace windsplat::data

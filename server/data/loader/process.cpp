@@ -1,4 +1,4 @@
-// Starts a process by posix_spawn with a socket and a pipe, and reaps it by waitpid.
+// Starts a process with posix_spawn, a socket and a pipe, and reaps it with waitpid.
 #include "server/data/loader/process.hpp"
 
 #include <fcntl.h>

@@ -47,7 +47,7 @@ class Process {
   [[nodiscard]] pid_t id() const;  // -1 if there is none
 
  private:
-  // The same without allocation: the status as of waitpid.
+  // The same without allocation: the status as waitpid returns it.
   std::optional<int> reap(std::chrono::milliseconds patience) noexcept;
 
   mutable std::mutex mutex_;  // protects id_: signals must not be sent after the process is reaped

@@ -85,7 +85,7 @@ Result<int> nearest_along(const Axis& axis, std::size_t letter, const std::optio
   return static_cast<int>(nearest - axis.coordinates.begin());
 }
 
-// Distance in degrees of arc, by haversines, which are exact for small distances.
+// Distance in degrees of arc, from haversines, which are exact for small distances.
 double distance(double lon_a, double lat_a, double lon_b, double lat_b) {
   const double across = std::sin((lon_a - lon_b) * radians_per_degree / 2);
   const double along = std::sin((lat_a - lat_b) * radians_per_degree / 2);

@@ -237,7 +237,7 @@ struct Store::State {
     return out;
   }
 
-  // Replaces the entry of dataset `old` by `entry` if still present; returns the old entry, to be
+  // Replaces the entry of dataset `old` with `entry` if still present; returns the old entry, to be
   // destroyed outside the lock.
   Entry put(Entry entry, const DatasetPtr& old) {
     const std::lock_guard lock(mutex);

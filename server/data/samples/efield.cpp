@@ -12,7 +12,7 @@
 //   cabin.
 // Inside: the field of an aperture A in a conducting plane with the incident field in it (Smythe's
 //   form of Kirchhoff's integral), F = Int_A exp(ikR) / (2 pi R) dS:
-//     E = curl(0, -F, 0) = (dF/dz, 0, -dF/dx),     free of divergence, tangential E = 0 beside A
+//     E = curl(0, -F, 0) = (dF/dz, 0, -dF/dx),     divergence-free, tangential E = 0 beside A
 //   plus its mirror images in the side, floor, ceiling and back walls (one reflection each, F odd
 //   in y, even in z and x, as required at a conductor), each attenuated by a lossy lining. The
 //   static part of grad F has a closed form, the solid angle of the window and logarithms; the

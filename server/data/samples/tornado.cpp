@@ -8,7 +8,7 @@
 //   updraft   w = W(z) exp(-s^2)                     W(z) = W_top (1 - exp(-z / h))
 //   inflow    v_r = -W'(z) r_u^2 / (2 r) (1 - exp(-s^2))          from continuity
 //   tilt      w dc/dz is added to the horizontal wind, so that the air follows the tilted axis
-// Each part is free of divergence: the swirl because v_theta does not depend on the angle, updraft
+// Each part is divergence-free: the swirl because v_theta does not depend on the angle, updraft
 // and inflow by construction, the tilt because shifting levels horizontally preserves volume.
 //   vorticity on the axis (untilted) = 4 V / r_c
 //   pressure deficit by cyclostrophic balance, dp/dr = density v_theta^2 / r:

@@ -37,7 +37,7 @@ KERNEL_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const P
                                Pixel v) {
   const hn::RebindToSigned<PixelTag> integers;
   const Pixel one = all<Pixel>(1.0F);
-  // The face lies entirely before or behind the splat on all rays.
+  // The face lies entirely in front of or behind the splat on all rays.
   if (hn::AllTrue(PixelTag(), hn::Le(v, hn::Neg(one)))) return hn::Zero(PixelTag());
   if (hn::AllTrue(PixelTag(), hn::Ge(v, one))) return all<Pixel>(partial_one);
   const Pixel column_position = (v + one) * all<Pixel>(0.5F * (partial_columns - 1));
@@ -107,7 +107,7 @@ KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_REST
   return __builtin_popcount(changed);
 }
 
-// The part before the near plane is ignored.
+// The part in front of the near plane is ignored.
 template <bool Perspective>
 void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
                Tile& tile) {

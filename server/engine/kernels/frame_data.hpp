@@ -121,8 +121,8 @@ struct Pass {
   const std::int32_t* partial;  // see partial.hpp; slab method only
 };
 
-// F(b^2, v): fraction of a splat's footprint before the point v half chords beyond the middle of a
-// ray that passes the centre at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
+// F(b^2, v): fraction of a splat's footprint in front of the point v half chords beyond the middle
+// of a ray that passes the centre at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
 constexpr int partial_rows = 33;
 constexpr int partial_columns = 65;
 constexpr float partial_one = 65535;  // table value of 1

@@ -140,9 +140,9 @@ RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
   return hit;
 }
 
-// The ribbon of a kernel position; empty if masked, below min_magnitude, without direction, outside
-// the kernel box or before the near plane. On a curved lattice the components of a vector are along
-// the edges of the cell.
+// The ribbon of a kernel position; empty if masked, below min_magnitude, without a direction,
+// outside the kernel box or in front of the near plane. On a curved lattice the components of a
+// vector are along the edges of the cell.
 std::optional<Ribbon> make_ribbon(const scene::Scene& scene, const View& view,
                                   const scene::VectorLayer& layer, const KernelPosition& position);
 

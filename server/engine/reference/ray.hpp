@@ -64,7 +64,7 @@ struct RayCount {
   std::int64_t evaluations = 0;
 };
 
-// One piece of the medium before a black background. error: upper bound on |dI| + |dA|.
+// One piece of the medium in front of a black background. error: upper bound on |dI| + |dA|.
 struct PieceLight {
   double alpha = 0;
   double transmitted = 1;

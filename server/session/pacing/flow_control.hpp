@@ -15,7 +15,7 @@ class FlowControl {
  public:
   [[nodiscard]] const Link& link() const { return link_; }
   [[nodiscard]] std::uint32_t next_seq() const { return sent_seq_ + 1; }
-  // Less than two frames are unacknowledged, and none is being written.
+  // Fewer than two frames are unacknowledged, and none is being written.
   [[nodiscard]] bool has_credit() const;
   // Time without a change that precedes a final frame: longer on a slow link.
   [[nodiscard]] Micros rest(const Options& options) const;

@@ -12,7 +12,7 @@ namespace windsplat::transport {
 
 // Holds the session weakly: it must not be destroyed on the renderer's thread; its timer keeps it
 // alive while a response is pending. If the work is lost and no response arrives, the connection is
-// closed; if memory is too short to post that, `lost` is set, and the timer detects it.
+// closed; if there is too little memory to post that, `lost` is set, and the timer detects it.
 class AwaitedReply {
  public:
   AwaitedReply(HttpOwner& owner, boost::asio::any_io_executor executor,

@@ -268,7 +268,7 @@ export class App {
     this.undoControl.edit(() => this.restore(quality === undefined ? view : { quality, ...view }));
   }
 
-  // Replaces the current view by another one.
+  // Replaces the current view with another one.
   restore(view: View): void {
     this.parts.status.clearError();
     const next = this.firstView(view);

@@ -1,4 +1,4 @@
-// Pictures -> a WebM video by the browser's MediaRecorder, which records in real time: the frames
+// Pictures -> a WebM video with the browser's MediaRecorder, which records in real time: the frames
 // are painted on a canvas one after another.
 import { waitFor } from "../wire/frame_request";
 import { clamp } from "../base/values";

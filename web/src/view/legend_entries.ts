@@ -14,7 +14,7 @@ export interface LegendEntry {
   ticks: LegendTick[];
   extinction: [number, number][]; // (position 0..1, fraction of the maximum), medium only
   note: string;
-  leftOut: string; // text on values that are not drawn; empty: none
+  leftOut: string; // text about values that are not drawn; empty: none
 }
 
 const fieldNamed = (dataset: Dataset, name: string): Field | undefined =>
@@ -69,7 +69,7 @@ function heightEntry(dataset: Dataset, view: View, range: [number, number]) {
 
 const speeds = /^([ckm]?m|mi|ft) ?(s⁻¹|h⁻¹|\/ ?s|\/ ?h)$|^knots?$|^kt$/i;
 
-// Text on vectors that are too short to be drawn.
+// Text about vectors that are too short to be drawn.
 function leftOutText(least: number, units: string): string {
   if (!(least > 0)) return "";
   const what = speeds.test(units) ? "slower" : "weaker";

@@ -1,4 +1,4 @@
-// Views -> lossless pictures by POST v1/frames, in order, at most two requests at a time. If the
+// Views -> lossless pictures from POST v1/frames, in order, at most two requests at a time. If the
 // server is busy, the request is repeated after the delay given in its answer.
 import type { View } from "./protocol";
 import { posted, refusalText } from "./requests";

@@ -18,7 +18,7 @@ struct PressureLevels {
   std::optional<HybridLevels> hybrid;
 };
 
-// For terrain-following levels, replaces the vertical axis by mean pressures. coordinate: the
+// For terrain-following levels, replaces the vertical axis with mean pressures. coordinate: the
 // vertical coordinate variable, -1 if there is none. Errors: bad_data.
 Result<PressureLevels> find_pressures(const ArrayFile& file, int coordinate, Placement& grid,
                                       DatasetInfo& info);

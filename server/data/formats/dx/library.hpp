@@ -28,7 +28,7 @@ class Library {
   // Errors: bad_data, not_found.
   Result<Found> find(const Found& from, const Reference& reference);
 
-  // Location of the numbers of an array by its `items` and `shape`; the caller sets the strides.
+  // Location of the numbers of an array, from its `items` and `shape`; the caller sets the strides.
   Result<bytes::Placement> place(const Found& array);
   // All numbers of a small array.
   Result<std::vector<double>> numbers(const Found& array, std::uint64_t count_max);

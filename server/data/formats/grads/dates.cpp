@@ -1,4 +1,4 @@
-// Date arithmetic by std::chrono, or with years of 365 days.
+// Date arithmetic with std::chrono, or with years of 365 days.
 #include "server/data/formats/grads/dates.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Metadata of one GRIB message, and its values in the order of rows and columns. All calls of
+// Metadata of one GRIB message, and its values in the order of rows and columns. All calls to
 // ecCodes are made here, under one lock.
 #pragma once
 

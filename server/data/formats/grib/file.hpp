@@ -1,4 +1,4 @@
-// The fields of a GRIB file combined to arrays over time, level, row and column.
+// The fields of a GRIB file combined into arrays over time, level, row and column.
 #pragma once
 
 #include <map>

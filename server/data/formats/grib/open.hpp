@@ -1,4 +1,4 @@
-// GRIB 1 and 2 by ecCodes, if windsplat was built with it. InputFile -> arrays.
+// GRIB 1 and 2 through ecCodes, if windsplat was built with it. InputFile -> arrays.
 #pragma once
 
 #include <memory>

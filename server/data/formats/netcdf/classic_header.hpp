@@ -1,5 +1,5 @@
-// The size that a classic netCDF file must have by its header. The library reads zeros beyond the
-// end of a truncated file, so the reader checks the size first.
+// The size that a classic netCDF file must have according to its header. The library reads zeros
+// beyond the end of a truncated file, so the reader checks the size first.
 #pragma once
 
 #include <cstdint>

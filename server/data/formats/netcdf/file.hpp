@@ -1,4 +1,4 @@
-// One open netCDF file, by the C library with RAII. InputFile -> validation -> nc_open ->
+// One open netCDF file, through the C library with RAII. InputFile -> validation -> nc_open ->
 // FileContents and numbers.
 #pragma once
 

@@ -17,8 +17,8 @@ namespace {
 
 constexpr std::size_t nesting_max = 64;  // limit of groups within groups
 
-// Largest number of objects of a file by its size: the smallest object has about 300 bytes, but a
-// link only about 20, and the netCDF library uses some kB for each.
+// Largest number of objects in a file of a given size: the smallest object has about 300 bytes, but
+// a link only about 20, and the netCDF library uses some kB for each.
 std::size_t objects_max(const InputFile& input) { return 8192 + input.size() / 128; }
 
 std::string bytes_text(std::size_t bytes) { return std::to_string(bytes) + " bytes"; }

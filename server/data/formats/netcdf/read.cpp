@@ -1,4 +1,4 @@
-// Reads blocks by the netCDF library, and masks unwritten chunks reported by HDF5.
+// Reads blocks through the netCDF library, and masks unwritten chunks reported by HDF5.
 #include <netcdf.h>
 
 #include <algorithm>

@@ -140,7 +140,7 @@ std::vector<OutVariable> plan_variables(const DatasetInfo& info) {
   return out;
 }
 
-// Replaces "HDF error" by an error of a full disk if there is no space left.
+// Replaces "HDF error" with an error of a full disk if there is no space left.
 Error with_room_left(Error error, const std::string& path) {
   std::error_code fault;
   const auto room = std::filesystem::space(std::filesystem::path(path).parent_path(), fault);

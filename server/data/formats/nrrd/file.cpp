@@ -44,7 +44,7 @@ class Part {
   Part(const Header& header, std::uint64_t begin, std::uint64_t bytes)
       : header_(header), begin_(begin), bytes_(bytes) {}
 
-  // Adds the bytes after the samples to `rest`, if the encoding permits to count them.
+  // Adds the bytes after the samples to `rest`, if the encoding permits counting them.
   [[nodiscard]] Result<std::shared_ptr<ByteStore>> in(const std::shared_ptr<const InputFile>& file,
                                                       std::uint64_t& rest) const {
     const auto from = skip_lines(*file, begin_, header_.line_skip);

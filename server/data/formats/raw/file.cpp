@@ -52,7 +52,7 @@ class Opener {
     std::uint64_t step_bytes;
   };
 
-  // Layout of a file by the description of all its fields.
+  // Layout of a file, from the description of all its fields.
   struct Extent {
     std::uint64_t size = 0;
     std::uint64_t described = 0;                 // end of the last step, bytes

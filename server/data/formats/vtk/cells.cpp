@@ -1,4 +1,4 @@
-// Inverts shape functions by Newton's method, or by division into simplices if that fails.
+// Inverts shape functions with Newton's method, or by division into simplices if that fails.
 #include "server/data/formats/vtk/cells.hpp"
 
 #include <algorithm>

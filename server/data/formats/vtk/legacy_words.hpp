@@ -40,7 +40,7 @@ class Scanner {
   std::vector<char> buffer_;
 };
 
-// The type of an array's values by its name in the file, in lower case.
+// The type of an array's values, given its name in the file in lower case.
 std::optional<bytes::Scalar> type_named(const std::string& name);
 
 // Decodes percent-encoded names.

@@ -56,7 +56,7 @@ Result<void> for_rows(const Extent& whole, const Extent& piece, bool of_cells, c
   const auto part = of_cells ? piece.cells() : piece.points();
   std::array<std::int64_t, 3> from{};
   for (std::size_t a = 0; a < 3; ++a) {
-    // A piece of one layer of points at the end of the whole has no own cells.
+    // A piece of one layer of points at the end of the whole has no cells of its own.
     from[a] = std::min(piece.first[a] - whole.first[a], all[a] - part[a]);
   }
   for (std::int64_t k = 0; k < part[2]; ++k) {
