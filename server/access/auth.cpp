@@ -154,7 +154,7 @@ Result<Token> Token::parse(std::string_view file) {
   }
   if (!is_b64token(file)) {
     return token_error(
-        "has an invalid character; allowed are letters, digits, -._~+/ "
+        "has an invalid character; it may contain letters, digits and -._~+/, "
         "and = at the end");
   }
   Token token;

@@ -23,7 +23,7 @@ namespace {
 constexpr const char* description =
     "windsplat draws winds and clouds from a 3-D field, on the CPU, for a browser or a file.\n"
     "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, study, synth).\n"
-    "An option that names an environment variable may be given by it; the option wins.";
+    "Where an option names an environment variable, that may set it; the option has precedence.";
 
 // Edit distance of two words: letters changed, added, removed or swapped with a neighbour.
 std::size_t letters_between(std::string_view one, std::string_view other) {

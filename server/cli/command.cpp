@@ -64,7 +64,7 @@ Result<std::uint64_t> memory_limit(const std::string& text) {
   return make_error(ErrorKind::malformed,
                     option + "is below the minimum of " + bytes_text(memory_bytes_min) + ": " +
                         bytes_text(program_bytes) + " for the program and a picture, the rest " +
-                        "for a loader and fields (a number without K, M, G or T is of bytes)");
+                        "for a loader and fields (a number without K, M, G or T is in bytes)");
 }
 
 void complain(std::string_view message) {

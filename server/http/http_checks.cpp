@@ -134,7 +134,7 @@ std::optional<Response> check_request(const Request& request, unsigned version) 
   if (count(request, "Host") != 1) return bad_request("a request must have exactly one Host");
   if (const std::string host = request.header("Host"); !is_host(host)) {
     return bad_request("the Host " + printable(host, 80) +
-                       " is not a host name with optional port");
+                       " is not a host name with an optional port");
   }
   if (std::find(known_methods.begin(), known_methods.end(), request.method) ==
       known_methods.end()) {

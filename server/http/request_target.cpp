@@ -176,7 +176,7 @@ std::optional<std::array<double, 2>> QueryReader::pair(std::string_view key, dou
     const auto value = parts.size() == 2 ? parse_number(parts[i]) : std::nullopt;
     if (!value) {
       fail(ErrorKind::malformed, "query parameter '" + std::string(key) +
-                                     "' must be two numbers with a comma, not " +
+                                     "' must be two numbers separated by a comma, not " +
                                      printable(*text, 80));
       return std::nullopt;
     }

@@ -206,7 +206,9 @@ Result<void> check_extinction(const protocol::ScalarView& scalar, const std::str
   for (std::size_t n = 0; n < scalar.extinction->size(); ++n) {
     const auto& point = (*scalar.extinction)[n];
     const std::string at = pointer + "/extinction/" + std::to_string(n);
-    if (!std::isfinite(point[0]) || !(point[1] >= 0)) return invalid_at(at, "is not an extinction");
+    if (!std::isfinite(point[0]) || !(point[1] >= 0)) {
+      return invalid_at(at, "must be a finite value and an extinction of at least 0");
+    }
     if (n > 0 && point[0] < (*scalar.extinction)[n - 1][0]) {
       return invalid_at(at, "its value is less than the previous one");
     }

@@ -103,7 +103,7 @@ std::vector<std::string> standard_names() {
 Result<Subject> standard_subject(const std::string& name, bool quick) {
   if (is_one_of(name, blob_names)) return blob_subject(name, quick);
   if (!is_one_of(name, sample_scenes)) {
-    std::string message = "there is no standard scene '" + printable(name) + "'; there are";
+    std::string message = "there is no standard scene '" + printable(name) + "'; known scenes:";
     for (const std::string& known : standard_names()) {
       message += ' ';
       message += known;

@@ -59,7 +59,8 @@ void give(CLI::Option& option, const std::vector<std::string>& words) {
 Result<void> apply(CLI::App& command, const ConfigEntry& entry) {
   CLI::Option* const option = is_setting(entry.key) ? find_option(command, entry.key) : nullptr;
   if (option == nullptr) {
-    return protocol::config_error(entry.key, "unknown; known are " + known_names(command));
+    return protocol::config_error(entry.key,
+                                  "unknown option; known options: " + known_names(command));
   }
   if (std::string fault = kind_fault(*option, entry.kind); !fault.empty()) {
     return protocol::config_error(entry.key, std::move(fault));

@@ -80,7 +80,7 @@ void add_limit_options(CLI::App& command, access::Limits& limits) {
   add(command, "--max-kernels", "WINDSPLAT_MAX_KERNELS", limits.kernels, number_max,
       "Estimated cost of a picture: lines, samples and the pixels they cover (16 count as 1)", "N");
   add(command, "--max-render", "WINDSPLAT_MAX_RENDER", limits.render_s, number_max,
-      "Estimated rendering time of a picture requested by HTTP", "SECONDS");
+      "Estimated rendering time of a picture requested over HTTP", "SECONDS");
   add(command, "--max-wait", "WINDSPLAT_MAX_WAIT", limits.wait_ms, number_max,
       "Reject an HTTP request for a picture that would wait for other addresses longer than this "
       "and longer than its own rendering time",

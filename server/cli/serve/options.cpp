@@ -50,7 +50,7 @@ void add_network_options(CLI::App& command, ServeArguments& arguments) {
       ->allow_extra_args(false)
       ->delimiter(',')
       ->type_name("NAME");
-  command.add_option("--max-sessions", arguments.sessions, "Limit of open sessions")
+  command.add_option("--max-sessions", arguments.sessions, "Concurrent sessions")
       ->envname("WINDSPLAT_MAX_SESSIONS")
       ->check(CLI::Range(1, sessions_max))
       ->type_name("N")
@@ -92,8 +92,9 @@ void add_data_options(CLI::App& command, ServeArguments& arguments) {
       ->type_name("DIR");
   add_memory_option(command, arguments.memory_limit);
   command
-      .add_option("--storage", arguments.storage,
-                  "Of resident data; the error of 16 bits is at most 1/131068 of a field's range")
+      .add_option(
+          "--storage", arguments.storage,
+          "Precision of resident data; packed16 errs by at most 1/131068 of a field's range")
       ->envname("WINDSPLAT_STORAGE")
       ->check(CLI::IsMember({"float32", "packed16"}))
       ->capture_default_str();

@@ -151,7 +151,7 @@ class HttpSession final : public Connection, public HttpOwner {
     const http::Request& request = current_.request;
     RequestParser& input = reader_.input();
     if (!input.parser().is_done() || input.has_input()) {
-      return refuse(http::problem_response(400, "Bad Request", "an upgrade has no body"));
+      return refuse(http::problem_response(400, "Bad Request", "an upgrade must have no body"));
     }
     if (auto fault = http::check_upgrade(request)) return refuse(std::move(*fault));
     if (context_.draining) {

@@ -215,7 +215,7 @@ def main():
         parser.error(f"{options.build} has no {' and no '.join(missing)}: "
                      "./scripts/build release windsplat bench_path")
     if not configs:
-        parser.error(f"no VTK configuration is named '{options.only}'; known are: {names}")
+        parser.error(f"no VTK configuration is named '{options.only}'; known names: {names}")
     try:
         python = vtk_python()
         with Display() as display, tempfile.TemporaryDirectory() as folder:

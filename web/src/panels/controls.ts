@@ -152,7 +152,7 @@ export const hasErrorLimit = (view: View): boolean => (view.quality?.maxError ??
 // Describes what moving frames are optimized for.
 export const qualityHint = (view: View): string =>
   hasErrorLimit(view)
-    ? "Moving frames: the fastest that is expected to keep the error, within the budget."
+    ? "Moving frames: the fastest expected to meet the error limit, within the budget."
     : "Moving frames: the least error that the budget allows.";
 
 // Which controls apply to a view; the others are hidden or disabled.

@@ -168,8 +168,8 @@ class Opener {
     }
     return append(out, std::move(*grid), *data->object, std::move(*place), cells,
                   fault("whose members differ in grid or type"),
-                  fault("with values of a shape that is not drawn: numbers and vectors of 2 or 3 "
-                        "components are"));
+                  fault("with values of an unsupported shape: only numbers and vectors of 2 or 3 "
+                        "components are supported"));
   }
 
   Result<void> append(Sequence& out, Grid grid, const Object& data, bytes::Placement place,

@@ -29,7 +29,7 @@ class Builder {
     if (auto fine = add(positions_); !fine) return fine.error();
     if (lines_.size() < 2 || lines_.size() > space_max) {
       return fault("a grid of " + std::to_string(lines_.size()) +
-                   " dimensions is not drawn; 2 or 3 are");
+                   " dimensions; 2 or 3 are supported");
     }
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       for (std::size_t other = 0; other < i; ++other) {
@@ -104,7 +104,9 @@ class Builder {
           delta.begin(), delta.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
       double length = 0;
       for (const double value : delta) length = std::hypot(length, value);
-      if (!(length > 0) || !std::isfinite(length)) return fault("a delta of no length");
+      if (!(length > 0) || !std::isfinite(length)) {
+        return fault("a delta whose length is zero or not finite");
+      }
       Line line;
       line.place = static_cast<std::size_t>(most - delta.begin());
       const bool skew = length - std::abs(*most) > 1e-6 * length;

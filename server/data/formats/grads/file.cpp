@@ -237,7 +237,7 @@ class Opener {
     const bool pressure = falls || ctl_.pascals;
     if (pressure) {
       file_->add_note(ctl_.pascals
-                          ? "levels are pressures in Pa by the option pascals"
+                          ? "levels are pressures in Pa because of the option pascals"
                           : "levels descend from 1100 or less: interpreted as pressures in hPa, as "
                             "in GrADS");
     }

@@ -151,7 +151,7 @@ Result<void> File::look_before_opening() {
   if (!classic_) {
     if (has_hdf5_signature(*input_)) return {};
     constexpr std::array<unsigned char, 4> hdf4{0x0e, 0x03, 0x13, 0x01};
-    return magic == hdf4 ? fault("is HDF4, which is not supported; convert it by h4toh5")
+    return magic == hdf4 ? fault("is HDF4, which is not supported; convert it with h4toh5")
                          : fault(
                                "is not a netCDF file, nor of another supported format: its first "
                                "bytes match no known signature");
@@ -191,14 +191,14 @@ Result<void> File::open_library() {
   }
   if (!classic_) {
     hdf5_ = open_hdf5(*input_);
-    if (!hdf5_) return fault("cannot be opened by HDF5 in addition to the netCDF library");
+    if (!hdf5_) return fault("is opened by the netCDF library but not by the HDF5 library");
     netcdf4_ = H5Aexists(hdf5_.id(), "_NCProperties") > 0;
   }
   int model = 0;
   int mode = 0;
   if (nc_inq_format_extended(ncid_, &model, &mode) != NC_NOERR ||
       model != (classic_ ? NC_FORMATX_NC3 : NC_FORMATX_NC_HDF5)) {
-    return fault("does not have the format of its signature");
+    return fault("has a format that differs from its signature");
   }
   return {};
 }

@@ -222,7 +222,7 @@ class Placer {
         continue;
       }
       if (!(length_of(direction) > 0) || !std::isfinite(length_of(direction))) {
-        return bad("has a space direction of no length");
+        return bad("has a space direction whose length is zero or not finite");
       }
       if (dimension != 0 && direction.size() != dimension) {
         return bad("has space directions of different dimensions");

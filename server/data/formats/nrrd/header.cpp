@@ -153,7 +153,7 @@ class Parser {
   void file_dimension(const Line& line, std::string_view word) {
     const auto count = bytes::to_integer(word);
     if (!count || *count < 1 || *count > dimension_max) {
-      complain(line, "the dimension of a data file is not a small number");
+      complain(line, "the dimension of a data file must be 1 to " + std::to_string(dimension_max));
     } else {
       header_.file_dimension = static_cast<std::size_t>(*count);
     }

@@ -92,7 +92,7 @@ class Object {
   }
 
   static std::string text_of(const json& value, const std::string& pointer) {
-    if (!value.is_string()) refuse(pointer, "must be text");
+    if (!value.is_string()) refuse(pointer, "must be a string");
     auto text = value.get<std::string>();
     if (text.size() > text_max) {
       refuse(pointer, "is longer than " + std::to_string(text_max) + " bytes");

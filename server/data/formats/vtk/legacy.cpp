@@ -116,7 +116,7 @@ class Reader {
     } else {
       return file_->fault(
           "holds VTK data of the type " + in_quotes(*word) +
-          "; supported are STRUCTURED_POINTS, RECTILINEAR_GRID, STRUCTURED_GRID and "
+          "; supported types: STRUCTURED_POINTS, RECTILINEAR_GRID, STRUCTURED_GRID and "
           "UNSTRUCTURED_GRID");
     }
     return {};

@@ -146,7 +146,7 @@ class Document {
       out.format = "VTK unstructured grid";
     } else {
       return file_->fault("holds VTK data of the type " + in_quotes(type) +
-                          "; supported are ImageData, RectilinearGrid, StructuredGrid, "
+                          "; supported types: ImageData, RectilinearGrid, StructuredGrid, "
                           "UnstructuredGrid and Collection");
     }
     const xml_node set = root_.child(type.c_str());
@@ -212,7 +212,7 @@ class Document {
       coding_.compressor = Compressor::lz4;
     } else if (!compressor.empty()) {
       return file_->fault("is compressed with " + in_quotes(compressor) +
-                          "; supported are vtkZLibDataCompressor and vtkLZ4DataCompressor");
+                          "; supported: vtkZLibDataCompressor and vtkLZ4DataCompressor");
     }
     return {};
   }

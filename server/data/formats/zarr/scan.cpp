@@ -120,7 +120,7 @@ class StoreScan {
     }
     if (!files_.exists(".zgroup")) {
       return make_error(ErrorKind::bad_data,
-                        "is a Zarr store of version 3, which is not supported; version 2 is");
+                        "is a Zarr store of version 3; only version 2 is supported");
     }
     return find_below_root();
   }

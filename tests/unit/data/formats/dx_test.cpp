@@ -197,7 +197,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadDxCase{"count", with_array("items 2 data follows 1 2"), "with 2 values on 12 positions"},
         BadDxCase{"tensor",
                   with_array("rank 1 shape 9 items 12 data follows " + text_of(counted(108))),
-                  "of a shape that is not drawn"},
+                  "of an unsupported shape"},
         BadDxCase{"strings", with_array("type string items 12 data follows \"a\""),
                   "not supported"},
         BadDxCase{"outside", with_array("items 12 data file \"../x\",0"),
