@@ -36,7 +36,7 @@ std::string named(const std::string& what, const Size& size) {
   return what + " " + std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-// The same scene by method slab: no naive row, because the naive renderer is kernel-based.
+// The same scene with method slab: no naive row, because the naive renderer is kernel-based.
 Workload by_slab(Workload workload) {
   workload.name += " slab";
   workload.method = protocol::MethodName::slab;

@@ -1,5 +1,5 @@
-// Speed of reading the volumes of a dataset: by the bare library or bare reads, by the reader in
-// this process, and by a loader process (which also transfers and validates them). Files are
+// Speed of reading the volumes of a dataset: with the bare library or bare reads, with the reader
+// in this process, and with a loader process (which also transfers and validates them). Files are
 // written and read once before, so that they are in the page cache; each read uses memory that is
 // new to the process, as resident volumes do. Milliseconds per step of all fields, the minimum of
 // the rounds, and ratios to the bare read.

@@ -157,8 +157,8 @@ void frames(benchmark::State& state, const Workload& workload, unsigned threads)
   }
   series.count(state);
   const data::Dataset& dataset = bench::dataset_of(workload.sample);
-  state.counters["bytes a voxel"] = static_cast<double>(dataset.resident_bytes()) /
-                                    static_cast<double>(dataset.info().grid.samples());
+  state.counters["bytes per voxel"] = static_cast<double>(dataset.resident_bytes()) /
+                                      static_cast<double>(dataset.info().grid.samples());
 }
 
 // Normal console output, and every run for the tables.
@@ -240,7 +240,7 @@ int run(int argc, char** argv) {
        {std::pair<std::string, bench::Row>{"medians, ms", times},
         {"a frame",
          {"allocations", "allocated MB", "in flight MB", "engine allocations",
-          "engine allocated MB", "JPEG kB", "bytes a voxel"}}}) {
+          "engine allocated MB", "JPEG kB", "bytes per voxel"}}}) {
     const bench::Table table = reporter.table(what, names);
     text += "\n";
     text += bench::plain(table, 1);

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Checks whether moving frames keep their budget: runs a daemon and a client that orbits, and lists
-for every budget the times, reported errors and settings of frames. Prints Markdown.
+"""Checks whether moving frames stay within their budget: runs a daemon and a client that
+orbits, and lists for every budget the times, reported errors and settings of frames. Prints
+Markdown.
 
 Usage: budgets.py [--program=windsplat] [--dataset=climate ...] [--size=640x480]
        [--budgets=16,33,66,100] [--max-errors=0.05,0.02,0.005] [--frames=120] [--check]

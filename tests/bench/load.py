@@ -10,8 +10,8 @@ each send the next request after an answer, or 50 ms after a refusal. Then reque
 and 10 times that rate regardless of answers (an open loop), each on a separate connection, from
 many addresses of 127.0.0.0/8. All pictures differ, so none is cached. Latency counts from sending
 the request; the delay of sending and the CPU time of the client are reported separately, because on
-two cores the client slows the daemon. Goodput is answers of 200 a second. A separate process
-requests /livez every 20 ms on new connections.
+two cores the client slows the daemon. Goodput is the number of 200 answers per second. A
+separate process requests /livez every 20 ms on new connections.
 
 Targets: at 10 times the peak the p99 of /livez is below 50 ms, that of admitted requests at most
 twice the unloaded one, and goodput at least 80 % of the peak. --check: exit 1 if a target is

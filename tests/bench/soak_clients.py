@@ -117,7 +117,7 @@ async def normal(client, counts, until):
 
 
 async def request(client, counts):
-    """Requests a picture or a saved view by HTTP."""
+    """Requests a picture or a saved view over HTTP."""
     reader, writer = await asyncio.open_connection("127.0.0.1", client.port,
                                                    ssl=client.options.context,
                                                    local_addr=(client.address, 0))

@@ -225,7 +225,7 @@ const watchDensities = () => {
   };
 };
 
-test("a high-density screen is sharp at rest and keeps the budget in motion", () =>
+test("a high-density screen is sharp at rest and within the budget in motion", () =>
   withPage(
     async (page) => {
       const box = await pictureBox(page);

@@ -92,7 +92,7 @@ def mask_cases():
         body = struct.pack(">H", 1000) if opcode == CLOSE else b"hi"
         yield closing(f"mask.none.{name}", where, f"an unmasked {name} frame",
                       frame(opcode, body, mask=b""), 1002)
-    yield closing("mask.none.empty", where, "an unmasked text of no length",
+    yield closing("mask.none.empty", where, "an unmasked text of length zero",
                   frame(TEXT, mask=b""), 1002)
     yield closing("mask.none.medium", where, "an unmasked text of 300 bytes",
                   frame(TEXT, b"x" * 300, mask=b""), 1002)

@@ -170,7 +170,7 @@ def silent(world, count):
         took.append(time.monotonic() - since)
     need(max(took) < SILENT_S + SLACK_S, f"one was held for {max(took):.1f} s")
     check_good(plain.port)
-    return f"closed after {max(took):.1f} s at most, by TCP and by TLS"
+    return f"closed after {max(took):.1f} s at most, over TCP and over TLS"
 
 
 @case("old versions and weak ciphers of TLS, by sslscan", 1, 1)

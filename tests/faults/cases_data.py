@@ -154,7 +154,7 @@ def little_memory(world, count):
     return "refused at startup or 507; a small dataset is still rendered"
 
 
-@case("little address space (ulimit -v)", 10, 3)
+@case("limited address space (ulimit -v)", 10, 3)
 def little_space(world, count):
     probe = world.start(SAMPLE)
     check_good(probe.port)
@@ -180,7 +180,7 @@ def little_space(world, count):
     return f"{refused} of {count} refused by 507 or 503, good ones between; ends with 0"
 
 
-@case("little memory (cgroup)", 10, 2)
+@case("limited memory (cgroup)", 10, 2)
 def little_cgroup(world, count):
     """The kernel kills the loader or reclaims pages; if the daemon itself exceeds the group's
     limit it is killed, as intended, so the sizes used here leave room for it."""

@@ -14,9 +14,9 @@ must not hang. Afterwards a stream opened before must continue, unless the log s
 connection failed, and a new request must succeed. --count and --seconds end a sweep early; the
 table gives the number of call sites. Phase guarded: the same on [::1] over TLS, with a token,
 limits of one address, logins and SIGHUPs. Phase start: the daemon starts, or exits with a
-message and an exit code. Phase drain: it exits with 0 within 10 s. A kind of call of which none
-failed in a phase is a failure, because nothing was tested. Exit code 0: the daemon never
-crashed, hung, or refused valid requests afterwards."""
+message and an exit code. Phase drain: it exits with 0 within 10 s. If no call of a kind failed in
+a phase, that is a failure, because nothing was tested. Exit code 0: the daemon never crashed,
+hung, or refused valid requests afterwards."""
 import argparse
 import http.client
 import json

@@ -1,5 +1,5 @@
-"""Shared by the fault scripts: a daemon with its log, requests, a stream by its bytes, and /proc
-entries of a process. Standard library only. Linux only."""
+"""Shared by the fault scripts: a daemon with its log, requests, a stream at the byte level, and
+/proc entries of a process. Standard library only. Linux only."""
 import collections
 import http.client
 import json
@@ -230,7 +230,7 @@ class Closed(Exception):
 
 
 class Stream:
-    """A WebSocket on the byte level, so that any byte may be invalid."""
+    """A WebSocket at the byte level, so that any byte may be invalid."""
 
     def __init__(self, port, headers=(), receive_buffer=0, timeout=PATIENCE_S, target="/v1/stream",
                  protocols="windsplat.v1"):

@@ -37,7 +37,7 @@ REQUESTS = [
          "/v1?x=1", "/v1/datasets?steps=1"),
     ("HEAD", "/v1", {}, None), ("OPTIONS", "/v1/frames", {}, None), ("OPTIONS", "*", {}, None),
     ("DELETE", "/v1", {}, None), ("TRACE", "/v1", {}, None), ("PUT", "/v1/frames", {}, "{}"),
-    # pictures by GET
+    # pictures with GET
     *get(*(f"{FRAME}.{kind}?width=64&height=48" for kind in ("jpg", "png", "npy"))),
     *get(f"{FRAME}.png?width=64&height=48&azimuth=30&elevation=40&zoom=1.5",
          f"{FRAME}.png?width=64&height=48&preset=streaks",
@@ -46,7 +46,7 @@ REQUESTS = [
          f"{FRAME}.png?foo=1", f"{FRAME}.png?width=64&width=65", f"{FRAME}.png?azimuth=x",
          f"{FRAME}.png?step=99", "/v1/datasets/none/frame.jpg"),
     *get(f"{FRAME}.jpg?width=64&height=48", Accept="image/png"),
-    # pictures by POST
+    # pictures with POST
     *post("/v1/frames", view(), Accept="image/png"),
     *post("/v1/frames", view(scalars=[]), Accept="application/x-npy"),
     *post("/v1/frames", view(vector={"field": None}), Accept="image/png"),

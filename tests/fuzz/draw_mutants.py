@@ -19,7 +19,7 @@ if all samples are masked. Both daemons must give the same bytes. CPU time per f
 are bounded.
 
 Needs python3-netcdf4. The files depend on --seed only. Exit code 0: no assertion failed, and at
-least half of the files of each format were opened and rendered by both methods.
+least half of the files of each format were opened and rendered with both methods.
 """
 
 import argparse
@@ -59,7 +59,7 @@ class Process:
         self.cpu = self.cpu_seconds()
 
     def cpu_seconds(self):
-        """Peak memory of the daemon, and of its ended loaders."""
+        """CPU time of the daemon and of its ended loaders, in seconds."""
         stat = pathlib.Path(f"/proc/{self.daemon.child.pid}/stat").read_text()
         return sum(map(int, stat.rpartition(")")[2].split()[11:15])) / os.sysconf("SC_CLK_TCK")
 

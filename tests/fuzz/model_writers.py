@@ -1,4 +1,4 @@
-"""Model -> the files of a dataset: netCDF by the C library, other formats byte by byte."""
+"""Model -> the files of a dataset: netCDF through the C library, other formats byte by byte."""
 
 import gzip
 import json

@@ -121,7 +121,7 @@ def text_line(data, random, other):
 
 
 def text_word(data, random, other):
-    """Removes a word, repeats it, or replaces it by a different one."""
+    """Removes a word, repeats it, or replaces it with a different one."""
     words = list(re.finditer(rb"[A-Za-z_.]{2,}|[\"'<>{}\[\]():,=/]", data[:HEAD]))
     if not words:
         return flip_bits(data, random, other)
@@ -132,7 +132,7 @@ def text_word(data, random, other):
 
 
 def text_value(data, random, other):
-    """Replaces a quoted string by a different one or by a number; the syntax remains valid."""
+    """Replaces a quoted string with a different one or with a number; the syntax remains valid."""
     values = list(re.finditer(rb'"([^"<>\n]*)"', data[:HEAD * 4]))
     if not values:
         return text_number(data, random, other)

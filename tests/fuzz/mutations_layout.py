@@ -278,7 +278,7 @@ def grib_bitmap(model, dice):
 
 
 def grib_scaling(model, dice):
-    """Reference, binary and decimal scale, bits a value: any valid numbers."""
+    """Reference, binary and decimal scale, bits per value: any valid numbers."""
     if model.kind not in GRIB:
         return False
     for field, at in each_message(model, dice, 0.3):

@@ -251,7 +251,7 @@ def attribute_of_wrong_type(model, dice):
 
 
 def unnamed(model, dice):
-    """Removes standard names and units, or replaces them by those of another quantity."""
+    """Removes standard names and units, or replaces them with those of another quantity."""
     if model.kind not in CF:
         return False
     for field in model.fields:

@@ -1,4 +1,4 @@
-// Creates X.509 certificates by OpenSSL: a P-256 key, version 3, with names of this machine.
+// Creates X.509 certificates with OpenSSL: a P-256 key, version 3, with names of this machine.
 #include "certificate.hpp"
 
 #include <openssl/evp.h>

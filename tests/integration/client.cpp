@@ -1,4 +1,4 @@
-// Sockets by poll(); HTTP/1.1 and RFC 6455 as far as the tests need them.
+// Sockets with poll(); HTTP/1.1 and RFC 6455 as far as the tests need them.
 #include "client.hpp"
 
 #include <arpa/inet.h>

@@ -117,7 +117,7 @@ TEST(Line, ColorFollowsTheConfiguredSource) {
   EXPECT_NEAR(brightness(scene::LineColor::magnitude, 0, 20), 0.5, 1e-5);
   EXPECT_NEAR(brightness(scene::LineColor::world_z, -1, 3), 0.25, 1e-5);
   EXPECT_NEAR(brightness(scene::LineColor::screen_z, 0, 10), 0.5, 1e-5);
-  // Half way up the box, rising at 0.8 of its length.
+  // Halfway up the box, rising at 0.8 of its length.
   EXPECT_NEAR(brightness(scene::LineColor::rise, 0, 1), 0.75 * 0.5 + 0.25 * 0.9, 1e-5);
 }
 

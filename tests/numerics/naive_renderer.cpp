@@ -348,8 +348,8 @@ class Renderer {
     return {dot(inverse_[0], v), dot(inverse_[1], v), dot(inverse_[2], v)};
   }
 
-  // The three pieces of the paper composited in order: medium before the line, line, medium behind
-  // it.
+  // The three pieces of the paper composited in order: medium in front of the line, line, medium
+  // behind it.
   void add_pieces(std::size_t index, Real absorbed, Real opacity, Real place,
                   const Vec<Real>& medium, const Vec<Real>& line) {
     const Real alphas[3] = {place * absorbed, opacity, (1 - place) * absorbed};
@@ -367,7 +367,7 @@ class Renderer {
   }
 
   // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau x) (c_v - c_s), `over` front to back.
-  // The other rules replace the second exponential by a chord or by nothing, or A by tau.
+  // The other rules replace the second exponential with a chord or with nothing, or A with tau.
   void add(std::size_t index, Real tau, Real opacity, Real place, const Vec<Real>& medium,
            const Vec<Real>& line) {
     using scene::Compositing;

@@ -1,4 +1,4 @@
-// Parts of the footprint, computed by integrals over the kernel.
+// Parts of the footprint, computed as integrals over the kernel.
 #pragma once
 
 #include <algorithm>

@@ -149,7 +149,7 @@ TEST(Ray, SheetsInASlabHaveTheirClosedForm) {
         sheets.push_back({unit(random), unit(random), {unit(random), unit(random), unit(random)}});
       }
       if (count == 7) sheets[3].opacity = 1;
-      sheets.push_back({-0.5, 0.3, {1, 1, 0}});  // before the slab
+      sheets.push_back({-0.5, 0.3, {1, 1, 0}});  // in front of the slab
       sheets.push_back({1.5, 0.8, {0, 1, 1}});   // and behind it
       std::sort(sheets.begin(), sheets.end(),
                 [](const Surface& a, const Surface& b) { return a.depth < b.depth; });

@@ -49,7 +49,7 @@ def is_code(path, content):
 
 
 def long_functions(path, lines):
-    """Blocks at the depth of a free function or a member of a class, as clang-format sets them.
+    """Blocks at the depth of a free function or a member of a class, as clang-format lays them out.
 
     A statement runs from its first line to the one that ends in ; { } or :, so that a function is
     known by its whole signature.

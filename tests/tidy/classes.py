@@ -1,4 +1,4 @@
-"""Members of C++ classes as clang-format sets them: functions and data, without constructors,
+"""Members of C++ classes as clang-format lays them out: functions and data, without constructors,
 destructors, deleted functions, constants and nested types."""
 import re
 

@@ -126,7 +126,7 @@ void expect_premultiplied(const engine::Image& image) {
   }
 }
 
-// The default view except for size and threshold, by both methods of streams.
+// The default view except for size and threshold, with both methods of streams.
 void draw(std::unique_ptr<FileSource> source) {
   if (source->info().grid.samples() > drawn_samples_max) return;
   const int last_step = static_cast<int>(source->info().steps.size()) - 1;

@@ -1,4 +1,4 @@
-// Decodes a PNG by the simplified API of libpng.
+// Decodes a PNG with the simplified API of libpng.
 #pragma once
 
 #include <gtest/gtest.h>

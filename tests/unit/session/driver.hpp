@@ -149,7 +149,7 @@ class Driver {
   std::vector<Calibrate> calibrations;
   std::optional<quality::Forecasts> calibrated;  // forecasts known; empty: the prior
   bool averaged = false;  // averaged data: errors of final frames do not depend on their slabs
-  std::optional<double> measured_error;  // error of final frames drawn by slabs of the view's own
+  std::optional<double> measured_error;  // error of final frames drawn with slabs of the view's own
                                          // thickness
 
  private:

@@ -140,7 +140,7 @@ TEST(NearestSample, NearestColumnIsMeasuredOnTheSphere) {
     const double latitude = 90 - std::hypot(x, y);
     const double longitude = std::atan2(y, x) * 180 / M_PI + 360 * (trial % 3 - 1);
     const std::array<int, 3> index = found(grid, longitude, latitude, 850);
-    // By unit vectors, an independent formula for the distance.
+    // From unit vectors, an independent formula for the distance.
     const auto unit = [](double lon, double lat) {
       const double a = lon * M_PI / 180;
       const double b = lat * M_PI / 180;

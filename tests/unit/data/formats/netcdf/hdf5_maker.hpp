@@ -1,4 +1,4 @@
-// Creates files by the HDF5 library itself.
+// Creates files with the HDF5 library itself.
 #pragma once
 
 #include <gtest/gtest.h>

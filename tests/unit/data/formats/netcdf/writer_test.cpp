@@ -1,4 +1,4 @@
-// open_file reads files of write_netcdf bit by bit, and other programs find their CF metadata.
+// open_file reads files of write_netcdf bit for bit, and other programs find their CF metadata.
 #include "server/data/formats/netcdf/writer.hpp"
 
 #include <gtest/gtest.h>
