@@ -71,7 +71,7 @@ class Admission {
   Seat open_session(const std::string& address);
   // Whether a token may be compared: the number of recent failures is within the limit.
   std::optional<http::Response> may_try_login(const std::string& address);
-  // The response to a wrong token beyond the limit of failures; nullopt: the usual one.
+  // The response to a wrong token beyond the limit on failures; nullopt: the usual one.
   std::optional<http::Response> failed_login(const std::string& address);
   // Counts a message of a stream; returns how long to pause reading.
   Micros message_received(const std::string& address, std::size_t bytes);

@@ -40,7 +40,7 @@ class Quota {
   // The address has shown the token: until its entry is evicted, its handshakes do not compete with
   // those of unknown addresses.
   void authenticated(const std::string& address, Micros now);
-  // `trusted`: a proxy, which is counted in the total only.
+  // `trusted`: a proxy, which counts towards the total only.
   Arrival connect(const std::string& address, bool trusted, Micros now);
   // Whether a connection was refused because other addresses fill the reserve.
   [[nodiscard]] bool is_kept_out_by_others(const std::string& address, bool trusted, Micros now);
@@ -62,7 +62,7 @@ class Quota {
   std::optional<Refusal> may_try_login(const std::string& address, Micros now);
   // Counts a message of a stream; returns how long to pause reading.
   Micros message_received(const std::string& address, std::size_t bytes, Micros now);
-  // Refused above the limit of recent failures; otherwise the failure is only counted.
+  // Refused above the limit on recent failures; otherwise the failure is only counted.
   std::optional<Refusal> failed_login(const std::string& address, Micros now);
 
   [[nodiscard]] std::size_t known() const { return addresses_.size(); }

@@ -1,4 +1,4 @@
-// Limit of the storage kept between frames.
+// Limit on the storage kept between frames.
 #pragma once
 
 #include <algorithm>

@@ -55,7 +55,7 @@ struct PassSummaries {
 // (not merely their addresses, which may be reused) and every number that a summary depends on.
 class SummaryCache {
  public:
-  // The limit of bytes may be exceeded by the passes of a single frame.
+  // The limit on bytes may be exceeded by the passes of a single frame.
   static constexpr std::size_t passes_max = 8;
   static constexpr std::size_t bytes_max = std::size_t{64} << 20U;
 

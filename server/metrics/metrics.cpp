@@ -76,7 +76,7 @@ void add_budget(Families& out, const data::BudgetCounts& budget) {
   add_gauge(out, "windsplat_resident_bytes",
             "Bytes of data that are in memory or reserved for a load.",
             static_cast<double>(budget.bytes));
-  add_gauge(out, "windsplat_memory_limit_bytes", "Limit of resident data.",
+  add_gauge(out, "windsplat_memory_limit_bytes", "Limit on resident data.",
             static_cast<double>(budget.bytes_max));
   add_labelled(out, "windsplat_data_lookups_total",
                "Requests for volumes and averages, by residency.", "result",

@@ -1,4 +1,4 @@
-// Forecasts and limits of time and error -> the setting to render with.
+// Forecasts and limits on time and error -> the setting to render with.
 #pragma once
 
 #include <cstddef>

@@ -19,7 +19,7 @@ constexpr std::size_t quantile_samples_max = std::size_t{1} << 15U;
 constexpr double length_spacings = 5.0;
 constexpr double coverage = 3.0;     // coverage of the projected box by lines
 constexpr double line_share = 0.75;  // mean length of the drawn lines relative to full length
-constexpr double value_max = 1e38;   // limit of numbers in a view
+constexpr double value_max = 1e38;   // limit on numbers in a view
 
 // A kind of scalar: words that identify it as part of its names, and short names that must match
 // exactly. Earlier kinds are preferred as media.

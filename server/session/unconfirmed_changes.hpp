@@ -18,7 +18,7 @@ class UnconfirmedChanges {
     std::string patch_json;
   };
 
-  // Beyond a limit of number or size, the oldest changes count as confirmed.
+  // Beyond a limit on number or size, the oldest changes count as confirmed.
   void add(Change change);
   // Records that a frame of that version was drawn.
   void confirm(std::uint64_t version);

@@ -31,10 +31,10 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds tls_timeout{5};
 constexpr std::chrono::seconds tls_reserve_timeout{2};  // for connections of the reserve
-// Limit of concurrent handshakes; above it, an existing one is ended.
+// Limit on concurrent handshakes; above it, an existing one is ended.
 constexpr std::size_t tls_handshakes_max = 256;
 constexpr std::size_t handshakes_per_address_max = 64;
-// Limit of bytes read. A ClientHello has about 500 bytes, 2 KB with a post-quantum key share;
+// Limit on bytes read. A ClientHello has about 500 bytes, 2 KB with a post-quantum key share;
 // OpenSSL would accept 131 kB.
 constexpr std::size_t handshake_bytes_max = std::size_t{16} * 1024;
 // Size of one read of Asio: the client's last message may arrive with following data.

@@ -22,7 +22,7 @@ constexpr std::chrono::milliseconds retry_delay{100};
 // Size of the kernel's send buffer; the kernel doubles this value.
 constexpr int send_buffer_bytes = 128 * 1024;
 
-// Limit of unsent bytes in the kernel (TCP_NOTSENT_LOWAT): with more, writes complete long before
+// Limit on unsent bytes in the kernel (TCP_NOTSENT_LOWAT): with more, writes complete long before
 // the data is sent, and later data is delayed.
 constexpr int unsent_bytes = 16 * 1024;
 

@@ -31,7 +31,7 @@ using protocol::ViewDocument;
 
 constexpr std::size_t file_bytes_max = protocol::limits::message_bytes_max;
 constexpr std::string_view suffix = ".json";
-constexpr int complaints_max = 20;  // limit of log lines for invalid files
+constexpr int complaints_max = 20;  // limit on log lines for invalid files
 
 // A file descriptor with RAII; closing it releases its lock.
 class Handle {

@@ -18,7 +18,7 @@ struct Options {
   // Views are stored in its subfolder "views"; both are created if missing. Empty: memory only.
   std::filesystem::path state_folder;
   std::size_t views_max = std::size_t{protocol::limits::views_max};
-  std::size_t bytes_max = std::size_t{protocol::limits::views_bytes_max};  // limit of all views, as
+  std::size_t bytes_max = std::size_t{protocol::limits::views_bytes_max};  // limit on all views, as
                                                                            // JSON
 };
 

@@ -26,7 +26,7 @@ struct BackendOptions {
   double wait_ms = 0;                       // delay by requests of other addresses
   // Called on the renderer's thread with the time of a picture and the address charged.
   std::function<void(const std::string& payer, std::int64_t us)> charge;
-  // Limit of the cost of a picture.
+  // Limit on the cost of a picture.
   std::function<Result<void>(const frame::Cost& cost)> check_cost;
 };
 

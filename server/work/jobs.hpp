@@ -31,7 +31,7 @@ class Jobs {
     bool slow = false;        // slow jobs run one at a time
   };
 
-  // `tasks_max` is the limit of listed jobs; a new one replaces the oldest finished one.
+  // `tasks_max` is the limit on listed jobs; a new one replaces the oldest finished one.
   explicit Jobs(const TaskExecutor::Settings& settings);
   ~Jobs();  // calls end()
   Jobs(const Jobs&) = delete;

@@ -21,7 +21,7 @@ namespace windsplat::work {
 // Thread-safe.
 class References {
  public:
-  static constexpr std::size_t bytes_max = std::size_t{32} << 20;  // limit of encoded pictures
+  static constexpr std::size_t bytes_max = std::size_t{32} << 20;  // limit on encoded pictures
   static constexpr std::size_t wanted_max = 4;                     // waiting or being drawn
 
   struct Kept {

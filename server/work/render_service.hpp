@@ -19,10 +19,10 @@ class RenderService {
   using Job = RenderJob;
 
   struct Options {
-    // Limit of waiting jobs of kind request, not counting cancelled ones; a payer may have half of
+    // Limit on waiting jobs of kind request, not counting cancelled ones; a payer may have half of
     // it. Sessions limit the jobs of streams to one at a time each, owners those of the background.
     std::size_t requests_max = 16;
-    double requests_ms_max = 30'000;  // limit of the sum of the jobs' estimates; a single job is
+    double requests_ms_max = 30'000;  // limit on the sum of the jobs' estimates; a single job is
                                       // always admitted
     std::function<std::int64_t()> now_us = {};  // empty: a steady clock
     // Limit on how long requests of other payers may delay a request that is itself shorter; 0: no

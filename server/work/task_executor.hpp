@@ -56,7 +56,7 @@ class TaskExecutor {
   std::unique_ptr<State> state_;
 };
 
-// Limit of waiting requests for pictures and of loads for one dataset.
+// Limit on waiting requests for pictures and of loads for one dataset.
 inline constexpr std::size_t requests_waiting_max = 16;
 
 // All executors of the server (docs/design/overview.md). The spare threads are for loads that hang

@@ -6,7 +6,7 @@ request before authentication, one connection each, relative to the bytes sent.
     tests/bench/preauth_cost.py --key=rsa:4096        # another one; may be repeated
     tests/bench/preauth_cost.py --count=20            # quick
 
-Daemons run without limits of handshakes, connections and requests. Times include all threads of
+Daemons run without limits on handshakes, connections and requests. Times include all threads of
 the daemon and its system calls; the last column is relative to a GET answered with 401."""
 import argparse
 import contextlib

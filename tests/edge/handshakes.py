@@ -28,7 +28,7 @@ from wire_client import BINARY, Closed, Connection, Daemon, WebSocket, request
 HEALTH_MS = 50
 FRAME_EVERY_S = 0.05
 THREADS = 8  # threads of the attacker
-# Small enough to be exhausted on a slow machine; the burst is ten seconds' worth. Limits of new
+# Small enough to be exhausted on a slow machine; the burst is ten seconds' worth. Limits on new
 # connections are disabled, as they would apply first.
 ADDRESS_SHARE = 0.06
 ADDRESS_AT_ONCE_S = 10 * ADDRESS_SHARE

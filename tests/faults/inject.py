@@ -434,7 +434,7 @@ def parsed_options(words=None):
     parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--phase", action="append", choices=PHASES)
     parser.add_argument("--count", type=int, default=100000, help="greatest number of rounds")
-    parser.add_argument("--seconds", type=float, default=1800, help="time limit of a sweep")
+    parser.add_argument("--seconds", type=float, default=1800, help="time limit on a sweep")
     parser.add_argument("--slack", type=float, default=1, help="factor for time limits")
     parser.add_argument("--quick", action="store_true", help="a few rounds of every sweep")
     options = parser.parse_args(words)

@@ -1,4 +1,4 @@
-// ViewDocument: typed values, merge patches, edits by pointer, and limits of the text itself.
+// ViewDocument: typed values, merge patches, edits by pointer, and limits on the text itself.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -36,7 +36,7 @@ constexpr std::array<std::string_view, 9> live_options{"token-file",   "tls-cert
                                                        "allow-origin", "allow-host", "allow-remote",
                                                        "allow-root",   "log-format", "log-level"};
 
-// Limit of the wait for a reload at shutdown, because a disk may not respond.
+// Limit on the wait for a reload at shutdown, because a disk may not respond.
 constexpr std::chrono::seconds reload_patience{1};
 
 void configure_log(const ServeArguments& arguments) {

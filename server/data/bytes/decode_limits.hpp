@@ -7,7 +7,7 @@
 
 namespace windsplat::data {
 
-// Limit of one decoded chunk of a chunked format (HDF5, Zarr).
+// Limit on the size of a decoded chunk of a chunked format (HDF5, Zarr).
 constexpr std::size_t chunk_bytes_max = std::size_t{1} << 30;
 
 // Compressors enlarge an incompressible chunk by less than this.

@@ -21,14 +21,14 @@
 
 namespace windsplat::data::loader {
 
-// Limits of one loader. Volumes do not count in its memory, because the caller provides them. A
-// call that exceeds a limit fails with the reason; the loader is killed, and the next call starts
+// Limits of one loader. Volumes do not count towards its memory, because the caller provides them.
+// A call that exceeds a limit fails with the reason; the loader is killed, and the next call starts
 // another.
 struct Limits {
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;
   // true: reads may use all of that memory; false: only as much as opening (opening_memory_bytes())
   bool reads_take_all = true;
-  // Wall clock limits of a whole call.
+  // Wall clock limits on a whole call.
   std::chrono::milliseconds open_time{60'000};
   std::chrono::milliseconds read_time{60'000};  // additional time:
   std::uint64_t read_bytes_per_second = 10'000'000;

@@ -16,7 +16,7 @@ namespace windsplat::data::loader {
 namespace {
 
 constexpr std::size_t text_max = std::size_t{1} << 16;
-constexpr std::size_t things_max = 1'000'000;  // limits of the numbers of fields, of notes and of
+constexpr std::size_t things_max = 1'000'000;  // limits on the numbers of fields, of notes and of
                                                // names in a folder
 constexpr std::size_t steps_max = std::size_t{1} << 24;
 constexpr std::size_t axis_max = std::size_t{1} << 24;

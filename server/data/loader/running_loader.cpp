@@ -173,7 +173,7 @@ Result<Fate> RunningLoader::wait(Patience& patience) {
 std::string RunningLoader::opening_limit() const {
   const std::uint64_t bytes =
       std::min(opening_memory_bytes(files_->opened_bytes()), limits_.memory_bytes);
-  return "; the limit of memory to open files of " + std::to_string(files_->opened_bytes()) +
+  return "; the limit on memory for opening files of " + std::to_string(files_->opened_bytes()) +
          " bytes is " + megabytes(bytes);
 }
 

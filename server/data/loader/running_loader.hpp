@@ -34,7 +34,7 @@ class RunningLoader {
   Result<std::string> open();
   // Serves the loader's requests until it answers. Any other event ends the loader and is an error.
   Result<Message> call(const Call& what);
-  // Private memory of the loader counts in the memory limit.
+  // Private memory of the loader counts towards the memory limit.
   Result<void> count_memory();
   void release();
   void on_progress(Progress progress) { progress_ = std::move(progress); }

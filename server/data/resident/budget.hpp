@@ -184,7 +184,8 @@ class Budget {
   BudgetCounts counts_;
 };
 
-// Memory other than volumes that counts in the limit during its lifetime. One thread at a time.
+// Memory other than volumes that counts towards the limit during its lifetime. One thread at a
+// time.
 class Reservation {
  public:
   enum class Term {

@@ -42,8 +42,8 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
 
   // The field at the step, averaged to a coarser level on first need. The level is shared and
-  // counts in the memory limit; the volume itself need not stay resident for it. Concurrent callers
-  // wait for one computation. Level zero is the volume itself. Errors: those of volume();
+  // counts towards the memory limit; the volume itself need not stay resident for it. Concurrent
+  // callers wait for one computation. Level zero is the volume itself. Errors: those of volume();
   // out_of_memory also if there is room for the volume but not for its level in addition.
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);

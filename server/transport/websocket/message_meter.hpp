@@ -1,4 +1,4 @@
-// Limits of an incoming message that the WebSocket layer does not enforce. That layer does not
+// Limits on an incoming message that the WebSocket layer does not enforce. That layer does not
 // report a message that never ends, sent as empty fragments or byte by byte; this class counts the
 // bytes since the last complete message, less control frames.
 #pragma once

@@ -5,7 +5,7 @@ Markdown table. Without VTK it prints a message and exits 0.
 Usage: compare.py [--build=build/release] [--frames=9] [--sizes=640x480,1280x720] [--dims=XxYxZ]
                   [--sample=climate|tornado] [--pictures=DIR] [--slow] [--only=TEXT]
 
---slow adds translucent lines by depth peeling, which takes minutes."""
+--slow adds translucent lines with depth peeling, which takes minutes."""
 import argparse
 import json
 import math

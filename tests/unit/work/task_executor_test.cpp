@@ -1,4 +1,4 @@
-// Limits of waiting loads: per dataset, in total, and exemptions.
+// Limits on waiting loads: per dataset, in total, and exemptions.
 #include "server/work/task_executor.hpp"
 
 #include <gtest/gtest.h>

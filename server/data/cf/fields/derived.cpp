@@ -185,7 +185,7 @@ class DerivedFinder {
   }
 
   // Charges the lowest level of a temperature in degrees Celsius, which celsius_of() examines.
-  // Errors: bad_data beyond the limit of decoded bytes for opening a dataset.
+  // Errors: bad_data beyond the limit on decoded bytes for opening a dataset.
   Result<void> charge_lowest_level(int temperature) {
     if (is_kelvin(lower(variable(temperature).units))) return {};
     return file_.charge(temperature, decoded_step_bytes(file_, grid_, temperature, {0, 1}));

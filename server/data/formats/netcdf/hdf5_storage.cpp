@@ -15,7 +15,7 @@ namespace windsplat::data::netcdf {
 
 namespace {
 
-constexpr std::size_t nesting_max = 64;  // limit of groups within groups
+constexpr std::size_t nesting_max = 64;  // limit on groups within groups
 
 // Largest number of objects in a file of a given size: the smallest object has about 300 bytes, but
 // a link only about 20, and the netCDF library uses some kB for each.

@@ -14,7 +14,8 @@ namespace windsplat::data::netcdf {
 
 namespace {
 
-// Cache limit of all variables together, but at least one chunk; resident.cpp accounts for it.
+// Limit on the caches of all variables together, but at least one chunk; resident.cpp accounts for
+// it.
 constexpr double kept_bytes_max = 128 << 20;
 
 // A scalar has no extent, but the library requires a valid pointer.

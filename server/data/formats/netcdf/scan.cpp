@@ -24,7 +24,7 @@ constexpr std::size_t text_max = 4096;      // bytes of a text attribute; the re
 constexpr std::size_t numbers_max = 65536;  // values of a numeric attribute
 constexpr int variables_max = 8192;
 constexpr std::size_t groups_max = 1024;
-constexpr int depth_max = 64;  // limit of groups within groups
+constexpr int depth_max = 64;  // limit on groups within groups
 
 struct TypeName {
   nc_type type;

@@ -1,4 +1,4 @@
-// JSON with limits of size and depth; rejects duplicate and unknown keys and checks every number.
+// JSON with limits on size and depth; rejects duplicate and unknown keys and checks every number.
 #include "server/data/formats/raw/document.hpp"
 
 #include <algorithm>

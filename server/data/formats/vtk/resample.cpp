@@ -10,12 +10,12 @@ namespace windsplat::data::vtk {
 
 namespace {
 
-// Limits of the work over all cells, in rows of samples within bounding boxes plus linear systems
+// Limits on the work over all cells, in rows of samples within bounding boxes plus linear systems
 // solved; meshes with too many overlapping cells are rejected. One limit is per sample that would
 // lie in a cell without overlap (typical simulation meshes need 3 to 12), so that small files
 // cannot cause much work; the other is a total (minutes).
 constexpr double work_per_sample = 128;
-constexpr std::uint64_t visits_per_work = 32;  // limit of visits of samples that already have a
+constexpr std::uint64_t visits_per_work = 32;  // limit on visits to samples that already have a
                                                // cell
 constexpr std::uint64_t work_max = std::uint64_t{1} << 31;
 constexpr double samples_min_3d = 4096;

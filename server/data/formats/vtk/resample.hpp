@@ -12,7 +12,7 @@
 
 namespace windsplat::data::vtk {
 
-// Limits of samples along one axis and in total.
+// Limits on samples along one axis and in total.
 inline constexpr int lattice_axis_max = 256;
 
 struct Resampling {

@@ -1,4 +1,4 @@
-// The memory of loaders counts in the budget and is limited.
+// The memory of loaders counts towards the budget and is limited.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
