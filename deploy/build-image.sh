@@ -80,5 +80,5 @@ echo "build-image: $tag" >&2
   tail -n 40 "$work/build.log" >&2
   fail "the build failed; the whole log is build/image/build.log"
 }
-echo "build-image: done; deploy/try-image.sh tries it" >&2
+echo "build-image: done; test it with deploy/try-image.sh" >&2
 "${buildah[@]}" images --filter "reference=${tag%%:*}"

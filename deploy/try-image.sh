@@ -20,7 +20,7 @@ done
 buildah=(buildah --storage-driver vfs --root "$work/storage" --runroot "$work/run")
 
 settings=$("${buildah[@]}" inspect --type image "$tag" 2>/dev/null) ||
-  fail "no image $tag; say: deploy/build-image.sh"
+  fail "no image $tag; run deploy/build-image.sh"
 # Reads one value of the image's configuration by its keys.
 setting() {
   python3 -c 'import json, sys

@@ -240,7 +240,7 @@ int main(int argc, char** argv) {
                             [&] { read_bare(folder + "/raw.bin", steps, samples); }));
   }
   std::filesystem::remove_all(folder);
-  std::printf("%zu samples, 4 components, %d steps: %.1f MB a step\n\n%s", samples, options.steps,
+  std::printf("%zu samples, 4 components, %d steps: %.1f MB per step\n\n%s", samples, options.steps,
               16e-6 * static_cast<double>(samples),
               (options.markdown ? bench::markdown(table) : bench::plain(table, 1)).c_str());
   return 0;

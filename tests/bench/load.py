@@ -285,7 +285,7 @@ def targets(unloaded, peak, high):
 
 
 def measure(options, daemon):
-    print(f"{options.dataset}, {options.size}, {options.seconds:g} s a load, "
+    print(f"{options.dataset}, {options.size}, {options.seconds:g} s per load, "
           f"{options.addresses} addresses, {os.cpu_count()} processors for daemon and clients. "
           "Times in ms.\n")
     print("| " + " | ".join(COLUMNS) + " |\n" + "|---" * len(COLUMNS) + "|")

@@ -149,7 +149,7 @@ def measure(daemon, options, size, count, mixed):
     deaf = Deaf(daemon.port, options.dataset_id, BIG) if mixed else None
     took = run(orbits + big, options.seconds, deaf.ask if deaf else None)
     held = daemon.memory()["VmRSS"]
-    print("| viewer | view | frames/s | latency, ms: median | p99 | KiB a frame |")
+    print("| viewer | view | frames/s | latency, ms: median | p99 | KiB per frame |")
     print("|---|---|---|---|---|---|")
     for i, orbit in enumerate(orbits):
         print(row(i + 1, orbit, took))

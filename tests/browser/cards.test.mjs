@@ -97,7 +97,7 @@ test("card pictures load one at a time, and a failure is shown on its card", () 
   );
 });
 
-test("cards are usable by arrow keys, Enter and Escape", () =>
+test("cards are usable with arrow keys, Enter and Escape", () =>
   withPage(async (page) => {
     await page.locator("#picture").focus();
     await page.keyboard.press("d");

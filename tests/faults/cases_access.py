@@ -198,7 +198,7 @@ def tls_versions(world, _count):
 def tls_all(world, _count):
     tool = shutil.which("testssl") or shutil.which("testssl.sh")
     if not tool:
-        raise Untried("testssl.sh is not installed: its list was not tried")
+        raise Untried("testssl.sh is not installed: its checks were not run")
     if world.quick:
         raise Untried("testssl.sh takes minutes: not in a quick round")
     daemon = with_tls(world)

@@ -142,7 +142,7 @@ def slow_bodies(world, count):
 @case("slow headers, by slowhttptest", 200, 30)
 def slow_by_tool(world, count):
     if not shutil.which("slowhttptest"):
-        raise Untried("slowhttptest is not installed: no slow headers, bodies by that tool")
+        raise Untried("slowhttptest is not installed: its slow headers and bodies were not tried")
     daemon = world.daemon()
     result = []
     for how in ("-H", "-B"):

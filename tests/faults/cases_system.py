@@ -72,11 +72,12 @@ def no_random(world, count):
 @case("a disk that is full", 60, 12)
 def full_disk(world, count):
     if os.geteuid() != 0:
-        raise Untried("a small tmpfs needs root: no full disk was tried (inject.py's ENOSPC was)")
+        raise Untried("a small tmpfs needs root: a full disk was not tried "
+                      "(inject.py's ENOSPC was)")
     folder = world.new_folder()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=128k", "none", folder],
                       capture_output=True, check=False).returncode != 0:
-        raise Untried("no tmpfs can be mounted here: no full disk was tried")
+        raise Untried("no tmpfs can be mounted here: a full disk was not tried")
     try:
         daemon = world.start("--state-dir", str(folder), SAMPLE)
         saved = []
@@ -123,7 +124,7 @@ def through_jumps(daemon, jump, count):
 @case("a state folder that becomes read-only", 10, 2)
 def read_only_state(world, count):
     if os.geteuid() != 0:
-        raise Untried("to mount a disk read-only needs root")
+        raise Untried("mounting a disk read-only needs root")
     folder = world.new_folder()
     if subprocess.run(["mount", "-t", "tmpfs", "none", folder], capture_output=True,
                       check=False).returncode != 0:
@@ -172,7 +173,7 @@ def clock(world, count):
 @case("a clock that jumps, by faketime", 20, 4)
 def faked_clock(world, count):
     if not pathlib.Path(FAKETIME).exists():
-        raise Untried("faketime is not installed: the clock did not jump by that tool")
+        raise Untried("faketime is not installed: a clock jump with it was not tried")
     if is_sanitized(world.program):
         raise Untried("a build with sanitizers: faketime cannot be preloaded into it")
     file = world.new_folder() / "time"
@@ -194,8 +195,8 @@ def no_descriptors(world, count):
     """More connections than descriptors; the listening socket must not be polled in a loop."""
     limit = 40
     if is_sanitized(world.program):
-        raise Untried("a build with sanitizers: UBSan tests by a pipe whether memory is readable, "
-                      "and reports it as invalid if no descriptor is available")
+        raise Untried("a build with sanitizers: UBSan tests through a pipe whether memory is "
+                      "readable, and reports it as invalid if no descriptor is available")
 
     def prepare():
         resource.setrlimit(resource.RLIMIT_NOFILE, (limit, limit))

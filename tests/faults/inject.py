@@ -409,7 +409,7 @@ class Sweep:
                 f"| {rounds} drains, the longest {slowest:.1f} s |")
 
     def run(self):
-        print("| call | while it | calls a session | places that failed | calls that failed "
+        print("| call | while it | calls per session | places that failed | calls that failed "
               "| steps that went wrong |\n|---|---|---|---|---|---|", flush=True)
         for phase in self.options.phase:
             serves = phase in ("serve", "guarded")

@@ -31,7 +31,7 @@ def plain_addresses():
 class Shim:
     def __init__(self, library, folder):
         if not pathlib.Path(library).exists():
-            raise Untried(f"{library} is not built: no call was made to fail")
+            raise Untried(f"{library} is not built: no failing call was tried")
         self.library = str(library)
         self.path = folder / "control"
         self.path.write_bytes(bytes(BYTES))
