@@ -147,7 +147,7 @@ test("the span control needs overlap, and the pattern control needs jitter", () 
     assert.equal(await disabled("new each step"), true);
   }));
 
-test("slab thickness is offered for slabs only, and each compositing is explained", () =>
+test("slab thickness is offered for slabs only, and each compositing operator is explained", () =>
   withPage(async (page) => {
     await unfold(page, "Method");
     const note = (text) => page.locator("#panel .panel-note", { hasText: text });

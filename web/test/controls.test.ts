@@ -145,7 +145,7 @@ test("controls without effect are hidden or disabled", () => {
   assert.equal(off({ depthCue: { strength: 0 } }).depthCue, false);
 });
 
-test("every offered method and compositing is explained, and the reference is not offered", () => {
+test("every offered method and operator is explained, and the reference is not offered", () => {
   assert.deepEqual(Object.values(methodOptions), ["kernel", "slab"]);
   for (const method of Object.values(methodOptions)) assert.ok(methodHints[method]);
   const offered = Object.values(compositingOptions);

@@ -1,5 +1,5 @@
 // The stiffness sweep through the engine: predictions of the one-kernel formulas for every
-// compositing.
+// compositing operator.
 #include "server/study/stability.hpp"
 
 #include <gtest/gtest.h>
