@@ -354,6 +354,14 @@ void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan
   add_medium(scene, pass);
 }
 
+bool is_inside(const Camera& camera, const Lattice& lattice) {
+  bool inside = camera.perspective;
+  for (int a = 0; a < 3; ++a) {
+    inside = inside && camera.eye[a] >= lattice.box_min[a] && camera.eye[a] <= lattice.box_max[a];
+  }
+  return inside;
+}
+
 // A kernel is prepared once for every tile that it may touch, so large tiles cost less. Small
 // pictures use small tiles, so that all threads have work.
 int tile_pixels(int width, int height) {
@@ -465,6 +473,7 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
   choose_passes(scene, plan.passes);
   const int major = major_axis(scene.camera, scene.lattice);
+  plan.eye_inside = is_inside(scene.camera, scene.lattice);
   plan.eye_sample = eye_index(scene.camera, major, scene.lattice.positions[major]);
   if (plan.curved) measure_ways(scene.lattice, plan.ways);
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, plan.ways, pass);

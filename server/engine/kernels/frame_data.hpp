@@ -167,6 +167,7 @@ struct Tile {
   int width, height;  // pixels inside the picture
   float* blocks;
   const float* rays;
+  const std::int32_t* partial;      // see partial.hpp; for perspective media
   float stop;                       // a block is closed when no transmittance exceeds this
   std::uint32_t open[tile_blocks];  // bit set: the block is open
   int any_closed;
