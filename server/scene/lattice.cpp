@@ -21,7 +21,7 @@ using protocol::VerticalPlacement;
 
 constexpr double box_edge = 2.0;  // length of the longest edge, world units
 // Widest cell of any axis over the narrowest. Kernels of 64 samples along one axis are up to 64
-// times as flat; the engine is exact up to 1e9 (tests/numerics/aspect_test.cpp).
+// times as flat; the engine is exact up to 1e9 (tests/numerics/truth/aspect_test.cpp).
 constexpr double aspect_max = 1e7;
 constexpr double vertical_share = 0.15;  // fraction of the longest horizontal edge, if units differ
 

@@ -7,8 +7,8 @@
 #include <tuple>
 
 #include "server/engine/reference/kernels.hpp"
-#include "tests/numerics/integrator.hpp"
 #include "tests/numerics/partial_footprint.hpp"
+#include "tests/numerics/truth/integrator.hpp"
 
 namespace windsplat::naive {
 

@@ -1,5 +1,5 @@
 // Splats and lines -> the light of each ray.
-#include "tests/numerics/integrator.hpp"
+#include "tests/numerics/truth/integrator.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "tests/numerics/integrator_kernels.hpp"
+#include "tests/numerics/truth/integrator_kernels.hpp"
 
 namespace windsplat::truth {
 

@@ -1,13 +1,13 @@
 // The brute-force integral: closed forms, and the reference and the engine compared with it.
-#include "tests/numerics/integrator.hpp"
+#include "tests/numerics/truth/integrator.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "tests/numerics/random_scenes.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/truth/random_scenes.hpp"
 
 namespace windsplat::test {
 namespace {

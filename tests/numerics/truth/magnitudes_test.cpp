@@ -8,9 +8,9 @@
 #include <string>
 
 #include "server/engine/kernels/dispatch.hpp"
-#include "tests/numerics/integrator.hpp"
-#include "tests/numerics/random_scenes.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/truth/integrator.hpp"
+#include "tests/numerics/truth/random_scenes.hpp"
 
 namespace windsplat::test {
 namespace {

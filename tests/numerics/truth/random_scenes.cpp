@@ -1,5 +1,5 @@
 // Small random scenes for comparison with the brute-force integral.
-#include "tests/numerics/random_scenes.hpp"
+#include "tests/numerics/truth/random_scenes.hpp"
 
 #include <cmath>
 #include <memory>
