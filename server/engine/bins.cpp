@@ -201,6 +201,17 @@ void Binner::begin_pass(const PassPlan& pass, PassBins& to) {
   to.done.assign(to.kept->blank_regions.size(), 0);
 }
 
+// Rank of a sheet `ahead` samples from that of the eye. No ray from the eye crosses cells on both
+// sides of its own, so all sheets above may precede those below. But kernels are wider than cells:
+// around an eye within the box some reach across it, so nearer sheets come first, and of two
+// equally near ones that behind the eye.
+std::int64_t rank_of(const RenderPlan& plan, int axis, int ahead) {
+  const std::int64_t distance = std::abs(ahead);
+  if (!plan.eye_inside) return ahead >= 0 ? distance : distance + (std::int64_t{1} << 32U);
+  const bool behind = plan.view->forward[axis] >= 0 ? ahead < 0 : ahead > 0;
+  return 2 * distance + (behind ? 0 : 1);
+}
+
 void Binner::order_sheets() {
   std::vector<SheetKey>& keys = space_.sheets;
   keys.clear();
@@ -209,14 +220,12 @@ void Binner::order_sheets() {
     const AxisArrays& axis = pass.axis[pass.kernel.major];
     for (int s = 0; s < static_cast<int>(axis.visit.size()); ++s) {
       const int ahead = axis.sample[axis.visit[s]] - plan_.eye_sample;
-      keys.push_back({ahead >= 0 ? 0 : 1, std::abs(ahead), p, s});
+      keys.push_back({rank_of(plan_, pass.kernel.major, ahead), p, s});
     }
   }
   // Keys are unique, so the order is deterministic.
   std::sort(keys.begin(), keys.end(), [](const SheetKey& a, const SheetKey& b) {
-    if (a.side != b.side) return a.side < b.side;
-    if (a.distance != b.distance) return a.distance < b.distance;
-    return a.pass < b.pass;
+    return a.rank != b.rank ? a.rank < b.rank : a.pass < b.pass;
   });
 }
 

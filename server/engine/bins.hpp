@@ -49,8 +49,7 @@ struct SheetBricks {
 // ascending order, then those below it in descending order. Passes of different strides are
 // interleaved by distance, lines first.
 struct SheetKey {
-  int side;      // 0: from the eye upward; 1: downward
-  int distance;  // distance in samples from the sample of the eye
+  std::int64_t rank;  // place in visibility order; equal for sheets of one sample
   int pass;
   int sheet;
 };

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "server/base/check.hpp"
+#include "server/engine/line_style.hpp"
 #include "server/engine/partial.hpp"
 
 namespace windsplat::engine {
@@ -19,17 +20,6 @@ using scene::Scene;
 
 // Keeps optical depths finite in float; such a medium is opaque over any distance.
 constexpr double extinction_max = 1e30;
-
-float bounded(double v) {
-  constexpr double largest = std::numeric_limits<float>::max();
-  return static_cast<float>(std::clamp(v, -largest, largest));
-}
-
-// 1 / (high - low) for clamp((v - low) * scale); a step where both are equal.
-float ramp_scale(double low, double high) {
-  constexpr double steepest = 1e30;
-  return high > low ? bounded(std::min(1.0 / (high - low), steepest)) : bounded(steepest);
-}
 
 kernels::Camera make_camera(const Scene& scene) {
   const Camera& from = scene.camera;
@@ -118,72 +108,10 @@ void place_axis(const Scene& scene, int a, int stride, AxisArrays& axis) {
   }
 }
 
-// Converts to the layout of kernels::ColorTable.
-void flatten(const scene::ColorTable& table, std::vector<float>& rgb) {
-  const std::size_t entries = table.entries.size();
-  WINDSPLAT_CHECK(entries > 0);
-  rgb.resize(kernels::color_floats * (entries + 1));
-  float* to = rgb.data();
-  for (std::size_t n = 0; n <= entries; ++n, to += kernels::color_floats) {
-    const std::array<float, 3>& entry = table.entries[std::min(n, entries - 1)];
-    std::copy(entry.begin(), entry.end(), to);
-    to[3] = 0;
-  }
-}
-
-kernels::ColorTable make_table(const scene::ColorTable& table, const std::vector<float>& rgb) {
-  kernels::ColorTable to{};
-  to.rgb = rgb.data();
-  to.entries = static_cast<int>(table.entries.size());
-  to.low = bounded(table.range[0]);
-  const double last = to.entries - 1;
-  to.scale = bounded(std::min(last * ramp_scale(table.range[0], table.range[1]), 1e30));
-  return to;
-}
-
 void check_volume(const data::Volume& volume, const Lattice& lattice) {
   WINDSPLAT_CHECK(volume.dims == lattice.dims);
   WINDSPLAT_CHECK(volume.values.size() ==
                   volume.samples() * static_cast<std::size_t>(volume.components));
-}
-
-void to_floats(const std::vector<double>& from, std::vector<float>& to) {
-  to.clear();
-  for (const double v : from) to.push_back(bounded(v));
-}
-
-// Sets jitter, kernel box and appearance of lines.
-void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::LineStyle& to) {
-  to.length = static_cast<float>(from.length);
-  const double full = from.magnitude_range[1];
-  to.inverse_full_magnitude = full > 0 ? bounded(1.0 / full) : std::numeric_limits<float>::max();
-  to.min_magnitude = bounded(from.min_magnitude);
-  to.half_span = static_cast<float>(0.5 * (from.overlap ? from.span : 1.0));
-  to.r1 = static_cast<float>(from.r1);
-  to.r2 = static_cast<float>(from.r2);
-  to.inverse_ramp = static_cast<float>(1.0 / std::max(from.r2 - from.r1, 1e-6));
-  to.opacity = static_cast<float>(from.opacity);
-  to.steep = to.inverse_ramp * to.opacity;
-  to.reach = to.r2 * to.steep;
-  to.head_desaturation = static_cast<float>(from.head_desaturation);
-  to.intensity_low = bounded(from.magnitude_range[0]);
-  to.intensity_scale = ramp_scale(from.magnitude_range[0], from.magnitude_range[1]);
-  to.intensity = static_cast<float>(from.magnitude_intensity);
-  to.cue_near = bounded(scene.depth_cue.near);
-  to.cue_scale = ramp_scale(scene.depth_cue.near, scene.depth_cue.far);
-  to.cue_strength = static_cast<float>(scene.depth_cue.strength);
-  to.color_by = static_cast<int>(from.color_by);
-  to.rise_weight = static_cast<float>(from.rise_weight);
-  const std::array<double, 2> heights = scene::height_range(scene.lattice);
-  to.box_low_z = static_cast<float>(heights[0]);
-  to.inverse_box_height = static_cast<float>(1.0 / (heights[1] - heights[0]));
-  to.jitter_center = static_cast<float>(from.jitter_center);
-  to.jitter_stride = static_cast<float>(from.jitter_stride);
-  to.seed = from.seed;
-  to.epoch = from.epoch;
-  for (int a = 0; a < 3; ++a) to.keep[a] = scene.slice && scene.slice->axis == a ? 0.0F : 1.0F;
-  to.moving = from.moving ? 1 : 0;
-  to.motion_cycles = from.motion_cycles;
 }
 
 void add_lines(const Scene& scene, PassPlan& pass) {
@@ -192,13 +120,8 @@ void add_lines(const Scene& scene, PassPlan& pass) {
   kernels::LineStyle& to = pass.kernel.line;
   for (int c = 0; c < 3; ++c) {
     to.velocity[c] = c < from.field->components ? from.field->component(c) : nullptr;
-    to.scale[c] = bounded(from.scale[c]);
   }
-  to_floats(from.rate_x, pass.rate_x);
-  to_floats(from.rate_z, pass.rate_z);
-  to.rate_x = pass.rate_x.empty() ? nullptr : pass.rate_x.data();
-  to.rate_y = pass.rate_x.empty() ? 1.0F : bounded(from.rate_y);
-  to.rate_z = pass.rate_z.empty() ? nullptr : pass.rate_z.data();
+  set_rates(from, pass.rate_x, pass.rate_z, to);
   style_lines(scene, from, to);
   if (from.color_by == scene::LineColor::scalar) {
     WINDSPLAT_CHECK(from.color_field != nullptr);
@@ -206,7 +129,8 @@ void add_lines(const Scene& scene, PassPlan& pass) {
     to.color_values = from.color_field->values.data();
   }
   flatten(from.color, pass.line_rgb);
-  to.color = make_table(from.color, pass.line_rgb);
+  const bool by_magnitude = from.color_by == scene::LineColor::magnitude;
+  to.color = make_table(from.color, pass.line_rgb, by_magnitude ? to.magnitude_scale : 1);
   pass.kernel.has_lines = 1;
 }
 
@@ -354,6 +278,14 @@ void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan
   add_medium(scene, pass);
 }
 
+bool is_inside(const Camera& camera, const Lattice& lattice) {
+  bool inside = camera.perspective;
+  for (int a = 0; a < 3; ++a) {
+    inside = inside && camera.eye[a] >= lattice.box_min[a] && camera.eye[a] <= lattice.box_max[a];
+  }
+  return inside;
+}
+
 // A kernel is prepared once for every tile that it may touch, so large tiles cost less. Small
 // pictures use small tiles, so that all threads have work.
 int tile_pixels(int width, int height) {
@@ -465,6 +397,7 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
   choose_passes(scene, plan.passes);
   const int major = major_axis(scene.camera, scene.lattice);
+  plan.eye_inside = is_inside(scene.camera, scene.lattice);
   plan.eye_sample = eye_index(scene.camera, major, scene.lattice.positions[major]);
   if (plan.curved) measure_ways(scene.lattice, plan.ways);
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, plan.ways, pass);

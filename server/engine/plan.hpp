@@ -80,6 +80,7 @@ struct RenderPlan {
   kernels::Camera camera{};
   std::vector<PassPlan> passes;     // the one with lines first
   int eye_sample = 0;               // eye_index of the whole lattice along the major axis
+  bool eye_inside = false;          // perspective view from within the box
   bool perspective_medium = false;  // pixel rays are needed
   bool slabs = false;               // the slab method
   bool curved = false;              // visibility order by depth only

@@ -199,6 +199,9 @@ class SlabSweep {
         tile_(tile),
         splats_(space.splats),
         lines_(space.lines) {
+    if (plan.camera.perspective != 0) {
+      near_ = static_cast<float>(static_cast<double>(plan.camera.near) - plan.camera.depth_origin);
+    }
     if (!space_.prepared) space_.prepared = std::make_unique<kernels::Prepared>();
     constexpr std::size_t floats = tile_block_count * kernels::gathered_floats;
     space_.gathered.resize(slabs_ahead * floats);
@@ -217,8 +220,10 @@ class SlabSweep {
         index_ = begun ? std::max(index_, begins) : begins;
       }
       for (std::int64_t n = index_; n < index_ + slabs_ahead; ++n) {
-        slab_at(n).front = depth_of(n);
-        slab_at(n).back = depth_of(n + 1);
+        Slab& slab = slab_at(n);
+        slab.front = depth_of(n);
+        slab.back = depth_of(n + 1);
+        slab.begin = near_ < slab.back ? std::max(slab.front, near_) : slab.front;
       }
       activate(cancel);
       gather();
@@ -390,6 +395,7 @@ class SlabSweep {
   Slab slabs_[slabs_ahead] = {};
   std::uint32_t lined_[tile_blocks] = {};  // bit set: the block may meet lines in this slab
   std::uint32_t met_until_[tile_block_count] = {};
+  float near_ = std::numeric_limits<float>::lowest();  // the near plane, from the depth origin
   float inverse_depth_ = static_cast<float>(1.0 / plan_.slab_depth);
   std::int64_t index_ = 0;
   std::int64_t gathered_until_ = std::numeric_limits<std::int64_t>::min();

@@ -13,6 +13,11 @@ using Field = std::weak_ptr<const data::Volume>;
 void add(std::vector<std::uint32_t>& key, float v) {
   key.push_back(std::bit_cast<std::uint32_t>(v));
 }
+void add(std::vector<std::uint32_t>& key, double v) {
+  const auto bits = std::bit_cast<std::uint64_t>(v);
+  key.push_back(static_cast<std::uint32_t>(bits));
+  key.push_back(static_cast<std::uint32_t>(bits >> 32U));
+}
 void add(std::vector<std::uint32_t>& key, int v) { key.push_back(static_cast<std::uint32_t>(v)); }
 
 void add(std::vector<std::uint32_t>& key, const float* values, int count) {
@@ -39,6 +44,8 @@ void write_key(const kernels::Pass& pass, std::vector<std::uint32_t>& key) {
     add(key, line.rate_x, pass.dims[1]);
     add(key, line.rate_y);
     add(key, line.rate_z, pass.dims[2]);
+    add(key, line.magnitude_scale);
+    add(key, line.unscaled_min_magnitude);
     add(key, line.inverse_full_magnitude);
     add(key, line.min_magnitude);
   }

@@ -37,7 +37,7 @@ struct WorkReport {
   std::int64_t skipped_scalar = 0;  // splat skipped: optical depth below its tolerance, or masked
   std::int64_t skipped_both = 0;    // neither line nor splat; included in the counts above
   std::int64_t occluded = 0;        // visits avoided because blocks were opaque
-  std::int64_t pixel_updates = 0;
+  std::int64_t pixel_updates = 0;   // each rounds the alpha of its pixel by at most 1e-7
   std::int64_t exponentials = 0;
   std::int64_t tiles = 0;
   std::int64_t tiles_stopped = 0;  // tiles ended by early ray termination

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <limits>
+#include <sstream>
 #include <utility>
 
 #include "server/scene/bend.hpp"
@@ -17,8 +19,10 @@ using data::Axis;
 using data::AxisKind;
 using protocol::VerticalPlacement;
 
-constexpr double box_edge = 2.0;         // length of the longest edge, world units
-constexpr double cell_min = 1e-19;       // the square of cell_min is a normal float
+constexpr double box_edge = 2.0;  // length of the longest edge, world units
+// Widest cell of any axis over the narrowest. Kernels of 64 samples along one axis are up to 64
+// times as flat; the engine is exact up to 1e9 (tests/numerics/truth/aspect_test.cpp).
+constexpr double aspect_max = 1e7;
 constexpr double vertical_share = 0.15;  // fraction of the longest horizontal edge, if units differ
 
 bool all_positive(const std::vector<double>& values) {
@@ -119,6 +123,58 @@ void proportion(const data::Grid& grid, VerticalPlacement placement, std::array<
   }
 }
 
+// Widths of the narrowest and the widest cell, and their axes.
+struct CellWidths {
+  double narrowest = std::numeric_limits<double>::infinity();
+  double widest = 0;
+  std::size_t narrow_axis = 0, wide_axis = 0;
+};
+
+// The widths divided by `scale` of their axis.
+CellWidths cell_widths(const Lattice& lattice, const std::array<double, 3>& scale) {
+  CellWidths widths;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto [low, high] =
+        std::minmax_element(lattice.spacing.at(a).begin(), lattice.spacing.at(a).end());
+    if (*low / scale.at(a) < widths.narrowest) {
+      widths.narrowest = *low / scale.at(a);
+      widths.narrow_axis = a;
+    }
+    if (*high / scale.at(a) > widths.widest) {
+      widths.widest = *high / scale.at(a);
+      widths.wide_axis = a;
+    }
+  }
+  return widths;
+}
+
+// Refuses cells whose proportions single precision cannot represent: a fault of the scale if the
+// unscaled cells would do, otherwise of the data.
+Result<void> check_aspect(const data::Grid& grid, const protocol::GeometryView& geometry,
+                          const Lattice& lattice) {
+  const CellWidths widths = cell_widths(lattice, {1, 1, 1});
+  if (widths.widest <= aspect_max * widths.narrowest) return {};
+  const auto name = [&](std::size_t axis) {
+    return "axis \"" + printable(grid.axes.at(axis).name) + "\"";
+  };
+  const std::string narrow = name(widths.narrow_axis);
+  const std::string wide =
+      widths.wide_axis == widths.narrow_axis ? "the same axis" : name(widths.wide_axis);
+  const std::string limit = ", less than the limit of 1e-7";
+  const CellWidths unscaled =
+      cell_widths(lattice, {geometry.scale[0], geometry.scale[1], geometry.scale[2]});
+  std::ostringstream part;
+  part << std::setprecision(2) << widths.narrowest / widths.widest;
+  if (unscaled.widest <= aspect_max * unscaled.narrowest) {
+    return make_error_at(ErrorKind::invalid,
+                         "/geometry/scale/" + std::to_string(widths.narrow_axis),
+                         "leaves the narrowest cell of " + narrow + " " + part.str() +
+                             " times as wide as the widest of " + wide + limit);
+  }
+  return make_error(ErrorKind::bad_data, "the narrowest cell of " + narrow + " is " + part.str() +
+                                             " times as wide as the widest of " + wide + limit);
+}
+
 }  // namespace
 
 Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
@@ -178,15 +234,10 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
       lattice.positions[a].push_back((axis.positions[i] - centre) * scale);
       lattice.spacing[a].push_back((axis.edges[i + 1] - axis.edges[i]) * scale);
     }
-    const auto& spacing = lattice.spacing[a];
-    if (*std::min_element(spacing.begin(), spacing.end()) < cell_min) {
-      return make_error(
-          ErrorKind::bad_data,
-          "the samples of axis \"" + printable(grid.axes[a].name) + "\" are too close together");
-    }
     lattice.box_min[index] = -0.5 * world_length;
     lattice.box_max[index] = 0.5 * world_length;
   }
+  if (auto ok = check_aspect(grid, geometry, lattice); !ok) return ok.error();
   return lattice;
 }
 

@@ -7,9 +7,9 @@ import model as models
 import model_grib
 from mutations_values import CF, GRIB, NETCDF, is_text, of_type
 
-# Axes with a greater ratio of lengths may be refused: in a box with the longest edge 2, the squares
-# of the smallest cells (1e-19, server/scene/lattice.cpp) must be representable as float.
-LENGTHS_APART_MAX = 1e15
+# Grids with a greater ratio of the widest cell to the narrowest may be refused: the squares of their
+# kernels must be representable as float (aspect_max of server/scene/lattice.cpp).
+ASPECT_MAX = 1e7
 
 
 # --- axes ----------------------------------------------------------------------------------------
@@ -48,8 +48,9 @@ def scaled_axis(model, dice):
         values = model.axes[a].values
         factor = float(dice.choice([1e-12, 1e-6, 1e-3, 1e3, 1e6, 1e12]))
         model.axes[a].values = factor * (values + dice.choice([0.0, 0.0, 100.0, -1e5]))
-    lengths = [length for length in (np.ptp(model.axes[a].values) for a in "xyz") if length > 0]
-    if lengths and max(lengths) > LENGTHS_APART_MAX * min(lengths):
+    cells = np.concatenate([np.diff(model.axes[a].values) for a in "xyz"])
+    cells = np.abs(cells[cells != 0])
+    if cells.size and cells.max() > ASPECT_MAX * cells.min():
         model.must_open = False
     if model.kind in ("vtu", "vts"):
         model.must_open = model.exact = model.placed = False

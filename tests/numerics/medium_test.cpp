@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/truth/integrator.hpp"
 
 namespace windsplat::test {
 namespace {
@@ -163,6 +164,32 @@ TEST(UniformMedium, AnyStrideAbsorbsLikeTheBox) {
         sum -= std::log1p(-static_cast<double>(image.rgba[4 * i + 3]));
       }
       EXPECT_NEAR(sum / (32 * 32) / (0.05 * layers), 1, 0.01) << layers << " by " << stride;
+    }
+  }
+}
+
+// Colours accumulate from zero, so that those of the thinnest medium are exact; opacity is one
+// minus a transmittance, and each update of a pixel rounds it by 1e-7 at most
+// (docs/design/engine.md).
+TEST(Media, ThinMediaLoseAtMostTheRoundingOfTheirUpdates) {
+  for (const double each : {1e-12, 1e-9, 3e-8, 1e-6}) {
+    scene::Scene scene;
+    scene.lattice = even_lattice({3, 3, 1000}, {0.5, 0.5, 0.002});
+    scene.camera = look({0.1, 0.05, 0}, {0, 0, -1}, 3, 5, 5, false, 0.2);
+    const auto rho = static_cast<float>(each / 0.002);
+    scene.scalars = {medium(uniform(scene.lattice, rho), {1.0F, 0.5F, 0.25F})};
+    scene.stop_transmittance = 0;
+    const auto light = truth::integrate(scene, 4);
+    for (const scene::Method method : {scene::Method::kernel, scene::Method::slab}) {
+      scene.method = method;
+      const engine::Rendered rendered = render(scene);
+      double lost = 0;
+      for (std::size_t i = 0; i < light.size(); ++i) {
+        EXPECT_NEAR(light[i].depth, 1000 * each, 100 * each) << "the medium is homogeneous";
+        EXPECT_NEAR(rendered.image.rgba[4 * i] / light[i].rgb[0], 1, 1e-3) << each;
+        lost += std::abs(rendered.image.rgba[4 * i + 3] - light[i].alpha);
+      }
+      EXPECT_LE(lost, 1e-7 * static_cast<double>(rendered.work.pixel_updates)) << each;
     }
   }
 }

@@ -7,6 +7,8 @@
 #include <tuple>
 
 #include "server/engine/reference/kernels.hpp"
+#include "tests/numerics/partial_footprint.hpp"
+#include "tests/numerics/truth/integrator.hpp"
 
 namespace windsplat::naive {
 
@@ -105,13 +107,15 @@ int major_axis(const Scene& scene) {
   return best;
 }
 
+// `side` precedes `distance` from outside the box, where the sheets above the eye come first;
+// from inside, sheets are ordered by distance, of two equally near ones first that behind the eye.
 struct Slab {
-  bool below;
-  int distance;
+  int first;
+  int second;
   int group;
   int position;
   bool operator<(const Slab& other) const {
-    return std::tie(below, distance, group) < std::tie(other.below, other.distance, other.group);
+    return std::tie(first, second, group) < std::tie(other.first, other.second, other.group);
   }
 };
 
@@ -127,13 +131,30 @@ int eye_sample(const Scene& scene, int a) {
   return eye;
 }
 
-std::vector<Slab> order_slabs(const std::vector<Group>& groups, int major, int eye) {
+bool eye_inside(const Scene& scene) {
+  if (!scene.camera.perspective) return false;
+  for (int a = 0; a < 3; ++a) {
+    const double eye = scene.camera.eye[a];
+    if (eye < scene.lattice.box_min[a] || eye > scene.lattice.box_max[a]) return false;
+  }
+  return true;
+}
+
+std::vector<Slab> order_slabs(const Scene& scene, const std::vector<Group>& groups, int major) {
+  const int eye = eye_sample(scene, major);
+  const bool inside = eye_inside(scene);
   std::vector<Slab> slabs;
   for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
     const OrderedAxis& axis = groups[g].axis[major];
     for (int i = 0; i < static_cast<int>(axis.positions.size()); ++i) {
       const int ahead = axis.positions[i].sample - eye;
-      slabs.push_back({ahead < 0, std::abs(ahead), g, i});
+      const int distance = std::abs(ahead);
+      const bool in_front = scene.camera.forward[major] >= 0 ? ahead >= 0 : ahead <= 0;
+      if (inside) {
+        slabs.push_back({distance, in_front ? 1 : 0, g, i});
+      } else {
+        slabs.push_back({ahead < 0 ? 1 : 0, distance, g, i});
+      }
     }
   }
   std::sort(slabs.begin(), slabs.end());
@@ -201,7 +222,7 @@ class Renderer {
     const int major = major_axis(scene_);
     const int u = major == 0 ? 1 : 0;
     const int v = major == 2 ? 1 : 2;
-    for (const Slab& slab : order_slabs(groups, major, eye_sample(scene_, major))) {
+    for (const Slab& slab : order_slabs(scene_, groups, major)) {
       const Group& group = groups[slab.group];
       std::array<int, 3> index{};
       index[major] = slab.position;
@@ -238,7 +259,7 @@ class Renderer {
         scene_, view_,
         {group.axis[0].positions[index[0]], group.axis[1].positions[index[1]],
          group.axis[2].positions[index[2]]});
-    if (!position_.has_cell || (view_.perspective && position_.centre[2] < view_.near)) return;
+    if (!position_.has_cell) return;
     cell_ = cast<Real>(position_.cell);
     from_eye_ = cast<Real>(position_.from_eye);
     centre_ = cast<Real>(position_.centre);
@@ -252,8 +273,33 @@ class Renderer {
       if (drawn) line = cast<Real>(*ribbon);
     }
     Medium<Real> medium;
-    if (!group.layers.media.empty()) medium = make_medium(group);
+    const bool reaches = engine::reference::lies_beyond_near(view_, position_);
+    if (!group.layers.media.empty() && reaches) medium = make_medium(group);
+    near_ = view_.perspective && may_reach_near();
     if (drawn || medium.drawn) composite(drawn ? &line : nullptr, medium);
+  }
+
+  // Within twice the depth of its ellipsoid.
+  [[nodiscard]] bool may_reach_near() const {
+    double depth2 = 0;
+    for (const auto& edge : position_.edge) {
+      const double along = engine::reference::dot(view_.forward, edge);
+      depth2 += along * along;
+    }
+    const double depth = engine::reference::footprint_t * std::sqrt(depth2);
+    return position_.centre[2] - 2 * depth < view_.near;
+  }
+
+  // The part of a splat before the point u cells behind the middle of a ray at distance r.
+  static Real part_before(Real r, Real u) {
+    constexpr double t = engine::reference::footprint_t;
+    const double b = static_cast<double>(r);
+    const double half = b < t ? std::sqrt(t * t - b * b) : 0;
+    if (static_cast<double>(u) <= -half) return 0;
+    if (static_cast<double>(u) >= half) return 1;
+    const auto at = [&](double v) { return truth::kernel(std::hypot(b, v)); };
+    const double before = test::simpson(at, -half, static_cast<double>(u), 64);
+    return static_cast<Real>(before / static_cast<double>(footprint(r)));
   }
 
   // A splat whose optical depth is below the tolerance of every layer, for all view directions, is
@@ -313,6 +359,10 @@ class Renderer {
     const Vec<Real> d = to_cells(ray);
     const Real cells = std::sqrt(dot(d, d));
     Real tau = 0;
+    Real r = 0;
+    // Splats that reach the near plane are divided exactly, others as if homogeneous over one cell.
+    const bool cut = medium.drawn && near_;
+    Real before = 0;            // part of the cell before the near plane
     Real closest = centre_[2];  // the view depth at which the ray is nearest to the sample
     if (medium.drawn) {
       // Origin of the ray: the eye in perspective projection, otherwise the pixel's point in the
@@ -326,19 +376,23 @@ class Renderer {
       o = to_cells(o);
       const Vec<Real> c = cross(o, d);
       closest = dot(o, d) / dot(d, d);
-      const Real r = std::sqrt(dot(c, c)) / cells;
+      r = std::sqrt(dot(c, c)) / cells;
       tau = medium.rho * footprint(r) * std::sqrt(dot(ray, ray)) / (Real(1.4476982547) * cells);
-      // The part in front of the near plane is excluded, as if the splat were uniform over one
-      // cell.
+      // The part in front of the near plane is excluded.
       const auto near = static_cast<Real>(scene_.camera.near);
-      if (scene_.camera.perspective) {
-        tau *= std::clamp(Real(0.5) + (closest - near) * cells, Real(0), Real(1));
+      if (cut) {
+        before = part_before(r, (near - closest) * cells);
+        tau *= 1 - before;
       }
     }
     engine::reference::RibbonHit<Real> hit;
     if (line != nullptr) hit = hit_ribbon(*line, x + Real(0.5), y + Real(0.5));
     if (tau == 0 && hit.opacity == 0) return;
-    const Real place = std::clamp(Real(0.5) + (hit.depth - closest) * cells, Real(0), Real(1));
+    const Real from_middle = (hit.depth - closest) * cells;
+    Real place = std::clamp(Real(0.5) + from_middle, Real(0), Real(1));
+    if (cut && before < 1) {
+      place = std::clamp((part_before(r, from_middle) - before) / (1 - before), Real(0), Real(1));
+    }
     add(static_cast<std::size_t>(y) * picture_.width + x, tau, hit.opacity, place, medium.color,
         hit.color);
   }
@@ -398,6 +452,7 @@ class Renderer {
   Real pixel_ = 1;
   // The current kernel.
   KernelPosition position_;
+  bool near_ = false;  // its splat may reach the near plane
   Vec<Real> cell_{}, from_eye_{}, centre_{};
   std::array<Vec<Real>, 3> inverse_{};
 };

@@ -156,12 +156,12 @@ TEST(Reference, RaysStartAtTheNearPlane) {
   scene.lattice = even_lattice({1, 1, 1}, {1, 1, 1});
   scene.scalars = {medium(constant_scalar(scene.lattice, 2), {1.0F, 1.0F, 1.0F})};
   scene.camera = look({0, 0, 0}, {0, 1, 0}, 0.5, 1, 1, true, 0.1);
-  for (const double near : {1e-3, 0.2, 0.45}) {
-    scene.camera.near = near;  // the centre of the splat is 0.5 away
+  for (const double near : {1e-3, 0.2, 0.45, 0.51, 0.8, 1.5}) {
+    scene.camera.near = near;  // the centre of the splat is 0.5 away, its end 1.87
     const double tau = 2 * (footprint(0) - partial_footprint(0, near - 0.5)) / footprint_integral;
     EXPECT_NEAR(truth(scene).rgba[3], -std::expm1(-tau), 1e-9) << near;
   }
-  scene.camera.near = 0.51;
+  scene.camera.near = 1.88;
   EXPECT_EQ(truth(scene).rgba[3], 0);
 }
 

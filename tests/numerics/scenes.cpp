@@ -5,6 +5,10 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
+#include "server/engine/bins.hpp"
+#include "server/engine/plan.hpp"
+#include "server/engine/tiles.hpp"
+
 namespace windsplat::test {
 
 double footprint(double r) {
@@ -139,6 +143,23 @@ engine::Rendered render(const scene::Scene& scene, unsigned threads) {
   auto rendered = engine::render(scene, pool, CancelToken());
   if (!rendered) throw std::runtime_error(rendered.error().message);
   return std::move(*rendered);
+}
+
+engine::Rendered render_with(const engine::kernels::Table& table, const scene::Scene& scene) {
+  ThreadPool pool(1);
+  const CancelToken cancel;
+  engine::Rendered out;
+  engine::RenderPlan plan;
+  engine::make_plan(scene, plan);
+  engine::BinSpace bin_space;
+  engine::TileSpace tile_space;
+  const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, bin_space, out.work);
+  out.image.width = scene.camera.width;
+  out.image.height = scene.camera.height;
+  out.image.rgba.assign(4 * static_cast<std::size_t>(scene.camera.width) * scene.camera.height, 0);
+  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, engine::sink_into(out.image),
+                     out.work);
+  return out;
 }
 
 const float* pixel(const engine::Image& image, int x, int y) {

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "server/engine/kernels/table.hpp"
 #include "server/engine/render.hpp"
 #include "server/scene/scene.hpp"
 
@@ -50,6 +51,9 @@ scene::VectorLayer plain_lines(std::shared_ptr<const data::Volume> field, std::a
 scene::Scene cloudy_scene(int side, int size);
 
 engine::Rendered render(const scene::Scene& scene, unsigned threads = 1);
+
+// The same by one instruction set.
+engine::Rendered render_with(const engine::kernels::Table& table, const scene::Scene& scene);
 
 const float* pixel(const engine::Image& image, int x, int y);
 

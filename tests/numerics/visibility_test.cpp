@@ -46,8 +46,9 @@ TEST(Visibility, NearerHidesFartherFromTwentySixDirections) {
         scene::Scene scene = two_splats(lattice, red, green);
         const glm::dvec3 forward = place(lattice, green) - place(lattice, red);
         for (const bool perspective : {false, true}) {
-          // From outside, and from inside the box between its centre and the face of the red splat.
-          for (const double distance : {4.0, 0.9 * glm::length(forward)}) {
+          // From outside, and from inside the box between its centre and the red splat, which ends
+          // 1.37 of 9 cells behind its centre.
+          for (const double distance : {4.0, 0.8 * glm::length(forward)}) {
             scene.camera = look(place(lattice, green), forward, distance, 15, 15, perspective, 0.1);
             const bool behind_eye = perspective && distance < glm::length(forward);
             const engine::Image image = render(scene).image;

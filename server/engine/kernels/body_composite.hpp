@@ -165,9 +165,10 @@ KERNEL_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
   return light;
 }
 
-template <bool Perspective, int Compositing, From Start>
-KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
-                                const float* HWY_RESTRICT ray, float* HWY_RESTRICT block) {
+// Lanes: SplatLanes or, from the near plane, NearLanes.
+template <bool Perspective, int Compositing, From Start, class Lanes>
+KERNEL_INLINE Light splat_block(const Lanes& s, float x, float y, const float* HWY_RESTRICT ray,
+                                float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
@@ -175,7 +176,7 @@ KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
     const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
     const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
     const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
-    const Attenuation<Pixel> medium = attenuation_by<Compositing>(lane.tau);
+    const Attenuation<Pixel> medium = attenuation_by<Compositing>(depth_beyond<Start>(lane));
     const Pixel t = load<Pixel>(to.transmittance + l);
     const Pixel a = t * medium.absorbed;
     for (int c = 0; c < 3; ++c) add_product(to.rgb[c] + l, a, s.color[c]);
@@ -188,9 +189,9 @@ KERNEL_INLINE Light splat_block(const SplatLanes& s, float x, float y,
 
 // The first form of [CM92]: the front part of the medium, the line and the back part composited one
 // over the other where the ray meets the line.
-KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const RibbonLane& line,
-                                const Attenuation<Pixel>& medium, Pixel x_line, const Channels& to,
-                                int l) {
+KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const Pixel medium_color[3],
+                                const RibbonLane& line, const Attenuation<Pixel>& medium,
+                                Pixel x_line, const Channels& to, int l) {
   const Pixel one = all<Pixel>(1.0F);
   const Pixel split = hn::IfThenElse(hn::Gt(line.opacity, hn::Zero(PixelTag())), x_line, one);
   const Pixel front = split * medium.absorbed;
@@ -201,7 +202,7 @@ KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const
   const Pixel t = load<Pixel>(to.transmittance + l);
   for (int c = 0; c < 3; ++c) {
     const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
-    add_product(to.rgb[c] + l, t, hn::MulAdd(line_weight, color, s.color[c] * absorbed));
+    add_product(to.rgb[c] + l, t, hn::MulAdd(line_weight, color, medium_color[c] * absorbed));
   }
   return t * (rest * (one - back));
 }
@@ -209,9 +210,9 @@ KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const SplatLanes& s, const
 // A line in a homogeneous cell of optical depth tau, with optical depth tau_f in front of it
 // (x = tau_f / tau is its relative position):
 // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau_f) (c_v - c_s).
-template <bool Perspective, int Compositing, int Style, From Start>
-KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise,
-                               const SplatLanes& s, float x, float y, const float* HWY_RESTRICT ray,
+template <bool Perspective, int Compositing, int Style, From Start, class Lanes>
+KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise, const Lanes& s,
+                               float x, float y, const float* HWY_RESTRICT ray,
                                float* HWY_RESTRICT block) {
   constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
   const Channels to = channels_of(block);
@@ -222,16 +223,16 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
     const RibbonLane line = ribbon_lane<along, Style>(r, px - r.x, py - r.y);
     const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
     const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
-    const Attenuation<Pixel> medium = attenuation_by<Compositing>(lane.tau);
-    const Pixel from_centre = hn::MulAdd(line.f, depth_rise, depth) - lane.behind;
-    const Pixel x_line = clamped(hn::MulAdd(from_centre, lane.cells, all<Pixel>(0.5F)), 0.0F, 1.0F);
+    const Pixel tau = depth_beyond<Start>(lane);
+    const Attenuation<Pixel> medium = attenuation_by<Compositing>(tau);
+    const Pixel x_line = fraction_before(s, lane, hn::MulAdd(line.f, depth_rise, depth));
     Pixel left;
     if (Compositing == compositing_cd_naive) {
-      left = naive_block(r, s, line, medium, x_line, to, l);
+      left = naive_block(r, s.color, line, medium, x_line, to, l);
     } else {
       const Pixel t = load<Pixel>(to.transmittance + l);
       const Pixel a = hn::MulAdd(line.opacity, medium.transmitted, medium.absorbed);
-      const Pixel line_weight = line.opacity * light_before<Compositing>(medium, lane.tau, x_line);
+      const Pixel line_weight = line.opacity * light_before<Compositing>(medium, tau, x_line);
       for (int c = 0; c < 3; ++c) {
         const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
         add_product(to.rgb[c] + l, t, hn::MulAdd(line_weight, color - s.color[c], s.color[c] * a));
@@ -247,7 +248,7 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
 
 template <bool Perspective, int Compositing, From Start>
 void splat_window(const Splat& splat, const Window& window, Tile& tile) {
-  const SplatLanes s = spread(splat);
+  const auto s = spread_from<Start>(splat, tile.partial);
   each_block<Perspective>(window, tile, [&](float x, float y, const float* ray, float* block) {
     return splat_block<Perspective, Compositing, Start>(s, x, y, ray, block);
   });
@@ -256,7 +257,7 @@ void splat_window(const Splat& splat, const Window& window, Tile& tile) {
 template <bool Perspective, int Compositing, int Style, From Start>
 void both_window(const Ribbon& ribbon, const Splat& splat, const Window& window, Tile& tile) {
   const RibbonLanes r = spread(ribbon);
-  const SplatLanes s = spread(splat);
+  const auto s = spread_from<Start>(splat, tile.partial);
   const Pixel depth = all<Pixel>(ribbon.depth);
   const Pixel depth_rise = all<Pixel>(ribbon.depth_rise);
   each_block<Perspective>(window, tile, [&](float x, float y, const float* ray, float* block) {

@@ -34,10 +34,24 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
   return out;
 }
 
+inline NearForm near_form_at(const Prepared& p, int l) {
+  const NearSplats& s = p.near_splats;
+  NearForm out = {};
+  out.x = p.middle_x;
+  out.y = p.middle_y;
+  for (int a = 0; a < 3; ++a) {
+    out.centre[a] = s.centre[a][l];
+    out.ahead[a] = s.ahead[a][l];
+    out.right[a] = s.right[a][l];
+    out.down[a] = s.down[a][l];
+  }
+  out.d2_least = p.splats.d2_least[l];
+  return out;
+}
+
 template <bool Perspective>
-inline Splat splat_at(const Prepared& p, int l) {
-  const Splats& s = p.splats;
-  Splat out = {};
+inline SplatForm form_at(const Splats& s, int l) {
+  SplatForm out = {};
   out.x = s.x[l];
   out.y = s.y[l];
   out.xx = s.xx[l];
@@ -56,10 +70,23 @@ inline Splat splat_at(const Prepared& p, int l) {
     out.dxy = s.dxy[l];
     out.dyy = s.dyy[l];
     out.d2_least = s.d2_least[l];
+  }
+  return out;
+}
+
+template <bool Perspective>
+inline Splat splat_at(const Prepared& p, int l) {
+  Splat out = {};
+  if (Perspective && has(p.splats.near, l)) {
+    out.near_form = near_form_at(p, l);
+  } else {
+    out.form = form_at<Perspective>(p.splats, l);
+  }
+  if (Perspective) {
     out.z = p.positions.z[l];
     out.near = p.near;
   }
-  out.strength = s.strength[l];
+  out.strength = p.splats.strength[l];
   for (int c = 0; c < 3; ++c) out.color[c] = p.densities.color[l][c];
   return out;
 }
@@ -167,7 +194,7 @@ template <bool Perspective>
 inline From from_of(const Prepared& p, int l) {
   if (!Perspective) return From::eye;
   const Splats& s = p.splats;
-  if (p.positions.z[l] - 2.0F * s.half_depth[l] < p.near) return From::near_plane;
+  if (has(s.near, l)) return From::near_plane;
   return s.ex[l] == s.x[l] && s.ey[l] == s.y[l] ? From::eye_inside : From::eye;
 }
 

@@ -7,34 +7,46 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-constexpr float magnitude_least = 1.17549435e-38F;  // denormal vectors count as zero
+// Nonzero magnitudes of lines are never less, so that none is lost as a denormal; see
+// LineStyle::magnitude_scale.
+constexpr float magnitude_least = 0x1p-124F;
+constexpr float normal_least = 1.17549435e-38F;
 
 // The vectors at kernel positions.
 struct Vectors {
-  Kernel magnitude;         // magnitude of the raw data; negative: no line
+  Kernel magnitude;         // of the raw data times magnitude_scale; negative: no line
   Three<Kernel> direction;  // a unit vector along the axes of the cell
 };
 
-// Lengths and their inverses; the inverse is finite but arbitrary below magnitude_least.
+// Lengths and their inverses; the inverse is finite but arbitrary below normal_least.
 struct Norm {
   Kernel length, inverse;
 };
+
+constexpr float moderate_low = 1e-15F;
+constexpr float moderate_high = 1e15F;
+
+// The norm of vectors whose largest component is zero or of moderate size.
+KERNEL_INLINE Norm moderate_norm(const Three<Kernel>& v) {
+  const Kernel square = dot3(v, v);
+  const Kernel inverse = inverse_root(hn::Max(square, all<Kernel>(1e-30F)));
+  // A further Newton step: a vector whose length equals a tolerance must not fall below it.
+  const Kernel length = square * inverse;
+  const Kernel rest = hn::NegMulAdd(length, length, square);
+  return {hn::MulAdd(rest, all<Kernel>(0.5F) * inverse, length), inverse};
+}
 
 // Avoids overflow and underflow by dividing by the largest component, unless that is zero or of
 // moderate size in every lane.
 KERNEL_INLINE Norm norm_of(const Three<Kernel>& v) {
   const Kernel top = hn::Max(hn::Max(hn::Abs(v.x), hn::Abs(v.y)), hn::Abs(v.z));
-  const auto moderate = hn::And(hn::Ge(top, all<Kernel>(1e-15F)), hn::Le(top, all<Kernel>(1e15F)));
+  const auto moderate =
+      hn::And(hn::Ge(top, all<Kernel>(moderate_low)), hn::Le(top, all<Kernel>(moderate_high)));
   const auto nothing = hn::Le(top, hn::Zero(KernelTag()));
   if (HWY_LIKELY(hn::AllTrue(KernelTag(), hn::Or(moderate, nothing)))) {
-    const Kernel square = dot3(v, v);
-    const Kernel inverse = inverse_root(hn::Max(square, all<Kernel>(1e-30F)));
-    // A further Newton step: a vector whose length equals a tolerance must not fall below it.
-    const Kernel length = square * inverse;
-    const Kernel rest = hn::NegMulAdd(length, length, square);
-    return {hn::MulAdd(rest, all<Kernel>(0.5F) * inverse, length), inverse};
+    return moderate_norm(v);
   }
-  const Kernel least = all<Kernel>(magnitude_least);
+  const Kernel least = all<Kernel>(normal_least);
   const Kernel scale = inverse_of(hn::Max(top, least));
   const Three<Kernel> unit = {v.x * scale, v.y * scale, v.z * scale};
   const Kernel length = top * hn::Sqrt(dot3(unit, unit));
@@ -61,25 +73,103 @@ KERNEL_INLINE Kernel rate_of(const float* rates, const Rows& rows, int a, int i)
   return load<Kernel>(lanes + i);
 }
 
+// Vectors whose largest component is zero or of moderate size. Compared as integers: a denormal,
+// which may count as zero in floating point, is neither.
+KERNEL_INLINE MaskOf<Kernel> is_moderate(const Three<Kernel>& v) {
+  const hn::RebindToSigned<KernelTag> integers;
+  const auto size = [&](Kernel c) {
+    return hn::And(hn::BitCast(integers, c), hn::Set(integers, 0x7fffffff));
+  };
+  const auto top = hn::Max(hn::Max(size(v.x), size(v.y)), size(v.z));
+  const auto low = hn::Set(integers, __builtin_bit_cast(std::int32_t, moderate_low));
+  const auto high = hn::Set(integers, __builtin_bit_cast(std::int32_t, moderate_high));
+  const auto extreme = hn::Or(hn::Lt(top, low), hn::Gt(top, high));
+  return hn::RebindMask(KernelTag(), hn::Or(hn::Not(extreme), hn::Eq(top, hn::Zero(integers))));
+}
+
+// The value of any float, where the processor takes denormals for zero too.
+inline double widened(float v) {
+  const auto bits = __builtin_bit_cast(std::uint32_t, v);
+  if ((bits & 0x7f800000U) != 0) return static_cast<double>(v);
+  const double size = static_cast<double>(bits & 0x7fffffU) * 0x1p-149;
+  return (bits >> 31U) != 0 ? -size : size;
+}
+
+inline double length_of(const double v[3]) {
+  return __builtin_sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+inline float least_magnitude(const LineStyle& line) {
+  return larger(line.min_magnitude, magnitude_least);
+}
+
+// The magnitude of a vector times magnitude_scale. Its place above or below the tolerance is
+// decided before rounding.
+inline float scaled_magnitude(const LineStyle& line, double magnitude) {
+  constexpr double largest = 3e38;
+  const auto least = static_cast<double>(least_magnitude(line));
+  const bool kept = magnitude >= line.unscaled_min_magnitude;
+  const double low = kept ? least : static_cast<double>(normal_least);
+  const double high = kept ? largest : 0.5 * least;
+  const double scaled = magnitude * line.magnitude_scale;
+  return static_cast<float>(scaled < low ? low : scaled > high ? high : scaled);
+}
+
+// Replaces the vectors of the lanes in `bits`, which may be of any size: in double precision
+// neither their squares nor their inverses leave the range of numbers.
+inline void read_extremes(const LineStyle& line, const Rows& rows, int i, const Three<Kernel>& v,
+                          std::uint32_t bits, Vectors& vectors) {
+  alignas(64) float data[3][pair_kernels], direction[3][pair_kernels], magnitude[pair_kernels];
+  store(v.x, data[0]);
+  store(v.y, data[1]);
+  store(v.z, data[2]);
+  store(vectors.magnitude, magnitude);
+  store(vectors.direction.x, direction[0]);
+  store(vectors.direction.y, direction[1]);
+  store(vectors.direction.z, direction[2]);
+  for (; bits != 0; bits &= bits - 1U) {
+    const int k = __builtin_ctz(bits);
+    double at[3] = {widened(data[0][k]), widened(data[1][k]), widened(data[2][k])};
+    const double length = length_of(at);
+    magnitude[k] = -1;
+    if (length <= 0) continue;
+    const double rates[3] = {
+        line.rate_x == nullptr ? 1.0 : static_cast<double>(line.rate_x[rows.sample[1][i + k]]),
+        static_cast<double>(line.rate_y),
+        line.rate_z == nullptr ? 1.0 : static_cast<double>(line.rate_z[rows.sample[2][i + k]])};
+    for (int c = 0; c < 3; ++c) at[c] *= static_cast<double>(line.scale[c]) * rates[c] / length;
+    const double drawn = length_of(at);
+    if (drawn <= 0) continue;
+    magnitude[k] = scaled_magnitude(line, length);
+    for (int c = 0; c < 3; ++c) direction[c][k] = static_cast<float>(at[c] / drawn);
+  }
+  vectors = {load<Kernel>(magnitude),
+             {load<Kernel>(direction[0]), load<Kernel>(direction[1]), load<Kernel>(direction[2])}};
+}
+
 // Unit directions as drawn, and magnitudes; a masked sample or one without a direction gets a
 // negative magnitude.
 KERNEL_INLINE Vectors read_vectors(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
-  const Three<Kernel> v = fetch_vectors(pass, rows, i);
-  const Norm raw = norm_of(v);
+  const Three<Kernel> all_sizes = fetch_vectors(pass, rows, i);
+  const auto moderate = is_moderate(all_sizes);
+  const Three<Kernel> v = {hn::IfThenElseZero(moderate, all_sizes.x),
+                           hn::IfThenElseZero(moderate, all_sizes.y),
+                           hn::IfThenElseZero(moderate, all_sizes.z)};
+  const Norm raw = moderate_norm(v);
   // Scaled by 1/m first: the products stay finite for any data.
   const Three<Kernel> drawn = {
       v.x * raw.inverse * all<Kernel>(line.scale[0]) * rate_of(line.rate_x, rows, 1, i),
       v.y * raw.inverse * all<Kernel>(line.scale[1]) * all<Kernel>(line.rate_y),
       v.z * raw.inverse * all<Kernel>(line.scale[2]) * rate_of(line.rate_z, rows, 2, i)};
   const Norm shown = norm_of(drawn);
-  const auto known = hn::Ge(shown.length, all<Kernel>(magnitude_least));
-  return {hn::IfThenElse(known, raw.length, all<Kernel>(-1.0F)),
-          {drawn.x * shown.inverse, drawn.y * shown.inverse, drawn.z * shown.inverse}};
-}
-
-inline float least_magnitude(const LineStyle& line) {
-  return larger(line.min_magnitude, magnitude_least);
+  const auto known = hn::Ge(shown.length, all<Kernel>(normal_least));
+  Vectors vectors = {hn::IfThenElse(known, raw.length, all<Kernel>(-1.0F)),
+                     {drawn.x * shown.inverse, drawn.y * shown.inverse, drawn.z * shown.inverse}};
+  const std::uint32_t lanes = (2U << (kernel_lanes - 1)) - 1U;
+  const std::uint32_t extreme = line.scaled != 0 ? lanes : lanes & ~bits_of<Kernel>(moderate);
+  if (HWY_UNLIKELY(extreme != 0)) read_extremes(line, rows, i, all_sizes, extreme, vectors);
+  return vectors;
 }
 
 // Upper bound on the width of the cell over all view directions: its longest edge.

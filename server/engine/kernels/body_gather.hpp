@@ -6,51 +6,6 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Rows of the table of partial footprints for a vector of rays, and the weights between a row and
-// the next.
-struct PartialRows {
-  SignedOf<Pixel> at;
-  Pixel part;
-};
-
-KERNEL_INLINE PartialRows partial_rows_at(Pixel r2) {
-  constexpr float rows_per_t2 = static_cast<float>(partial_rows - 1) / (footprint_t * footprint_t);
-  const Pixel row_position =
-      hn::Min(r2 * all<Pixel>(rows_per_t2), all<Pixel>(partial_rows - 1.001F));
-  const SignedOf<Pixel> row = truncated(row_position);
-  const hn::RebindToSigned<PixelTag> integers;
-  return {row * hn::Set(integers, partial_columns - 1), row_position - from_integer<Pixel>(row)};
-}
-
-// Interpolates between the two values of a table entry.
-KERNEL_INLINE Pixel between_columns(SignedOf<Pixel> entry, Pixel part) {
-  const hn::RebindToSigned<PixelTag> integers;
-  const hn::RebindToUnsigned<PixelTag> bits;
-  const SignedOf<Pixel> low = hn::And(entry, hn::Set(integers, 0xffff));
-  const auto high = hn::BitCast(integers, hn::ShiftRight<16>(hn::BitCast(bits, entry)));
-  const Pixel a = from_integer<Pixel>(low);
-  return hn::MulAdd(part, from_integer<Pixel>(high) - a, a);
-}
-
-// F(b^2, v) in units of 1 / partial_one, bilinearly interpolated; v in [-1, 1].
-KERNEL_INLINE Pixel partial_at(const std::int32_t* HWY_RESTRICT partial, const PartialRows& rows,
-                               Pixel v) {
-  const hn::RebindToSigned<PixelTag> integers;
-  const Pixel one = all<Pixel>(1.0F);
-  // The face lies entirely in front of or behind the splat on all rays.
-  if (hn::AllTrue(PixelTag(), hn::Le(v, hn::Neg(one)))) return hn::Zero(PixelTag());
-  if (hn::AllTrue(PixelTag(), hn::Ge(v, one))) return all<Pixel>(partial_one);
-  const Pixel column_position = (v + one) * all<Pixel>(0.5F * (partial_columns - 1));
-  const SignedOf<Pixel> column =
-      hn::Min(truncated(column_position), hn::Set(integers, partial_columns - 2));
-  const Pixel part = column_position - from_integer<Pixel>(column);
-  const SignedOf<Pixel> at = rows.at + column;
-  const Pixel upper = between_columns(hn::GatherIndex(integers, partial, at), part);
-  const Pixel lower =
-      between_columns(hn::GatherIndex(integers, partial + (partial_columns - 1), at), part);
-  return hn::MulAdd(rows.part, lower - upper, upper);
-}
-
 // The accumulated medium of the block, cleared at its first use in this slab.
 KERNEL_INLINE float* touch(Slab& slab, int row, int column) {
   float* at =
@@ -71,8 +26,8 @@ struct Faces {
 };
 
 // Adds the part of the splat in each slab to one block. Returns the number of slabs changed.
-template <bool Perspective>
-KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_RESTRICT partial,
+template <bool Perspective, From Start, class Lanes>
+KERNEL_INLINE int gather_block(const Lanes& s, const std::int32_t* HWY_RESTRICT partial,
                                const Faces& faces, const Tile& tile, int row, int column) {
   constexpr float t2 = footprint_t * footprint_t;
   const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
@@ -81,11 +36,10 @@ KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_REST
     const Pixel px = all<Pixel>(left_of(tile, column)) + load<Pixel>(lane_x + l);
     const Pixel py = all<Pixel>(top_of(tile, row)) + load<Pixel>(lane_y + l);
     const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
-    const SplatLane lane = splat_lane<Perspective, From::eye>(s, px, py, length);
+    const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
     if (hn::AllFalse(PixelTag(), hn::Lt(lane.r2, all<Pixel>(t2)))) continue;
     // Half the chord in cells; converts the depths of faces to half chords from the middle.
-    const Pixel chord2 = hn::Max(all<Pixel>(t2) - lane.r2, all<Pixel>(1e-6F));
-    const Pixel scale = lane.cells / hn::Sqrt(chord2);
+    const Pixel scale = lane.cells / half_chord(lane.r2);
     const Pixel whole = lane.tau * all<Pixel>(1.0F / partial_one);
     const PartialRows rows = partial_rows_at(lane.r2);
     const auto at_face = [&](int n) {
@@ -107,8 +61,8 @@ KERNEL_INLINE int gather_block(const SplatLanes& s, const std::int32_t* HWY_REST
   return __builtin_popcount(changed);
 }
 
-// The part in front of the near plane is ignored.
-template <bool Perspective>
+// The part before the near plane is ignored.
+template <bool Perspective, From Start>
 void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
                Tile& tile) {
   const auto near = static_cast<float>(static_cast<double>(camera.near) - camera.depth_origin);
@@ -126,24 +80,26 @@ void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int
   }
   if (faces.count == 0 || record.last - record.middle <= faces.depth[0]) return;
   const std::uint32_t columns = range_mask({record.column_first, record.column_last});
-  const SplatLanes lanes = spread(record.splat);
+  const auto lanes = spread_from<Start>(record.splat, record.partial);
   for (int row = record.row_first; row <= record.row_last; ++row) {
     std::uint32_t left = columns & tile.open[row];
     while (left != 0) {
       const int column = __builtin_ctz(left);
       left &= left - 1U;
       const int changed =
-          gather_block<Perspective>(lanes, record.partial, faces, tile, row, column);
+          gather_block<Perspective, Start>(lanes, record.partial, faces, tile, row, column);
       tile.counters.pixel_updates += std::int64_t{changed} * block_pixels;
     }
   }
 }
 
 void gather(const Camera& camera, const SplatRecord& record, Slab* slabs, int first, Tile& tile) {
-  if (camera.perspective != 0) {
-    gather_on<true>(camera, record, slabs, first, tile);
+  if (camera.perspective == 0) {
+    gather_on<false, From::eye>(camera, record, slabs, first, tile);
+  } else if (record.near != 0) {
+    gather_on<true, From::near_plane>(camera, record, slabs, first, tile);
   } else {
-    gather_on<false>(camera, record, slabs, first, tile);
+    gather_on<true, From::eye>(camera, record, slabs, first, tile);
   }
 }
 
@@ -163,7 +119,8 @@ int pack_splats_on(const Prepared& p, SplatRecord* out) {
                 static_cast<std::int16_t>(f.row_first[l]),
                 static_cast<std::int16_t>(f.row_last[l]),
                 static_cast<std::int16_t>(f.column_first[l]),
-                static_cast<std::int16_t>(f.column_last[l])};
+                static_cast<std::int16_t>(f.column_last[l]),
+                Perspective && has(p.splats.near, l) ? 1 : 0};
   }
   return n;
 }

@@ -1,7 +1,7 @@
 // Part of the kernel body: contributions of one line and of one splat to a vector of pixels.
 #pragma once
 
-#include "server/engine/kernels/body_math.hpp"
+#include "server/engine/kernels/body_partial.hpp"
 #include "server/engine/kernels/prepared.hpp"
 
 namespace windsplat::engine::kernels {
@@ -130,14 +130,44 @@ struct SplatLanes {
 
 KERNEL_INLINE SplatLanes spread(const Splat& s) {
   const auto lanes = [](float v) { return all<Pixel>(v); };
+  const SplatForm& f = s.form;
   return {
-      lanes(s.x),    lanes(s.y),        lanes(s.ex),
-      lanes(s.ey),   lanes(s.xx),       lanes(s.xy),
-      lanes(s.yy),   lanes(s.b0),       lanes(s.bx),
-      lanes(s.by),   lanes(s.d0),       lanes(s.dx),
-      lanes(s.dy),   lanes(s.dxx),      lanes(s.dxy),
-      lanes(s.dyy),  lanes(s.d2_least), lanes(s.z),
+      lanes(f.x),    lanes(f.y),        lanes(f.ex),
+      lanes(f.ey),   lanes(f.xx),       lanes(f.xy),
+      lanes(f.yy),   lanes(f.b0),       lanes(f.bx),
+      lanes(f.by),   lanes(f.d0),       lanes(f.dx),
+      lanes(f.dy),   lanes(f.dxx),      lanes(f.dxy),
+      lanes(f.dyy),  lanes(f.d2_least), lanes(s.z),
       lanes(s.near), lanes(s.strength), {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])}};
+}
+
+// The same for a splat that may reach the near plane.
+struct NearLanes {
+  Pixel x, y;
+  Three<Pixel> centre, ahead, right, down;
+  Pixel d2_least, z, near, strength;
+  Pixel color[3];
+  const std::int32_t* partial;
+};
+
+KERNEL_INLINE NearLanes spread_near(const Splat& s, const std::int32_t* partial) {
+  const auto lanes = [](float v) { return all<Pixel>(v); };
+  const auto three = [&](const float v[3]) {
+    return Three<Pixel>{lanes(v[0]), lanes(v[1]), lanes(v[2])};
+  };
+  const NearForm& f = s.near_form;
+  return {lanes(f.x),
+          lanes(f.y),
+          three(f.centre),
+          three(f.ahead),
+          three(f.right),
+          three(f.down),
+          lanes(f.d2_least),
+          lanes(s.z),
+          lanes(s.near),
+          lanes(s.strength),
+          {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])},
+          partial};
 }
 
 // A splat along the rays of pixels; see Splats.
@@ -146,12 +176,22 @@ struct SplatLane {
   Pixel tau;     // optical depth of the whole splat
   Pixel cells;   // ray length in cells per unit of view depth
   Pixel behind;  // view depth of the point closest to the centre minus that of the centre
+  Pixel before;  // near plane only: part of the splat before it
 };
 
 // Start of the rays. `eye`: the splat lies beyond the near plane. `eye_inside`: the same, and its
-// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat reaches the near
-// plane; the part before it is removed as if the splat were homogeneous over one cell.
+// centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat may reach the
+// near plane; the part before it is removed.
 enum class From { eye, eye_inside, near_plane };
+
+template <From Start>
+KERNEL_INLINE auto spread_from(const Splat& s, const std::int32_t* partial) {
+  if constexpr (Start == From::near_plane) {
+    return spread_near(s, partial);
+  } else {
+    return spread(s);
+  }
+}
 
 template <bool Perspective, From Start>
 KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
@@ -176,15 +216,62 @@ KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixe
     const Pixel cells = length2 * inverse;
     const Pixel behind =
         hn::NegMulAdd(s.z, bent, hn::MulAdd(s.bx, ex, hn::MulAdd(s.by, ey, s.b0))) * inverse2;
-    if (Start == From::near_plane) {
-      const Pixel beyond = hn::MulAdd((s.z - s.near) + behind, cells, all<Pixel>(0.5F));
-      return {r2, tau * clamped(beyond, 0.0F, 1.0F), cells, behind};
-    }
-    return {r2, tau, cells, behind};
+    return {r2, tau, cells, behind, zero};
   } else {
     const Pixel behind = hn::MulAdd(s.bx, dx, s.by * dy);
-    return {top, s.strength * footprint(top), hn::Sqrt(s.d0), behind};
+    return {top, s.strength * footprint(top), hn::Sqrt(s.d0), behind, zero};
   }
+}
+
+// The part of a splat before a view depth relative to its centre's.
+KERNEL_INLINE Pixel part_before(const std::int32_t* partial, const SplatLane& lane, Pixel depth) {
+  const Pixel half_chords = (depth - lane.behind) * (lane.cells / half_chord(lane.r2));
+  return partial_at(partial, partial_rows_at(lane.r2), clamped(half_chords, -1.0F, 1.0F)) *
+         all<Pixel>(1.0F / partial_one);
+}
+
+// From vectors, because the projected centre of a splat beside the eye is at infinity.
+template <bool Perspective, From Start>
+KERNEL_INLINE SplatLane splat_lane(const NearLanes& s, Pixel px, Pixel py, Pixel ray) {
+  const Pixel right = px - s.x;
+  const Pixel down = py - s.y;
+  const auto along = [&](Pixel ahead, Pixel by_right, Pixel by_down) {
+    return hn::MulAdd(right, by_right, hn::MulAdd(down, by_down, ahead));
+  };
+  const Three<Pixel> d = {along(s.ahead.x, s.right.x, s.down.x),
+                          along(s.ahead.y, s.right.y, s.down.y),
+                          along(s.ahead.z, s.right.z, s.down.z)};
+  const Three<Pixel> normal = cross3(s.centre, d);
+  const Pixel length2 = hn::Max(dot3(d, d), s.d2_least);
+  const Pixel inverse = inverse_root(length2);
+  const Pixel inverse2 = inverse * inverse;
+  SplatLane lane;
+  lane.r2 = dot3(normal, normal) * inverse2;
+  lane.tau = s.strength * footprint(lane.r2) * (inverse * ray);
+  lane.cells = length2 * inverse;
+  lane.behind = hn::MulSub(dot3(s.centre, d), inverse2, s.z);
+  lane.before = part_before(s.partial, lane, s.near - s.z);
+  return lane;
+}
+
+// Optical depth of the part of a splat beyond the near plane.
+template <From Start>
+KERNEL_INLINE Pixel depth_beyond(const SplatLane& lane) {
+  if constexpr (Start != From::near_plane) {
+    return lane.tau;
+  } else {
+    return lane.tau * (all<Pixel>(1.0F) - lane.before);
+  }
+}
+
+// The fraction of that part in front of a line whose depth relative to the centre is `depth`.
+KERNEL_INLINE Pixel fraction_before(const SplatLanes& /*s*/, const SplatLane& lane, Pixel depth) {
+  return clamped(hn::MulAdd(depth - lane.behind, lane.cells, all<Pixel>(0.5F)), 0.0F, 1.0F);
+}
+
+KERNEL_INLINE Pixel fraction_before(const NearLanes& s, const SplatLane& lane, Pixel depth) {
+  const Pixel rest = hn::Max(all<Pixel>(1.0F) - lane.before, all<Pixel>(1e-6F));
+  return clamped((part_before(s.partial, lane, depth) - lane.before) / rest, 0.0F, 1.0F);
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ struct BrickMaker {
     if (splats == 0) return 0;
     store(found.rho, out.densities.rho + l);
     const Outline outline =
-        prepare_splats<Perspective, Curved>(camera, out.positions, cell, l, found.rho, out.splats);
+        prepare_splats<Perspective, Curved>(camera, out.positions, cell, l, found.rho, out);
     return find_splat_blocks(outline, tile, l, splats, out.footing);
   }
 
@@ -160,9 +160,11 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
                    Prepared& out) {
   BrickMaker<Lines, Medium, Perspective, Curved> maker(camera, pass, tile, out);
   KernelPositions& positions = out.positions;
-  positions.lines = positions.splats = out.footing.windowed = 0;
+  positions.lines = positions.splats = out.splats.near = out.footing.windowed = 0;
   out.pass = &pass;
   out.near = camera.near;
+  out.middle_x = camera.half_width_px;
+  out.middle_y = camera.half_height_px;
   open_rows(pass, brick, maker.rows);
   float reach[3];
   brick_reach(camera, pass, brick, maker.rows, reach);

@@ -257,7 +257,7 @@ Frustum frustum_of(const Camera& camera, const Tile& tile, const float reach[3],
   return f;
 }
 
-// The positions of a pair that lie beyond the near plane and whose kernels may touch the tile.
+// The positions of a pair whose kernels may reach beyond the near plane and touch the tile.
 template <bool Perspective>
 std::uint32_t seen_in_pair(const Camera& camera, const Frustum& f, const KernelPositions& positions,
                            int pair) {
@@ -274,7 +274,7 @@ std::uint32_t seen_in_pair(const Camera& camera, const Frustum& f, const KernelP
     outside = hn::Max(outside, hn::MulSub(all<Kernel>(f.y0), z, y) - all<Kernel>(f.top));
     outside = hn::Max(outside, hn::NegMulAdd(all<Kernel>(f.y1), z, y) - all<Kernel>(f.bottom));
     auto inside = hn::Le(outside, hn::Zero(KernelTag()));
-    if (Perspective) inside = hn::And(inside, hn::Ge(z, all<Kernel>(camera.near)));
+    if (Perspective) inside = hn::And(inside, hn::Ge(z, all<Kernel>(camera.near - f.reach[2])));
     bits |= bits_of<Kernel>(inside) << static_cast<unsigned>(i);
   }
   return bits;

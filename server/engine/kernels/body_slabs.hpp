@@ -87,8 +87,8 @@ KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, const Slab& slab, Pixe
 }
 
 KERNEL_INLINE Pixel fraction_in(const Slab& slab, Pixel depth) {
-  const Pixel inverse = all<Pixel>(1.0F / (slab.back - slab.front));
-  return clamped((depth - all<Pixel>(slab.front)) * inverse, 0.0F, 1.0F);
+  const Pixel inverse = all<Pixel>(1.0F / (slab.back - slab.begin));
+  return clamped((depth - all<Pixel>(slab.begin)) * inverse, 0.0F, 1.0F);
 }
 
 // Returns whether any pixel meets the line.
@@ -329,10 +329,10 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
     sort_block_hits(hits, held);
     held = block_hits_max / 2;
     pass_lines<Compositing>(hits, held, passage);
-    const float depth = farthest_x(hits[held - 1]) * (with.slab.back - with.slab.front);
+    const float depth = farthest_x(hits[held - 1]) * (with.slab.back - with.slab.begin);
     for (int n = 0; n < held; ++n) hits[n] = hits[n + held];
     if (is_dark(with.transmittance, passage, with.stop) &&
-        rest_is_behind(with, h + 1, with.slab.front + depth)) {
+        rest_is_behind(with, h + 1, with.slab.begin + depth)) {
       return Outcome::dark;
     }
   }

@@ -7,8 +7,9 @@ namespace windsplat::engine::kernels {
 namespace {
 
 // Half the width of the silhouette along one screen axis and its centre, as coordinates at unit
-// distance, from M = v v^T - t^2 A A^T; unbounded if the splat reaches the plane of the eye. The
-// discriminant M13^2 - M11 M33 is expanded so that the squares of v never cancel.
+// distance, from M = v v^T - t^2 A A^T; unbounded if the splat reaches the plane of the eye or
+// nearly does, where the bounds would cancel. The discriminant M13^2 - M11 M33 is expanded so that
+// the squares of v never cancel.
 struct Extent {
   Kernel low, high;
 };
@@ -20,7 +21,7 @@ KERNEL_INLINE Extent silhouette(Kernel v, Kernel z, Kernel s11, Kernel s13, Kern
       (z2 * s11 - all<Kernel>(2.0F) * v * z * s13 + v * v * s33) - (s11 * s33 - s13 * s13);
   const Kernel root = hn::Sqrt(hn::Max(inner, hn::Zero(KernelTag())));
   const Kernel middle = v * z - s13;
-  const auto bounded = hn::Gt(m33, all<Kernel>(1e-6F) * z2);
+  const auto bounded = hn::Gt(m33, all<Kernel>(1e-2F) * z2);
   const Kernel inverse = inverse_of(hn::IfThenElse(bounded, m33, all<Kernel>(1.0F)));
   return {hn::IfThenElse(bounded, (middle - root) * inverse, all<Kernel>(-1e30F)),
           hn::IfThenElse(bounded, (middle + root) * inverse, all<Kernel>(1e30F))};
@@ -154,10 +155,30 @@ KERNEL_INLINE Outline perspective_outline(const Camera& camera, const KernelPosi
   return {across, along, oval};
 }
 
+KERNEL_INLINE void store_three(const Three<Kernel>& v, float to[3][brick_kernels], int l) {
+  store(v.x, to[0] + l);
+  store(v.y, to[1] + l);
+  store(v.z, to[2] + l);
+}
+
+// Splats whose cells may reach the near plane, on any ray.
+KERNEL_INLINE MaskOf<Kernel> reach_near(const Camera& camera, Kernel z, Kernel half_depth) {
+  return hn::Lt(hn::NegMulAdd(all<Kernel>(2.0F), half_depth, z), all<Kernel>(camera.near));
+}
+
+// Empties the outlines of splats that lie before the near plane.
+KERNEL_INLINE void drop_before_near(const Camera& camera, Kernel z, Kernel half_depth,
+                                    Outline& outline) {
+  const auto gone = hn::Le(z + half_depth, all<Kernel>(camera.near));
+  outline.x.low = hn::IfThenElse(gone, all<Kernel>(1e30F), outline.x.low);
+  outline.x.high = hn::IfThenElse(gone, all<Kernel>(-1e30F), outline.x.high);
+}
+
 template <bool Curved>
 KERNEL_INLINE Outline perspective_splats(const Camera& camera, const KernelPositions& positions,
                                          const CellLanes<Curved>& cells, int l, Kernel rho,
-                                         Splats& s) {
+                                         Prepared& out) {
+  Splats& s = out.splats;
   const Facing f = face<Curved>(camera, cells);
   const Kernel z = load<Kernel>(positions.z + l);
   const Kernel two = all<Kernel>(2.0F);
@@ -199,9 +220,20 @@ KERNEL_INLINE Outline perspective_splats(const Camera& camera, const KernelPosit
   store(hn::IfThenElse(inside, hn::Zero(KernelTag()), dot3(o, d) - z * rays.d0), s.b0 + l);
   store(dot3(o, f.right) - z * rays.dx, s.bx + l);
   store(dot3(o, f.down) - z * rays.dy, s.by + l);
-  store(hn::Sqrt(f.s33), s.half_depth + l);
+  const Kernel half_depth = hn::Sqrt(f.s33);
+  store(half_depth, s.half_depth + l);
   store(rho * all<Kernel>(1.0F / footprint_integral), s.strength + l);
-  return perspective_outline(camera, positions, l, f, form, rays, px, py, inside);
+  Outline outline = perspective_outline(camera, positions, l, f, form, rays, px, py, inside);
+  const std::uint64_t near = bits_of<Kernel>(reach_near(camera, z, half_depth));
+  if (near != 0) {
+    s.near |= near << static_cast<unsigned>(l);
+    store_three(o, out.near_splats.centre, l);
+    store_three(forward, out.near_splats.ahead, l);
+    store_three(f.right, out.near_splats.right, l);
+    store_three(f.down, out.near_splats.down, l);
+    drop_before_near(camera, z, half_depth, outline);
+  }
+  return outline;
 }
 
 template <bool Curved>
@@ -237,9 +269,10 @@ KERNEL_INLINE Outline orthographic_splats(const Camera& camera, const KernelPosi
 // Prepares the splats of a vector of kernel positions.
 template <bool Perspective, bool Curved>
 KERNEL_INLINE Outline prepare_splats(const Camera& camera, const KernelPositions& positions,
-                                     const CellLanes<Curved>& cells, int l, Kernel rho, Splats& s) {
-  if (Perspective) return perspective_splats<Curved>(camera, positions, cells, l, rho, s);
-  return orthographic_splats<Curved>(camera, positions, cells, l, rho, s);
+                                     const CellLanes<Curved>& cells, int l, Kernel rho,
+                                     Prepared& out) {
+  if (Perspective) return perspective_splats<Curved>(camera, positions, cells, l, rho, out);
+  return orthographic_splats<Curved>(camera, positions, cells, l, rho, out.splats);
 }
 
 }  // namespace

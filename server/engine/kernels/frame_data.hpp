@@ -45,7 +45,13 @@ struct LineStyle {
   const float* rate_x;  // indexed by sample along y; null: components are not scaled
   float rate_y;
   const float* rate_z;  // indexed by sample along z
-  float length;         // world units at full magnitude
+  // A power of two by which magnitudes are multiplied: 1, unless the full magnitude is so large or
+  // small that its square or inverse could leave the range of floats (`scaled`). Then, and for
+  // vectors of such sizes, magnitudes are computed in double. All numbers below are scaled.
+  double magnitude_scale;
+  double unscaled_min_magnitude;
+  int scaled;
+  float length;  // world units at full magnitude
   float inverse_full_magnitude;
   float min_magnitude;
   float half_span;  // half the width of the kernel box, in cells
@@ -167,6 +173,7 @@ struct Tile {
   int width, height;  // pixels inside the picture
   float* blocks;
   const float* rays;
+  const std::int32_t* partial;      // see partial.hpp; for perspective media
   float stop;                       // a block is closed when no transmittance exceeds this
   std::uint32_t open[tile_blocks];  // bit set: the block is open
   int any_closed;

@@ -56,8 +56,10 @@ struct Densities {
 //   orthographic  the same with the constant |d|^2 = d0 divided out of xx, xy, yy, and the closest
 //                 point bx ex + by ey beyond the centre.
 // The second point is the projected centre itself if that lies in the picture. Offsets from centres
-// far outside it (kernels that contain the eye) would lose all precision.
+// far outside it would lose all precision. Splats that reach the near plane, whose centres may lie
+// beside or behind the eye, have the form of NearSplats instead.
 struct Splats {
+  std::uint64_t near;  // bit l set: splat l may reach the near plane; see NearSplats
   alignas(64) float x[brick_kernels], y[brick_kernels];  // projected centre, pixels
   alignas(64) float ex[brick_kernels],
       ey[brick_kernels];  // the point of the picture near it, pixels
@@ -70,6 +72,17 @@ struct Splats {
   alignas(64) float strength[brick_kernels];
   alignas(64) float half_depth[brick_kernels];  // half the depth of the silhouette along the view,
                                                 // world units
+};
+
+// A splat that may reach the near plane, in cells, by component: its centre o from the eye, and the
+// ray d = ahead + x right + y down through the pixel (x, y) right of and below the middle of the
+// picture, per unit of view depth. r^2 = |o x d|^2 / |d|^2, and the ray is closest to the centre at
+// a view depth of o.d / |d|^2.
+struct NearSplats {
+  alignas(64) float centre[3][brick_kernels];
+  alignas(64) float ahead[3][brick_kernels];
+  alignas(64) float right[3][brick_kernels];
+  alignas(64) float down[3][brick_kernels];
 };
 
 // Rows and columns of blocks of the tile that each line and splat may touch, both ends included;
@@ -98,11 +111,13 @@ struct Footing {
 
 struct Prepared {
   const Pass* pass;
-  float near;  // the camera's near plane, a view depth
+  float near;                // the camera's near plane, a view depth
+  float middle_x, middle_y;  // of the picture, pixels
   KernelPositions positions;
   Ribbons ribbons;
   Densities densities;
   Splats splats;
+  NearSplats near_splats;
   Footing footing;
 };
 
@@ -113,6 +128,7 @@ constexpr int slabs_ahead = 8;
 // weighted by it, 4 floats per pixel in the block layout of the tile.
 struct Slab {
   float front, back;  // view depths from the camera's depth origin, world units
+  float begin;        // the front or, if the near plane lies within the slab, that plane
   float* gathered;
   std::uint32_t touched[tile_blocks];  // bit set: the block contains medium
 };
@@ -128,10 +144,24 @@ struct Ribbon {
   float reach, steep, opacity;
 };
 
-// Constants of one splat; see Splats.
-struct Splat {
+// Constants of the form of one splat; see Splats.
+struct SplatForm {
   float x, y, ex, ey, xx, xy, yy;
   float b0, bx, by, d0, dx, dy, dxx, dxy, dyy, d2_least;
+};
+
+// The same of a splat that may reach the near plane; see NearSplats.
+struct NearForm {
+  float x, y;  // the middle of the picture, pixels
+  float centre[3], ahead[3], right[3], down[3];
+  float d2_least;  // |d|^2 is never less
+};
+
+struct Splat {
+  union {
+    SplatForm form;
+    NearForm near_form;
+  };
   float z, near, strength;
   float color[3];
 };
@@ -144,6 +174,7 @@ struct SplatRecord {
   float middle;
   Splat splat;
   std::int16_t row_first, row_last, column_first, column_last;
+  std::int32_t near;  // it has the near form
 };
 
 struct RibbonRecord {

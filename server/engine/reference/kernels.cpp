@@ -31,6 +31,13 @@ double extinction(const ScalarLayer& layer, double value) {
   return rho;
 }
 
+// p^T t^2 A A^T q.
+double spread(const KernelPosition& position, const Vec& p, const Vec& q) {
+  double sum = 0;
+  for (const Vec& edge : position.edge) sum += dot(p, edge) * dot(q, edge);
+  return footprint_t * footprint_t * sum;
+}
+
 }  // namespace
 
 Vec table_color(const ColorTable& table, double value) {
@@ -70,14 +77,16 @@ Density make_density(const std::vector<const ScalarLayer*>& layers,
   return density;
 }
 
+bool lies_beyond_near(const View& view, const KernelPosition& position) {
+  if (!view.perspective) return true;
+  return position.centre[2] + std::sqrt(spread(position, view.forward, view.forward)) > view.near;
+}
+
 // M = v v^T - t^2 A A^T: the tangents of the silhouette are at (M13 +- sqrt(M13^2 - M11 M33)) /
-// M33.
+// M33, which cancels where M33 nearly vanishes.
 ScreenBox splat_box(const View& view, const KernelPosition& position) {
-  const auto s = [&](const Vec& p, const Vec& q) {
-    double sum = 0;
-    for (const Vec& edge : position.edge) sum += dot(p, edge) * dot(q, edge);
-    return footprint_t * footprint_t * sum;
-  };
+  constexpr double least = 1e-9;  // of M33, relative to the squared view depth
+  const auto s = [&](const Vec& p, const Vec& q) { return spread(position, p, q); };
   const double w = view.half_width;
   const double h = view.half_height;
   const Vec& centre = position.centre;
@@ -89,7 +98,7 @@ ScreenBox splat_box(const View& view, const KernelPosition& position) {
     return {x - dx, x + dx, y - dy, y + dy};
   }
   const double m33 = centre[2] * centre[2] - s(view.forward, view.forward);
-  if (m33 <= 0) return {0, 2 * w, 0, 2 * h};
+  if (m33 <= least * centre[2] * centre[2]) return {0, 2 * w, 0, 2 * h};
   const auto range = [&](int c, const Vec& axis, double middle, double& low, double& high) {
     const double m11 = centre[c] * centre[c] - s(axis, axis);
     const double m13 = centre[c] * centre[2] - s(axis, view.forward);
@@ -128,11 +137,12 @@ void list_kernels(const Scene& scene, const View& view, const CancelToken& cance
         if (cancel.cancelled()) return;
         for (const AxisPosition& x : group.axis[0]) {
           const KernelPosition position = make_kernel_position(scene, view, {x, y, z});
-          if (!position.has_cell || (view.perspective && position.centre[2] < view.near)) continue;
+          if (!position.has_cell) continue;
           if (group.lines != nullptr) {
             const auto ribbon = make_ribbon(scene, view, *group.lines, position);
             if (ribbon) kernels.ribbons.push_back(*ribbon);
           }
+          if (group.media.empty() || !lies_beyond_near(view, position)) continue;
           const Density density = make_density(group.media, position);
           if (density.rho <= 0) continue;
           kernels.splats.push_back(

@@ -161,8 +161,10 @@ Vec table_color(const scene::ColorTable& table, double value);
 struct ScreenBox {
   double x0 = 0, x1 = 0, y0 = 0, y1 = 0;
 };
-// Bounding box of the silhouette of a splat, the ellipsoid of radius 1.37 cells; the whole screen
-// if it reaches the plane of the eye.
+// Whether a splat, the ellipsoid of radius 1.37 cells, reaches beyond the near plane.
+bool lies_beyond_near(const View& view, const KernelPosition& position);
+// Bounding box of the silhouette of a splat that reaches beyond the near plane; the whole screen if
+// it reaches the plane of the eye.
 ScreenBox splat_box(const View& view, const KernelPosition& position);
 ScreenBox ribbon_box(const Ribbon& line);
 

@@ -151,7 +151,7 @@ TEST(Lattice, ScaleMultipliesBeforeTheLongestEdgeIsSetToTwo) {
 
 TEST(Lattice, SpacingsAMillionfoldApartStayFinite) {
   const auto lattice =
-      place_lattice(metres({0, 1e-6, 1, 2}, {0, 1e-6, 2e-6}, {0, 1, 1e6}), GeometryView{});
+      place_lattice(metres({0, 1e-3, 1, 2}, {0, 1e-3, 2e-3}, {0, 1, 1e3}), GeometryView{});
   ASSERT_TRUE(lattice);
   for (std::size_t a = 0; a < 3; ++a) {
     for (std::size_t i = 0; i < lattice->spacing[a].size(); ++i) {
@@ -160,6 +160,35 @@ TEST(Lattice, SpacingsAMillionfoldApartStayFinite) {
     }
   }
   EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 2.0, 1e-12);
+}
+
+// The engine draws kernels of single precision, with a limit of 1e-7 of the widths of cells.
+TEST(Lattice, CellsTooNarrowForSinglePrecisionAreRefused) {
+  const auto placed = place_lattice(metres({0, 1, 2}, {0, 1, 2}, {0, 2e-7, 4e-7}), GeometryView{});
+  EXPECT_TRUE(placed);
+  const auto refused =
+      place_lattice(metres({0, 1, 2}, {0, 1, 2}, {0, 0.5e-7, 1e-7}), GeometryView{});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::bad_data);
+  EXPECT_NE(refused.error().message.find("5e-08 times as wide"), std::string::npos)
+      << refused.error().message;
+  const auto uneven = place_lattice(metres({0, 1e-9, 1, 2}, {0, 1}, {0, 1}), GeometryView{});
+  ASSERT_FALSE(uneven);
+  EXPECT_EQ(uneven.error().kind, ErrorKind::bad_data);
+}
+
+TEST(Lattice, ScaleThatFlattensCellsBeyondTheLimitIsInvalid) {
+  GeometryView geometry;
+  geometry.scale = {1e3, 1, 1e-3};
+  const auto even = metres({0, 1, 2}, {0, 1, 2}, {0, 1, 2});
+  EXPECT_TRUE(place_lattice(even, geometry));
+  const auto refused = place_lattice(metres({0, 1, 2}, {0, 1, 2}, {0, 0.05, 0.1}), geometry);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::invalid);
+  ASSERT_EQ(refused.error().at.size(), 1U);
+  EXPECT_EQ(refused.error().at[0].pointer, "/geometry/scale/2");
+  EXPECT_NE(refused.error().message.find("limit of 1e-7"), std::string::npos)
+      << refused.error().message;
 }
 
 TEST(Lattice, NonMonotonicCoordinatesAreRefused) {

@@ -1,0 +1,111 @@
+// Appearance of lines and colours -> the numbers of the kernels.
+#include "server/engine/line_style.hpp"
+
+#include <cmath>
+#include <cstddef>
+
+#include "server/base/check.hpp"
+
+namespace windsplat::engine {
+
+namespace {
+
+using scene::Scene;
+
+// 2^-e for a value of the order of 2^e outside this range, otherwise 1.
+double toward_one(double value, double low, double high) {
+  const bool moderate = !(value > 0) || (value >= low && value <= high);
+  return moderate ? 1 : std::exp2(-std::ilogb(value));
+}
+
+double magnitude_scale(const scene::VectorLayer& from) {
+  return toward_one(from.magnitude_range[1], 1e-15, 1e15);
+}
+
+}  // namespace
+
+void to_floats(const std::vector<double>& from, std::vector<float>& to) {
+  to.clear();
+  for (const double v : from) to.push_back(bounded(v));
+}
+
+void flatten(const scene::ColorTable& table, std::vector<float>& rgb) {
+  const std::size_t entries = table.entries.size();
+  WINDSPLAT_CHECK(entries > 0);
+  rgb.resize(kernels::color_floats * (entries + 1));
+  float* to = rgb.data();
+  for (std::size_t n = 0; n <= entries; ++n, to += kernels::color_floats) {
+    const std::array<float, 3>& entry = table.entries[std::min(n, entries - 1)];
+    std::copy(entry.begin(), entry.end(), to);
+    to[3] = 0;
+  }
+}
+
+kernels::ColorTable make_table(const scene::ColorTable& table, const std::vector<float>& rgb,
+                               double scale) {
+  kernels::ColorTable to{};
+  to.rgb = rgb.data();
+  to.entries = static_cast<int>(table.entries.size());
+  to.low = bounded(scale * table.range[0]);
+  const double last = to.entries - 1;
+  to.scale =
+      bounded(std::min(last * ramp_scale(scale * table.range[0], scale * table.range[1]), 1e30));
+  return to;
+}
+
+void set_rates(const scene::VectorLayer& from, std::vector<float>& rate_x,
+               std::vector<float>& rate_z, kernels::LineStyle& to) {
+  constexpr double least = 0x1p-100;  // relative to the largest: it shows only alone
+  double largest = 0;
+  for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(from.scale[c]));
+  const double factor = toward_one(largest, 1e-12, 1e12);
+  for (int c = 0; c < 3; ++c) {
+    const double scale = from.scale[c];
+    const double kept = std::max(std::abs(scale), least * largest);
+    to.scale[c] = scale == 0 ? 0.0F : bounded(std::copysign(factor * kept, scale));
+  }
+  to_floats(from.rate_x, rate_x);
+  to_floats(from.rate_z, rate_z);
+  to.rate_x = rate_x.empty() ? nullptr : rate_x.data();
+  to.rate_y = rate_x.empty() ? 1.0F : bounded(from.rate_y);
+  to.rate_z = rate_z.empty() ? nullptr : rate_z.data();
+}
+
+void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::LineStyle& to) {
+  to.length = static_cast<float>(from.length);
+  const double scale = magnitude_scale(from);
+  const double full = scale * from.magnitude_range[1];
+  to.magnitude_scale = scale;
+  to.scaled = scale != 1 ? 1 : 0;
+  to.unscaled_min_magnitude = from.min_magnitude;
+  to.inverse_full_magnitude = full > 0 ? bounded(1.0 / full) : std::numeric_limits<float>::max();
+  to.min_magnitude = bounded(scale * from.min_magnitude);
+  to.half_span = static_cast<float>(0.5 * (from.overlap ? from.span : 1.0));
+  to.r1 = static_cast<float>(from.r1);
+  to.r2 = static_cast<float>(from.r2);
+  to.inverse_ramp = static_cast<float>(1.0 / std::max(from.r2 - from.r1, 1e-6));
+  to.opacity = static_cast<float>(from.opacity);
+  to.steep = to.inverse_ramp * to.opacity;
+  to.reach = to.r2 * to.steep;
+  to.head_desaturation = static_cast<float>(from.head_desaturation);
+  to.intensity_low = bounded(scale * from.magnitude_range[0]);
+  to.intensity_scale = ramp_scale(scale * from.magnitude_range[0], scale * from.magnitude_range[1]);
+  to.intensity = static_cast<float>(from.magnitude_intensity);
+  to.cue_near = bounded(scene.depth_cue.near);
+  to.cue_scale = ramp_scale(scene.depth_cue.near, scene.depth_cue.far);
+  to.cue_strength = static_cast<float>(scene.depth_cue.strength);
+  to.color_by = static_cast<int>(from.color_by);
+  to.rise_weight = static_cast<float>(from.rise_weight);
+  const std::array<double, 2> heights = scene::height_range(scene.lattice);
+  to.box_low_z = static_cast<float>(heights[0]);
+  to.inverse_box_height = static_cast<float>(1.0 / (heights[1] - heights[0]));
+  to.jitter_center = static_cast<float>(from.jitter_center);
+  to.jitter_stride = static_cast<float>(from.jitter_stride);
+  to.seed = from.seed;
+  to.epoch = from.epoch;
+  for (int a = 0; a < 3; ++a) to.keep[a] = scene.slice && scene.slice->axis == a ? 0.0F : 1.0F;
+  to.moving = from.moving ? 1 : 0;
+  to.motion_cycles = from.motion_cycles;
+}
+
+}  // namespace windsplat::engine

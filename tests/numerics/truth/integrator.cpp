@@ -1,0 +1,204 @@
+// Splats and lines -> the light of each ray.
+#include "tests/numerics/truth/integrator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "tests/numerics/truth/integrator_kernels.hpp"
+
+namespace windsplat::truth {
+
+namespace {
+
+using scene::Scene;
+using scene::VectorLayer;
+
+struct Surface {
+  Real depth = 0;
+  Real opacity = 0;
+  Vec color;
+};
+
+// Where the ray through a pixel meets a line.
+std::optional<Surface> meet(const Scene& scene, const Line& line, Real x, Real y) {
+  const scene::Camera& camera = scene.camera;
+  const VectorLayer& layer = *scene.vector;
+  const Real pixel = 2 * static_cast<Real>(camera.half_height) / camera.height;
+  const auto on_screen = [&](const Vec& p) {
+    const Real scale = camera.perspective ? 1 / (p.z * pixel) : 1 / pixel;
+    return Vec{camera.width / 2.0L + p.x * scale, camera.height / 2.0L + p.y * scale, 0};
+  };
+  const Vec from = on_screen(line.a);
+  const Vec u = on_screen(line.b) - from;
+  const Vec p = Vec{x, y, 0} - from;
+  const Real eps = 1e-6L * layer.r2;
+  const Real q =
+      std::clamp(dot(p - 0.5L * u, u) / std::max(dot(u, u), eps * eps), Real(-0.5L), Real(0.5L));
+  const Real w = q + 0.5L;
+  const Real distance = length(p - w * u);
+  if (distance >= layer.r2) return {};
+  Surface surface;
+  surface.opacity = layer.opacity * (1 - ramp(distance, layer.r1, layer.r2));
+  const Real f = camera.perspective ? w * line.a.z / (w * line.a.z + (1 - w) * line.b.z) : w;
+  surface.depth = line.a.z + f * (line.b.z - line.a.z);
+  const Real at = line.q0 + f * (line.q1 - line.q0) + 0.5L;
+  if (layer.moving) {
+    const Real turn = at - line.phase;
+    surface.opacity *= 1 - std::abs(2 * (turn - std::floor(turn)) - 1);
+  }
+  const Real top = std::max({line.color.x, line.color.y, line.color.z});
+  const Real grey = layer.head_desaturation * at;
+  surface.color = (1 - grey) * line.color + grey * Vec{top, top, top};
+  return surface;
+}
+
+// A splat on a ray: the distance from its centre at view depth z is
+// sqrt(least^2 + (cells (z - middle))^2) cells.
+struct Stretch {
+  Real middle = 0, cells = 0, least = 0;
+  double density = 0;  // extinction over C per unit of view depth
+  std::array<double, 3> color{};
+  Real entry = 0, exit = 0;
+};
+
+class Ray {
+ public:
+  Ray(const Scene& scene, const std::vector<Splat>& splats, Real x, Real y) {
+    const scene::Camera& camera = scene.camera;
+    const Real pixel = 2 * static_cast<Real>(camera.half_height) / camera.height;
+    const Vec aside = (pixel * (x - camera.width / 2.0L)) * vec(camera.right) -
+                      (pixel * (y - camera.height / 2.0L)) * vec(camera.up);
+    const Vec origin = camera.perspective ? vec(camera.eye) : vec(camera.eye) + aside;
+    const Vec way = camera.perspective ? vec(camera.forward) + aside : vec(camera.forward);
+    start_ = camera.perspective ? Real(camera.near) : -std::numeric_limits<Real>::infinity();
+    for (const Splat& splat : splats) add(splat, splat.centre - origin, way);
+  }
+
+  Light follow(std::vector<Surface> surfaces, int steps) {
+    std::stable_sort(surfaces.begin(), surfaces.end(),
+                     [](const Surface& a, const Surface& b) { return a.depth < b.depth; });
+    for (const Surface& surface : surfaces) breaks_.push_back(surface.depth);
+    std::sort(breaks_.begin(), breaks_.end());
+    std::size_t met = 0;
+    for (std::size_t b = 0; b < breaks_.size(); ++b) {
+      for (; met < surfaces.size() && surfaces[met].depth <= breaks_[b]; ++met) {
+        absorb(
+            static_cast<double>(surfaces[met].opacity),
+            {static_cast<double>(surfaces[met].color.x), static_cast<double>(surfaces[met].color.y),
+             static_cast<double>(surfaces[met].color.z)});
+        left_ *= 1 - static_cast<double>(surfaces[met].opacity);
+      }
+      if (b + 1 < breaks_.size()) cross_piece(breaks_[b], breaks_[b + 1], steps);
+    }
+    return light_;
+  }
+
+ private:
+  void add(const Splat& splat, const Vec& to_centre, const Vec& way) {
+    const Vec o = to_cells(splat.normal, to_centre);
+    const Vec d = to_cells(splat.normal, way);
+    Stretch s;
+    s.cells = length(d);
+    s.middle = dot(o, d) / dot(d, d);
+    s.least = length(cross(o, d)) / s.cells;
+    if (s.least >= outer) return;
+    const Real half = std::sqrt(outer * outer - s.least * s.least) / s.cells;
+    s.entry = std::max(s.middle - half, start_);
+    s.exit = s.middle + half;
+    if (s.exit <= start_) return;
+    s.density = static_cast<double>(splat.rho * length(way));
+    s.color = {static_cast<double>(splat.color.x), static_cast<double>(splat.color.y),
+               static_cast<double>(splat.color.z)};
+    stretches_.push_back(s);
+    breaks_.push_back(s.entry);
+    breaks_.push_back(s.exit);
+    if (s.least >= inner) return;
+    const Real core = std::sqrt(inner * inner - s.least * s.least) / s.cells;
+    for (const Real end : {s.middle - core, s.middle + core}) {
+      if (end > start_) breaks_.push_back(end);
+    }
+  }
+
+  // The kernels are smooth between two breaks; at these their derivatives are infinite, so the
+  // steps narrow towards both ends.
+  void cross_piece(Real from, Real to, int steps) {
+    active_.clear();
+    for (const Stretch& s : stretches_) {
+      if (s.entry < to && s.exit > from) active_.push_back(&s);
+    }
+    if (active_.empty() || !(to > from)) return;
+    constexpr std::array<double, 3> node{-0.7745966692414834, 0, 0.7745966692414834};
+    constexpr std::array<double, 3> weight{5.0 / 18, 8.0 / 18, 5.0 / 18};
+    for (int n = 0; n < steps; ++n) {
+      double tau = 0;
+      std::array<double, 3> glow{};
+      for (std::size_t k = 0; k < node.size(); ++k) {
+        const Real w = (n + 0.5L + 0.5L * node[k]) / steps;
+        const Real z = from + (to - from) * w * w * (3 - 2 * w);
+        const auto width = static_cast<double>((to - from) * 6 * w * (1 - w) * weight[k] / steps);
+        for (const Stretch* s : active_) {
+          const Real along = s->cells * (z - s->middle);
+          const double r = static_cast<double>(std::sqrt(s->least * s->least + along * along));
+          const double part = width * s->density * kernel(r);
+          tau += part;
+          for (std::size_t c = 0; c < 3; ++c) glow[c] += part * s->color[c];
+        }
+      }
+      if (!(tau > 0)) continue;
+      absorb(-std::expm1(-tau), {glow[0] / tau, glow[1] / tau, glow[2] / tau});
+      left_ *= std::exp(-tau);
+      light_.depth += tau;
+    }
+  }
+
+  void absorb(double alpha, const std::array<double, 3>& color) {
+    light_.alpha += left_ * alpha;
+    for (std::size_t c = 0; c < 3; ++c) light_.rgb[c] += left_ * alpha * color[c];
+  }
+
+  Real start_ = 0;
+  std::vector<Stretch> stretches_;
+  std::vector<const Stretch*> active_;
+  std::vector<Real> breaks_;
+  Light light_;
+  double left_ = 1;
+};
+
+}  // namespace
+
+// The inverse Abel transform of the footprint. With a = sqrt(t^2 - r^2), b = sqrt(s^2 - r^2):
+// (1/pi) [2 b / (s t) + 2 / (t (t - s)) (t ln((t + a) / (s + b)) - (a - b))] for r < s, and
+// 2 / (pi t (t - s)) (t ln((t + a) / r) - a) up to t.
+double kernel(double r) {
+  const auto s = static_cast<double>(inner);
+  const auto t = static_cast<double>(outer);
+  if (r >= t) return 0;
+  const double a = std::sqrt(t * t - r * r);
+  const double scale = 2 / (std::numbers::pi * t * (t - s));
+  if (r >= s) return scale * (t * std::log((t + a) / r) - a);
+  const double b = std::sqrt(s * s - r * r);
+  return 2 * b / (std::numbers::pi * s * t) + scale * (t * std::log((t + a) / (s + b)) - (a - b));
+}
+
+std::vector<Light> integrate(const Scene& scene, int steps) {
+  const std::vector<Splat> splats = splats_of(scene);
+  const std::vector<Line> lines = lines_of(scene);
+  std::vector<Light> out;
+  for (int y = 0; y < scene.camera.height; ++y) {
+    for (int x = 0; x < scene.camera.width; ++x) {
+      std::vector<Surface> surfaces;
+      for (const Line& line : lines) {
+        const auto surface = meet(scene, line, x + 0.5L, y + 0.5L);
+        if (surface && surface->opacity > 0) surfaces.push_back(*surface);
+      }
+      out.push_back(Ray(scene, splats, x + 0.5L, y + 0.5L).follow(std::move(surfaces), steps));
+    }
+  }
+  return out;
+}
+
+}  // namespace windsplat::truth
