@@ -303,7 +303,9 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
     return invalid_at("/vector/magnitudeRange", "does not ascend");
   }
   if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
-  if (!vector.color.by) vector.color.by = default_color_by(info.grid);
+  if (!vector.color.by) {
+    vector.color.by = default_color_by(info.grid, slice_of(view.geometry));
+  }
   if (auto ok = outline_scalars(view, info); !ok) return ok.error();
   return camera;
 }

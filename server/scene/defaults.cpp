@@ -362,11 +362,12 @@ double default_length(const Lattice& lattice, int stride, const std::optional<Sl
   return std::clamp(std::round(length / grain) * grain, 1e-9, 10.0);
 }
 
-protocol::ColorBy default_color_by(const data::Grid& grid) {
+protocol::ColorBy default_color_by(const data::Grid& grid, const std::optional<Slice>& slice) {
   const data::Axis& z = grid.axes[2];
   const bool own_kind = z.kind != data::AxisKind::cartesian;
-  return own_kind && z.coordinates.size() >= 4 ? protocol::ColorBy::world_z
-                                               : protocol::ColorBy::magnitude;
+  const bool horizontal = slice && slice->axis == 2;
+  return own_kind && !horizontal && z.coordinates.size() >= 4 ? protocol::ColorBy::world_z
+                                                              : protocol::ColorBy::magnitude;
 }
 
 }  // namespace windsplat::scene

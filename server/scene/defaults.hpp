@@ -74,7 +74,8 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
 double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice);
 
 // The default: by height if the unit of the vertical axis differs from that of the horizontal ones
-// (as in the atmosphere), otherwise by magnitude.
-protocol::ColorBy default_color_by(const data::Grid& grid);
+// (as in the atmosphere), otherwise by magnitude. By magnitude in a horizontal slice, all of whose
+// lines have the same height.
+protocol::ColorBy default_color_by(const data::Grid& grid, const std::optional<Slice>& slice);
 
 }  // namespace windsplat::scene

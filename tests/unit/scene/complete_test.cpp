@@ -208,6 +208,19 @@ TEST(CompleteView, AtmospheresAreColoredByHeightOthersByMagnitude) {
   EXPECT_EQ(completed(View{}, *tornado).vector.color.by, ColorBy::magnitude);
 }
 
+TEST(CompleteView, HorizontalSlicesAreColoredByMagnitude) {
+  auto climate = sample_dataset("climate", {24, 16, 12});
+  View view;
+  view.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 4};
+  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::magnitude)
+      << "all lines of the layer have the same height";
+  view.geometry.slice->axis = protocol::GridAxis::y;
+  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::world_z);
+  view.geometry.slice->axis = protocol::GridAxis::z;
+  view.vector.color.by = ColorBy::world_z;
+  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::world_z) << "as given";
+}
+
 // Rises of the drawn lines of a scene in full detail, from tail to head.
 std::vector<double> rises_in(const Scene& scene) {
   const VectorLayer& layer = scene.vector.value();
