@@ -71,7 +71,7 @@ struct VectorColorView {
   std::string map = "viridis";
   std::optional<std::string> field;  // `scalar` only
   std::optional<Range> range;        // values of the quantity `by` at the ends of the map
-  double rise_weight = 0.2;          // 0..1, `rise` only: 0 height only, 1 rise only
+  double rise_weight = 0.5;          // 0..1, `rise` only: 0 height only, 1 rise only
   std::string constant = "#ffffff";  // sRGB, `constant` only
   bool operator==(const VectorColorView&) const = default;
 };

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
@@ -16,6 +17,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/limited_picture.hpp"
 #include "server/cli/picture.hpp"
 #include "server/cli/signals.hpp"
 #include "server/engine/render.hpp"
@@ -32,6 +34,7 @@ struct AnimateArguments {
   ViewArguments view;
   std::string steps;
   std::string output;
+  std::string report;  // empty: no report
   int per_step = 1;
   unsigned threads = 0;
 };
@@ -207,6 +210,37 @@ Error interrupted(int done, int total) {
                                               " of " + std::to_string(total) + " frames");
 }
 
+// Reports of the pictures, a line each, and how many of them exceed a limit of the view.
+struct Reports {
+  std::string lines;
+  int exceeding = 0;
+};
+
+Result<Reports> draw_all(const Plan& plan, protocol::View view, LimitedPictures& pictures,
+                         const CancelToken& cancel) {
+  Reports reports;
+  const int total = plan.steps.count() * plan.per_step;
+  const double motion_start = view.vector.motion_time;
+  Progress progress(total);
+  for (int n = 0; n < total; ++n) {
+    progress.show(n);
+    view.step = plan.steps.first + n / plan.per_step * plan.steps.stride;
+    // Fraction of the way to the next drawn step, so that the phase is continuous.
+    const double part = static_cast<double>(n % plan.per_step) / plan.per_step;
+    view.vector.motion_time = motion_start + plan.steps.stride * part;
+    const auto picture = pictures.draw(view, cancel);
+    if (cancel.cancelled()) return interrupted(n, total);
+    if (!picture) return picture.error();
+    if (auto done = write_output(plan.pattern.name(n), picture->frame.bytes); !done) {
+      return done.error();
+    }
+    if (!exceeded_limits(*picture).empty()) ++reports.exceeding;
+    reports.lines += report_line(*picture);
+  }
+  progress.show(total);
+  return reports;
+}
+
 Result<void> animate(const AnimateArguments& arguments, const CancelToken& cancel) {
   const auto document = assemble_view(arguments.view);
   if (!document) return document.error();
@@ -217,25 +251,19 @@ Result<void> animate(const AnimateArguments& arguments, const CancelToken& cance
   const auto plan = plan_of(arguments, (*dataset)->info(), view);
   if (!plan) return plan.error();
 
-  const frame::Encoding encoding = file_encoding(plan->format, arguments.view.quality);
+  frame::Encoding encoding = file_encoding(plan->format, arguments.view.quality);
+  encoding.measure = !arguments.report.empty();
   ThreadPool pool(arguments.threads);
-  frame::Workspace workspace;
-  const int total = plan->steps.count() * plan->per_step;
-  const double motion_start = view.vector.motion_time;
-  Progress progress(total);
-  for (int n = 0; n < total; ++n) {
-    progress.show(n);
-    view.step = plan->steps.first + n / plan->per_step * plan->steps.stride;
-    // Fraction of the way to the next drawn step, so that the phase is continuous.
-    const double part = static_cast<double>(n % plan->per_step) / plan->per_step;
-    view.vector.motion_time = motion_start + plan->steps.stride * part;
-    const auto picture = frame::produce(view, **dataset, encoding, pool, cancel, workspace);
-    if (cancel.cancelled()) return interrupted(n, total);
-    if (!picture) return picture.error();
-    if (auto done = write_output(plan->pattern.name(n), picture->bytes); !done) return done;
+  LimitedPictures pictures(**dataset, encoding, pool);
+  const auto reports = draw_all(*plan, view, pictures, cancel);
+  if (!reports) return reports.error();
+  if (reports->exceeding > 0) {
+    complain(std::to_string(reports->exceeding) + " pictures exceed a limit of /quality");
   }
-  progress.show(total);
-  return {};
+  if (arguments.report.empty()) return {};
+  const std::string& lines = reports->lines;
+  return write_output(arguments.report,
+                      {reinterpret_cast<const std::uint8_t*>(lines.data()), lines.size()});
 }
 
 }  // namespace
@@ -254,6 +282,10 @@ void add_animate(CLI::App& app, Action& chosen) {
   command->add_option("-o", arguments->output, "f_%04d.jpg, .png or .npy; frames count from 0")
       ->required()
       ->type_name("PATTERN");
+  command
+      ->add_option("--report", arguments->report,
+                   "Write the report of each picture as a line of JSON; - writes to stdout")
+      ->type_name("FILE");
   add_threads_option(*command, arguments->threads);
   command->callback([&chosen, arguments] {
     chosen = [arguments] {

@@ -5,12 +5,11 @@
 #include <memory>
 #include <string>
 
-#include "protocol/codec.hpp"
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/limited_picture.hpp"
 #include "server/cli/picture.hpp"
-#include "server/frame/frame_info.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -22,12 +21,8 @@ struct RenderArguments {
   unsigned threads = 0;
 };
 
-Result<void> write_report(const std::string& path, const frame::Frame& picture) {
-  constexpr double ms_per_us = 1e-3;
-  std::string text = protocol::encode_frame_report(
-      frame::frame_info(picture, picture.view), static_cast<double>(picture.render_us) * ms_per_us,
-      static_cast<double>(picture.encode_us) * ms_per_us);
-  text += '\n';
+Result<void> write_report(const std::string& path, const Picture& picture) {
+  const std::string text = report_line(picture);
   return write_output(path, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
@@ -51,10 +46,12 @@ Result<void> render(const RenderArguments& arguments) {
   view.dataset = (*dataset)->info().id;
 
   ThreadPool pool(arguments.threads);
-  const frame::Encoding encoding = file_encoding(*format, arguments.view.quality);
-  const auto picture = frame::produce(view, **dataset, encoding, pool, CancelToken());
+  frame::Encoding encoding = file_encoding(*format, arguments.view.quality);
+  encoding.measure = !arguments.report.empty();
+  const auto picture = LimitedPictures(**dataset, encoding, pool).draw(view, CancelToken());
   if (!picture) return picture.error();
-  auto written = write_output(arguments.output, picture->bytes);
+  if (const std::string text = exceeded_limits(*picture); !text.empty()) complain(text);
+  auto written = write_output(arguments.output, picture->frame.bytes);
   if (!written || arguments.report.empty()) return written;
   return write_report(arguments.report, *picture);
 }
@@ -70,8 +67,9 @@ void add_render(CLI::App& app, Action& chosen) {
       ->required()
       ->type_name("FILE");
   command
-      ->add_option("--report", arguments->report,
-                   "Write times, memory and omissions as JSON; - writes to stdout")
+      ->add_option(
+          "--report", arguments->report,
+          "Write times, memory, omissions and the measured error as JSON; - writes to stdout")
       ->type_name("FILE");
   add_threads_option(*command, arguments->threads);
   command->callback([&chosen, arguments] {

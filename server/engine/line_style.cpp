@@ -95,10 +95,6 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::Li
   to.cue_scale = ramp_scale(scene.depth_cue.near, scene.depth_cue.far);
   to.cue_strength = static_cast<float>(scene.depth_cue.strength);
   to.color_by = static_cast<int>(from.color_by);
-  to.rise_weight = static_cast<float>(from.rise_weight);
-  const std::array<double, 2> heights = scene::height_range(scene.lattice);
-  to.box_low_z = static_cast<float>(heights[0]);
-  to.inverse_box_height = static_cast<float>(1.0 / (heights[1] - heights[0]));
   to.jitter_center = static_cast<float>(from.jitter_center);
   to.jitter_stride = static_cast<float>(from.jitter_stride);
   to.seed = from.seed;
@@ -106,6 +102,18 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::Li
   for (int a = 0; a < 3; ++a) to.keep[a] = scene.slice && scene.slice->axis == a ? 0.0F : 1.0F;
   to.moving = from.moving ? 1 : 0;
   to.motion_cycles = from.motion_cycles;
+}
+
+void color_by_rise(const Scene& scene, const scene::VectorLayer& from, kernels::LineStyle& to) {
+  const auto [low, high] = from.color.range;
+  const auto [bottom, top] = scene::height_range(scene.lattice);
+  const double by_rise = from.rise_weight / (high - low);
+  const double by_height = (1 - from.rise_weight) / (top - bottom);
+  to.rise_scale = bounded(by_rise * from.length);
+  to.height_scale = bounded(by_height);
+  to.rise_shift = bounded(-by_rise * low - by_height * bottom);
+  to.color.low = 0;
+  to.color.scale = static_cast<float>(to.color.entries - 1);
 }
 
 }  // namespace windsplat::engine

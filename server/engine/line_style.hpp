@@ -38,4 +38,9 @@ void set_rates(const scene::VectorLayer& from, std::vector<float>& rate_x,
 // Sets magnitudes, jitter, kernel box and appearance of lines.
 void style_lines(const scene::Scene& scene, const scene::VectorLayer& from, kernels::LineStyle& to);
 
+// Colour by rise looks up a position from 0 to 1: w (rise - low) / (high - low) + (1 - w) (z - z0)
+// / (z1 - z0). Replaces the range of to.color.
+void color_by_rise(const scene::Scene& scene, const scene::VectorLayer& from,
+                   kernels::LineStyle& to);
+
 }  // namespace windsplat::engine

@@ -131,6 +131,7 @@ void add_lines(const Scene& scene, PassPlan& pass) {
   flatten(from.color, pass.line_rgb);
   const bool by_magnitude = from.color_by == scene::LineColor::magnitude;
   to.color = make_table(from.color, pass.line_rgb, by_magnitude ? to.magnitude_scale : 1);
+  if (from.color_by == scene::LineColor::rise) color_by_rise(scene, from, to);
   pass.kernel.has_lines = 1;
 }
 

@@ -144,18 +144,15 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
                                       const Fields& fields) {
   const protocol::VectorView& from = view.vector;
   VectorLayer layer;
-  layer.scale = {from.scale[0], from.scale[1], from.scale[2]};
-  const data::FieldInfo& field = *fields.dataset.info().find(from.field.name);
-  if (from.space == protocol::VectorSpace::world) {
-    const auto rates = world_rates(placed.grid, field, view.geometry, placed.lattice);
-    if (!rates) return rates.error();
+  const auto factors =
+      component_factors(view, placed, *fields.dataset.info().find(from.field.name));
+  if (!factors) return factors.error();
+  layer.scale = factors->scale;
+  if (const auto& rates = factors->rates) {
     const auto& level = fields.coarsening.halvings;
     layer.rate_x = coarsen_along(rates->x, placed.lattice.spacing[1], level[1]);
     layer.rate_y = rates->y;
     layer.rate_z = coarsen_along(rates->z, placed.lattice.spacing[2], level[2]);
-  } else if (rises_where_negative(placed.grid, field)) {
-    // Omega is positive downward, so drawing it unchanged would show rising air as sinking.
-    layer.scale[2] = -layer.scale[2];
   }
   layer.length = from.length.value();
   layer.span = from.span;

@@ -13,6 +13,7 @@
 #include "server/scene/colormap.hpp"
 #include "server/scene/defaults.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/rates.hpp"
 #include "server/scene/refusal.hpp"
 
 namespace windsplat::scene {
@@ -150,9 +151,32 @@ Result<Range> first_scalar_range(const data::FieldInfo& field, data::Dataset& da
   return Range{(*range)[0], (*range)[1]};
 }
 
+Result<Range> first_rise_range(const View& view, const Placed& placed, data::Dataset& dataset) {
+  const protocol::VectorView& vector = view.vector;
+  const auto factors = component_factors(view, placed, *dataset.info().find(vector.field.name));
+  if (!factors) return factors.error();
+  const std::optional<Slice> slice = slice_of(view.geometry);
+  std::vector<double> arguments = numbers_of(placed.lattice, slice);
+  arguments.insert(arguments.end(),
+                   {*vector.length, *vector.min_magnitude, (*vector.magnitude_range)[1],
+                    factors->scale.x, factors->scale.y, factors->scale.z});
+  if (const auto& rates = factors->rates) {
+    arguments.insert(arguments.end(), rates->x.begin(), rates->x.end());
+    arguments.push_back(rates->y);
+    arguments.insert(arguments.end(), rates->z.begin(), rates->z.end());
+  }
+  const auto range = from_first_step(
+      dataset, "rises", vector.field.name, arguments, [&](const data::Volume& volume) {
+        return numbers_of(default_rise_range(vector, *factors, volume, slice));
+      });
+  if (!range) return range.error();
+  return Range{(*range)[0], (*range)[1]};
+}
+
 // The range of the value that determines the colour.
-Result<Range> default_color_range(const View& view, const Lattice& lattice,
+Result<Range> default_color_range(const View& view, const Placed& placed,
                                   const std::array<double, 2>& depths, data::Dataset& dataset) {
+  const Lattice& lattice = placed.lattice;
   const protocol::VectorView& vector = view.vector;
   const bool lines = vector.field.kind == FieldChoice::Kind::named;
   switch (*vector.color.by) {
@@ -178,6 +202,8 @@ Result<Range> default_color_range(const View& view, const Lattice& lattice,
       return first_scalar_range(*dataset.info().find(vector.color.field.value()), dataset);
     }
     case ColorBy::rise:
+      return lines ? first_rise_range(view, placed, dataset)
+                   : Result<Range>(Range{-*vector.length, *vector.length});
     case ColorBy::constant:
       break;
   }
@@ -279,18 +305,21 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
     return invalid_at("/vector/magnitudeRange", "does not ascend");
   }
   if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
-  if (!vector.color.by) vector.color.by = default_color_by(info.grid);
+  if (!vector.color.by) {
+    vector.color.by = default_color_by(info.grid, slice_of(view.geometry));
+  }
   if (auto ok = outline_scalars(view, info); !ok) return ok.error();
   return camera;
 }
 
 // The second pass: ranges and extinctions.
-Result<void> complete_from_data(View& view, const Camera& camera, const Lattice& lattice,
+Result<void> complete_from_data(View& view, const Camera& camera, const Placed& placed,
                                 data::Dataset& dataset) {
+  const Lattice& lattice = placed.lattice;
   const std::optional<Slice> slice = slice_of(view.geometry);
   if (auto ok = complete_magnitudes(view, lattice, slice, dataset); !ok) return ok;
   if (!view.vector.color.range) {
-    auto range = default_color_range(view, lattice, view_depths(camera, lattice), dataset);
+    auto range = default_color_range(view, placed, view_depths(camera, lattice), dataset);
     if (!range) return range.error();
     view.vector.color.range = *range;
   }
@@ -321,7 +350,7 @@ Result<CompletedView> complete(const View& view, data::Dataset& dataset) {
   const Lattice& lattice = (*placed)->lattice;
   const auto camera = complete_from_description(full, info, lattice);
   if (!camera) return camera.error();
-  if (auto ok = complete_from_data(full, *camera, lattice, dataset); !ok) return ok.error();
+  if (auto ok = complete_from_data(full, *camera, **placed, dataset); !ok) return ok.error();
   ++completed_views;
   return CompletedView(std::move(full), std::move(*placed), *camera);
 }

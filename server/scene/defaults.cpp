@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <string_view>
 
@@ -247,6 +248,37 @@ protocol::Range default_magnitude_colors(const protocol::VectorView& vector) {
   return low < drawn[1] ? protocol::Range{low, drawn[1]} : drawn;
 }
 
+protocol::Range default_rise_range(const protocol::VectorView& vector,
+                                   const ComponentFactors& factors, const data::Volume& volume,
+                                   const std::optional<Slice>& slice) {
+  const double length = *vector.length;
+  const double full = (*vector.magnitude_range)[1];
+  const auto row = static_cast<std::size_t>(volume.dims[0]);
+  const auto rows = static_cast<std::size_t>(volume.dims[1]);
+  std::vector<double> rises;
+  double most = 0;
+  for_some_samples(volume, slice, [&](std::size_t at, double magnitude) {
+    if (!(magnitude > 0) || magnitude < *vector.min_magnitude) return;
+    glm::dvec3 drawn(0);
+    for (int c = 0; c < volume.components; ++c) {
+      drawn[c] = factors.scale[c] * static_cast<double>(volume.component(c)[at]) / magnitude;
+    }
+    if (const auto& rates = factors.rates) {
+      drawn *= glm::dvec3(rates->x[at / row % rows], rates->y, rates->z[at / (row * rows)]);
+    }
+    const double norm = glm::length(drawn);
+    if (!(norm > 0)) return;
+    const double part = full > 0 ? std::min(magnitude / full, 1.0) : 1.0;
+    rises.push_back(std::abs(drawn.z / norm) * part * length);
+    most = std::max(most, rises.back());
+  });
+  double top = pick(rises, 0.0, 0.98)[1];
+  // For lines that are level nearly everywhere, use the maximum.
+  if (!(top > 1e-3 * most)) top = most;
+  top = top > 1e-9 * length ? nice_above(top) : length;
+  return {-top, top};
+}
+
 ScalarStyle scalar_style(const data::FieldInfo& field) {
   if (is_body(field)) return body_style;
   const std::size_t kind = kind_of(field);
@@ -330,11 +362,12 @@ double default_length(const Lattice& lattice, int stride, const std::optional<Sl
   return std::clamp(std::round(length / grain) * grain, 1e-9, 10.0);
 }
 
-protocol::ColorBy default_color_by(const data::Grid& grid) {
+protocol::ColorBy default_color_by(const data::Grid& grid, const std::optional<Slice>& slice) {
   const data::Axis& z = grid.axes[2];
   const bool own_kind = z.kind != data::AxisKind::cartesian;
-  return own_kind && z.coordinates.size() >= 4 ? protocol::ColorBy::world_z
-                                               : protocol::ColorBy::magnitude;
+  const bool horizontal = slice && slice->axis == 2;
+  return own_kind && !horizontal && z.coordinates.size() >= 4 ? protocol::ColorBy::world_z
+                                                              : protocol::ColorBy::magnitude;
 }
 
 }  // namespace windsplat::scene

@@ -9,6 +9,7 @@
 #include "protocol/view.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/volume.hpp"
+#include "server/scene/rates.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {
@@ -40,6 +41,13 @@ protocol::Range default_magnitude_colors(const protocol::VectorView& vector);
 protocol::Range default_height_range(const protocol::VectorView& vector, const data::Volume& volume,
                                      const Lattice& lattice);
 
+// The rise of lines from tail to head (LineColor::rise): [-r, r], with r such
+// that about 2 % of the drawn lines rise or sink by more. The range of their full length if none
+// rises. `vector` is completed but for the colours. For a slice, only its own lines count.
+protocol::Range default_rise_range(const protocol::VectorView& vector,
+                                   const ComponentFactors& factors, const data::Volume& volume,
+                                   const std::optional<Slice>& slice);
+
 // Default appearance of a kind of scalar.
 struct ScalarStyle {
   const char* map;
@@ -66,7 +74,8 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
 double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice);
 
 // The default: by height if the unit of the vertical axis differs from that of the horizontal ones
-// (as in the atmosphere), otherwise by magnitude.
-protocol::ColorBy default_color_by(const data::Grid& grid);
+// (as in the atmosphere), otherwise by magnitude. By magnitude in a horizontal slice, all of whose
+// lines have the same height.
+protocol::ColorBy default_color_by(const data::Grid& grid, const std::optional<Slice>& slice);
 
 }  // namespace windsplat::scene

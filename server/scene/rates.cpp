@@ -183,4 +183,20 @@ Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
   return rates;
 }
 
+Result<ComponentFactors> component_factors(const protocol::View& view, const Placed& placed,
+                                           const data::FieldInfo& field) {
+  ComponentFactors factors;
+  const protocol::VectorView& vector = view.vector;
+  factors.scale = {vector.scale[0], vector.scale[1], vector.scale[2]};
+  if (vector.space == protocol::VectorSpace::world) {
+    auto rates = world_rates(placed.grid, field, view.geometry, placed.lattice);
+    if (!rates) return rates.error();
+    factors.rates = std::move(*rates);
+  } else if (rises_where_negative(placed.grid, field)) {
+    // Omega is positive downward, so drawing it unchanged would show rising air as sinking.
+    factors.scale.z = -factors.scale.z;
+  }
+  return factors;
+}
+
 }  // namespace windsplat::scene

@@ -2,11 +2,13 @@
 // the world (space = world).
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
 #include "server/data/model/dataset_info.hpp"
+#include "server/scene/place.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::scene {
@@ -34,5 +36,14 @@ struct Rates {
 // component has no known rate along its axis.
 Result<Rates> world_rates(const data::Grid& grid, const data::FieldInfo& field,
                           const protocol::GeometryView& geometry, const Lattice& lattice);
+
+// Factors of the components of a vector as a view draws them.
+struct ComponentFactors {
+  glm::dvec3 scale{1, 1, 1};
+  std::optional<Rates> rates;  // in world space, applied after the scale
+};
+// Those of a view whose grid is placed. Errors: those of world_rates().
+Result<ComponentFactors> component_factors(const protocol::View& view, const Placed& placed,
+                                           const data::FieldInfo& field);
 
 }  // namespace windsplat::scene

@@ -56,7 +56,10 @@ struct ColorTable {
 };
 
 // direction: the compass bearing of the vector in degrees, 0 along +y (north), 90 along +x (east),
-// below 360. scalar: the value of a second field, mid-grey where it is masked.
+// below 360. rise: (1 - w) H + w R, where R is the rise of the line from tail to head as drawn at
+// full detail in world units (along the vertical of a curved cell, and of the vector itself in a
+// slice), H the height, as the heights of the box count like rises across the range of the table,
+// and w rise_weight. scalar: the value of a second field, mid-grey where it is masked.
 enum class LineColor { world_z, screen_z, rise, magnitude, direction, scalar, constant };
 
 // The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in docs/design/rendering-model.md).
@@ -79,7 +82,7 @@ struct VectorLayer {
   LineColor color_by = LineColor::world_z;
   ColorTable color;
   std::shared_ptr<const data::Volume> color_field;  // color_by scalar only
-  double rise_weight = 0.2;
+  double rise_weight = 0.5;
   std::array<double, 2> magnitude_range{0, 1};
   double min_magnitude = 0;
   double magnitude_intensity = 0.6;

@@ -113,12 +113,45 @@ TEST(Line, ColorFollowsTheConfiguredSource) {
     scene.vector->color.range = {low, high};
     return static_cast<double>(pixel(render(scene).image, 40, 40)[0]) / 0.75;
   };
-  scene.vector->rise_weight = 0.25;
   EXPECT_NEAR(brightness(scene::LineColor::magnitude, 0, 20), 0.5, 1e-5);
   EXPECT_NEAR(brightness(scene::LineColor::world_z, -1, 3), 0.25, 1e-5);
   EXPECT_NEAR(brightness(scene::LineColor::screen_z, 0, 10), 0.5, 1e-5);
-  // Halfway up the box, rising at 0.8 of its length.
-  EXPECT_NEAR(brightness(scene::LineColor::rise, 0, 1), 0.75 * 0.5 + 0.25 * 0.9, 1e-5);
+}
+
+// The line is at full magnitude, 2 world units long, and rises by 0.8 of that; it is half way up a
+// box from -1 to 1.
+TEST(Line, ColorByRiseWeighsTheHeightItGainsAgainstItsHeight) {
+  for (const bool slice : {false, true}) {
+    scene::Scene scene = one_line(6, 0, 8);
+    if (slice) scene.slice = scene::Slice{2, 0};
+    scene.vector->color = ramp_color(-2, 4, {0.0F, 0.0F, 0.0F}, {1.0F, 1.0F, 1.0F});
+    scene.vector->color_by = scene::LineColor::rise;
+    const auto position = [&](double weight) {
+      scene.vector->rise_weight = weight;
+      return static_cast<double>(pixel(render(scene).image, 40, 40)[0]) / 0.75;
+    };
+    EXPECT_NEAR(position(1), (1.6 + 2) / 6, 1e-5);
+    EXPECT_NEAR(position(0), 0.5, 1e-5) << "half way up the box, half way along the map";
+    EXPECT_NEAR(position(0.25), 0.75 * 0.5 + 0.25 * 3.6 / 6, 1e-5);
+    scene.vector->magnitude_range = {0, 20};
+    EXPECT_NEAR(position(1), (0.8 + 2) / 6, 1e-5) << "half as long";
+  }
+}
+
+TEST(Line, ColorByRiseIsSymmetricAndClampedAtTheEndsOfTheMap) {
+  const auto position = [](float w) {
+    scene::Scene scene = one_line(10, 0, w);
+    scene.vector->color = ramp_color(-0.02, 0.02, {0.0F, 0.0F, 0.0F}, {1.0F, 1.0F, 1.0F});
+    scene.vector->color_by = scene::LineColor::rise;
+    scene.vector->rise_weight = 1;
+    return static_cast<double>(pixel(render(scene).image, 40, 40)[0]) / 0.75;
+  };
+  EXPECT_NEAR(position(0), 0.5, 1e-5);
+  // A rise of 1 in 200 over 2 world units is a quarter of the range.
+  EXPECT_NEAR(position(0.05F), 0.75, 1e-4);
+  EXPECT_NEAR(position(-0.05F), 0.25, 1e-4);
+  EXPECT_NEAR(position(5), 1, 1e-5);
+  EXPECT_NEAR(position(-5), 0, 1e-5);
 }
 
 TEST(Line, DirectionIsCorrectForHugeAndTinyMagnitudes) {

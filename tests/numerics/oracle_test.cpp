@@ -94,7 +94,7 @@ class SceneMaker {
     if (layer.color_by == scene::LineColor::direction) layer.color.range = {0, 360};
     if (layer.color_by == scene::LineColor::scalar) layer.color_field = field(lattice, 1);
     if (layer.color_by == scene::LineColor::screen_z) layer.color.range = {0, 4};
-    if (layer.color_by == scene::LineColor::rise) layer.color.range = {0, 1};
+    if (layer.color_by == scene::LineColor::rise) layer.color.range = {-0.3, 0.3};
     layer.magnitude_range = {0.2, 1.8};
     layer.min_magnitude = 0.3;
     layer.seed = static_cast<std::uint32_t>(whole(0, 1 << 30));

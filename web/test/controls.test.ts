@@ -184,6 +184,15 @@ test("the legend labels direction by the compass and a scalar by its name and un
   assert.deepEqual(scalar!.range, [0, 16000]);
 });
 
+test("the legend of colour by rise has its own range and tells the share of the height", () => {
+  const rise = (riseWeight: number) =>
+    legendEntries(dataset, colored({ by: "rise", range: [-0.02, 0.02], riseWeight }))[0]!;
+  assert.equal(rise(1).title, "wind: rise");
+  assert.deepEqual(rise(1).range, [-0.02, 0.02]);
+  assert.equal(rise(0.7).title, "wind: height and rise");
+  assert.match(rise(0.7).note, /^70 % rise of a line, 30 % height in the box/);
+});
+
 test("levels are at their axis positions unless the grid is curved", () => {
   assert.notEqual(sampleHeights(dataset, {}), null);
   assert.equal(sampleHeights(dataset, { geometry: { mapping: "sphere" } }), null);

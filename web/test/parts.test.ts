@@ -198,7 +198,7 @@ test("each colouring has its unit, a constant colour has no range", () => {
   const units = (color: object) => legendEntries(dataset, vector(color))[0]!.units;
   assert.equal(units({ by: "magnitude", range: [0, 60] }), "m s⁻¹");
   assert.equal(units({ by: "screenZ", range: [1, 3] }), "world units");
-  assert.equal(units({ by: "rise", range: [0, 1] }), "fraction");
+  assert.equal(units({ by: "rise", range: [-0.02, 0.02] }), "world units");
   const [constant] = legendEntries(dataset, vector({ by: "constant", constant: "#ff0000" }));
   assert.equal(constant!.range, null);
   assert.equal(constant!.color, "#ff0000");

@@ -209,11 +209,12 @@ KERNEL_INLINE Kernel color_value(const LineStyle& line, const Rows& rows, const 
     case 1:
       return view_distance;
     case 2: {
+      // The vector itself, even if a slice draws only its part in the plane.
+      const Kernel part =
+          clamped(vectors.magnitude * all<Kernel>(line.inverse_full_magnitude), 0.0F, 1.0F);
       const Kernel height =
-          (z - all<Kernel>(line.box_low_z)) * all<Kernel>(line.inverse_box_height);
-      const Kernel half = all<Kernel>(0.5F);
-      const Kernel rise = hn::MulAdd(vectors.direction.z * all<Kernel>(line.keep[2]), half, half);
-      return all<Kernel>(1.0F - line.rise_weight) * height + all<Kernel>(line.rise_weight) * rise;
+          hn::MulAdd(z, all<Kernel>(line.height_scale), all<Kernel>(line.rise_shift));
+      return hn::MulAdd(vectors.direction.z * part, all<Kernel>(line.rise_scale), height);
     }
     case 3:
       return vectors.magnitude;

@@ -65,8 +65,9 @@ struct LineStyle {
   int color_by;  // scene::LineColor
   ColorTable color;
   const float* color_values;  // values of the field that determines the colour, or null
-  float rise_weight;
-  float box_low_z, inverse_box_height;
+  // Colour by rise: position on the map = rise_scale * part of the length that rises + height_scale
+  // * world height + rise_shift.
+  float rise_scale, height_scale, rise_shift;
   float jitter_center, jitter_stride;
   std::uint32_t seed, epoch;
   float keep[3];  // times the drawn extent: 0 along a slice's axis

@@ -60,6 +60,7 @@ Jitter jitter_of(const VectorLayer& layer, const std::array<int, 3>& sample) {
 // slice removed a component), `extent` from tail to head in world units.
 struct DrawnVector {
   double magnitude = 0;  // magnitude of the data
+  double rise = 0;       // from tail to head along the vertical of the cell, before a slice
   Vec unit{};
   Vec extent{};
 };
@@ -84,9 +85,10 @@ std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& la
   const double norm = length(d);
   if (norm == 0) return {};
   for (int c = 0; c < 3; ++c) drawn.unit[c] = d[c] / norm;
-  if (scene.slice) drawn.unit[scene.slice->axis] = 0;
   const double full = layer.magnitude_range[1];
   const double part = full > 0 ? std::clamp(drawn.magnitude / full, 0.0, 1.0) : 1.0;
+  drawn.rise = drawn.unit[2] * part * layer.length;
+  if (scene.slice) drawn.unit[scene.slice->axis] = 0;
   if (!scene.lattice.places) {
     drawn.extent = scaled(drawn.unit, part * layer.length);
     return drawn;
@@ -147,9 +149,10 @@ Vec undimmed_color(const Scene& scene, const VectorLayer& layer, const KernelPos
     case LineColor::screen_z:
       return table_color(layer.color, seen.distance);
     case LineColor::rise: {
-      const double height = (seen.z - low) / (high - low);
-      const double rise = 0.5 + 0.5 * drawn.unit[2];
-      return table_color(layer.color, (1 - layer.rise_weight) * height + layer.rise_weight * rise);
+      const auto [least, most] = layer.color.range;
+      const double height = least + (seen.z - low) / (high - low) * (most - least);
+      return table_color(layer.color,
+                         (1 - layer.rise_weight) * height + layer.rise_weight * drawn.rise);
     }
     case LineColor::magnitude:
       return table_color(layer.color, drawn.magnitude);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <glm/geometric.hpp>
 
 #include "server/data/samples/samples.hpp"
 #include "server/scene/colormap.hpp"
@@ -95,6 +96,7 @@ TEST(CompleteView, KeepsGivenValues) {
   view.vector.magnitude_range = protocol::Range{1, 2};
   view.vector.min_magnitude = 0.25;
   view.vector.color.by = ColorBy::rise;
+  view.vector.color.range = protocol::Range{-0.1, 0.3};
   view.camera.eye = protocol::Vec3{3, 1, 1};
   protocol::ScalarView scalar;
   scalar.field = "temperature";
@@ -106,7 +108,7 @@ TEST(CompleteView, KeepsGivenValues) {
   EXPECT_EQ(full.vector.length, 0.7);
   EXPECT_EQ(full.vector.magnitude_range, (protocol::Range{1, 2}));
   EXPECT_EQ(full.vector.min_magnitude, 0.25);
-  EXPECT_EQ(full.vector.color.range, (protocol::Range{0, 1}));
+  EXPECT_EQ(full.vector.color.range, (protocol::Range{-0.1, 0.3}));
   EXPECT_EQ(full.camera.eye, (protocol::Vec3{3, 1, 1}));
   ASSERT_EQ(full.scalars->size(), 1U);
   EXPECT_EQ((*full.scalars)[0].color.range, (protocol::Range{300, 200}));
@@ -204,6 +206,77 @@ TEST(CompleteView, AtmospheresAreColoredByHeightOthersByMagnitude) {
   auto tornado = sample_dataset("tornado", {24, 16, 12});
   EXPECT_EQ(completed(View{}, *climate).vector.color.by, ColorBy::world_z);
   EXPECT_EQ(completed(View{}, *tornado).vector.color.by, ColorBy::magnitude);
+}
+
+TEST(CompleteView, HorizontalSlicesAreColoredByMagnitude) {
+  auto climate = sample_dataset("climate", {24, 16, 12});
+  View view;
+  view.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 4};
+  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::magnitude)
+      << "all lines of the layer have the same height";
+  view.geometry.slice->axis = protocol::GridAxis::y;
+  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::world_z);
+  view.geometry.slice->axis = protocol::GridAxis::z;
+  view.vector.color.by = ColorBy::world_z;
+  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::world_z) << "as given";
+}
+
+// Rises of the drawn lines of a scene in full detail, from tail to head.
+std::vector<double> rises_in(const Scene& scene) {
+  const VectorLayer& layer = scene.vector.value();
+  const data::Volume& wind = *layer.field;
+  const auto [nx, ny, nz] = wind.dims;
+  std::vector<double> rises;
+  for (std::size_t at = 0; at < wind.samples(); ++at) {
+    const auto n = static_cast<int>(at);
+    glm::dvec3 v(wind.component(0)[at], wind.component(1)[at], wind.component(2)[at]);
+    const double magnitude = glm::length(v);
+    if (!(magnitude > 0 && magnitude >= layer.min_magnitude)) continue;
+    v *= layer.scale;
+    if (!layer.rate_x.empty()) {
+      v *= glm::dvec3(layer.rate_x[n / nx % ny], layer.rate_y, layer.rate_z[n / (nx * ny)]);
+    }
+    const double part = std::min(magnitude / layer.magnitude_range[1], 1.0);
+    rises.push_back(v.z / glm::length(v) * part * layer.length);
+  }
+  return rises;
+}
+
+TEST(CompleteView, ColorsByRiseCoverTheRisesOfTheDrawnLines) {
+  for (const char* sample : {"climate", "tornado", "efield"}) {
+    for (const auto space : {protocol::VectorSpace::components, protocol::VectorSpace::world}) {
+      if (space == protocol::VectorSpace::world && sample == std::string("efield")) continue;
+      auto dataset = sample_dataset(sample, {40, 24, 16});
+      View view;
+      view.vector.color.by = ColorBy::rise;
+      view.vector.space = space;
+      view.method.detail = protocol::Detail::full;
+      const auto scene = build_scene(view, *dataset);
+      ASSERT_TRUE(scene) << scene.error().message;
+      const auto [low, high] = scene->vector->color.range;
+      EXPECT_EQ(low, -high) << "level lines have the colour of the middle";
+      std::vector<double> rises = rises_in(*scene);
+      for (double& rise : rises) rise = std::abs(rise);
+      std::sort(rises.begin(), rises.end());
+      const auto quantile = [&](double q) {
+        return rises[static_cast<std::size_t>(q * static_cast<double>(rises.size() - 1))];
+      };
+      EXPECT_GE(high, 0.95 * quantile(0.98)) << sample;
+      EXPECT_LE(high, 1.35 * quantile(0.98)) << sample << ": no wider than they need";
+    }
+  }
+}
+
+TEST(CompleteView, RiseRangeOfLevelWindIsTheLengthOfItsLines) {
+  data::FieldInfo flat = wind_info();
+  flat.components = {"u", "v"};
+  flat.component_units = {"m s-1", "m s-1"};
+  auto dataset = dataset_of(
+      std::make_unique<FakeSource>(atmosphere_grid(), std::vector<data::FieldInfo>{flat}, 1));
+  View view;
+  view.vector.color.by = ColorBy::rise;
+  view.vector.length = 0.4;
+  EXPECT_EQ(completed(view, *dataset).vector.color.range, (protocol::Range{-0.4, 0.4}));
 }
 
 TEST(CompleteView, RefusesByPointer) {

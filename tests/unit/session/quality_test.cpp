@@ -216,6 +216,89 @@ TEST(Refining, IsCancelledByTheNextChange) {
   EXPECT_TRUE(driver.cancelled);
 }
 
+// The forecasts of a calibrated view, with the errors of full pictures by kernels and by slabs.
+quality::Forecasts with_errors(double kernel, double slab) {
+  quality::Forecasts out = calibrated(10);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const quality::Setting& setting = quality::settings[i];
+    if (setting.half_level > 0 || setting.coarser > 0) {
+      out[i].error = 0.02;
+    } else if (setting.method == protocol::MethodName::kernel) {
+      out[i].error = kernel;
+    } else {
+      out[i].error = slab / (setting.thinner * setting.thinner);
+    }
+  }
+  return out;
+}
+
+// The frames of a dragged view once it has come to rest. A full picture takes 10 ms, and 80 ms if
+// it is drawn by slabs and measured: too long for a moving frame.
+std::vector<SendFrame> frames_to_rest(Driver& driver) {
+  std::size_t before = 0;
+  driver.patch(1, R"({"dataset":"wind"})");
+  for (std::uint32_t rev = 2; rev < 5; ++rev) {
+    for (int turns = 0; turns < 10; ++turns) {
+      if (driver.render) driver.finish_render(driver.render->encoding.measure ? 80 * ms : 10 * ms);
+      if (!driver.frames.empty()) driver.ack(driver.frames.back().header.seq);
+      if (!driver.render) driver.wait(200 * ms);
+    }
+    if (rev == 4) break;
+    before = driver.frames.size();
+    driver.patch(rev, azimuth(static_cast<int>(rev)));
+  }
+  return {driver.frames.begin() + static_cast<std::ptrdiff_t>(before), driver.frames.end()};
+}
+
+TEST(Refining, FinalFrameIsAsAccurateAsTheFramesShownBefore) {
+  Driver driver;
+  driver.calibrated = with_errors(1.7e-5, 2.7e-4);
+  driver.measured = driver.calibrated;
+  const auto frames = frames_to_rest(driver);
+  ASSERT_EQ(frames.size(), 2U) << "one moving, one final";
+  EXPECT_FLOAT_EQ(frames[0].header.error, 1.7e-5F);
+  EXPECT_TRUE(Driver::is_final(frames[1]));
+  EXPECT_EQ(frames[1].header.method, protocol::MethodCode::kernel);
+  EXPECT_LE(frames[1].header.error, frames[0].header.error);
+}
+
+TEST(Refining, FinalFrameIsDrawnAgainIfItsMeasuredErrorIsLarger) {
+  Driver driver;
+  driver.calibrated = with_errors(1.7e-5, 1e-5);
+  driver.measured = with_errors(1.7e-5, 2.7e-4);
+  const auto frames = frames_to_rest(driver);
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_EQ(frames[1].header.method, protocol::MethodCode::slab);
+  EXPECT_FALSE(Driver::is_final(frames[1]));
+  EXPECT_TRUE(Driver::is_final(frames[2]));
+  EXPECT_FLOAT_EQ(frames[2].header.error, 1.7e-5F);
+}
+
+TEST(Refining, FinalFrameUsesTheOwnMethodAgainIfAForecastWasTooLow) {
+  Driver driver;
+  driver.calibrated = with_errors(1e-4, 3e-4);
+  driver.measured = with_errors(5e-4, 3e-4);
+  const auto frames = frames_to_rest(driver);
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_EQ(frames[1].header.method, protocol::MethodCode::kernel);
+  EXPECT_FALSE(Driver::is_final(frames[1]));
+  EXPECT_EQ(frames[2].header.method, protocol::MethodCode::slab);
+  EXPECT_FLOAT_EQ(frames[2].header.error, 3e-4F);
+}
+
+TEST(Refining, FinalFrameIsTheBestOfThoseDrawnWhereThinnerSlabsMakeItWorse) {
+  Driver driver;
+  driver.calibrated = with_errors(1e-2, 1e-3);
+  driver.measured = driver.calibrated;
+  for (std::size_t i = 0; i < quality::settings_count; ++i) {
+    if (quality::settings[i].thinner > 1) (*driver.measured)[i].error = 2e-3;
+  }
+  driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.0001}})");
+  driver.settle();
+  EXPECT_TRUE(Driver::is_final(driver.frames.back()));
+  EXPECT_FLOAT_EQ(driver.frames.back().header.error, 1e-3F);
+}
+
 TEST(Refining, SlabsBecomeThinnerUntilTheRequestedErrorIsMet) {
   Driver driver;
   driver.measured_error = 1e-3;  // a quarter with every halving

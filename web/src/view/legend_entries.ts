@@ -76,6 +76,18 @@ function leftOutText(least: number, units: string): string {
   return `${what} than ${formatNumber(least)}${units === "" ? "" : ` ${units}`} not drawn`;
 }
 
+// Rises from tail to head; heights from the bottom to the top of the box count as the same range.
+function riseEntry(entry: LegendEntry, name: string, weight: number): LegendEntry {
+  const percent = Math.round(100 * weight);
+  const note = `${percent} % rise of a line, ${100 - percent} % height in the box`;
+  return {
+    ...entry,
+    title: weight === 1 ? `${name}: rise` : `${name}: height and rise`,
+    units: "world units",
+    note: weight === 1 ? entry.note : [note, entry.note].filter((part) => part !== "").join(", "),
+  };
+}
+
 function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const vector = view.vector;
   if (!vector?.field) return null;
@@ -112,7 +124,7 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
     case "screenZ":
       return { ...entry, title: `${name}: distance from the eye`, units: "world units" };
     case "rise":
-      return { ...entry, title: `${name}: height and rise`, units: "fraction" };
+      return riseEntry(entry, name, color.riseWeight ?? 0.5);
     case "direction":
       return {
         ...entry,

@@ -1,0 +1,141 @@
+// Completes the view, measures its settings if it has limits, chooses one and draws.
+#include "server/cli/limited_picture.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/frame/frame_info.hpp"
+#include "server/frame/measure.hpp"
+#include "server/quality/pick.hpp"
+#include "server/quality/setting.hpp"
+#include "server/work/error_report.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+bool is_reference(const protocol::View& view) {
+  return view.method.name == protocol::MethodName::reference;
+}
+
+// A reference has no error to limit.
+bool is_limited(const protocol::View& view) {
+  return (view.quality.budget_ms || view.quality.max_error) && !is_reference(view);
+}
+
+double milliseconds(std::int64_t us) { return 1e-3 * static_cast<double>(us); }
+
+std::string short_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+}  // namespace
+
+Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
+                                        const CancelToken& cancel) {
+  const quality::SceneSignature signature = quality::signature_of(completed.view());
+  if (!tables_.begin_study(signature, frame::viewpoint_of(completed))) return {};
+  // Loads the averages of coarser settings as far as memory allows; the run itself loads nothing.
+  for (const int coarser : {0, 1, 2}) {
+    quality::Setting setting = frame::own_setting(completed);
+    setting.coarser = coarser;
+    const auto loaded = frame::prepare(completed, setting, dataset_, {});
+    if (!loaded && coarser == 0) return loaded.error();
+  }
+  data::Dataset resident = dataset_.resident_only();
+  const auto keep = [&](const frame::CalibrationSample& found) {
+    tables_.add(signature, found.setting, found.viewpoint, found.measured);
+  };
+  const auto done = frame::calibrate(completed, resident, pool_, cancel, workspace_, keep);
+  tables_.end_study(signature, static_cast<bool>(done));
+  // Without memory for these pictures, the setting follows from the measurements made so far and
+  // from forecasts.
+  const bool short_of_memory = !done && (done.error().kind == ErrorKind::not_resident ||
+                                         done.error().kind == ErrorKind::out_of_memory);
+  return short_of_memory ? Result<void>() : done;
+}
+
+quality::Setting LimitedPictures::setting_of(const scene::CompletedView& completed) {
+  const protocol::View& view = completed.view();
+  if (!is_limited(view)) return frame::own_setting(completed);
+  auto known = tables_.forecasts(quality::signature_of(view), frame::viewpoint_of(completed));
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    known[i].ms += encode_ms_a_pixel_ * quality::pixels_at(view, quality::settings[i]);
+  }
+  const quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
+  return quality::settings[quality::pick(view, known, aim).setting];
+}
+
+Result<Picture> LimitedPictures::draw_at(const scene::CompletedView& completed,
+                                         const quality::Setting& setting,
+                                         const CancelToken& cancel) {
+  frame::Encoding encoding = encoding_;
+  encoding.measure = encoding.measure || completed.view().quality.max_error.has_value();
+  const auto prepared = frame::prepare(completed, setting, dataset_, encoding);
+  if (!prepared) return prepared.error();
+  auto drawn = frame::produce(*prepared, dataset_, pool_, cancel, workspace_);
+  if (!drawn) return drawn.error();
+  encode_ms_a_pixel_ =
+      milliseconds(drawn->encode_us) / (static_cast<double>(drawn->width) * drawn->height);
+  Picture picture{std::move(*drawn), {}};
+  picture.info = frame::frame_info(picture.frame, picture.frame.view);
+  work::report_error(picture.frame, work::observed_in(picture.frame, setting), setting, encoding,
+                     tables_, picture.info);
+  return picture;
+}
+
+Result<Picture> LimitedPictures::draw(const protocol::View& view, const CancelToken& cancel) {
+  const auto completed = frame::complete(view, dataset_, encoding_.allow_reference);
+  if (!completed) return completed.error();
+  if (is_reference(view) && view.quality.budget_ms) {
+    return make_error_at(ErrorKind::invalid, "/quality/budgetMs",
+                         "cannot limit the time of method reference");
+  }
+  if (is_limited(completed->view())) {
+    if (auto done = calibrate(*completed, cancel); !done) return done.error();
+  }
+  quality::Setting setting = setting_of(*completed);
+  auto picture = draw_at(*completed, setting, cancel);
+  // The time of encoding and the measured error of a picture correct the forecasts.
+  constexpr int attempts_max = 3;
+  for (int n = 1; n < attempts_max && picture && !exceeded_limits(*picture).empty(); ++n) {
+    const quality::Setting next = setting_of(*completed);
+    if (next == setting) break;
+    setting = next;
+    picture = draw_at(*completed, setting, cancel);
+  }
+  return picture;
+}
+
+std::string report_line(const Picture& picture) {
+  return protocol::encode_frame_report(picture.info, milliseconds(picture.frame.render_us),
+                                       milliseconds(picture.frame.encode_us)) +
+         '\n';
+}
+
+std::string exceeded_limits(const Picture& picture) {
+  const protocol::QualityView& limits = picture.frame.view.quality;
+  std::string text;
+  const auto exceeds = [&](const char* what, double value, const char* unit, double limit,
+                           const char* pointer) {
+    if (!text.empty()) text += "; ";
+    text += std::string(what) + ' ' + short_text(value) + unit + " exceeds " + pointer + ' ' +
+            short_text(limit);
+  };
+  const double ms = milliseconds(picture.frame.render_us + picture.frame.encode_us);
+  if (limits.budget_ms && ms > *limits.budget_ms) {
+    exceeds("time", ms, " ms", *limits.budget_ms, "/quality/budgetMs");
+  }
+  const auto& error = picture.info.error_value;
+  if (limits.max_error && error && *error > *limits.max_error) {
+    exceeds("error", *error, "", *limits.max_error, "/quality/maxError");
+  }
+  return text;
+}
+
+}  // namespace windsplat::cli

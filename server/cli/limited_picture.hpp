@@ -1,0 +1,61 @@
+// View -> picture and report, within the time budget and the error bound of the view.
+#pragma once
+
+#include <string>
+
+#include "protocol/messages.hpp"
+#include "protocol/view.hpp"
+#include "server/base/cancel.hpp"
+#include "server/base/error.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/data/resident/dataset.hpp"
+#include "server/frame/frame.hpp"
+#include "server/quality/setting.hpp"
+#include "server/quality/tables.hpp"
+#include "server/scene/completed_view.hpp"
+
+namespace windsplat::cli {
+
+struct Picture {
+  frame::Frame frame;
+  protocol::FrameInfo info;  // with the error, if it was measured or estimated
+};
+
+// Draws the pictures of a command one after another. A view with quality.budgetMs or
+// quality.maxError is drawn at every setting first, which takes the time of about thirty pictures;
+// its picture has the setting that quality::pick() selects by these times and errors. Later
+// pictures of the same scene near the same viewpoint, as of an animation, use the same
+// measurements. A picture that exceeds a limit is drawn again if what it shows of the time of
+// encoding and of the error leads to another setting.
+class LimitedPictures {
+ public:
+  // The dataset and the pool must outlive this object. The pictures are measured if the encoding
+  // says so, or if their error is limited.
+  LimitedPictures(data::Dataset& dataset, const frame::Encoding& encoding, ThreadPool& pool)
+      : dataset_(dataset), encoding_(encoding), pool_(pool) {}
+
+  // Errors: those of frame::complete(), frame::prepare() and frame::produce(); invalid at
+  // /quality/budgetMs for a reference, whose time cannot be limited.
+  Result<Picture> draw(const protocol::View& view, const CancelToken& cancel);
+
+ private:
+  Result<void> calibrate(const scene::CompletedView& completed, const CancelToken& cancel);
+  [[nodiscard]] quality::Setting setting_of(const scene::CompletedView& completed);
+  Result<Picture> draw_at(const scene::CompletedView& completed, const quality::Setting& setting,
+                          const CancelToken& cancel);
+
+  data::Dataset& dataset_;
+  frame::Encoding encoding_;
+  ThreadPool& pool_;
+  quality::Tables tables_;
+  frame::Workspace workspace_;
+  double encode_ms_a_pixel_ = 0;  // of the last picture
+};
+
+// The report of a picture as a line of JSON.
+std::string report_line(const Picture& picture);
+
+// Text on each limit of the view that the picture does not keep; empty if it keeps them.
+std::string exceeded_limits(const Picture& picture);
+
+}  // namespace windsplat::cli
