@@ -40,7 +40,7 @@ Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
                                         const CancelToken& cancel) {
   const quality::SceneSignature signature = quality::signature_of(completed.view());
   if (!tables_.begin_study(signature, frame::viewpoint_of(completed))) return {};
-  // Loads the averages of coarser settings as far as memory allows; the run itself loads nothing.
+  // Loads the levels of coarser settings as far as memory allows; the run itself loads nothing.
   for (const int coarser : {0, 1, 2}) {
     quality::Setting setting = frame::own_setting(completed);
     setting.coarser = coarser;

@@ -64,7 +64,7 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
   std::array<double, 3> reach{};
   for (int a = 0; a < 3; ++a) {
     const double cell = pass.cell_max[a];
-    const double moved = 0.5 * (pass.line.jitter_center + pass.line.jitter_stride) * cell;
+    const double moved = pass.line.shift[a] * cell;
     // Lines are clipped to the boxes of their kernels.
     const double inside = std::min<double>(line_reach, pass.line.half_span * cell);
     const double line = pass.has_lines != 0 && line_reach >= 0 ? inside + moved : 0;

@@ -22,6 +22,19 @@ double magnitude_scale(const scene::VectorLayer& from) {
   return toward_one(from.magnitude_range[1], 1e-15, 1e15);
 }
 
+void set_detail(const scene::VectorLayer& from, kernels::LineStyle& to) {
+  to.merged = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const int halvings = from.halvings[a];
+    to.halvings[a] = halvings;
+    to.data_dims[a] = from.data_dims[a];
+    WINDSPLAT_CHECK(halvings >= 0 && halvings <= 15);  // products of indices fit in 32 bits
+    const double jitter = 0.5 * (from.jitter_center + from.jitter_stride);
+    to.shift[a] = static_cast<float>(halvings > 0 ? 0.5 + jitter : jitter);
+    if (halvings > 0) to.merged = 1;
+  }
+}
+
 }  // namespace
 
 void to_floats(const std::vector<double>& from, std::vector<float>& to) {
@@ -81,6 +94,7 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::Li
   to.inverse_full_magnitude = full > 0 ? bounded(1.0 / full) : std::numeric_limits<float>::max();
   to.min_magnitude = bounded(scale * from.min_magnitude);
   to.half_span = static_cast<float>(0.5 * (from.overlap ? from.span : 1.0));
+  set_detail(from, to);
   to.r1 = static_cast<float>(from.r1);
   to.r2 = static_cast<float>(from.r2);
   to.inverse_ramp = static_cast<float>(1.0 / std::max(from.r2 - from.r1, 1e-6));

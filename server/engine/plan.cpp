@@ -135,38 +135,59 @@ void add_lines(const Scene& scene, PassPlan& pass) {
   pass.kernel.has_lines = 1;
 }
 
+void flatten_layer(const scene::ScalarLayer& from, LayerArrays& arrays) {
+  WINDSPLAT_CHECK(!from.extinction.empty());
+  arrays.x.clear();
+  arrays.y.clear();
+  arrays.slope.clear();
+  for (std::size_t p = 0; p < from.extinction.size(); ++p) {
+    const double x = from.extinction[p][0];
+    const double y = std::min(from.extinction[p][1], extinction_max);
+    double slope = 0;
+    if (p + 1 < from.extinction.size() && from.extinction[p + 1][0] > x) {
+      slope = (std::min(from.extinction[p + 1][1], extinction_max) - y) /
+              (from.extinction[p + 1][0] - x);
+    }
+    arrays.x.push_back(bounded(x));
+    arrays.y.push_back(bounded(y));
+    arrays.slope.push_back(bounded(slope));
+  }
+  flatten(from.color, arrays.rgb);
+}
+
+// A medium of a coarser level has two values at each sample and becomes two layers.
+void add_layers(const scene::ScalarLayer& from, const LayerArrays& arrays, kernels::Medium& to) {
+  using data::TwoValues;
+  const auto add = [&](const float* values, const float* share) {
+    WINDSPLAT_CHECK(to.layers < kernels::medium_layers_max);
+    kernels::MediumLayer& layer = to.layer[to.layers++];
+    layer.values = values;
+    layer.share = share;
+    layer.extinction = {static_cast<int>(arrays.x.size()), arrays.x.data(), arrays.y.data(),
+                        arrays.slope.data()};
+    layer.color = make_table(from.color, arrays.rgb);
+  };
+  const data::Volume& field = *from.field;
+  if (field.components == 1) {
+    add(field.values.data(), nullptr);
+    return;
+  }
+  WINDSPLAT_CHECK(field.components == TwoValues::components);
+  add(field.component(TwoValues::low), field.component(TwoValues::low_share));
+  add(field.component(TwoValues::high), field.component(TwoValues::high_share));
+}
+
 void add_medium(const Scene& scene, PassPlan& pass) {
   pass.layers.resize(pass.scalars.size());
   if (pass.scalars.empty()) return;
   kernels::Medium& to = pass.kernel.medium;
-  WINDSPLAT_CHECK(pass.scalars.size() <= kernels::medium_layers_max);
-  to.layers = static_cast<int>(pass.scalars.size());
+  to.layers = 0;
   to.min_optical_depth = std::numeric_limits<float>::max();
   for (std::size_t k = 0; k < pass.scalars.size(); ++k) {
     const scene::ScalarLayer& from = *pass.scalars[k];
     check_volume(*from.field, scene.lattice);
-    WINDSPLAT_CHECK(!from.extinction.empty());
-    LayerArrays& arrays = pass.layers[k];
-    arrays.x.clear();
-    arrays.y.clear();
-    arrays.slope.clear();
-    for (std::size_t p = 0; p < from.extinction.size(); ++p) {
-      const double x = from.extinction[p][0];
-      const double y = std::min(from.extinction[p][1], extinction_max);
-      double slope = 0;
-      if (p + 1 < from.extinction.size() && from.extinction[p + 1][0] > x) {
-        slope = (std::min(from.extinction[p + 1][1], extinction_max) - y) /
-                (from.extinction[p + 1][0] - x);
-      }
-      arrays.x.push_back(bounded(x));
-      arrays.y.push_back(bounded(y));
-      arrays.slope.push_back(bounded(slope));
-    }
-    flatten(from.color, arrays.rgb);
-    to.layer[k].values = from.field->values.data();
-    to.layer[k].extinction = {static_cast<int>(arrays.x.size()), arrays.x.data(), arrays.y.data(),
-                              arrays.slope.data()};
-    to.layer[k].color = make_table(from.color, arrays.rgb);
+    flatten_layer(from, pass.layers[k]);
+    add_layers(from, pass.layers[k], to);
     to.min_optical_depth = std::min(to.min_optical_depth, bounded(from.min_optical_depth));
   }
   pass.kernel.has_medium = 1;

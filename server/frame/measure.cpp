@@ -162,7 +162,7 @@ class CalibrationRun {
   }
 
  private:
-  // The averaged data of a coarser setting do not fit into memory.
+  // The merged data of a coarser setting do not fit into memory.
   static bool is_absent(const Error& error) {
     return error.kind == ErrorKind::not_resident || error.kind == ErrorKind::out_of_memory;
   }
@@ -314,13 +314,15 @@ bool is_measured(const Prepared& prepared) {
 Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dataset& dataset,
                                              ThreadPool& pool, const CancelToken& cancel,
                                              Workspace& workspace) {
-  // Reads no file, and takes no longer than a few frames.
+  // Reads no file, and takes no longer than a few frames, or than a frame of this many samples.
   constexpr double times_as_many = 4;
+  constexpr double samples_always = 4e6;
   const scene::Scene& scene = prepared.scene;
   data::Dataset resident = dataset.resident_only();
   const auto finer =
       finer_scene(prepared.completed, resident, 2,
-                  std::min(truth_samples_max, times_as_many * samples_of(scene.lattice)));
+                  std::min(truth_samples_max,
+                           std::max(samples_always, times_as_many * samples_of(scene.lattice))));
   if (!finer || !finer->second) return std::optional<double>();
   // The picture itself is encoded afterwards.
   std::vector<float>& rgba = workspace.space.image().rgba;

@@ -28,7 +28,7 @@ bool is_measured(const Prepared& prepared);
 // Linear RMSE over premultiplied RGBA of the picture in the workspace, which is replaced by the
 // differences. The finer rendering uses slabs of half the thickness, from every sample. The error
 // of slabs is of order 2 in their thickness, so it is 4/3 of the difference; for other pictures it
-// is the difference. Empty if the finer rendering is not possible: averaged data of which not every
+// is the difference. Empty if the finer rendering is not possible: merged data of which not every
 // sample is resident, or with more than four times the samples drawn. Reads no file. Errors: those
 // of the engine.
 Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dataset& dataset,

@@ -79,9 +79,9 @@ void add_budget(Families& out, const data::BudgetCounts& budget) {
   add_gauge(out, "windsplat_memory_limit_bytes", "Limit on resident data.",
             static_cast<double>(budget.bytes_max));
   add_labelled(out, "windsplat_data_lookups_total",
-               "Requests for volumes and averages, by residency.", "result",
+               "Requests for volumes and their levels, by residency.", "result",
                {{"hit", budget.hits}, {"miss", budget.misses}});
-  add_counter(out, "windsplat_data_evictions_total", "Volumes and averages evicted.",
+  add_counter(out, "windsplat_data_evictions_total", "Volumes and their levels evicted.",
               budget.evictions);
   add_counter(out, "windsplat_data_refusals_total", "Loads refused for lack of memory.",
               budget.refusals);

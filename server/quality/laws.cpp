@@ -22,9 +22,9 @@ struct Law {
   Scatter scatter;
 };
 
-Law law_of_lines(const Kind& kind, const Setting& setting, bool averaged) {
+Law law_of_lines(const Kind& kind, const Setting& setting, bool merged) {
   const bool slab = setting.method == protocol::MethodName::slab;
-  if (setting.coarser > 0 || averaged) {
+  if (setting.coarser > 0 || merged) {
     const double factor = kind.medium ? 0.09 : 0.11;
     return {
         factor * std::pow(1.55, std::max(0, setting.coarser - 1)), -0.65, 0.1, {0.35, 0.3, 0.06}};
@@ -41,9 +41,9 @@ Law law_of_lines(const Kind& kind, const Setting& setting, bool averaged) {
   return {2.8e-4 * std::pow(kind.depth, 0.7) * thickness * thickness, -0.25, 0, {0.6, 0.75, 0.06}};
 }
 
-Law law_of_media(const Kind& kind, const Setting& setting, bool averaged) {
+Law law_of_media(const Kind& kind, const Setting& setting, bool merged) {
   const bool slab = setting.method == protocol::MethodName::slab;
-  if (setting.coarser > 0 || averaged) {
+  if (setting.coarser > 0 || merged) {
     return {0.032 * std::pow(2.4, std::max(0, setting.coarser - 1)), -0.35, 0, {0.5, 0.4, 0.06}};
   }
   if (setting.half_level > 0) {
@@ -56,15 +56,15 @@ Law law_of_media(const Kind& kind, const Setting& setting, bool averaged) {
 
 }  // namespace
 
-bool is_averaged(const Setting& setting, const Viewpoint& viewpoint) {
+bool is_merged(const Setting& setting, const Viewpoint& viewpoint) {
   return setting.half_level == 0 && setting.coarser == 0 && viewpoint.detail > 0 &&
          viewpoint.detail < 1;
 }
 
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
-  const bool averaged = is_averaged(setting, viewpoint);
+  const bool merged = is_merged(setting, viewpoint);
   const Law law =
-      kind.lines ? law_of_lines(kind, setting, averaged) : law_of_media(kind, setting, averaged);
+      kind.lines ? law_of_lines(kind, setting, merged) : law_of_media(kind, setting, merged);
   double error = law.factor * std::pow(viewpoint.pixels_high / pixels_high_of_laws, law.by_pixels);
   if (kind.length > 0) {
     error *= std::pow(viewpoint.height / (height_of_laws * kind.length), law.by_height);

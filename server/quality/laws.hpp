@@ -23,9 +23,9 @@ struct Expected {
 // are reported as this value.
 inline constexpr double error_least = 1e-5;
 
-// Whether the setting draws the view at its own size and level, but that level already averages
+// Whether the setting draws the view at its own size and level, but that level already merges
 // samples.
-bool is_averaged(const Setting& setting, const Viewpoint& viewpoint);
+bool is_merged(const Setting& setting, const Viewpoint& viewpoint);
 
 // Linear RMSE, and milliseconds of rendering on the machine on which the laws were fitted.
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);

@@ -105,7 +105,7 @@ void Table::add(std::size_t setting, const Viewpoint& viewpoint, const Measured&
   };
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
-  Entry entry{viewpoint, {}, {}, is_averaged(how, viewpoint)};
+  Entry entry{viewpoint, {}, {}, is_merged(how, viewpoint)};
   if (measured.error) {
     const double error = std::max(*measured.error, error_least);
     entry.log_error = std::log(error / expected_error(kind_, how, viewpoint).value);
@@ -125,14 +125,14 @@ void Table::add(std::size_t setting, const Viewpoint& viewpoint, const Measured&
 
 Forecast Table::forecast(std::size_t setting, const Viewpoint& viewpoint) const {
   const Setting& how = settings[setting];
-  const bool averaged = is_averaged(how, viewpoint);
+  const bool merged = is_merged(how, viewpoint);
   Forecast out = prior(kind_, how, viewpoint);
   std::vector<Observation> errors;
   std::vector<Observation> times;
   for (const Entry& entry : entries_[setting]) {
     const double apart = distance(entry.viewpoint, viewpoint);
     // Averaged data and data in full detail follow different laws.
-    if (entry.log_error && entry.averaged == averaged) {
+    if (entry.log_error && entry.merged == merged) {
       errors.push_back({&entry.viewpoint, *entry.log_error, apart});
     }
     if (entry.log_ms) times.push_back({&entry.viewpoint, *entry.log_ms, apart});

@@ -64,7 +64,7 @@ class Table {
     // Logarithms of measured over expected values.
     std::optional<double> log_error;
     std::optional<double> log_ms;
-    bool averaged = false;
+    bool merged = false;
   };
 
   Kind kind_;

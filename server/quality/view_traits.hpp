@@ -13,7 +13,7 @@ struct Viewpoint {
   protocol::Vec3 direction{0, 1, 0};  // view direction from the eye, unit length
   int width = 1;                      // width of the picture, pixels
   int pixels_high = 1;
-  // Size of the finest cells relative to that below which samples are averaged; 0: never averaged,
+  // Size of the finest cells relative to that below which samples are merged; 0: never merged,
   // or unknown.
   double detail = 0;
 };

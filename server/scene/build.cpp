@@ -107,37 +107,55 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.magnitude_intensity = from.magnitude_intensity;
 }
 
-// Fields of the level that is drawn: all are averaged to the same level.
+data::Coarsening drawn(data::Coarsening how) {
+  how.reduction = data::Reduction::drawn;
+  return how;
+}
+
+// Fields of the level that is rendered. Media have two values per sample. Lines are those of
+// samples, and so is the scalar that colours them: the mean of vectors that differ is shorter than
+// each of them, and would be held against a least magnitude of the samples.
 struct Fields {
+  using Volume = Result<std::shared_ptr<const data::Volume>>;
   data::Dataset& dataset;
   std::size_t step;
   data::Coarsening coarsening;
-  [[nodiscard]] Result<std::shared_ptr<const data::Volume>> get(const std::string& name) const {
+  [[nodiscard]] Volume of_medium(const std::string& name) const {
     return dataset.level(name, step, coarsening);
+  }
+  [[nodiscard]] Volume of_lines(const std::string& name) const {
+    return dataset.level(name, step, drawn(coarsening));
   }
 };
 
-// Cells that cover less than this are averaged; 0: no averaging.
-double averaged_below_px(const View& view) {
-  const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
-  const bool strided = (lines && view.vector.stride > 1) ||
+bool shows_lines(const View& view) {
+  return view.vector.field.kind == protocol::FieldChoice::Kind::named && view.vector.opacity > 0;
+}
+
+// A stride counts samples of the data, and the reference uses all of them.
+bool is_drawn_in_full(const View& view) {
+  const bool strided = (shows_lines(view) && view.vector.stride > 1) ||
                        std::any_of(view.scalars->begin(), view.scalars->end(),
                                    [](const auto& scalar) { return scalar.stride > 1; });
-  // A stride counts samples of the data, and the reference uses all of them.
-  if (view.method.detail == protocol::Detail::full || strided ||
-      view.method.name == protocol::MethodName::reference) {
-    return 0;
-  }
-  return lines ? halved_with_lines_below_px : halved_below_px;
+  return view.method.detail == protocol::Detail::full || strided ||
+         view.method.name == protocol::MethodName::reference;
+}
+
+// The samples of the data that one may represent in the picture.
+double samples_merged(const View& view) {
+  if (!shows_lines(view)) return merged_max;
+  VectorLayer layer;
+  set_radii(view.vector, view.image.height, layer);
+  return std::min(merged_max, 1 / layer.opacity);
 }
 
 // The fraction of the requested detail that the picture can show.
 std::array<int, 3> level_for(const View& view, const Camera& camera, const Lattice& lattice,
                              int coarser) {
-  const double below_px = averaged_below_px(view);
-  if (below_px == 0) return {0, 0, 0};
+  if (is_drawn_in_full(view)) return {0, 0, 0};
   const auto slice = slice_of(view.geometry);
-  return coarser_level(lattice, slice, choose_level(camera, lattice, slice, below_px), coarser);
+  const auto level = choose_level(camera, lattice, slice, samples_merged(view));
+  return coarser_level(lattice, slice, level, coarser);
 }
 
 Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
@@ -167,18 +185,14 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   if (layer.moving) layer.motion_cycles = from.motion_rate * (view.step + from.motion_time);
   layer.epoch = from.jitter.per_step ? static_cast<std::uint32_t>(view.step) : 0U;
   if (layer.color_by == LineColor::scalar) {
-    auto values = fields.get(from.color.field.value());
+    auto values = fields.of_lines(from.color.field.value());
     if (!values) return values.error();
     layer.color_field = std::move(*values);
   }
-  auto volume = fields.get(from.field.name);
+  auto volume = fields.of_lines(from.field.name);
   if (!volume) return volume.error();
   layer.field = std::move(*volume);
   return layer;
-}
-
-bool shows_lines(const View& view) {
-  return view.vector.field.kind == protocol::FieldChoice::Kind::named && view.vector.opacity > 0;
 }
 
 bool absorbs(const protocol::ScalarView& scalar) {
@@ -192,7 +206,7 @@ Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, const Fi
   layer.extinction = from.extinction.value();
   layer.min_optical_depth = from.min_optical_depth;
   layer.stride = from.stride;
-  auto volume = fields.get(from.field);
+  auto volume = fields.of_medium(from.field);
   if (!volume) return volume.error();
   layer.field = std::move(*volume);
   return layer;
@@ -256,24 +270,24 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
 }
 
 double detail_shown(const CompletedView& completed) {
-  const double below_px = averaged_below_px(completed.view());
-  if (below_px == 0) return 0;
-  const auto slice = slice_of(completed.view().geometry);
-  return finest_cell_px(completed.camera(), completed.lattice(), slice) / below_px;
+  const View& view = completed.view();
+  if (is_drawn_in_full(view) || samples_merged(view) < 2) return 0;
+  const auto slice = slice_of(view.geometry);
+  return finest_cell_px(completed.camera(), completed.lattice(), slice) / halved_below_px;
 }
 
-Shown shown_by(const CompletedView& completed) {
+std::vector<Shown> shown_by(const CompletedView& completed) {
   const View& view = completed.view();
-  Shown shown;
-  shown.coarsening = coarsening_of(completed.lattice(), level_of(completed));
+  std::vector<Shown> shown;
+  const data::Coarsening how = coarsening_of(completed.lattice(), level_of(completed));
   if (shows_lines(view)) {
-    shown.fields.push_back(view.vector.field.name);
+    shown.push_back({view.vector.field.name, drawn(how)});
     if (view.vector.color.by == protocol::ColorBy::scalar) {
-      shown.fields.push_back(view.vector.color.field.value());
+      shown.push_back({view.vector.color.field.value(), drawn(how)});
     }
   }
   for (const protocol::ScalarView& scalar : *view.scalars) {
-    if (absorbs(scalar)) shown.fields.push_back(scalar.field);
+    if (absorbs(scalar)) shown.push_back({scalar.field, how});
   }
   return shown;
 }

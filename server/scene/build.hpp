@@ -17,7 +17,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
 // Completes the view first.
 Result<Scene> build_scene(const protocol::View& view, data::Dataset& dataset);
 
-// The size of the finest cells in the picture relative to the size below which cells are averaged:
+// The size of the finest cells in the picture relative to the size below which cells are merged:
 // below 1, not every sample is drawn. 0 if every sample is always drawn.
 double detail_shown(const CompletedView& completed);
 
@@ -25,12 +25,12 @@ double detail_shown(const CompletedView& completed);
 std::array<int, 3> level_of(const CompletedView& completed);
 std::array<int, 3> level_of(const ViewOutline& outline);
 
-// The fields that a completed view shows at any step, and their level of detail, determined without
-// loading them.
+// The fields that a completed view shows at any step, each with its level of detail, determined
+// without loading them.
 struct Shown {
-  std::vector<std::string> fields;
+  std::string field;
   data::Coarsening coarsening;
 };
-Shown shown_by(const CompletedView& completed);
+std::vector<Shown> shown_by(const CompletedView& completed);
 
 }  // namespace windsplat::scene

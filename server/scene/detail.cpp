@@ -44,17 +44,23 @@ double pixels_per_unit(const Camera& camera, const Lattice& lattice) {
 }
 
 std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
-                                const std::optional<Slice>& slice, double below_px) {
+                                const std::optional<Slice>& slice, double samples) {
   std::array<int, 3> level{0, 0, 0};
   if (lattice.places) return level;
   const double scale = pixels_per_unit(camera, lattice);
-  for (std::size_t a = 0; a < 3; ++a) {
-    if (slice && slice->axis == static_cast<int>(a)) continue;
-    const auto& spacing = lattice.spacing[a];
-    while (data::halved(lattice.dims[a], level[a] + 1) >= 2 &&
-           widest_cell(spacing, level[a]) * scale < below_px) {
-      ++level[a];
+  for (double merged = 1; 2 * merged <= samples; merged *= 2) {
+    std::size_t finest = 3;
+    double finest_px = halved_below_px;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const bool stays = (slice && slice->axis == static_cast<int>(a)) ||
+                         data::halved(lattice.dims[a], level[a] + 1) < 2;
+      const double cell_px = stays ? 0 : widest_cell(lattice.spacing[a], level[a]) * scale;
+      if (stays || cell_px >= finest_px) continue;
+      finest = a;
+      finest_px = cell_px;
     }
+    if (finest == 3) break;
+    ++level[finest];
   }
   return level;
 }
@@ -129,6 +135,8 @@ Lattice coarsen_lattice(const Lattice& lattice, const std::array<int, 3>& level)
 
 void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pixels_per_unit,
                  VectorLayer& layer) {
+  layer.halvings = level;
+  layer.data_dims = fine.dims;
   // Mean over the groups, so that an incomplete last group counts with its actual size.
   double lines = 1;
   double apart_px = 0;  // first to last sample of a group, at the nearest point of the box

@@ -75,6 +75,11 @@ struct VectorLayer {
   double length = 0.03;  // world units at magnitude_range[1] and above
   double span = 7;
   int stride = 1;
+  // At a coarser level a sample is drawn from a group of samples of the data
+  // (data::Reduction::drawn), and its line keeps the jitter and the kernel box that it has at full
+  // detail, and, on an evenly spaced axis, its position.
+  std::array<int, 3> halvings{0, 0, 0};
+  std::array<int, 3> data_dims{1, 1, 1};
   double r1 = 0.6;  // pixels of this picture (already scaled with its height)
   double r2 = 1.4;
   double opacity = 0.8;

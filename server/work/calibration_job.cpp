@@ -22,7 +22,7 @@ class Study {
   Study(const Study&) = delete;
   Study& operator=(const Study&) = delete;
 
-  // Prepares the averages of coarser settings as far as memory allows. Nothing is pinned: others
+  // Prepares the levels of coarser settings as far as memory allows. Nothing is pinned: others
   // may need the memory until the renderer is idle.
   Result<void> load(data::Dataset& dataset, const CancelToken& unwanted) {
     for (const int coarser : {0, 1, 2}) {

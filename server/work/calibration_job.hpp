@@ -11,7 +11,7 @@
 
 namespace windsplat::work {
 
-// Prepares the averages used by coarser settings on a thread that may block, then draws every
+// Prepares the levels of coarser settings on a thread that may block, then draws every
 // setting while the renderer is idle. Does nothing if the tables cover the scene near this
 // viewpoint, the picture is small, or `unwanted` is raised. Never evicts data of prefetch requests.
 void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,

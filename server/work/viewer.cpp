@@ -71,11 +71,11 @@ Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Data
   if (!completed) return completed.error();
   const auto drawn = frame::at_setting(*completed, wanted.setting);
   if (!drawn) return drawn.error();
-  const scene::Shown shown = scene::shown_by(*drawn);
+  const std::vector<scene::Shown> shown = scene::shown_by(*drawn);
   std::vector<data::PrefetchRequest> requests;
   for (const int step : wanted.steps) {
-    for (const std::string& field : shown.fields) {
-      requests.push_back({dataset, field, static_cast<std::size_t>(step), shown.coarsening});
+    for (const auto& [field, how] : shown) {
+      requests.push_back({dataset, field, static_cast<std::size_t>(step), how});
     }
   }
   return requests;

@@ -7,8 +7,8 @@ import model as models
 import model_grib
 from mutations_values import CF, GRIB, NETCDF, is_text, of_type
 
-# Grids with a greater ratio of the widest cell to the narrowest may be refused: the squares of their
-# kernels must be representable as float (aspect_max of server/scene/lattice.cpp).
+# Grids with a greater ratio of the widest cell to the narrowest may be refused: the squares of
+# their kernels must be representable as float (aspect_max of server/scene/lattice.cpp).
 ASPECT_MAX = 1e7
 
 

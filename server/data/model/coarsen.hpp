@@ -1,4 +1,4 @@
-// Averages a volume to a coarser level; neighbours are weighted by the size of their cells.
+// Reduces a volume to a coarser level: two values of scalars, drawn samples of vectors.
 #pragma once
 
 #include <array>
@@ -9,24 +9,37 @@
 
 namespace windsplat::data {
 
-// halvings[a] = h: 2^h samples along axis a are averaged to one; the last group may be smaller.
-// widths[a]: cell widths along an axis, in any unit, since only ratios matter; not needed for an
-// axis that is not halved.
+// What represents a group of samples. two_values: the means of the samples below the mean of the
+// group and of the others, each with its share of the group; a function of the value that is linear
+// over each half keeps its mean. drawn: one of the samples, each with the same probability, which
+// keeps magnitudes and directions, and in expectation any sum over the samples (stochastic
+// simplification: Cook, Halstead, Planck, Ryu, SIGGRAPH 2007).
+enum class Reduction { two_values, drawn };
+
+// halvings[a] = h: 2^h samples along axis a become one; the last group may be smaller.
+// widths[a]: cell widths along an axis, in any unit, since only ratios matter; only two values of
+// an axis that is halved need them.
 struct Coarsening {
   std::array<int, 3> halvings{0, 0, 0};
   std::array<std::vector<double>, 3> widths;
+  Reduction reduction = Reduction::two_values;
 };
 
 // Number of samples along an axis after `halvings` halvings.
 int halved(int samples, int halvings);
 
-// Mean of the unmasked samples of each group, weighted by the volumes of their cells, per
-// component; masked only if the whole group is masked. This preserves the integral of a scalar over
-// space. O(samples), one pass over the source.
+// two_values: of a scalar; the samples are weighted by the volumes of their cells, so that
+// integrals over space are preserved. O(samples), two passes over the source.
+//
+// drawn: a sample of each group with all its components, masked if that sample is. The draw depends
+// on the position of the group alone, so that all fields of a level draw the same samples.
 Volume coarsen(const Volume& fine, const Coarsening& how);
 
-// Cache key of a coarser volume: equal keys have equal weights. Contains the normalised weights,
-// rounded as in coarsen(), so it does not depend on the unit of the widths.
+// Components of the reduction of a field with `components`.
+int reduced_components(int components, Reduction reduction);
+
+// Cache key of a coarser volume: equal keys have equal reductions and weights. Contains the
+// normalised weights, rounded as in coarsen(), so it does not depend on the unit of the widths.
 std::string key_of(const Coarsening& how);
 
 }  // namespace windsplat::data

@@ -9,11 +9,23 @@
 
 namespace windsplat::data {
 
+// Components of a volume reduced to two values.
+struct TwoValues {
+  static constexpr int components = 4;
+  static constexpr int low = 0;
+  static constexpr int high = 1;
+  // Of the volume of the group, of which masked samples have no part: the shares add up to 1 where
+  // none is masked. All four components are NaN where all samples are.
+  static constexpr int low_share = 2;
+  static constexpr int high_share = 3;
+};
+
 // One field at one step. Samples are x fastest, then y, then z; the components of a vector are
 // consecutive arrays. A masked sample is NaN (for a vector: in every component).
 struct Volume {
   std::array<int, 3> dims{};
-  int components = 1;  // 1: scalar; 2: horizontal vector, whose third component is zero; 3: vector
+  int components = 1;  // 1: scalar; 2: horizontal vector, whose third component is zero; 3: vector;
+                       // 4: TwoValues of a scalar
   Samples values;
   std::array<float, 2> range{0, 0};  // range of the values, or of the magnitudes of vectors;
                                      // unmasked samples only

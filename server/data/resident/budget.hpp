@@ -1,4 +1,4 @@
-// The memory limit, shared by the datasets of a store: resident volumes and their averages, and
+// The memory limit, shared by the datasets of a store: resident volumes and their levels, and
 // what loaders and large pictures reserve. A load reserves its bytes first; the least recently used
 // volumes are evicted if room is needed.
 #pragma once
@@ -140,7 +140,7 @@ class Budget {
     return requested_.count(key) > 0;
   }
   void drop_all(std::uint64_t owner, bool held_too);
-  // Whether a volume can be recomputed cheaply: from its packed form, or as the average of a
+  // Whether a volume can be recomputed cheaply: from its packed form, or as the level of a
   // resident volume.
   [[nodiscard]] bool is_derived(const ResidentKey& key) const;
   [[nodiscard]] bool may_go(const ResidentKey& key, Urgency urgency) const;

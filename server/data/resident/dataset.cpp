@@ -1,4 +1,4 @@
-// Volumes of one dataset: cached in the budget, or read, unpacked or averaged into it.
+// Volumes of one dataset: cached in the budget, or read, unpacked or reduced into it.
 #include "server/data/resident/dataset.hpp"
 
 #include <algorithm>
@@ -296,7 +296,9 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
   const DatasetInfo& info = state_->info;
-  std::uint64_t bytes = info.fields[*index].components.size() * sizeof(float);
+  const auto components = static_cast<int>(info.fields[*index].components.size());
+  std::uint64_t bytes = sizeof(float);
+  bytes *= static_cast<std::uint64_t>(reduced_components(components, how.reduction));
   for (std::size_t a = 0; a < 3; ++a) {
     bytes *= static_cast<std::uint64_t>(halved(info.grid.dims()[a], how.halvings[a]));
   }
@@ -310,7 +312,7 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     return fine.error();
   }
   auto level = get(key, bytes, [&] {
-    state_->add(&Counts::averages);
+    state_->add(&Counts::levels);
     return guarded(info.fields[*index], [&]() -> Result<Volume> { return coarsen(**fine, how); });
   });
   if (own_) own_->erase(own_->find(fine->get()));  // the volume is not yet shared

@@ -41,14 +41,14 @@ class Dataset {
   // not_resident (evicted during the read), draining (after end()).
   Result<std::shared_ptr<const Volume>> volume(const std::string& field, std::size_t step);
 
-  // The field at the step, averaged to a coarser level on first need. The level is shared and
+  // The field at the step, reduced to a coarser level on first need. The level is shared and
   // counts towards the memory limit; the volume itself need not stay resident for it. Concurrent
   // callers wait for one computation. Level zero is the volume itself. Errors: those of volume();
   // out_of_memory also if there is room for the volume but not for its level in addition.
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 
-  // A handle that never loads, averages or waits: absent volumes yield the error not_resident.
+  // A handle that never loads, reduces or waits: absent volumes yield the error not_resident.
   [[nodiscard]] Dataset resident_only() const;
   // A handle that waits for room used by others (Budget::get(), in_turn). Only one thread at a
   // time, among all datasets that share a budget, so that each gets all the room it needs. `cancel`
@@ -98,14 +98,14 @@ class Dataset {
   struct Counts {
     std::uint64_t loads = 0;       // volumes read from the source
     std::uint64_t prefetched = 0;  // number of loads before the first request
-    std::uint64_t averages = 0;    // levels averaged
+    std::uint64_t levels = 0;      // levels computed
     std::uint64_t unpacked = 0;    // volumes restored from their packed form
     std::uint64_t failures = 0;    // reads that failed
   };
   [[nodiscard]] Counts counts() const;
   [[nodiscard]] std::uint64_t resident_bytes() const;
   [[nodiscard]] std::uint64_t loads() const { return counts().loads; }
-  [[nodiscard]] std::uint64_t averages() const { return counts().averages; }
+  [[nodiscard]] std::uint64_t levels() const { return counts().levels; }
 
   // The running read, for progress reports.
   struct Loading {

@@ -395,7 +395,9 @@ void prefetch_brick(const Pass& pass, const Brick& brick) {
       }
     }
     for (int k = 0; brick.splats != 0 && k < pass.medium.layers; ++k) {
-      prefetch_row(pass.medium.layer[k].values + at, brick.u_count);
+      const MediumLayer& layer = pass.medium.layer[k];
+      prefetch_row(layer.values + at, brick.u_count);
+      if (layer.share != nullptr) prefetch_row(layer.share + at, brick.u_count);
     }
   }
 }

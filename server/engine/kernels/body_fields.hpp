@@ -201,8 +201,9 @@ KERNEL_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, i
           all<Kernel>(extinction.y[p]) + all<Kernel>(extinction.slope[p]) * (value - x);
       rho = hn::IfThenElse(hn::Ge(value, x), here, rho);
     }
-    rho = hn::IfThenElse(masked, zero, rho);
-    total = total + hn::Max(rho, zero);
+    rho = hn::Max(rho, zero);
+    if (medium.layer[k].share != nullptr) rho = rho * fetch(medium.layer[k].share, rows, i);
+    total = total + hn::IfThenElse(masked, zero, rho);
   }
   const Kernel depth = total * cell_longest(rows, i) * all<Kernel>(1.0F / footprint_integral);
   return {total,
@@ -222,7 +223,8 @@ void color_density(const Pass& pass, std::int64_t offset, float* color) {
     const MediumLayer& layer = medium.layer[k];
     const float value = layer.values[offset];
     if (is_masked(value)) continue;
-    const float rho = extinction_at(layer.extinction, value);
+    float rho = extinction_at(layer.extinction, value);
+    if (layer.share != nullptr) rho *= layer.share[offset];
     if (rho <= 0) continue;
     float layer_color[3];
     look_up(layer.color, value, layer_color);

@@ -15,10 +15,47 @@ struct Segments {
   Kernel phase;  // phase of the moving texture
 };
 
-KERNEL_INLINE UnsignedOf<Kernel> hashed_sample(const Rows& rows, int a, int i, std::uint32_t key) {
+// The samples of the data whose lines are drawn. At a coarser level, each is one of `count` samples
+// along an axis, at `place` relative to the kernel position, in cells of the level.
+struct Origins {
+  Hash3<UnsignedOf<Kernel>> sample;
+  Three<Kernel> place, count;
+};
+
+// The index that is drawn from each group along an axis (data::Reduction::drawn).
+KERNEL_INLINE UnsignedOf<Kernel> drawn_index(const LineStyle& line, int a, UnsignedOf<Kernel> group,
+                                             UnsignedOf<Kernel> hash, Kernel& place,
+                                             Kernel& samples) {
   const hn::RebindToUnsigned<KernelTag> tag;
   const hn::RebindToSigned<KernelTag> integers;
-  return hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i)) + hn::Set(tag, key);
+  const int halvings = line.halvings[a];
+  const auto size = hn::Set(tag, 1U << static_cast<unsigned>(halvings));
+  const auto first = hn::ShiftLeftSame(group, halvings);
+  const auto count =
+      hn::Min(size, hn::Set(tag, static_cast<std::uint32_t>(line.data_dims[a])) - first);
+  const auto high = hn::ShiftRight<1>(hn::ShiftRightSame(hash, 31 - halvings));
+  const auto within = hn::ShiftRightSame(high * count, halvings);
+  samples = from_integer<Kernel>(hn::BitCast(integers, count));
+  const Kernel middle = from_integer<Kernel>(hn::BitCast(integers, within)) + all<Kernel>(0.5F);
+  place = middle / samples - all<Kernel>(0.5F);
+  return first + within;
+}
+
+KERNEL_INLINE Origins origins_of(const LineStyle& line, const Rows& rows, int i) {
+  const hn::RebindToUnsigned<KernelTag> tag;
+  const hn::RebindToSigned<KernelTag> integers;
+  const auto sample = [&](int a) {
+    return hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i));
+  };
+  const Kernel zero = hn::Zero(KernelTag());
+  const Kernel one = all<Kernel>(1.0F);
+  Origins out = {{sample(0), sample(1), sample(2)}, {zero, zero, zero}, {one, one, one}};
+  if (line.merged == 0) return out;
+  const Hash3<UnsignedOf<Kernel>> hash = pcg3d(out.sample);
+  out.sample = {drawn_index(line, 0, out.sample.x, hash.x, out.place.x, out.count.x),
+                drawn_index(line, 1, out.sample.y, hash.y, out.place.y, out.count.y),
+                drawn_index(line, 2, out.sample.z, hash.z, out.place.z, out.count.z)};
+  return out;
 }
 
 // Liang-Barsky against the kernel box: per axis |in_box + q along| <= half the box.
@@ -68,26 +105,38 @@ template <bool Curved>
 KERNEL_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
                                       const CellLanes<Curved>& cells, const Vectors& vectors,
                                       const Hash3<std::uint32_t>& key, int i) {
-  const Hash3<UnsignedOf<Kernel>> kernel = pcg3d(
-      Hash3<UnsignedOf<Kernel>>{hashed_sample(rows, 0, i, key.x), hashed_sample(rows, 1, i, key.y),
-                                hashed_sample(rows, 2, i, key.z)});
+  const Origins origins = origins_of(line, rows, i);
+  const Hash3<UnsignedOf<Kernel>> kernel =
+      pcg3d(Hash3<UnsignedOf<Kernel>>{origins.sample.x + repeated(key.x, origins.sample.x),
+                                      origins.sample.y + repeated(key.y, origins.sample.y),
+                                      origins.sample.z + repeated(key.z, origins.sample.z)});
   const Hash3<UnsignedOf<Kernel>> centre = pcg3d(kernel);
   const Kernel half = all<Kernel>(0.5F);
   const Kernel by_centre = all<Kernel>(line.jitter_center);
   const Kernel by_stride = all<Kernel>(line.jitter_stride);
   const auto centred = [&](UnsignedOf<Kernel> bits) { return unit_interval<Kernel>(bits) - half; };
+  // In cells of the data.
   const Three<Kernel> in_box = {by_centre * centred(centre.x), by_centre * centred(centre.y),
                                 by_centre * centred(centre.z)};
-  const Three<Kernel> moved = {hn::MulAdd(by_stride, centred(kernel.x), in_box.x),
-                               hn::MulAdd(by_stride, centred(kernel.y), in_box.y),
-                               hn::MulAdd(by_stride, centred(kernel.z), in_box.z)};
+  Three<Kernel> moved = {hn::MulAdd(by_stride, centred(kernel.x), in_box.x),
+                         hn::MulAdd(by_stride, centred(kernel.y), in_box.y),
+                         hn::MulAdd(by_stride, centred(kernel.z), in_box.z)};
+  if (line.merged != 0) {
+    moved = {moved.x / origins.count.x + origins.place.x,
+             moved.y / origins.count.y + origins.place.y,
+             moved.z / origins.count.z + origins.place.z};
+  }
   Segments s;
   s.offset = cells.to_world(moved);
   s.extent = extent_of(line, cells, vectors);
   s.lift = moved.z;
   s.phase = hn::Zero(KernelTag());
   if (line.moving != 0) s.phase = unit_interval<Kernel>(pcg3d(centre).x);
-  clip_to_box(line.half_span, in_box, cells.to_grid(s.extent), s);
+  Three<Kernel> along = cells.to_grid(s.extent);
+  if (line.merged != 0) {
+    along = {along.x * origins.count.x, along.y * origins.count.y, along.z * origins.count.z};
+  }
+  clip_to_box(line.half_span, in_box, along, s);
   return s;
 }
 

@@ -211,7 +211,6 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
   cell[pass.major] = pass.axis[pass.major].cell[rows.first[pass.major]];
   widest(pass.u, rows.first[pass.u], brick.u_count);
   widest(pass.v, rows.first[pass.v], brick.v_count);
-  const float moved = 0.5F * (pass.line.jitter_center + pass.line.jitter_stride);
   if (pass.places != nullptr) {
     for (int c = 0; c < 3; ++c) cell[c] = pass.cell_max[c];
   }
@@ -222,7 +221,7 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
     float square = 0;
     for (int a = 0; a < 3; ++a) {
       box += pass.line.half_span * absolute(frame[c][a]) * cell[a];
-      shift += moved * absolute(frame[c][a]) * cell[a];
+      shift += pass.line.shift[a] * absolute(frame[c][a]) * cell[a];
       square += frame[c][a] * frame[c][a] * cell[a] * cell[a];
     }
     const float line = smaller(brick.line_reach, box) + shift;

@@ -54,8 +54,13 @@ struct LineStyle {
   float length;  // world units at full magnitude
   float inverse_full_magnitude;
   float min_magnitude;
-  float half_span;  // half the width of the kernel box, in cells
-  float r1, r2;     // pixels
+  float half_span;  // half the width of the kernel box, in cells of the data
+  // Lines of a coarser level; see data::Reduction::drawn.
+  int merged;  // 0 at full detail
+  int halvings[3];
+  int data_dims[3];
+  float shift[3];  // bound on the distance of a line's centre from its position, in cells
+  float r1, r2;    // pixels
   float inverse_ramp;
   float opacity;
   float reach, steep;  // opacity of a pixel: clamp(reach - steep distance, 0, opacity)
@@ -83,10 +88,11 @@ struct Extinction {
   const float* slope;
 };
 
-constexpr int medium_layers_max = 8;
+constexpr int medium_layers_max = 8;  // two for each medium of a coarser level
 
 struct MediumLayer {
   const float* values;
+  const float* share;  // times the extinction: part of the sample that has this value; null: 1
   Extinction extinction;
   ColorTable color;
 };

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "server/base/pcg3d.hpp"
 #include "server/engine/reference/kernels.hpp"
 
 namespace windsplat::engine::reference {
@@ -14,22 +15,9 @@ using scene::LineColor;
 using scene::Scene;
 using scene::VectorLayer;
 
-// ---- jitter: pcg3d (Jarzynski & Olano 2020) ----
+// ---- jitter ----
 
 using Hash = std::array<std::uint32_t, 3>;
-
-Hash pcg3d(Hash v) {
-  for (auto& c : v) c = c * 1664525U + 1013904223U;
-  for (int round = 0; round < 2; ++round) {
-    v[0] += v[1] * v[2];
-    v[1] += v[2] * v[0];
-    v[2] += v[0] * v[1];
-    if (round == 0) {
-      for (auto& c : v) c ^= c >> 16U;
-    }
-  }
-  return v;
-}
 
 double unit_interval(std::uint32_t bits) { return static_cast<double>(bits >> 8U) / 16777216.0; }
 

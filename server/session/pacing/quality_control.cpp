@@ -164,7 +164,7 @@ bool QualityControl::needs_thinner_slabs(const protocol::View& view, double erro
   constexpr int halvings_max = 4;
   const auto& most = view.quality.max_error;
   if (!most || error <= *most || thinner_ >= halvings_max) return false;
-  // Errors of averaged data are not reduced by thinner slabs.
+  // Errors of merged data are not reduced by thinner slabs.
   constexpr double mended = 0.67;
   if (thinner_ > 0 && error > mended * thicker_error_) return false;
   thicker_error_ = error;

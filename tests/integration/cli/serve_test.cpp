@@ -199,7 +199,7 @@ TEST_F(CliServe, DatasetAboveTheMemoryLimitIsReportedWithTheOption) {
   const std::string url = url_of(daemon);
   const auto port = port_of(url);
   const std::string of = "/v1/datasets/" + large + '/';
-  // Small pictures use averages, which also need memory.
+  // Small pictures use levels of detail, which also need memory.
   const auto picture = server_test::get(port, of + "frame.png?width=512&height=512");
   ASSERT_EQ(picture.status, 507);
   EXPECT_THAT(picture.body, HasSubstr("dataset '" + large + "'"));

@@ -51,11 +51,11 @@ TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   view.method.detail = protocol::Detail::full;
   EXPECT_TRUE(prepared(viewer, 1, view));
   EXPECT_FALSE(prepared(viewer, 2, view));
-  ASSERT_EQ(dataset->averages(), 0U);
+  ASSERT_EQ(dataset->levels(), 0U);
   const std::uint64_t loads = dataset->loads();
   view.method.detail = protocol::Detail::automatic;
   EXPECT_TRUE(prepared(viewer, 3, view));
-  ASSERT_GT(dataset->averages(), 0U) << "the picture is too large for a coarser level";
+  ASSERT_GT(dataset->levels(), 0U) << "the picture is too large for a coarser level";
   EXPECT_EQ(dataset->loads(), loads);
   EXPECT_FALSE(prepared(viewer, 4, view));
 }

@@ -180,7 +180,7 @@ TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
               4, 1e-3);
 }
 
-// From far away the view averages its data: slabs of any thickness then have equal errors.
+// From far away the view merges its data: slabs of any thickness then have equal errors.
 TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   scene::orbit(view, completed().lattice(), 20, 30, 0.05);
   EXPECT_LT(viewpoint_of(completed()).detail, 1);

@@ -49,24 +49,26 @@ Camera before(double distance) {
   return camera;
 }
 
-TEST(ChooseLevel, HalvesWhileACellIsSmallerThanAPixel) {
+constexpr double any = 1e9;  // number of samples that one may represent
+
+TEST(ChooseLevel, HalvesWhileTwoCellsFitInAPixel) {
   const Camera camera = before(8);  // at the face a cell of the cube covers 200 / side pixels
   EXPECT_NEAR(pixels_per_unit(camera, cube(64)), 100, 1e-9);
-  EXPECT_EQ(choose_level(camera, cube(199), {}), (Level{0, 0, 0}));
-  EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{1, 1, 1}));
-  EXPECT_EQ(choose_level(camera, cube(398), {}), (Level{1, 1, 1}));
-  EXPECT_EQ(choose_level(camera, cube(404), {}), (Level{2, 2, 2}));
+  EXPECT_EQ(choose_level(camera, cube(398), {}, any), (Level{0, 0, 0}));
+  EXPECT_EQ(choose_level(camera, cube(404), {}, any), (Level{1, 1, 1}));
+  EXPECT_EQ(choose_level(camera, cube(796), {}, any), (Level{1, 1, 1}));
+  EXPECT_EQ(choose_level(camera, cube(808), {}, any), (Level{2, 2, 2}));
 }
 
 TEST(ChooseLevel, RisesByOneWhenTheDistanceDoubles) {
-  const Lattice lattice = cube(160);  // 1.25 pixels per cell at distance 8
+  const Lattice lattice = cube(320);  // 0.625 pixels per cell at distance 8
   for (int doubled = 0; doubled < 6; ++doubled) {
     Camera camera = before(8);
     camera.eye.y = -1 - 8 * std::exp2(doubled);
-    const Level level = choose_level(camera, lattice, {});
+    const Level level = choose_level(camera, lattice, {}, any);
     EXPECT_EQ(level, (Level{doubled, doubled, doubled}));
-    const double fine_px = pixels_per_unit(camera, lattice) * 2 / 160;
-    EXPECT_LT(fine_px * std::exp2(level[0]), 2) << "never more than two pixels";
+    const double fine_px = pixels_per_unit(camera, lattice) * 2 / 320;
+    EXPECT_LT(fine_px * std::exp2(level[0]), 1) << "never more than a pixel";
   }
 }
 
@@ -76,8 +78,8 @@ TEST(ChooseLevel, OrthographicDependsOnThePictureHeightOnly) {
   camera.half_height = 2;  // 400 pixels for 4 units
   for (const double away : {1.5, 30.0, 3000.0}) {
     camera.eye.y = -away;
-    EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{1, 1, 1})) << away;
-    EXPECT_EQ(choose_level(camera, cube(199), {}), (Level{0, 0, 0})) << away;
+    EXPECT_EQ(choose_level(camera, cube(404), {}, any), (Level{1, 1, 1})) << away;
+    EXPECT_EQ(choose_level(camera, cube(398), {}, any), (Level{0, 0, 0})) << away;
   }
 }
 
@@ -90,38 +92,52 @@ TEST(ChooseLevel, DoesNotChangeWhenAnOrthographicViewRotates) {
     camera.forward = {std::sin(angle), std::cos(angle), 0};
     camera.right = {std::cos(angle), -std::sin(angle), 0};
     camera.eye = -9.0 * camera.forward;
-    EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{1, 1, 1})) << angle;
+    EXPECT_EQ(choose_level(camera, cube(404), {}, any), (Level{1, 1, 1})) << angle;
   }
 }
 
 TEST(ChooseLevel, UsesTheWidestCellOfEveryAxis) {
-  // 400 columns of half a pixel, 19 layers of 1.5 to 1.6, 100 rows of which one is 1.2 wide.
-  std::vector<double> rows(100, 0.004);
-  rows[40] = 0.012;
+  // 800 columns of a quarter of a pixel, 19 layers of 1.5 to 1.6, 100 rows of which one is 0.6
+  // wide.
+  std::vector<double> rows(100, 0.002);
+  rows[40] = 0.006;
   std::vector<double> layers(19, 0.015);
   layers[3] = 0.016;
-  const Lattice lattice = box({std::vector<double>(400, 0.005), rows, layers});
+  const Lattice lattice = box({std::vector<double>(800, 0.0025), rows, layers});
   Camera camera = before(8);
   camera.eye.y = lattice.box_min.y - 8;
-  EXPECT_EQ(choose_level(camera, lattice, {}), (Level{1, 0, 0}));
+  EXPECT_EQ(choose_level(camera, lattice, {}, any), (Level{1, 0, 0}));
 }
 
 TEST(ChooseLevel, KeepsSlicedCurvedAndSmallAxes) {
   Camera camera = before(8);
-  EXPECT_EQ(choose_level(camera, cube(202), Slice{1, 7}), (Level{1, 0, 1}));
+  EXPECT_EQ(choose_level(camera, cube(404), Slice{1, 7}, any), (Level{1, 0, 1}));
   camera.eye.y = -1e6;
   const std::vector<double> two(2, 1.0);
-  EXPECT_EQ(choose_level(camera, box({two, std::vector<double>{2.0}, {1.0, 0.5, 0.5}}), {}),
+  EXPECT_EQ(choose_level(camera, box({two, std::vector<double>{2.0}, {1.0, 0.5, 0.5}}), {}, any),
             (Level{0, 0, 1}));
-  Lattice bent = cube(202);
+  Lattice bent = cube(404);
   bent.places = std::make_shared<const std::vector<std::array<float, 3>>>();
-  EXPECT_EQ(choose_level(camera, bent, {}), (Level{0, 0, 0}));
+  EXPECT_EQ(choose_level(camera, bent, {}, any), (Level{0, 0, 0}));
 }
 
 TEST(ChooseLevel, EyeInsideTheBoxUsesFullDetail) {
   Camera camera = before(8);
   camera.eye = {0, 0, 0};
-  EXPECT_EQ(choose_level(camera, cube(202), {}), (Level{0, 0, 0}));
+  EXPECT_EQ(choose_level(camera, cube(404), {}, any), (Level{0, 0, 0}));
+}
+
+TEST(ChooseLevel, MergesTheFinestCellsFirstAndAtMostTheGivenSamples) {
+  Camera camera = before(8);
+  camera.eye.y = -1e6;
+  const Lattice flat = box({std::vector<double>(64, 2.0 / 64), std::vector<double>(64, 2.0 / 64),
+                            std::vector<double>(64, 0.01 / 64)});
+  EXPECT_EQ(choose_level(camera, flat, {}, 1), (Level{0, 0, 0}));
+  EXPECT_EQ(choose_level(camera, flat, {}, 1.9), (Level{0, 0, 0}));
+  EXPECT_EQ(choose_level(camera, flat, {}, 2), (Level{0, 0, 1}));
+  EXPECT_EQ(choose_level(camera, flat, {}), (Level{0, 0, 2}));
+  EXPECT_EQ(choose_level(camera, flat, {}, 31), (Level{0, 0, 4}));
+  EXPECT_EQ(choose_level(camera, cube(64), {}, 8), (Level{1, 1, 1}));
 }
 
 TEST(CoarsenLattice, KeepsTheBoxAndCentersMergedCells) {

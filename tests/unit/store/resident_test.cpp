@@ -377,7 +377,7 @@ TEST(Resident, AveragesAreEvictedBeforeTheirSourceVolumes) {
   for (std::size_t step = 0; step < 5; ++step) ASSERT_TRUE(f.dataset->level("f", step, half));
   ASSERT_TRUE(f.dataset->volume("f", 5));
   for (std::size_t step = 0; step < 6; ++step) EXPECT_TRUE(f.is_resident(step)) << step;
-  EXPECT_EQ(f.dataset->counts().averages, 5U);
+  EXPECT_EQ(f.dataset->counts().levels, 5U);
   ASSERT_TRUE(f.dataset->level("f", 5, half)) << "instead of a volume";
   EXPECT_FALSE(f.is_resident(0));
 }

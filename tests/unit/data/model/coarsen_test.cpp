@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <random>
 
@@ -40,54 +41,152 @@ std::vector<double> sums(const std::vector<double>& widths, int halvings) {
   return out;
 }
 
-// The integral of a component over space, over unmasked cells only.
-double integral(const Volume& volume, int c, const std::array<std::vector<double>, 3>& widths) {
+// The integral over space of a scalar, or of a function of it, over unmasked samples only.
+double integral(
+    const Volume& volume, const std::array<std::vector<double>, 3>& widths,
+    const std::function<double(double)>& of = [](double v) { return v; }) {
   double sum = 0;
   std::size_t n = 0;
   for (const double z : widths[2]) {
     for (const double y : widths[1]) {
-      for (const double x : widths[0]) sum += x * y * z * volume.component(c)[n++];
+      for (const double x : widths[0]) {
+        double value = 0;
+        if (volume.components == 1) {
+          value = of(volume.component(0)[n]);
+        } else {
+          value =
+              of(volume.component(TwoValues::low)[n]) * volume.component(TwoValues::low_share)[n] +
+              of(volume.component(TwoValues::high)[n]) * volume.component(TwoValues::high_share)[n];
+        }
+        if (!std::isnan(value)) sum += x * y * z * value;
+        ++n;
+      }
     }
   }
   return sum;
 }
 
-TEST(Coarsen, KeepsTheIntegralOverUnevenCells) {
+Coarsening drawn(const std::array<int, 3>& halvings) { return {halvings, {}, Reduction::drawn}; }
+
+TEST(CoarsenByDrawing, TakesOneSampleOfEachGroupWithAllItsComponents) {
+  const std::array<int, 3> dims{9, 6, 5};
+  std::vector<float> values;
+  for (int c = 0; c < 3; ++c) {
+    for (int n = 0; n < 9 * 6 * 5; ++n) values.push_back(static_cast<float>(1000 * c + n));
+  }
+  const Volume fine = volume_of(dims, 3, std::move(values));
+  const Volume coarse = coarsen(fine, drawn({1, 2, 1}));
+  ASSERT_EQ(coarse.dims, (std::array{5, 2, 3}));
+  std::size_t n = 0;
+  for (int k = 0; k < 3; ++k) {
+    for (int j = 0; j < 2; ++j) {
+      for (int i = 0; i < 5; ++i, ++n) {
+        const auto from = static_cast<int>(coarse.component(0)[n]);
+        EXPECT_EQ(from % 9 / 2, i);
+        EXPECT_EQ(from / 9 % 6 / 4, j);
+        EXPECT_EQ(from / 54 / 2, k);
+        EXPECT_EQ(coarse.component(1)[n], static_cast<float>(from + 1000));
+        EXPECT_EQ(coarse.component(2)[n], static_cast<float>(from + 2000));
+      }
+    }
+  }
+}
+
+// Of n draws with probability 1/8 the expected count is n / 8 with a standard deviation of
+// sqrt(n 7/64); six of them are allowed.
+TEST(CoarsenByDrawing, DrawsEverySampleOfAGroupEquallyOften) {
+  const int side = 64;
+  std::vector<float> values;
+  for (int n = 0; n < side * side * side; ++n) {
+    const int x = n % side & 1;
+    const int y = n / side % side & 1;
+    const int z = n / side / side & 1;
+    values.push_back(static_cast<float>(x + 2 * y + 4 * z));
+  }
+  const Volume coarse =
+      coarsen(volume_of({side, side, side}, 1, std::move(values)), drawn({1, 1, 1}));
+  std::array<int, 8> count{};
+  for (const float v : coarse.values) ++count.at(static_cast<std::size_t>(v));
+  const double groups = side * side * side / 8.0;
+  for (const int n : count) EXPECT_NEAR(n, groups / 8, 6 * std::sqrt(groups * 7 / 64));
+}
+
+TEST(CoarsenByDrawing, IsMaskedWhereTheDrawnSampleIs) {
+  std::vector<float> values(32 * 32 * 32, 1);
+  for (std::size_t n = 0; n < values.size(); n += 2) values[n] = masked;
+  const Volume coarse = coarsen(volume_of({32, 32, 32}, 1, std::move(values)), drawn({1, 0, 0}));
+  int there = 0;
+  for (const float v : coarse.values) there += v == 1 ? 1 : 0;
+  EXPECT_NEAR(there, 32 * 32 * 8, 6 * std::sqrt(32 * 32 * 16 / 4.0));
+}
+
+TEST(CoarsenByDrawing, HasAKeyOfItsOwn) {
+  const std::array<std::vector<double>, 3> widths{std::vector<double>(8, 1.0), {}, {}};
+  EXPECT_NE(key_of({{1, 0, 0}, widths}), key_of({{1, 0, 0}, widths, Reduction::drawn}));
+  EXPECT_EQ(key_of(drawn({1, 0, 0})), key_of({{1, 0, 0}, widths, Reduction::drawn}));
+}
+
+TEST(CoarsenToTwoValues, KeepsTheIntegralOverUnevenCells) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> value(-2, 5);
   const std::array<int, 3> dims{11, 6, 5};
   for (const std::array<int, 3> halvings :
        {std::array{1, 1, 1}, {0, 1, 0}, {2, 0, 1}, {4, 2, 0}, {0, 0, 3}}) {
-    Coarsening how{halvings, {}};
-    for (std::size_t a = 0; a < 3; ++a) how.widths[a] = uneven(dims[a], random);
-    std::vector<float> values(3 * 11 * 6 * 5);
-    for (float& v : values) v = value(random);
-    const Volume fine = volume_of(dims, 3, values);
-    const Volume coarse = coarsen(fine, how);
-    std::array<std::vector<double>, 3> widths;
-    for (std::size_t a = 0; a < 3; ++a) {
-      widths[a] = sums(how.widths[a], halvings[a]);
-      ASSERT_EQ(coarse.dims[a], static_cast<int>(widths[a].size()));
-    }
-    ASSERT_EQ(coarse.components, 3);
-    for (int c = 0; c < 3; ++c) {
-      const double whole = integral(fine, c, how.widths);
-      EXPECT_NEAR(integral(coarse, c, widths), whole, 1e-5 * std::abs(whole) + 1e-3) << c;
+    for (const bool gaps : {false, true}) {
+      Coarsening how{halvings, {}};
+      for (std::size_t a = 0; a < 3; ++a) how.widths[a] = uneven(dims[a], random);
+      std::vector<float> values(11 * 6 * 5);
+      for (float& v : values) v = value(random);
+      for (std::size_t n = 0; gaps && n < values.size(); n += 3) values[n] = masked;
+      const Volume fine = volume_of(dims, 1, values);
+      const Volume coarse = coarsen(fine, how);
+      std::array<std::vector<double>, 3> widths;
+      for (std::size_t a = 0; a < 3; ++a) {
+        widths[a] = sums(how.widths[a], halvings[a]);
+        ASSERT_EQ(coarse.dims[a], static_cast<int>(widths[a].size()));
+      }
+      ASSERT_EQ(coarse.components, TwoValues::components);
+      const double whole = integral(fine, how.widths);
+      EXPECT_NEAR(integral(coarse, widths), whole, 1e-5 * std::abs(whole) + 1e-3);
     }
   }
 }
 
-TEST(Coarsen, WeightsNeighborsByTheirCells) {
+// A step between the two values of a field keeps its integral; it is lost if the values are
+// averaged first.
+TEST(CoarsenToTwoValues, KeepsTheIntegralOfAStepBetweenThem) {
+  std::mt19937 random(11);
+  std::bernoulli_distribution is_high(0.2);
+  const std::array<int, 3> dims{16, 12, 8};
+  std::vector<float> values(16 * 12 * 8);
+  for (float& v : values) v = is_high(random) ? 1 : 0.25F;
+  Coarsening how{{2, 1, 1}, {}};
+  for (std::size_t a = 0; a < 3; ++a) how.widths[a] = uneven(dims[a], random);
+  const Volume fine = volume_of(dims, 1, values);
+  std::array<std::vector<double>, 3> widths;
+  for (std::size_t a = 0; a < 3; ++a) widths[a] = sums(how.widths[a], how.halvings[a]);
+  const auto step = [](double v) { return v > 0.9 ? 1.0 : 0.0; };
+  const double whole = integral(fine, how.widths, step);
+  ASSERT_GT(whole, 1);
+  EXPECT_NEAR(integral(coarsen(fine, how), widths, step), whole, 1e-5 * whole);
+}
+
+TEST(CoarsenToTwoValues, WeightsNeighborsByTheirCells) {
   const Volume fine = volume_of({3, 1, 1}, 1, {1, 5, 7});
   const Volume coarse = coarsen(fine, {{1, 0, 0}, {std::vector<double>{3, 1, 2}, {}, {}}});
   EXPECT_EQ(coarse.dims, (std::array{2, 1, 1}));
-  EXPECT_FLOAT_EQ(coarse.values[0], 2);  // (3 * 1 + 1 * 5) / 4
-  EXPECT_FLOAT_EQ(coarse.values[1], 7);  // the last group has one sample
-  EXPECT_FLOAT_EQ(coarse.range[0], 2);
-  EXPECT_FLOAT_EQ(coarse.range[1], 7);
+  const auto at = [&](int component, std::size_t n) { return coarse.component(component)[n]; };
+  // The mean of the first group is (3 * 1 + 1 * 5) / 4 = 2.
+  EXPECT_FLOAT_EQ(at(TwoValues::low, 0), 1);
+  EXPECT_FLOAT_EQ(at(TwoValues::high, 0), 5);
+  EXPECT_FLOAT_EQ(at(TwoValues::low_share, 0), 0.75F);
+  EXPECT_FLOAT_EQ(at(TwoValues::high_share, 0), 0.25F);
+  // The last group has one sample.
+  EXPECT_FLOAT_EQ(at(TwoValues::high, 1), 7);
+  EXPECT_FLOAT_EQ(at(TwoValues::low_share, 1) + at(TwoValues::high_share, 1), 1);
 }
 
-TEST(Coarsen, ConstantStaysConstant) {
+TEST(CoarsenToTwoValues, ConstantStaysConstant) {
   std::mt19937 random(3);
   const std::array<int, 3> dims{9, 7, 4};
   Coarsening how{{2, 1, 1}, {}};
@@ -95,29 +194,33 @@ TEST(Coarsen, ConstantStaysConstant) {
   for (const float value : {0.0F, 0.3F, -1e30F, std::numeric_limits<float>::max() / 1.0001F}) {
     const Volume coarse = coarsen(volume_of(dims, 1, std::vector<float>(9 * 7 * 4, value)), how);
     EXPECT_EQ(coarse.masked, 0);
-    for (const float v : coarse.values) EXPECT_NEAR(v, value, 1e-5 * std::abs(value));
+    for (std::size_t n = 0; n < coarse.samples(); ++n) {
+      EXPECT_NEAR(coarse.component(TwoValues::low)[n], value, 1e-5 * std::abs(value));
+      EXPECT_NEAR(coarse.component(TwoValues::high)[n], value, 1e-5 * std::abs(value));
+    }
   }
 }
 
-TEST(Coarsen, IsMaskedOnlyWhereAllSamplesAre) {
-  const Volume fine = volume_of({4, 2, 1}, 2,
-                                {1, masked, masked, masked, 3, masked, masked, masked,  //
-                                 10, masked, masked, masked, 30, masked, masked, masked});
+TEST(CoarsenToTwoValues, IsMaskedOnlyWhereAllSamplesAre) {
+  const Volume fine =
+      volume_of({4, 2, 1}, 1, {1, masked, masked, masked, 3, masked, masked, masked});
   const std::vector<double> even(4, 1.0);
   const Volume coarse = coarsen(fine, {{1, 1, 0}, {even, {1, 3}, {}}});
   ASSERT_EQ(coarse.dims, (std::array{2, 1, 1}));
-  EXPECT_FLOAT_EQ(coarse.component(0)[0], 2.5);  // (1 * 1 + 3 * 3) / 4
-  EXPECT_FLOAT_EQ(coarse.component(1)[0], 25);
-  EXPECT_TRUE(std::isnan(coarse.component(0)[1]));
-  EXPECT_TRUE(std::isnan(coarse.component(1)[1]));
+  // The mean is (1 * 1 + 3 * 3) / 4 = 2.5; half of the volume is masked.
+  EXPECT_FLOAT_EQ(coarse.component(TwoValues::low)[0], 1);
+  EXPECT_FLOAT_EQ(coarse.component(TwoValues::high)[0], 3);
+  EXPECT_FLOAT_EQ(coarse.component(TwoValues::low_share)[0], 0.125F);
+  EXPECT_FLOAT_EQ(coarse.component(TwoValues::high_share)[0], 0.375F);
+  for (int c = 0; c < TwoValues::components; ++c) EXPECT_TRUE(std::isnan(coarse.component(c)[1]));
   EXPECT_EQ(coarse.masked, 1);
 }
 
 class Levels : public testing::Test {
  protected:
-  // Scalars of 16^3: 16 KiB at level 0, 2 KiB at level 1.
+  // Scalars of 16^3: 16 KiB at level 0, two values and their shares of 8^3, 8 KiB, at level 1.
   static constexpr std::uint64_t fine_bytes = 4 * 16 * 16 * 16;
-  static constexpr std::uint64_t coarse_bytes = fine_bytes / 8;
+  static constexpr std::uint64_t coarse_bytes = TwoValues::components * fine_bytes / 8;
 
   static std::unique_ptr<Dataset> dataset_within(std::uint64_t bytes) {
     return std::make_unique<Dataset>(*open_sample("tornado", {16, 16, 16}, 4), "t", bytes);
@@ -140,9 +243,11 @@ TEST_F(Levels, AreAveragedOnceSharedAndCounted) {
   EXPECT_NE(dataset->level("vorticity", 1, halves(2))->get(), coarse->get());
   EXPECT_EQ(dataset->resident_bytes(), fine_bytes + 2 * coarse_bytes);
   EXPECT_EQ(dataset->loads(), 1U);
-  EXPECT_EQ(dataset->averages(), 2U);
+  EXPECT_EQ(dataset->levels(), 2U);
   const auto& fine = *dataset->volume("vorticity", 1).value();
-  EXPECT_FLOAT_EQ((*coarse)->values[0],
+  const auto first = [&](int component) { return (*coarse)->component(component)[0]; };
+  EXPECT_FLOAT_EQ(first(TwoValues::low) * first(TwoValues::low_share) +
+                      first(TwoValues::high) * first(TwoValues::high_share),
                   (fine.values[0] + fine.values[1] + fine.values[16] + fine.values[17] +
                    fine.values[256] + fine.values[257] + fine.values[272] + fine.values[273]) /
                       8);

@@ -1,0 +1,117 @@
+// Coarser levels compared with full detail over the trial fields, by whole views with their
+// defaults.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
+#include "tests/numerics/scenes.hpp"
+#include "tests/numerics/trial_fields.hpp"
+
+namespace windsplat::test {
+namespace {
+
+enum class Shown { lines, medium, both };
+
+protocol::View small_view(const TrialField& field, Shown shown) {
+  protocol::View view;
+  view.dataset = field.name;
+  view.image.width = 96;
+  view.image.height = 72;
+  view.method.stop_transmittance = 0;
+  if (shown == Shown::medium) view.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  view.scalars.emplace();
+  if (shown != Shown::lines) {
+    view.scalars->emplace_back();
+    view.scalars->back().field = "cloud";
+    view.scalars->back().min_optical_depth = 0;  // would leave out thin cells at full detail
+  }
+  return view;
+}
+
+// Mean premultiplied colour and opacity of a picture.
+std::array<double, 4> mean(const engine::Image& image) {
+  std::array<double, 4> sum{};
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) sum[i % 4] += image.rgba[i];
+  for (double& s : sum) s *= 4.0 / static_cast<double>(image.rgba.size());
+  return sum;
+}
+
+struct Compared {
+  double opacity = 0;  // ratio of the mean opacities
+  double color = 0;    // largest difference of the mean colour, relative to its brightest channel
+  std::array<int, 3> level{};
+};
+
+Compared compare(const TrialField& field, Shown shown) {
+  const auto dataset = trial_dataset(field);
+  const auto completed = scene::complete(small_view(field, shown), *dataset).value();
+  const auto full =
+      completed.with([](protocol::View& view) { view.method.detail = protocol::Detail::full; });
+  auto coarse_scene = scene::build_scene(completed, *dataset).value();
+  auto full_scene = scene::build_scene(full.value(), *dataset).value();
+  const bool medium = shown == Shown::medium;
+  coarse_scene.method = full_scene.method = medium ? scene::Method::slab : scene::Method::kernel;
+  const auto at_level = mean(render(coarse_scene, 2).image);
+  const auto whole = mean(render(full_scene, 2).image);
+  Compared out;
+  out.level = coarse_scene.level;
+  out.opacity = at_level[3] / whole[3];
+  const double brightest = std::max({whole[0], whole[1], whole[2]});
+  for (std::size_t c = 0; c < 3; ++c) {
+    out.color = std::max(out.color, std::abs(at_level[c] - whole[c]) / brightest);
+  }
+  return out;
+}
+
+// Views with their defaults at 96 x 72 pixels, where most members of the family are merged.
+void expect_means(const std::vector<Shown>& all) {
+  int merged = 0;
+  for (const TrialField& field : trial_fields()) {
+    for (const Shown shown : all) {
+      const Compared found = compare(field, shown);
+      EXPECT_NEAR(found.opacity, 1, 0.02) << field.name;
+      EXPECT_LT(found.color, 0.02) << field.name;
+      merged += found.level != std::array<int, 3>{0, 0, 0} ? 1 : 0;
+    }
+  }
+  EXPECT_GE(merged, 4);
+}
+
+TEST(Level, KeepsMeanOpacityAndColorOfLines) { expect_means({Shown::lines}); }
+TEST(Level, KeepsMeanOpacityAndColorOfMedia) { expect_means({Shown::medium}); }
+TEST(Level, KeepsMeanOpacityAndColorOfLinesInMedia) { expect_means({Shown::both}); }
+
+// The lines of a level are some of those of full detail, unchanged but for their opacity.
+TEST(Level, DrawsASubsetOfTheLines) {
+  const TrialField field{"turbulence", {25, 21, 18}, {1e3, 1e3, 1e3}};
+  const auto dataset = trial_dataset(field);
+  const auto completed = scene::complete(small_view(field, Shown::lines), *dataset);
+  const auto coarser = scene::build_scene(completed->coarsened(1), *dataset);
+  auto full = scene::build_scene(*completed, *dataset);
+  ASSERT_TRUE(coarser) << coarser.error().message;
+  ASSERT_EQ(full->level, (std::array{0, 0, 0}));
+  ASSERT_NE(coarser->level, full->level);
+  auto level = *coarser;
+  const double opacity = full->vector->opacity;
+  const double r1 = full->vector->r1;
+  const double r2 = full->vector->r2;
+  level.vector->opacity = opacity;
+  level.vector->r1 = r1;
+  level.vector->r2 = r2;
+  const auto some = render(level, 2).image;
+  const auto all = render(*full, 2).image;
+  double sum = 0;
+  for (std::size_t i = 3; i < all.rgba.size(); i += 4) {
+    EXPECT_LE(some.rgba[i], all.rgba[i] + 1e-4F);
+    sum += some.rgba[i];
+  }
+  EXPECT_GT(sum, 10);
+}
+
+}  // namespace
+}  // namespace windsplat::test
