@@ -20,7 +20,9 @@ function(windsplat_bench name)
   target_link_libraries(${name} PRIVATE bench_support)
 endfunction()
 
-windsplat_bench(bench_frame ${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp)
+set(numerics_dir ${CMAKE_CURRENT_LIST_DIR}/numerics)
+windsplat_bench(bench_frame ${numerics_dir}/naive_renderer.cpp ${numerics_dir}/truth/integrator.cpp
+  ${numerics_dir}/truth/integrator_kernels.cpp)
 windsplat_bench(bench_kernels)
 windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
 windsplat_bench(bench_path)

@@ -76,8 +76,13 @@ Result<Picture> LimitedPictures::draw_at(const scene::CompletedView& completed,
                                          const CancelToken& cancel) {
   frame::Encoding encoding = encoding_;
   encoding.measure = encoding.measure || completed.view().quality.max_error.has_value();
-  const auto prepared = frame::prepare(completed, setting, dataset_, encoding);
+  auto prepared = frame::prepare(completed, setting, dataset_, encoding);
   if (!prepared) return prepared.error();
+  // Prepared again from resident data, since a limit on the time does not include reading files.
+  if (is_limited(completed.view())) {
+    prepared = frame::prepare(completed, setting, dataset_, encoding);
+    if (!prepared) return prepared.error();
+  }
   auto drawn = frame::produce(*prepared, dataset_, pool_, cancel, workspace_);
   if (!drawn) return drawn.error();
   encode_ms_a_pixel_ =

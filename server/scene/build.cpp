@@ -141,12 +141,13 @@ bool is_drawn_in_full(const View& view) {
          view.method.name == protocol::MethodName::reference;
 }
 
-// The samples of the data that one may represent in the picture.
-double samples_merged(const View& view) {
-  if (!shows_lines(view)) return merged_max;
+MergeLimits merge_limits(const View& view) {
+  MergeLimits limits;
+  if (!shows_lines(view)) return limits;
   VectorLayer layer;
   set_radii(view.vector, view.image.height, layer);
-  return std::min(merged_max, 1 / layer.opacity);
+  limits.samples = std::min(limits.samples, 1 / layer.opacity);
+  return limits;
 }
 
 // The fraction of the requested detail that the picture can show.
@@ -154,7 +155,7 @@ std::array<int, 3> level_for(const View& view, const Camera& camera, const Latti
                              int coarser) {
   if (is_drawn_in_full(view)) return {0, 0, 0};
   const auto slice = slice_of(view.geometry);
-  const auto level = choose_level(camera, lattice, slice, samples_merged(view));
+  const auto level = choose_level(camera, lattice, slice, merge_limits(view));
   return coarser_level(lattice, slice, level, coarser);
 }
 
@@ -271,7 +272,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
 
 double detail_shown(const CompletedView& completed) {
   const View& view = completed.view();
-  if (is_drawn_in_full(view) || samples_merged(view) < 2) return 0;
+  if (is_drawn_in_full(view) || merge_limits(view).samples < 2) return 0;
   const auto slice = slice_of(view.geometry);
   return finest_cell_px(completed.camera(), completed.lattice(), slice) / halved_below_px;
 }

@@ -44,15 +44,16 @@ double pixels_per_unit(const Camera& camera, const Lattice& lattice) {
 }
 
 std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
-                                const std::optional<Slice>& slice, double samples) {
+                                const std::optional<Slice>& slice, const MergeLimits& limits) {
   std::array<int, 3> level{0, 0, 0};
   if (lattice.places) return level;
   const double scale = pixels_per_unit(camera, lattice);
-  for (double merged = 1; 2 * merged <= samples; merged *= 2) {
+  for (double merged = 1; 2 * merged <= limits.samples; merged *= 2) {
     std::size_t finest = 3;
     double finest_px = halved_below_px;
     for (std::size_t a = 0; a < 3; ++a) {
       const bool stays = (slice && slice->axis == static_cast<int>(a)) ||
+                         level[a] == limits.halvings ||
                          data::halved(lattice.dims[a], level[a] + 1) < 2;
       const double cell_px = stays ? 0 : widest_cell(lattice.spacing[a], level[a]) * scale;
       if (stays || cell_px >= finest_px) continue;

@@ -15,19 +15,23 @@ namespace windsplat::scene {
 // plane.
 double pixels_per_unit(const Camera& camera, const Lattice& lattice);
 
+// How much may be merged. With one halving per axis, mean opacity and colour stay within 2 % over
+// the trial fields (tests/numerics/level_test.cpp). A line of opacity a represents at most 1 / a:
+// more would have to be wider than they are apart, and lines of different directions do not hide
+// each other.
+struct MergeLimits {
+  double samples = 8;  // that one may represent
+  int halvings = 1;    // of an axis
+};
+
 // How often each axis of a rectilinear lattice is halved: the one with the finest cells first,
 // while its widest cell covers less than half a pixel at the nearest point of the box, so that two
-// fit in a pixel, and a sample of the level represents at most `samples` of the data. Independent
-// of the direction of the camera, so that rotating it does not change the level. Curved lattices
-// and the axis of a slice are not halved; no axis is reduced below two samples.
-//
-// With at most four samples, mean opacity and colour stay within 2 % over the trial fields
-// (tests/numerics/level_test.cpp). A line of opacity a represents at most 1 / a: more would have to
-// be wider than they are apart, and lines of different directions do not hide each other.
+// fit in a pixel. Independent of the direction of the camera, so that rotating it does not change
+// the level. Curved lattices and the axis of a slice are not halved; no axis is reduced below two
+// samples.
 inline constexpr double halved_below_px = 0.5;
-inline constexpr double merged_max = 4;
 std::array<int, 3> choose_level(const Camera& camera, const Lattice& lattice,
-                                const std::optional<Slice>& slice, double samples = merged_max);
+                                const std::optional<Slice>& slice, const MergeLimits& limits = {});
 
 // Pixels covered by the widest cell of the axis that is halved first; 0 if none is ever halved.
 double finest_cell_px(const Camera& camera, const Lattice& lattice,

@@ -54,8 +54,7 @@ Compared compare(const TrialField& field, Shown shown) {
       completed.with([](protocol::View& view) { view.method.detail = protocol::Detail::full; });
   auto coarse_scene = scene::build_scene(completed, *dataset).value();
   auto full_scene = scene::build_scene(full.value(), *dataset).value();
-  const bool medium = shown == Shown::medium;
-  coarse_scene.method = full_scene.method = medium ? scene::Method::slab : scene::Method::kernel;
+  coarse_scene.method = full_scene.method = scene::Method::slab;
   const auto at_level = mean(render(coarse_scene, 2).image);
   const auto whole = mean(render(full_scene, 2).image);
   Compared out;

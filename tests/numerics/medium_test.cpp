@@ -194,6 +194,33 @@ TEST(Media, ThinMediaLoseAtMostTheRoundingOfTheirUpdates) {
   }
 }
 
+// Also where the eye lies in the medium.
+TEST(Media, ColorsOfAnyExtinctionEqualTheTruth) {
+  for (const float rho : {1e-24F, 1e-12F, 1e-3F, 1.0F, 1e3F, 1e12F, 1e30F}) {
+    for (const double distance : {4.0, 0.0}) {
+      scene::Scene scene;
+      scene.lattice = even_lattice({3, 3, 3}, {0.5, 0.4, 0.3});
+      scene.camera = look({0.1, 0.05, 0}, {0.3, 1, -0.2}, distance, 12, 9, true, 0.3);
+      scene.scalars = {medium(uniform(scene.lattice, rho), {1.0F, 0.5F, 0.25F})};
+      scene.stop_transmittance = 0;
+      const auto light = truth::integrate(scene);
+      for (const scene::Method method : {scene::Method::kernel, scene::Method::slab}) {
+        scene.method = method;
+        const engine::Image image = render(scene).image;
+        for (std::size_t i = 0; i < light.size(); ++i) {
+          if (!(light[i].rgb[0] > 1e-3 * static_cast<double>(rho))) continue;
+          for (std::size_t c = 0; c < 3; ++c) {
+            // Partial footprints at the near plane are interpolated.
+            EXPECT_NEAR(image.rgba[4 * i + c] / light[i].rgb[c], 1, distance > 0 ? 1e-4 : 5e-3)
+                << rho << " method " << static_cast<int>(method);
+          }
+          EXPECT_NEAR(image.rgba[4 * i + 3], light[i].alpha, distance > 0 ? 2e-6 : 1e-3) << rho;
+        }
+      }
+    }
+  }
+}
+
 TEST(Media, ExtinctionsAddAndWeightTheirColors) {
   scene::Scene scene = one_splat(0.6, {1, 1, 1}, {0, 1, 0}, false);
   scene.scalars.push_back(medium(uniform(scene.lattice, 1.8F), {0.0F, 0.1F, 1.0F}));

@@ -22,10 +22,8 @@ FinalChoice::Candidate& FinalChoice::candidate(const quality::Setting& setting) 
 }
 
 void FinalChoice::shown(const quality::Setting& setting, double error) {
-  quality::Setting full = setting;
-  full.half_level = 0;
-  full.coarser = 0;
-  Candidate& of = candidate(full);
+  if (setting.half_level > 0 || setting.coarser > 0) return;
+  Candidate& of = candidate(setting);
   if (of.times_drawn == 0) of.error = std::min(of.error, error);
 }
 
@@ -35,6 +33,11 @@ void FinalChoice::drawn(const quality::Setting& setting, double error) {
   ++of.times_drawn;
 }
 
+bool FinalChoice::any_drawn() const {
+  return std::any_of(known_.begin(), known_.end(),
+                     [](const Candidate& candidate) { return candidate.times_drawn > 0; });
+}
+
 bool FinalChoice::was_drawn(const quality::Setting& setting) const {
   const Candidate* const known = find(setting);
   return known != nullptr && known->times_drawn > 0;
@@ -42,7 +45,8 @@ bool FinalChoice::was_drawn(const quality::Setting& setting) const {
 
 FinalChoice::Candidate FinalChoice::winner(const quality::Setting& own, double own_error) const {
   const Candidate* const of_own = find(own);
-  Candidate best{own, of_own != nullptr && of_own->times_drawn > 0 ? of_own->error : own_error};
+  Candidate best{own, own_error};
+  if (of_own != nullptr && of_own->times_drawn > 0) best = *of_own;
   for (const Candidate& known : known_) {
     if (known.error < best.error && !(known.setting == own)) best = known;
   }
@@ -55,9 +59,12 @@ quality::Setting FinalChoice::best(const quality::Setting& own, double own_error
 
 bool FinalChoice::accepts(const quality::Setting& last, const quality::Setting& own,
                           double own_error) const {
+  // Forecasts deviate: another frame is drawn for a clearly lower one only.
+  constexpr double clearly = 1.5;
   const Candidate* const known = find(last);
-  return known == nullptr || known->times_drawn > 1 ||
-         !(winner(own, own_error).error < known->error);
+  const Candidate best = winner(own, own_error);
+  const double better = best.times_drawn > 0 ? best.error : clearly * best.error;
+  return known == nullptr || known->times_drawn > 1 || !(better < known->error);
 }
 
 }  // namespace windsplat::session

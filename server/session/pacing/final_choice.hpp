@@ -8,9 +8,8 @@
 namespace windsplat::session {
 
 // A final frame is at least as accurate as every frame shown of its view. The candidates are the
-// view's own setting and those shown, at full size and detail; each counts with its measured error
-// once it was drawn as final, before that with the error reported of the frame shown, which is an
-// upper bound for the same setting at full size.
+// view's own setting and those shown at full size and detail; each counts with its measured error
+// once it was drawn as final, before that with the error reported of the frame shown.
 class FinalChoice {
  public:
   // The view changed.
@@ -21,10 +20,12 @@ class FinalChoice {
   // A frame was drawn as the final one, with its error.
   void drawn(const quality::Setting& setting, double error);
 
+  [[nodiscard]] bool any_drawn() const;
   [[nodiscard]] bool was_drawn(const quality::Setting& setting) const;
   // The candidate with the least error, `own_error` being the forecast of the view's own setting.
   [[nodiscard]] quality::Setting best(const quality::Setting& own, double own_error) const;
-  // Whether the frame drawn last as final is the final one: none is better, or it was drawn twice.
+  // Whether the frame drawn last as final is the final one: no candidate has a lower measured or a
+  // clearly lower forecast error, or it was drawn twice.
   [[nodiscard]] bool accepts(const quality::Setting& last, const quality::Setting& own,
                              double own_error) const;
 

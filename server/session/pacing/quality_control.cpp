@@ -70,6 +70,7 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   constexpr Micros long_in_coming = 200'000;
   constexpr double better = 0.5;
   constexpr int usual = JpegRate::quality_usual;
+  if (final_.any_drawn()) return std::nullopt;
   const auto [known, cost, guessed] = times_.forecast(view, now);
   if (guessed || cost <= long_in_coming || is_reference(view)) return std::nullopt;
   const Micros budget = cost / 4;

@@ -164,9 +164,10 @@ Vec centred(const Hash& bits) {
 
 struct Arrow {
   Real magnitude = 0;
-  Real part = 0;  // of full length
-  Vec direction;  // in the axes of the cell
-  Vec extent;     // tail to head, world
+  Real part = 0;   // of full length
+  Vec direction;   // in the axes of the cell
+  Vec extent;      // tail to head, world
+  Real climb = 0;  // vertical part of the unit vector, before a slice removes a component
 };
 
 std::optional<Arrow> arrow_of(const Scene& scene, const VectorLayer& layer, const Cell& cell) {
@@ -187,6 +188,7 @@ std::optional<Arrow> arrow_of(const Scene& scene, const VectorLayer& layer, cons
   }
   if (length(drawn) == 0) return {};
   arrow.direction = (1 / length(drawn)) * drawn;
+  arrow.climb = arrow.direction.z;
   if (scene.slice) arrow.direction[scene.slice->axis] = 0;
   const Real full = layer.magnitude_range[1];
   arrow.part = full > 0 ? std::min(arrow.magnitude / full, Real(1)) : 1;
@@ -213,9 +215,13 @@ Vec line_color(const Scene& scene, const VectorLayer& layer, const Cell& cell, c
         return in_table(height);
       case LineColor::screen_z:
         return in_table(depth);
-      case LineColor::rise:
-        return in_table((1 - layer.rise_weight) * (height - low) / (high - low) +
-                        layer.rise_weight * (1 + arrow.direction.z) / 2);
+      case LineColor::rise: {
+        const auto [least, most] = layer.color.range;
+        const Real rise = arrow.climb * arrow.part * layer.length;
+        const Real place = (1 - layer.rise_weight) * (height - low) / (high - low) +
+                           layer.rise_weight * (rise - least) / (most - least);
+        return in_table(least + place * (most - least));
+      }
       case LineColor::magnitude:
         return in_table(arrow.magnitude);
       case LineColor::direction: {

@@ -49,7 +49,7 @@ Camera before(double distance) {
   return camera;
 }
 
-constexpr double any = 1e9;  // number of samples that one may represent
+constexpr MergeLimits any{1e9, 30};
 
 TEST(ChooseLevel, HalvesWhileTwoCellsFitInAPixel) {
   const Camera camera = before(8);  // at the face a cell of the cube covers 200 / side pixels
@@ -127,17 +127,17 @@ TEST(ChooseLevel, EyeInsideTheBoxUsesFullDetail) {
   EXPECT_EQ(choose_level(camera, cube(404), {}, any), (Level{0, 0, 0}));
 }
 
-TEST(ChooseLevel, MergesTheFinestCellsFirstAndAtMostTheGivenSamples) {
+TEST(ChooseLevel, MergesTheFinestCellsFirstWithinTheLimits) {
   Camera camera = before(8);
   camera.eye.y = -1e6;
   const Lattice flat = box({std::vector<double>(64, 2.0 / 64), std::vector<double>(64, 2.0 / 64),
                             std::vector<double>(64, 0.01 / 64)});
-  EXPECT_EQ(choose_level(camera, flat, {}, 1), (Level{0, 0, 0}));
-  EXPECT_EQ(choose_level(camera, flat, {}, 1.9), (Level{0, 0, 0}));
-  EXPECT_EQ(choose_level(camera, flat, {}, 2), (Level{0, 0, 1}));
-  EXPECT_EQ(choose_level(camera, flat, {}), (Level{0, 0, 2}));
-  EXPECT_EQ(choose_level(camera, flat, {}, 31), (Level{0, 0, 4}));
-  EXPECT_EQ(choose_level(camera, cube(64), {}, 8), (Level{1, 1, 1}));
+  EXPECT_EQ(choose_level(camera, flat, {}, {1.9, 9}), (Level{0, 0, 0}));
+  EXPECT_EQ(choose_level(camera, flat, {}, {2, 9}), (Level{0, 0, 1}));
+  EXPECT_EQ(choose_level(camera, flat, {}, {31, 9}), (Level{0, 0, 4}));
+  EXPECT_EQ(choose_level(camera, flat, {}, {31, 2}), (Level{1, 1, 2}));
+  EXPECT_EQ(choose_level(camera, flat, {}), (Level{1, 1, 1}));
+  EXPECT_EQ(choose_level(camera, cube(64), {}, {4, 1}), (Level{1, 1, 0}));
 }
 
 TEST(CoarsenLattice, KeepsTheBoxAndCentersMergedCells) {
@@ -220,8 +220,8 @@ TEST_F(LevelOfAScene, DependsOnThePictureSize) {
   EXPECT_EQ(small.lattice.dims, (std::array{side, side, side}));
   EXPECT_EQ(small.vector->field->dims, small.lattice.dims);
   EXPECT_EQ(small.scalars[0].field->dims, small.lattice.dims);
-  view.image.width *= 2;
-  view.image.height *= 2;
+  view.image.width *= 4;
+  view.image.height *= 4;
   EXPECT_EQ(built().level[0], level - 1);
 }
 
@@ -257,13 +257,14 @@ TEST_F(LevelOfAScene, KeepsTheCameraAndItsDepthCue) {
   EXPECT_EQ(coarse.vector->min_magnitude, full.vector->min_magnitude);
 }
 
-TEST_F(LevelOfAScene, AveragesNoHiddenFields) {
+TEST_F(LevelOfAScene, ReducesNoHiddenFields) {
   view.vector.field.kind = protocol::FieldChoice::Kind::none;
   const Scene scene = built();
   ASSERT_EQ(scene.level[0], scene.level[2]);
   const std::uint64_t fine = 4ULL * 64 * 64 * 64;
   ASSERT_EQ(scene.scalars.size(), 1U);
-  EXPECT_EQ(dataset->resident_bytes(), fine + (fine >> (3 * scene.level[0])));
+  EXPECT_EQ(dataset->resident_bytes(),
+            fine + data::TwoValues::components * (fine >> (3 * scene.level[0])));
 }
 
 // The cloud only, of 64^3 samples, in a store of that many bytes.

@@ -35,7 +35,7 @@ export const methodHints: Readonly<Record<string, string>> = {
 export const methodOptions: Options = { kernel: "kernel", slab: "slab" };
 
 export const detailHints: Readonly<Record<string, string>> = {
-  auto: "Up to four samples that fit in a pixel are merged.",
+  auto: "Pairs of samples that fit in a pixel are merged.",
   full: "Every sample is drawn.",
 };
 
