@@ -7,10 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "server/engine/bins.hpp"
 #include "server/engine/kernels/dispatch.hpp"
-#include "server/engine/plan.hpp"
-#include "server/engine/tiles.hpp"
 #include "tests/numerics/scenes.hpp"
 
 namespace windsplat::test {
@@ -136,31 +133,6 @@ scene::Scene busy_scene(int width, int height, bool perspective) {
   scene.vector->jitter_stride = 0.3;
   scene.scalars.push_back(medium(make_volume(scene.lattice, 1, wave), {0.5F, 0.6F, 0.9F}));
   return scene;
-}
-
-engine::Rendered render_with(const Table& table, const scene::Scene& scene) {
-  ThreadPool pool(1);
-  const CancelToken cancel;
-  engine::Rendered out;
-  engine::RenderPlan plan;
-  engine::make_plan(scene, plan);
-  engine::BinSpace bin_space;
-  engine::TileSpace tile_space;
-  const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, bin_space, out.work);
-  out.image.width = scene.camera.width;
-  out.image.height = scene.camera.height;
-  out.image.rgba.assign(4 * static_cast<std::size_t>(scene.camera.width) * scene.camera.height, 0);
-  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, engine::sink_into(out.image),
-                     out.work);
-  return out;
-}
-
-float largest_difference(const engine::Rendered& a, const engine::Rendered& b) {
-  float most = 0;
-  for (std::size_t i = 0; i < a.image.rgba.size(); ++i) {
-    most = std::max(most, std::abs(a.image.rgba[i] - b.image.rgba[i]));
-  }
-  return most;
 }
 
 // Lane by lane without fused multiply-add, at the full vector width: differences are due to

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "server/engine/reference/body.hpp"
 #include "server/engine/reference/kernels.hpp"
 
 namespace windsplat::naive {
@@ -194,6 +195,14 @@ class Renderer {
     const std::size_t pixels = static_cast<std::size_t>(c.width) * c.height;
     picture_.rgba.assign(4 * pixels, 0);
     transmittance_.assign(pixels, 1);
+    if (!scene.body) return;
+    for (int y = 0; y < c.height; ++y) {
+      for (int x = 0; x < c.width; ++x) {
+        body_.push_back(engine::reference::body_surface(*scene.body, view_, x + 0.5, y + 0.5));
+        behind_.push_back(static_cast<Real>(1 - body_.back().opacity));
+        farther_.insert(farther_.end(), 4, Real(0));
+      }
+    }
   }
 
   Picture<Real> run() {
@@ -217,6 +226,7 @@ class Renderer {
         });
       });
     }
+    for (std::size_t i = 0; i < body_.size(); ++i) add_body(i);
     return std::move(picture_);
   }
 
@@ -339,8 +349,45 @@ class Renderer {
     if (line != nullptr) hit = hit_ribbon(*line, x + Real(0.5), y + Real(0.5));
     if (tau == 0 && hit.opacity == 0) return;
     const Real place = std::clamp(Real(0.5) + (hit.depth - closest) * cells, Real(0), Real(1));
-    add(static_cast<std::size_t>(y) * picture_.width + x, tau, hit.opacity, place, medium.color,
-        hit.color);
+    const std::size_t index = static_cast<std::size_t>(y) * picture_.width + x;
+    const Cell cell{tau, hit.opacity, place, medium.color, hit.color};
+    if (body_.empty() || body_[index].opacity == 0) {
+      return add(picture_.rgba.data() + 4 * index, cell, transmittance_[index]);
+    }
+    const auto depth = static_cast<Real>(body_[index].depth);
+    const Real part =
+        medium.drawn ? std::clamp(Real(0.5) + (depth - closest) * cells, Real(0), Real(1)) : 1;
+    divide(index, cell, part, hit.depth < depth);
+  }
+
+  // A line of some opacity at `place` in a homogeneous cell.
+  struct Cell {
+    Real tau, opacity, place;
+    Vec<Real> medium, line;
+  };
+
+  // The body lies at `part` of the cell: what is behind it shines through the rest of the pixel.
+  void divide(std::size_t index, const Cell& cell, Real part, bool line_before) {
+    Cell before = cell;
+    before.tau = cell.tau * part;
+    before.opacity = line_before ? cell.opacity : 0;
+    before.place = part > 0 ? std::min(cell.place / part, Real(1)) : 0;
+    add(picture_.rgba.data() + 4 * index, before, transmittance_[index]);
+    Cell after = cell;
+    after.tau = cell.tau * (1 - part);
+    after.opacity = line_before ? 0 : cell.opacity;
+    after.place = part < 1 ? std::max((cell.place - part) / (1 - part), Real(0)) : 0;
+    add(farther_.data() + 4 * index, after, behind_[index]);
+  }
+
+  void add_body(std::size_t index) {
+    const auto& body = body_[index];
+    const Real front = transmittance_[index];
+    Real* to = picture_.rgba.data() + 4 * index;
+    for (int c = 0; c < 3; ++c) {
+      to[c] += front * (static_cast<Real>(body.opacity * body.color[c]) + farther_[4 * index + c]);
+    }
+    to[3] = 1 - front * behind_[index];
   }
 
   Vec<Real> to_cells(const Vec<Real>& v) const {
@@ -350,13 +397,10 @@ class Renderer {
 
   // The three pieces of the paper composited in order: medium before the line, line, medium behind
   // it.
-  void add_pieces(std::size_t index, Real absorbed, Real opacity, Real place,
-                  const Vec<Real>& medium, const Vec<Real>& line) {
-    const Real alphas[3] = {place * absorbed, opacity, (1 - place) * absorbed};
-    const Vec<Real> colors[3] = {medium, line, medium};
-    Real* to = picture_.rgba.data() + 4 * index;
-    Real& t = transmittance_[index];
-    if (opacity == 0) return over(to, t, absorbed, medium);
+  void add_pieces(Real* to, Real absorbed, const Cell& cell, Real& t) {
+    const Real alphas[3] = {cell.place * absorbed, cell.opacity, (1 - cell.place) * absorbed};
+    const Vec<Real> colors[3] = {cell.medium, cell.line, cell.medium};
+    if (cell.opacity == 0) return over(to, t, absorbed, cell.medium);
     for (int n = 0; n < 3; ++n) over(to, t, alphas[n], colors[n]);
   }
 
@@ -368,23 +412,21 @@ class Renderer {
 
   // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau x) (c_v - c_s), `over` front to back.
   // The other rules replace the second exponential by a chord or by nothing, or A by tau.
-  void add(std::size_t index, Real tau, Real opacity, Real place, const Vec<Real>& medium,
-           const Vec<Real>& line) {
+  void add(Real* to, const Cell& cell, Real& t) {
+    const auto& [tau, opacity, place, medium, line] = cell;
     using scene::Compositing;
     const Compositing rule = scene_.compositing;
     const bool euler = rule == Compositing::cd_euler;
     const Real absorbed = euler ? std::min(tau, Real(1e6)) : -std::expm1(-tau);
     const Real transmitted = euler ? 1 - absorbed : std::exp(-tau);
     if (rule == Compositing::cd_naive) {
-      return add_pieces(index, absorbed, opacity, place, medium, line);
+      return add_pieces(to, absorbed, cell, t);
     }
     Real before = std::exp(-tau * place);
     if (rule == Compositing::simple) before = transmitted;
     if (rule == Compositing::cd || euler) before = 1 - place * absorbed;
-    Real& t = transmittance_[index];
     const Real alpha = absorbed + opacity * transmitted;
     const Real own = opacity * before;
-    Real* to = picture_.rgba.data() + 4 * index;
     for (int c = 0; c < 3; ++c) to[c] += t * (medium[c] * alpha + own * (line[c] - medium[c]));
     to[3] += t * alpha;
     t *= transmitted * (1 - opacity);
@@ -394,6 +436,11 @@ class Renderer {
   View view_;
   Picture<Real> picture_;
   std::vector<Real> transmittance_;
+  // With a body, by pixel: the body; the light from behind it; its transmittance and that of all
+  // behind it.
+  std::vector<engine::reference::Surface> body_;
+  std::vector<Real> farther_;
+  std::vector<Real> behind_;
   Vec<Real> right_{}, down_{}, forward_{};
   Real pixel_ = 1;
   // The current kernel.

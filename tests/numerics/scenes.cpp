@@ -1,9 +1,14 @@
 // Synthetic scenes for the numerical tests.
 #include "tests/numerics/scenes.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <stdexcept>
+
+#include "server/engine/bins.hpp"
+#include "server/engine/plan.hpp"
+#include "server/engine/tiles.hpp"
 
 namespace windsplat::test {
 
@@ -139,6 +144,31 @@ engine::Rendered render(const scene::Scene& scene, unsigned threads) {
   auto rendered = engine::render(scene, pool, CancelToken());
   if (!rendered) throw std::runtime_error(rendered.error().message);
   return std::move(*rendered);
+}
+
+engine::Rendered render_with(const engine::kernels::Table& table, const scene::Scene& scene) {
+  ThreadPool pool(1);
+  const CancelToken cancel;
+  engine::Rendered out;
+  engine::RenderPlan plan;
+  engine::make_plan(scene, plan);
+  engine::BinSpace bin_space;
+  engine::TileSpace tile_space;
+  const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, bin_space, out.work);
+  out.image.width = scene.camera.width;
+  out.image.height = scene.camera.height;
+  out.image.rgba.assign(4 * static_cast<std::size_t>(scene.camera.width) * scene.camera.height, 0);
+  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, engine::sink_into(out.image),
+                     out.work);
+  return out;
+}
+
+float largest_difference(const engine::Rendered& a, const engine::Rendered& b) {
+  float most = 0;
+  for (std::size_t i = 0; i < a.image.rgba.size(); ++i) {
+    most = std::max(most, std::abs(a.image.rgba[i] - b.image.rgba[i]));
+  }
+  return most;
 }
 
 const float* pixel(const engine::Image& image, int x, int y) {

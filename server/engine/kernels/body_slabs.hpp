@@ -111,6 +111,33 @@ KERNEL_INLINE bool hit_block(const RibbonRecord& line, const Slab& slab, float x
   return any;
 }
 
+// The body as a line that covers its pixels, where it is in front of the end of the slab and still
+// waits for light; it no longer does then.
+inline void take_body(const Slab& slab, const float rgb[3], BodyBlock& body, BlockHit& m) {
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel zero = hn::Zero(PixelTag());
+    const Pixel depth = load<Pixel>(body.depth + l);
+    const Pixel opacity = load<Pixel>(body.opacity + l);
+    const auto here = hn::And(hn::Lt(depth, all<Pixel>(slab.back)), hn::Gt(opacity, zero));
+    store(fraction_in(slab, depth), m.x_line + l);
+    store(hn::IfThenElseZero(here, opacity), m.opacity + l);
+    for (int c = 0; c < 3; ++c) {
+      store(load<Pixel>(body.shade + l) * all<Pixel>(rgb[c]), m.color[c] + l);
+    }
+    store(hn::IfThenZeroElse(here, opacity), body.opacity + l);
+    store(hn::IfThenElse(here, all<Pixel>(1.0F), load<Pixel>(body.behind + l)), body.behind + l);
+  }
+}
+
+// Whether any pixel of the block still waits for light of the body.
+inline bool awaits_body(const BodyBlock& body) {
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const auto waits = hn::Gt(load<Pixel>(body.opacity + l), hn::Zero(PixelTag()));
+    if (!hn::AllFalse(PixelTag(), waits)) return true;
+  }
+  return false;
+}
+
 // Sorts two neighbours per pixel. Returns whether any pixel swapped them.
 KERNEL_INLINE bool put_in_order(BlockHit& first, BlockHit& second) {
   bool swapped = false;
@@ -233,6 +260,8 @@ struct Closing {
   float x, y;  // the block's corner, pixels
   float stop;
   const float* transmittance;  // transmittance in front of the slab
+  BodyBlock* body;             // null: no pixel meets the body in the slab
+  const float* body_rgb;
 };
 
 // Stable rank sort of a few lines by depth: the number of predecessors is the index.
@@ -321,9 +350,15 @@ template <bool Perspective, int Compositing>
 Outcome pass_sorted(const Closing& with, Passage* passage) {
   BlockHit hits[block_hits_max];
   int held = 0;
-  for (int h = 0; h < with.count; ++h) {
-    const RibbonRecord& line = with.lines[with.met[h].line];
-    if (!hit_block<Perspective>(line, with.slab, with.x, with.y, hits[held])) continue;
+  bool body = with.body != nullptr;
+  for (int h = 0; h < with.count || body;) {
+    if (body && (h == with.count || with.met[h].depth >= with.body->nearest)) {
+      take_body(with.slab, with.body_rgb, *with.body, hits[held]);
+      body = false;
+    } else {
+      const RibbonRecord& line = with.lines[with.met[h++].line];
+      if (!hit_block<Perspective>(line, with.slab, with.x, with.y, hits[held])) continue;
+    }
     if (++held < block_hits_max) continue;
     // Composite the nearer half; later lines may still precede lines of the farther half.
     sort_block_hits(hits, held);
@@ -332,7 +367,7 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
     const float depth = farthest_x(hits[held - 1]) * (with.slab.back - with.slab.front);
     for (int n = 0; n < held; ++n) hits[n] = hits[n + held];
     if (is_dark(with.transmittance, passage, with.stop) &&
-        rest_is_behind(with, h + 1, with.slab.front + depth)) {
+        rest_is_behind(with, h, with.slab.front + depth)) {
       return Outcome::dark;
     }
   }
@@ -350,7 +385,8 @@ void close_block(const Closing& with, const float* gathered, int row, int column
     }
   };
   open();
-  Outcome outcome = pass_in_order<Perspective, Compositing>(with, passage);
+  Outcome outcome = Outcome::out_of_order;
+  if (with.body == nullptr) outcome = pass_in_order<Perspective, Compositing>(with, passage);
   if (outcome == Outcome::out_of_order) {
     open();
     outcome = pass_sorted<Perspective, Compositing>(with, passage);
@@ -396,19 +432,28 @@ void close_slab(const Camera& camera, int compositing, const Slab& slab, const R
     sort_met(met, count, sorted);
     met = sorted;
   }
-  const Closing with = {slab,
-                        lines,
-                        met,
-                        count,
-                        left_of(tile, column),
-                        top_of(tile, row),
-                        tile.stop,
-                        block_at(tile, row, column)};
+  Closing with = {slab,
+                  lines,
+                  met,
+                  count,
+                  left_of(tile, column),
+                  top_of(tile, row),
+                  tile.stop,
+                  block_at(tile, row, column),
+                  nullptr,
+                  nullptr};
+  const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(column);
+  if (tile.body != nullptr && (tile.body->seen[row] & bit) != 0) {
+    BodyBlock& body = tile.body->blocks[index];
+    if (body.nearest < slab.back) with.body = &body;
+    with.body_rgb = tile.body->rgb;
+  }
   if (camera.perspective != 0) {
     close_slab_on<true>(compositing, with, gathered, row, column, tile);
   } else {
     close_slab_on<false>(compositing, with, gathered, row, column, tile);
   }
+  if (with.body != nullptr && !awaits_body(*with.body)) tile.body->seen[row] &= ~bit;
   const int own = medium && compositing != compositing_cd_euler ? 1 : 0;
   const int each = medium && compositing == compositing_analytic ? count : 0;
   tile.counters.pixel_updates += std::int64_t{1 + count} * block_pixels;
