@@ -111,21 +111,44 @@ KERNEL_INLINE bool hit_block(const RibbonRecord& line, const Slab& slab, float x
   return any;
 }
 
+// The part of the slab before the body, by pixel: the medium of pixels that it covers entirely ends
+// there (body_limit), and x_line is relative to it. 1 for other pixels.
+struct BodyShare {
+  alignas(64) float before[block_pixels];
+};
+
+KERNEL_INLINE void open_share(const Slab& slab, const BodyBlock& body, BodyShare& share) {
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel before = fraction_in(slab, body_limit(body, l));
+    store(hn::Max(before, all<Pixel>(1e-6F)), share.before + l);
+  }
+}
+
+inline void scale_hit(const BodyShare& share, BlockHit& m) {
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    store(load<Pixel>(m.x_line + l) / load<Pixel>(share.before + l), m.x_line + l);
+  }
+}
+
 // The body as a line that covers its pixels, where it is in front of the end of the slab and still
 // waits for light; it no longer does then.
 inline void take_body(const Slab& slab, const float rgb[3], BodyBlock& body, BlockHit& m) {
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel one = all<Pixel>(1.0F);
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const Pixel zero = hn::Zero(PixelTag());
     const Pixel depth = load<Pixel>(body.depth + l);
     const Pixel opacity = load<Pixel>(body.opacity + l);
     const auto here = hn::And(hn::Lt(depth, all<Pixel>(slab.back)), hn::Gt(opacity, zero));
-    store(fraction_in(slab, depth), m.x_line + l);
+    // Behind the medium before it, or before everything in the slab.
+    const Pixel end = hn::IfThenElse(hn::Le(depth, all<Pixel>(slab.front)), hn::Neg(one), one);
+    const Pixel x_line = hn::IfThenElse(hn::Ge(opacity, one), end, fraction_in(slab, depth));
+    store(x_line, m.x_line + l);
     store(hn::IfThenElseZero(here, opacity), m.opacity + l);
     for (int c = 0; c < 3; ++c) {
       store(load<Pixel>(body.shade + l) * all<Pixel>(rgb[c]), m.color[c] + l);
     }
     store(hn::IfThenZeroElse(here, opacity), body.opacity + l);
-    store(hn::IfThenElse(here, all<Pixel>(1.0F), load<Pixel>(body.behind + l)), body.behind + l);
+    store(hn::IfThenElse(here, one, load<Pixel>(body.behind + l)), body.behind + l);
   }
 }
 
@@ -349,8 +372,10 @@ inline float farthest_x(const BlockHit& m) {
 template <bool Perspective, int Compositing>
 Outcome pass_sorted(const Closing& with, Passage* passage) {
   BlockHit hits[block_hits_max];
+  BodyShare share;
   int held = 0;
   bool body = with.body != nullptr;
+  if (body) open_share(with.slab, *with.body, share);
   for (int h = 0; h < with.count || body;) {
     if (body && (h == with.count || with.met[h].depth >= with.body->nearest)) {
       take_body(with.slab, with.body_rgb, *with.body, hits[held]);
@@ -358,6 +383,7 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
     } else {
       const RibbonRecord& line = with.lines[with.met[h++].line];
       if (!hit_block<Perspective>(line, with.slab, with.x, with.y, hits[held])) continue;
+      if (with.body != nullptr) scale_hit(share, hits[held]);
     }
     if (++held < block_hits_max) continue;
     // Composite the nearer half; later lines may still precede lines of the farther half.
