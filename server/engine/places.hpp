@@ -1,6 +1,8 @@
 // The kernel positions of a brick of a curved lattice.
 #pragma once
 
+#include <cstdint>
+
 #include "server/engine/kernels/frame_data.hpp"
 
 namespace windsplat::engine {
