@@ -22,6 +22,8 @@ constexpr std::array<Name<GeometryMapping>, 3> mapping_names{
     {{GeometryMapping::flat, "flat"},
      {GeometryMapping::curvilinear, "curvilinear"},
      {GeometryMapping::sphere, "sphere"}}};
+constexpr std::array<Name<BodyShow>, 3> body_show_names{
+    {{BodyShow::automatic, "auto"}, {BodyShow::on, "on"}, {BodyShow::off, "off"}}};
 constexpr std::array<Name<GridAxis>, 3> axis_names{
     {{GridAxis::x, "x"}, {GridAxis::y, "y"}, {GridAxis::z, "z"}}};
 constexpr std::array<Name<VectorSpace>, 2> space_names{
@@ -98,6 +100,15 @@ SliceView read_slice(const Json& json, const std::string& pointer, Faults& fault
   return slice;
 }
 
+BodyView read_body(const Json& json, const std::string& pointer, Faults& faults) {
+  BodyView body;
+  ObjectReader reader(json, pointer, faults);
+  reader.choice("show", body.show, body_show_names);
+  reader.color("surfaceColor", body.surface_color);
+  reader.finish();
+  return body;
+}
+
 GeometryView read_geometry(const Json& json, const std::string& pointer, Faults& faults) {
   GeometryView geometry;
   ObjectReader reader(json, pointer, faults);
@@ -107,6 +118,9 @@ GeometryView read_geometry(const Json& json, const std::string& pointer, Faults&
   reader.text("heightField", geometry.height_field, 1);
   if (const Json* slice = reader.child("slice", Presence::optional, Null::is_default)) {
     geometry.slice = read_slice(*slice, reader.at("slice"), faults);
+  }
+  if (const Json* body = reader.child("body")) {
+    geometry.body = read_body(*body, reader.at("body"), faults);
   }
   reader.finish();
   return geometry;
@@ -346,7 +360,10 @@ Json geometry_to_json(const GeometryView& geometry) {
               {"vertical", name_of(geometry.vertical, vertical_names)},
               {"mapping", name_of(geometry.mapping, mapping_names)},
               {"heightField", text_or_null(geometry.height_field)},
-              {"slice", std::move(slice)}};
+              {"slice", std::move(slice)},
+              {"body",
+               {{"show", name_of(geometry.body.show, body_show_names)},
+                {"surfaceColor", geometry.body.surface_color}}}};
 }
 
 Json vector_to_json(const VectorView& vector) {

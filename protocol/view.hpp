@@ -17,6 +17,7 @@ using Range = std::array<double, 2>;
 enum class Projection { perspective, orthographic };
 enum class VerticalPlacement { automatic, linear, logp, index };
 enum class GeometryMapping { flat, curvilinear, sphere };
+enum class BodyShow { automatic, on, off };
 enum class GridAxis { x, y, z };
 enum class VectorSpace { components, world };
 enum class ColorBy { world_z, screen_z, rise, magnitude, direction, scalar, constant };
@@ -49,12 +50,20 @@ struct SliceView {
   bool operator==(const SliceView&) const = default;
 };
 
+// An opaque surface: a globe within the shell of a sphere, otherwise the bottom of the box.
+struct BodyView {
+  BodyShow show = BodyShow::automatic;    // automatic: on a sphere
+  std::string surface_color = "#2b3a4d";  // sRGB
+  bool operator==(const BodyView&) const = default;
+};
+
 struct GeometryView {
   Vec3 scale{1, 1, 1};
   VerticalPlacement vertical = VerticalPlacement::automatic;
   GeometryMapping mapping = GeometryMapping::flat;
   std::optional<std::string> height_field;  // empty: use the vertical coordinate
   std::optional<SliceView> slice;           // empty: the whole grid
+  BodyView body;
   bool operator==(const GeometryView&) const = default;
 };
 

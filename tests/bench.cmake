@@ -3,7 +3,8 @@
 set(bench_dir ${CMAKE_CURRENT_LIST_DIR}/bench)
 # The baseline for the engine is compiled for the baseline instruction set with -O2, whose limited
 # vectorisation in g++ 12 is intended, without the additional optimisations of -O3.
-set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp
+set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/numerics/naive_order.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/numerics/naive_renderer.cpp
   PROPERTIES COMPILE_OPTIONS -O2 SKIP_PRECOMPILE_HEADERS ON)
 
 # Times under a sanitizer are meaningless.
@@ -20,9 +21,9 @@ function(windsplat_bench name)
   target_link_libraries(${name} PRIVATE bench_support)
 endfunction()
 
-set(numerics_dir ${CMAKE_CURRENT_LIST_DIR}/numerics)
-windsplat_bench(bench_frame ${numerics_dir}/naive_renderer.cpp ${numerics_dir}/truth/integrator.cpp
-  ${numerics_dir}/truth/integrator_kernels.cpp)
+set(naive_dir ${CMAKE_CURRENT_LIST_DIR}/numerics)
+windsplat_bench(bench_frame ${naive_dir}/naive_renderer.cpp ${naive_dir}/naive_order.cpp
+  ${naive_dir}/truth/integrator.cpp ${naive_dir}/truth/integrator_kernels.cpp)
 windsplat_bench(bench_kernels)
 windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
 windsplat_bench(bench_path)

@@ -8,7 +8,9 @@
 #include <numeric>
 
 #include "server/engine/flush_denormals.hpp"
+#include "server/engine/places.hpp"
 #include "server/engine/projector.hpp"
+#include "server/engine/shadow.hpp"
 
 namespace windsplat::engine {
 
@@ -25,20 +27,13 @@ Box curved_box(const Pass& pass, const Brick& brick) {
   Box box;
   box.low.fill(1e300);
   box.high.fill(-1e300);
-  const auto offset = [&](int a, int visited) {
-    return pass.step[a] * pass.axis[a].sample[pass.axis[a].visit[visited]];
-  };
-  for (int v = 0; v < brick.v_count; ++v) {
-    for (int u = 0; u < brick.u_count; ++u) {
-      const float* position =
-          pass.places + 3 * (offset(pass.major, brick.sheet) + offset(pass.v, brick.v_first + v) +
-                             offset(pass.u, brick.u_first + u));
-      for (int c = 0; c < 3; ++c) {
-        box.low[c] = std::min<double>(box.low[c], position[c]);
-        box.high[c] = std::max<double>(box.high[c], position[c]);
-      }
+  all_places(pass, brick, [&](const float* position) {
+    for (int c = 0; c < 3; ++c) {
+      box.low[c] = std::min<double>(box.low[c], position[c]);
+      box.high[c] = std::max<double>(box.high[c], position[c]);
     }
-  }
+    return true;
+  });
   return box;
 }
 
@@ -147,7 +142,7 @@ double splat_cover(const Pass& pass, const Brick& brick, double scale) {
 class Binner {
  public:
   Binner(const RenderPlan& plan, const kernels::Table& table, BinSpace& space)
-      : plan_(plan), table_(table), space_(space), project_(plan) {}
+      : plan_(plan), table_(table), space_(space), project_(plan), shadow_(plan) {}
 
   void begin() {
     const std::size_t count = plan_.passes.size();
@@ -186,6 +181,7 @@ class Binner {
   const kernels::Table& table_;
   BinSpace& space_;
   const Projector project_;
+  const Shadow shadow_;
 };
 
 void Binner::begin_pass(const PassPlan& pass, PassBins& to) {
@@ -308,6 +304,10 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
   const std::int64_t positions = static_cast<std::int64_t>(brick.u_count) * brick.v_count;
   const Box box = positions_box(pass, brick);
   out.counts.samples += positions;
+  if (shadow_.hides(pass, from, shared.longest, pass.kernel.has_medium != 0)) {
+    out.counts.culled += positions;
+    return;
+  }
   // A brick without summary is first culled by the longest line that the style allows, before any
   // sample is read; one with a summary by its actual contents.
   KeptSummary& kept = summary_at(pass, shared, brick);
@@ -333,6 +333,7 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
   if (pass.kernel.has_medium != 0) out.counts.without_splat += positions - kept.splats;
   out.counts.without_both += kept.without_both;
   if (!kept.holds_any() || found.seen.empty()) return;
+  if (shadow_.hides(pass, from, line_reach(pass.kernel, shared, kept), kept.splats > 0)) return;
   brick.lines = kept.lines;
   brick.splats = kept.splats;
   brick.line_reach = static_cast<float>(std::max(line_reach(pass.kernel, shared, kept), 0.0));

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "server/base/check.hpp"
+#include "server/engine/body.hpp"
 #include "server/engine/line_style.hpp"
 #include "server/engine/partial.hpp"
 
@@ -203,13 +204,19 @@ void measure_ways(const Lattice& lattice, SampleWays& ways) {
   std::size_t step = 1;
   for (int a = 0; a < 3; ++a) {
     std::array<float, 3> way{};
+    double farthest2 = 0;
     const std::size_t row = step * dims[a];
     for (std::size_t i = 0; i + step < places.size(); ++i) {
       if (i % row >= row - step) continue;
+      double square = 0;
       for (int c = 0; c < 3; ++c) {
-        way[c] = std::max(way[c], std::abs(places[i + step][c] - places[i][c]));
+        const float apart = std::abs(places[i + step][c] - places[i][c]);
+        way[c] = std::max(way[c], apart);
+        square += static_cast<double>(apart) * static_cast<double>(apart);
       }
+      farthest2 = std::max(farthest2, square);
     }
+    ways.distance[a] = std::sqrt(farthest2);
     ways.longest[a] = way;
     step = row;
   }
@@ -225,6 +232,8 @@ void bend_pass(const Scene& scene, const SampleWays& ways, PassPlan& pass) {
   std::array<float, 3> widest{};
   for (int a = 0; a < 3; ++a) {
     // Along an axis of one sample the cell keeps its width on the uncurved lattice.
+    pass.edge_max[a] = scene.lattice.dims[a] > 1 ? 1.001 * ways.distance[a] * pass.stride
+                                                 : static_cast<double>(to.cell_max[a]);
     for (int c = 0; c < 3; ++c) {
       widest[c] += scene.lattice.dims[a] > 1 ? ways.longest[a][c] * static_cast<float>(pass.stride)
                                              : to.cell_max[a];
@@ -325,6 +334,7 @@ Variant variant_of(const Scene& scene, const RenderPlan& plan) {
   variant.moving = variant.vector && scene.vector->moving;
   variant.slabs = plan.slabs;
   variant.curved = plan.curved;
+  variant.body = scene.body.has_value();
   variant.passes = static_cast<int>(plan.passes.size());
   return variant;
 }
@@ -412,6 +422,7 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   WINDSPLAT_CHECK(scene.camera.half_height > 0);
   plan.view = &scene.camera;
   plan.camera = make_camera(scene);
+  plan.body = make_body(scene);
   plan.compositing = static_cast<int>(scene.compositing);
   plan.curved = scene.lattice.places != nullptr;
   plan.slabs = scene.method == scene::Method::slab;
@@ -425,6 +436,9 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   for (PassPlan& pass : plan.passes) finish_pass(scene, major, plan.ways, pass);
   plan.slab_depth = 1;
   if (plan.slabs || plan.curved) plan_slabs(scene, plan);
+  if (scene.body) {
+    for (PassPlan& pass : plan.passes) pass.kernel.by_depth = 1;
+  }
   plan.tile_pixels = tile_pixels(scene.camera.width, scene.camera.height);
   plan.variant = variant_of(scene, plan);
 }

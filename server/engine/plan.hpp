@@ -63,7 +63,8 @@ struct PassPlan {
   std::vector<float> line_rgb;
   std::vector<float> rate_x, rate_z;
   std::vector<LayerArrays> layers;
-  kernels::Pass kernel{};  // points into the arrays above
+  std::array<double, 3> edge_max{};  // curved lattices: the longest edge of a cell along each axis
+  kernels::Pass kernel{};            // points into the arrays above
 };
 
 // Largest distances between neighbouring samples of a curved lattice. Kept between frames, because
@@ -73,11 +74,14 @@ struct SampleWays {
   std::array<int, 3> dims{};
   // [a][c]: largest distance along world axis c between neighbours along lattice axis a.
   std::array<std::array<float, 3>, 3> longest{};
+  std::array<double, 3>
+      distance{};  // [a]: the longest of all between neighbours along lattice axis a
 };
 
 struct RenderPlan {
   const scene::Camera* view = nullptr;
   kernels::Camera camera{};
+  kernels::Body body{};
   std::vector<PassPlan> passes;     // the one with lines first
   int eye_sample = 0;               // eye_index of the whole lattice along the major axis
   bool eye_inside = false;          // perspective view from within the box

@@ -65,7 +65,7 @@ Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const Can
   WorkReport work;
   work.variant = plan.variant;
   work.variant.target = (*table)->name;
-  if (!plan.passes.empty() && !cancel.cancelled()) {
+  if ((!plan.passes.empty() || scene.body) && !cancel.cancelled()) {
     const Bins& bins = make_bins(plan, **table, pool, cancel, parts.bins, work);
     if (!cancel.cancelled()) {
       draw_tiles(plan, bins, **table, pool, cancel, parts.tiles, sink, work);

@@ -1,6 +1,7 @@
 // Sweeps a tile front to back, slab by slab: accumulates the parts of splats, sorts lines by depth
 // and composites both block by block.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -338,6 +339,7 @@ class SlabSweep {
     if (lines_.count() > 0) meet(slab);
     for (int row = 0; row < tile_blocks; ++row) {
       std::uint32_t left = (lined_[row] | slab.touched[row]) & tile_.open[row];
+      if (tile_.body != nullptr) left |= blocks_at_body(row, slab.back);
       for (; left != 0; left &= left - 1U) {
         const int column = __builtin_ctz(left);
         const int block = row * tile_blocks + column;
@@ -348,6 +350,18 @@ class SlabSweep {
       }
       slab.touched[row] = 0;
     }
+  }
+
+  // The open blocks of a row that the body enters before `depth`, as bits.
+  [[nodiscard]] std::uint32_t blocks_at_body(int row, float depth) const {
+    const kernels::TileBody& body = *tile_.body;
+    if (body.nearest >= depth) return 0;
+    std::uint32_t found = 0;
+    for (std::uint32_t left = body.seen[row] & tile_.open[row]; left != 0; left &= left - 1U) {
+      const int column = std::countr_zero(left);
+      if (body.blocks[row * tile_blocks + column].nearest < depth) found |= left & (~left + 1U);
+    }
+    return found;
   }
 
   // Collects the lines that open blocks may meet in the slab in space_.met, grouped by block;

@@ -108,7 +108,7 @@ void each_vector(const Visit& visit) {
 // Slabs between two checks for opacity and cancellation.
 constexpr std::int64_t slabs_between_checks = 4;
 
-// True if every block of the tile that the brick may touch is opaque.
+// True if every block of the tile that the brick may touch is opaque or shows the body before it.
 bool all_closed(const kernels::Tile& tile, const kernels::Brick& brick);
 
 // Draws tile `index`, whose bricks must be sorted by their first depth. Returns true if it ended

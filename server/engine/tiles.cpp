@@ -2,6 +2,7 @@
 #include "server/engine/tiles.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <memory>
 
@@ -29,6 +30,7 @@ void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {
     space.blocks.resize(blocks_of_tile * block_floats);
     space.rows.resize(row_floats * rows_delivered);
     if (plan.perspective_medium) space.rays.resize(blocks_of_tile * block_pixels);
+    if (plan.body.shape != kernels::body_none) space.body.resize(blocks_of_tile);
   }
 }
 
@@ -119,11 +121,17 @@ void deliver_tile(const kernels::Table& table, const Tile& tile, AlignedVector<f
   }
 }
 
-// Tiles with bricks, most expensive first, so that the frame does not end with one long tile.
-void busy_tiles(const Bins& bins, std::vector<std::uint32_t>& order) {
+bool has_bricks(const Bins& bins, std::size_t tile) {
+  return bins.first[tile + 1] > bins.first[tile];
+}
+
+// Tiles with bricks, most expensive first, so that the frame does not end with one long tile; in a
+// scene with a body all tiles.
+void busy_tiles(const RenderPlan& plan, const Bins& bins, std::vector<std::uint32_t>& order) {
   order.clear();
   for (std::size_t t = 0; t + 1 < bins.first.size(); ++t) {
-    if (bins.first[t + 1] > bins.first[t]) order.push_back(static_cast<std::uint32_t>(t));
+    if (plan.body.shape != kernels::body_none || has_bricks(bins, t))
+      order.push_back(static_cast<std::uint32_t>(t));
   }
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return bins.load[a] != bins.load[b] ? bins.load[a] > bins.load[b] : a < b;
@@ -158,8 +166,22 @@ void level(std::vector<Workspace>& spaces) {
 
 }  // namespace
 
+namespace {
+
+// Whether the body hides everything from `depth` on in the blocks of a row.
+bool body_hides(const kernels::TileBody& body, int row, std::uint32_t columns, float depth) {
+  if ((columns & ~body.opaque[row]) != 0) return false;
+  for (; columns != 0; columns &= columns - 1U) {
+    const int column = std::countr_zero(columns);
+    if (body.blocks[row * tile_blocks + column].farthest > depth) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
 bool all_closed(const Tile& tile, const Brick& brick) {
-  if (tile.any_closed == 0) return false;
+  if (tile.any_closed == 0 && tile.body == nullptr) return false;
   const int bx = tile.x / block_side;
   const int by = tile.y / block_side;
   const int x0 = std::max(brick.block_x - bx, 0);
@@ -169,7 +191,9 @@ bool all_closed(const Tile& tile, const Brick& brick) {
   const std::uint32_t columns = ((2U << static_cast<unsigned>(x1 - x0)) - 1U)
                                 << static_cast<unsigned>(x0);
   for (int row = y0; row <= y1; ++row) {
-    if ((tile.open[row] & columns) != 0) return false;
+    const std::uint32_t open = tile.open[row] & columns;
+    if (open == 0) continue;
+    if (tile.body == nullptr || !body_hides(*tile.body, row, open, brick.depth_first)) return false;
   }
   return true;
 }
@@ -177,7 +201,7 @@ bool all_closed(const Tile& tile, const Brick& brick) {
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                 ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
                 WorkReport& work) {
-  busy_tiles(bins, space.order);
+  busy_tiles(plan, bins, space.order);
   const std::vector<std::uint32_t>& order = space.order;
   if (space.workers.size() < pool.size()) space.workers.resize(pool.size());
   std::vector<Workspace>& spaces = space.workers;
@@ -188,19 +212,27 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     if (cancel.cancelled()) return;
     const FlushDenormals flush;
     Tile tile{};
+    kernels::TileBody body{};
     open_tile(plan, bins, table, order[i], spaces[worker], tile);
+    if (plan.body.shape != kernels::body_none) {
+      body.blocks = spaces[worker].body.data();
+      if (table.open_body(plan.camera, plan.body, tile, body)) tile.body = &body;
+      if (tile.body == nullptr && !has_bricks(bins, order[i])) return;
+    }
+    done[i].drawn = true;
     if (plan.slabs || plan.curved) {
       done[i].stopped = sweep_tile(plan, bins, table, cancel, order[i], spaces[worker].sweep, tile);
     } else {
       draw_tile(plan, bins, table, cancel, order[i], tile, done[i]);
     }
+    if (tile.body != nullptr) table.close_body(tile);
     done[i].counters = tile.counters;
     done[i].closed_blocks = tile.any_closed != 0;
     deliver_tile(table, tile, spaces[worker].rows, sink);
   });
   level(spaces);
-  work.tiles = static_cast<std::int64_t>(order.size());
   for (const TileWork& tile : done) {
+    work.tiles += tile.drawn ? 1 : 0;
     work.occluded += tile.counters.occluded;
     work.pixel_updates += tile.counters.pixel_updates;
     work.exponentials += tile.counters.exponentials;

@@ -16,12 +16,14 @@ struct Workspace {
   AlignedVector<float> blocks;
   AlignedVector<float> rays;
   AlignedVector<float> rows;  // rows of a finished tile
+  AlignedVector<kernels::BodyBlock> body;
   SweepSpace sweep;
 };
 
 // Results of a tile for the work report.
 struct TileWork {
   kernels::Counters counters{};
+  bool drawn = false;
   bool stopped = false;
   bool closed_blocks = false;
 };
@@ -33,8 +35,8 @@ struct TileSpace {
   std::vector<TileWork> done;
 };
 
-// Delivers every pixel of a tile with bricks to `sink` once and adds the counts to `work`. After
-// cancellation the delivered pixels are invalid.
+// Delivers every pixel of a tile with bricks or the body to `sink` once and adds the counts to
+// `work`. After cancellation the delivered pixels are invalid.
 void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
                 ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
                 WorkReport& work);

@@ -19,6 +19,7 @@ struct Variant {
   bool moving = false;
   bool slabs = false;
   bool curved = false;
+  bool body = false;
   int passes = 0;
   const char* target = "";            // instruction set of the kernels; a string literal
   std::array<int, 3> level{0, 0, 0};  // how often each axis was halved; set by the caller
@@ -29,8 +30,8 @@ std::string text_of(const Variant& variant);
 
 struct WorkReport {
   std::int64_t samples = 0;  // kernel positions of the scene
-  // Kernel positions in bricks of 8 x 8 x 1 that lie entirely outside the picture or before the
-  // near plane.
+  // Kernel positions in bricks of 8 x 8 x 1 that lie entirely outside the picture, before the near
+  // plane or behind the body.
   std::int64_t culled = 0;
   // Among the others, independent of the view direction:
   std::int64_t skipped_vector = 0;  // line skipped: magnitude below its tolerance, or masked

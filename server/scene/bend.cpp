@@ -391,6 +391,7 @@ Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryVie
   };
   if (sphere) {
     set_radii(shell, lattice);
+    lattice.inner_radius = shell.inner;
     measure_columns();
     set_box(lattice);
     lattice.box_min = glm::max(lattice.box_min, glm::dvec3(-1));

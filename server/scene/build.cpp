@@ -213,6 +213,24 @@ Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, const Fi
   return layer;
 }
 
+// The sphere lies slightly inside the lowest cells, so that lines in them are not cut off.
+constexpr double globe_share = 0.999;
+
+std::optional<Body> make_body(const protocol::GeometryView& geometry, const Lattice& lattice) {
+  const bool sphere = geometry.mapping == protocol::GeometryMapping::sphere;
+  const bool shown = geometry.body.show == protocol::BodyShow::on ||
+                     (geometry.body.show == protocol::BodyShow::automatic && sphere);
+  if (!shown) return std::nullopt;
+  Body body;
+  body.shape = sphere ? BodyShape::sphere : BodyShape::ground;
+  body.radius = globe_share * lattice.inner_radius;
+  body.low = {lattice.box_min.x, lattice.box_min.y};
+  body.high = {lattice.box_max.x, lattice.box_max.y};
+  body.height = lattice.box_min.z;
+  body.color = parse_color(geometry.body.surface_color).value();
+  return body;
+}
+
 // The scene at a level, still without lattice and layers.
 Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View& view,
                        const Placed& placed, data::Dataset& dataset) {
@@ -256,6 +274,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   const double depth = depths[1] - depths[0];
   scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
                      depths[0] + view.depth_cue.far * depth};
+  scene.body = make_body(view.geometry, placed.lattice);
   scene.method = engine_method(view.method.name);
   scene.compositing = engine_compositing(view.method.compositing);
   scene.slab_thickness = view.method.slab_thickness;

@@ -285,6 +285,8 @@ Result<void> check(const View& view, const data::DatasetInfo& info) {
                                    std::to_string(info.steps.size() - 1));
   }
   if (auto ok = check_color(view.image.background, "/image/background"); !ok) return ok;
+  if (auto ok = check_color(view.geometry.body.surface_color, "/geometry/body/surfaceColor"); !ok)
+    return ok;
   if (auto ok = check_vector(view.vector); !ok) return ok;
   if (view.depth_cue.near >= view.depth_cue.far) {
     return invalid_at("/depthCue/near", "is not less than far");

@@ -17,7 +17,7 @@ namespace {
 
 // The cache entry of a dataset: a placement with the parameters that determine it.
 struct Kept {
-  protocol::GeometryView geometry;  // the geometry without its slice, which does not change
+  protocol::GeometryView geometry;  // without slice and body, which do not change
                                     // positions
   std::shared_ptr<const Placed> placed;
 };
@@ -76,6 +76,7 @@ Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView
   const bool bent = is_bent(geometry);
   protocol::GeometryView unsliced = geometry;
   unsliced.slice.reset();
+  unsliced.body = {};
   if (bent) {
     const std::any any = dataset.kept(kept_key);
     const auto* kept = std::any_cast<KeptPtr>(&any);

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
@@ -44,6 +45,7 @@ struct Lattice {
   std::shared_ptr<const std::vector<std::array<float, 3>>> places;  // x fastest; null: rectilinear
   glm::dvec3 box_min{-1, -1, -1};
   glm::dvec3 box_max{1, 1, 1};
+  double inner_radius = 0;  // of the shell of a globe: the lowest edge of its cells; otherwise 0
 };
 
 // World heights of the edges of the lowest and the highest cell.
@@ -125,6 +127,19 @@ enum class Method { kernel, slab, reference };
 // Compositing of a line in a homogeneous piece of medium (docs/design/rendering-model.md).
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
 
+// An opaque surface that hides what lies behind it: a sphere about the origin, which an eye inside
+// it does not see, or a horizontal rectangle. Its brightness is body_ambient + (1 - body_ambient)
+// |cos(normal, ray)|.
+enum class BodyShape { sphere, ground };
+struct Body {
+  BodyShape shape = BodyShape::sphere;
+  double radius = 1;                    // sphere, world units
+  glm::dvec2 low{-1, -1}, high{1, 1};   // ground: corners in x and y
+  double height = 0;                    // ground: z
+  std::array<float, 3> color{0, 0, 0};  // linear
+};
+constexpr double body_ambient = 0.6;
+
 // Draws only the samples of one layer, and only the part of vectors within its plane: the
 // two-dimensional filter of [CM92].
 struct Slice {
@@ -140,6 +155,7 @@ struct Scene {
   std::vector<ScalarLayer> scalars;
   DepthCue depth_cue;
   std::optional<Slice> slice;
+  std::optional<Body> body;
   Method method = Method::kernel;
   Compositing compositing = Compositing::analytic;
   double slab_thickness = 1;  // thickness in cells along the line of sight

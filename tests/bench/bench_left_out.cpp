@@ -132,10 +132,12 @@ void no_overlap(View& view) { view.vector.span = 1; }
 void flat_on(View& view) { view.camera.projection = protocol::Projection::orthographic; }
 void globe(View& view) {
   view.geometry.mapping = protocol::GeometryMapping::sphere;
+  view.geometry.body.show = protocol::BodyShow::off;
   view.camera.eye.reset();
   view.camera.target.reset();
   view.camera.height.reset();
 }
+void opaque(View& view) { view.geometry.body.show = protocol::BodyShow::on; }
 void one_layer(View& view) { view.geometry.slice = {protocol::GridAxis::z, 8}; }
 
 // Every wind is rendered except where omitting winds is the feature, as in the figures of the
@@ -159,6 +161,8 @@ std::vector<Feature> features() {
       {"colour by a scalar, no medium", "climate", then(then(all, no_medium), colored_by("cloud")),
        then(all, no_medium)},
       {"curved lattice: globe to flat", "climate", then(all, globe), all},
+      {"the far side of a globe: opaque", "climate", then(all, globe),
+       then(then(all, globe), opaque)},
       {"overlap: span 7 to 1", "climate", all, then(all, no_overlap)},
       {"every other sample: stride 2", "climate", all, then(all, stride(2))},
       {"all layers but one: a slice", "climate", all, then(all, one_layer)},

@@ -135,14 +135,6 @@ scene::Scene busy_scene(int width, int height, bool perspective) {
   return scene;
 }
 
-float largest_difference(const engine::Rendered& a, const engine::Rendered& b) {
-  float most = 0;
-  for (std::size_t i = 0; i < a.image.rgba.size(); ++i) {
-    most = std::max(most, std::abs(a.image.rgba[i] - b.image.rgba[i]));
-  }
-  return most;
-}
-
 // Lane by lane without fused multiply-add, at the full vector width: differences are due to
 // rounding. Targets with FMA also differ by the processor's estimates of reciprocal square roots.
 TEST(Targets, AgreeAtAwkwardSizes) {

@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <tuple>
 
+#include "server/engine/reference/body.hpp"
 #include "server/engine/reference/kernels.hpp"
+#include "tests/numerics/naive_order.hpp"
 #include "tests/numerics/partial_footprint.hpp"
 #include "tests/numerics/truth/integrator.hpp"
 
@@ -14,9 +15,7 @@ namespace windsplat::naive {
 
 namespace {
 
-using engine::reference::AxisPosition;
 using engine::reference::KernelPosition;
-using engine::reference::LayerGroup;
 using engine::reference::ScreenBox;
 using engine::reference::View;
 using scene::Scene;
@@ -33,135 +32,6 @@ template <class Real>
 Vec<Real> cross(const Vec<Real>& a, const Vec<Real>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-
-// ---- order ----
-
-// Rank of a kernel position along its axis: bricks of eight outward from the brick of the eye,
-// upper side first; within a brick outward from the position nearest to the eye, upper side first.
-std::tuple<bool, int, bool, int> place_in_bricks(int position, int eye, int count) {
-  const int brick = position / 8;
-  const int eye_brick = eye / 8;
-  const int start = std::clamp(eye, 8 * brick, std::min(8 * brick + 7, count - 1));
-  return {brick < eye_brick, std::abs(brick - eye_brick), position < start,
-          std::abs(position - start)};
-}
-
-struct OrderedAxis {
-  std::vector<AxisPosition> positions;
-  int eye = 0;
-  std::vector<int> order;  // kernel positions in rendering order
-};
-
-OrderedAxis order_axis(const Scene& scene, int a, const std::vector<AxisPosition>& positions) {
-  OrderedAxis axis;
-  axis.positions = positions;
-  const int count = static_cast<int>(positions.size());
-  if (scene.camera.perspective) {
-    // The kernel position whose cell, bounded midway to its neighbours, contains the eye.
-    for (int i = 1; i < count; ++i) {
-      const double border = (scene.lattice.positions[a][positions[i - 1].sample] +
-                             scene.lattice.positions[a][positions[i].sample]) /
-                            2;
-      if (scene.camera.eye[a] >= border) axis.eye = i;
-    }
-  } else {
-    axis.eye = scene.camera.forward[a] >= 0 ? 0 : count - 1;
-  }
-  for (int i = 0; i < count; ++i) axis.order.push_back(i);
-  std::sort(axis.order.begin(), axis.order.end(), [&](int p, int q) {
-    return place_in_bricks(p, axis.eye, count) < place_in_bricks(q, axis.eye, count);
-  });
-  return axis;
-}
-
-// Layers of one stride.
-struct Group {
-  LayerGroup layers;
-  std::array<OrderedAxis, 3> axis;
-};
-
-std::vector<Group> order_groups(const Scene& scene) {
-  std::vector<Group> groups;
-  for (LayerGroup& layers : engine::reference::group_layers(scene)) {
-    Group group;
-    for (int a = 0; a < 3; ++a) group.axis[a] = order_axis(scene, a, layers.axis[a]);
-    group.layers = std::move(layers);
-    groups.push_back(std::move(group));
-  }
-  return groups;
-}
-
-// The axis along which the view crosses most cells per unit length.
-int major_axis(const Scene& scene) {
-  int best = 0;
-  double most = -1;
-  for (int a = 0; a < 3; ++a) {
-    double width = 0;
-    for (const double s : scene.lattice.spacing[a]) width += s / scene.lattice.dims[a];
-    const double crossed = std::abs(scene.camera.forward[a]) / width;
-    if (crossed > most * (1 + 1e-12)) {
-      most = crossed;
-      best = a;
-    }
-  }
-  return best;
-}
-
-// `side` precedes `distance` from outside the box, where the sheets above the eye come first;
-// from inside, sheets are ordered by distance, of two equally near ones first that behind the eye.
-struct Slab {
-  int first;
-  int second;
-  int group;
-  int position;
-  bool operator<(const Slab& other) const {
-    return std::tie(first, second, group) < std::tie(other.first, other.second, other.group);
-  }
-};
-
-// The sample of the full lattice whose cell contains the eye.
-int eye_sample(const Scene& scene, int a) {
-  const auto& at = scene.lattice.positions[a];
-  const int last = static_cast<int>(at.size()) - 1;
-  if (!scene.camera.perspective) return scene.camera.forward[a] >= 0 ? 0 : last;
-  int eye = 0;
-  for (int i = 1; i <= last; ++i) {
-    if (scene.camera.eye[a] >= (at[i - 1] + at[i]) / 2) eye = i;
-  }
-  return eye;
-}
-
-bool eye_inside(const Scene& scene) {
-  if (!scene.camera.perspective) return false;
-  for (int a = 0; a < 3; ++a) {
-    const double eye = scene.camera.eye[a];
-    if (eye < scene.lattice.box_min[a] || eye > scene.lattice.box_max[a]) return false;
-  }
-  return true;
-}
-
-std::vector<Slab> order_slabs(const Scene& scene, const std::vector<Group>& groups, int major) {
-  const int eye = eye_sample(scene, major);
-  const bool inside = eye_inside(scene);
-  std::vector<Slab> slabs;
-  for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
-    const OrderedAxis& axis = groups[g].axis[major];
-    for (int i = 0; i < static_cast<int>(axis.positions.size()); ++i) {
-      const int ahead = axis.positions[i].sample - eye;
-      const int distance = std::abs(ahead);
-      const bool in_front = scene.camera.forward[major] >= 0 ? ahead >= 0 : ahead <= 0;
-      if (inside) {
-        slabs.push_back({distance, in_front ? 1 : 0, g, i});
-      } else {
-        slabs.push_back({ahead < 0 ? 1 : 0, distance, g, i});
-      }
-    }
-  }
-  std::sort(slabs.begin(), slabs.end());
-  return slabs;
-}
-
-// ---- content of a kernel position ----
 
 template <class Real>
 using Line = engine::reference::BasicRibbon<Real>;
@@ -215,6 +85,14 @@ class Renderer {
     const std::size_t pixels = static_cast<std::size_t>(c.width) * c.height;
     picture_.rgba.assign(4 * pixels, 0);
     transmittance_.assign(pixels, 1);
+    if (!scene.body) return;
+    for (int y = 0; y < c.height; ++y) {
+      for (int x = 0; x < c.width; ++x) {
+        body_.push_back(engine::reference::body_surface(*scene.body, view_, x + 0.5, y + 0.5));
+        behind_.push_back(static_cast<Real>(1 - body_.back().opacity));
+        farther_.insert(farther_.end(), 4, Real(0));
+      }
+    }
   }
 
   Picture<Real> run() {
@@ -238,6 +116,7 @@ class Renderer {
         });
       });
     }
+    for (std::size_t i = 0; i < body_.size(); ++i) add_body(i);
     return std::move(picture_);
   }
 
@@ -388,13 +267,51 @@ class Renderer {
     engine::reference::RibbonHit<Real> hit;
     if (line != nullptr) hit = hit_ribbon(*line, x + Real(0.5), y + Real(0.5));
     if (tau == 0 && hit.opacity == 0) return;
-    const Real from_middle = (hit.depth - closest) * cells;
-    Real place = std::clamp(Real(0.5) + from_middle, Real(0), Real(1));
-    if (cut && before < 1) {
-      place = std::clamp((part_before(r, from_middle) - before) / (1 - before), Real(0), Real(1));
+    // The part of the rest of the cell before a depth.
+    const auto part_at = [&](Real depth) {
+      const Real from_middle = (depth - closest) * cells;
+      if (cut && before < 1) {
+        return std::clamp((part_before(r, from_middle) - before) / (1 - before), Real(0), Real(1));
+      }
+      return std::clamp(Real(0.5) + from_middle, Real(0), Real(1));
+    };
+    const std::size_t index = static_cast<std::size_t>(y) * picture_.width + x;
+    const Cell cell{tau, hit.opacity, part_at(hit.depth), medium.color, hit.color};
+    if (body_.empty() || body_[index].opacity == 0) {
+      return add(picture_.rgba.data() + 4 * index, cell, transmittance_[index]);
     }
-    add(static_cast<std::size_t>(y) * picture_.width + x, tau, hit.opacity, place, medium.color,
-        hit.color);
+    const auto depth = static_cast<Real>(body_[index].depth);
+    divide(index, cell, medium.drawn ? part_at(depth) : 1, hit.depth < depth);
+  }
+
+  // A line of some opacity at `place` in a homogeneous cell.
+  struct Cell {
+    Real tau, opacity, place;
+    Vec<Real> medium, line;
+  };
+
+  // The body lies at `part` of the cell: what is behind it shines through the rest of the pixel.
+  void divide(std::size_t index, const Cell& cell, Real part, bool line_before) {
+    Cell before = cell;
+    before.tau = cell.tau * part;
+    before.opacity = line_before ? cell.opacity : 0;
+    before.place = part > 0 ? std::min(cell.place / part, Real(1)) : 0;
+    add(picture_.rgba.data() + 4 * index, before, transmittance_[index]);
+    Cell after = cell;
+    after.tau = cell.tau * (1 - part);
+    after.opacity = line_before ? 0 : cell.opacity;
+    after.place = part < 1 ? std::max((cell.place - part) / (1 - part), Real(0)) : 0;
+    add(farther_.data() + 4 * index, after, behind_[index]);
+  }
+
+  void add_body(std::size_t index) {
+    const auto& body = body_[index];
+    const Real front = transmittance_[index];
+    Real* to = picture_.rgba.data() + 4 * index;
+    for (int c = 0; c < 3; ++c) {
+      to[c] += front * (static_cast<Real>(body.opacity * body.color[c]) + farther_[4 * index + c]);
+    }
+    to[3] = 1 - front * behind_[index];
   }
 
   Vec<Real> to_cells(const Vec<Real>& v) const {
@@ -404,13 +321,10 @@ class Renderer {
 
   // The three pieces of the paper composited in order: medium in front of the line, line, medium
   // behind it.
-  void add_pieces(std::size_t index, Real absorbed, Real opacity, Real place,
-                  const Vec<Real>& medium, const Vec<Real>& line) {
-    const Real alphas[3] = {place * absorbed, opacity, (1 - place) * absorbed};
-    const Vec<Real> colors[3] = {medium, line, medium};
-    Real* to = picture_.rgba.data() + 4 * index;
-    Real& t = transmittance_[index];
-    if (opacity == 0) return over(to, t, absorbed, medium);
+  void add_pieces(Real* to, Real absorbed, const Cell& cell, Real& t) {
+    const Real alphas[3] = {cell.place * absorbed, cell.opacity, (1 - cell.place) * absorbed};
+    const Vec<Real> colors[3] = {cell.medium, cell.line, cell.medium};
+    if (cell.opacity == 0) return over(to, t, absorbed, cell.medium);
     for (int n = 0; n < 3; ++n) over(to, t, alphas[n], colors[n]);
   }
 
@@ -422,23 +336,21 @@ class Renderer {
 
   // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau x) (c_v - c_s), `over` front to back.
   // The other rules replace the second exponential with a chord or with nothing, or A with tau.
-  void add(std::size_t index, Real tau, Real opacity, Real place, const Vec<Real>& medium,
-           const Vec<Real>& line) {
+  void add(Real* to, const Cell& cell, Real& t) {
+    const auto& [tau, opacity, place, medium, line] = cell;
     using scene::Compositing;
     const Compositing rule = scene_.compositing;
     const bool euler = rule == Compositing::cd_euler;
     const Real absorbed = euler ? std::min(tau, Real(1e6)) : -std::expm1(-tau);
     const Real transmitted = euler ? 1 - absorbed : std::exp(-tau);
     if (rule == Compositing::cd_naive) {
-      return add_pieces(index, absorbed, opacity, place, medium, line);
+      return add_pieces(to, absorbed, cell, t);
     }
     Real before = std::exp(-tau * place);
     if (rule == Compositing::simple) before = transmitted;
     if (rule == Compositing::cd || euler) before = 1 - place * absorbed;
-    Real& t = transmittance_[index];
     const Real alpha = absorbed + opacity * transmitted;
     const Real own = opacity * before;
-    Real* to = picture_.rgba.data() + 4 * index;
     for (int c = 0; c < 3; ++c) to[c] += t * (medium[c] * alpha + own * (line[c] - medium[c]));
     to[3] += t * alpha;
     t *= transmitted * (1 - opacity);
@@ -448,6 +360,11 @@ class Renderer {
   View view_;
   Picture<Real> picture_;
   std::vector<Real> transmittance_;
+  // With a body, by pixel: the body; the light from behind it; its transmittance and that of all
+  // behind it.
+  std::vector<engine::reference::Surface> body_;
+  std::vector<Real> farther_;
+  std::vector<Real> behind_;
   Vec<Real> right_{}, down_{}, forward_{};
   Real pixel_ = 1;
   // The current kernel.

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "server/engine/kernels/dispatch.hpp"
 #include "tests/numerics/naive_renderer.hpp"
 #include "tests/numerics/scenes.hpp"
 
@@ -164,6 +165,61 @@ TEST_P(RandomView, EqualsTheNaiveRenderer) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomView, testing::Range(1U, 85U));
+
+// A sphere or a rectangle among the kernels, on every instruction set.
+class RandomBody : public testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(RandomBody, EqualsTheNaiveRenderer) {
+  const std::uint32_t seed = GetParam();
+  Scene scene = SceneMaker(seed).make(static_cast<What>(seed % 6), seed % 4 != 3, seed % 8 == 4);
+  scene.slice.reset();
+  scene.compositing = static_cast<scene::Compositing>(seed % 4);
+  scene.body = scene::Body{};
+  scene.body->color = {0.2F, 0.3F, 0.1F};
+  scene.body->radius = 0.15 + 0.03 * (seed % 7);
+  if (seed % 3 == 0) {
+    scene.body->shape = scene::BodyShape::ground;
+    scene.body->low = {-0.5, -0.3};
+    scene.body->high = {0.4, 0.2};
+    scene.body->height = 0.1 - 0.05 * (seed % 5);
+  }
+  const naive::Picture<double> truth = naive::render<double>(scene);
+  for (const engine::kernels::Table* table : engine::kernels::usable_tables()) {
+    const Difference d = compare(render_with(*table, scene).image, truth);
+    EXPECT_LE(d.linear, 5e-4) << table->name;
+    EXPECT_LE(d.codes, 1);
+    EXPECT_GT(d.brightest, 0.02) << "an empty view tests nothing";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, RandomBody, testing::Range(100U, 148U));
+
+// Lines and medium around the eye, close above a rectangle: of many splats the near plane removes
+// one part and the body another.
+TEST(Inside, LinesAndMediumEndAtTheGround) {
+  for (std::uint32_t seed = 1; seed <= 12; ++seed) {
+    Scene scene = SceneMaker(seed).make(What::both, true, true);
+    scene.slice.reset();
+    scene.compositing = static_cast<scene::Compositing>(seed % 4);
+    const double angle = 0.7 * seed;
+    const glm::dvec3 forward{std::cos(angle), std::sin(angle), -0.4};
+    scene.camera = look({0.05, -0.04, 0.02}, forward, 0, 80, 60, true, 0.9);
+    scene.camera.near = 0.01;
+    scene.body = scene::Body{};
+    scene.body->shape = scene::BodyShape::ground;
+    scene.body->color = {0.2F, 0.3F, 0.1F};
+    scene.body->low = {-0.5, -0.3};
+    scene.body->high = {0.4, 0.2};
+    scene.body->height = 0.005 - 0.015 * (seed % 4);
+    const naive::Picture<double> truth = naive::render<double>(scene);
+    for (const engine::kernels::Table* table : engine::kernels::usable_tables()) {
+      const Difference d = compare(render_with(*table, scene).image, truth);
+      EXPECT_LE(d.linear, 5e-4) << seed << ' ' << table->name;
+    }
+    scene.body.reset();
+    EXPECT_GT(compare(render(scene).image, truth).linear, 0.02) << "the body is not in sight";
+  }
+}
 
 // Partial rows, and rows whose first and last samples are as far apart as in a full row: samples in
 // between must not be read.

@@ -1,6 +1,7 @@
 // Synthetic scenes for the numerical tests.
 #include "tests/numerics/scenes.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <stdexcept>
@@ -160,6 +161,14 @@ engine::Rendered render_with(const engine::kernels::Table& table, const scene::S
   engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, engine::sink_into(out.image),
                      out.work);
   return out;
+}
+
+float largest_difference(const engine::Rendered& a, const engine::Rendered& b) {
+  float most = 0;
+  for (std::size_t i = 0; i < a.image.rgba.size(); ++i) {
+    most = std::max(most, std::abs(a.image.rgba[i] - b.image.rgba[i]));
+  }
+  return most;
 }
 
 const float* pixel(const engine::Image& image, int x, int y) {

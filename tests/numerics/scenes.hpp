@@ -51,9 +51,11 @@ scene::VectorLayer plain_lines(std::shared_ptr<const data::Volume> field, std::a
 scene::Scene cloudy_scene(int side, int size);
 
 engine::Rendered render(const scene::Scene& scene, unsigned threads = 1);
-
-// The same by one instruction set.
+// With the kernels of one instruction set, on one thread.
 engine::Rendered render_with(const engine::kernels::Table& table, const scene::Scene& scene);
+
+// Largest difference of a channel of any pixel.
+float largest_difference(const engine::Rendered& a, const engine::Rendered& b);
 
 const float* pixel(const engine::Image& image, int x, int y);
 

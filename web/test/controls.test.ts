@@ -142,6 +142,11 @@ test("controls without effect are hidden or disabled", () => {
   assert.equal(off({ geometry: { heightField: "zg" } }).vertical, false);
   assert.equal(off({ geometry: { slice: { axis: "x", index: 0 } } }).slice, true);
   assert.equal(off({ camera: { projection: "orthographic" } }).fovY, false);
+  assert.equal(off({ geometry: { mapping: "flat" } }).body, false);
+  assert.equal(off({ geometry: { mapping: "flat", body: { show: "on" } } }).body, true);
+  assert.equal(off({ geometry: { mapping: "sphere" } }).body, true);
+  assert.equal(off({ geometry: { mapping: "sphere", body: { show: "auto" } } }).body, true);
+  assert.equal(off({ geometry: { mapping: "sphere", body: { show: "off" } } }).body, false);
   assert.equal(off({ depthCue: { strength: 0 } }).depthCue, false);
 });
 

@@ -25,6 +25,8 @@ const Table& WINDSPLAT_KERNEL_TABLE() {
                                close_slab,
                                prefetch_brick,
                                fill_rays,
+                               open_body,
+                               close_body,
                                copy_row,
                                count_open,
                                attenuate,

@@ -187,29 +187,50 @@ KERNEL_INLINE Light splat_block(const Lanes& s, float x, float y, const float* H
   return light;
 }
 
+// A line in a homogeneous cell at a vector of pixels; see add_cell.
+struct CellLight {
+  Pixel tau;
+  Attenuation<Pixel> medium;
+  const Pixel* color;  // of the medium
+  Pixel opacity;
+  const Pixel* line_color;
+  Pixel x_line;
+};
+
 // The first form of [CM92]: the front part of the medium, the line and the back part composited one
 // over the other where the ray meets the line.
-KERNEL_INLINE Pixel naive_block(const RibbonLanes& r, const Pixel medium_color[3],
-                                const RibbonLane& line, const Attenuation<Pixel>& medium,
-                                Pixel x_line, const Channels& to, int l) {
+KERNEL_INLINE Pixel add_naive_cell(const CellLight& cell, Pixel t, const Channels& to, int l) {
   const Pixel one = all<Pixel>(1.0F);
-  const Pixel split = hn::IfThenElse(hn::Gt(line.opacity, hn::Zero(PixelTag())), x_line, one);
-  const Pixel front = split * medium.absorbed;
-  const Pixel back = (one - split) * medium.absorbed;
-  const Pixel line_weight = (one - front) * line.opacity;
-  const Pixel rest = (one - front) * (one - line.opacity);
+  const Pixel split = hn::IfThenElse(hn::Gt(cell.opacity, hn::Zero(PixelTag())), cell.x_line, one);
+  const Pixel front = split * cell.medium.absorbed;
+  const Pixel back = (one - split) * cell.medium.absorbed;
+  const Pixel line_weight = (one - front) * cell.opacity;
+  const Pixel rest = (one - front) * (one - cell.opacity);
   const Pixel absorbed = front + rest * back;
-  const Pixel t = load<Pixel>(to.transmittance + l);
   for (int c = 0; c < 3; ++c) {
-    const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
-    add_product(to.rgb[c] + l, t, hn::MulAdd(line_weight, color, medium_color[c] * absorbed));
+    add_product(to.rgb[c] + l, t,
+                hn::MulAdd(line_weight, cell.line_color[c], cell.color[c] * absorbed));
   }
-  return t * (rest * (one - back));
+  return rest * (one - back);
 }
 
-// A line in a homogeneous cell of optical depth tau, with optical depth tau_f in front of it
-// (x = tau_f / tau is its relative position):
+// Adds a line in a homogeneous cell of optical depth tau, with optical depth tau_f in front of it
+// (x = tau_f / tau is its relative position), where the transmittance t remains:
 // A = -expm1(-tau) + a exp(-tau), I = c_s A + a exp(-tau_f) (c_v - c_s).
+// Returns the transmittance of the cell.
+template <int Compositing>
+KERNEL_INLINE Pixel add_cell(const CellLight& cell, Pixel t, const Channels& to, int l) {
+  if (Compositing == compositing_cd_naive) return add_naive_cell(cell, t, to, l);
+  const Attenuation<Pixel>& medium = cell.medium;
+  const Pixel a = hn::MulAdd(cell.opacity, medium.transmitted, medium.absorbed);
+  const Pixel line_weight = cell.opacity * light_before<Compositing>(medium, cell.tau, cell.x_line);
+  for (int c = 0; c < 3; ++c) {
+    const Pixel difference = cell.line_color[c] - cell.color[c];
+    add_product(to.rgb[c] + l, t, hn::MulAdd(line_weight, difference, cell.color[c] * a));
+  }
+  return medium.transmitted * (all<Pixel>(1.0F) - cell.opacity);
+}
+
 template <bool Perspective, int Compositing, int Style, From Start, class Lanes>
 KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise, const Lanes& s,
                                float x, float y, const float* HWY_RESTRICT ray,
@@ -226,20 +247,11 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
     const Pixel tau = depth_beyond<Start>(lane);
     const Attenuation<Pixel> medium = attenuation_by<Compositing>(tau);
     const Pixel x_line = fraction_before(s, lane, hn::MulAdd(line.f, depth_rise, depth));
-    Pixel left;
-    if (Compositing == compositing_cd_naive) {
-      left = naive_block(r, s.color, line, medium, x_line, to, l);
-    } else {
-      const Pixel t = load<Pixel>(to.transmittance + l);
-      const Pixel a = hn::MulAdd(line.opacity, medium.transmitted, medium.absorbed);
-      const Pixel line_weight = line.opacity * light_before<Compositing>(medium, tau, x_line);
-      for (int c = 0; c < 3; ++c) {
-        const Pixel color = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
-        add_product(to.rgb[c] + l, t, hn::MulAdd(line_weight, color - s.color[c], s.color[c] * a));
-      }
-      left = t * (medium.transmitted * (all<Pixel>(1.0F) - line.opacity));
-    }
-    left = bounded_light<Compositing>(left);
+    Pixel line_color[3];
+    for (int c = 0; c < 3; ++c) line_color[c] = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
+    const Pixel t = load<Pixel>(to.transmittance + l);
+    const CellLight cell = {tau, medium, s.color, line.opacity, line_color, x_line};
+    const Pixel left = bounded_light<Compositing>(t * add_cell<Compositing>(cell, t, to, l));
     store(left, to.transmittance + l);
     see_light<Compositing>(left, light);
   }

@@ -3,93 +3,13 @@
 #pragma once
 
 #include "server/engine/kernels/body_composite.hpp"
+#include "server/engine/kernels/body_forms.hpp"
+#include "server/engine/kernels/body_opaque.hpp"
+#include "server/engine/kernels/body_pixels.hpp"
 #include "server/engine/kernels/body_prepare.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
-
-inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
-  Ribbon out = {r.x[l],
-                r.y[l],
-                r.ux[l],
-                r.uy[l],
-                r.wx[l],
-                r.wy[l],
-                r.w0[l],
-                r.depth_ratio[l],
-                r.bend[l],
-                {r.tail[l][0], r.tail[l][1], r.tail[l][2]},
-                {r.rise[l][0], r.rise[l][1], r.rise[l][2]},
-                r.depth[l],
-                r.depth_rise[l],
-                0,
-                0,
-                line.reach,
-                line.steep,
-                line.opacity};
-  if (line.moving != 0) {
-    out.phase = r.phase[l];
-    out.phase_rise = r.phase_rise[l];
-  }
-  return out;
-}
-
-inline NearForm near_form_at(const Prepared& p, int l) {
-  const NearSplats& s = p.near_splats;
-  NearForm out = {};
-  out.x = p.middle_x;
-  out.y = p.middle_y;
-  for (int a = 0; a < 3; ++a) {
-    out.centre[a] = s.centre[a][l];
-    out.ahead[a] = s.ahead[a][l];
-    out.right[a] = s.right[a][l];
-    out.down[a] = s.down[a][l];
-  }
-  out.d2_least = p.splats.d2_least[l];
-  return out;
-}
-
-template <bool Perspective>
-inline SplatForm form_at(const Splats& s, int l) {
-  SplatForm out = {};
-  out.x = s.x[l];
-  out.y = s.y[l];
-  out.xx = s.xx[l];
-  out.xy = s.xy[l];
-  out.yy = s.yy[l];
-  out.d0 = s.d0[l];
-  out.bx = s.bx[l];
-  out.by = s.by[l];
-  if (Perspective) {
-    out.ex = s.ex[l];
-    out.ey = s.ey[l];
-    out.b0 = s.b0[l];
-    out.dx = s.dx[l];
-    out.dy = s.dy[l];
-    out.dxx = s.dxx[l];
-    out.dxy = s.dxy[l];
-    out.dyy = s.dyy[l];
-    out.d2_least = s.d2_least[l];
-  }
-  return out;
-}
-
-template <bool Perspective>
-inline Splat splat_at(const Prepared& p, int l) {
-  Splat out = {};
-  if (Perspective && has(p.splats.near, l)) {
-    out.near_form = near_form_at(p, l);
-  } else {
-    out.form = form_at<Perspective>(p.splats, l);
-  }
-  if (Perspective) {
-    out.z = p.positions.z[l];
-    out.near = p.near;
-  }
-  out.strength = p.splats.strength[l];
-  for (int c = 0; c < 3; ++c) out.color[c] = p.densities.color[l][c];
-  return out;
-}
 
 // Offsets of the blocks of a window from its corner, in pixels.
 struct WindowOffsets {
@@ -270,22 +190,21 @@ struct KernelDrawing {
   }
 };
 
-template <bool Perspective>
-void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
-  const Footing& f = p.footing;
-  const bool lined = has(p.positions.lines, l);
-  KernelDrawing kernel = {
-      with, tile, splat_at<Perspective>(p, l), {}, static_cast<int>(from_of<Perspective>(p, l))};
-  if (lined) kernel.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
-  const Box splat = splat_box(f, l);
+// Calls draw(row, column, lines, splats) for each window of a kernel, with the blocks of the window
+// that its line and its splat may touch.
+template <class Draw>
+KERNEL_INLINE void each_window(const Footing& f, int l, bool lined, bool splatted,
+                               const Draw& draw) {
+  const Box splat = splatted ? splat_box(f, l) : line_box(f, l);
   const Box line = lined ? line_box(f, l) : splat;
   const Box box = united(splat, line);
   if (within_window(box)) {
     const Window window = {box.row, box.column, 0};
     const std::uint64_t lines =
         lined ? moved(joined(f.window_high[l], f.window_low[l]), line, window) : 0;
-    const std::uint64_t splats = moved(joined(f.splat_high[l], f.splat_low[l]), splat, window);
-    kernel.draw(box.row, box.column, lines, splats);
+    const std::uint64_t splats =
+        splatted ? moved(joined(f.splat_high[l], f.splat_low[l]), splat, window) : 0;
+    draw(box.row, box.column, lines, splats);
     return;
   }
   const std::uint32_t columns = range_mask({splat.column, splat.column_last});
@@ -296,14 +215,94 @@ void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
       if (lined) {
         lines = in_window(line, window, [&](int at) { return f.line_columns[at - line.row][l]; });
       }
-      kernel.draw(row, column, lines, in_window(splat, window, [&](int) { return columns; }));
+      std::uint64_t splats = 0;
+      if (splatted) splats = in_window(splat, window, [&](int) { return columns; });
+      draw(row, column, lines, splats);
     }
   }
 }
 
 template <bool Perspective>
+void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
+  const bool lined = has(p.positions.lines, l);
+  KernelDrawing kernel = {
+      with, tile, splat_at<Perspective>(p, l), {}, static_cast<int>(from_of<Perspective>(p, l))};
+  if (lined) kernel.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
+  each_window(p.footing, l, lined, true,
+              [&](int row, int column, std::uint64_t lines, std::uint64_t splats) {
+                kernel.draw(row, column, lines, splats);
+              });
+}
+
+// The cell along a ray of a splat extends to sqrt(t^2 + 1/4) strides from the centre, the
+// silhouette to t.
+inline KernelDepths depths_of(const Prepared& p, int l) {
+  const float centre = p.positions.depth[l];
+  KernelDepths depths = {body_nowhere, -body_nowhere};
+  const auto reach = [&](float a, float b) {
+    depths.first = smaller(depths.first, smaller(a, b));
+    depths.last = larger(depths.last, larger(a, b));
+  };
+  if (has(p.positions.lines, l)) {
+    const float from = centre + p.ribbons.depth[l];
+    reach(from, from + p.ribbons.depth_rise[l]);
+  }
+  if (has(p.positions.splats, l)) {
+    constexpr float cell_share = 1.07F;
+    const float half = cell_share * p.splats.half_depth[l];
+    reach(centre - half, centre + half);
+  }
+  return depths;
+}
+
+// Whether the body hides a part of a kernel.
+inline bool meets_body(const Prepared& p, const KernelDepths& depths, int l, const Tile& tile) {
+  if (depths.last <= tile.body->nearest) return false;
+  bool meets = false;
+  each_window(p.footing, l, has(p.positions.lines, l), has(p.positions.splats, l),
+              [&](int row, int column, std::uint64_t lines, std::uint64_t splats) {
+                const BodyWindow found = at_body(*tile.body, depths, {row, column, lines | splats});
+                meets = meets || (found.hidden | found.divided) != 0;
+              });
+  return meets;
+}
+
+// Draws a kernel of which the body hides a part.
+template <bool Perspective>
+void draw_at_body(const Prepared& p, const Compositor& with, const KernelDepths& depths, int l,
+                  Tile& tile) {
+  const bool lined = has(p.positions.lines, l);
+  const bool splatted = has(p.positions.splats, l);
+  KernelDrawing kernel = {with, tile, {}, {}, static_cast<int>(From::eye)};
+  if (lined) kernel.ribbon = ribbon_at(p.pass->line, p.ribbons, l);
+  if (splatted) {
+    kernel.splat = splat_at<Perspective>(p, l);
+    kernel.from = static_cast<int>(from_of<Perspective>(p, l));
+  }
+  const int near = kernel.from == static_cast<int>(From::near_plane) ? 1 : 0;
+  const DividedKernel divided = {&kernel.ribbon, &kernel.splat, p.pass->line.moving, near,
+                                 p.positions.depth[l]};
+  each_window(p.footing, l, lined, splatted,
+              [&](int row, int column, std::uint64_t lines, std::uint64_t splats) {
+                std::uint64_t open = lines | splats;
+                if (tile.any_closed != 0) open &= open_window(tile, row, column);
+                const BodyWindow found = at_body(*tile.body, depths, {row, column, open});
+                const std::uint64_t before = open & ~(found.hidden | found.divided);
+                kernel.draw(row, column, lines & before, splats & before);
+                draw_divided<Perspective>(divided, p.pass->compositing, row, column,
+                                          lines & found.divided, splats & found.divided, tile);
+              });
+}
+
+template <bool Perspective>
 KERNEL_INLINE void draw_position(const Prepared& p, const Compositor& with, int style, int l,
                                  Tile& tile) {
+  if (tile.body != nullptr) {
+    const KernelDepths depths = depths_of(p, l);
+    if (meets_body(p, depths, l, tile)) {
+      return draw_at_body<Perspective>(p, with, depths, l, tile);
+    }
+  }
   if (has(p.positions.splats, l)) {
     draw_kernel<Perspective>(p, with, l, tile);
   } else {
@@ -420,48 +419,6 @@ void draw(const Camera& camera, const Pass& pass, const Brick& brick, Tile& tile
   } else {
     draw_in_order<false>(brick, prepared, tile);
   }
-}
-
-// Lengths of the rays of pixels at unit depth.
-void fill_rays(const Camera& camera, const Tile& tile, float* rays) {
-  const Pixel pixel = all<Pixel>(camera.pixel);
-  const Pixel one = all<Pixel>(1.0F);
-  for (int row = 0; row < blocks_of(tile.height); ++row) {
-    const float top = top_of(tile, row) - camera.half_height_px;
-    for (int column = 0; column < blocks_of(tile.width); ++column) {
-      const float left = left_of(tile, column) - camera.half_width_px;
-      float* to = rays + static_cast<std::ptrdiff_t>(row * tile_blocks + column) * block_pixels;
-      for (int l = 0; l < block_pixels; l += pixel_lanes) {
-        const Pixel x = (all<Pixel>(left) + load<Pixel>(lane_x + l)) * pixel;
-        const Pixel y = (all<Pixel>(top) + load<Pixel>(lane_y + l)) * pixel;
-        store(hn::Sqrt(hn::MulAdd(x, x, hn::MulAdd(y, y, one))), to + l);
-      }
-    }
-  }
-}
-
-// alpha = 1 - transmittance. With forward Euler the transmittance may be negative; divergence is
-// shown, not clamped.
-void copy_row(const Tile& tile, int y, float* rgba) {
-  const hn::CappedTag<float, block_side> tag;
-  constexpr int lanes = static_cast<int>(hn::MaxLanes(tag));
-  const auto one = hn::Set(tag, 1.0F);
-  const std::ptrdiff_t row = std::ptrdiff_t{block_side} * (y % block_side);
-  const float* block = block_at(tile, y / block_side, 0) + row;
-  for (int column = 0; column < blocks_of(tile.width); ++column, block += block_floats) {
-    for (int i = 0; i < block_side; i += lanes, rgba += std::ptrdiff_t{4} * lanes) {
-      const auto channel = [&](std::ptrdiff_t c) {
-        return hn::LoadU(tag, block + c * block_pixels + i);
-      };
-      hn::StoreInterleaved4(channel(1), channel(2), channel(3), one - channel(0), tag, rgba);
-    }
-  }
-}
-
-int count_open(const Tile& tile) {
-  int open = 0;
-  for (const std::uint32_t row : tile.open) open += __builtin_popcount(row);
-  return open;
 }
 
 }  // namespace

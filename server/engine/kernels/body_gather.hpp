@@ -25,10 +25,25 @@ struct Faces {
   Slab* slab[slabs_ahead];
 };
 
+// Depth at which the medium ends for pixels that the body covers entirely. Others see the medium
+// behind it, too: there the slab in which the body lies counts as homogeneous.
+KERNEL_INLINE Pixel body_limit(const BodyBlock& body, int l) {
+  const auto covered = hn::Ge(load<Pixel>(body.opacity + l), all<Pixel>(1.0F));
+  return hn::IfThenElse(covered, load<Pixel>(body.depth + l), all<Pixel>(body_nowhere));
+}
+
+// Whether the body may hide a part of a splat in a block.
+inline bool is_limited(const SplatRecord& record, const Tile& tile, int row, int column) {
+  const bool seen = (tile.body->seen[row] >> static_cast<unsigned>(column) & 1U) != 0;
+  return seen && record.last > tile.body->blocks[row * tile_blocks + column].nearest;
+}
+
 // Adds the part of the splat in each slab to one block. Returns the number of slabs changed.
-template <bool Perspective, From Start, class Lanes>
+// Limited: without the part behind the body; `middle` is the depth of the splat.
+template <bool Perspective, From Start, bool Limited, class Lanes>
 KERNEL_INLINE int gather_block(const Lanes& s, const std::int32_t* HWY_RESTRICT partial,
-                               const Faces& faces, const Tile& tile, int row, int column) {
+                               const Faces& faces, float middle, const Tile& tile, int row,
+                               int column) {
   constexpr float t2 = footprint_t * footprint_t;
   const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
   std::uint32_t changed = 0;
@@ -43,7 +58,12 @@ KERNEL_INLINE int gather_block(const Lanes& s, const std::int32_t* HWY_RESTRICT 
     const Pixel whole = lane.tau * all<Pixel>(1.0F / partial_one);
     const PartialRows rows = partial_rows_at(lane.r2);
     const auto at_face = [&](int n) {
-      return clamped((all<Pixel>(faces.depth[n]) - lane.behind) * scale, -1.0F, 1.0F);
+      Pixel depth = all<Pixel>(faces.depth[n]);
+      if (Limited) {
+        const BodyBlock& body = tile.body->blocks[row * tile_blocks + column];
+        depth = hn::Min(depth, body_limit(body, l) - all<Pixel>(middle));
+      }
+      return clamped((depth - lane.behind) * scale, -1.0F, 1.0F);
     };
     Pixel before = partial_at(partial, rows, at_face(0));
     for (int n = 0; n < faces.count; ++n) {
@@ -61,8 +81,8 @@ KERNEL_INLINE int gather_block(const Lanes& s, const std::int32_t* HWY_RESTRICT 
   return __builtin_popcount(changed);
 }
 
-// The part before the near plane is ignored.
-template <bool Perspective, From Start>
+// The part before the near plane is ignored. Body: the tile sees the body.
+template <bool Perspective, From Start, bool Body>
 void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
                Tile& tile) {
   const auto near = static_cast<float>(static_cast<double>(camera.near) - camera.depth_origin);
@@ -86,20 +106,33 @@ void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int
     while (left != 0) {
       const int column = __builtin_ctz(left);
       left &= left - 1U;
-      const int changed =
-          gather_block<Perspective, Start>(lanes, record.partial, faces, tile, row, column);
+      const int changed = Body && is_limited(record, tile, row, column)
+                              ? gather_block<Perspective, Start, true>(
+                                    lanes, record.partial, faces, record.middle, tile, row, column)
+                              : gather_block<Perspective, Start, false>(
+                                    lanes, record.partial, faces, record.middle, tile, row, column);
       tile.counters.pixel_updates += std::int64_t{changed} * block_pixels;
     }
   }
 }
 
+template <bool Perspective, From Start>
+void gather_from(const Camera& camera, const SplatRecord& record, Slab* slabs, int first,
+                 Tile& tile) {
+  if (tile.body != nullptr) {
+    gather_on<Perspective, Start, true>(camera, record, slabs, first, tile);
+  } else {
+    gather_on<Perspective, Start, false>(camera, record, slabs, first, tile);
+  }
+}
+
 void gather(const Camera& camera, const SplatRecord& record, Slab* slabs, int first, Tile& tile) {
   if (camera.perspective == 0) {
-    gather_on<false, From::eye>(camera, record, slabs, first, tile);
+    gather_from<false, From::eye>(camera, record, slabs, first, tile);
   } else if (record.near != 0) {
-    gather_on<true, From::near_plane>(camera, record, slabs, first, tile);
+    gather_from<true, From::near_plane>(camera, record, slabs, first, tile);
   } else {
-    gather_on<true, From::eye>(camera, record, slabs, first, tile);
+    gather_from<true, From::eye>(camera, record, slabs, first, tile);
   }
 }
 

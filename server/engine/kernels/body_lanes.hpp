@@ -195,6 +195,7 @@ KERNEL_INLINE auto spread_from(const Splat& s, const std::int32_t* partial) {
 
 template <bool Perspective, From Start>
 KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
+  static_assert(Start != From::near_plane, "such splats have the near form");
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel dx = px - s.x;
   const Pixel dy = py - s.y;
@@ -233,6 +234,7 @@ KERNEL_INLINE Pixel part_before(const std::int32_t* partial, const SplatLane& la
 // From vectors, because the projected centre of a splat beside the eye is at infinity.
 template <bool Perspective, From Start>
 KERNEL_INLINE SplatLane splat_lane(const NearLanes& s, Pixel px, Pixel py, Pixel ray) {
+  static_assert(Perspective && Start == From::near_plane, "only such splats have the near form");
   const Pixel right = px - s.x;
   const Pixel down = py - s.y;
   const auto along = [&](Pixel ahead, Pixel by_right, Pixel by_down) {
@@ -264,7 +266,7 @@ KERNEL_INLINE Pixel depth_beyond(const SplatLane& lane) {
   }
 }
 
-// The fraction of that part in front of a line whose depth relative to the centre is `depth`.
+// The fraction of that part in front of a surface whose depth relative to the centre is `depth`.
 KERNEL_INLINE Pixel fraction_before(const SplatLanes& /*s*/, const SplatLane& lane, Pixel depth) {
   return clamped(hn::MulAdd(depth - lane.behind, lane.cells, all<Pixel>(0.5F)), 0.0F, 1.0F);
 }

@@ -111,6 +111,56 @@ KERNEL_INLINE bool hit_block(const RibbonRecord& line, const Slab& slab, float x
   return any;
 }
 
+// The part of the slab before the body, by pixel: the medium of pixels that it covers entirely ends
+// there (body_limit), and x_line is relative to it. 1 for other pixels.
+struct BodyShare {
+  alignas(64) float before[block_pixels];
+};
+
+KERNEL_INLINE void open_share(const Slab& slab, const BodyBlock& body, BodyShare& share) {
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel before = fraction_in(slab, body_limit(body, l));
+    store(hn::Max(before, all<Pixel>(1e-6F)), share.before + l);
+  }
+}
+
+inline void scale_hit(const BodyShare& share, BlockHit& m) {
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    store(load<Pixel>(m.x_line + l) / load<Pixel>(share.before + l), m.x_line + l);
+  }
+}
+
+// The body as a line that covers its pixels, where it is in front of the end of the slab and still
+// waits for light; it no longer does then.
+inline void take_body(const Slab& slab, const float rgb[3], BodyBlock& body, BlockHit& m) {
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel one = all<Pixel>(1.0F);
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const Pixel depth = load<Pixel>(body.depth + l);
+    const Pixel opacity = load<Pixel>(body.opacity + l);
+    const auto here = hn::And(hn::Lt(depth, all<Pixel>(slab.back)), hn::Gt(opacity, zero));
+    // Behind the medium before it, or before everything in the slab.
+    const Pixel end = hn::IfThenElse(hn::Le(depth, all<Pixel>(slab.front)), hn::Neg(one), one);
+    const Pixel x_line = hn::IfThenElse(hn::Ge(opacity, one), end, fraction_in(slab, depth));
+    store(x_line, m.x_line + l);
+    store(hn::IfThenElseZero(here, opacity), m.opacity + l);
+    for (int c = 0; c < 3; ++c) {
+      store(load<Pixel>(body.shade + l) * all<Pixel>(rgb[c]), m.color[c] + l);
+    }
+    store(hn::IfThenZeroElse(here, opacity), body.opacity + l);
+    store(hn::IfThenElse(here, one, load<Pixel>(body.behind + l)), body.behind + l);
+  }
+}
+
+// Whether any pixel of the block still waits for light of the body.
+inline bool awaits_body(const BodyBlock& body) {
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const auto waits = hn::Gt(load<Pixel>(body.opacity + l), hn::Zero(PixelTag()));
+    if (!hn::AllFalse(PixelTag(), waits)) return true;
+  }
+  return false;
+}
+
 // Sorts two neighbours per pixel. Returns whether any pixel swapped them.
 KERNEL_INLINE bool put_in_order(BlockHit& first, BlockHit& second) {
   bool swapped = false;
@@ -233,6 +283,8 @@ struct Closing {
   float x, y;  // the block's corner, pixels
   float stop;
   const float* transmittance;  // transmittance in front of the slab
+  BodyBlock* body;             // null: no pixel meets the body in the slab
+  const float* body_rgb;
 };
 
 // Stable rank sort of a few lines by depth: the number of predecessors is the index.
@@ -320,10 +372,19 @@ inline float farthest_x(const BlockHit& m) {
 template <bool Perspective, int Compositing>
 Outcome pass_sorted(const Closing& with, Passage* passage) {
   BlockHit hits[block_hits_max];
+  BodyShare share;
   int held = 0;
-  for (int h = 0; h < with.count; ++h) {
-    const RibbonRecord& line = with.lines[with.met[h].line];
-    if (!hit_block<Perspective>(line, with.slab, with.x, with.y, hits[held])) continue;
+  bool body = with.body != nullptr;
+  if (body) open_share(with.slab, *with.body, share);
+  for (int h = 0; h < with.count || body;) {
+    if (body && (h == with.count || with.met[h].depth >= with.body->nearest)) {
+      take_body(with.slab, with.body_rgb, *with.body, hits[held]);
+      body = false;
+    } else {
+      const RibbonRecord& line = with.lines[with.met[h++].line];
+      if (!hit_block<Perspective>(line, with.slab, with.x, with.y, hits[held])) continue;
+      if (with.body != nullptr) scale_hit(share, hits[held]);
+    }
     if (++held < block_hits_max) continue;
     // Composite the nearer half; later lines may still precede lines of the farther half.
     sort_block_hits(hits, held);
@@ -332,7 +393,7 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
     const float depth = farthest_x(hits[held - 1]) * (with.slab.back - with.slab.begin);
     for (int n = 0; n < held; ++n) hits[n] = hits[n + held];
     if (is_dark(with.transmittance, passage, with.stop) &&
-        rest_is_behind(with, h + 1, with.slab.begin + depth)) {
+        rest_is_behind(with, h, with.slab.begin + depth)) {
       return Outcome::dark;
     }
   }
@@ -350,7 +411,8 @@ void close_block(const Closing& with, const float* gathered, int row, int column
     }
   };
   open();
-  Outcome outcome = pass_in_order<Perspective, Compositing>(with, passage);
+  Outcome outcome = Outcome::out_of_order;
+  if (with.body == nullptr) outcome = pass_in_order<Perspective, Compositing>(with, passage);
   if (outcome == Outcome::out_of_order) {
     open();
     outcome = pass_sorted<Perspective, Compositing>(with, passage);
@@ -396,19 +458,28 @@ void close_slab(const Camera& camera, int compositing, const Slab& slab, const R
     sort_met(met, count, sorted);
     met = sorted;
   }
-  const Closing with = {slab,
-                        lines,
-                        met,
-                        count,
-                        left_of(tile, column),
-                        top_of(tile, row),
-                        tile.stop,
-                        block_at(tile, row, column)};
+  Closing with = {slab,
+                  lines,
+                  met,
+                  count,
+                  left_of(tile, column),
+                  top_of(tile, row),
+                  tile.stop,
+                  block_at(tile, row, column),
+                  nullptr,
+                  nullptr};
+  const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(column);
+  if (tile.body != nullptr && (tile.body->seen[row] & bit) != 0) {
+    BodyBlock& body = tile.body->blocks[index];
+    if (body.nearest < slab.back) with.body = &body;
+    with.body_rgb = tile.body->rgb;
+  }
   if (camera.perspective != 0) {
     close_slab_on<true>(compositing, with, gathered, row, column, tile);
   } else {
     close_slab_on<false>(compositing, with, gathered, row, column, tile);
   }
+  if (with.body != nullptr && !awaits_body(*with.body)) tile.body->seen[row] &= ~bit;
   const int own = medium && compositing != compositing_cd_euler ? 1 : 0;
   const int each = medium && compositing == compositing_analytic ? count : 0;
   tile.counters.pixel_updates += std::int64_t{1 + count} * block_pixels;

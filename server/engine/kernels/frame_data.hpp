@@ -117,6 +117,20 @@ struct Camera {
   double depth_origin;  // view depth of the middle of the volume, the origin of slabs
 };
 
+// The opaque body of the scene; see scene::Body.
+constexpr int body_none = 0;
+constexpr int body_sphere = 1;
+constexpr int body_ground = 2;
+struct Body {
+  int shape;
+  double pixel;            // as Camera::pixel, without rounding to float
+  double centre[3];        // sphere: right, down and forward of the eye, world units
+  double radius;           // sphere
+  double low[3], high[3];  // ground: corners relative to the eye, world axes; both at its height
+  float rgb[3];
+  float ambient;
+};
+
 // Kernel positions of one stride, with their lines and media.
 struct Pass {
   Axis axis[3];
@@ -173,6 +187,30 @@ struct Counters {
   std::int64_t occluded;
 };
 
+// The body at the pixels of a block. Where a pixel does not see it: opacity 0, behind 1, depth
+// body_nowhere.
+struct BodyBlock {
+  alignas(64) float depth[block_pixels];    // from the camera's depth origin, world units
+  alignas(64) float opacity[block_pixels];  // part of the pixel that it covers
+  alignas(64) float shade[block_pixels];    // factor of its colour
+  // What is composited behind the body so far: its light and its transmittance, both including the
+  // body's.
+  alignas(64) float light[3][block_pixels];
+  alignas(64) float behind[block_pixels];
+  float nearest, farthest;  // depths of the pixels that see it
+};
+constexpr float body_nowhere = 1e30F;
+
+// The body in a tile. Its light is added in the end (close_body), so that kernels that reach
+// through it may come in any order; the slab method composites it at its depth.
+struct TileBody {
+  BodyBlock* blocks;
+  float rgb[3];
+  float nearest;                      // least depth in the tile
+  std::uint32_t seen[tile_blocks];    // bit set: the block still waits for light of the body
+  std::uint32_t opaque[tile_blocks];  // bit set: the body covers every pixel of the block
+};
+
 // Pixels of one tile as blocks of 4 x 4; see block_channels. Rays, for perspective media: the
 // length of the ray of each pixel at unit view depth.
 struct Tile {
@@ -184,6 +222,7 @@ struct Tile {
   float stop;                       // a block is closed when no transmittance exceeds this
   std::uint32_t open[tile_blocks];  // bit set: the block is open
   int any_closed;
+  TileBody* body;  // null: no pixel of the tile sees the body
   Counters counters;
 };
 

@@ -55,6 +55,13 @@ struct Table {
   // The length of the ray of each pixel at forward component 1, in the block layout of the tile.
   void (*fill_rays)(const Camera& camera, const Tile& tile, float* rays);
 
+  // The body at the pixels of a tile. Returns whether any pixel sees it. to.blocks must have room
+  // for the blocks of a whole tile.
+  bool (*open_body)(const Camera& camera, const Body& body, const Tile& tile, TileBody& to);
+
+  // Adds the light of the body to the pixels that still wait for it.
+  void (*close_body)(Tile& tile);
+
   // A row of pixels of the tile as linear premultiplied RGBA, 4 floats each, rounded up to a
   // multiple of block_side pixels.
   void (*copy_row)(const Tile& tile, int y, float* rgba);

@@ -5,8 +5,10 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
+#include "server/engine/reference/body.hpp"
 #include "server/engine/reference/kernels.hpp"
 #include "server/engine/reference/profile.hpp"
 #include "server/engine/reference/ray.hpp"
@@ -138,6 +140,7 @@ class SplatMedium {
 
 struct Frame {
   const View& view;
+  std::optional<scene::Body> body;
   const Kernels& kernels;
   const ScreenGrid& splats;
   const ScreenGrid& ribbons;
@@ -152,11 +155,11 @@ class Painter {
   // Storage for a pixel that `splats` and `ribbons` may cover; sorting surfaces needs a second
   // copy.
   static std::uint64_t bytes_for(std::uint64_t splats, std::uint64_t ribbons) {
-    return SplatMedium::bytes_for(splats) + 2 * ribbons * sizeof(Surface);
+    return SplatMedium::bytes_for(splats) + 2 * (ribbons + 1) * sizeof(Surface);
   }
   void make_room(std::size_t splats, std::size_t ribbons) {
     medium_.make_room(splats);
-    surfaces_.reserve(ribbons);
+    surfaces_.reserve(ribbons + 1);
   }
 
   Light pixel(int x, int y, RayCount& count) {
@@ -191,6 +194,10 @@ class Painter {
       const auto hit = hit_ribbon(frame_.kernels.ribbons[id], px, py);
       if (hit.opacity > 0) surfaces_.push_back({hit.depth, hit.opacity, hit.color});
     }
+    if (frame_.body) {
+      const Surface body = body_surface(*frame_.body, frame_.view, px, py);
+      if (body.opacity > 0) surfaces_.push_back(body);
+    }
     // Stable: equal depths stay in order of id.
     std::stable_sort(surfaces_.begin(), surfaces_.end(),
                      [](const Surface& a, const Surface& b) { return a.depth < b.depth; });
@@ -211,7 +218,7 @@ struct Painting::State {
         splats(scene.camera.width, scene.camera.height),
         ribbons(scene.camera.width, scene.camera.height),
         rules(make_rules()),
-        frame{view, kernels, splats, ribbons, rules, options.tolerance} {}
+        frame{view, scene.body, kernels, splats, ribbons, rules, options.tolerance} {}
 
   Result<void> reserve_bytes(std::uint64_t bytes, const Reserve& reserve) {
     auto held = reserve(bytes);

@@ -27,9 +27,10 @@ struct Picture {
 };
 
 // The medium is rho(x) = sum_i rho_i K(|A_i^-1 (x - x_i)|) / C, where the columns of A_i are the
-// edges of a cell, and likewise its emission; lines are surfaces at their depth. Tolerances and
-// Compositing are ignored, except that min_magnitude selects the lines. In perspective, rays begin
-// at camera.near: of kernels that reach it, the part beyond counts, wherever their centres are.
+// edges of a cell, and likewise its emission; lines and the body are surfaces at their depth.
+// Tolerances and Compositing are ignored, except that min_magnitude selects the lines. In
+// perspective, rays begin at camera.near: of kernels that reach it, the part beyond counts,
+// wherever their centres are.
 //
 // progress (may be empty) is called with the number of finished rows, from any thread. Errors:
 // cancelled.

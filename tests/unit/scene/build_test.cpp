@@ -202,6 +202,50 @@ TEST(BuildScene, OmegaOnNumberedLevelsIsNotTurned) {
   EXPECT_EQ(built(View{}, *dataset).vector->scale, glm::dvec3(1, 1, 1));
 }
 
+// The lowest level of the shell is half a cell above the inside, which the body nearly fills.
+TEST(BuildScene, AGlobeHasABodyUnlessItIsOff) {
+  using protocol::BodyShow;
+  auto dataset = weather();
+  View view;
+  EXPECT_FALSE(built(view, *dataset).body);
+  view.geometry.mapping = protocol::GeometryMapping::sphere;
+  view.geometry.body.surface_color = "#00ff00";
+  const Scene scene = built(view, *dataset);
+  ASSERT_TRUE(scene.body);
+  EXPECT_EQ(scene.body->shape, BodyShape::sphere);
+  EXPECT_EQ(scene.body->color, (std::array<float, 3>{0, 1, 0}));
+  const auto& lowest = scene.lattice.places->front();
+  const double level = std::hypot(lowest[0], lowest[1], lowest[2]);
+  const double inside = level - 0.5 * scene.lattice.spacing[2].front();
+  EXPECT_LT(scene.body->radius, inside);
+  EXPECT_GT(scene.body->radius, 0.998 * inside);
+  view.geometry.body.show = BodyShow::on;
+  EXPECT_TRUE(built(view, *dataset).body);
+  view.geometry.body.show = BodyShow::off;
+  EXPECT_FALSE(built(view, *dataset).body);
+}
+
+TEST(BuildScene, OtherMappingsHaveAGroundIfItIsOn) {
+  auto dataset = weather();
+  View view;
+  view.geometry.body.show = protocol::BodyShow::on;
+  const Scene scene = built(view, *dataset);
+  ASSERT_TRUE(scene.body);
+  EXPECT_EQ(scene.body->shape, BodyShape::ground);
+  EXPECT_EQ(scene.body->height, scene.lattice.box_min.z);
+  EXPECT_EQ(scene.body->low, glm::dvec2(scene.lattice.box_min));
+  EXPECT_EQ(scene.body->high, glm::dvec2(scene.lattice.box_max));
+}
+
+TEST(BuildScene, TheColorOfTheBodyIsChecked) {
+  auto dataset = weather();
+  View view;
+  view.geometry.body.surface_color = "green";
+  const auto refused = complete(view, *dataset);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().at.at(0).pointer, "/geometry/body/surfaceColor");
+}
+
 TEST(WorldRates, HeightAxesUseMetersPerSecondUnchanged) {
   data::Grid grid = atmosphere_grid();
   grid.axes[0] = axis(data::AxisKind::cartesian, "km", {0, 1, 2, 3});

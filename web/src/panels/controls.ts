@@ -155,6 +155,16 @@ export const qualityHint = (view: View): string =>
     ? "Moving frames: the fastest expected to meet the error limit, within the budget."
     : "Moving frames: the least error that the budget allows.";
 
+// The choices of geometry.body.show.
+export const bodyOptions: Options = { "on a globe": "auto", always: "on", never: "off" };
+
+// Whether the view draws its opaque body.
+export function showsBody(view: View): boolean {
+  const { mapping = "flat", body } = view.geometry ?? {};
+  const show = body?.show ?? "auto";
+  return show === "auto" ? mapping === "sphere" : show === "on";
+}
+
 // Which controls apply to a view; the others are hidden or disabled.
 export function controlStates(view: View) {
   const vector = view.vector ?? {};
@@ -174,6 +184,7 @@ export function controlStates(view: View) {
     slab: view.method?.name === "slab",
     vertical: (view.geometry?.heightField ?? null) === null,
     slice: (view.geometry?.slice ?? null) !== null,
+    body: showsBody(view),
     fovY: view.camera?.projection !== "orthographic",
     errorLimit: hasErrorLimit(view),
     depthCue: lines && view.depthCue?.strength !== 0,

@@ -2,6 +2,7 @@
 import type GUI from "lil-gui";
 import { withProjection, type Camera } from "../view/camera";
 import {
+  bodyOptions,
   depthCuePatch,
   fieldOptions,
   heightOptions,
@@ -49,6 +50,9 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
     );
   }
   addStretch(folder, kit);
+  kit.choice(folder, "opaque surface", keyAccess("/geometry/body/show"), bodyOptions);
+  const color = kit.color(folder, "surface colour", keyAccess("/geometry/body/surfaceColor"));
+  kit.showWhen((states) => states.body, color);
 }
 
 function addStretch(folder: GUI, kit: PanelKit): void {

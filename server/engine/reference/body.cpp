@@ -1,0 +1,91 @@
+// Rays and bodies in world space.
+#include "server/engine/reference/body.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace windsplat::engine::reference {
+
+namespace {
+
+struct Ray {
+  Vec from{};
+  Vec along{};  // forward component 1
+};
+
+Ray ray_of(const View& view, double x, double y) {
+  const double right = (x - view.half_width) * view.pixel;
+  const double down = (y - view.half_height) * view.pixel;
+  Ray ray{view.eye, view.forward};
+  Vec& moved = view.perspective ? ray.along : ray.from;
+  for (int a = 0; a < 3; ++a) moved[a] += right * view.right[a] + down * view.down[a];
+  return ray;
+}
+
+// Change of a function of the pixel from one pixel to the next, by central differences.
+template <class Function>
+double step_of(const Function& value, double x, double y) {
+  constexpr double h = 1e-3;
+  const double dx = (value(x + h, y) - value(x - h, y)) / (2 * h);
+  const double dy = (value(x, y + h) - value(x, y - h)) / (2 * h);
+  return std::max(std::hypot(dx, dy), 1e-300);
+}
+
+// The part of a pixel within an edge at this distance in pixels.
+double within(double pixels) { return std::clamp(0.5 + pixels, 0.0, 1.0); }
+
+struct Hit {
+  double depth = 0;
+  double coverage = 0;
+  double cosine = 0;  // between ray and normal
+};
+
+Hit hit_sphere(const scene::Body& body, const View& view, double x, double y) {
+  // Distance of the ray from the centre, and the view depth there.
+  const auto nearest = [](const Ray& ray) {
+    return -dot(ray.from, ray.along) / dot(ray.along, ray.along);
+  };
+  const auto distance_at = [&](double px, double py) {
+    const Ray ray = ray_of(view, px, py);
+    return length(plus(ray.from, nearest(ray), ray.along));
+  };
+  const Ray ray = ray_of(view, x, y);
+  const double distance = distance_at(x, y);
+  const double half = std::sqrt(std::max(body.radius * body.radius - distance * distance, 0.0));
+  return {nearest(ray) - half / length(ray.along),
+          within((body.radius - distance) / step_of(distance_at, x, y)), half / body.radius};
+}
+
+Hit hit_ground(const scene::Body& body, const View& view, double x, double y) {
+  const auto depth_of = [&](const Ray& ray) { return (body.height - ray.from[2]) / ray.along[2]; };
+  const Ray ray = ray_of(view, x, y);
+  Hit hit{depth_of(ray), 1, std::abs(ray.along[2]) / length(ray.along)};
+  if (ray.along[2] == 0) return {};
+  for (int a = 0; a < 2; ++a) {
+    const auto place = [&](double px, double py) {
+      const Ray at = ray_of(view, px, py);
+      return at.from[a] + depth_of(at) * at.along[a];
+    };
+    const double here = place(x, y);
+    const double step = step_of(place, x, y);
+    hit.coverage *= std::max(
+        within((here - body.low[a]) / step) + within((body.high[a] - here) / step) - 1, 0.0);
+  }
+  return hit;
+}
+
+}  // namespace
+
+Surface body_surface(const scene::Body& body, const View& view, double x, double y) {
+  const bool sphere = body.shape == scene::BodyShape::sphere;
+  const Hit hit = sphere ? hit_sphere(body, view, x, y) : hit_ground(body, view, x, y);
+  Surface out;
+  out.depth = hit.depth;
+  if (view.perspective && hit.depth < view.near) return out;
+  out.opacity = hit.coverage;
+  const double shade = scene::body_ambient + (1 - scene::body_ambient) * hit.cosine;
+  for (int c = 0; c < 3; ++c) out.color[c] = shade * static_cast<double>(body.color[c]);
+  return out;
+}
+
+}  // namespace windsplat::engine::reference
