@@ -245,7 +245,7 @@ const std::vector<TrialField>& trial_fields() {
       {"shells", {96, 96, 96}, {1e3, 1e3, 1e3}},
       {"front", {128, 96, 32}, {2e5, 1e5, 1e4}},
       {"plume", {80, 80, 160}, {1e3, 1e3, 2e3}},
-      {"turbulence in a column", {24, 24, 512}, {300, 300, 4e3}},
+      {"turbulence in a column", {48, 48, 384}, {800, 800, 4e3}},
   };
   return fields;
 }

@@ -100,7 +100,7 @@ TEST_F(CostTest, GiantKernelsCostWhatTheyCover) {
 
 TEST_F(CostTest, MergedOrCulledSamplesCostLess) {
   protocol::View far = view_;
-  far.vector.field.kind = protocol::FieldChoice::Kind::none;  // opaque lines are not merged
+  far.vector.opacity = 0.05;  // opaque lines are not merged
   far.camera.eye = protocol::Vec3{0, -1000, 0};
   far.camera.target = protocol::Vec3{0, 0, 0};
   const double all = cost(far).kernels;

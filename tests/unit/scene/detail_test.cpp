@@ -291,7 +291,7 @@ TEST_F(LevelWithin, FullDetailIsRenderedWhenALevelDoesNotFit) {
 }
 
 TEST_F(LevelWithin, LevelIsRenderedWhenItFits) {
-  open_within(fine + fine / 8);
+  open_within(fine + data::TwoValues::components * fine / 8);
   EXPECT_GE(built().level[0], 1);
 }
 
