@@ -1,6 +1,7 @@
 // Completes the view, measures its settings if it has limits, chooses one and draws.
 #include "server/cli/limited_picture.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -27,6 +28,20 @@ bool is_limited(const protocol::View& view) {
 }
 
 double milliseconds(std::int64_t us) { return 1e-3 * static_cast<double>(us); }
+
+double drawing_ms(const Picture& picture) {
+  return milliseconds(picture.frame.render_us + picture.frame.encode_us);
+}
+
+// The largest ratio of a picture's time and error to their limits.
+double excess(const Picture& picture) {
+  const protocol::QualityView& limits = picture.frame.view.quality;
+  double most = 0;
+  if (limits.budget_ms) most = drawing_ms(picture) / *limits.budget_ms;
+  const auto& error = picture.info.error_value;
+  if (limits.max_error && error) most = std::max(most, *error / *limits.max_error);
+  return most;
+}
 
 std::string short_text(double value) {
   char text[32];
@@ -105,16 +120,19 @@ Result<Picture> LimitedPictures::draw(const protocol::View& view, const CancelTo
     if (auto done = calibrate(*completed, cancel); !done) return done.error();
   }
   quality::Setting setting = setting_of(*completed);
-  auto picture = draw_at(*completed, setting, cancel);
+  auto best = draw_at(*completed, setting, cancel);
   // The time of encoding and the measured error of a picture correct the forecasts.
   constexpr int attempts_max = 3;
-  for (int n = 1; n < attempts_max && picture && !exceeded_limits(*picture).empty(); ++n) {
+  for (int n = 1; n < attempts_max && best && !exceeded_limits(*best).empty(); ++n) {
     const quality::Setting next = setting_of(*completed);
     if (next == setting) break;
     setting = next;
-    picture = draw_at(*completed, setting, cancel);
+    auto picture = draw_at(*completed, setting, cancel);
+    if (!picture && picture.error().kind == ErrorKind::cancelled) return picture;
+    if (!picture) break;
+    if (excess(*picture) < excess(*best)) best = std::move(picture);
   }
-  return picture;
+  return best;
 }
 
 std::string report_line(const Picture& picture) {
@@ -132,7 +150,7 @@ std::string exceeded_limits(const Picture& picture) {
     text += std::string(what) + ' ' + short_text(value) + unit + " exceeds " + pointer + ' ' +
             short_text(limit);
   };
-  const double ms = milliseconds(picture.frame.render_us + picture.frame.encode_us);
+  const double ms = drawing_ms(picture);
   if (limits.budget_ms && ms > *limits.budget_ms) {
     exceeds("time", ms, " ms", *limits.budget_ms, "/quality/budgetMs");
   }

@@ -131,7 +131,7 @@ Forecast Table::forecast(std::size_t setting, const Viewpoint& viewpoint) const 
   std::vector<Observation> times;
   for (const Entry& entry : entries_[setting]) {
     const double apart = distance(entry.viewpoint, viewpoint);
-    // Averaged data and data in full detail follow different laws.
+    // Merged data and data in full detail follow different laws.
     if (entry.log_error && entry.merged == merged) {
       errors.push_back({&entry.viewpoint, *entry.log_error, apart});
     }

@@ -78,8 +78,8 @@ struct VectorLayer {
   double span = 7;
   int stride = 1;
   // At a coarser level a sample is drawn from a group of samples of the data
-  // (data::Reduction::drawn), and its line keeps the jitter and the kernel box that it has at full
-  // detail, and, on an evenly spaced axis, its position.
+  // (data::Reduction::drawn), and its line keeps, on an evenly spaced axis, the position, jitter
+  // and kernel box that it has at full detail.
   std::array<int, 3> halvings{0, 0, 0};
   std::array<int, 3> data_dims{1, 1, 1};
   double r1 = 0.6;  // pixels of this picture (already scaled with its height)

@@ -232,6 +232,8 @@ def examine(process, path, model, seed):
             field["dtype"] == "derived" for field in about["fields"])
         for method in METHODS:
             view = view_of(about, step, method, np.random.default_rng(seed))
+            if empty:
+                view["geometry"]["body"] = {"show": "off"}
             data = picture(daemon, view)
             drawn.append(check_picture(data, method, empty))
             answers.append(data)

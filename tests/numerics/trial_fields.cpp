@@ -20,10 +20,10 @@ struct Values {
   std::array<double, 3> flow{};
   double cloud = 0;
 };
-using Formula = std::function<Values(const Point& at, const std::array<int, 3>& index)>;
+using TrialFormula = std::function<Values(const Point& at, const std::array<int, 3>& index)>;
 
 constexpr double two_pi = 6.283185307179586;
-constexpr double masked = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 // Uniform in [-1, 1).
 double hashed(int i, int j, int k, std::uint32_t salt) {
@@ -138,14 +138,14 @@ Values plume(const Point& at) {
   const double width = 0.02 + 0.08 * at[2];
   const double core = std::exp(-(x * x + y * y) / (width * width));
   Values out;
-  if (core < 1e-3) return {{masked, masked, masked}, masked};
+  if (core < 1e-3) return {{no_value, no_value, no_value}, no_value};
   const double eddies = 1 + 0.8 * turbulence(at, 64, 0.7, 41);
   out.flow = {-20 * y * eddies, 20 * x * eddies, 6 * core * eddies};
   out.cloud = std::clamp(core * eddies, 0.0, 1.0);
   return out;
 }
 
-Formula formula_of(const std::string& name) {
+TrialFormula formula_of(const std::string& name) {
   if (name.starts_with("white noise")) {
     return [](const Point&, const std::array<int, 3>& i) { return white_noise(i); };
   }
@@ -228,7 +228,7 @@ class TrialSource final : public data::Source {
     return info;
   }
 
-  Formula formula_;
+  TrialFormula formula_;
   data::DatasetInfo info_;
 };
 

@@ -8,15 +8,15 @@ namespace windsplat::engine::reference {
 
 namespace {
 
-struct Ray {
+struct SurfaceRay {
   Vec from{};
   Vec along{};  // forward component 1
 };
 
-Ray ray_of(const View& view, double x, double y) {
+SurfaceRay ray_of(const View& view, double x, double y) {
   const double right = (x - view.half_width) * view.pixel;
   const double down = (y - view.half_height) * view.pixel;
-  Ray ray{view.eye, view.forward};
+  SurfaceRay ray{view.eye, view.forward};
   Vec& moved = view.perspective ? ray.along : ray.from;
   for (int a = 0; a < 3; ++a) moved[a] += right * view.right[a] + down * view.down[a];
   return ray;
@@ -42,14 +42,14 @@ struct Hit {
 
 Hit hit_sphere(const scene::Body& body, const View& view, double x, double y) {
   // Distance of the ray from the centre, and the view depth there.
-  const auto nearest = [](const Ray& ray) {
+  const auto nearest = [](const SurfaceRay& ray) {
     return -dot(ray.from, ray.along) / dot(ray.along, ray.along);
   };
   const auto distance_at = [&](double px, double py) {
-    const Ray ray = ray_of(view, px, py);
+    const SurfaceRay ray = ray_of(view, px, py);
     return length(plus(ray.from, nearest(ray), ray.along));
   };
-  const Ray ray = ray_of(view, x, y);
+  const SurfaceRay ray = ray_of(view, x, y);
   const double distance = distance_at(x, y);
   const double half = std::sqrt(std::max(body.radius * body.radius - distance * distance, 0.0));
   return {nearest(ray) - half / length(ray.along),
@@ -57,13 +57,13 @@ Hit hit_sphere(const scene::Body& body, const View& view, double x, double y) {
 }
 
 Hit hit_ground(const scene::Body& body, const View& view, double x, double y) {
-  const auto depth_of = [&](const Ray& ray) { return (body.height - ray.from[2]) / ray.along[2]; };
-  const Ray ray = ray_of(view, x, y);
+  const auto depth_of = [&](const SurfaceRay& ray) { return (body.height - ray.from[2]) / ray.along[2]; };
+  const SurfaceRay ray = ray_of(view, x, y);
   Hit hit{depth_of(ray), 1, std::abs(ray.along[2]) / length(ray.along)};
   if (ray.along[2] == 0) return {};
   for (int a = 0; a < 2; ++a) {
     const auto place = [&](double px, double py) {
-      const Ray at = ray_of(view, px, py);
+      const SurfaceRay at = ray_of(view, px, py);
       return at.from[a] + depth_of(at) * at.along[a];
     };
     const double here = place(x, y);

@@ -7,8 +7,8 @@
 
 namespace windsplat::session {
 
-// A final frame is at least as accurate as every frame shown of its view. The candidates are the
-// view's own setting and those shown at full size and detail; each counts with its measured error
+// A final frame is at least as accurate as every frame of full size and detail shown of its view.
+// The candidates are the view's own setting and those shown; each counts with its measured error
 // once it was drawn as final, before that with the error reported of the frame shown.
 class FinalChoice {
  public:

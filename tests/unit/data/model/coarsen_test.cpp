@@ -1,4 +1,4 @@
-// Averaged volumes: conservation, masks, and sharing of levels by a dataset.
+// Coarser volumes: conservation, masks, and sharing of levels by a dataset.
 #include "server/data/model/coarsen.hpp"
 
 #include <gtest/gtest.h>
