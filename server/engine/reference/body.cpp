@@ -57,7 +57,9 @@ Hit hit_sphere(const scene::Body& body, const View& view, double x, double y) {
 }
 
 Hit hit_ground(const scene::Body& body, const View& view, double x, double y) {
-  const auto depth_of = [&](const SurfaceRay& ray) { return (body.height - ray.from[2]) / ray.along[2]; };
+  const auto depth_of = [&](const SurfaceRay& ray) {
+    return (body.height - ray.from[2]) / ray.along[2];
+  };
   const SurfaceRay ray = ray_of(view, x, y);
   Hit hit{depth_of(ray), 1, std::abs(ray.along[2]) / length(ray.along)};
   if (ray.along[2] == 0) return {};
