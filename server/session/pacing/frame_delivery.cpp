@@ -91,7 +91,8 @@ void after_frame(SessionState& state, const Render& render, std::uint32_t seq, d
 // Sends the frame with its accompanying messages.
 void send_frame(SessionState& state, const Render& render, Drawn drawn, Micros now) {
   const bool still = render.purpose == Purpose::still;
-  const bool final = !still && state.quality.is_final(render, drawn, state.view, now);
+  const bool final = render.purpose == Purpose::final &&
+                     !state.quality.needs_thinner_slabs(render, drawn, state.view);
   const bool blank = is_blank(drawn.info);
   const bool loaded = drawn.loaded;
   // Do not refine twice if the error is unknown.

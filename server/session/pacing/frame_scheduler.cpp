@@ -41,7 +41,7 @@ void start(SessionState& state, Purpose purpose, const FramePlan& plan, Micros n
 
 void start_still(SessionState& state, Micros now) {
   const Still still = state.stills.take();
-  const FramePlan plan = state.quality.still(still.view, still.message.format == "png", now);
+  const FramePlan plan = QualityControl::still(still.view, still.message.format == "png");
   Render render = render_by(state, Purpose::still, plan, now);
   render.rev = still.rev;
   render.t = still.t;
@@ -50,7 +50,7 @@ void start_still(SessionState& state, Micros now) {
 }
 
 void start_final(SessionState& state, Micros now) {
-  start(state, Purpose::final, state.quality.final_frame(state.view.view(), now), now);
+  start(state, Purpose::final, state.quality.final_frame(state.view.view()), now);
 }
 
 void start_moving(SessionState& state, Micros now) {

@@ -70,7 +70,6 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   constexpr Micros long_in_coming = 200'000;
   constexpr double better = 0.5;
   constexpr int usual = JpegRate::quality_usual;
-  if (final_.any_drawn()) return std::nullopt;
   const auto [known, cost, guessed] = times_.forecast(view, now);
   if (guessed || cost <= long_in_coming || is_reference(view)) return std::nullopt;
   const Micros budget = cost / 4;
@@ -84,13 +83,7 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   return plan;
 }
 
-double QualityControl::forecast_error(const protocol::View& view, const quality::Setting& setting,
-                                      Micros now) const {
-  const auto index = quality::index_of(setting);
-  return index ? times_.forecast(view, now).settings[*index].error : 1;
-}
-
-quality::Setting QualityControl::thinned_setting(const protocol::View& view) const {
+quality::Setting QualityControl::final_setting(const protocol::View& view) const {
   quality::Setting setting = quality::settings[quality::own_setting(view)];
   if (thinner_ == 0) return setting;
   const int halvings = setting.method == protocol::MethodName::slab ? thinner_ : thinner_ - 1;
@@ -99,34 +92,20 @@ quality::Setting QualityControl::thinned_setting(const protocol::View& view) con
   return setting;
 }
 
-quality::Setting QualityControl::final_setting(const protocol::View& view, Micros now) const {
-  const quality::Setting thinned = thinned_setting(view);
-  if (thinner_ > 0 && !final_.was_drawn(thinned)) return thinned;
-  const quality::Setting& own = quality::settings[quality::own_setting(view)];
-  return final_.best(own, forecast_error(view, own, now));
-}
-
-FramePlan QualityControl::final_frame(const protocol::View& view, Micros now) const {
+FramePlan QualityControl::final_frame(const protocol::View& view) const {
   FramePlan plan;
   plan.encoding = full_quality(view.quality.lossless, final_quality);
   plan.encoding.measure = true;
-  if (!is_reference(view)) plan.setting = final_setting(view, now);
+  if (!is_reference(view)) plan.setting = final_setting(view);
   return plan;
 }
 
-FramePlan QualityControl::still(const protocol::View& view, bool png, Micros now) const {
-  FramePlan plan{quality::settings[quality::own_setting(view)], full_quality(png, still_quality)};
-  const quality::Aim limits{view.quality.budget_ms, view.quality.max_error};
-  if ((!limits.budget_ms && !limits.max_error) || is_reference(view)) return plan;
-  const auto known = times_.forecast(view, now).settings;
-  plan.setting = quality::settings[quality::pick(view, known, limits).setting];
-  plan.encoding.measure = limits.max_error.has_value();
-  return plan;
+FramePlan QualityControl::still(const protocol::View& view, bool png) {
+  return {quality::settings[quality::own_setting(view)], full_quality(png, still_quality)};
 }
 
 void QualityControl::on_view_changed(bool other_dataset) {
   thinner_ = 0;
-  final_.restart();
   if (!other_dataset) return;
   chooser_ = Chooser();
   times_.forget();
@@ -146,8 +125,6 @@ void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewS
     queue_us_ += newest * (static_cast<double>(drawn.queue_us) - queue_us_);
   }
   if (render.purpose == Purpose::final) {
-    const quality::Setting& own = quality::settings[quality::own_setting(view)];
-    if (render.setting.method != own.method) return;
     times_.learn_final(drawn.render_us + drawn.measure_us + drawn.encode_us, view, now);
   } else if (const auto setting = quality::index_of(render.setting)) {
     const Micros cost = drawn.render_us + drawn.encode_us;
@@ -161,40 +138,25 @@ void QualityControl::learn_bytes(const Render& render, const Drawn& drawn, std::
   jpeg_.learn(pixels, render.encoding.quality, frame_bytes, text_bytes);
 }
 
-bool QualityControl::needs_thinner_slabs(const protocol::View& view, double error) {
+bool QualityControl::needs_thinner_slabs(const Render& render, const Drawn& drawn,
+                                         const ViewState& state) {
   constexpr int halvings_max = 4;
+  const protocol::View& view = state.view();
   const auto& most = view.quality.max_error;
-  if (!most || error <= *most || thinner_ >= halvings_max) return false;
+  if (render.purpose != Purpose::final || render.version != state.version() || !most) return false;
+  if (!drawn.info.error_value || *drawn.info.error_value <= *most) return false;
+  if (drawn.info.method == "reference" || thinner_ >= halvings_max) return false;
   // Errors of merged data are not reduced by thinner slabs.
   constexpr double mended = 0.67;
-  if (thinner_ > 0 && error > mended * thicker_error_) return false;
-  thicker_error_ = error;
+  if (thinner_ > 0 && *drawn.info.error_value > mended * thicker_error_) return false;
+  thicker_error_ = *drawn.info.error_value;
   ++thinner_;
-  if (view.method.slab_thickness / thinned_setting(view).thinner >=
+  if (view.method.slab_thickness / final_setting(view).thinner >=
       protocol::limits::slab_thickness_min) {
     return true;
   }
   --thinner_;
   return false;
-}
-
-bool QualityControl::is_final(const Render& render, const Drawn& drawn, const ViewState& state,
-                              Micros now) {
-  const bool current = render.version == state.version();
-  const auto& error = drawn.info.error_value;
-  if (drawn.info.method == "reference" || !error || !current) {
-    return render.purpose == Purpose::final;
-  }
-  if (render.purpose != Purpose::final) {
-    final_.shown(render.setting, *error);
-    return false;
-  }
-  const protocol::View& view = state.view();
-  final_.drawn(render.setting, *error);
-  const bool latest = thinner_ == 0 || render.setting == thinned_setting(view);
-  if (latest && needs_thinner_slabs(view, *error)) return false;
-  const quality::Setting& own = quality::settings[quality::own_setting(view)];
-  return final_.accepts(render.setting, own, forecast_error(view, own, now));
 }
 
 }  // namespace windsplat::session

@@ -10,7 +10,6 @@
 #include "server/quality/setting.hpp"
 #include "server/session/effects.hpp"
 #include "server/session/pacing/chooser.hpp"
-#include "server/session/pacing/final_choice.hpp"
 #include "server/session/pacing/frame_times.hpp"
 #include "server/session/pacing/jpeg_rate.hpp"
 #include "server/session/pacing/link.hpp"
@@ -34,11 +33,9 @@ class QualityControl {
   // at a fraction of the final time. nullopt: draw the final frame next.
   [[nodiscard]] std::optional<FramePlan> refining(const protocol::View& view, const Link& link,
                                                   double shown_error, Micros now) const;
-  // The view as specified; at a setting shown before if that is more accurate, and with thinner
-  // slabs if the error would exceed maxError.
-  [[nodiscard]] FramePlan final_frame(const protocol::View& view, Micros now) const;
-  // Within the limits of the view, if it has any.
-  [[nodiscard]] FramePlan still(const protocol::View& view, bool png, Micros now) const;
+  // The view as specified; with thinner slabs if its error would exceed maxError.
+  [[nodiscard]] FramePlan final_frame(const protocol::View& view) const;
+  [[nodiscard]] static FramePlan still(const protocol::View& view, bool png);
 
   // Whether a final frame is expected within the budget of a moving one.
   [[nodiscard]] bool final_is_cheap(const protocol::View& view, Micros now) const;
@@ -51,25 +48,18 @@ class QualityControl {
   // Records that a moving frame is sent; `text_bytes` precede it.
   void learn_bytes(const Render& render, const Drawn& drawn, std::size_t frame_bytes,
                    std::size_t text_bytes);
-  // Whether a frame of the stream that will be sent is the final one. A frame drawn as final is not
-  // if it exceeds maxError and thinner slabs are possible, or if a setting shown before is more
-  // accurate: the next one is drawn accordingly.
-  [[nodiscard]] bool is_final(const Render& render, const Drawn& drawn, const ViewState& state,
-                              Micros now);
+  // Whether a frame drawn as final exceeds maxError and thinner slabs are possible: the next one
+  // then has thinner slabs.
+  [[nodiscard]] bool needs_thinner_slabs(const Render& render, const Drawn& drawn,
+                                         const ViewState& state);
 
  private:
   [[nodiscard]] quality::Aim aim(const protocol::View& view) const;
-  [[nodiscard]] double forecast_error(const protocol::View& view, const quality::Setting& setting,
-                                      Micros now) const;
-  // The view's own setting with slabs halved as often as maxError required so far.
-  [[nodiscard]] quality::Setting thinned_setting(const protocol::View& view) const;
-  [[nodiscard]] quality::Setting final_setting(const protocol::View& view, Micros now) const;
-  [[nodiscard]] bool needs_thinner_slabs(const protocol::View& view, double error);
+  [[nodiscard]] quality::Setting final_setting(const protocol::View& view) const;
 
   FrameTimes times_;
   Chooser chooser_;
   JpegRate jpeg_;
-  FinalChoice final_;
   quality::Setting moving_setting_;  // the last one chosen
   double queue_us_ = 0;              // recent waiting time of moving frames for the renderer
   int thinner_ = 0;                  // number of halvings of the final frame's slabs for maxError

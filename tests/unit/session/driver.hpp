@@ -149,7 +149,6 @@ class Driver {
   std::vector<Calibrate> calibrations;
   std::optional<quality::Forecasts> calibrated;  // forecasts known; empty: the prior
   bool averaged = false;  // averaged data: errors of final frames do not depend on their slabs
-  std::optional<quality::Forecasts> measured;  // errors of final frames at each setting
   std::optional<double> measured_error;  // error of final frames drawn with slabs of the view's own
                                          // thickness
 
@@ -170,11 +169,7 @@ class Driver {
     const bool kernel = done.setting.method == protocol::MethodName::kernel;
     out.info.method = kernel ? "kernel" : "slab";
     out.signature.key = "its style";
-    const auto place = quality::index_of(done.setting);
-    if (done.encoding.measure && measured && place) {
-      out.info.error_value = (*measured)[*place].error;
-      out.info.error_kind = "measured";
-    } else if (done.encoding.measure && measured_error) {
+    if (done.encoding.measure && measured_error) {
       const int by = averaged ? 1 : done.setting.thinner * done.setting.thinner;
       out.info.error_value = *measured_error / by;
       out.info.error_kind = "measured";

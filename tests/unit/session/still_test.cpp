@@ -35,18 +35,6 @@ TEST(Still, IsRenderedAtItsSizeAndAnnouncedWithItsId) {
   EXPECT_EQ(driver.texts_of<protocol::ChosenMessage>().back().seq, header.seq);
 }
 
-TEST(Still, KeepsTheErrorBoundOfTheView) {
-  Driver driver;
-  driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.05}})");
-  driver.settle();
-  driver.say(protocol::StillMessage{});
-  ASSERT_TRUE(driver.render);
-  EXPECT_NE(driver.render->setting, quality::settings[quality::own_setting(View{})])
-      << "the fastest that complies, as for a picture over HTTP";
-  const auto known = quality::Table(quality::Kind{}).forecasts({1, {0, 1, 0}, 1280, 720});
-  EXPECT_LE(known[quality::index_of(driver.render->setting).value()].error, 0.05);
-}
-
 TEST(Still, WaitsForCreditAndIsServedWhileTheViewMoves) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
