@@ -73,7 +73,6 @@ export const launch = () =>
     executablePath: process.env.WINDSPLAT_CHROMIUM,
     args: [
       "--no-sandbox",
-      "--headless=new",
       "--disable-gpu",
       "--disable-quic",
       "--no-first-run",
