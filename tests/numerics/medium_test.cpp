@@ -172,22 +172,30 @@ TEST(UniformMedium, AnyStrideAbsorbsLikeTheBox) {
 // minus a transmittance, and each update of a pixel rounds it by 1e-7 at most
 // (docs/design/engine.md).
 TEST(Media, ThinMediaLoseAtMostTheRoundingOfTheirUpdates) {
-  for (const double each : {1e-12, 1e-9, 3e-8, 1e-6}) {
-    scene::Scene scene;
-    scene.lattice = even_lattice({3, 3, 1000}, {0.5, 0.5, 0.002});
-    scene.camera = look({0.1, 0.05, 0}, {0, 0, -1}, 3, 5, 5, false, 0.2);
-    const auto rho = static_cast<float>(each / 0.002);
+  constexpr int layers = 300;
+  constexpr double unit = 1e-3;  // optical depth of a layer
+  scene::Scene scene;
+  scene.lattice = even_lattice({3, 3, layers}, {0.5, 0.5, 0.002});
+  scene.camera = look({0.1, 0.05, 0}, {0, 0, -1}, 3, 3, 3, false, 0.3);
+  scene.stop_transmittance = 0;
+  const auto set_layer_depth = [&](double depth) {
+    const auto rho = static_cast<float>(depth / 0.002);
     scene.scalars = {medium(uniform(scene.lattice, rho), {1.0F, 0.5F, 0.25F})};
-    scene.stop_transmittance = 0;
-    const auto light = truth::integrate(scene, 4);
+  };
+  set_layer_depth(unit);
+  const auto light = truth::integrate(scene, 4);
+  for (const double each : {1e-12, 1e-9, 3e-8, 1e-6}) {
+    set_layer_depth(each);
     for (const scene::Method method : {scene::Method::kernel, scene::Method::slab}) {
       scene.method = method;
       const engine::Rendered rendered = render(scene);
       double lost = 0;
       for (std::size_t i = 0; i < light.size(); ++i) {
-        EXPECT_NEAR(light[i].depth, 1000 * each, 100 * each) << "the medium is homogeneous";
-        EXPECT_NEAR(rendered.image.rgba[4 * i] / light[i].rgb[0], 1, 1e-3) << each;
-        lost += std::abs(rendered.image.rgba[4 * i + 3] - light[i].alpha);
+        EXPECT_NEAR(light[i].depth, layers * unit, 0.1 * layers * unit) << "it is homogeneous";
+        // Optical depth is proportional to extinction, and the medium has one colour.
+        const double alpha = -std::expm1(-light[i].depth * each / unit);
+        EXPECT_NEAR(rendered.image.rgba[4 * i] / alpha, 1, 1e-3) << each;
+        lost += std::abs(rendered.image.rgba[4 * i + 3] - alpha);
       }
       EXPECT_LE(lost, 1e-7 * static_cast<double>(rendered.work.pixel_updates)) << each;
     }
