@@ -14,6 +14,8 @@ namespace server_test {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
 
+inline const Headers json_type{{"Content-Type", "application/json"}};
+
 inline constexpr int patience_ms = 60'000;  // longer waits are failures
 
 // A port of this machine, and whether it uses TLS.

@@ -13,8 +13,6 @@ namespace {
 
 using testing::HasSubstr;
 
-const Headers json_type{{"Content-Type", "application/json"}};
-
 class Forecasts : public testing::Test {
  protected:
   [[nodiscard]] std::uint16_t port() const { return server_.port(); }

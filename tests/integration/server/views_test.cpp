@@ -18,8 +18,6 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using windsplat::views::SavedViews;
 
-const Headers json_type{{"Content-Type", "application/json"}};
-
 Headers with(Headers headers, const std::string& name, const std::string& value) {
   headers.emplace_back(name, value);
   return headers;
