@@ -168,10 +168,9 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   if (!factors) return factors.error();
   layer.scale = factors->scale;
   if (const auto& rates = factors->rates) {
-    const auto& level = fields.coarsening.halvings;
-    layer.rate_x = coarsen_along(rates->x, placed.lattice.spacing[1], level[1]);
+    layer.rate_x = rates->x;
     layer.rate_y = rates->y;
-    layer.rate_z = coarsen_along(rates->z, placed.lattice.spacing[2], level[2]);
+    layer.rate_z = rates->z;
   }
   layer.length = from.length.value();
   layer.span = from.span;
