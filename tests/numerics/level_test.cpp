@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "server/frame/cost.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "tests/numerics/scenes.hpp"
@@ -84,6 +85,41 @@ void expect_means(const std::vector<Shown>& all) {
 TEST(Level, KeepsMeanOpacityAndColorOfLines) { expect_means({Shown::lines}); }
 TEST(Level, KeepsMeanOpacityAndColorOfMedia) { expect_means({Shown::medium}); }
 TEST(Level, KeepsMeanOpacityAndColorOfLinesInMedia) { expect_means({Shown::both}); }
+
+// The estimated work of a view over that which its frame reports, both in the units of frame::Cost.
+double estimate_over_count(const scene::CompletedView& completed, data::Dataset& dataset,
+                           bool merged) {
+  const auto outline = scene::outline(completed.view(), dataset.info()).value();
+  const auto scene = scene::build_scene(completed, dataset).value();
+  EXPECT_EQ(scene.level != (std::array{0, 0, 0}), merged);
+  const engine::WorkReport work = render(scene, 2).work;
+  const double values = merged && !scene.scalars.empty() ? 2 : 1;
+  const double pixels = 28 * 21 + static_cast<double>(work.pixel_updates);
+  const double counted =
+      values * static_cast<double>(work.samples) + pixels / frame::Cost::pixels_a_kernel;
+  return frame::cost_of(outline, dataset).kernels / counted;
+}
+
+// Lines that end at the boxes of their kernels; a medium without gaps.
+TEST(Level, CostEstimateFollowsTheWorkOfAFrame) {
+  const TrialField field{"turbulence", {48, 48, 48}, {1e3, 1e3, 1e3}};
+  const auto dataset = trial_dataset(field);
+  for (const Shown shown : {Shown::lines, Shown::medium}) {
+    protocol::View view = small_view(field, shown);
+    view.image.width = 28;
+    view.image.height = 21;
+    view.method.name = protocol::MethodName::kernel;
+    view.vector.length = 10;
+    view.vector.span = 16;
+    view.vector.opacity = 0.05;
+    if (shown == Shown::medium) view.scalars->back().extinction.emplace(1, std::array{0.0, 1.0});
+    const auto level = scene::complete(view, *dataset).value();
+    const auto full =
+        level.with([](protocol::View& all) { all.method.detail = protocol::Detail::full; });
+    const double at_level = estimate_over_count(level, *dataset, true);
+    EXPECT_NEAR(at_level / estimate_over_count(full.value(), *dataset, false), 1, 0.25);
+  }
+}
 
 // The lines of a level are some of those of full detail, unchanged but for their opacity.
 TEST(Level, DrawsASubsetOfTheLines) {

@@ -300,6 +300,17 @@ TEST_F(LevelWithin, LevelIsRenderedWhenItFits) {
   EXPECT_GE(built().level[0], 1);
 }
 
+// The memory that others hold at the moment must not change the picture.
+TEST_F(LevelWithin, LevelDoesNotDependOnWhatIsResident) {
+  open_within(2 * fine);
+  const auto completed = complete(view, *dataset).value();
+  {
+    const auto other = dataset->volume("vorticity", 0).value();
+    EXPECT_EQ(build_scene(completed, *dataset).error().kind, ErrorKind::out_of_memory);
+  }
+  EXPECT_GE(build_scene(completed, *dataset).value().level[0], 1);
+}
+
 TEST_F(LevelWithin, ErrorsOfFullDetailAreReturned) {
   open_within(fine);
   const auto completed = complete(view, *dataset).value();
