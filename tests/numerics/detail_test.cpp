@@ -6,12 +6,15 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "scenes.hpp"
 #include "server/data/model/coarsen.hpp"
 #include "server/engine/kernels/dispatch.hpp"
+#include "server/engine/reference/reference.hpp"
+#include "tests/numerics/naive_renderer.hpp"
 
 namespace windsplat::test {
 namespace {
@@ -97,6 +100,23 @@ TEST(Detail, NoiseKeepsItsMeanOpacity) {
   const double whole = mean_alpha(render(full).image);
   const double coarse = mean_alpha(render(at_level(full, {1, 1, 1})).image);
   EXPECT_NEAR(coarse, whole, 0.005 * whole);
+}
+
+TEST(Detail, SliceOfAMediumKeepsItsMeanOpacity) {
+  scene::Scene full = small_picture();
+  full.lattice = even_lattice({65, 63, 3}, {2.0 / 65, 2.0 / 63, 0.05});
+  full.slice = scene::Slice{2, 1};
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> value(0, 8);
+  full.scalars = {medium(
+      make_volume(full.lattice, 1, [&](int, double, double, double) { return value(random); }),
+      {1, 1, 1})};
+  for (const auto method : {scene::Method::kernel, scene::Method::slab}) {
+    full.method = method;
+    const double whole = mean_alpha(render(full).image);
+    ASSERT_GT(whole, 0.01);
+    EXPECT_NEAR(mean_alpha(render(at_level(full, {1, 1, 0})).image), whole, 0.02 * whole);
+  }
 }
 
 TEST(Detail, SmallLinesKeepTheirMeanOpacity) {
@@ -232,6 +252,14 @@ TEST(Detail, LinesAreThoseOfTheirSamplesAtFullDetail) {
       }
     }
   }
+}
+
+TEST(Detail, IsRefusedByTheReferencesWhichDrawEverySample) {
+  scene::Scene scene = at_level(lines_to_draw(true), {1, 0, 0});
+  EXPECT_THROW(naive::render<double>(scene), std::logic_error);
+  ThreadPool pool(1);
+  EXPECT_THROW((void)engine::reference::render(scene, pool, CancelToken(), {1e-3}),
+               std::logic_error);
 }
 
 TEST(Detail, IsTheSameForAnyNumberOfThreads) {
