@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <vector>
+#include <map>
 
 #include "server/frame/cost.hpp"
 #include "server/scene/build.hpp"
@@ -48,13 +48,12 @@ struct Compared {
   std::array<int, 3> level{};
 };
 
-Compared compare(const TrialField& field, Shown shown) {
-  const auto dataset = trial_dataset(field);
-  const auto completed = scene::complete(small_view(field, shown), *dataset).value();
+Compared compare(const TrialField& field, Shown shown, data::Dataset& dataset) {
+  const auto completed = scene::complete(small_view(field, shown), dataset).value();
   const auto full =
       completed.with([](protocol::View& view) { view.method.detail = protocol::Detail::full; });
-  auto coarse_scene = scene::build_scene(completed, *dataset).value();
-  auto full_scene = scene::build_scene(full.value(), *dataset).value();
+  auto coarse_scene = scene::build_scene(completed, dataset).value();
+  auto full_scene = scene::build_scene(full.value(), dataset).value();
   coarse_scene.method = full_scene.method = scene::Method::slab;
   const auto at_level = mean(render(coarse_scene, 2).image);
   const auto whole = mean(render(full_scene, 2).image);
@@ -69,22 +68,19 @@ Compared compare(const TrialField& field, Shown shown) {
 }
 
 // Views with their defaults at 96 x 72 pixels, where most members of the family are merged.
-void expect_means(const std::vector<Shown>& all) {
-  int merged = 0;
+TEST(Level, KeepsMeanOpacityAndColorOfLinesAndMedia) {
+  std::map<Shown, int> merged;
   for (const TrialField& field : trial_fields()) {
-    for (const Shown shown : all) {
-      const Compared found = compare(field, shown);
-      EXPECT_NEAR(found.opacity, 1, 0.02) << field.name;
-      EXPECT_LT(found.color, 0.02) << field.name;
-      merged += found.level != std::array<int, 3>{0, 0, 0} ? 1 : 0;
+    const auto dataset = trial_dataset(field);
+    for (const Shown shown : {Shown::lines, Shown::medium, Shown::both}) {
+      const Compared found = compare(field, shown, *dataset);
+      EXPECT_NEAR(found.opacity, 1, 0.02) << field.name << ' ' << static_cast<int>(shown);
+      EXPECT_LT(found.color, 0.02) << field.name << ' ' << static_cast<int>(shown);
+      merged[shown] += found.level != std::array<int, 3>{0, 0, 0} ? 1 : 0;
     }
   }
-  EXPECT_GE(merged, 4);
+  for (const Shown shown : {Shown::lines, Shown::medium, Shown::both}) EXPECT_GE(merged[shown], 4);
 }
-
-TEST(Level, KeepsMeanOpacityAndColorOfLines) { expect_means({Shown::lines}); }
-TEST(Level, KeepsMeanOpacityAndColorOfMedia) { expect_means({Shown::medium}); }
-TEST(Level, KeepsMeanOpacityAndColorOfLinesInMedia) { expect_means({Shown::both}); }
 
 // The estimated work of a view over that which its frame reports, both in the units of frame::Cost.
 double estimate_over_count(const scene::CompletedView& completed, data::Dataset& dataset,
