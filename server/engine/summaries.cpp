@@ -41,9 +41,12 @@ void write_key(const kernels::Pass& pass, std::vector<std::uint32_t>& key) {
   if (pass.has_lines != 0) {
     const kernels::LineStyle& line = pass.line;
     add(key, line.scale, 3);
-    add(key, line.rate_x, pass.dims[1]);
+    // Rates are those of the samples that are drawn from the data.
+    const int* const dims = line.merged != 0 ? line.data_dims : pass.dims;
+    for (int a = 0; a < 3; ++a) add(key, line.halvings[a]);
+    add(key, line.rate_x, dims[1]);
     add(key, line.rate_y);
-    add(key, line.rate_z, pass.dims[2]);
+    add(key, line.rate_z, dims[2]);
     add(key, line.magnitude_scale);
     add(key, line.unscaled_min_magnitude);
     add(key, line.inverse_full_magnitude);

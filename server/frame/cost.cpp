@@ -57,7 +57,8 @@ class Counting {
       : view_(outline.view),
         lattice_(outline.lattice),
         visible_(visible_part(outline.camera, lattice_)),
-        pixels_(static_cast<double>(outline.camera.width) * outline.camera.height) {
+        pixels_(static_cast<double>(outline.camera.width) * outline.camera.height),
+        values_(level == std::array{0, 0, 0} ? 1 : 2) {
     const auto slice = scene::slice_of(view_.geometry);
     for (std::size_t a = 0; a < 3; ++a) {
       const bool one = slice && slice->axis == static_cast<int>(a);
@@ -102,9 +103,10 @@ class Counting {
   }
 
   // Lines are assumed to have the largest length that the view allows, clipped to the box of a
-  // kernel.
+  // kernel, which is that of a sample of the data at any level.
   void add_lines(const protocol::VectorView& vector) {
-    const double widest = *std::max_element(cell_.begin(), cell_.end());
+    double widest = 0;
+    for (std::size_t a = 0; a < 3; ++a) widest = std::max(widest, scene::cell_size(lattice_, a));
     const double length =
         std::min(*vector.length, std::max(vector.span, 1.0) * vector.stride * widest * 2);
     const double wide = 2 * std::max(1.0, vector.r2 * view_.image.height / reference_height);
@@ -124,13 +126,14 @@ class Counting {
     const double face = (cell_[0] * cell_[1] + cell_[1] * cell_[2] + cell_[2] * cell_[0]) / 3;
     const double covered = footprint * face * scalar.stride * scalar.stride * visible_.px2;
     const double count = stops(scalar.stride);
-    add(pointer + "/stride", count * (1 + drawn(covered)));
+    add(pointer + "/stride", count * (values_ + drawn(covered)));
   }
 
   const protocol::View& view_;
   const scene::Lattice& lattice_;
   const VisiblePart visible_;
   const double pixels_;
+  const double values_;  // of a medium at each sample
   std::array<double, 3> samples_{};
   std::array<double, 3> cell_{};
   Cost cost_;
@@ -139,9 +142,8 @@ class Counting {
 
 }  // namespace
 
-Cost cost_of(const scene::ViewOutline& outline) {
-  const std::array<int, 3> level = outline.bent ? std::array{0, 0, 0} : scene::level_of(outline);
-  return Counting(outline, level).count();
+Cost cost_of(const scene::ViewOutline& outline, const data::Dataset& dataset) {
+  return Counting(outline, scene::level_of(outline, dataset)).count();
 }
 
 }  // namespace windsplat::frame

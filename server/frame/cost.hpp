@@ -10,9 +10,10 @@
 
 namespace windsplat::frame {
 
-// Work is counted in kernels: one for each kernel position of the lines and each sample of a
-// medium, and one per pixels_a_kernel pixels that a kernel covers, that slabs cross, or that the
-// picture has. The fixed work of a kernel is about that of pixels_a_kernel pixels.
+// Work is counted in kernels: one for each kernel position of the lines and each value of a medium
+// (merged samples have two), and one per pixels_a_kernel pixels that a kernel covers, that slabs
+// cross, or that the picture has. The fixed work of a kernel is about that of pixels_a_kernel
+// pixels.
 struct Cost {
   static constexpr double pixels_a_kernel = 16;
 
@@ -21,8 +22,8 @@ struct Cost {
   std::string dominant;  // JSON pointer to the setting with the largest share
 };
 
-// All samples of a bent lattice are drawn. The part outside the picture counts by its fraction of
-// the volume.
-Cost cost_of(const scene::ViewOutline& outline);
+// At the level of detail at which the dataset is drawn. The part outside the picture counts by its
+// fraction of the volume.
+Cost cost_of(const scene::ViewOutline& outline, const data::Dataset& dataset);
 
 }  // namespace windsplat::frame

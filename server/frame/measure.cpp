@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <mutex>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -73,6 +74,26 @@ void each_value(const engine::TilePixels& tile, int width, const Value& value) {
     }
   }
 }
+
+// Sums over the parts of a picture, which threads deliver in any order. They are added in the order
+// of the parts, so that the total has the same bits for any number of threads.
+class PartSums {
+ public:
+  void add(const engine::TilePixels& part, double sum) {
+    const std::lock_guard lock(mutex_);
+    sums_.emplace_back(part.y, part.x, sum);
+  }
+  [[nodiscard]] double total() {
+    std::sort(sums_.begin(), sums_.end());
+    double total = 0;
+    for (const auto& [y, x, sum] : sums_) total += sum;
+    return total;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::tuple<int, int, double>> sums_;  // row and column of the part
+};
 
 double rms(const std::vector<float>& values) {
   double squares = 0;
@@ -202,8 +223,7 @@ class CalibrationRun {
 
   // I + (I - I_half) / 3: the error of slabs is of order 2.
   Result<void> draw_quarter(const scene::Scene& scene) {
-    std::mutex mutex;
-    double squares = 0;
+    PartSums squares;
     const int width = completed_.view().image.width;
     const auto extrapolate = [&](const engine::TilePixels& tile) {
       double sum = 0;
@@ -212,12 +232,11 @@ class CalibrationRun {
         truth_.rgba[at] = value + d / 3;
         sum += static_cast<double>(d) * d;
       });
-      const std::lock_guard lock(mutex);
-      squares += sum;
+      squares.add(tile, sum);
     };
     const auto work = engine::render(scene, pool_, cancel_, workspace_.space, extrapolate);
     if (!work) return work.error();
-    const double difference = std::sqrt(squares / static_cast<double>(truth_.rgba.size()));
+    const double difference = std::sqrt(squares.total() / static_cast<double>(truth_.rgba.size()));
     for (const float v : truth_.rgba) truth_.squares += static_cast<double>(v) * v;
     truth_.error_of_half = difference * 4 / 3;
     truth_.error_of_quarter = difference / 3;
@@ -263,8 +282,7 @@ class CalibrationRun {
   // Pictures of the size of the reference are compared tile by tile: the sum of (v - t)^2 - t^2
   // over the tiles drawn, since pixels outside them are 0.
   Result<engine::WorkReport> compare(const scene::Scene& scene, double& beyond) {
-    std::mutex mutex;
-    beyond = 0;
+    PartSums sums;
     const int width = completed_.view().image.width;
     const auto add = [&](const engine::TilePixels& tile) {
       double sum = 0;
@@ -273,10 +291,11 @@ class CalibrationRun {
         const double d = value - t;
         sum += d * d - t * t;
       });
-      const std::lock_guard lock(mutex);
-      beyond += sum;
+      sums.add(tile, sum);
     };
-    return engine::render(scene, pool_, cancel_, workspace_.space, add);
+    auto work = engine::render(scene, pool_, cancel_, workspace_.space, add);
+    beyond = sums.total();
+    return work;
   }
 
   static double milliseconds_since(Clock::time_point start) {

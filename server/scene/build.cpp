@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <set>
 #include <utility>
 
 #include "server/scene/camera.hpp"
@@ -150,13 +152,51 @@ MergeLimits merge_limits(const View& view) {
   return limits;
 }
 
-// The fraction of the requested detail that the picture can show.
+// Extinctions that follow from the data are not yet known for an outline.
+bool absorbs(const protocol::ScalarView& scalar) {
+  return !scalar.extinction || std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
+                                           [](const auto& point) { return point[1] > 0; });
+}
+
+std::vector<Shown> shown_at(const View& view, const data::Coarsening& how) {
+  std::vector<Shown> shown;
+  if (shows_lines(view)) {
+    shown.push_back({view.vector.field.name, drawn(how)});
+    if (view.vector.color.by == protocol::ColorBy::scalar) {
+      shown.push_back({view.vector.color.field.value(), drawn(how)});
+    }
+  }
+  for (const protocol::ScalarView& scalar : *view.scalars) {
+    if (absorbs(scalar)) shown.push_back({scalar.field, how});
+  }
+  return shown;
+}
+
+// Whether the levels of all fields fit into memory beside the largest volume from which one is
+// reduced. It depends on sizes alone, so that a view has the same level whatever is resident.
+bool are_within_limit(const std::vector<Shown>& shown, const data::Dataset& dataset) {
+  std::set<std::pair<std::string, data::Reduction>> counted;
+  std::uint64_t levels = 0;
+  std::uint64_t largest = 0;
+  for (const auto& [field, how] : shown) {
+    if (!counted.emplace(field, how.reduction).second) continue;
+    levels += dataset.level_bytes(field, how);
+    largest = std::max(largest, dataset.level_bytes(field, {}));
+  }
+  return dataset.is_within_limit(levels + largest);
+}
+
+// The fraction of the requested detail that the picture can show. If there is memory for the
+// volumes but not for their levels, every sample is drawn; the report of the frame says so.
 std::array<int, 3> level_for(const View& view, const Camera& camera, const Lattice& lattice,
-                             int coarser) {
-  if (is_drawn_in_full(view)) return {0, 0, 0};
+                             int coarser, const data::Dataset& dataset) {
+  constexpr std::array full{0, 0, 0};
+  if (is_drawn_in_full(view)) return full;
   const auto slice = slice_of(view.geometry);
-  const auto level = choose_level(camera, lattice, slice, merge_limits(view));
-  return coarser_level(lattice, slice, level, coarser);
+  const auto level = coarser_level(
+      lattice, slice, choose_level(camera, lattice, slice, merge_limits(view)), coarser);
+  if (level == full) return full;
+  return are_within_limit(shown_at(view, coarsening_of(lattice, level)), dataset) ? level : full;
 }
 
 Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
@@ -168,10 +208,9 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   if (!factors) return factors.error();
   layer.scale = factors->scale;
   if (const auto& rates = factors->rates) {
-    const auto& level = fields.coarsening.halvings;
-    layer.rate_x = coarsen_along(rates->x, placed.lattice.spacing[1], level[1]);
+    layer.rate_x = rates->x;
     layer.rate_y = rates->y;
-    layer.rate_z = coarsen_along(rates->z, placed.lattice.spacing[2], level[2]);
+    layer.rate_z = rates->z;
   }
   layer.length = from.length.value();
   layer.span = from.span;
@@ -194,11 +233,6 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   if (!volume) return volume.error();
   layer.field = std::move(*volume);
   return layer;
-}
-
-bool absorbs(const protocol::ScalarView& scalar) {
-  return std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
-                     [](const auto& point) { return point[1] > 0; });
 }
 
 Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, const Fields& fields) {
@@ -256,12 +290,14 @@ Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View&
 
 }  // namespace
 
-std::array<int, 3> level_of(const CompletedView& completed) {
-  return level_for(completed.view(), completed.camera(), completed.lattice(), completed.coarser());
+std::array<int, 3> level_of(const CompletedView& completed, const data::Dataset& dataset) {
+  return level_for(completed.view(), completed.camera(), completed.lattice(), completed.coarser(),
+                   dataset);
 }
 
-std::array<int, 3> level_of(const ViewOutline& outline) {
-  return level_for(outline.view, outline.camera, outline.lattice, 0);
+std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dataset) {
+  if (outline.bent) return {0, 0, 0};
+  return level_for(outline.view, outline.camera, outline.lattice, 0, dataset);
 }
 
 Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset) {
@@ -280,13 +316,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
-  const auto level = level_of(completed);
-  auto built = at_level(scene, level, view, placed, dataset);
-  const bool reduced = level != std::array{0, 0, 0};
-  if (built || !reduced || built.error().kind != ErrorKind::out_of_memory) return built;
-  // If there is memory for the volumes but not for their levels, every sample is drawn; the report
-  // of the frame says so.
-  return at_level(std::move(scene), {0, 0, 0}, view, placed, dataset);
+  return at_level(std::move(scene), level_of(completed, dataset), view, placed, dataset);
 }
 
 double detail_shown(const CompletedView& completed) {
@@ -296,20 +326,9 @@ double detail_shown(const CompletedView& completed) {
   return finest_cell_px(completed.camera(), completed.lattice(), slice) / halved_below_px;
 }
 
-std::vector<Shown> shown_by(const CompletedView& completed) {
-  const View& view = completed.view();
-  std::vector<Shown> shown;
-  const data::Coarsening how = coarsening_of(completed.lattice(), level_of(completed));
-  if (shows_lines(view)) {
-    shown.push_back({view.vector.field.name, drawn(how)});
-    if (view.vector.color.by == protocol::ColorBy::scalar) {
-      shown.push_back({view.vector.color.field.value(), drawn(how)});
-    }
-  }
-  for (const protocol::ScalarView& scalar : *view.scalars) {
-    if (absorbs(scalar)) shown.push_back({scalar.field, how});
-  }
-  return shown;
+std::vector<Shown> shown_by(const CompletedView& completed, const data::Dataset& dataset) {
+  return shown_at(completed.view(),
+                  coarsening_of(completed.lattice(), level_of(completed, dataset)));
 }
 
 Result<Scene> build_scene(const View& view, data::Dataset& dataset) {

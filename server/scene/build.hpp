@@ -21,9 +21,10 @@ Result<Scene> build_scene(const protocol::View& view, data::Dataset& dataset);
 // below 1, not every sample is drawn. 0 if every sample is always drawn.
 double detail_shown(const CompletedView& completed);
 
-// Number of halvings of each axis of the data for this picture.
-std::array<int, 3> level_of(const CompletedView& completed);
-std::array<int, 3> level_of(const ViewOutline& outline);
+// Number of halvings of each axis of the data for this picture: none if the levels do not fit into
+// the memory limit of the dataset.
+std::array<int, 3> level_of(const CompletedView& completed, const data::Dataset& dataset);
+std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dataset);
 
 // The fields that a completed view shows at any step, each with its level of detail, determined
 // without loading them.
@@ -31,6 +32,6 @@ struct Shown {
   std::string field;
   data::Coarsening coarsening;
 };
-std::vector<Shown> shown_by(const CompletedView& completed);
+std::vector<Shown> shown_by(const CompletedView& completed, const data::Dataset& dataset);
 
 }  // namespace windsplat::scene

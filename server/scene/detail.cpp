@@ -138,11 +138,10 @@ void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pi
                  VectorLayer& layer) {
   layer.halvings = level;
   layer.data_dims = fine.dims;
-  // Mean over the groups, so that an incomplete last group counts with its actual size.
   double lines = 1;
   double apart_px = 0;  // first to last sample of a group, at the nearest point of the box
   for (std::size_t a = 0; a < 3; ++a) {
-    const double group = static_cast<double>(fine.dims[a]) / data::halved(fine.dims[a], level[a]);
+    const double group = std::exp2(level[a]);
     lines *= group;
     apart_px = std::max(apart_px, (group - 1) * cell_size(fine, a) * pixels_per_unit);
   }

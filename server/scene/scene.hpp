@@ -69,8 +69,8 @@ struct VectorLayer {
   std::shared_ptr<const data::Volume> field;
   glm::dvec3 scale{1, 1, 1};  // factor of each component, applied first
   // Used for lines along trajectories in the world (space = world): world units per second per unit
-  // of each component, by y index for x (meridians converge), constant for y, by z index for z.
-  // Empty: components are not scaled.
+  // of each component, by y index of the data for x (meridians converge), constant for y, by z
+  // index for z. Empty: components are not scaled.
   std::vector<double> rate_x;
   double rate_y = 1;
   std::vector<double> rate_z;

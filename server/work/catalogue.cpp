@@ -142,7 +142,8 @@ Result<Catalogue::Checked> Catalogue::check(const protocol::View& view) const {
   if (!dataset) return dataset.error();
   const auto outline = scene::outline(view, (*dataset)->info());
   if (!outline) return outline.error();
-  return Checked{static_cast<int>((*dataset)->info().steps.size()), frame::cost_of(*outline)};
+  return Checked{static_cast<int>((*dataset)->info().steps.size()),
+                 frame::cost_of(*outline, **dataset)};
 }
 
 Error with_dataset_name(Error error, const std::string& dataset, const std::string& field) {

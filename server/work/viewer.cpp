@@ -71,7 +71,7 @@ Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Data
   if (!completed) return completed.error();
   const auto drawn = frame::at_setting(*completed, wanted.setting);
   if (!drawn) return drawn.error();
-  const std::vector<scene::Shown> shown = scene::shown_by(*drawn);
+  const std::vector<scene::Shown> shown = scene::shown_by(*drawn, dataset);
   std::vector<data::PrefetchRequest> requests;
   for (const int step : wanted.steps) {
     for (const auto& [field, how] : shown) {

@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <vector>
+#include <map>
 
+#include "server/frame/cost.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "tests/numerics/scenes.hpp"
@@ -47,13 +48,12 @@ struct Compared {
   std::array<int, 3> level{};
 };
 
-Compared compare(const TrialField& field, Shown shown) {
-  const auto dataset = trial_dataset(field);
-  const auto completed = scene::complete(small_view(field, shown), *dataset).value();
+Compared compare(const TrialField& field, Shown shown, data::Dataset& dataset) {
+  const auto completed = scene::complete(small_view(field, shown), dataset).value();
   const auto full =
       completed.with([](protocol::View& view) { view.method.detail = protocol::Detail::full; });
-  auto coarse_scene = scene::build_scene(completed, *dataset).value();
-  auto full_scene = scene::build_scene(full.value(), *dataset).value();
+  auto coarse_scene = scene::build_scene(completed, dataset).value();
+  auto full_scene = scene::build_scene(full.value(), dataset).value();
   coarse_scene.method = full_scene.method = scene::Method::slab;
   const auto at_level = mean(render(coarse_scene, 2).image);
   const auto whole = mean(render(full_scene, 2).image);
@@ -68,22 +68,54 @@ Compared compare(const TrialField& field, Shown shown) {
 }
 
 // Views with their defaults at 96 x 72 pixels, where most members of the family are merged.
-void expect_means(const std::vector<Shown>& all) {
-  int merged = 0;
+TEST(Level, KeepsMeanOpacityAndColorOfLinesAndMedia) {
+  std::map<Shown, int> merged;
   for (const TrialField& field : trial_fields()) {
-    for (const Shown shown : all) {
-      const Compared found = compare(field, shown);
-      EXPECT_NEAR(found.opacity, 1, 0.02) << field.name;
-      EXPECT_LT(found.color, 0.02) << field.name;
-      merged += found.level != std::array<int, 3>{0, 0, 0} ? 1 : 0;
+    const auto dataset = trial_dataset(field);
+    for (const Shown shown : {Shown::lines, Shown::medium, Shown::both}) {
+      const Compared found = compare(field, shown, *dataset);
+      EXPECT_NEAR(found.opacity, 1, 0.02) << field.name << ' ' << static_cast<int>(shown);
+      EXPECT_LT(found.color, 0.02) << field.name << ' ' << static_cast<int>(shown);
+      merged[shown] += found.level != std::array<int, 3>{0, 0, 0} ? 1 : 0;
     }
   }
-  EXPECT_GE(merged, 4);
+  for (const Shown shown : {Shown::lines, Shown::medium, Shown::both}) EXPECT_GE(merged[shown], 4);
 }
 
-TEST(Level, KeepsMeanOpacityAndColorOfLines) { expect_means({Shown::lines}); }
-TEST(Level, KeepsMeanOpacityAndColorOfMedia) { expect_means({Shown::medium}); }
-TEST(Level, KeepsMeanOpacityAndColorOfLinesInMedia) { expect_means({Shown::both}); }
+// The estimated work of a view over that which its frame reports, both in the units of frame::Cost.
+double estimate_over_count(const scene::CompletedView& completed, data::Dataset& dataset,
+                           bool merged) {
+  const auto outline = scene::outline(completed.view(), dataset.info()).value();
+  const auto scene = scene::build_scene(completed, dataset).value();
+  EXPECT_EQ(scene.level != (std::array{0, 0, 0}), merged);
+  const engine::WorkReport work = render(scene, 2).work;
+  const double values = merged && !scene.scalars.empty() ? 2 : 1;
+  const double pixels = 28 * 21 + static_cast<double>(work.pixel_updates);
+  const double counted =
+      values * static_cast<double>(work.samples) + pixels / frame::Cost::pixels_a_kernel;
+  return frame::cost_of(outline, dataset).kernels / counted;
+}
+
+// Lines that end at the boxes of their kernels; a medium without gaps.
+TEST(Level, CostEstimateFollowsTheWorkOfAFrame) {
+  const TrialField field{"turbulence", {48, 48, 48}, {1e3, 1e3, 1e3}};
+  const auto dataset = trial_dataset(field);
+  for (const Shown shown : {Shown::lines, Shown::medium}) {
+    protocol::View view = small_view(field, shown);
+    view.image.width = 28;
+    view.image.height = 21;
+    view.method.name = protocol::MethodName::kernel;
+    view.vector.length = 10;
+    view.vector.span = 16;
+    view.vector.opacity = 0.05;
+    if (shown == Shown::medium) view.scalars->back().extinction.emplace(1, std::array{0.0, 1.0});
+    const auto level = scene::complete(view, *dataset).value();
+    const auto full =
+        level.with([](protocol::View& all) { all.method.detail = protocol::Detail::full; });
+    const double at_level = estimate_over_count(level, *dataset, true);
+    EXPECT_NEAR(at_level / estimate_over_count(full.value(), *dataset, false), 1, 0.25);
+  }
+}
 
 // The lines of a level are some of those of full detail, unchanged but for their opacity.
 TEST(Level, DrawsASubsetOfTheLines) {

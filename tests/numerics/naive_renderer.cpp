@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "server/base/check.hpp"
 #include "server/engine/reference/body.hpp"
 #include "server/engine/reference/kernels.hpp"
 #include "tests/numerics/naive_order.hpp"
@@ -378,6 +379,7 @@ class Renderer {
 
 template <class Real>
 Picture<Real> render(const scene::Scene& scene) {
+  WINDSPLAT_CHECK((scene.level == std::array{0, 0, 0}));  // it draws no merged samples
   return Renderer<Real>(scene).run();
 }
 

@@ -10,6 +10,7 @@
 #include "server/engine/kernels/dispatch.hpp"
 #include "tests/numerics/naive_renderer.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/truth/random_scenes.hpp"
 
 namespace windsplat::test {
 namespace {
@@ -18,10 +19,10 @@ using scene::Scene;
 
 enum class What { vectors, scalars, both, two_scalars, strides, fine_medium };
 
-class SceneMaker {
+class SceneMaker : private Draws {
  public:
   explicit SceneMaker(std::uint32_t seed, const std::array<int, 3>& dims = {0, 0, 0})
-      : random_(seed), wanted_(dims) {}
+      : Draws(seed), wanted_(dims) {}
 
   Scene make(What what, bool perspective, bool eye_inside) {
     Scene scene;
@@ -31,9 +32,7 @@ class SceneMaker {
     for (int a = 0; a < 3; ++a) {
       if (wanted_[a] > 0) dims[a] = wanted_[a];
     }
-    for (int a = 0; a < 3; ++a) {
-      for (int i = 0; i < dims[a]; ++i) spacing[a].push_back(cell[a] * between(0.6, 1.4));
-    }
+    for (int a = 0; a < 3; ++a) spacing[a] = widths(dims[a], cell[a], 0.6, 1.4);
     scene.lattice = make_lattice(spacing);
     const int width = whole(60, 150);
     const int height = whole(50, 110);
@@ -62,11 +61,6 @@ class SceneMaker {
   }
 
  private:
-  double between(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  int whole(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
-
   std::shared_ptr<const data::Volume> field(const scene::Lattice& lattice, int components) {
     const double phase = between(0, 6);
     const double k = between(3, 6);
@@ -118,7 +112,6 @@ class SceneMaker {
     return layer;
   }
 
-  std::mt19937 random_;
   std::array<int, 3> wanted_;  // 0: any
 };
 

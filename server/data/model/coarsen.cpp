@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "server/base/check.hpp"
@@ -177,11 +178,10 @@ class TwoValueReducer {
   Volume coarse_;
 };
 
-// The sample of a group of `count` that the highest bits of a hash draw; lines of the engine's
-// kernels repeat it (drawn_index in server/engine/kernels).
-std::size_t drawn_from(std::size_t count, int halvings, std::uint32_t hash) {
-  const std::uint64_t bits = std::uint64_t{hash} >> static_cast<unsigned>(32 - halvings);
-  return (bits * count) >> static_cast<unsigned>(halvings);
+// The place in a group that the highest bits of a hash draw; lines of the engine's kernels repeat
+// it (drawn_samples in server/engine/kernels).
+std::size_t drawn_place(int halvings, std::uint32_t hash) {
+  return std::uint64_t{hash} >> static_cast<unsigned>(32 - halvings);
 }
 
 // Copies drawn samples, group by group. Hashes are of the group's indices alone.
@@ -201,9 +201,10 @@ class Drawer {
     for (group[2] = 0; group[2] < coarse_.dims[2]; ++group[2]) {
       for (group[1] = 0; group[1] < coarse_.dims[1]; ++group[1]) {
         for (group[0] = 0; group[0] < coarse_.dims[0]; ++group[0], ++to) {
-          const std::size_t from = drawn(group);
+          const std::optional<std::size_t> from = drawn(group);
           for (int c = 0; c < fine_.components; ++c) {
-            coarse_.values[samples * static_cast<std::size_t>(c) + to] = fine_.component(c)[from];
+            coarse_.values[samples * static_cast<std::size_t>(c) + to] =
+                from ? fine_.component(c)[*from] : std::numeric_limits<float>::quiet_NaN();
           }
         }
       }
@@ -213,15 +214,17 @@ class Drawer {
   }
 
  private:
-  [[nodiscard]] std::size_t drawn(const std::array<int, 3>& group) const {
+  // Empty: a place beyond the last sample.
+  [[nodiscard]] std::optional<std::size_t> drawn(const std::array<int, 3>& group) const {
     const auto hash =
         pcg3d({static_cast<std::uint32_t>(group[0]), static_cast<std::uint32_t>(group[1]),
                static_cast<std::uint32_t>(group[2])});
     std::size_t at = 0;
     for (std::size_t a = 3; a-- > 0;) {
       const Group along = group_at(static_cast<std::size_t>(group[a]), halvings_[a], fine_.dims[a]);
-      at = at * static_cast<std::size_t>(fine_.dims[a]) + along.first +
-           drawn_from(along.count, halvings_[a], hash[a]);
+      const std::size_t place = drawn_place(halvings_[a], hash[a]);
+      if (place >= along.count) return std::nullopt;
+      at = at * static_cast<std::size_t>(fine_.dims[a]) + along.first + place;
     }
     return at;
   }

@@ -13,7 +13,9 @@ namespace windsplat::data {
 // group and of the others, each with its share of the group; a function of the value that is linear
 // over each half keeps its mean. drawn: one of the samples, each with the same probability, which
 // keeps magnitudes and directions, and in expectation any sum over the samples (stochastic
-// simplification: Cook, Halstead, Planck, Ryu, SIGGRAPH 2007).
+// simplification: Cook, Halstead, Planck, Ryu, SIGGRAPH 2007). The draw is among the places of a
+// whole group, also where the last group of an axis has fewer samples: a sample has the same
+// probability in every group.
 enum class Reduction { two_values, drawn };
 
 // halvings[a] = h: 2^h samples along axis a become one; the last group may be smaller.
@@ -31,8 +33,9 @@ int halved(int samples, int halvings);
 // two_values: of a scalar; the samples are weighted by the volumes of their cells, so that
 // integrals over space are preserved. O(samples), two passes over the source.
 //
-// drawn: a sample of each group with all its components, masked if that sample is. The draw depends
-// on the position of the group alone, so that all fields of a level draw the same samples.
+// drawn: a sample of each group with all its components, masked if that sample is or if the place
+// drawn lies beyond the last sample. The draw depends on the position of the group alone, so that
+// all fields of a level draw the same samples.
 Volume coarsen(const Volume& fine, const Coarsening& how);
 
 // Components of the reduction of a field with `components`.

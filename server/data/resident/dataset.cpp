@@ -295,13 +295,6 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
-  const DatasetInfo& info = state_->info;
-  const auto components = static_cast<int>(info.fields[*index].components.size());
-  std::uint64_t bytes = sizeof(float);
-  bytes *= static_cast<std::uint64_t>(reduced_components(components, how.reduction));
-  for (std::size_t a = 0; a < 3; ++a) {
-    bytes *= static_cast<std::uint64_t>(halved(info.grid.dims()[a], how.halvings[a]));
-  }
   if (const auto there = state_->budget->find(key)) {
     if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
@@ -311,12 +304,31 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
   if (!fine) {
     return fine.error();
   }
-  auto level = get(key, bytes, [&] {
+  auto level = get(key, level_bytes(field, how), [&] {
     state_->add(&Counts::levels);
-    return guarded(info.fields[*index], [&]() -> Result<Volume> { return coarsen(**fine, how); });
+    return guarded(state_->info.fields[*index],
+                   [&]() -> Result<Volume> { return coarsen(**fine, how); });
   });
   if (own_) own_->erase(own_->find(fine->get()));  // the volume is not yet shared
   return level;
+}
+
+std::uint64_t Dataset::level_bytes(const std::string& field, const Coarsening& how) const {
+  const DatasetInfo& info = state_->info;
+  const Result<std::size_t> index = state_->find(field, 0);
+  if (!index) return 0;
+  auto components = static_cast<int>(info.fields[*index].components.size());
+  const bool whole = how.halvings == std::array{0, 0, 0};
+  if (!whole) components = reduced_components(components, how.reduction);
+  std::uint64_t bytes = sizeof(float) * static_cast<std::uint64_t>(components);
+  for (std::size_t a = 0; a < 3; ++a) {
+    bytes *= static_cast<std::uint64_t>(halved(info.grid.dims()[a], how.halvings[a]));
+  }
+  return bytes;
+}
+
+bool Dataset::is_within_limit(std::uint64_t bytes) const {
+  return bytes + state_->bytes_beside(loader_bytes_min) <= state_->budget->bytes_max();
 }
 
 Result<std::shared_ptr<const void>> Dataset::reserve(std::uint64_t bytes) const {
@@ -413,12 +425,11 @@ std::optional<Dataset::Loading> Dataset::loading() const {
 }
 
 Result<void> Dataset::check_room(const std::vector<std::string>& fields) const {
-  const Budget& budget = *state_->budget;
   for (const std::string& field : fields) {
     const std::uint64_t bytes = bytes_at_a_step(state_->info, {field});
-    if (bytes + state_->bytes_beside(loader_bytes_min) <= budget.bytes_max()) continue;
+    if (is_within_limit(bytes)) continue;
     return make_error(ErrorKind::out_of_memory, in_quotes(field) + " needs " + megabytes(bytes) +
-                                                    " at a step; " + budget.limit_text() +
+                                                    " at a step; " + state_->budget->limit_text() +
                                                     beyond_limit(fields));
   }
   return {};

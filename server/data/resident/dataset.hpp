@@ -48,6 +48,11 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 
+  // Bytes of the field at a step, reduced in that way; 0: no such field.
+  [[nodiscard]] std::uint64_t level_bytes(const std::string& field, const Coarsening& how) const;
+  // Whether that much fits into the memory limit beside a loader, whatever is resident now.
+  [[nodiscard]] bool is_within_limit(std::uint64_t bytes) const;
+
   // A handle that never loads, reduces or waits: absent volumes yield the error not_resident.
   [[nodiscard]] Dataset resident_only() const;
   // A handle that waits for room used by others (Budget::get(), in_turn). Only one thread at a

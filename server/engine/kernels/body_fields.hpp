@@ -65,12 +65,43 @@ KERNEL_INLINE Three<Kernel> fetch_vectors(const Pass& pass, const Rows& rows, in
           hn::IfThenElse(masked, zero, z)};
 }
 
-// Scale factors from vectors of the field to those drawn.
-KERNEL_INLINE Kernel rate_of(const float* rates, const Rows& rows, int a, int i) {
-  if (rates == nullptr) return all<Kernel>(1.0F);
-  alignas(64) float lanes[pair_kernels];
-  for (int k = 0; k < pair_kernels; ++k) lanes[k] = rates[rows.sample[a][k]];
-  return load<Kernel>(lanes + i);
+// The samples of the data whose lines are drawn. At a coarser level, each is drawn from a group by
+// the highest bits of a hash (data::Reduction::drawn). Beyond the last sample, where the field is
+// masked, the last one.
+KERNEL_INLINE Hash3<UnsignedOf<Kernel>> drawn_samples(const LineStyle& line, const Rows& rows,
+                                                      int i) {
+  const hn::RebindToUnsigned<KernelTag> tag;
+  const hn::RebindToSigned<KernelTag> integers;
+  const auto position = [&](int a) {
+    return hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i));
+  };
+  const Hash3<UnsignedOf<Kernel>> group = {position(0), position(1), position(2)};
+  if (line.merged == 0) return group;
+  const auto drawn = [&](int a, UnsignedOf<Kernel> index, UnsignedOf<Kernel> bits) {
+    const int halvings = line.halvings[a];
+    const auto place = hn::ShiftRight<1>(hn::ShiftRightSame(bits, 31 - halvings));
+    const auto last = hn::Set(tag, static_cast<std::uint32_t>(line.data_dims[a] - 1));
+    return hn::Min(hn::ShiftLeftSame(index, halvings) + place, last);
+  };
+  const Hash3<UnsignedOf<Kernel>> hash = pcg3d(group);
+  return {drawn(0, group.x, hash.x), drawn(1, group.y, hash.y), drawn(2, group.z, hash.z)};
+}
+
+// Factors from the components of vectors of the field to those drawn.
+KERNEL_INLINE Three<Kernel> rates_of(const LineStyle& line, const Rows& rows, int i) {
+  const Kernel one = all<Kernel>(1.0F);
+  const Kernel rate_y = all<Kernel>(line.rate_y);
+  if (line.rate_x == nullptr && line.rate_z == nullptr) return {one, rate_y, one};
+  const auto look_up = [&](const float* rates, UnsignedOf<Kernel> samples) {
+    if (rates == nullptr) return one;
+    alignas(64) std::uint32_t sample[pair_kernels];
+    alignas(64) float lanes[pair_kernels];
+    hn::Store(samples, hn::RebindToUnsigned<KernelTag>(), sample);
+    for (int k = 0; k < kernel_lanes; ++k) lanes[k] = rates[sample[k]];
+    return load<Kernel>(lanes);
+  };
+  const Hash3<UnsignedOf<Kernel>> sample = drawn_samples(line, rows, i);
+  return {look_up(line.rate_x, sample.y), rate_y, look_up(line.rate_z, sample.z)};
 }
 
 // Vectors whose largest component is zero or of moderate size. Compared as integers: a denormal,
@@ -117,12 +148,16 @@ inline float scaled_magnitude(const LineStyle& line, double magnitude) {
 
 // Replaces the vectors of the lanes in `bits`, which may be of any size: in double precision
 // neither their squares nor their inverses leave the range of numbers.
-inline void read_extremes(const LineStyle& line, const Rows& rows, int i, const Three<Kernel>& v,
+inline void read_extremes(const LineStyle& line, const Three<Kernel>& rates, const Three<Kernel>& v,
                           std::uint32_t bits, Vectors& vectors) {
-  alignas(64) float data[3][pair_kernels], direction[3][pair_kernels], magnitude[pair_kernels];
+  alignas(64) float data[3][pair_kernels], rate[3][pair_kernels], direction[3][pair_kernels],
+      magnitude[pair_kernels];
   store(v.x, data[0]);
   store(v.y, data[1]);
   store(v.z, data[2]);
+  store(rates.x, rate[0]);
+  store(rates.y, rate[1]);
+  store(rates.z, rate[2]);
   store(vectors.magnitude, magnitude);
   store(vectors.direction.x, direction[0]);
   store(vectors.direction.y, direction[1]);
@@ -133,11 +168,9 @@ inline void read_extremes(const LineStyle& line, const Rows& rows, int i, const 
     const double length = length_of(at);
     magnitude[k] = -1;
     if (length <= 0) continue;
-    const double rates[3] = {
-        line.rate_x == nullptr ? 1.0 : static_cast<double>(line.rate_x[rows.sample[1][i + k]]),
-        static_cast<double>(line.rate_y),
-        line.rate_z == nullptr ? 1.0 : static_cast<double>(line.rate_z[rows.sample[2][i + k]])};
-    for (int c = 0; c < 3; ++c) at[c] *= static_cast<double>(line.scale[c]) * rates[c] / length;
+    for (int c = 0; c < 3; ++c) {
+      at[c] *= static_cast<double>(line.scale[c]) * static_cast<double>(rate[c][k]) / length;
+    }
     const double drawn = length_of(at);
     if (drawn <= 0) continue;
     magnitude[k] = scaled_magnitude(line, length);
@@ -158,17 +191,17 @@ KERNEL_INLINE Vectors read_vectors(const Pass& pass, const Rows& rows, int i) {
                            hn::IfThenElseZero(moderate, all_sizes.z)};
   const Norm raw = moderate_norm(v);
   // Scaled by 1/m first: the products stay finite for any data.
-  const Three<Kernel> drawn = {
-      v.x * raw.inverse * all<Kernel>(line.scale[0]) * rate_of(line.rate_x, rows, 1, i),
-      v.y * raw.inverse * all<Kernel>(line.scale[1]) * all<Kernel>(line.rate_y),
-      v.z * raw.inverse * all<Kernel>(line.scale[2]) * rate_of(line.rate_z, rows, 2, i)};
+  const Three<Kernel> rates = rates_of(line, rows, i);
+  const Three<Kernel> drawn = {v.x * raw.inverse * all<Kernel>(line.scale[0]) * rates.x,
+                               v.y * raw.inverse * all<Kernel>(line.scale[1]) * rates.y,
+                               v.z * raw.inverse * all<Kernel>(line.scale[2]) * rates.z};
   const Norm shown = norm_of(drawn);
   const auto known = hn::Ge(shown.length, all<Kernel>(normal_least));
   Vectors vectors = {hn::IfThenElse(known, raw.length, all<Kernel>(-1.0F)),
                      {drawn.x * shown.inverse, drawn.y * shown.inverse, drawn.z * shown.inverse}};
   const std::uint32_t lanes = (2U << (kernel_lanes - 1)) - 1U;
   const std::uint32_t extreme = line.scaled != 0 ? lanes : lanes & ~bits_of<Kernel>(moderate);
-  if (HWY_UNLIKELY(extreme != 0)) read_extremes(line, rows, i, all_sizes, extreme, vectors);
+  if (HWY_UNLIKELY(extreme != 0)) read_extremes(line, rates, all_sizes, extreme, vectors);
   return vectors;
 }
 

@@ -22,39 +22,27 @@ struct Origins {
   Three<Kernel> place, count;
 };
 
-// The index that is drawn from each group along an axis (data::Reduction::drawn).
-KERNEL_INLINE UnsignedOf<Kernel> drawn_index(const LineStyle& line, int a, UnsignedOf<Kernel> group,
-                                             UnsignedOf<Kernel> hash, Kernel& place,
-                                             Kernel& samples) {
-  const hn::RebindToUnsigned<KernelTag> tag;
-  const hn::RebindToSigned<KernelTag> integers;
-  const int halvings = line.halvings[a];
-  const auto size = hn::Set(tag, 1U << static_cast<unsigned>(halvings));
-  const auto first = hn::ShiftLeftSame(group, halvings);
-  const auto count =
-      hn::Min(size, hn::Set(tag, static_cast<std::uint32_t>(line.data_dims[a])) - first);
-  const auto high = hn::ShiftRight<1>(hn::ShiftRightSame(hash, 31 - halvings));
-  const auto within = hn::ShiftRightSame(high * count, halvings);
-  samples = from_integer<Kernel>(hn::BitCast(integers, count));
-  const Kernel middle = from_integer<Kernel>(hn::BitCast(integers, within)) + all<Kernel>(0.5F);
-  place = middle / samples - all<Kernel>(0.5F);
-  return first + within;
-}
-
 KERNEL_INLINE Origins origins_of(const LineStyle& line, const Rows& rows, int i) {
-  const hn::RebindToUnsigned<KernelTag> tag;
-  const hn::RebindToSigned<KernelTag> integers;
-  const auto sample = [&](int a) {
-    return hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i));
-  };
   const Kernel zero = hn::Zero(KernelTag());
   const Kernel one = all<Kernel>(1.0F);
-  Origins out = {{sample(0), sample(1), sample(2)}, {zero, zero, zero}, {one, one, one}};
+  Origins out = {drawn_samples(line, rows, i), {zero, zero, zero}, {one, one, one}};
   if (line.merged == 0) return out;
-  const Hash3<UnsignedOf<Kernel>> hash = pcg3d(out.sample);
-  out.sample = {drawn_index(line, 0, out.sample.x, hash.x, out.place.x, out.count.x),
-                drawn_index(line, 1, out.sample.y, hash.y, out.place.y, out.count.y),
-                drawn_index(line, 2, out.sample.z, hash.z, out.place.z, out.count.z)};
+  const hn::RebindToUnsigned<KernelTag> tag;
+  const hn::RebindToSigned<KernelTag> integers;
+  const auto find = [&](int a, UnsignedOf<Kernel> sample, Kernel& place, Kernel& count) {
+    const int halvings = line.halvings[a];
+    const auto group = hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i));
+    const auto first = hn::ShiftLeftSame(group, halvings);
+    const auto size = hn::Set(tag, 1U << static_cast<unsigned>(halvings));
+    const auto rest = hn::Set(tag, static_cast<std::uint32_t>(line.data_dims[a])) - first;
+    count = from_integer<Kernel>(hn::BitCast(integers, hn::Min(size, rest)));
+    const Kernel middle =
+        from_integer<Kernel>(hn::BitCast(integers, sample - first)) + all<Kernel>(0.5F);
+    place = middle / count - all<Kernel>(0.5F);
+  };
+  find(0, out.sample.x, out.place.x, out.count.x);
+  find(1, out.sample.y, out.place.y, out.count.y);
+  find(2, out.sample.z, out.place.z, out.count.z);
   return out;
 }
 

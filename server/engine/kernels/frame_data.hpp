@@ -42,9 +42,9 @@ struct ColorTable {
 struct LineStyle {
   const float* velocity[3];  // third null for a horizontal field
   float scale[3];
-  const float* rate_x;  // indexed by sample along y; null: components are not scaled
+  const float* rate_x;  // by sample of the data along y; null: components are not scaled
   float rate_y;
-  const float* rate_z;  // indexed by sample along z
+  const float* rate_z;  // by sample of the data along z
   // A power of two by which magnitudes are multiplied: 1, unless the full magnitude is so large or
   // small that its square or inverse could leave the range of floats (`scaled`). Then, and for
   // vectors of such sizes, magnitudes are computed in double. All numbers below are scaled.

@@ -2,12 +2,14 @@
 #include "server/engine/reference/reference.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
 
+#include "server/base/check.hpp"
 #include "server/engine/reference/body.hpp"
 #include "server/engine/reference/kernels.hpp"
 #include "server/engine/reference/profile.hpp"
@@ -277,6 +279,7 @@ Result<std::unique_ptr<Painting>> Painting::begin(const scene::Scene& scene, uns
                                                   const CancelToken& cancel, const Options& options,
                                                   const Reserve& reserve) {
   if (cancel.cancelled()) return cancelled_error();
+  WINDSPLAT_CHECK((scene.level == std::array{0, 0, 0}));  // it draws no merged samples
   auto state = std::make_unique<State>(scene, options);
   if (reserve) {
     if (auto room = state->make_room_for_kernels(scene, reserve); !room) return room.error();

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <memory>
-#include <random>
 #include <stdexcept>
 
 #include "server/engine/reference/reference.hpp"
@@ -13,16 +12,17 @@ namespace windsplat::test {
 
 namespace {
 
-class Maker {
+class Maker : private Draws {
  public:
-  explicit Maker(std::uint32_t seed) : random_(seed) {}
+  using Draws::Draws;
 
   scene::Scene make(bool inside) {
     scene::Scene scene;
     std::array<std::vector<double>, 3> spacing;
     for (auto& axis : spacing) {
       const double cell = between(0.1, 0.4);
-      for (int n = whole(2, 6); n > 0; --n) axis.push_back(cell * between(0.7, 1.4));
+      const int count = whole(2, 6);
+      axis = widths(count, cell, 0.7, 1.4);
     }
     scene.lattice = make_lattice(spacing);
     if (whole(0, 3) == 0) bend(scene.lattice);
@@ -46,11 +46,6 @@ class Maker {
   }
 
  private:
-  double between(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  int whole(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
-
   std::shared_ptr<const data::Volume> wave(const scene::Lattice& lattice, int components) {
     const double phase = between(0, 6);
     const double k = between(2, 7);
@@ -93,8 +88,6 @@ class Maker {
     layer.stride = whole(0, 3) == 0 ? 2 : 1;
     return layer;
   }
-
-  std::mt19937 random_;
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "server/access/cost_limits.hpp"
 #include "server/data/resident/store.hpp"
+#include "server/data/samples/samples.hpp"
 
 namespace windsplat::access {
 namespace {
@@ -12,7 +13,7 @@ namespace {
 // Lines of 100 x 80 x 60 samples and one medium.
 class CostTest : public testing::Test {
  protected:
-  CostTest() : store_(data::StoreOptions{}) {
+  CostTest() : store_(std::uint64_t{1} << 30U) {
     dataset_ = store_.add("tornado:100x80x60").value();
     view_.dataset = dataset_->info().id;
     view_.vector.field = {protocol::FieldChoice::Kind::named, "wind"};
@@ -27,7 +28,7 @@ class CostTest : public testing::Test {
   frame::Cost cost(const protocol::View& view) {
     const auto outline = scene::outline(view, dataset_->info());
     EXPECT_TRUE(outline) << (outline ? "" : outline.error().message);
-    return frame::cost_of(outline.value());
+    return frame::cost_of(outline.value(), *dataset_);
   }
 
   protocol::ScalarView medium() {
@@ -114,6 +115,23 @@ TEST_F(CostTest, MergedOrCulledSamplesCostLess) {
   within.camera.target = protocol::Vec3{0, 1, 0};
   within.camera.fov_y = 5;
   EXPECT_LT(cost(within).kernels, 0.5 * from_outside);
+}
+
+TEST_F(CostTest, CountsEverySampleWhereLevelsDoNotFitIntoMemory) {
+  protocol::View far = view_;
+  far.vector.opacity = 0.05;
+  far.camera.eye = protocol::Vec3{0, -1000, 0};
+  far.camera.target = protocol::Vec3{0, 0, 0};
+  const double all = cost(far).kernels;
+  far.method.detail = protocol::Detail::automatic;
+  const auto within = [&](double bytes) {
+    const data::Dataset dataset(data::open_sample("tornado", {100, 80, 60}).value(), "tornado",
+                                static_cast<std::uint64_t>(bytes));
+    return frame::cost_of(scene::outline(far, dataset.info()).value(), dataset).kernels;
+  };
+  const double wind = 3 * sizeof(float) * samples;
+  EXPECT_LT(within(wind + wind / 8), 0.2 * all);
+  EXPECT_EQ(within(wind + wind / 8 - 1), all);
 }
 
 TEST_F(CostTest, IsFiniteAndRefusedAtEveryExtremeOfAView) {

@@ -37,10 +37,11 @@ class Measure : public testing::Test {
 
   scene::CompletedView completed() { return scene::complete(view, *dataset).value(); }
 
-  std::map<std::size_t, quality::Measured> calibrated() {
+  std::map<std::size_t, quality::Measured> calibrated() { return calibrated(pool); }
+  std::map<std::size_t, quality::Measured> calibrated(ThreadPool& threads) {
     std::map<std::size_t, quality::Measured> found;
     const auto done = calibrate(
-        completed(), *dataset, pool, cancel, workspace, [&](const CalibrationSample& one) {
+        completed(), *dataset, threads, cancel, workspace, [&](const CalibrationSample& one) {
           EXPECT_TRUE(found.emplace(one.setting, one.measured).second) << one.setting;
           EXPECT_EQ(one.viewpoint.pixels_high, 96);
         });
@@ -178,6 +179,17 @@ TEST_F(Measure, CalibrationRunAgreesWithMeasuredFrames) {
   EXPECT_NEAR(error_of({protocol::MethodName::slab, 0, 0, 2}) /
                   error_of({protocol::MethodName::slab, 0, 0, 4}),
               4, 1e-3);
+}
+
+TEST_F(Measure, CalibrationErrorsHaveTheSameBitsForAnyNumberOfThreads) {
+  ThreadPool one(1);
+  ThreadPool three(3);
+  const auto first = calibrated(one);
+  for (int run = 0; run < 2; ++run) {
+    for (const auto& [setting, measured] : calibrated(three)) {
+      EXPECT_EQ(measured.error.value(), first.at(setting).error.value()) << setting;
+    }
+  }
 }
 
 // From far away the view merges its data: slabs of any thickness then have equal errors.

@@ -68,7 +68,8 @@ double integral(
 
 Coarsening drawn(const std::array<int, 3>& halvings) { return {halvings, {}, Reduction::drawn}; }
 
-TEST(CoarsenByDrawing, TakesOneSampleOfEachGroupWithAllItsComponents) {
+// No sample where the place that is drawn lies beyond the end of an axis.
+TEST(CoarsenByDrawing, TakesAtMostOneSampleOfEachGroupWithAllItsComponents) {
   const std::array<int, 3> dims{9, 6, 5};
   std::vector<float> values;
   for (int c = 0; c < 3; ++c) {
@@ -78,9 +79,16 @@ TEST(CoarsenByDrawing, TakesOneSampleOfEachGroupWithAllItsComponents) {
   const Volume coarse = coarsen(fine, drawn({1, 2, 1}));
   ASSERT_EQ(coarse.dims, (std::array{5, 2, 3}));
   std::size_t n = 0;
+  int empty = 0;
   for (int k = 0; k < 3; ++k) {
     for (int j = 0; j < 2; ++j) {
       for (int i = 0; i < 5; ++i, ++n) {
+        if (std::isnan(coarse.component(0)[n])) {
+          EXPECT_TRUE(i == 4 || j == 1 || k == 2) << "a whole group";
+          EXPECT_TRUE(std::isnan(coarse.component(1)[n]) && std::isnan(coarse.component(2)[n]));
+          ++empty;
+          continue;
+        }
         const auto from = static_cast<int>(coarse.component(0)[n]);
         EXPECT_EQ(from % 9 / 2, i);
         EXPECT_EQ(from / 9 % 6 / 4, j);
@@ -90,6 +98,21 @@ TEST(CoarsenByDrawing, TakesOneSampleOfEachGroupWithAllItsComponents) {
       }
     }
   }
+  EXPECT_EQ(coarse.masked, empty);
+}
+
+// Rows of three samples: the second group has one. Of n draws with probability 1/2 the standard
+// deviation is sqrt(n) / 2; six of them are allowed.
+TEST(CoarsenByDrawing, DrawsEverySampleOfAnIncompleteGroupAsOftenAsOthers) {
+  const int rows = 64 * 64;
+  std::vector<float> values;
+  for (int n = 0; n < 3 * rows; ++n) values.push_back(static_cast<float>(n % 3));
+  const Volume coarse = coarsen(volume_of({3, 64, 64}, 1, std::move(values)), drawn({1, 0, 0}));
+  std::array<int, 3> count{};
+  for (const float v : coarse.values) {
+    if (!std::isnan(v)) ++count.at(static_cast<std::size_t>(v));
+  }
+  for (const int n : count) EXPECT_NEAR(n, rows / 2, 6 * std::sqrt(rows) / 2);
 }
 
 // Of n draws with probability 1/8 the expected count is n / 8 with a standard deviation of
