@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include "server/engine/flush_denormals.hpp"
@@ -69,39 +68,6 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
   return reach;
 }
 
-// Pixels per world unit at a view depth, clamped to the near plane.
-double scale_at(const kernels::Camera& camera, double depth) {
-  if (camera.perspective == 0) return camera.inverse_pixel;
-  return camera.inverse_pixel / std::max<double>(depth, camera.near);
-}
-
-// Upper bound on the alphas, summed over the picture, of the lines and splats of a brick that are
-// below tolerance: a line covers its length times r1 + r2 and two half discs, a splat its
-// extinction times its volume. All are assumed at the nearest depth of the brick, with `scale`
-// pixels per world unit. The sampling factors bound the ratio of the sum over pixels to the area,
-// over all positions and rotations, for shapes and line ramps no narrower than a pixel.
-double left_out(const RenderPlan& plan, const PassPlan& pass, const KeptSummary& summary,
-                double cover, double scale) {
-  constexpr double line_sampling = 1.2;
-  constexpr double splat_sampling = 1.03;
-  if (summary.weak_lines == 0 && summary.thin_medium <= 0) return 0;
-  const kernels::Camera& camera = plan.camera;
-  const kernels::LineStyle& line = pass.kernel.line;
-  const double pixels = static_cast<double>(camera.width) * camera.height;
-  double oblique = 1;  // length of the longest ray at unit depth
-  if (camera.perspective != 0) {
-    oblique = std::hypot(1.0, std::hypot(camera.half_width_px, camera.half_height_px) *
-                                  static_cast<double>(camera.pixel));
-  }
-  const double r1 = line.r1;
-  const double r2 = std::max<double>(line.r2, r1 + 1);
-  const double discs = std::numbers::pi * (r1 * r1 + r1 * r2 + r2 * r2) / 3;
-  const double length = line.length * static_cast<double>(summary.weak_parts) * scale * oblique;
-  const double covered = line_sampling * (length * (r1 + r2) + summary.weak_lines * discs);
-  const double lines = line.opacity * std::min(covered, summary.weak_lines * pixels);
-  return lines + splat_sampling * static_cast<double>(summary.thin_medium) * cover * oblique;
-}
-
 void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick) {
   const auto block = [](double pixel, int size) {
     const int last = (size - 1) / kernels::block_side;
@@ -112,30 +78,6 @@ void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick)
   brick.block_x_last = block(r.x1, camera.width);
   brick.block_y = block(r.y0, camera.height);
   brick.block_y_last = block(r.y1, camera.height);
-}
-
-// Upper bound on the area that thin splats of a brick cover at `scale` pixels per world unit, as a
-// multiple of that at a scale of 0: the largest of the three terms of splat_cover of the kernels,
-// divided by the third. Uses the widest cells of the brick.
-double splat_cover(const Pass& pass, const Brick& brick, double scale) {
-  std::array<double, 3> edge{};
-  const auto widest = [&](int a, int first, int count) {
-    for (int i = first; i < first + count; ++i) {
-      edge[a] = std::max<double>(edge[a], pass.axis[a].cell[pass.axis[a].visit[i]]);
-    }
-  };
-  if (pass.places != nullptr) {
-    for (int a = 0; a < 3; ++a) edge[a] = pass.cell_max[a];
-    const double section = std::hypot(edge[1] * edge[2], edge[2] * edge[0], edge[0] * edge[1]);
-    const double chord = std::hypot(edge[0], edge[1], edge[2]);
-    return std::max(
-        {edge[0] * edge[1] * edge[2] / chord * scale * scale, section / chord * scale, 1.0});
-  }
-  widest(pass.major, brick.sheet, 1);
-  widest(pass.u, brick.u_first, brick.u_count);
-  widest(pass.v, brick.v_first, brick.v_count);
-  std::sort(edge.begin(), edge.end());
-  return std::max({edge[0] * edge[1] * scale * scale, edge[1] * scale, 1.0});
 }
 
 // Selects the bricks that a frame draws.
@@ -322,9 +264,12 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
     }
     if (!kept.known()) read_summary(pass, shared, brick, kept);
     if (kept.left_out_any()) {
-      const double scale = scale_at(plan_.camera, most.depth_first);
-      const double cover = kept.thin_medium > 0 ? splat_cover(pass.kernel, brick, scale) : 0;
-      out.counts.left_out += left_out(plan_, pass, kept, cover, scale);
+      const double alphas = left_out_alphas(plan_, pass, brick, kept, most.depth_first);
+      set_blocks(most.seen, plan_.camera, brick);
+      out.left_out.push_back(
+          {brick.block_x, brick.block_x_last, brick.block_y, brick.block_y_last});
+      const std::int64_t pixels = pixels_in(out.left_out.back(), plan_.camera);
+      out.counts.left_out += std::min(alphas, static_cast<double>(pixels));
     }
     if (!known && kept.holds_any())
       found = project_(pass, box, reach_of(pass.kernel, shared, kept));
@@ -350,6 +295,7 @@ void Binner::add_sheet(const SheetKey& key, SheetBricks& out) {
   PassBins& shared = space_.passes[key.pass];
   out.bricks.clear();
   out.kernels.clear();
+  out.left_out.clear();
   out.counts = {};
   const int layer = pass.axis[kernel.major].visit[key.sheet];
   const AxisArrays& along_u = pass.axis[kernel.u];
@@ -471,21 +417,23 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   });
   if (cancel.cancelled()) return bins;
   BrickCounts sum;
+  space.touched.begin(plan.camera);
   for (const BrickCounts& row : space.rows) sum += row;
   for (std::size_t i = 0; i < sheets && !cancel.cancelled(); ++i) {
     const SheetBricks& sheet = space.found[i];
     bins.bricks.insert(bins.bricks.end(), sheet.bricks.begin(), sheet.bricks.end());
     add_load(plan, bins, sheet);
     sum += sheet.counts;
+    for (const BlockRange& range : sheet.left_out) space.touched.add(range);
   }
   work.samples += sum.samples;
   work.culled += sum.culled;
   work.skipped_vector += sum.without_line;
   work.skipped_scalar += sum.without_splat;
   work.skipped_both += sum.without_both;
-  // The alpha of a pixel is at most 1.
+  const double pixels = static_cast<double>(plan.camera.width) * plan.camera.height;
   work.skipped_bound =
-      std::min(1.0, sum.left_out / (static_cast<double>(plan.camera.width) * plan.camera.height));
+      std::min(sum.left_out, static_cast<double>(space.touched.pixels(plan.camera))) / pixels;
   if (plan.slabs || plan.curved) sort_by_depth(space);
   if (!cancel.cancelled()) list_by_tile(plan, cancel, space);
   return bins;

@@ -8,6 +8,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/engine/kernels/table.hpp"
+#include "server/engine/left_out.hpp"
 #include "server/engine/plan.hpp"
 #include "server/engine/summaries.hpp"
 #include "server/engine/work.hpp"
@@ -42,6 +43,7 @@ struct BrickCounts {
 struct SheetBricks {
   std::vector<kernels::Brick> bricks;
   std::vector<std::int32_t> kernels;  // lines and splats of each brick
+  std::vector<BlockRange> left_out;   // where bricks may show what tolerances skipped
   BrickCounts counts;
 };
 
@@ -72,6 +74,7 @@ struct BinSpace {
   std::vector<PassBins> passes;
   std::vector<SheetKey> sheets;
   std::vector<SheetBricks> found;  // per sheet
+  TouchedBlocks touched;           // by what tolerances skipped
   std::vector<BrickCounts> rows;   // counts of the regions counted as a whole, per row
   struct DepthKey {
     float depth;

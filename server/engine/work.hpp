@@ -42,8 +42,8 @@ struct WorkReport {
   std::int64_t exponentials = 0;
   std::int64_t tiles = 0;
   std::int64_t tiles_stopped = 0;  // tiles ended by early ray termination
-  // Upper bounds: mean over the picture of the alphas skipped by tolerances, and the largest change
-  // of a pixel by early termination.
+  // Upper bounds: mean over the picture of the change by what tolerances skip, and the largest
+  // change of a pixel by early termination.
   double skipped_bound = 0;
   double stop_bound = 0;
   std::vector<std::string> fields;  // set by the caller

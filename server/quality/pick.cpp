@@ -36,19 +36,24 @@ double pixels_at(const protocol::View& view, const Setting& setting) {
          edge_at(view.image.height, setting.half_level);
 }
 
+bool is_candidate(const Setting& setting, const protocol::View& view, const Aim& aim) {
+  const bool any_finer = aim.max_error && !aim.before_final;
+  return is_allowed(setting, view) && (any_finer || !is_finer(setting, view));
+}
+
 Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim,
             double pixels_most) {
   const double budget =
       aim.budget_ms ? headroom * *aim.budget_ms : std::numeric_limits<double>::max();
   const bool any_small = std::any_of(settings.begin(), settings.end(), [&](const auto& setting) {
-    return is_allowed(setting, view) && pixels_at(view, setting) <= pixels_most;
+    return is_candidate(setting, view, aim) && pixels_at(view, setting) <= pixels_most;
   });
   Candidate keeps_both;
   Candidate least_error;  // within the time budget
   Candidate fastest;
   for (std::size_t i = 0; i < settings_count; ++i) {
     const bool large = pixels_at(view, settings[i]) > pixels_most;
-    if (!is_allowed(settings[i], view) || (any_small && large)) continue;
+    if (!is_candidate(settings[i], view, aim) || (any_small && large)) continue;
     const double ms = forecasts[i].ms;
     fastest.take(i, ms);
     if (ms > budget) continue;

@@ -16,7 +16,13 @@ namespace windsplat::quality {
 struct Aim {
   std::optional<double> budget_ms;
   std::optional<double> max_error;  // linear RMSE
+  // The frame precedes the final one of its view, which is the most accurate.
+  bool before_final = false;
 };
+
+// Whether a setting may be chosen: it is allowed for the view, and not finer than the view's own
+// unless for an error bound that does not apply to a frame before the final one.
+bool is_candidate(const Setting& setting, const protocol::View& view, const Aim& aim);
 
 // The 95 % and 5 % quantiles of the error by the forecast distribution.
 double error_bound(const Forecast& forecast);
@@ -30,8 +36,8 @@ struct Choice {
   bool fits = false;  // within the budget; otherwise the fastest setting was chosen
 };
 
-// Chooses among the settings allowed for the view with at most `pixels_most` pixels, or among all
-// allowed ones if none is that small.
+// Chooses among the candidates with at most `pixels_most` pixels, or among all if none is that
+// small.
 Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim,
             double pixels_most = std::numeric_limits<double>::infinity());
 

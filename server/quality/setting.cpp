@@ -51,4 +51,9 @@ bool is_allowed(const Setting& setting, const protocol::View& view) {
   return setting.half_level == 0 || edge_at(shorter, setting.half_level) >= edge_min;
 }
 
+bool is_finer(const Setting& setting, const protocol::View& view) {
+  const bool slab = setting.method == protocol::MethodName::slab;
+  return setting.thinner > 1 || (slab && view.method.name == protocol::MethodName::kernel);
+}
+
 }  // namespace windsplat::quality

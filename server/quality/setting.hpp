@@ -59,4 +59,8 @@ std::optional<std::size_t> index_of(const Setting& setting);
 // reduced pictures with an edge below 64 pixels, and coarser data if the view requires full detail.
 bool is_allowed(const Setting& setting, const protocol::View& view);
 
+// Whether the setting is more accurate than the one that renders the view unchanged: thinner slabs,
+// and all slabs for a view of method kernel.
+bool is_finer(const Setting& setting, const protocol::View& view);
+
 }  // namespace windsplat::quality

@@ -8,7 +8,11 @@
 #include <string>
 
 #include "server/engine/plan.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
+#include "server/scene/completed_view.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/trial_fields.hpp"
 
 namespace windsplat::test {
 namespace {
@@ -233,6 +237,60 @@ TEST(LeftOut, WeakLinesAndThinMediaStayWithinTheirBound) {
   }
   EXPECT_GT(changed, 40) << "the scenes contain little below tolerance";
   EXPECT_GT(tight, changed / 4) << "the bound is never approached";
+}
+
+// By default most vectors are left out for clarity, and their alphas add up to several times the
+// picture.
+TEST(LeftOut, BoundIsWithinAFactorOfFourAtDefaultViews) {
+  int views = 0;
+  for (const TrialField& field : trial_fields()) {
+    // Those that are generated quickly.
+    if (field.name.find("noise") == std::string::npos && !field.name.starts_with("she") &&
+        field.name != "plume") {
+      continue;
+    }
+    const auto dataset = trial_dataset(field);
+    protocol::View view;
+    view.dataset = field.name;
+    view.image.width = 160;
+    view.image.height = 120;
+    view.method.name = protocol::MethodName::kernel;
+    view.scalars.emplace();
+    const auto completed = scene::complete(view, *dataset).value();
+    for (const double azimuth : {0.0, 70.0}) {
+      const auto turned = completed.with(
+          [&](protocol::View& by) { scene::orbit(by, completed.lattice(), azimuth, 20, 1); });
+      Scene scene = scene::build_scene(turned.value(), *dataset).value();
+      const engine::Rendered less = render(scene, 2);
+      scene.vector->min_magnitude = 0;
+      const double change = between(less.image, render(scene, 2).image).mean;
+      ASSERT_GT(change, 0.05) << field.name;
+      EXPECT_GE(less.work.skipped_bound, change) << field.name;
+      EXPECT_LE(less.work.skipped_bound, 4 * change) << field.name << ' ' << azimuth;
+      ++views;
+    }
+  }
+  EXPECT_EQ(views, 8);
+}
+
+// Bricks behind each other change the pixels of one; beside each other those of all.
+TEST(LeftOut, BoundCountsPixelsOnce) {
+  const auto bound = [](std::array<int, 3> dims) {
+    Scene scene;
+    scene.lattice = even_lattice(dims, {0.05, 0.05, 0.05});
+    scene.camera = look({0, 0, 0}, {0, 1, 0}, 5, 64, 64, false, 1);
+    scene.vector =
+        plain_lines(make_volume(scene.lattice, 3,
+                                [](int c, double, double, double) { return c == 0 ? 1.F : 0.F; }),
+                    {1.0F, 1.0F, 1.0F});
+    scene.vector->length = 0.1;
+    scene.vector->min_magnitude = 2;
+    return render(scene).work.skipped_bound;
+  };
+  const double one = bound({8, 1, 8});
+  EXPECT_LT(one, 0.3) << "a fifth of the edge of the picture, and the reach of lines";
+  EXPECT_EQ(bound({8, 40, 8}), one);
+  EXPECT_GT(bound({24, 1, 8}), 1.8 * one);
 }
 
 // A pixel whose centre hits a splat smaller than itself shows the peak of the splat.

@@ -339,6 +339,7 @@ TEST(Threads, AnyCountGivesTheSameBits) {
       EXPECT_EQ(one.work.exponentials, many.work.exponentials);
       EXPECT_EQ(one.work.occluded, many.work.occluded);
       EXPECT_EQ(one.work.skipped_both, many.work.skipped_both);
+      EXPECT_EQ(one.work.skipped_bound, many.work.skipped_bound);
     }
   }
 }

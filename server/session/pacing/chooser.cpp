@@ -26,7 +26,7 @@ std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts
   constexpr Micros rest = 1'000'000;
   if (now - chosen_at_ > rest) chosen_.reset();
   chosen_at_ = now;
-  const bool stays = chosen_ && quality::is_allowed(quality::settings[*chosen_], view) &&
+  const bool stays = chosen_ && quality::is_candidate(quality::settings[*chosen_], view, aim) &&
                      quality::pixels_at(view, quality::settings[*chosen_]) <= pixels_most;
   if (stays && measured_ && wanted.fits) {
     if (!is_wrong(wanted.setting, forecasts, aim)) {

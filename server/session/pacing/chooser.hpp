@@ -24,8 +24,8 @@ class Chooser {
   // The first time was measured, or earlier ones no longer apply (FrameTimes::learn).
   void restart();
 
-  // Chooses among settings that quality::is_allowed permits for the view and whose pictures have at
-  // most `pixels_most` pixels, or all if none has.
+  // Chooses among the settings that quality::is_candidate permits and whose pictures have at most
+  // `pixels_most` pixels, or all if none has.
   std::size_t choose(const protocol::View& view, const quality::Forecasts& forecasts,
                      const quality::Aim& aim, double pixels_most, Micros now);
 

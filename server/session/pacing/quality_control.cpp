@@ -34,7 +34,7 @@ Encoding full_quality(bool png, int jpeg_quality) {
 
 // If both are null, a stream keeps the default budget.
 quality::Aim QualityControl::aim(const protocol::View& view) const {
-  quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
+  quality::Aim aim{view.quality.budget_ms, view.quality.max_error, true};
   if (aim.budget_ms || aim.max_error) return aim;
   // When sessions compete for the renderer, shorten the frames of all of them to raise the rate:
   // for n similar sessions by the root of n.
@@ -73,7 +73,7 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   const auto [known, cost, guessed] = times_.forecast(view, now);
   if (guessed || cost <= long_in_coming || is_reference(view)) return std::nullopt;
   const Micros budget = cost / 4;
-  const auto next = quality::pick(view, known, {1e-3 * static_cast<double>(budget), {}});
+  const auto next = quality::pick(view, known, {1e-3 * static_cast<double>(budget), {}, true});
   if (!next.fits || !(known[next.setting].error < better * shown_error)) return std::nullopt;
   FramePlan plan;
   plan.setting = quality::settings[next.setting];

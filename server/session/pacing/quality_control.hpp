@@ -33,7 +33,8 @@ class QualityControl {
   // at a fraction of the final time. nullopt: draw the final frame next.
   [[nodiscard]] std::optional<FramePlan> refining(const protocol::View& view, const Link& link,
                                                   double shown_error, Micros now) const;
-  // The view as specified; with thinner slabs if its error would exceed maxError.
+  // The view as specified, whatever was shown before; with thinner slabs if its error would exceed
+  // maxError. Frames before it are never finer.
   [[nodiscard]] FramePlan final_frame(const protocol::View& view) const;
   [[nodiscard]] static FramePlan still(const protocol::View& view, bool png);
 

@@ -102,6 +102,21 @@ TEST_F(Pick, OnlyAllowedSettings) {
   EXPECT_EQ(picked({500, 0.001}), finest);
 }
 
+// The final frame of a view has the view's own setting, and nothing shown before is finer.
+TEST_F(Pick, FinerThanTheViewOnlyForAnErrorBound) {
+  const Setting thinner{MethodName::slab, 0, 0, 4};
+  set(thinner, 1e-5, 120);
+  EXPECT_EQ(picked({500, {}}), finest);
+  EXPECT_EQ(picked({{}, {}}), finest);
+  EXPECT_EQ(picked({{}, 1e-4}), thinner);
+  EXPECT_EQ(picked({{}, 1e-4, true}), finest);
+  EXPECT_EQ(picked({500, 1e-4, true}), finest);
+  view.method.name = MethodName::kernel;
+  view.quality.max_error = 1e-4;
+  EXPECT_EQ(picked({{}, 1e-4}), thinner);
+  EXPECT_EQ(picked({{}, 1e-4, true}), fine);
+}
+
 TEST_F(Pick, OneSettingIsFasterThanAllOthers) {
   for (Forecast& forecast : forecasts) forecast.ms = 1000;
   forecasts[index_of(fine).value()].ms = 5;

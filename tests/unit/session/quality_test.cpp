@@ -200,6 +200,44 @@ TEST(Refining, LongFinalFrameIsPrecededByABetterOne) {
   EXPECT_EQ(drawn.back(), quality::settings[quality::own_setting(View{})]);
 }
 
+// Small pictures: thinner slabs take next to no time.
+TEST(Refining, FinalFrameIsTheFinestShownWhateverWasShownBefore) {
+  const std::string view =
+      R"({"dataset":"wind","image":{"width":160,"height":120},"camera":{"eye":[1,-3,1]}})";
+  for (const char* quality : {R"({})", R"({"budgetMs":500})", R"({"maxError":0.000001})"}) {
+    std::vector<quality::Setting> finals;
+    for (const int dragged : {0, 1, 40}) {
+      Driver driver;
+      driver.calibrated = calibrated(0.5);
+      driver.measured_error = 5e-7;
+      driver.patch(1, view);
+      driver.patch(2, std::string(R"({"quality":)") + quality + "}");
+      std::uint32_t rev = 2;
+      std::vector<quality::Setting> moving = drag(driver, dragged, rev, costs(*driver.calibrated));
+      driver.patch(++rev, view);
+      std::optional<quality::Setting> last;
+      for (int turns = 0; turns < 50 && !(last && !driver.render); ++turns) {
+        if (driver.render) {
+          if (driver.render->encoding.measure) {
+            last = driver.render->setting;
+          } else {
+            moving.push_back(driver.render->setting);
+          }
+          driver.finish_render(1 * ms);
+        }
+        if (!driver.frames.empty()) driver.ack(driver.frames.back().header.seq);
+        driver.wait(200 * ms);
+      }
+      ASSERT_TRUE(last);
+      finals.push_back(*last);
+      for (const quality::Setting& shown : moving) {
+        EXPECT_LE(shown.thinner, last->thinner) << quality << " after " << dragged;
+      }
+    }
+    for (const quality::Setting& final : finals) EXPECT_EQ(final, finals.front()) << quality;
+  }
+}
+
 TEST(Refining, IsCancelledByTheNextChange) {
   Driver driver;
   driver.calibrated = calibrated(200);
