@@ -136,7 +136,7 @@ function trustTable({ trust }: StudyExtremes): HTMLElement {
         String(one.cases),
         String(one.refused),
         String(one.failed),
-        ...one.within.map(({ values }) => values),
+        ...one.within.map(({ values }) => element("span", { class: "values" }, values)),
         scientific(one.worst, 1),
         one.worstAt,
         fixed(one.leastReported, 2),
