@@ -126,6 +126,51 @@ Json stability_json(const StudyStability& one) {
               {"diverges", one.diverges}};
 }
 
+Json extreme_json(const StudyExtreme& one) {
+  Json json{{"group", one.group},     {"label", one.label},           {"value", one.value},
+            {"method", one.method},   {"projection", one.projection}, {"mapping", one.mapping},
+            {"samples", one.samples}, {"width", one.width},           {"height", one.height},
+            {"outcome", one.outcome}};
+  if (!one.message.empty()) json["message"] = one.message;
+  if (one.truth.empty()) return json;
+  json["truth"] = one.truth;
+  json["finite"] = one.finite;
+  json["bounded"] = one.bounded;
+  json["honest"] = one.honest;
+  json["monotone"] = one.monotone ? Json(*one.monotone) : Json(nullptr);
+  json["rmse"] = one.rmse;
+  json["max"] = one.max;
+  json["measured"] = one.measured;
+  json["estimate"] = one.estimate;
+  json["bound"] = one.bound;
+  return json;
+}
+
+Json extremes_json(const StudyExtremes& extremes) {
+  Json cases = Json::array();
+  for (const StudyExtreme& one : extremes.cases) cases.push_back(extreme_json(one));
+  Json trust = Json::array();
+  for (const StudyTrust& one : extremes.trust) {
+    Json within = Json::array();
+    for (const auto& [limit, values] : one.within) {
+      within.push_back(Json{{"limit", limit}, {"values", values}});
+    }
+    trust.push_back(Json{{"group", one.group},
+                         {"parameter", one.parameter},
+                         {"method", one.method},
+                         {"cases", one.cases},
+                         {"refused", one.refused},
+                         {"failed", one.failed},
+                         {"worst", one.worst},
+                         {"worstAt", one.worst_at},
+                         {"leastReported", one.least_reported},
+                         {"estimated", one.estimated},
+                         {"withinBound", one.within_bound},
+                         {"within", std::move(within)}});
+  }
+  return Json{{"cases", std::move(cases)}, {"trust", std::move(trust)}};
+}
+
 }  // namespace
 
 std::string encode_study(const StudyDocument& study, bool compact) {
@@ -133,22 +178,23 @@ std::string encode_study(const StudyDocument& study, bool compact) {
   for (const StudyScene& scene : study.scenes) scenes.push_back(scene_json(scene));
   Json stability = Json::array();
   for (const StudyStability& one : study.stability) stability.push_back(stability_json(one));
-  const Json document{{"machine",
-                       {{"processor", study.processor},
-                        {"system", study.system},
-                        {"compiler", study.compiler},
-                        {"windsplat", study.version},
-                        {"kernels", study.kernels},
-                        {"hardwareThreads", study.hardware_threads},
-                        {"threads", study.threads}}},
-                      {"quick", study.quick},
-                      {"seconds", study.seconds},
-                      {"runs", study.runs},
-                      {"measured", study.measured},
-                      {"skipped", study.skipped},
-                      {"scenes", std::move(scenes)},
-                      {"stability", std::move(stability)},
-                      {"stabilityLayers", study.stability_layers}};
+  Json document{{"machine",
+                 {{"processor", study.processor},
+                  {"system", study.system},
+                  {"compiler", study.compiler},
+                  {"windsplat", study.version},
+                  {"kernels", study.kernels},
+                  {"hardwareThreads", study.hardware_threads},
+                  {"threads", study.threads}}},
+                {"quick", study.quick},
+                {"seconds", study.seconds},
+                {"runs", study.runs},
+                {"measured", study.measured},
+                {"skipped", study.skipped},
+                {"scenes", std::move(scenes)},
+                {"stability", std::move(stability)},
+                {"stabilityLayers", study.stability_layers}};
+  if (study.extremes) document["extremes"] = extremes_json(*study.extremes);
   return document.dump(compact ? -1 : 2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

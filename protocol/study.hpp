@@ -2,6 +2,7 @@
 // null.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -127,6 +128,39 @@ struct StudyStability {
   bool diverges = false;
 };
 
+// A stiff or extreme case drawn by one method.
+struct StudyExtreme {
+  std::string group, label;
+  double value = 0;  // null: not a number
+  std::string method, projection, mapping;
+  std::array<int, 3> samples{};
+  int width = 0, height = 0;
+  std::string outcome;  // "good", "failed" or "refused"
+  std::string message;  // empty: none
+  std::string truth;    // empty: none
+  bool finite = true, bounded = true, honest = true;
+  std::optional<bool> monotone;
+  double rmse = 0, max = 0;           // null: not compared
+  double measured = 0, estimate = 0;  // null: none
+  double bound = 0;
+};
+
+// The values of a parameter at which a method may be trusted.
+struct StudyTrust {
+  std::string group, parameter, method;
+  std::size_t cases = 0, refused = 0, failed = 0;
+  double worst = 0;
+  std::string worst_at;
+  double least_reported = 0;
+  std::size_t estimated = 0, within_bound = 0;
+  std::vector<std::pair<double, std::string>> within;  // limit of the error, values
+};
+
+struct StudyExtremes {
+  std::vector<StudyExtreme> cases;
+  std::vector<StudyTrust> trust;
+};
+
 struct StudyDocument {
   std::string processor, system, compiler, version, kernels;
   unsigned hardware_threads = 0, threads = 0;
@@ -137,6 +171,7 @@ struct StudyDocument {
   std::vector<StudyScene> scenes;
   std::vector<StudyStability> stability;
   int stability_layers = 0;  // cells of `layers_min` and `layers_max`
+  std::optional<StudyExtremes> extremes;
 };
 
 // Indented by two for human readers; `compact`: one line.

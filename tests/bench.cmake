@@ -22,8 +22,8 @@ function(windsplat_bench name)
 endfunction()
 
 set(naive_dir ${CMAKE_CURRENT_LIST_DIR}/numerics)
-windsplat_bench(bench_frame ${naive_dir}/naive_renderer.cpp ${naive_dir}/naive_order.cpp
-  ${naive_dir}/truth/integrator.cpp ${naive_dir}/truth/integrator_kernels.cpp)
+windsplat_bench(bench_frame ${naive_dir}/naive_renderer.cpp ${naive_dir}/naive_order.cpp)
+target_link_libraries(bench_frame PRIVATE windsplat_truth)
 windsplat_bench(bench_kernels)
 windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
 windsplat_bench(bench_path)

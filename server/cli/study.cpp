@@ -1,4 +1,4 @@
-// windsplat study: writes a report of error against run time of every method.
+// windsplat study: writes a report of error against run time of every method, or of extreme cases.
 #include "server/study/study.hpp"
 
 #include <unistd.h>
@@ -21,6 +21,8 @@
 #include "server/cli/signals.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/engine/reference/reference.hpp"
+#include "server/study/extremes/cases.hpp"
+#include "server/study/report/extremes_text.hpp"
 #include "server/study/report/report.hpp"
 
 namespace windsplat::cli {
@@ -34,6 +36,8 @@ constexpr double quick_tolerance = 1e-6;
 struct StudyArguments {
   std::string dataset;
   bool standard = false;
+  bool extremes = false;
+  std::vector<std::string> groups;
   std::vector<std::string> scenes;
   std::string view_file;
   std::string size;
@@ -161,7 +165,38 @@ std::string summary(const study::Report& report, const std::string& folder) {
   return text;
 }
 
+int interrupted() {
+  complain("study: interrupted; run the same command to continue");
+  return exit_interrupted;
+}
+
+// Exits with 1 if a case fails, so that a test can rely on it.
+int extremes_command(const StudyArguments& arguments) {
+  const CancelToken cancel;
+  const SignalWatch watch([&cancel] { cancel.cancel(); }, nullptr, {exit_interrupted});
+  ThreadPool pool(arguments.threads);
+  Reporter reporter(isatty(STDERR_FILENO) == 1);
+  auto report = study::study_extremes(arguments.groups, arguments.output, pool, cancel,
+                                      [&reporter](const std::string& group, double done) {
+                                        reporter({group, "", done});
+                                      });
+  reporter.finish();
+  if (!report) {
+    return report.error().kind == ErrorKind::cancelled ? interrupted() : answer(report.error());
+  }
+  const auto written = study::write_report(*report, arguments.output);
+  if (!written) return answer(written.error());
+  const study::Extremes& extremes = *report->extremes;
+  std::string text = study::extremes_text(extremes);
+  text += std::to_string(extremes.cases.size()) + " cases, " + std::to_string(extremes.failed());
+  text += " failed, in " + study::format_number("%.1f", report->seconds) + " s: ";
+  text += printable(arguments.output) + "/index.html\n";
+  if (const auto printed = write_stdout(text); !printed) return answer(printed.error());
+  return extremes.failed() == 0 ? exit_ok : exit_failed;
+}
+
 int study_command(const StudyArguments& arguments) {
+  if (arguments.extremes) return extremes_command(arguments);
   const auto limit = memory_limit(arguments.memory);
   if (!limit) return answer(limit.error());
   const CancelToken cancel;
@@ -182,9 +217,7 @@ int study_command(const StudyArguments& arguments) {
                        [&reporter](const study::Progress& progress) { reporter(progress); });
   reporter.finish();
   if (!report) {
-    if (report.error().kind != ErrorKind::cancelled) return answer(report.error());
-    complain("study: interrupted; run the same command to continue");
-    return exit_interrupted;
+    return report.error().kind == ErrorKind::cancelled ? interrupted() : answer(report.error());
   }
   const auto written = study::write_report(*report, arguments.output);
   if (!written) return answer(written.error());
@@ -198,12 +231,27 @@ void add_study(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
       "study", "Measure error against run time of every method; writes a report into a folder");
   const auto arguments = std::make_shared<StudyArguments>();
-  command->add_option("dataset", arguments->dataset, "A sample's name or a file")
-      ->type_name("DATASET");
-  command->add_flag("--standard", arguments->standard, "The standard scenes (without a DATASET)");
-  command->add_option("--scene", arguments->scenes, "Only this standard scene; may be repeated")
+  CLI::Option* dataset =
+      command->add_option("dataset", arguments->dataset, "A sample's name or a file")
+          ->type_name("DATASET");
+  CLI::Option* standard = command->add_flag("--standard", arguments->standard,
+                                            "The standard scenes (without a DATASET)");
+  CLI::Option* scene =
+      command->add_option("--scene", arguments->scenes, "Only this standard scene; may be repeated")
+          ->allow_extra_args(false)
+          ->check(CLI::IsMember(study::standard_names()));
+  CLI::Option* extremes =
+      command
+          ->add_flag("--extremes", arguments->extremes,
+                     "Stiff and extreme cases instead; fails if one of them does")
+          ->excludes(dataset)
+          ->excludes(standard)
+          ->excludes(scene);
+  command
+      ->add_option("--group", arguments->groups, "Only this group of --extremes; may be repeated")
+      ->needs(extremes)
       ->allow_extra_args(false)
-      ->check(CLI::IsMember(study::standard_names()));
+      ->check(CLI::IsMember(study::group_names()));
   command->add_option("--view", arguments->view_file, "A view of DATASET as JSON")->type_name("F");
   command->add_option("--size", arguments->size, "Pixels of DATASET's pictures, default 160x120")
       ->type_name("WxH");

@@ -244,19 +244,41 @@ class Study {
   double done_ = 0;
 };
 
+Result<void> make_folder(const std::filesystem::path& folder) {
+  std::error_code fault;
+  std::filesystem::create_directories(folder, fault);
+  if (!fault) return {};
+  std::string message = "cannot create the folder '";
+  message += printable(folder.native());
+  message += "': ";
+  message += fault.message();
+  return make_error(ErrorKind::internal, std::move(message));
+}
+
 }  // namespace
+
+Result<Report> study_extremes(const std::vector<std::string>& group_names,
+                              const std::filesystem::path& folder, ThreadPool& pool,
+                              const CancelToken& cancel, const GroupListener& listen) {
+  if (auto made = make_folder(folder); !made) return made.error();
+  const Clock::time_point start = Clock::now();
+  Report report;
+  auto machine = this_machine(pool.size());
+  if (!machine) return machine.error();
+  report.machine = std::move(*machine);
+  auto extremes = run_extremes(group_names, pool, cancel, listen);
+  if (!extremes) return extremes.error();
+  report.extremes = std::move(*extremes);
+  auto stability = stiffness_sweep(pool, cancel);
+  if (!stability) return stability.error();
+  report.stability = std::move(*stability);
+  report.seconds = seconds_since(start);
+  return report;
+}
 
 Result<Report> run_study(const std::vector<Subject>& subjects, const Options& options,
                          ThreadPool& pool, const CancelToken& cancel, const Listener& listen) {
-  std::error_code fault;
-  std::filesystem::create_directories(options.folder, fault);
-  if (fault) {
-    std::string message = "cannot create the folder '";
-    message += printable(options.folder.native());
-    message += "': ";
-    message += fault.message();
-    return make_error(ErrorKind::internal, std::move(message));
-  }
+  if (auto made = make_folder(options.folder); !made) return made.error();
   auto points = PointsFile::open(options.folder / "points.csv");
   if (!points) return points.error();
   auto machine = this_machine(pool.size());

@@ -10,6 +10,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/study/calibration.hpp"
+#include "server/study/extremes/extremes.hpp"
 #include "server/study/machine.hpp"
 #include "server/study/scenes.hpp"
 #include "server/study/stability.hpp"
@@ -54,6 +55,7 @@ struct Report {
   std::size_t skipped = 0;  // points of earlier runs
   std::vector<SceneReport> scenes;
   std::vector<Stiffness> stability;
+  std::optional<Extremes> extremes;
 };
 
 struct Progress {
@@ -77,5 +79,11 @@ using Listener = std::function<void(const Progress&)>;
 // and the files.
 Result<Report> run_study(const std::vector<Subject>& subjects, const Options& options,
                          ThreadPool& pool, const CancelToken& cancel, const Listener& listen);
+
+// A report of extreme cases (extremes.hpp) and stability, without scenes, for a folder that is
+// made. Errors: those of run_extremes(); internal (the folder).
+Result<Report> study_extremes(const std::vector<std::string>& group_names,
+                              const std::filesystem::path& folder, ThreadPool& pool,
+                              const CancelToken& cancel, const GroupListener& listen);
 
 }  // namespace windsplat::study

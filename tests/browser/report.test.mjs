@@ -11,7 +11,7 @@ import { launch, openPage, screenshots } from "./support.mjs";
 
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const folder = mkdtempSync(join(tmpdir(), "windsplat-report-"));
-const address = pathToFileURL(join(folder, "index.html")).href;
+const addressOf = (folder) => pathToFileURL(join(folder, "index.html")).href;
 let browser, study;
 
 before(async () => {
@@ -27,7 +27,7 @@ after(async () => {
   rmSync(folder, { recursive: true, force: true });
 });
 
-async function withReport(run, options = {}) {
+async function withReport(run, { address = addressOf(folder), ...options } = {}) {
   const requests = [];
   const prepare = (page) => page.on("request", (request) => requests.push(request.url()));
   const page = await openPage(browser, address, { colorScheme: "light", prepare, ...options });
@@ -159,6 +159,35 @@ test("tables contain the numbers of study.json", () =>
     const own = study.scenes[1].points.find((point) => point.own && point.method === "slab");
     assert.equal(summary[1][3], own.rmse.toExponential(2));
   }));
+
+test("a report of extreme cases states where each method may be trusted", () => {
+  const own = join(folder, "extremes");
+  const words = ["study", "--extremes", "--group", "opacity", "-o", own];
+  execFileSync(process.env.WINDSPLAT_PROGRAM, words, { stdio: "pipe" });
+  const { cases, trust } = JSON.parse(readFileSync(join(own, "study.json"), "utf8")).extremes;
+  return withReport(
+    async (page) => {
+      assert.equal(await page.title(), "windsplat: extreme cases");
+      const [trusted] = await rowsOf(page, "may be trusted");
+      assert.deepEqual(
+        trusted.map((row) => [row[0], row[1], ...row.slice(5, 7)]),
+        trust.map((one) => [one.group, one.method, ...one.within.map(({ values }) => values)]),
+      );
+      const [listed] = await rowsOf(page, "opacity: every case");
+      assert.deepEqual(
+        listed.map((row) => [row[0], row[6], row[7]]),
+        cases.map((one) => [one.label, one.outcome, one.truth ?? ""]),
+      );
+      // An opacity of 0 is not on a logarithmic axis.
+      const drawn = cases.filter(({ outcome, value }) => outcome !== "refused" && value > 0);
+      const marks = await marksOf(page.locator("figure.plot"), ".point > *");
+      assert.equal(marks.length, drawn.length);
+      assert.ok(marks.every(isWithin), JSON.stringify(marks));
+      await page.screenshot({ path: join(screenshots, "extremes.png"), fullPage: true });
+    },
+    { address: addressOf(own) },
+  );
+});
 
 test("pictures are shown and the pointer names a point", () =>
   withReport(async (page) => {

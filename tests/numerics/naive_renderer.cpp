@@ -8,9 +8,9 @@
 #include "server/base/check.hpp"
 #include "server/engine/reference/body.hpp"
 #include "server/engine/reference/kernels.hpp"
+#include "server/study/truth/integrator.hpp"
 #include "tests/numerics/naive_order.hpp"
 #include "tests/numerics/partial_footprint.hpp"
-#include "tests/numerics/truth/integrator.hpp"
 
 namespace windsplat::naive {
 

@@ -24,6 +24,33 @@ StudyPoint unstable_point() {
   return point;
 }
 
+StudyExtremes extremes() {
+  StudyExtreme drawn;
+  drawn.group = "depth";
+  drawn.label = "1e30";
+  drawn.value = 1e30;
+  drawn.method = "slab";
+  drawn.projection = "perspective";
+  drawn.mapping = "flat";
+  drawn.samples = {4, 4, 1};
+  StudyExtreme refused = drawn;
+  refused.value = unknown;
+  refused.outcome = "refused";
+  refused.message = "is too large";
+  drawn.outcome = "failed";
+  drawn.truth = "integrator";
+  drawn.finite = false;
+  drawn.monotone = true;
+  drawn.rmse = std::numeric_limits<double>::infinity();
+  drawn.measured = unknown;
+  StudyTrust trust;
+  trust.group = "depth";
+  trust.method = "slab";
+  trust.worst = unknown;
+  trust.within = {{1e-3, "all"}};
+  return {{drawn, refused}, {trust}};
+}
+
 // One element of every kind.
 StudyDocument whole_document() {
   StudyDocument study;
@@ -47,6 +74,7 @@ StudyDocument whole_document() {
   scene.pictures = {{"reference", "iVBO", ""}, {"slab analytic", "iVBO", "iVBO"}};
   study.scenes = {scene};
   study.stability = {{"simple", 1e30, unknown, 0, 1, true, false, -1e30, 1, true}};
+  study.extremes = extremes();
   return study;
 }
 
@@ -58,16 +86,21 @@ TEST(Study, MatchesItsSchemaWithEveryPart) {
   EXPECT_TRUE(scene.at("points").at(0).at("psnr").is_null());
   EXPECT_FALSE(scene.at("pictures").at(0).contains("differencePng"));
   EXPECT_EQ(scene.at("pictures").at(1).at("differencePng"), "iVBO");
+  const Json& cases = json.at("extremes").at("cases");
+  EXPECT_TRUE(cases.at(0).at("rmse").is_null());
+  EXPECT_FALSE(cases.at(1).contains("truth"));
 }
 
 TEST(Study, MatchesItsSchemaWithoutOptionalParts) {
   StudyDocument study = whole_document();
   study.scenes[0].calibration.reset();
   study.scenes[0].pictures.clear();
+  study.extremes.reset();
   const Json json = Json::parse(encode_study(study));
   EXPECT_THAT(schema_complaints("study.schema.json", "", json), IsEmpty());
   EXPECT_FALSE(json.at("scenes").at(0).contains("calibration"));
   EXPECT_FALSE(json.at("scenes").at(0).contains("pictures"));
+  EXPECT_FALSE(json.contains("extremes"));
 }
 
 TEST(Study, IsTheSameOnOneLine) {

@@ -3,6 +3,7 @@ import type { Study, StudyCalibration, StudyPicture, StudyScene } from "../gener
 import { calibrationFigure } from "./calibration_figure";
 import { details, element } from "./dom";
 import { errorFigure } from "./error_figure";
+import { extremesSection } from "./extremes";
 import {
   agreementTable,
   aimsTable,
@@ -20,8 +21,9 @@ function introduction(study: Study): string {
     `windsplat ${machine.windsplat} (${machine.kernels}), built by ${machine.compiler},`,
     `on ${machine.processor}, ${machine.system}:`,
     `${machine.threads} of ${machine.hardwareThreads} threads.`,
-    `Each time is the median of ${study.runs} runs after one to warm up.`,
-    `${study.measured} points measured${skipped}, in ${fixed(study.seconds, 1)} s.`,
+    study.extremes ? "" : `Each time is the median of ${study.runs} runs after one to warm up.`,
+    study.extremes ? "" : `${study.measured} points measured${skipped}.`,
+    `${fixed(study.seconds, 1)} s in all.`,
     study.quick ? "A quick study: small pictures and few points." : "",
   ].join(" ");
 }
@@ -125,12 +127,13 @@ function stabilitySection(study: Study): HTMLElement {
 }
 
 const study = JSON.parse(document.getElementById("study")!.textContent!) as Study;
+if (study.extremes) document.title = "windsplat: extreme cases";
 document
   .getElementById("report")!
   .append(
-    element("h1", {}, "windsplat: error against run time"),
+    element("h1", {}, document.title),
     element("p", {}, introduction(study)),
-    summaryTable(study),
+    ...(study.extremes ? [extremesSection(study.extremes)] : [summaryTable(study)]),
     ...study.scenes.map(sceneSection),
     stabilitySection(study),
   );

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/image/encode.hpp"
+#include "server/study/extremes/cases.hpp"
 
 namespace windsplat::study {
 
@@ -134,6 +135,57 @@ protocol::StudyScene document_of(const SceneReport& scene) {
   return out;
 }
 
+protocol::StudyExtreme document_of(const CaseResult& one) {
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  protocol::StudyExtreme out;
+  out.group = one.group;
+  out.label = one.label;
+  out.value = one.value;
+  out.method = one.method;
+  out.projection = one.projection;
+  out.mapping = one.mapping;
+  out.samples = one.samples;
+  out.width = one.width;
+  out.height = one.height;
+  out.outcome = outcome_of(one);
+  out.message = one.message;
+  if (one.message.empty()) out.truth = name_of(one.truth);
+  out.finite = one.verdict.finite;
+  out.bounded = one.verdict.bounded;
+  out.honest = one.verdict.honest;
+  out.monotone = one.verdict.monotone;
+  out.rmse = one.verdict.rmse;
+  out.max = one.verdict.max;
+  out.measured = one.measured.value_or(unknown);
+  out.estimate = one.estimate;
+  out.bound = one.bound;
+  return out;
+}
+
+protocol::StudyExtremes document_of(const Extremes& extremes) {
+  protocol::StudyExtremes out;
+  for (const CaseResult& one : extremes.cases) out.cases.push_back(document_of(one));
+  for (const Trust& trust : extremes.trust) {
+    protocol::StudyTrust to;
+    to.group = trust.group;
+    to.parameter = parameter_of(trust.group);
+    to.method = trust.method;
+    to.cases = trust.cases;
+    to.refused = trust.refused;
+    to.failed = trust.failed;
+    to.worst = trust.worst;
+    to.worst_at = trust.worst_at;
+    to.least_reported = trust.least_reported;
+    to.estimated = trust.estimated;
+    to.within_bound = trust.within_bound;
+    for (std::size_t i = 0; i < trust_limits.size(); ++i) {
+      to.within.emplace_back(trust_limits.at(i), trust.within.at(i));
+    }
+    out.trust.push_back(std::move(to));
+  }
+  return out;
+}
+
 }  // namespace
 
 bool has_knob(const SceneReport& scene, const Setting& setting, Knob knob) {
@@ -165,6 +217,7 @@ protocol::StudyDocument document_of(const Report& report) {
                                   s.monotone, s.layers_min, s.layers_max, s.diverges});
   }
   document.stability_layers = stiff_layers;
+  if (report.extremes) document.extremes = document_of(*report.extremes);
   return document;
 }
 

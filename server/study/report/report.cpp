@@ -9,6 +9,7 @@
 #include "server/base/check.hpp"
 #include "server/base/whole_file.hpp"
 #include "server/study/report/document.hpp"
+#include "server/study/report/extremes_text.hpp"
 #include "server/study/report/template.hpp"
 
 namespace windsplat::study {
@@ -23,14 +24,7 @@ std::string report_csv(const Report& report) {
       "rmse,max,psnr,flip,ms,msMin,msMax,pareto,stable\n";
   for (const SceneReport& scene : report.scenes) {
     for (const Point& point : scene.points) {
-      // A name that contains a comma or a quote is quoted (RFC 4180).
-      std::string name = scene.name;
-      if (name.find_first_of(",\"") != std::string::npos) {
-        std::string quoted(1, '"');
-        for (const char c : name) quoted.append(c == '"' ? 2 : 1, c);
-        name = quoted + '"';
-      }
-      text += name;
+      text += csv_text(scene.name);
       text += ',';
       text += name_of(point.setting.method);
       text += ',';
@@ -80,9 +74,19 @@ Result<std::string> report_page(const Report& report) {
 Result<void> write_report(const Report& report, const std::filesystem::path& folder) {
   const auto page = report_page(report);
   if (!page) return page.error();
-  if (auto done = write_whole_file(folder / "study.csv", report_csv(report)); !done) return done;
+  const auto csv = report.extremes
+                       ? write_whole_file(folder / "extremes.csv", extremes_csv(*report.extremes))
+                       : write_whole_file(folder / "study.csv", report_csv(report));
+  if (!csv) return csv;
   if (auto done = write_whole_file(folder / "study.json", report_json(report)); !done) return done;
   return write_whole_file(folder / "index.html", *page);
+}
+
+std::string csv_text(const std::string& text) {
+  if (text.find_first_of(",\"") == std::string::npos) return text;
+  std::string quoted(1, '"');
+  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
+  return quoted + '"';
 }
 
 std::string format_number(const char* format, double value) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/integration/cli_program.hpp"
+#include "tests/protocol/support.hpp"
 
 namespace cli_test {
 namespace {
@@ -75,12 +76,37 @@ TEST(CliStudy, InterruptedStudyCanBeResumed) {
   EXPECT_FALSE(std::filesystem::exists(out + "/study.json"));
 }
 
+TEST(CliStudy, ExtremeCasesOfAGroupPassAndAreReported) {
+  const Folder folder;
+  const std::string out = folder.file("report");
+  const Outcome done = run({"study", "--extremes", "--group", "opacity", "-o", out});
+  ASSERT_EQ(done.code, 0) << done.out << done.err;
+  EXPECT_THAT(done.out, HasSubstr("48 cases, 0 failed"));
+  EXPECT_THAT(done.out, HasSubstr("refused: opacity 1.1: /vector/opacity"));
+  const Json study = Json::parse(read_file(out + "/study.json"));
+  EXPECT_THAT(windsplat::protocol::testing::schema_complaints("study.schema.json", "", study),
+              testing::IsEmpty());
+  const Json& cases = study.at("extremes").at("cases");
+  EXPECT_EQ(cases.size(), 48U);
+  for (const Json& one : cases) {
+    EXPECT_EQ(one.at("outcome"), one.at("value") > 1 ? "refused" : "good") << one;
+    EXPECT_EQ(one.value("truth", "none"), one.at("value") > 1 ? "none" : "integrator");
+  }
+  EXPECT_EQ(study.at("extremes").at("trust").size(), 3U);
+  EXPECT_THAT(read_file(out + "/extremes.csv"), HasSubstr("\nopacity,0.5,slab,perspective,flat,"));
+  EXPECT_THAT(read_file(out + "/index.html"), HasSubstr("\"extremes\""));
+}
+
 TEST(CliStudy, WrongArgumentsAreUsageErrors) {
   const Folder folder;
   const std::string out = folder.file("report");
   for (const Words& words : std::vector<Words>{{"study"},
                                                {"study", "--standard"},
                                                {"study", "--scene", "hard", "-o", out},
+                                               {"study", "--extremes"},
+                                               {"study", "tornado", "--extremes", "-o", out},
+                                               {"study", "--group", "fov", "-o", out},
+                                               {"study", "--extremes", "--group", "x", "-o", out},
                                                {"study", "tornado", "--standard", "-o", out},
                                                {"study", "tornado", "--size", "8", "-o", out},
                                                {"study", "--size", "8x8", "-o", out}}) {

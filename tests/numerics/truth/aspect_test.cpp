@@ -4,8 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "server/study/truth/integrator.hpp"
 #include "tests/numerics/scenes.hpp"
-#include "tests/numerics/truth/integrator.hpp"
 #include "tests/numerics/truth/random_scenes.hpp"
 
 namespace windsplat::test {

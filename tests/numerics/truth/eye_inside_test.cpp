@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "server/study/truth/integrator.hpp"
 #include "tests/numerics/scenes.hpp"
-#include "tests/numerics/truth/integrator.hpp"
 #include "tests/numerics/truth/random_scenes.hpp"
 
 namespace windsplat::test {

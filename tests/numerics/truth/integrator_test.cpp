@@ -1,5 +1,5 @@
 // The brute-force integral: closed forms, and the reference and the engine compared with it.
-#include "tests/numerics/truth/integrator.hpp"
+#include "server/study/truth/integrator.hpp"
 
 #include <gtest/gtest.h>
 
@@ -72,6 +72,19 @@ TEST(Truth, RaysBeginAtTheNearPlane) {
   scene.camera = look({0, 0, 0}, {0, 1, 0}, 0, 1, 1, true, 0.5);
   scene.camera.near = 0;
   EXPECT_NEAR(truth::integrate(scene)[0].depth, 1 / footprint_integral, 1e-7);
+}
+
+TEST(Truth, SelectedPixelsAreThoseOfTheWholePicture) {
+  const Scene scene = random_scene(3, false);
+  const auto whole = truth::integrate(scene, 4);
+  const std::vector<truth::Pixel> pixels{{2, 1}, {7, 5}, {4, 3}};
+  const auto some = truth::integrate(scene, pixels, 4);
+  ASSERT_EQ(some.size(), pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const auto& same = whole.at(static_cast<std::size_t>(10 * pixels[i].y + pixels[i].x));
+    EXPECT_EQ(some[i].rgb, same.rgb);
+    EXPECT_EQ(some[i].alpha, same.alpha);
+  }
 }
 
 class Judged : public testing::TestWithParam<std::uint32_t> {};

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "server/engine/kernels/dispatch.hpp"
+#include "server/study/truth/integrator.hpp"
 #include "tests/numerics/scenes.hpp"
-#include "tests/numerics/truth/integrator.hpp"
 #include "tests/numerics/truth/random_scenes.hpp"
 
 namespace windsplat::test {

@@ -1,11 +1,12 @@
-// Scene -> the rendering integral of each pixel by brute force: the ground truth of the tests. It
-// shares no code with the engine or its reference, follows the formulas of
-// docs/design/rendering-model.md alone, and tests every ray against every kernel.
+// Scene -> the rendering integral of each pixel by brute force: the ground truth of the tests and
+// of `windsplat study --extremes`. It shares no code with the engine or its reference, follows the
+// formulas of docs/design/rendering-model.md alone, and tests every ray against every kernel.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "server/scene/scene.hpp"
@@ -20,10 +21,18 @@ struct Light {
   double depth = 0;
 };
 
-// One entry per pixel, row 0 on top. The method, compositing, stop_transmittance and tolerance of
-// optical depth of the scene are ignored. `steps`: intervals between two places where a kernel
-// begins or ends or a line is met; colours converge with its square, optical depths much faster
-// (1e-9). Curved lattices must have two samples or more along every axis.
+struct Pixel {
+  int x = 0, y = 0;
+};
+
+// One entry per pixel. The method, compositing, stop_transmittance, tolerance of optical depth and
+// body of the scene are ignored. `steps`: intervals between two places where a kernel begins or
+// ends or a line is met; colours converge with its square, optical depths much faster (1e-9).
+// Opaque intervals are divided further. Curved lattices must have two samples or more along every
+// axis.
+std::vector<Light> integrate(const scene::Scene& scene, std::span<const Pixel> pixels,
+                             int steps = 16);
+// Every pixel, row 0 on top.
 std::vector<Light> integrate(const scene::Scene& scene, int steps = 16);
 
 // The 3-D kernel of a splat at a distance of r cells; its integral over space is the constant C.

@@ -1,6 +1,6 @@
 // Scene -> splats and lines of the brute-force integral, by the formulas of
 // docs/design/rendering-model.md.
-#include "tests/numerics/truth/integrator_kernels.hpp"
+#include "server/study/truth/integrator_kernels.hpp"
 
 #include <cstdint>
 #include <numbers>

@@ -1,5 +1,5 @@
 // Splats and lines -> the light of each ray.
-#include "tests/numerics/truth/integrator.hpp"
+#include "server/study/truth/integrator.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "tests/numerics/truth/integrator_kernels.hpp"
+#include "server/study/truth/integrator_kernels.hpp"
 
 namespace windsplat::truth {
 
@@ -131,28 +131,42 @@ class Ray {
       if (s.entry < to && s.exit > from) active_.push_back(&s);
     }
     if (active_.empty() || !(to > from)) return;
+    for (int n = 0; n < steps; ++n) {
+      cross_step(from, to - from, static_cast<Real>(n) / steps, (n + Real(1)) / steps, 0);
+    }
+  }
+
+  // From the part w0 to w1 of a piece. Opaque steps are halved, as far as their light is seen.
+  void cross_step(Real from, Real width, Real w0, Real w1, int halvings) {
     constexpr std::array<double, 3> node{-0.7745966692414834, 0, 0.7745966692414834};
     constexpr std::array<double, 3> weight{5.0 / 18, 8.0 / 18, 5.0 / 18};
-    for (int n = 0; n < steps; ++n) {
-      double tau = 0;
-      std::array<double, 3> glow{};
-      for (std::size_t k = 0; k < node.size(); ++k) {
-        const Real w = (n + 0.5L + 0.5L * node[k]) / steps;
-        const Real z = from + (to - from) * w * w * (3 - 2 * w);
-        const auto width = static_cast<double>((to - from) * 6 * w * (1 - w) * weight[k] / steps);
-        for (const Stretch* s : active_) {
-          const Real along = s->cells * (z - s->middle);
-          const double r = static_cast<double>(std::sqrt(s->least * s->least + along * along));
-          const double part = width * s->density * kernel(r);
-          tau += part;
-          for (std::size_t c = 0; c < 3; ++c) glow[c] += part * s->color[c];
-        }
+    constexpr double thick = 0.25;
+    constexpr double unseen = 1e-9;
+    constexpr int halvings_max = 120;
+    double tau = 0;
+    std::array<double, 3> glow{};
+    for (std::size_t k = 0; k < node.size(); ++k) {
+      const Real w = (w0 + w1 + (w1 - w0) * node[k]) / 2;
+      const Real z = from + width * w * w * (3 - 2 * w);
+      const auto share = static_cast<double>(width * 6 * w * (1 - w) * weight[k] * (w1 - w0));
+      for (const Stretch* s : active_) {
+        const Real along = s->cells * (z - s->middle);
+        const double r = static_cast<double>(std::sqrt(s->least * s->least + along * along));
+        const double part = share * s->density * kernel(r);
+        tau += part;
+        for (std::size_t c = 0; c < 3; ++c) glow[c] += part * s->color[c];
       }
-      if (!(tau > 0)) continue;
-      absorb(-std::expm1(-tau), {glow[0] / tau, glow[1] / tau, glow[2] / tau});
-      left_ *= std::exp(-tau);
-      light_.depth += tau;
     }
+    if (!(tau > 0)) return;
+    if (tau > thick && left_ > unseen && active_.size() > 1 && halvings < halvings_max) {
+      const Real middle = (w0 + w1) / 2;
+      cross_step(from, width, w0, middle, halvings + 1);
+      cross_step(from, width, middle, w1, halvings + 1);
+      return;
+    }
+    absorb(-std::expm1(-tau), {glow[0] / tau, glow[1] / tau, glow[2] / tau});
+    left_ *= std::exp(-tau);
+    light_.depth += tau;
   }
 
   void absorb(double alpha, const std::array<double, 3>& color) {
@@ -184,21 +198,29 @@ double kernel(double r) {
   return 2 * b / (std::numbers::pi * s * t) + scale * (t * std::log((t + a) / (s + b)) - (a - b));
 }
 
-std::vector<Light> integrate(const Scene& scene, int steps) {
+std::vector<Light> integrate(const Scene& scene, std::span<const Pixel> pixels, int steps) {
   const std::vector<Splat> splats = splats_of(scene);
   const std::vector<Line> lines = lines_of(scene);
   std::vector<Light> out;
-  for (int y = 0; y < scene.camera.height; ++y) {
-    for (int x = 0; x < scene.camera.width; ++x) {
-      std::vector<Surface> surfaces;
-      for (const Line& line : lines) {
-        const auto surface = meet(scene, line, x + 0.5L, y + 0.5L);
-        if (surface && surface->opacity > 0) surfaces.push_back(*surface);
-      }
-      out.push_back(Ray(scene, splats, x + 0.5L, y + 0.5L).follow(std::move(surfaces), steps));
+  for (const Pixel& pixel : pixels) {
+    const Real x = pixel.x + 0.5L;
+    const Real y = pixel.y + 0.5L;
+    std::vector<Surface> surfaces;
+    for (const Line& line : lines) {
+      const auto surface = meet(scene, line, x, y);
+      if (surface && surface->opacity > 0) surfaces.push_back(*surface);
     }
+    out.push_back(Ray(scene, splats, x, y).follow(std::move(surfaces), steps));
   }
   return out;
+}
+
+std::vector<Light> integrate(const Scene& scene, int steps) {
+  std::vector<Pixel> pixels;
+  for (int y = 0; y < scene.camera.height; ++y) {
+    for (int x = 0; x < scene.camera.width; ++x) pixels.push_back({x, y});
+  }
+  return integrate(scene, pixels, steps);
 }
 
 }  // namespace windsplat::truth
