@@ -48,6 +48,12 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 
+  // A volume of `bytes` bytes that make() computes from the field at the step, identified by
+  // `variant`: on first need, and shared, counted and refused like a level.
+  Result<std::shared_ptr<const Volume>> derived(const std::string& field, std::size_t step,
+                                                const std::string& variant, std::uint64_t bytes,
+                                                const std::function<Volume(const Volume&)>& make);
+
   // A handle that never loads, reduces or waits: absent volumes yield the error not_resident.
   [[nodiscard]] Dataset resident_only() const;
   // A handle that waits for room used by others (Budget::get(), in_turn). Only one thread at a
