@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -15,10 +16,12 @@
 #include <string>
 #include <vector>
 
+#include "server/engine/kernels/dispatch.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/lattice.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/truth/random_scenes.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::scene {
@@ -224,6 +227,21 @@ TEST(Plane, IsRefusedWithItsReason) {
   EXPECT_THAT(refusal(raised, *dataset), HasSubstr("heightField"));
 }
 
+TEST(Plane, SampledFieldsAreSharedAndCountAsResident) {
+  auto dataset = dataset_with(box_grid(false), linear);
+  View view = plane_view({0, 0, 0}, {1, 2, 3});
+  View whole = view;
+  whole.geometry.plane.reset();
+  static_cast<void>(built(whole, *dataset));
+  const auto before = dataset->resident_bytes();
+  const Scene scene = built(view, *dataset);
+  EXPECT_EQ(dataset->resident_bytes() - before,
+            scene.vector->field->bytes() + scene.scalars[0].field->bytes());
+  const Scene again = built(view, *dataset);
+  EXPECT_EQ(again.vector->field, scene.vector->field);
+  EXPECT_EQ(again.scalars[0].field, scene.scalars[0].field);
+}
+
 TEST(Plane, HasALimitedNumberOfSamples) {
   Lattice lattice = test::even_lattice({3000, 3000, 2}, {1e-3, 1e-3, 1e-3});
   protocol::GeometryView geometry;
@@ -291,6 +309,40 @@ TEST(Plane, ThroughALayerEqualsTheLayer) {
             << "axis " << a << " colour " << static_cast<int>(by);
       }
     }
+  }
+}
+
+// Lines and the opacity of a medium; the order of coplanar lines does not matter with `or`.
+TEST(Plane, EqualsTheReferenceOnEveryInstructionSet) {
+  auto dataset = dataset_with(box_grid(true), waves);
+  View view = plane_view({0.1, 0, -0.1}, {0.4, -0.5, 0.7});
+  view.vector.combine = protocol::LineCombination::either;
+  view.image.width = 60;
+  view.image.height = 45;
+  Scene lines = built(view, *dataset);
+  lines.stop_transmittance = 0;
+  Scene medium = lines;
+  lines.scalars.clear();
+  medium.vector.reset();
+  const auto expected_lines = test::reference_picture(lines);
+  const auto expected_medium = test::reference_picture(medium);
+  for (const Method method : {Method::kernel, Method::slab}) {
+    lines.method = medium.method = method;
+    for (const engine::kernels::Table* table : engine::kernels::usable_tables()) {
+      const auto drawn_lines = test::render_with(*table, lines);
+      const auto drawn_medium = test::render_with(*table, medium);
+      double most = 0;
+      for (std::size_t i = 0; i < expected_lines.size(); ++i) {
+        const auto value = static_cast<double>(drawn_lines.image.rgba[i]);
+        ASSERT_NEAR(value, expected_lines[i], 2e-4) << table->name;
+        most = std::max(most, value);
+        if (i % 4 != 3) continue;
+        ASSERT_NEAR(drawn_medium.image.rgba[i], expected_medium[i], 1e-5) << table->name;
+      }
+      EXPECT_GT(most, 0.05);
+    }
+    EXPECT_EQ(test::render(lines, 1).image.rgba, test::render(lines, 3).image.rgba);
+    EXPECT_EQ(test::render(medium, 1).image.rgba, test::render(medium, 3).image.rgba);
   }
 }
 
