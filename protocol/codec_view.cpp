@@ -3,6 +3,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/codec_json.hpp"
+#include "protocol/codec_names.hpp"
 #include "protocol/limits.hpp"
 
 namespace windsplat::protocol {
@@ -10,43 +11,6 @@ namespace windsplat::protocol {
 namespace {
 
 using limits::value_max;
-
-constexpr std::array<Name<Projection>, 2> projection_names{
-    {{Projection::perspective, "perspective"}, {Projection::orthographic, "orthographic"}}};
-constexpr std::array<Name<VerticalPlacement>, 4> vertical_names{
-    {{VerticalPlacement::automatic, "auto"},
-     {VerticalPlacement::linear, "linear"},
-     {VerticalPlacement::logp, "logp"},
-     {VerticalPlacement::index, "index"}}};
-constexpr std::array<Name<GeometryMapping>, 3> mapping_names{
-    {{GeometryMapping::flat, "flat"},
-     {GeometryMapping::curvilinear, "curvilinear"},
-     {GeometryMapping::sphere, "sphere"}}};
-constexpr std::array<Name<BodyShow>, 3> body_show_names{
-    {{BodyShow::automatic, "auto"}, {BodyShow::on, "on"}, {BodyShow::off, "off"}}};
-constexpr std::array<Name<GridAxis>, 3> axis_names{
-    {{GridAxis::x, "x"}, {GridAxis::y, "y"}, {GridAxis::z, "z"}}};
-constexpr std::array<Name<VectorSpace>, 2> space_names{
-    {{VectorSpace::components, "components"}, {VectorSpace::world, "world"}}};
-constexpr std::array<Name<ColorBy>, 7> color_by_names{{{ColorBy::world_z, "worldZ"},
-                                                       {ColorBy::screen_z, "screenZ"},
-                                                       {ColorBy::rise, "rise"},
-                                                       {ColorBy::magnitude, "magnitude"},
-                                                       {ColorBy::direction, "direction"},
-                                                       {ColorBy::scalar, "scalar"},
-                                                       {ColorBy::constant, "constant"}}};
-constexpr std::array<Name<MotionMode>, 2> motion_names{
-    {{MotionMode::still, "still"}, {MotionMode::phase, "phase"}}};
-constexpr std::array<Name<MethodName>, 3> method_names{{{MethodName::kernel, "kernel"},
-                                                        {MethodName::slab, "slab"},
-                                                        {MethodName::reference, "reference"}}};
-constexpr std::array<Name<Compositing>, 5> compositing_names{{{Compositing::simple, "simple"},
-                                                              {Compositing::cd_naive, "cd-naive"},
-                                                              {Compositing::cd, "cd"},
-                                                              {Compositing::analytic, "analytic"},
-                                                              {Compositing::cd_euler, "cd-euler"}}};
-constexpr std::array<Name<Detail>, 2> detail_names{
-    {{Detail::automatic, "auto"}, {Detail::full, "full"}}};
 
 constexpr NumberRange fraction{0, 1};
 constexpr NumberRange world{-limits::world_max, limits::world_max};
@@ -56,6 +20,13 @@ constexpr IntegerRange stride_range{1, limits::stride_max};
 std::string number_text(double value) { return dump(canonical_number(value)); }
 
 // --- reading ------------------------------------------------------------------------------------
+
+void check_direction(const Vec3& direction, const std::string& pointer, Faults& faults) {
+  if (std::hypot(direction[0], direction[1], direction[2]) < limits::up_length_min) {
+    faults.add(pointer,
+               "must be a direction of length " + number_text(limits::up_length_min) + " or more");
+  }
+}
 
 CameraView read_camera(const Json& json, const std::string& pointer, Faults& faults) {
   CameraView camera;
@@ -67,10 +38,7 @@ CameraView read_camera(const Json& json, const std::string& pointer, Faults& fau
   reader.number("fovY", camera.fov_y, {limits::fov_min, limits::fov_max});
   reader.number("height", camera.height, {limits::view_height_min, limits::world_max});
   reader.finish();
-  if (std::hypot(camera.up[0], camera.up[1], camera.up[2]) < limits::up_length_min) {
-    faults.add(reader.at("up"),
-               "must be a direction of length " + number_text(limits::up_length_min) + " or more");
-  }
+  check_direction(camera.up, reader.at("up"), faults);
   return camera;
 }
 
@@ -95,9 +63,23 @@ SliceView read_slice(const Json& json, const std::string& pointer, Faults& fault
   SliceView slice;
   ObjectReader reader(json, pointer, faults);
   reader.choice("axis", slice.axis, axis_names, Presence::required);
-  reader.integer("index", slice.index, {0, limits::slice_index_max}, Presence::required);
+  if (const Json* index = reader.child("index", Presence::required)) {
+    const auto read = read_number(*index, reader.at("index"),
+                                  {0, static_cast<double>(limits::slice_index_max)}, faults);
+    if (read) slice.index = *read;
+  }
   reader.finish();
   return slice;
+}
+
+PlaneView read_plane(const Json& json, const std::string& pointer, Faults& faults) {
+  PlaneView plane;
+  ObjectReader reader(json, pointer, faults);
+  if (reader.child("point", Presence::required)) reader.numbers("point", plane.point, world);
+  if (reader.child("normal", Presence::required)) reader.numbers("normal", plane.normal, world);
+  reader.finish();
+  check_direction(plane.normal, reader.at("normal"), faults);
+  return plane;
 }
 
 BodyView read_body(const Json& json, const std::string& pointer, Faults& faults) {
@@ -118,6 +100,9 @@ GeometryView read_geometry(const Json& json, const std::string& pointer, Faults&
   reader.text("heightField", geometry.height_field, 1);
   if (const Json* slice = reader.child("slice", Presence::optional, Null::is_default)) {
     geometry.slice = read_slice(*slice, reader.at("slice"), faults);
+  }
+  if (const Json* plane = reader.child("plane", Presence::optional, Null::is_default)) {
+    geometry.plane = read_plane(*plane, reader.at("plane"), faults);
   }
   if (const Json* body = reader.child("body")) {
     geometry.body = read_body(*body, reader.at("body"), faults);
@@ -207,6 +192,7 @@ VectorView read_vector(const Json& json, const std::string& pointer, Faults& fau
   reader.number("r1", vector.r1, {0, limits::radius_max});
   reader.number("r2", vector.r2, {0, limits::radius_max});
   reader.number("opacity", vector.opacity, fraction);
+  reader.choice("combine", vector.combine, combination_names);
   reader.number("headDesaturation", vector.head_desaturation, fraction);
   if (const Json* color = reader.child("color")) {
     vector.color = read_vector_color(*color, reader.at("color"), faults);
@@ -354,13 +340,20 @@ Json text_or_null(const std::optional<std::string>& value) {
 Json geometry_to_json(const GeometryView& geometry) {
   Json slice;
   if (geometry.slice) {
-    slice = {{"axis", name_of(geometry.slice->axis, axis_names)}, {"index", geometry.slice->index}};
+    slice = {{"axis", name_of(geometry.slice->axis, axis_names)},
+             {"index", canonical_number(geometry.slice->index)}};
+  }
+  Json plane;
+  if (geometry.plane) {
+    plane = {{"point", numbers_to_json(geometry.plane->point)},
+             {"normal", numbers_to_json(geometry.plane->normal)}};
   }
   return Json{{"scale", numbers_to_json(geometry.scale)},
               {"vertical", name_of(geometry.vertical, vertical_names)},
               {"mapping", name_of(geometry.mapping, mapping_names)},
               {"heightField", text_or_null(geometry.height_field)},
               {"slice", std::move(slice)},
+              {"plane", std::move(plane)},
               {"body",
                {{"show", name_of(geometry.body.show, body_show_names)},
                 {"surfaceColor", geometry.body.surface_color}}}};
@@ -382,6 +375,7 @@ Json vector_to_json(const VectorView& vector) {
            {"r1", canonical_number(vector.r1)},
            {"r2", canonical_number(vector.r2)},
            {"opacity", canonical_number(vector.opacity)},
+           {"combine", name_of(vector.combine, combination_names)},
            {"headDesaturation", canonical_number(vector.head_desaturation)},
            {"color", std::move(color)},
            {"magnitudeRange", numbers_or_null(vector.magnitude_range)},

@@ -21,6 +21,7 @@ enum class BodyShow { automatic, on, off };
 enum class GridAxis { x, y, z };
 enum class VectorSpace { components, world };
 enum class ColorBy { world_z, screen_z, rise, magnitude, direction, scalar, constant };
+enum class LineCombination { over, either };  // either: "or"
 enum class MotionMode { still, phase };
 enum class MethodName { kernel, slab, reference };
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
@@ -43,11 +44,18 @@ struct ImageView {
   bool operator==(const ImageView&) const = default;
 };
 
-// One layer of the grid.
+// One layer of the grid, or between two of its layers.
 struct SliceView {
   GridAxis axis = GridAxis::z;
-  int index = 0;  // grid samples
+  double index = 0;  // grid samples
   bool operator==(const SliceView&) const = default;
+};
+
+// A plane through the grid.
+struct PlaneView {
+  Vec3 point{0, 0, 0};   // world
+  Vec3 normal{0, 0, 1};  // of any length
+  bool operator==(const PlaneView&) const = default;
 };
 
 // An opaque surface: a globe within the shell of a sphere, otherwise the bottom of the box.
@@ -63,6 +71,7 @@ struct GeometryView {
   GeometryMapping mapping = GeometryMapping::flat;
   std::optional<std::string> height_field;  // empty: use the vertical coordinate
   std::optional<SliceView> slice;           // empty: the whole grid
+  std::optional<PlaneView> plane;           // empty: the whole grid, or the slice
   BodyView body;
   bool operator==(const GeometryView&) const = default;
 };
@@ -104,6 +113,7 @@ struct VectorView {
   double r1 = 0.6;               // pixels at a picture height of 720
   double r2 = 1.4;
   double opacity = 0.8;
+  LineCombination combine = LineCombination::over;  // of a slice or plane
   double head_desaturation = 0.7;
   VectorColorView color;
   std::optional<Range> magnitude_range;

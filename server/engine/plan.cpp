@@ -303,7 +303,9 @@ void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan
     to.cell_max[a] = *std::max_element(axis.cell.begin(), axis.cell.end());
     to.dims[a] = dims[a];
   }
-  to.compositing = static_cast<int>(scene.compositing);
+  to.compositing = pass.vector != nullptr && pass.vector->combine_or
+                       ? kernels::compositing_or
+                       : static_cast<int>(scene.compositing);
   if (scene.lattice.places) bend_pass(scene, ways, pass);
   if (pass.vector != nullptr) add_lines(scene, pass);
   add_medium(scene, pass);
@@ -350,11 +352,11 @@ void begin_pass(int stride, PassPlan& pass) {
   pass.kernel = kernels::Pass{};
 }
 
-// One pass per stride; the pass of the lines is the first.
+// One pass per stride; the pass of the lines is the first. Lines combined by `or` have their own.
 void choose_passes(const Scene& scene, std::vector<PassPlan>& passes) {
   std::size_t used = 0;
   const auto with_stride = [&](int stride) -> PassPlan& {
-    for (std::size_t n = 0; n < used; ++n) {
+    for (std::size_t n = scene.vector && scene.vector->combine_or ? 1 : 0; n < used; ++n) {
       if (passes[n].stride == stride) return passes[n];
     }
     if (used == passes.size()) passes.emplace_back();
@@ -428,6 +430,7 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   plan.slabs = scene.method == scene::Method::slab;
   plan.stop_transmittance = static_cast<float>(scene.stop_transmittance);
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
+  plan.or_lines = scene.vector && scene.vector->combine_or;
   choose_passes(scene, plan.passes);
   const int major = major_axis(scene.camera, scene.lattice);
   plan.eye_inside = is_inside(scene.camera, scene.lattice);

@@ -87,6 +87,7 @@ struct RenderPlan {
   bool eye_inside = false;          // perspective view from within the box
   bool perspective_medium = false;  // pixel rays are needed
   bool slabs = false;               // the slab method
+  bool or_lines = false;            // the first pass has lines that are combined by `or`
   bool curved = false;              // visibility order by depth only
   int compositing = 0;              // scene::Compositing
   double slab_depth = 1;            // depth of a slab along the view, world units

@@ -248,6 +248,7 @@ class SlabSweep {
   }
 
   void count_occluded(const Brick& brick) {
+    if (has_or_lines(plan_, brick)) return;
     tile_.counters.occluded += static_cast<std::int64_t>(brick.u_count) * brick.v_count;
   }
 
@@ -275,6 +276,7 @@ class SlabSweep {
     for (; next_ < last_ && brick(next_).depth_first < slab_at(index_).back; ++next_) {
       if (next_ % bricks_between_checks == 0 && cancel.cancelled()) return;
       const Brick& here = brick(next_);
+      if (has_or_lines(plan_, here)) continue;
       if (all_closed(tile_, here)) {
         count_occluded(here);
         continue;

@@ -65,6 +65,7 @@ class Sweep {
   }
 
   void count_occluded(const Brick& brick) {
+    if (has_or_lines(plan_, brick)) return;
     tile_.counters.occluded += static_cast<std::int64_t>(brick.u_count) * brick.v_count;
   }
 
@@ -83,6 +84,7 @@ class Sweep {
       constexpr std::size_t bricks_between_checks = 64;
       if (next_ % bricks_between_checks == 0 && cancel.cancelled()) return;
       const Brick& here = brick(next_);
+      if (has_or_lines(plan_, here)) continue;
       if (all_closed(tile_, here)) {
         count_occluded(here);
         continue;

@@ -111,6 +111,11 @@ constexpr std::int64_t slabs_between_checks = 4;
 // True if every block of the tile that the brick may touch is opaque or shows the body before it.
 bool all_closed(const kernels::Tile& tile, const kernels::Brick& brick);
 
+// Whether the lines of the brick are combined by `or`: they are drawn before the sweep begins.
+inline bool has_or_lines(const RenderPlan& plan, const kernels::Brick& brick) {
+  return plan.or_lines && brick.pass == 0;
+}
+
 // Draws tile `index`, whose bricks must be sorted by their first depth. Returns true if it ended
 // early because the tile became opaque. After cancellation the tile is invalid.
 bool sweep_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,

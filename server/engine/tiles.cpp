@@ -72,14 +72,21 @@ std::int64_t positions_of(const Brick& brick) {
 }
 
 // Iterates over the bricks of a tile in order, skipping those that touch closed blocks only.
+// or_lines: only those with lines that are combined by `or`; otherwise only the others.
 class OpenBricks {
  public:
-  OpenBricks(const Bins& bins, std::size_t index, Tile& tile)
-      : bins_(bins), tile_(tile), at_(bins.first[index]), last_(bins.first[index + 1]) {}
+  OpenBricks(const RenderPlan& plan, const Bins& bins, bool or_lines, std::size_t index, Tile& tile)
+      : plan_(plan),
+        bins_(bins),
+        or_lines_(or_lines),
+        tile_(tile),
+        at_(bins.first[index]),
+        last_(bins.first[index + 1]) {}
 
   const Brick* next() {
     while (at_ < last_) {
       const Brick& brick = bins_.bricks[bins_.entries[at_++]];
+      if (has_or_lines(plan_, brick) != or_lines_) continue;
       if (!all_closed(tile_, brick)) return &brick;
       tile_.counters.occluded += positions_of(brick);
     }
@@ -87,16 +94,19 @@ class OpenBricks {
   }
 
  private:
+  const RenderPlan& plan_;
   const Bins& bins_;
+  const bool or_lines_;
   Tile& tile_;
   std::size_t at_;
   std::size_t last_;
 };
 
-void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-               const CancelToken& cancel, std::size_t index, Tile& tile, TileWork& work) {
+void draw_bricks(const RenderPlan& plan, const Bins& bins, bool or_lines,
+                 const kernels::Table& table, const CancelToken& cancel, std::size_t index,
+                 Tile& tile) {
   constexpr std::size_t bricks_between_checks = 16;
-  OpenBricks bricks(bins, index, tile);
+  OpenBricks bricks(plan, bins, or_lines, index, tile);
   const Brick* next = bricks.next();
   for (std::size_t drawn = 1; next != nullptr; ++drawn) {
     if (drawn % bricks_between_checks == 0 && cancel.cancelled()) return;
@@ -105,7 +115,14 @@ void draw_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
     if (next != nullptr) table.prefetch(plan.passes[next->pass].kernel, *next);
     table.draw(plan.camera, plan.passes[brick.pass].kernel, brick, tile);
   }
-  work.stopped = table.count_open(tile) == 0;
+}
+
+// In any order. Opaque lines close no block, since others may add to their colour.
+void draw_or_lines(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
+                   const CancelToken& cancel, std::size_t index, Tile& tile) {
+  tile.stop = -1;
+  draw_bricks(plan, bins, true, table, cancel, index, tile);
+  tile.stop = plan.stop_transmittance;
 }
 
 // Converts blocks to rows, a few at a time, so that they are still in the cache when the sink reads
@@ -220,10 +237,12 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
       if (tile.body == nullptr && !has_bricks(bins, order[i])) return;
     }
     done[i].drawn = true;
+    if (plan.or_lines) draw_or_lines(plan, bins, table, cancel, order[i], tile);
     if (plan.slabs || plan.curved) {
       done[i].stopped = sweep_tile(plan, bins, table, cancel, order[i], spaces[worker].sweep, tile);
     } else {
-      draw_tile(plan, bins, table, cancel, order[i], tile, done[i]);
+      draw_bricks(plan, bins, false, table, cancel, order[i], tile);
+      done[i].stopped = table.count_open(tile) == 0;
     }
     if (tile.body != nullptr) table.close_body(tile);
     done[i].counters = tile.counters;

@@ -11,6 +11,7 @@
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/section.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -59,7 +60,14 @@ class Counting {
         visible_(visible_part(outline.camera, lattice_)),
         pixels_(static_cast<double>(outline.camera.width) * outline.camera.height),
         values_(level == std::array{0, 0, 0} ? 1 : 2) {
-    const auto slice = scene::slice_of(view_.geometry);
+    if (scene::is_section(view_.geometry)) {
+      if (const auto section = scene::make_section(view_.geometry, lattice_)) {
+        for (std::size_t a = 0; a < 3; ++a) samples_[a] = section->dims[a];
+        cell_ = section->pitch;
+        return;
+      }
+    }
+    const auto slice = scene::slice_of(view_.geometry, lattice_);
     for (std::size_t a = 0; a < 3; ++a) {
       const bool one = slice && slice->axis == static_cast<int>(a);
       samples_[a] = one ? 1.0 : data::halved(lattice_.dims[a], level[a]);

@@ -39,14 +39,19 @@ void name_field(const data::Volume& volume, const std::string& name, engine::Wor
 
 // The engine has volumes without names: the layers of the scene correspond to those of the view, in
 // the same order, without media of zero extinction. A field drawn twice counts once.
-void name_fields(const scene::Scene& scene, const protocol::View& completed,
+void name_fields(const scene::Scene& scene, const scene::CompletedView& view,
                  engine::WorkReport& work) {
+  const protocol::View& completed = view.view();
   work.fields.clear();
   work.bytes = 0;
   if (scene.vector) {
     name_field(*scene.vector->field, completed.vector.field.name, work);
     if (scene.vector->color_field) {
-      name_field(*scene.vector->color_field, completed.vector.color.field.value(), work);
+      // On a plane the colours of other quantities are computed from the vectors.
+      const bool by_scalar = completed.vector.color.by == protocol::ColorBy::scalar;
+      name_field(*scene.vector->color_field,
+                 by_scalar ? completed.vector.color.field.value() : completed.vector.field.name,
+                 work);
     }
   }
   auto layer = scene.scalars.begin();
@@ -58,7 +63,7 @@ void name_fields(const scene::Scene& scene, const protocol::View& completed,
   }
   WINDSPLAT_CHECK(layer == scene.scalars.end());
   if (const auto& heights = completed.geometry.height_field) {
-    const auto& dims = scene.lattice.dims;
+    const auto& dims = view.lattice().dims;
     const std::int64_t samples = std::int64_t{dims[0]} * dims[1] * dims[2];
     name_field(*heights, samples * static_cast<std::int64_t>(sizeof(float)), work);
   }
@@ -206,7 +211,7 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.width = scene.camera.width;
   drawn.height = scene.camera.height;
   drawn.work = std::move(*work);
-  name_fields(scene, prepared.completed.view(), drawn.work);
+  name_fields(scene, prepared.completed, drawn.work);
   drawn.view = prepared.completed.view();
   drawn.view.image = prepared.asked;
   drawn.detail = scene::detail_shown(prepared.completed) * prepared.asked.height / drawn.height;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "server/scene/colormap.hpp"
 #include "server/scene/detail.hpp"
 #include "server/scene/rates.hpp"
+#include "server/scene/section.hpp"
 
 namespace windsplat::scene {
 
@@ -122,10 +124,13 @@ struct Fields {
   data::Dataset& dataset;
   std::size_t step;
   data::Coarsening coarsening;
+  const Section* section;  // null: the samples of the data
   [[nodiscard]] Volume of_medium(const std::string& name) const {
+    if (section != nullptr) return sampled(*section, dataset, name, step);
     return dataset.level(name, step, coarsening);
   }
   [[nodiscard]] Volume of_lines(const std::string& name) const {
+    if (section != nullptr) return sampled(*section, dataset, name, step);
     return dataset.level(name, step, drawn(coarsening));
   }
 };
@@ -134,12 +139,12 @@ bool shows_lines(const View& view) {
   return view.vector.field.kind == protocol::FieldChoice::Kind::named && view.vector.opacity > 0;
 }
 
-// A stride counts samples of the data, and the reference uses all of them.
+// A stride counts samples of the data, the reference uses all of them, and a section has its own.
 bool is_drawn_in_full(const View& view) {
   const bool strided = (shows_lines(view) && view.vector.stride > 1) ||
                        std::any_of(view.scalars->begin(), view.scalars->end(),
                                    [](const auto& scalar) { return scalar.stride > 1; });
-  return view.method.detail == protocol::Detail::full || strided ||
+  return view.method.detail == protocol::Detail::full || strided || is_section(view.geometry) ||
          view.method.name == protocol::MethodName::reference;
 }
 
@@ -192,11 +197,42 @@ std::array<int, 3> level_for(const View& view, const Camera& camera, const Latti
                              int coarser, const data::Dataset& dataset) {
   constexpr std::array full{0, 0, 0};
   if (is_drawn_in_full(view)) return full;
-  const auto slice = slice_of(view.geometry);
+  const auto slice = slice_of(view.geometry, lattice);
   const auto level = coarser_level(
       lattice, slice, choose_level(camera, lattice, slice, merge_limits(view)), coarser);
   if (level == full) return full;
   return are_within_limit(shown_at(view, coarsening_of(lattice, level)), dataset) ? level : full;
+}
+
+// The lines of a plane, whose vectors and colours do not depend on the axes of the grid.
+Result<void> load_plane(const Fields& fields, const std::string& field,
+                        const ComponentFactors& factors, VectorLayer& layer) {
+  const Section& plane = *fields.section;
+  const bool by_axes = layer.color_by == LineColor::world_z || layer.color_by == LineColor::rise ||
+                       layer.color_by == LineColor::direction;
+  if (by_axes) {
+    auto values = sampled_colors(plane, fields.dataset, field, fields.step, factors, layer);
+    if (!values) return values.error();
+    layer.color_field = std::move(*values);
+    if (layer.color_by == LineColor::rise) layer.color.range = {0, 1};
+    layer.color_by = LineColor::scalar;
+  }
+  auto volume = sampled_vectors(plane, fields.dataset, field, fields.step, factors);
+  if (!volume) return volume.error();
+  layer.field = std::move(*volume);
+  return {};
+}
+
+void set_factors(const ComponentFactors& factors, const Fields& fields, VectorLayer& layer) {
+  layer.scale = factors.scale;
+  const auto& rates = factors.rates;
+  if (!rates) return;
+  layer.rate_x = rates->x;
+  layer.rate_y = rates->y;
+  layer.rate_z = rates->z;
+  if (fields.section == nullptr) return;
+  layer.rate_x = along_section(*fields.section, 1, std::move(layer.rate_x));
+  layer.rate_z = along_section(*fields.section, 2, std::move(layer.rate_z));
 }
 
 Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
@@ -206,12 +242,6 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   const auto factors =
       component_factors(view, placed, *fields.dataset.info().find(from.field.name));
   if (!factors) return factors.error();
-  layer.scale = factors->scale;
-  if (const auto& rates = factors->rates) {
-    layer.rate_x = rates->x;
-    layer.rate_y = rates->y;
-    layer.rate_z = rates->z;
-  }
   layer.length = from.length.value();
   layer.span = from.span;
   layer.stride = from.stride;
@@ -224,11 +254,18 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   layer.moving = from.motion == protocol::MotionMode::phase;
   if (layer.moving) layer.motion_cycles = from.motion_rate * (view.step + from.motion_time);
   layer.epoch = from.jitter.per_step ? static_cast<std::uint32_t>(view.step) : 0U;
+  layer.combine_or = from.combine == protocol::LineCombination::either &&
+                     (view.geometry.slice || view.geometry.plane);
   if (layer.color_by == LineColor::scalar) {
     auto values = fields.of_lines(from.color.field.value());
     if (!values) return values.error();
     layer.color_field = std::move(*values);
   }
+  if (view.geometry.plane) {
+    if (auto ok = load_plane(fields, from.field.name, *factors, layer); !ok) return ok.error();
+    return layer;
+  }
+  set_factors(*factors, fields, layer);
   auto volume = fields.of_lines(from.field.name);
   if (!volume) return volume.error();
   layer.field = std::move(*volume);
@@ -269,10 +306,23 @@ std::optional<Body> make_body(const protocol::GeometryView& geometry, const Latt
 Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View& view,
                        const Placed& placed, data::Dataset& dataset) {
   scene.level = level;
+  std::optional<Section> section;
+  if (is_section(view.geometry)) {
+    auto made = make_section(view.geometry, placed.lattice);
+    if (!made) return made.error();
+    section = *made;
+  }
   const Fields fields{dataset, static_cast<std::size_t>(view.step),
-                      coarsening_of(placed.lattice, level)};
+                      coarsening_of(placed.lattice, level), section ? &*section : nullptr};
   const double pixels = pixels_per_unit(scene.camera, placed.lattice);
-  scene.lattice = coarsen_lattice(placed.lattice, level);
+  if (section) {
+    auto lattice = lattice_of(*section, dataset);
+    if (!lattice) return lattice.error();
+    scene.lattice = std::move(*lattice);
+    scene.slice = Slice{section->axis, 0};
+  } else {
+    scene.lattice = coarsen_lattice(placed.lattice, level);
+  }
   if (shows_lines(view)) {
     auto layer = make_vector_layer(view, placed, fields);
     if (!layer) return layer.error();
@@ -304,7 +354,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   const View& view = completed.view();
   const Placed& placed = completed.placed();
   Scene scene;
-  scene.slice = slice_of(view.geometry);
+  scene.slice = slice_of(view.geometry, placed.lattice);
   scene.camera = completed.camera();
   const auto depths = view_depths(scene.camera, placed.lattice);
   const double depth = depths[1] - depths[0];
@@ -322,7 +372,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
 double detail_shown(const CompletedView& completed) {
   const View& view = completed.view();
   if (is_drawn_in_full(view) || merge_limits(view).samples < 2) return 0;
-  const auto slice = slice_of(view.geometry);
+  const auto slice = slice_of(view.geometry, completed.lattice());
   return finest_cell_px(completed.camera(), completed.lattice(), slice) / halved_below_px;
 }
 

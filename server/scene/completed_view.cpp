@@ -15,6 +15,7 @@
 #include "server/scene/lattice.hpp"
 #include "server/scene/rates.hpp"
 #include "server/scene/refusal.hpp"
+#include "server/scene/section.hpp"
 
 namespace windsplat::scene {
 
@@ -155,7 +156,7 @@ Result<Range> first_rise_range(const View& view, const Placed& placed, data::Dat
   const protocol::VectorView& vector = view.vector;
   const auto factors = component_factors(view, placed, *dataset.info().find(vector.field.name));
   if (!factors) return factors.error();
-  const std::optional<Slice> slice = slice_of(view.geometry);
+  const std::optional<Slice> slice = slice_of(view.geometry, placed.lattice);
   std::vector<double> arguments = numbers_of(placed.lattice, slice);
   arguments.insert(arguments.end(),
                    {*vector.length, *vector.min_magnitude, (*vector.magnitude_range)[1],
@@ -302,13 +303,13 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
   if (!camera) return camera;
   protocol::VectorView& vector = view.vector;
   if (auto ok = choose_vector_field(view, info); !ok) return ok.error();
-  if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry));
+  if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry, lattice));
   if (const auto& range = vector.magnitude_range; range && !((*range)[0] < (*range)[1])) {
     return invalid_at("/vector/magnitudeRange", "does not ascend");
   }
   if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
   if (!vector.color.by) {
-    vector.color.by = default_color_by(info.grid, slice_of(view.geometry));
+    vector.color.by = default_color_by(info.grid, slice_of(view.geometry, lattice));
   }
   if (auto ok = outline_scalars(view, info); !ok) return ok.error();
   return camera;
@@ -318,7 +319,7 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
 Result<void> complete_from_data(View& view, const Camera& camera, const Placed& placed,
                                 data::Dataset& dataset) {
   const Lattice& lattice = placed.lattice;
-  const std::optional<Slice> slice = slice_of(view.geometry);
+  const std::optional<Slice> slice = slice_of(view.geometry, lattice);
   if (auto ok = complete_magnitudes(view, lattice, slice, dataset); !ok) return ok;
   if (!view.vector.color.range) {
     auto range = default_color_range(view, placed, view_depths(camera, lattice), dataset);
@@ -329,6 +330,13 @@ Result<void> complete_from_data(View& view, const Camera& camera, const Placed& 
     if (auto ok = complete_scalar(scalar, lattice, slice, dataset); !ok) return ok;
   }
   return {};
+}
+
+// Errors: invalid at /geometry/plane.
+Result<void> check_section(const View& view, const Lattice& lattice) {
+  if (!is_section(view.geometry)) return {};
+  const auto section = make_section(view.geometry, lattice);
+  return section ? Result<void>() : section.error();
 }
 
 std::atomic<std::uint64_t> completed_views{0};
@@ -350,6 +358,7 @@ Result<CompletedView> complete(const View& view, data::Dataset& dataset) {
   auto placed = place_dataset(full.geometry, dataset);
   if (!placed) return placed.error();
   const Lattice& lattice = (*placed)->lattice;
+  if (auto ok = check_section(full, lattice); !ok) return ok.error();
   const auto camera = complete_from_description(full, info, lattice);
   if (!camera) return camera.error();
   if (auto ok = complete_from_data(full, *camera, **placed, dataset); !ok) return ok.error();
@@ -370,6 +379,7 @@ Result<ViewOutline> outline(const View& view, const data::DatasetInfo& info) {
   auto lattice = place_lattice(info.grid, out.view.geometry);
   if (!lattice) return lattice.error();
   out.lattice = std::move(*lattice);
+  if (auto ok = check_section(out.view, out.lattice); !ok) return ok.error();
   const auto camera = complete_from_description(out.view, info, out.lattice);
   if (!camera) return camera.error();
   out.camera = *camera;

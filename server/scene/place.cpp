@@ -2,10 +2,13 @@
 
 #include <any>
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "server/scene/bend.hpp"
 #include "server/scene/lattice.hpp"
@@ -17,7 +20,7 @@ namespace {
 
 // The cache entry of a dataset: a placement with the parameters that determine it.
 struct Kept {
-  protocol::GeometryView geometry;  // without slice and body, which do not change
+  protocol::GeometryView geometry;  // without slice, plane and body, which do not change
                                     // positions
   std::shared_ptr<const Placed> placed;
 };
@@ -45,9 +48,44 @@ bool is_bent(const protocol::GeometryView& geometry) {
   return geometry.mapping != protocol::GeometryMapping::flat || geometry.height_field.has_value();
 }
 
-std::optional<Slice> slice_of(const protocol::GeometryView& geometry) {
+namespace {
+
+// The layer nearest to the plane above the centre of the box.
+Slice layer_near(const protocol::PlaneView& plane, const Lattice& lattice) {
+  std::size_t axis = 0;
+  for (std::size_t a = 1; a < 3; ++a) {
+    if (std::abs(plane.normal[a]) >= std::abs(plane.normal[axis])) axis = a;
+  }
+  double at = 0;
+  for (std::size_t a = 0; a < 3; ++a) at += plane.normal[a] * plane.point[a];
+  at /= plane.normal[axis];
+  const std::vector<double>& positions = lattice.positions[axis];
+  std::size_t nearest = 0;
+  for (std::size_t i = 1; i < positions.size(); ++i) {
+    if (std::abs(positions[i] - at) < std::abs(positions[nearest] - at)) nearest = i;
+  }
+  return {static_cast<int>(axis), static_cast<int>(nearest)};
+}
+
+Result<void> check_plane(const protocol::GeometryView& geometry) {
+  const std::string pointer = "/geometry/plane";
+  if (geometry.slice) return invalid_at(pointer, "a view has a slice or a plane, not both");
+  if (geometry.height_field) {
+    return invalid_at(pointer, "is not available with heightField: use a slice");
+  }
+  if (geometry.mapping != protocol::GeometryMapping::flat) {
+    return invalid_at(pointer, "requires the mapping flat: use a slice");
+  }
+  return {};
+}
+
+}  // namespace
+
+std::optional<Slice> slice_of(const protocol::GeometryView& geometry, const Lattice& lattice) {
+  if (geometry.plane) return layer_near(*geometry.plane, lattice);
   if (!geometry.slice) return std::nullopt;
-  return Slice{static_cast<int>(geometry.slice->axis), geometry.slice->index};
+  return Slice{static_cast<int>(geometry.slice->axis),
+               static_cast<int>(std::lround(geometry.slice->index))};
 }
 
 Result<void> check_geometry(const protocol::GeometryView& geometry, const data::DatasetInfo& info) {
@@ -57,10 +95,13 @@ Result<void> check_geometry(const protocol::GeometryView& geometry, const data::
     if (!field) return field.error();
   }
   if (auto ok = check_mapping(info.grid, geometry.mapping); !ok) return ok;
-  if (const auto slice = slice_of(geometry)) {
+  if (geometry.plane) {
+    if (auto ok = check_plane(geometry); !ok) return ok;
+  }
+  if (const auto& slice = geometry.slice) {
     const auto axis = static_cast<std::size_t>(slice->axis);
     const int last = info.grid.dims().at(axis) - 1;
-    if (slice->sample < 0 || slice->sample > last) {
+    if (!(slice->index >= 0 && slice->index <= last)) {
       constexpr std::array<const char*, 3> names = {"x", "y", "z"};
       return invalid_at("/geometry/slice/index", "dataset " + in_double_quotes(info.id) +
                                                      " has layers 0 to " + std::to_string(last) +
@@ -76,6 +117,7 @@ Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView
   const bool bent = is_bent(geometry);
   protocol::GeometryView unsliced = geometry;
   unsliced.slice.reset();
+  unsliced.plane.reset();
   unsliced.body = {};
   if (bent) {
     const std::any any = dataset.kept(kept_key);

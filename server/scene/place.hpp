@@ -30,8 +30,9 @@ bool is_bent(const protocol::GeometryView& geometry);
 Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const std::string& name,
                                           data::FieldKind kind, const std::string& pointer);
 
-// The layer of the grid that the view shows, if it is a slice.
-std::optional<Slice> slice_of(const protocol::GeometryView& geometry);
+// The layer of the grid that the view shows, if it is a slice; if it is a plane, or lies between
+// two layers, the one nearest to it. `lattice`: that of the dataset.
+std::optional<Slice> slice_of(const protocol::GeometryView& geometry, const Lattice& lattice);
 
 // Validates a geometry without loading or placing anything: the height field is a scalar, the grid
 // supports the mapping, the slice is within the grid. Errors: invalid with a pointer.

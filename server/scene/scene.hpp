@@ -96,6 +96,9 @@ struct VectorLayer {
   double jitter_center = 0.5;
   double jitter_stride = 0.3;
   bool overlap = true;
+  // Lines are combined by `or` and laid over the medium: in each pixel the largest opacity, and of
+  // each channel the largest premultiplied light of all lines before the body, and behind it.
+  bool combine_or = false;
   std::uint32_t seed = 1;
   std::uint32_t epoch = 0;
   // Phase motion: the opacity of a line is multiplied by W(frac(q + 1/2 - phase)), W(p) = 1 - |2p -
@@ -141,7 +144,8 @@ struct Body {
 constexpr double body_ambient = 0.6;
 
 // Draws only the samples of one layer, and only the part of vectors within its plane: the
-// two-dimensional filter of [CM92].
+// two-dimensional filter of [CM92]. A layer between those of the data, or an oblique plane, has a
+// lattice of its own, which has one sample along the axis (section.hpp).
 struct Slice {
   int axis = 2;
   int sample = 0;

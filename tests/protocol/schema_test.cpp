@@ -31,6 +31,8 @@ void walk(const Json& schema, const std::string& pointer, const Visit& visit) {
 
 bool in_slice(const std::string& pointer) { return pointer.starts_with("/geometry/slice/"); }
 
+bool in_plane(const std::string& pointer) { return pointer.starts_with("/geometry/plane/"); }
+
 Json with_scalar() { return Json{{"scalars", {{{"field", "q"}}}}}; }
 
 // A view with one value set, and others that it requires.
@@ -43,6 +45,9 @@ Json view_with(const std::string& pointer, const Json& value) {
   if (pointer == "/image/width") view["image"]["height"] = 1;
   if (pointer == "/image/height") view["image"]["width"] = 1;
   if (in_slice(pointer)) view["geometry"]["slice"] = {{"axis", "y"}, {"index", 0}};
+  if (in_plane(pointer)) {
+    view["geometry"]["plane"] = {{"point", {0, 0, 0}}, {"normal", {0, 0, 1}}};
+  }
   view[Json::json_pointer(pointer)] = value;
   return view;
 }
@@ -74,7 +79,7 @@ TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
       ++compared;
     } else if (at == "/vector/field") {
       EXPECT_FALSE(encoded.contains(pointer)) << "null means no lines";
-    } else if (at != "/scalars" && at != "/scalars/0/field" && !in_slice(at)) {
+    } else if (at != "/scalars" && at != "/scalars/0/field" && !in_slice(at) && !in_plane(at)) {
       ASSERT_TRUE(encoded.contains(pointer)) << at;
       EXPECT_TRUE(encoded.at(pointer).is_null()) << at << " has no static default";
     }
@@ -92,6 +97,7 @@ TEST(Schema, EncodedViewsHoldExactlyTheSchemasKeys) {
   View view;
   view.vector.field = {FieldChoice::Kind::named, "wind"};
   view.geometry.slice = SliceView{GridAxis::x, 2};
+  view.geometry.plane = PlaneView{};
   view.scalars = std::vector<ScalarView>(1);
   view.scalars->front().field = "q";
   const Json encoded = Json::parse(encode_view(view));

@@ -12,6 +12,7 @@ import {
   mappingOptions,
   methodHints,
   methodOptions,
+  planePatch,
   sliceIndexMax,
   sliceOptions,
   slicePatch,
@@ -75,14 +76,30 @@ test("heights are offered from the axis or a scalar, metres first", () => {
   assert.deepEqual(Object.values(heightOptions(dataset)), ["", "zg", "cloud"]);
 });
 
+test("a plane keeps its other numbers, and a normal without a direction is not sent", () => {
+  const plane = slicePatch(dataset, "plane") as View;
+  assert.deepEqual(planePatch(plane, "point", 1, 0.25), {
+    geometry: { plane: { point: [0, 0.25, 0], normal: [1, 1, 0] } },
+  });
+  const last: View = { geometry: { plane: { point: [0, 0, 0], normal: [0, 1, 0] } } };
+  assert.equal(planePatch(last, "normal", 1, 0), null);
+  assert.equal(planePatch({}, "point", 0, 1), null);
+  assert.equal(controlStates(plane).combined, true);
+});
+
 test("a slice starts in the middle of an axis with layers and shows its position", () => {
-  assert.deepEqual(Object.values(sliceOptions(dataset)), ["all", "x", "z"]);
+  assert.deepEqual(Object.values(sliceOptions(dataset)), ["all", "x", "z", "plane"]);
   assert.equal(sliceIndexMax(dataset, "x"), 3);
-  assert.deepEqual(slicePatch(dataset, "z"), { geometry: { slice: { axis: "z", index: 2 } } });
-  assert.deepEqual(slicePatch(dataset, "all"), { geometry: { slice: null } });
+  assert.deepEqual(slicePatch(dataset, "z"), {
+    geometry: { slice: { axis: "z", index: 2 }, plane: null },
+  });
+  assert.deepEqual(slicePatch(dataset, "all"), { geometry: { slice: null, plane: null } });
   const view: View = { geometry: { slice: { axis: "z", index: 3 } } };
   assert.match(sliceText(dataset, view), /3 of 0 to 4: lev 500 hPa/);
   assert.equal(sliceText(dataset, {}), "");
+  const half: View = { geometry: { slice: { axis: "x", index: 0.5 } } };
+  const [first, second] = dataset.axes.x.coordinates;
+  assert.ok(sliceText(dataset, half).includes(` ${((first ?? 0) + (second ?? 0)) / 2}`));
 });
 
 test("colouring by another quantity resets the range, and scalars are named", () => {

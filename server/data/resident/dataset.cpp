@@ -286,11 +286,21 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
   if (how.halvings == std::array{0, 0, 0}) {
     return volume(field, step);
   }
+  return derived(field, step, digest_of(key_of(how)), level_bytes(field, how),
+                 [&](const Volume& fine) {
+                   state_->add(&Counts::levels);
+                   return coarsen(fine, how);
+                 });
+}
+
+Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
+                                   const std::string& variant, std::uint64_t bytes,
+                                   const std::function<Volume(const Volume&)>& make) {
   const Result<std::size_t> index = state_->find(field, step);
   if (!index) {
     return index.error();
   }
-  const ResidentKey key{state_->owner, *index, step, digest_of(key_of(how))};
+  const ResidentKey key{state_->owner, *index, step, variant};
   if (manner_ == Manner::resident_only) {
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
@@ -299,18 +309,16 @@ Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
     if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
   }
-  // Keep a reference, so that the volume is not evicted before the level is computed from it.
+  // Keep a reference, so that the volume is not evicted before the result is computed from it.
   const auto fine = volume(field, step);
   if (!fine) {
     return fine.error();
   }
-  auto level = get(key, level_bytes(field, how), [&] {
-    state_->add(&Counts::levels);
-    return guarded(state_->info.fields[*index],
-                   [&]() -> Result<Volume> { return coarsen(**fine, how); });
+  auto made = get(key, bytes, [&] {
+    return guarded(state_->info.fields[*index], [&]() -> Result<Volume> { return make(**fine); });
   });
   if (own_) own_->erase(own_->find(fine->get()));  // the volume is not yet shared
-  return level;
+  return made;
 }
 
 std::uint64_t Dataset::level_bytes(const std::string& field, const Coarsening& how) const {

@@ -48,6 +48,12 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 
+  // A volume of `bytes` bytes that make() computes from the field at the step, identified by
+  // `variant`: on first need, and shared, counted and refused like a level.
+  Result<std::shared_ptr<const Volume>> derived(const std::string& field, std::size_t step,
+                                                const std::string& variant, std::uint64_t bytes,
+                                                const std::function<Volume(const Volume&)>& make);
+
   // Bytes of the field at a step, reduced in that way; 0: no such field.
   [[nodiscard]] std::uint64_t level_bytes(const std::string& field, const Coarsening& how) const;
   // Whether that much fits into the memory limit beside a loader, whatever is resident now.

@@ -143,6 +143,34 @@ struct BlockPixels {
   Pixel x, y;
 };
 
+// Combines a line with the others by `or`: the largest opacity and the largest premultiplied light
+// of each channel. `open`: transmittance without lines. Returns the transmittance.
+KERNEL_INLINE Pixel add_or(Pixel opacity, const Pixel color[3], Pixel open, const Channels& to,
+                           int l) {
+  const Pixel weight = open * opacity;
+  for (int c = 0; c < 3; ++c) {
+    store(hn::Max(load<Pixel>(to.rgb[c] + l), weight * color[c]), to.rgb[c] + l);
+  }
+  const Pixel left = hn::Min(load<Pixel>(to.transmittance + l), open - weight);
+  store(left, to.transmittance + l);
+  return left;
+}
+
+template <Depth Along, int Style>
+KERNEL_INLINE Light or_block(const RibbonLanes& r, const BlockPixels& corner,
+                             float* HWY_RESTRICT block) {
+  const Channels to = channels_of(block);
+  Light light;
+  for (int l = 0; l < block_pixels; l += pixel_lanes) {
+    const RibbonLane lane = ribbon_lane<Along, Style>(r, corner.x + load<Pixel>(lane_x + l),
+                                                      corner.y + load<Pixel>(lane_y + l));
+    Pixel color[3];
+    for (int c = 0; c < 3; ++c) color[c] = hn::MulAdd(lane.f, r.rise[c], r.tail[c]);
+    light.see(add_or(lane.opacity, color, all<Pixel>(1.0F), to, l));
+  }
+  return light;
+}
+
 template <Depth Along, int Style>
 KERNEL_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
                                float* HWY_RESTRICT block) {
@@ -287,6 +315,15 @@ void line_window(const Ribbon& ribbon, const Window& window, Tile& tile) {
   });
 }
 
+template <bool Perspective, int Style>
+void or_window(const Ribbon& ribbon, const Window& window, Tile& tile) {
+  const RibbonLanes r = spread(ribbon);
+  each_block<false>(window, tile, [&](float x, float y, const float* /*ray*/, float* block) {
+    constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
+    return or_block<along, Style>(r, {all<Pixel>(x) - r.x, all<Pixel>(y) - r.y}, block);
+  });
+}
+
 using LineFunction = void (*)(const Ribbon& r, const Window& window, Tile& tile);
 using SplatFunction = void (*)(const Splat& s, const Window& window, Tile& tile);
 using BothFunction = void (*)(const Ribbon& r, const Splat& s, const Window& window, Tile& tile);
@@ -331,10 +368,21 @@ inline Compositor compositor_with(int style) {
                                : compositor_with<Perspective, Compositing, style_head>();
 }
 
+// Lines combined by `or` have a pass without splats.
+template <bool Perspective>
+inline Compositor or_compositor(int style) {
+  Compositor with = compositor_with<Perspective, compositing_analytic>(style);
+  with.line = style == style_moving ? or_window<Perspective, style_moving>
+                                    : or_window<Perspective, style_head>;
+  return with;
+}
+
 template <bool Perspective>
 inline Compositor compositor_of(const Pass& pass) {
   const int style = signature_of(pass.line);
   switch (pass.compositing) {
+    case compositing_or:
+      return or_compositor<Perspective>(style);
     case compositing_simple:
       return compositor_with<Perspective, compositing_simple>(style);
     case compositing_cd_naive:

@@ -234,6 +234,16 @@ void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
               });
 }
 
+template <bool Perspective>
+void draw_or_line(const Prepared& p, const Compositor& with, int l, Tile& tile) {
+  KernelDrawing kernel = {
+      with, tile, {}, ribbon_at(p.pass->line, p.ribbons, l), static_cast<int>(From::eye)};
+  each_window(p.footing, l, true, false,
+              [&](int row, int column, std::uint64_t lines, std::uint64_t splats) {
+                kernel.draw(row, column, lines, splats);
+              });
+}
+
 // The cell along a ray of a splat extends to sqrt(t^2 + 1/4) strides from the centre, the
 // silhouette to t.
 inline KernelDepths depths_of(const Prepared& p, int l) {
@@ -305,6 +315,8 @@ KERNEL_INLINE void draw_position(const Prepared& p, const Compositor& with, int 
   }
   if (has(p.positions.splats, l)) {
     draw_kernel<Perspective>(p, with, l, tile);
+  } else if (p.pass->compositing == compositing_or) {
+    draw_or_line<Perspective>(p, with, l, tile);
   } else {
     draw_styled<Perspective>(p, style, l, tile);
   }

@@ -303,6 +303,13 @@ Light divided_block(const DividedKernel& kernel, const std::int32_t* partial, fl
       for (int c = 0; c < 3; ++c) color[c] = all<Pixel>(kernel.splat->color[c]);
     }
     const auto before = hn::Lt(line.depth, surface);
+    if (Compositing == compositing_or) {
+      light.see(add_or(hn::IfThenElseZero(before, line.opacity), line.color, one, to, l));
+      const Channels beyond = {body.behind, {body.light[0], body.light[1], body.light[2]}};
+      add_or(hn::IfThenZeroElse(before, line.opacity), line.color,
+             one - load<Pixel>(body.opacity + l), beyond, l);
+      continue;
+    }
     const Pixel least = all<Pixel>(1e-6F);
     const auto add = [&](Pixel part, Pixel opacity, Pixel place, Pixel t, const Channels& into) {
       const Pixel here = splat.tau * part;
@@ -344,6 +351,8 @@ inline DividedFunction divided_function(int compositing) {
       return divided_block<Perspective, compositing_cd>;
     case compositing_cd_euler:
       return divided_block<Perspective, compositing_cd_euler>;
+    case compositing_or:
+      return divided_block<Perspective, compositing_or>;
     default:
       return divided_block<Perspective, compositing_analytic>;
   }

@@ -143,12 +143,20 @@ inline void take_body(const Slab& slab, const float rgb[3], BodyBlock& body, Blo
     const Pixel end = hn::IfThenElse(hn::Le(depth, all<Pixel>(slab.front)), hn::Neg(one), one);
     const Pixel x_line = hn::IfThenElse(hn::Ge(opacity, one), end, fraction_in(slab, depth));
     store(x_line, m.x_line + l);
-    store(hn::IfThenElseZero(here, opacity), m.opacity + l);
+    // With the lines combined by `or` that are seen beside the body, where there are any.
+    const Pixel behind = load<Pixel>(body.behind + l);
+    const auto lined = hn::Lt(behind, one - opacity);
+    const Pixel all_opacity = hn::IfThenElse(lined, one - behind, opacity);
+    const Pixel inverse = one / hn::Max(all_opacity, all<Pixel>(1e-37F));
+    store(hn::IfThenElseZero(here, all_opacity), m.opacity + l);
     for (int c = 0; c < 3; ++c) {
-      store(load<Pixel>(body.shade + l) * all<Pixel>(rgb[c]), m.color[c] + l);
+      const Pixel own = load<Pixel>(body.shade + l) * all<Pixel>(rgb[c]);
+      const Pixel light = load<Pixel>(body.light[c] + l);
+      store(hn::IfThenElse(lined, hn::MulAdd(own, opacity, light) * inverse, own), m.color[c] + l);
+      store(hn::IfThenZeroElse(here, light), body.light[c] + l);
     }
     store(hn::IfThenZeroElse(here, opacity), body.opacity + l);
-    store(hn::IfThenElse(here, one, load<Pixel>(body.behind + l)), body.behind + l);
+    store(hn::IfThenElse(here, one, behind), body.behind + l);
   }
 }
 

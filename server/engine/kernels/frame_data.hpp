@@ -12,7 +12,9 @@ constexpr int tile_side = 128;                         // pixels, at most
 constexpr int tile_blocks = tile_side / block_side;    // blocks along a tile's side
 constexpr int block_channels = 4;                      // transmittance, red, green, blue
 constexpr int block_floats = block_channels * block_pixels;
-constexpr int window_side = 8;             // blocks; 8 x 8 blocks are the bits of one word
+constexpr int window_side = 8;  // blocks; 8 x 8 blocks are the bits of one word
+// The value of Pass::compositing of lines combined by `or`, beyond those of scene::Compositing.
+constexpr int compositing_or = 5;
 constexpr double footprint_radius = 1.37;  // radius of the footprint of a splat, cells
 constexpr int brick_side = 8;              // kernel positions
 constexpr int brick_kernels = brick_side * brick_side;
@@ -143,7 +145,7 @@ struct Pass {
   float cell_max[3];            // widest cell along each axis; curved: largest extent of a cell
   int dims[3];                  // dimensions of the fields
   const float* places;          // curved lattices: 3 per sample, world units; otherwise null
-  int compositing;              // scene::Compositing
+  int compositing;              // scene::Compositing or compositing_or
   int by_depth;                 // depths of kernel positions are required
   const std::int32_t* partial;  // see partial.hpp; slab method only
 };

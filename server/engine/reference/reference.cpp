@@ -143,6 +143,7 @@ class SplatMedium {
 struct Frame {
   const View& view;
   std::optional<scene::Body> body;
+  bool combine_or = false;  // the lines
   const Kernels& kernels;
   const ScreenGrid& splats;
   const ScreenGrid& ribbons;
@@ -157,11 +158,11 @@ class Painter {
   // Storage for a pixel that `splats` and `ribbons` may cover; sorting surfaces needs a second
   // copy.
   static std::uint64_t bytes_for(std::uint64_t splats, std::uint64_t ribbons) {
-    return SplatMedium::bytes_for(splats) + 2 * (ribbons + 1) * sizeof(Surface);
+    return SplatMedium::bytes_for(splats) + 2 * (ribbons + 3) * sizeof(Surface);
   }
   void make_room(std::size_t splats, std::size_t ribbons) {
     medium_.make_room(splats);
-    surfaces_.reserve(ribbons + 1);
+    surfaces_.reserve(ribbons + 3);
   }
 
   Light pixel(int x, int y, RayCount& count) {
@@ -190,8 +191,32 @@ class Painter {
     return ray;
   }
 
+  // The lines that are combined by `or`, before the body and behind it, as one surface each: before
+  // the medium, and next to the body.
+  void gather_or_surfaces(int x, int y, double px, double py) {
+    Surface body;
+    if (frame_.body) body = body_surface(*frame_.body, frame_.view, px, py);
+    Surface before{lowest};
+    Surface behind{body.depth};
+    for (const std::uint32_t id : frame_.ribbons.at(x, y)) {
+      const auto hit = hit_ribbon(frame_.kernels.ribbons[id], px, py);
+      Surface& all = body.opacity > 0 && hit.depth >= body.depth ? behind : before;
+      all.opacity = std::max(all.opacity, hit.opacity);
+      for (int c = 0; c < 3; ++c) {
+        all.color[c] = std::max(all.color[c], hit.opacity * hit.color[c]);  // premultiplied
+      }
+    }
+    for (Surface* all : {&before, &behind}) {
+      for (double& color : all->color) color /= std::max(all->opacity, 1e-300);
+    }
+    for (const Surface& surface : {before, body, behind}) {
+      if (surface.opacity > 0) surfaces_.push_back(surface);
+    }
+  }
+
   void gather_surfaces(int x, int y, double px, double py) {
     surfaces_.clear();
+    if (frame_.combine_or) return gather_or_surfaces(x, y, px, py);
     for (const std::uint32_t id : frame_.ribbons.at(x, y)) {
       const auto hit = hit_ribbon(frame_.kernels.ribbons[id], px, py);
       if (hit.opacity > 0) surfaces_.push_back({hit.depth, hit.opacity, hit.color});
@@ -220,7 +245,9 @@ struct Painting::State {
         splats(scene.camera.width, scene.camera.height),
         ribbons(scene.camera.width, scene.camera.height),
         rules(make_rules()),
-        frame{view, scene.body, kernels, splats, ribbons, rules, options.tolerance} {}
+        frame{view,    scene.body,       scene.vector && scene.vector->combine_or,
+              kernels, splats,           ribbons,
+              rules,   options.tolerance} {}
 
   Result<void> reserve_bytes(std::uint64_t bytes, const Reserve& reserve) {
     auto held = reserve(bytes);

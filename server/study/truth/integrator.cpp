@@ -56,6 +56,21 @@ std::optional<Surface> meet(const Scene& scene, const Line& line, Real x, Real y
   return surface;
 }
 
+// `or`: the largest opacity and the largest premultiplied light of each channel, before the medium.
+std::vector<Surface> combined(const std::vector<Surface>& surfaces) {
+  Surface all;
+  all.depth = -1e300L;
+  for (const Surface& one : surfaces) {
+    all.opacity = std::max(all.opacity, one.opacity);
+    all.color.x = std::max(all.color.x, one.opacity * one.color.x);
+    all.color.y = std::max(all.color.y, one.opacity * one.color.y);
+    all.color.z = std::max(all.color.z, one.opacity * one.color.z);
+  }
+  if (!(all.opacity > 0)) return {};
+  all.color = (1 / all.opacity) * all.color;
+  return {all};
+}
+
 // A splat on a ray: the distance from its centre at view depth z is
 // sqrt(least^2 + (cells (z - middle))^2) cells.
 struct Stretch {
@@ -210,6 +225,7 @@ std::vector<Light> integrate(const Scene& scene, std::span<const Pixel> pixels, 
       const auto surface = meet(scene, line, x, y);
       if (surface && surface->opacity > 0) surfaces.push_back(*surface);
     }
+    if (scene.vector && scene.vector->combine_or) surfaces = combined(surfaces);
     out.push_back(Ray(scene, splats, x, y).follow(std::move(surfaces), steps));
   }
   return out;

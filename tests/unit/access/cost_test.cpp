@@ -78,6 +78,10 @@ TEST_F(CostTest, StrideReducesSamplesAndASliceLeavesOneLayer) {
   protocol::View sliced = plain;
   sliced.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 3};
   EXPECT_NEAR((cost(plain).kernels - picture) / (cost(sliced).kernels - picture), 60, 1);
+  // Planes have the pitch of the cells.
+  protocol::View plane = plain;
+  plane.geometry.plane = protocol::PlaneView{{0, 0, 0}, {0, 0, 1}};
+  EXPECT_NEAR((cost(plane).kernels - picture) / (cost(sliced).kernels - picture), 1, 0.05);
 }
 
 TEST_F(CostTest, GiantKernelsCostWhatTheyCover) {

@@ -49,7 +49,7 @@ TEST(Slice, BeyondTheGridIsRefusedWithItsLimit) {
   for (const GridAxis axis : {GridAxis::x, GridAxis::y, GridAxis::z}) {
     const int count = layers.at(static_cast<std::size_t>(axis));
     View view;
-    view.geometry.slice = SliceView{axis, count - 1};
+    view.geometry.slice = SliceView{axis, count - 1.0};
     EXPECT_TRUE(complete(view, *dataset));
     view.geometry.slice->index = count;
     EXPECT_EQ(pointer_of_refusal(view, *dataset), "/geometry/slice/index");

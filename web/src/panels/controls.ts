@@ -79,6 +79,8 @@ export function heightOptions(dataset: Dataset): Options {
 
 export const wholeVolume = "all";
 
+export const obliquePlane = "plane";
+
 const sliceAxes: readonly SliceAxis[] = ["x", "y", "z"];
 
 // Axes with one sample are omitted: their slice would be the whole volume.
@@ -89,18 +91,32 @@ export function sliceOptions(dataset: Dataset): Options {
     if (dataset.dims[axis] < 2) continue;
     options[name === axis ? `across ${axis}` : `across ${axis}: ${name}`] = axis;
   }
+  options["oblique plane"] = obliquePlane;
   return options;
 }
 
 export const sliceIndexMax = (dataset: Dataset, axis: SliceAxis): number =>
   Math.max(0, dataset.dims[axis] - 1);
 
-// A new slice starts in the middle of the axis.
+// A new slice starts in the middle of the axis, a new plane is diagonal through the centre.
 export function slicePatch(dataset: Dataset, axis: string): Patch {
+  if (axis === obliquePlane) {
+    return { geometry: { slice: null, plane: { point: [0, 0, 0], normal: [1, 1, 0] } } };
+  }
   const known = sliceAxes.find((one) => one === axis);
-  if (known === undefined) return { geometry: { slice: null } };
+  if (known === undefined) return { geometry: { slice: null, plane: null } };
   const index = Math.floor(sliceIndexMax(dataset, known) / 2);
-  return { geometry: { slice: { axis: known, index } } };
+  return { geometry: { slice: { axis: known, index }, plane: null } };
+}
+
+// One number of the plane changed; null where its normal would have no direction.
+export function planePatch(view: View, key: "point" | "normal", at: number, to: number) {
+  const plane = view.geometry?.plane;
+  if (!plane) return null;
+  const values: [number, number, number] = [...plane[key]];
+  values[at] = to;
+  if (key === "normal" && Math.hypot(...values) < 0.01) return null;
+  return { geometry: { plane: { ...plane, [key]: values } } };
 }
 
 // Position of the slice in the coordinate of its axis.
@@ -108,7 +124,12 @@ export function sliceText(dataset: Dataset, view: View): string {
   const slice = view.geometry?.slice;
   if (!slice) return "";
   const axis = dataset.axes[slice.axis];
-  const value = axis.coordinates[slice.index];
+  const low = Math.floor(slice.index);
+  const [below, above] = [axis.coordinates[low], axis.coordinates[low + 1]];
+  const value =
+    below === undefined || above === undefined
+      ? below
+      : below + (slice.index - low) * (above - below);
   const layer = `Layer ${slice.index} of 0 to ${sliceIndexMax(dataset, slice.axis)}`;
   if (value === undefined) return `${layer}.`;
   return `${layer}: ${axis.name} ${formatNumber(value)} ${unitText(axis.units)}`.trim() + ".";
@@ -184,6 +205,8 @@ export function controlStates(view: View) {
     slab: view.method?.name === "slab",
     vertical: (view.geometry?.heightField ?? null) === null,
     slice: (view.geometry?.slice ?? null) !== null,
+    plane: (view.geometry?.plane ?? null) !== null,
+    combined: lines && (view.geometry?.slice ?? view.geometry?.plane ?? null) !== null,
     body: showsBody(view),
     fovY: view.camera?.projection !== "orthographic",
     errorLimit: hasErrorLimit(view),

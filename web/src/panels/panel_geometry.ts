@@ -8,6 +8,8 @@ import {
   heightOptions,
   mappingOptions,
   ownHeight,
+  obliquePlane,
+  planePatch,
   sliceIndexMax,
   sliceOptions,
   slicePatch,
@@ -84,7 +86,7 @@ function addSlice(folder: GUI, kit: PanelKit): void {
     "slice",
     {
       pointer: "/geometry/slice",
-      get: () => slice()?.axis ?? wholeVolume,
+      get: (view) => slice()?.axis ?? (view.geometry?.plane ? obliquePlane : wholeVolume),
       set: (axis) => slicePatch(dataset, axis),
     },
     options,
@@ -94,13 +96,28 @@ function addSlice(folder: GUI, kit: PanelKit): void {
     "layer",
     {
       pointer: "/geometry/slice/index",
-      get: () => slice()?.index,
+      get: () => Math.floor(slice()?.index ?? 0),
       set: (layer) => {
         const axis = slice()?.axis;
         return axis === undefined ? null : { geometry: { slice: { axis, index: layer } } };
       },
     },
     { min: 0, max: sliceIndexMax(dataset, slice()?.axis ?? "z"), step: 1 },
+  );
+  const between = kit.number(
+    folder,
+    "toward the next layer",
+    {
+      pointer: "/geometry/slice/index",
+      get: () => (slice()?.index ?? 0) % 1,
+      set: (part) => {
+        const { axis, index: at } = slice() ?? {};
+        if (axis === undefined || at === undefined) return null;
+        const next = Math.min(Math.floor(at) + part, sliceIndexMax(dataset, axis));
+        return { geometry: { slice: { axis, index: next } } };
+      },
+    },
+    { min: 0, max: 0.95, step: 0.05 },
   );
   let axis = slice()?.axis;
   kit.onRefresh(() => {
@@ -110,9 +127,31 @@ function addSlice(folder: GUI, kit: PanelKit): void {
     index.max(sliceIndexMax(dataset, next));
     index.updateDisplay();
   });
-  kit.showWhen((states) => states.slice, index);
+  kit.showWhen((states) => states.slice, index, between);
+  addPlane(folder, kit);
   kit.note(folder, () => sliceText(dataset, kit.host.view()));
   if (Object.keys(options).length < 2) kit.showWhen((states) => states.slice, choice);
+}
+
+function addPlane(folder: GUI, kit: PanelKit): void {
+  const { min, max } = kit.host.dataset().world;
+  const numbers = (["point", "normal"] as const).flatMap((key) =>
+    (["x", "y", "z"] as const).map((axis, at) =>
+      kit.number(
+        folder,
+        `plane ${key} ${axis}`,
+        {
+          pointer: `/geometry/plane/${key}`,
+          get: (view) => view.geometry?.plane?.[key][at],
+          set: (to) => planePatch(kit.host.view(), key, at, to),
+        },
+        key === "point"
+          ? { min: min[at], max: max[at], step: 0.01 }
+          : { min: -1, max: 1, step: 0.01 },
+      ),
+    ),
+  );
+  kit.showWhen((states) => states.plane, ...numbers);
 }
 
 export function addCamera(gui: GUI, kit: PanelKit, camera: CameraSwitch): void {

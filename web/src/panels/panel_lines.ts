@@ -54,6 +54,11 @@ function addMain(folder: GUI, kit: PanelKit, per: string): void {
     max: Math.min(10, Number((5 * length).toPrecision(2))),
   });
   kit.number(folder, "opacity", keyAccess("/vector/opacity"));
+  const combine = kit.choice(folder, "overlapping lines", keyAccess("/vector/combine"), {
+    "nearer over farther": "over",
+    "largest of all (or)": "or",
+  });
+  kit.showWhen((states) => states.combined, combine);
   kit.number(folder, `min |v|${per}`, keyAccess("/vector/minMagnitude"), { min: 0, max: top });
   kit.number(folder, "every n-th sample", keyAccess("/vector/stride"), {
     min: 1,

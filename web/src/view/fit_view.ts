@@ -56,12 +56,18 @@ function fitVector(vector: Vector, dataset: Dataset): Vector {
 
 function fitGeometry(geometry: Geometry, dataset: Dataset): Geometry {
   const fitted: Geometry = { ...geometry };
-  const { mapping, heightField, slice } = geometry;
+  const { mapping, heightField, slice, plane } = geometry;
   if (mapping && !dataset.mappings.includes(mapping)) delete fitted.mapping;
   if (heightField && !has(dataset, "scalar", heightField)) delete fitted.heightField;
   if (slice) {
     const last = Math.max(0, dataset.dims[slice.axis] - 1);
     fitted.slice = { ...slice, index: Math.min(slice.index, last) };
+  }
+  // Through a point of the box, so that the plane does not miss it.
+  if (plane) {
+    const { min, max } = dataset.world;
+    const inside = (at: 0 | 1 | 2) => Math.min(Math.max(plane.point[at], min[at]), max[at]);
+    fitted.plane = { ...plane, point: [inside(0), inside(1), inside(2)] };
   }
   return fitted;
 }

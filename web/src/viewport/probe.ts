@@ -62,7 +62,7 @@ export class Probe {
     let axis: 0 | 1 | 2 = 2;
     if (slice) {
       axis = axisNames.indexOf(slice.axis) as typeof axis;
-      sample[axis] = slice.index;
+      sample[axis] = Math.round(slice.index);
     } else {
       const { forward } = cameraFrame(camera);
       const edgewise = Math.abs(forward[2]) < edgewiseMax;

@@ -1,0 +1,445 @@
+// Plane and box -> directions and pitch; places between samples -> interpolated values.
+#include "server/scene/section.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "server/data/model/digest.hpp"
+#include "server/scene/lattice.hpp"
+#include "server/scene/refusal.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using data::Volume;
+using VolumePtr = std::shared_ptr<const Volume>;
+
+// The samples next to a place, and the share of the second along each axis.
+struct Neighbours {
+  std::array<int, 3> low{};
+  std::array<double, 3> part{};
+};
+
+constexpr double rounding = 1e-9;  // of a cell
+
+// A place as close to a sample as rounding allows has no share of the next one.
+void snap(int axis, double part, Neighbours& at) {
+  if (part > 1 - rounding) ++at.low[axis];
+  at.part[axis] = part > rounding && part <= 1 - rounding ? part : 0;
+}
+
+void seek(const std::vector<double>& positions, double x, int axis, Neighbours& at) {
+  const auto above = std::upper_bound(positions.begin(), positions.end(), x);
+  if (above == positions.begin()) return;
+  const auto low = static_cast<std::size_t>(above - positions.begin()) - 1;
+  at.low[axis] = static_cast<int>(low);
+  if (above == positions.end()) return;
+  snap(axis, (x - positions[low]) / (*above - positions[low]), at);
+}
+
+glm::dvec3 place_of(const Section& section, int i, int j, int k) {
+  const std::array<int, 3> sample{i, j, k};
+  glm::dvec3 at = section.first;
+  for (int a = 0; a < 3; ++a) at += sample[a] * section.pitch[a] * section.along[a];
+  return at;
+}
+
+// False outside of the box.
+bool find_neighbours(const Section& section, int i, int j, int k, Neighbours& at) {
+  at = {{i, j, k}, {0, 0, 0}};
+  const Lattice& whole = *section.whole;
+  if (!section.oblique) {
+    at.low[section.axis] = static_cast<int>(section.index);
+    snap(section.axis, section.index - std::floor(section.index), at);
+    return true;
+  }
+  const glm::dvec3 place = place_of(section, i, j, k);
+  for (int a = 0; a < 3; ++a) {
+    const double margin = rounding * (whole.box_max[a] - whole.box_min[a]);
+    if (place[a] < whole.box_min[a] - margin || place[a] > whole.box_max[a] + margin) return false;
+    at.low[a] = 0;
+    seek(whole.positions[a], place[a], a, at);
+  }
+  return true;
+}
+
+// The place of a sample of a layer of a curved lattice, on the straight line between its
+// neighbours.
+glm::dvec3 place_between(const Section& section, int i, int j, int k) {
+  Neighbours at;
+  find_neighbours(section, i, j, k, at);
+  const Lattice& whole = *section.whole;
+  const auto place = [&](const std::array<int, 3>& sample) {
+    const auto row = static_cast<std::size_t>(sample[2]) * whole.dims[1] + sample[1];
+    const auto& near = (*whole.places)[row * whole.dims[0] + sample[0]];
+    return glm::dvec3(near[0], near[1], near[2]);
+  };
+  const glm::dvec3 low = place(at.low);
+  const double part = at.part[section.axis];
+  if (!(part > 0)) return low;
+  ++at.low[section.axis];
+  return low + part * (place(at.low) - low);
+}
+
+double value_at(const float* values, const std::array<int, 3>& dims, const Neighbours& at) {
+  double sum = 0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    double share = 1;
+    std::size_t index = 0;
+    for (int a = 2; a >= 0; --a) {
+      const unsigned next = corner >> static_cast<unsigned>(a) & 1U;
+      share *= next != 0 ? at.part[a] : 1 - at.part[a];
+      index =
+          index * static_cast<std::size_t>(dims[a]) + static_cast<std::size_t>(at.low[a]) + next;
+    }
+    if (share > 0) sum += share * static_cast<double>(values[index]);
+  }
+  return sum;
+}
+
+double value_at(const std::vector<double>& values, int axis, const Neighbours& at) {
+  const auto low = static_cast<std::size_t>(at.low[axis]);
+  const double part = at.part[axis];
+  return part > 0 ? (1 - part) * values[low] + part * values[low + 1] : values[low];
+}
+
+std::size_t samples_of(const Section& section) {
+  std::size_t samples = 1;
+  for (const int count : section.dims) samples *= static_cast<std::size_t>(count);
+  return samples;
+}
+
+// A volume of which visit(neighbours, values) sets the components of each sample that lies
+// in the box; the others are masked.
+template <class Visit>
+Volume filled(const Section& section, int components, const Visit& visit) {
+  Volume out;
+  out.dims = section.dims;
+  out.components = components;
+  const std::size_t samples = samples_of(section);
+  out.values = data::Samples(samples * static_cast<std::size_t>(components));
+  std::size_t at = 0;
+  Neighbours neighbours;
+  for (int k = 0; k < section.dims[2]; ++k) {
+    for (int j = 0; j < section.dims[1]; ++j) {
+      for (int i = 0; i < section.dims[0]; ++i, ++at) {
+        std::array<double, 3> values{};
+        values.fill(std::numeric_limits<double>::quiet_NaN());
+        if (find_neighbours(section, i, j, k, neighbours)) visit(neighbours, values);
+        for (int c = 0; c < components; ++c) {
+          out.values[static_cast<std::size_t>(c) * samples + at] = static_cast<float>(values[c]);
+        }
+      }
+    }
+  }
+  finish_volume(out);
+  return out;
+}
+
+glm::dvec3 vector_at(const Volume& volume, const Neighbours& at) {
+  glm::dvec3 out(0);
+  for (int c = 0; c < std::min(volume.components, 3); ++c) {
+    out[c] = value_at(volume.component(c), volume.dims, at);
+  }
+  return out;
+}
+
+// The direction in which a vector is drawn, of any length.
+glm::dvec3 drawn_along(glm::dvec3 vector, const ComponentFactors& factors, const Neighbours& at) {
+  vector *= factors.scale;
+  if (const auto& rates = factors.rates) {
+    vector *= glm::dvec3(value_at(rates->x, 1, at), rates->y, value_at(rates->z, 2, at));
+  }
+  return vector;
+}
+
+glm::dvec3 unit(const glm::dvec3& vector) {
+  const double length = glm::length(vector);
+  return length > 0 ? vector / length : glm::dvec3(0);
+}
+
+double bearing(const glm::dvec3& vector) {
+  const double degrees = std::atan2(vector.x, vector.y) * 180 / std::numbers::pi;
+  return degrees < 0 ? degrees + 360 : degrees;
+}
+
+// ---- the plane ----
+
+// The length of a cell along a direction.
+double cell_along(const Lattice& lattice, const glm::dvec3& direction) {
+  double cells2 = 0;
+  for (int a = 0; a < 3; ++a) {
+    const double cells = direction[a] / cell_size(lattice, static_cast<std::size_t>(a));
+    cells2 += cells * cells;
+  }
+  return 1 / std::sqrt(cells2);
+}
+
+// Sets the directions of a plane with this unit normal.
+void set_directions(glm::dvec3 normal, Section& section) {
+  int axis = 0;
+  for (int a = 1; a < 3; ++a) {
+    if (std::abs(normal[a]) >= std::abs(normal[axis])) axis = a;
+  }
+  if (normal[axis] < 0) normal = -normal;
+  const int u = axis == 0 ? 1 : 0;
+  const int v = axis == 2 ? 1 : 2;
+  glm::dvec3 first(0);
+  first[u] = 1;
+  first = glm::normalize(first - normal[u] * normal);
+  glm::dvec3 second = glm::cross(normal, first);
+  if (second[v] < 0) second = -second;
+  section.axis = axis;
+  section.along[axis] = normal;
+  section.along[u] = first;
+  section.along[v] = second;
+}
+
+struct Extent {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+};
+
+// The extents along the directions of the plane of its intersection with the box: the hull of its
+// points on the edges of the box. Empty if there are none.
+std::array<Extent, 3> extents_in_box(const Section& section, const glm::dvec3& point) {
+  const Lattice& whole = *section.whole;
+  std::array<Extent, 3> extents;
+  const auto corner = [&](unsigned bits) {
+    glm::dvec3 at = whole.box_min;
+    for (int a = 0; a < 3; ++a) {
+      if ((bits >> static_cast<unsigned>(a) & 1U) != 0) at[a] = whole.box_max[a];
+    }
+    return at;
+  };
+  const glm::dvec3& normal = section.along[section.axis];
+  for (unsigned bits = 0; bits < 8; ++bits) {
+    for (unsigned a = 0; a < 3; ++a) {
+      if ((bits >> a & 1U) != 0) continue;
+      const glm::dvec3 from = corner(bits);
+      const glm::dvec3 to = corner(bits | 1U << a);
+      const double before = glm::dot(normal, from - point);
+      const double after = glm::dot(normal, to - point);
+      if (before * after > 0 || before == after) continue;
+      const glm::dvec3 met = from + (to - from) * (before / (before - after));
+      for (int c = 0; c < 3; ++c) {
+        const double at = glm::dot(section.along[c], met);
+        extents[c] = {std::min(extents[c].low, at), std::max(extents[c].high, at)};
+      }
+    }
+  }
+  return extents;
+}
+
+std::string text_of(const glm::dvec3& point) {
+  std::ostringstream text;
+  text << '(' << point.x << ", " << point.y << ", " << point.z << ')';
+  return text.str();
+}
+
+Result<Section> make_plane(const protocol::PlaneView& plane, const Lattice& whole) {
+  Section section;
+  section.whole = &whole;
+  section.oblique = true;
+  const glm::dvec3 point(plane.point[0], plane.point[1], plane.point[2]);
+  set_directions(glm::normalize(glm::dvec3(plane.normal[0], plane.normal[1], plane.normal[2])),
+                 section);
+  const auto extents = extents_in_box(section, point);
+  if (!(extents[0].low <= extents[0].high)) {
+    return invalid_at("/geometry/plane/point", "the plane misses the box of the data, from " +
+                                                   text_of(whole.box_min) + " to " +
+                                                   text_of(whole.box_max) + " in the world");
+  }
+  double samples = 1;
+  section.first = glm::dot(section.along[section.axis], point) * section.along[section.axis];
+  for (int a = 0; a < 3; ++a) {
+    section.pitch[a] = cell_along(whole, section.along[a]);
+    if (a == section.axis) continue;
+    const double length = extents[a].high - extents[a].low;
+    const double count = std::max(std::round(length / section.pitch[a]), 1.0);
+    samples *= count;
+    if (length > 0) section.pitch[a] = length / count;
+    section.first += (extents[a].low + 0.5 * section.pitch[a]) * section.along[a];
+    section.dims[a] = static_cast<int>(std::min(count, 1e9));
+  }
+  if (samples > static_cast<double>(plane_samples_max)) {
+    std::ostringstream text;
+    text << "the plane has " << static_cast<std::int64_t>(samples)
+         << " samples, more than the limit of " << plane_samples_max;
+    return invalid_at("/geometry/plane", text.str());
+  }
+  return section;
+}
+
+void append(const std::vector<double>& values, std::vector<double>& to) {
+  to.insert(to.end(), values.begin(), values.end());
+}
+
+// Everything that determines the places of the samples.
+std::vector<double> numbers_of(const Section& section) {
+  std::vector<double> out{static_cast<double>(section.axis), section.oblique ? 1.0 : 0.0,
+                          section.index};
+  if (!section.oblique) return out;
+  for (int a = 0; a < 3; ++a) {
+    const auto& along = section.along[a];
+    out.insert(out.end(),
+               {static_cast<double>(section.dims[a]), section.pitch[a], along.x, along.y, along.z,
+                section.first[a], section.whole->box_min[a], section.whole->box_max[a]});
+    append(section.whole->positions[a], out);
+  }
+  return out;
+}
+
+void append_factors(const ComponentFactors& factors, std::vector<double>& to) {
+  for (int a = 0; a < 3; ++a) to.push_back(factors.scale[a]);
+  if (!factors.rates) return;
+  append(factors.rates->x, to);
+  to.push_back(factors.rates->y);
+  append(factors.rates->z, to);
+}
+
+std::string key_of(const char* what, const std::vector<double>& numbers) {
+  return what + data::digest_of({reinterpret_cast<const char*>(numbers.data()),
+                                 numbers.size() * sizeof(double)});
+}
+
+std::uint64_t bytes_of(const Section& section, std::size_t components) {
+  return samples_of(section) * components * sizeof(float);
+}
+
+std::array<float, 3> rounded(const glm::dvec3& place) {
+  return {static_cast<float>(place.x), static_cast<float>(place.y), static_cast<float>(place.z)};
+}
+
+}  // namespace
+
+bool is_section(const protocol::GeometryView& geometry) {
+  return geometry.plane ||
+         (geometry.slice && geometry.slice->index != std::floor(geometry.slice->index));
+}
+
+Result<Section> make_section(const protocol::GeometryView& geometry, const Lattice& whole) {
+  if (geometry.plane) return make_plane(*geometry.plane, whole);
+  Section section;
+  section.whole = &whole;
+  section.axis = static_cast<int>(geometry.slice->axis);
+  section.index = geometry.slice->index;
+  section.dims = whole.dims;
+  section.dims[section.axis] = 1;
+  for (std::size_t a = 0; a < 3; ++a) section.pitch[a] = cell_size(whole, a);
+  return section;
+}
+
+std::vector<double> along_section(const Section& section, int axis, std::vector<double> values) {
+  if (axis != section.axis || section.oblique) return values;
+  Neighbours at;
+  find_neighbours(section, 0, 0, 0, at);
+  return {value_at(values, axis, at)};
+}
+
+Result<Lattice> lattice_of(const Section& section, const data::Dataset& dataset) {
+  const Lattice& whole = *section.whole;
+  Lattice out = whole;
+  out.dims = section.dims;
+  for (int a = 0; a < 3; ++a) {
+    out.positions[a] = along_section(section, a, whole.positions[a]);
+    out.spacing[a] = along_section(section, a, whole.spacing[a]);
+    if (!section.oblique) continue;
+    out.positions[a].clear();
+    for (int i = 0; i < section.dims[a]; ++i) {
+      out.positions[a].push_back(glm::dot(section.first, section.along[a]) + i * section.pitch[a]);
+    }
+    out.spacing[a].assign(static_cast<std::size_t>(section.dims[a]), section.pitch[a]);
+  }
+  if (!section.oblique && !whole.places) return out;
+  struct Held {
+    std::shared_ptr<const void> room;
+    std::vector<std::array<float, 3>> places;
+  };
+  const auto held = std::make_shared<Held>();
+  auto room = dataset.reserve(samples_of(section) * sizeof(held->places[0]));
+  if (!room) return room.error();
+  held->room = std::move(*room);
+  held->places.reserve(samples_of(section));
+  for (int k = 0; k < section.dims[2]; ++k) {
+    for (int j = 0; j < section.dims[1]; ++j) {
+      for (int i = 0; i < section.dims[0]; ++i) {
+        held->places.push_back(rounded(section.oblique ? place_of(section, i, j, k)
+                                                       : place_between(section, i, j, k)));
+      }
+    }
+  }
+  out.places = std::shared_ptr<const std::vector<std::array<float, 3>>>(held, &held->places);
+  return out;
+}
+
+Result<VolumePtr> sampled(const Section& section, data::Dataset& dataset, const std::string& field,
+                          std::size_t step) {
+  const data::FieldInfo* const info = dataset.info().find(field);
+  const std::size_t components = info == nullptr ? 1 : info->components.size();
+  return dataset.derived(field, step, key_of("section", numbers_of(section)),
+                         bytes_of(section, components), [&](const Volume& volume) {
+                           return filled(section, volume.components,
+                                         [&](const Neighbours& at, auto& values) {
+                                           const glm::dvec3 value = vector_at(volume, at);
+                                           for (int c = 0; c < volume.components; ++c)
+                                             values[c] = value[c];
+                                         });
+                         });
+}
+
+Result<VolumePtr> sampled_vectors(const Section& section, data::Dataset& dataset,
+                                  const std::string& field, std::size_t step,
+                                  const ComponentFactors& factors) {
+  std::vector<double> numbers = numbers_of(section);
+  append_factors(factors, numbers);
+  return dataset.derived(
+      field, step, key_of("vectors", numbers), bytes_of(section, 3), [&](const Volume& volume) {
+        return filled(section, 3, [&](const Neighbours& at, auto& values) {
+          const glm::dvec3 vector = vector_at(volume, at);
+          const glm::dvec3 turned = glm::length(vector) * unit(drawn_along(vector, factors, at));
+          for (int a = 0; a < 3; ++a) values[a] = glm::dot(turned, section.along[a]);
+        });
+      });
+}
+
+Result<VolumePtr> sampled_colors(const Section& section, data::Dataset& dataset,
+                                 const std::string& field, std::size_t step,
+                                 const ComponentFactors& factors, const VectorLayer& layer) {
+  const auto [bottom, top] = height_range(*section.whole);
+  const auto [low, high] = layer.color.range;
+  const double full = layer.magnitude_range[1];
+  const double weight = layer.rise_weight;
+  std::vector<double> numbers = numbers_of(section);
+  append_factors(factors, numbers);
+  numbers.insert(numbers.end(), {static_cast<double>(layer.color_by), low, high, layer.length, full,
+                                 weight, bottom, top});
+  const auto color = [&, bottom = bottom, top = top, low = low, high = high](const Volume& volume,
+                                                                             const Neighbours& at) {
+    const double z = value_at(section.whole->positions[2], 2, at);
+    if (layer.color_by == LineColor::world_z) return z;
+    const glm::dvec3 vector = vector_at(volume, at);
+    const glm::dvec3 direction = unit(drawn_along(vector, factors, at));
+    if (layer.color_by == LineColor::direction) {
+      const glm::dvec3& normal = section.along[section.axis];
+      return bearing(direction - glm::dot(direction, normal) * normal);
+    }
+    const double part = full > 0 ? std::min(glm::length(vector) / full, 1.0) : 1.0;
+    const double rise = direction.z * part * layer.length;
+    return (1 - weight) * (z - bottom) / (top - bottom) + weight * (rise - low) / (high - low);
+  };
+  return dataset.derived(
+      field, step, key_of("colors", numbers), bytes_of(section, 1), [&](const Volume& volume) {
+        return filled(section, 1,
+                      [&](const Neighbours& at, auto& values) { values[0] = color(volume, at); });
+      });
+}
+
+}  // namespace windsplat::scene
