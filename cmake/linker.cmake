@@ -1,5 +1,5 @@
-# Selects the linker. The presets use mold where it is installed: it takes a tenth of the time of the
-# compiler's own.
+# Selects the linker. The presets use mold where it is installed: it takes a tenth of the time of
+# the compiler's own.
 set(WINDSPLAT_LINKER "" CACHE STRING "mold, lld, gold or bfd; empty: the compiler's own")
 if(WINDSPLAT_LINKER)
   find_program(WINDSPLAT_LINKER_PROGRAM NAMES ${WINDSPLAT_LINKER} ld.${WINDSPLAT_LINKER})
