@@ -182,7 +182,9 @@ int extremes_command(const StudyArguments& arguments) {
                                       });
   reporter.finish();
   if (!report) {
-    return report.error().kind == ErrorKind::cancelled ? interrupted() : answer(report.error());
+    if (report.error().kind != ErrorKind::cancelled) return answer(report.error());
+    complain("study: interrupted; nothing was written");
+    return exit_interrupted;
   }
   const auto written = study::write_report(*report, arguments.output);
   if (!written) return answer(written.error());
@@ -252,14 +254,22 @@ void add_study(CLI::App& app, Action& chosen) {
       ->needs(extremes)
       ->allow_extra_args(false)
       ->check(CLI::IsMember(study::group_names()));
-  command->add_option("--view", arguments->view_file, "A view of DATASET as JSON")->type_name("F");
+  command->add_option("--view", arguments->view_file, "A view of DATASET as JSON")
+      ->type_name("F")
+      ->excludes(extremes);
   command->add_option("--size", arguments->size, "Pixels of DATASET's pictures, default 160x120")
-      ->type_name("WxH");
-  command->add_flag("--quick", arguments->quick, "Small pictures and few points");
-  command->add_flag("--no-reference", arguments->no_reference,
-                    "Do not integrate: extrapolate the reference from method slab");
-  command->add_flag("--no-calibration", arguments->no_calibration,
-                    "Do not compare reported errors with measured ones");
+      ->type_name("WxH")
+      ->excludes(extremes);
+  command->add_flag("--quick", arguments->quick, "Small pictures and few points")
+      ->excludes(extremes);
+  command
+      ->add_flag("--no-reference", arguments->no_reference,
+                 "Do not integrate: extrapolate the reference from method slab")
+      ->excludes(extremes);
+  command
+      ->add_flag("--no-calibration", arguments->no_calibration,
+                 "Do not compare reported errors with measured ones")
+      ->excludes(extremes);
   command->add_option("-o", arguments->output, "Folder of the report; existing results are reused")
       ->required()
       ->type_name("DIR");

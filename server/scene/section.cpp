@@ -116,6 +116,13 @@ std::size_t samples_of(const Section& section) {
   return samples;
 }
 
+// The components of a vector that was turned may exceed those of the data and the range of float;
+// a conversion beyond it is undefined.
+float as_float(double value) {
+  constexpr double most = std::numeric_limits<float>::max();
+  return static_cast<float>(value < -most ? -most : value > most ? most : value);
+}
+
 // A volume of which visit(neighbours, values) sets the components of each sample that lies
 // in the box; the others are masked.
 template <class Visit>
@@ -134,7 +141,7 @@ Volume filled(const Section& section, int components, const Visit& visit) {
         values.fill(std::numeric_limits<double>::quiet_NaN());
         if (find_neighbours(section, i, j, k, neighbours)) visit(neighbours, values);
         for (int c = 0; c < components; ++c) {
-          out.values[static_cast<std::size_t>(c) * samples + at] = static_cast<float>(values[c]);
+          out.values[static_cast<std::size_t>(c) * samples + at] = as_float(values[c]);
         }
       }
     }
@@ -418,9 +425,11 @@ Result<VolumePtr> sampled_colors(const Section& section, data::Dataset& dataset,
   const double full = layer.magnitude_range[1];
   const double weight = layer.rise_weight;
   std::vector<double> numbers = numbers_of(section);
-  append_factors(factors, numbers);
-  numbers.insert(numbers.end(), {static_cast<double>(layer.color_by), low, high, layer.length, full,
-                                 weight, bottom, top});
+  numbers.push_back(static_cast<double>(layer.color_by));
+  if (layer.color_by != LineColor::world_z) append_factors(factors, numbers);
+  if (layer.color_by == LineColor::rise) {
+    numbers.insert(numbers.end(), {low, high, layer.length, full, weight, bottom, top});
+  }
   const auto color = [&, bottom = bottom, top = top, low = low, high = high](const Volume& volume,
                                                                              const Neighbours& at) {
     const double z = value_at(section.whole->positions[2], 2, at);

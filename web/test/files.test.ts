@@ -57,6 +57,21 @@ test("a view keeps what changed files still contain", () => {
   assert.equal(shapeOf(same), shapeOf({ ...same, residentBytes: 9, notes: ["read again"] }));
 });
 
+test("only a plane that misses the box of the data is moved", () => {
+  const dataset = described("storm"); // its box, by its longest edge, from -1 to 1
+  const { max } = dataset.world;
+  const edge = Math.max(...max);
+  const through = (point: [number, number, number], scale?: [number, number, number]) => {
+    const geometry = { plane: { point, normal: [1, 1, 0] as [number, number, number] }, scale };
+    return fitView({ geometry }, dataset).geometry?.plane?.point;
+  };
+  // Outside of the box, and the plane crosses it.
+  assert.deepEqual(through([-4, 4, 0]), [-4, 4, 0]);
+  assert.deepEqual(through([4, 4, 0]), [max[0] / edge, max[1] / edge, 0]);
+  // Above the box of the data, within that of the stretched one.
+  assert.deepEqual(through([0, 0, 0.9], [1, 1, 10]), [0, 0, 0.9]);
+});
+
 test("fewer steps select the last one and keep the rest", () => {
   const page = shown();
   page.app.change({ step: 4, vector: { length: 0.2 } });

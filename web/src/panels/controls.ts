@@ -126,13 +126,13 @@ export function sliceText(dataset: Dataset, view: View): string {
   const axis = dataset.axes[slice.axis];
   const low = Math.floor(slice.index);
   const [below, above] = [axis.coordinates[low], axis.coordinates[low + 1]];
-  const value =
-    below === undefined || above === undefined
-      ? below
-      : below + (slice.index - low) * (above - below);
   const layer = `Layer ${slice.index} of 0 to ${sliceIndexMax(dataset, slice.axis)}`;
-  if (value === undefined) return `${layer}.`;
-  return `${layer}: ${axis.name} ${formatNumber(value)} ${unitText(axis.units)}`.trim() + ".";
+  if (below === undefined) return `${layer}.`;
+  const place =
+    slice.index === low || above === undefined
+      ? formatNumber(below)
+      : `between ${formatNumber(below)} and ${formatNumber(above)}`;
+  return `${layer}: ${axis.name} ${place} ${unitText(axis.units)}`.trim() + ".";
 }
 
 // Colours the lines by a different quantity: the old range has the wrong unit and is removed, and a

@@ -79,9 +79,8 @@ function addStretch(folder: GUI, kit: PanelKit): void {
 
 function addSlice(folder: GUI, kit: PanelKit): void {
   const dataset = kit.host.dataset();
-  const options = sliceOptions(dataset);
   const slice = () => kit.host.view().geometry?.slice ?? null;
-  const choice = kit.choice(
+  kit.choice(
     folder,
     "slice",
     {
@@ -89,7 +88,7 @@ function addSlice(folder: GUI, kit: PanelKit): void {
       get: (view) => slice()?.axis ?? (view.geometry?.plane ? obliquePlane : wholeVolume),
       set: (axis) => slicePatch(dataset, axis),
     },
-    options,
+    sliceOptions(dataset),
   );
   const index = kit.number(
     folder,
@@ -130,7 +129,6 @@ function addSlice(folder: GUI, kit: PanelKit): void {
   kit.showWhen((states) => states.slice, index, between);
   addPlane(folder, kit);
   kit.note(folder, () => sliceText(dataset, kit.host.view()));
-  if (Object.keys(options).length < 2) kit.showWhen((states) => states.slice, choice);
 }
 
 function addPlane(folder: GUI, kit: PanelKit): void {

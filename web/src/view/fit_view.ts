@@ -1,9 +1,13 @@
 // Adapts a view to files that changed while displayed: (view, new description) -> the same view as
 // far as the new files support it.
+import { clamp } from "../base/values";
+import { dot, subtract, type Vec3 } from "../base/vec3";
+import { scaledBox, type Box } from "./camera";
 import type { Dataset, View } from "../wire/protocol";
 
 type Vector = NonNullable<View["vector"]>;
 type Geometry = NonNullable<View["geometry"]>;
+type Plane = NonNullable<Geometry["plane"]>;
 
 // Keys that no longer apply return to their defaults; all others are preserved.
 export function fitView(view: View, dataset: Dataset): View {
@@ -54,6 +58,16 @@ function fitVector(vector: Vector, dataset: Dataset): Vector {
   return fitted;
 }
 
+// Whether the box has corners on both sides of the plane or on it.
+function meets({ point, normal }: Plane, { min, max }: Box): boolean {
+  const sides = [min[0], max[0]].flatMap((x) =>
+    [min[1], max[1]].flatMap((y) =>
+      [min[2], max[2]].map((z) => dot(normal as Vec3, subtract([x, y, z], point as Vec3))),
+    ),
+  );
+  return Math.min(...sides) <= 0 && Math.max(...sides) >= 0;
+}
+
 function fitGeometry(geometry: Geometry, dataset: Dataset): Geometry {
   const fitted: Geometry = { ...geometry };
   const { mapping, heightField, slice, plane } = geometry;
@@ -63,11 +77,13 @@ function fitGeometry(geometry: Geometry, dataset: Dataset): Geometry {
     const last = Math.max(0, dataset.dims[slice.axis] - 1);
     fitted.slice = { ...slice, index: Math.min(slice.index, last) };
   }
-  // Through a point of the box, so that the plane does not miss it.
+  // A plane that misses the box is moved through its nearest point.
   if (plane) {
-    const { min, max } = dataset.world;
-    const inside = (at: 0 | 1 | 2) => Math.min(Math.max(plane.point[at], min[at]), max[at]);
-    fitted.plane = { ...plane, point: [inside(0), inside(1), inside(2)] };
+    const box = scaledBox(dataset.world, geometry.scale ?? [1, 1, 1]);
+    if (!meets(plane, box)) {
+      const inside = (at: 0 | 1 | 2) => clamp(plane.point[at], box.min[at], box.max[at]);
+      fitted.plane = { ...plane, point: [inside(0), inside(1), inside(2)] };
+    }
   }
   return fitted;
 }
