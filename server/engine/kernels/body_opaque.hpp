@@ -119,8 +119,8 @@ BodyCover fill_body_block(const Camera& camera, const Body& body, double left, d
   alignas(64) double coverage[block_pixels];
   alignas(64) double cosine[block_pixels];
   for (int l = 0; l < block_pixels; l += wide_lanes) {
-    const double down = top + static_cast<double>(l / block_side) + 0.5 -
-                        static_cast<double>(camera.half_height_px);
+    const int row = l / block_side;
+    const double down = top + row + 0.5 - static_cast<double>(camera.half_height_px);
     const double right = left + l % block_side + 0.5 - static_cast<double>(camera.half_width_px);
     const Wide x = (wide(right) + hn::Iota(WideTag(), 0)) * wide(body.pixel);
     const BodyLanes lanes = body_lanes<Perspective>(camera, body, x, wide(down * body.pixel));

@@ -198,6 +198,7 @@ const std::vector<double> aspects{1, 10, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8};
 // Flat cells, of an optical depth of 0.25 across.
 std::vector<Case> plates(Projection projection) {
   std::vector<Case> cases;
+  cases.reserve(aspects.size());
   for (const double aspect : aspects) {
     cases.push_back(
         numbered(aspect, base_view(projection, aspect / 2),

@@ -143,7 +143,7 @@ class Battery {
       result.samples = one.dataset->info().grid.dims();
       result.width = one.view.image.width;
       result.height = one.view.image.height;
-      const auto drawn =
+      auto drawn =
           subject ? draw(group, one, *subject, method, result) : Result<void>(subject.error());
       if (!drawn) {
         if (drawn.error().kind == ErrorKind::cancelled) return drawn;

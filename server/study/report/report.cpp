@@ -74,9 +74,9 @@ Result<std::string> report_page(const Report& report) {
 Result<void> write_report(const Report& report, const std::filesystem::path& folder) {
   const auto page = report_page(report);
   if (!page) return page.error();
-  const auto csv = report.extremes
-                       ? write_whole_file(folder / "extremes.csv", extremes_csv(*report.extremes))
-                       : write_whole_file(folder / "study.csv", report_csv(report));
+  auto csv = report.extremes
+                 ? write_whole_file(folder / "extremes.csv", extremes_csv(*report.extremes))
+                 : write_whole_file(folder / "study.csv", report_csv(report));
   if (!csv) return csv;
   if (auto done = write_whole_file(folder / "study.json", report_json(report)); !done) return done;
   return write_whole_file(folder / "index.html", *page);
