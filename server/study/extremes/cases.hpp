@@ -23,7 +23,7 @@ struct Case {
 
 struct Group {
   const char* name;       // --group
-  const char* parameter;  // in words, with its unit
+  const char* parameter;  // description with its unit
   // Along the cases of one method and projection no opacity may decrease.
   bool monotone;
   // The cases of one projection, in the order of the parameter; none where it does not apply.
