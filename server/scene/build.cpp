@@ -116,23 +116,40 @@ data::Coarsening drawn(data::Coarsening how) {
   return how;
 }
 
-// Fields of the level that is rendered. Media have two values per sample. Lines are those of
-// samples, and so is the scalar that colours them: the mean of vectors that differ is shorter than
-// each of them, and would be held against a least magnitude of the samples.
+// Fields of the level or section that is rendered. Media have two values per sample. Lines are
+// those of samples, and so is the scalar that colours them: the mean of vectors that differ is
+// shorter than each of them, and would be held against a least magnitude of the samples.
 struct Fields {
-  using Volume = Result<std::shared_ptr<const data::Volume>>;
-  data::Dataset& dataset;
-  std::size_t step;
+  const data::Dataset& dataset;
   data::Coarsening coarsening;
   const Section* section;  // null: the samples of the data
-  [[nodiscard]] Volume of_medium(const std::string& name) const {
-    if (section != nullptr) return sampled(*section, dataset, name, step);
-    return dataset.level(name, step, coarsening);
+  [[nodiscard]] Needed of_medium(const std::string& name) const { return find(name, coarsening); }
+  [[nodiscard]] Needed of_lines(const std::string& name) const {
+    return find(name, drawn(coarsening));
   }
-  [[nodiscard]] Volume of_lines(const std::string& name) const {
-    if (section != nullptr) return sampled(*section, dataset, name, step);
-    return dataset.level(name, step, drawn(coarsening));
+
+ private:
+  [[nodiscard]] Needed find(const std::string& name, const data::Coarsening& how) const {
+    if (section == nullptr) return {name, dataset.reduction(name, how)};
+    const std::size_t components = dataset.info().find(name)->components.size();
+    return {name, sampled(*section, static_cast<int>(components))};
   }
+};
+
+// A layer, still without fields, and the fields that it needs.
+struct NeededLines {
+  VectorLayer layer;
+  Needed vectors;
+  std::optional<Needed> colors;
+};
+struct NeededMedium {
+  ScalarLayer layer;
+  Needed values;
+};
+struct NeededScene {
+  std::optional<Section> section;
+  std::optional<NeededLines> lines;
+  std::vector<NeededMedium> media;
 };
 
 bool shows_lines(const View& view) {
@@ -162,6 +179,12 @@ bool absorbs(const protocol::ScalarView& scalar) {
   return !scalar.extinction || std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
                                            [](const auto& point) { return point[1] > 0; });
 }
+
+// A field and how it is reduced.
+struct Shown {
+  std::string field;
+  data::Coarsening coarsening;
+};
 
 std::vector<Shown> shown_at(const View& view, const data::Coarsening& how) {
   std::vector<Shown> shown;
@@ -205,22 +228,17 @@ std::array<int, 3> level_for(const View& view, const Camera& camera, const Latti
 }
 
 // The lines of a plane, whose vectors and colours do not depend on the axes of the grid.
-Result<void> load_plane(const Fields& fields, const std::string& field,
-                        const ComponentFactors& factors, VectorLayer& layer) {
-  const Section& plane = *fields.section;
+void set_plane(const Section& plane, const std::string& field, const ComponentFactors& factors,
+               NeededLines& lines) {
+  VectorLayer& layer = lines.layer;
   const bool by_axes = layer.color_by == LineColor::world_z || layer.color_by == LineColor::rise ||
                        layer.color_by == LineColor::direction;
   if (by_axes) {
-    auto values = sampled_colors(plane, fields.dataset, field, fields.step, factors, layer);
-    if (!values) return values.error();
-    layer.color_field = std::move(*values);
+    lines.colors = Needed{field, sampled_colors(plane, factors, layer)};
     if (layer.color_by == LineColor::rise) layer.color.range = {0, 1};
     layer.color_by = LineColor::scalar;
   }
-  auto volume = sampled_vectors(plane, fields.dataset, field, fields.step, factors);
-  if (!volume) return volume.error();
-  layer.field = std::move(*volume);
-  return {};
+  lines.vectors = {field, sampled_vectors(plane, factors)};
 }
 
 void set_factors(const ComponentFactors& factors, const Fields& fields, VectorLayer& layer) {
@@ -235,10 +253,10 @@ void set_factors(const ComponentFactors& factors, const Fields& fields, VectorLa
   layer.rate_z = along_section(*fields.section, 2, std::move(layer.rate_z));
 }
 
-Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
-                                      const Fields& fields) {
+Result<NeededLines> needed_lines(const View& view, const Placed& placed, const Fields& fields) {
   const protocol::VectorView& from = view.vector;
-  VectorLayer layer;
+  NeededLines lines;
+  VectorLayer& layer = lines.layer;
   const auto factors =
       component_factors(view, placed, *fields.dataset.info().find(from.field.name));
   if (!factors) return factors.error();
@@ -256,32 +274,47 @@ Result<VectorLayer> make_vector_layer(const View& view, const Placed& placed,
   layer.epoch = from.jitter.per_step ? static_cast<std::uint32_t>(view.step) : 0U;
   layer.combine_or = from.combine == protocol::LineCombination::either &&
                      (view.geometry.slice || view.geometry.plane);
-  if (layer.color_by == LineColor::scalar) {
-    auto values = fields.of_lines(from.color.field.value());
-    if (!values) return values.error();
-    layer.color_field = std::move(*values);
-  }
+  if (layer.color_by == LineColor::scalar) lines.colors = fields.of_lines(*from.color.field);
   if (view.geometry.plane) {
-    if (auto ok = load_plane(fields, from.field.name, *factors, layer); !ok) return ok.error();
-    return layer;
+    set_plane(*fields.section, from.field.name, *factors, lines);
+  } else {
+    set_factors(*factors, fields, layer);
+    lines.vectors = fields.of_lines(from.field.name);
   }
-  set_factors(*factors, fields, layer);
-  auto volume = fields.of_lines(from.field.name);
-  if (!volume) return volume.error();
-  layer.field = std::move(*volume);
-  return layer;
+  return lines;
 }
 
-Result<ScalarLayer> make_scalar_layer(const protocol::ScalarView& from, const Fields& fields) {
+NeededMedium needed_medium(const protocol::ScalarView& from, const Fields& fields) {
   ScalarLayer layer;
   layer.color = make_table(from.color.map.value(), from.color.range.value());
   layer.extinction = from.extinction.value();
   layer.min_optical_depth = from.min_optical_depth;
   layer.stride = from.stride;
-  auto volume = fields.of_medium(from.field);
-  if (!volume) return volume.error();
-  layer.field = std::move(*volume);
-  return layer;
+  return {std::move(layer), fields.of_medium(from.field)};
+}
+
+Result<NeededScene> needed_scene(const CompletedView& completed, const std::array<int, 3>& level,
+                                 const data::Dataset& dataset) {
+  const View& view = completed.view();
+  const std::shared_ptr<const Placed>& placed = completed.placed();
+  NeededScene needed;
+  if (is_section(view.geometry)) {
+    auto section = make_section(view.geometry, placed->lattice);
+    if (!section) return section.error();
+    section->owner = placed;
+    needed.section = std::move(*section);
+  }
+  const Fields fields{dataset, coarsening_of(placed->lattice, level),
+                      needed.section ? &*needed.section : nullptr};
+  if (shows_lines(view)) {
+    auto lines = needed_lines(view, *placed, fields);
+    if (!lines) return lines.error();
+    needed.lines = std::move(*lines);
+  }
+  for (const protocol::ScalarView& scalar : *view.scalars) {
+    if (absorbs(scalar)) needed.media.push_back(needed_medium(scalar, fields));
+  }
+  return needed;
 }
 
 // The sphere lies slightly inside the lowest cells, so that lines in them are not cut off.
@@ -302,39 +335,41 @@ std::optional<Body> make_body(const protocol::GeometryView& geometry, const Latt
   return body;
 }
 
-// The scene at a level, still without lattice and layers.
-Result<Scene> at_level(Scene scene, const std::array<int, 3>& level, const View& view,
-                       const Placed& placed, data::Dataset& dataset) {
-  scene.level = level;
-  std::optional<Section> section;
-  if (is_section(view.geometry)) {
-    auto made = make_section(view.geometry, placed.lattice);
-    if (!made) return made.error();
-    section = *made;
+Result<void> load(const Needed& needed, std::size_t step, data::Dataset& dataset,
+                  std::shared_ptr<const data::Volume>& to) {
+  auto volume = dataset.derived(needed.field, step, needed.how);
+  if (!volume) return volume.error();
+  to = std::move(*volume);
+  return {};
+}
+
+// Adds lattice and layers. The places of a section come last: the volumes from which its fields are
+// computed need not fit into memory beside them.
+Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& completed,
+                        data::Dataset& dataset) {
+  const Lattice& whole = completed.lattice();
+  const auto step = static_cast<std::size_t>(completed.view().step);
+  if (needed.lines) {
+    auto& [layer, vectors, colors] = *needed.lines;
+    if (colors) {
+      if (auto ok = load(*colors, step, dataset, layer.color_field); !ok) return ok.error();
+    }
+    if (auto ok = load(vectors, step, dataset, layer.field); !ok) return ok.error();
+    merge_lines(whole, scene.level, pixels_per_unit(scene.camera, whole), layer);
+    scene.vector = std::move(layer);
   }
-  const Fields fields{dataset, static_cast<std::size_t>(view.step),
-                      coarsening_of(placed.lattice, level), section ? &*section : nullptr};
-  const double pixels = pixels_per_unit(scene.camera, placed.lattice);
-  if (section) {
-    auto lattice = lattice_of(*section, dataset);
-    if (!lattice) return lattice.error();
-    scene.lattice = std::move(*lattice);
-    scene.slice = Slice{section->axis, 0};
-  } else {
-    scene.lattice = coarsen_lattice(placed.lattice, level);
+  for (auto& [layer, values] : needed.media) {
+    if (auto ok = load(values, step, dataset, layer.field); !ok) return ok.error();
+    scene.scalars.push_back(std::move(layer));
   }
-  if (shows_lines(view)) {
-    auto layer = make_vector_layer(view, placed, fields);
-    if (!layer) return layer.error();
-    merge_lines(placed.lattice, level, pixels, *layer);
-    scene.vector = std::move(*layer);
+  if (!needed.section) {
+    scene.lattice = coarsen_lattice(whole, scene.level);
+    return scene;
   }
-  for (const protocol::ScalarView& scalar : *view.scalars) {
-    if (!absorbs(scalar)) continue;
-    auto layer = make_scalar_layer(scalar, fields);
-    if (!layer) return layer.error();
-    scene.scalars.push_back(std::move(*layer));
-  }
+  auto lattice = lattice_of(*needed.section, dataset);
+  if (!lattice) return lattice.error();
+  scene.lattice = std::move(*lattice);
+  scene.slice = Slice{needed.section->axis, 0};
   return scene;
 }
 
@@ -352,21 +387,24 @@ std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dat
 
 Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset) {
   const View& view = completed.view();
-  const Placed& placed = completed.placed();
+  const Lattice& lattice = completed.lattice();
   Scene scene;
-  scene.slice = slice_of(view.geometry, placed.lattice);
+  scene.slice = slice_of(view.geometry, lattice);
   scene.camera = completed.camera();
-  const auto depths = view_depths(scene.camera, placed.lattice);
+  const auto depths = view_depths(scene.camera, lattice);
   const double depth = depths[1] - depths[0];
   scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
                      depths[0] + view.depth_cue.far * depth};
-  scene.body = make_body(view.geometry, placed.lattice);
+  scene.body = make_body(view.geometry, lattice);
   scene.method = engine_method(view.method.name);
   scene.compositing = engine_compositing(view.method.compositing);
   scene.slab_thickness = view.method.slab_thickness;
   scene.stop_transmittance = view.method.stop_transmittance;
   scene.background = parse_color(view.image.background).value();
-  return at_level(std::move(scene), level_of(completed, dataset), view, placed, dataset);
+  scene.level = level_of(completed, dataset);
+  auto needed = needed_scene(completed, scene.level, dataset);
+  if (!needed) return needed.error();
+  return with_data(std::move(scene), std::move(*needed), completed, dataset);
 }
 
 double detail_shown(const CompletedView& completed) {
@@ -376,9 +414,17 @@ double detail_shown(const CompletedView& completed) {
   return finest_cell_px(completed.camera(), completed.lattice(), slice) / halved_below_px;
 }
 
-std::vector<Shown> shown_by(const CompletedView& completed, const data::Dataset& dataset) {
-  return shown_at(completed.view(),
-                  coarsening_of(completed.lattice(), level_of(completed, dataset)));
+Result<Needs> needs_of(const CompletedView& completed, const data::Dataset& dataset) {
+  auto needed = needed_scene(completed, level_of(completed, dataset), dataset);
+  if (!needed) return needed.error();
+  Needs needs;
+  if (needed->lines) {
+    needs.fields.push_back(std::move(needed->lines->vectors));
+    if (needed->lines->colors) needs.fields.push_back(std::move(*needed->lines->colors));
+  }
+  for (auto& [layer, values] : needed->media) needs.fields.push_back(std::move(values));
+  if (needed->section) needs.places = places_of(*needed->section);
+  return needs;
 }
 
 Result<Scene> build_scene(const View& view, data::Dataset& dataset) {

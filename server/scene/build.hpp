@@ -26,12 +26,15 @@ double detail_shown(const CompletedView& completed);
 std::array<int, 3> level_of(const CompletedView& completed, const data::Dataset& dataset);
 std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dataset);
 
-// The fields that a completed view shows at any step, each with its level of detail, determined
-// without loading them.
-struct Shown {
+// What a completed view needs of the dataset at any step, determined without loading.
+struct Needed {
   std::string field;
-  data::Coarsening coarsening;
+  data::Derivation how;
 };
-std::vector<Shown> shown_by(const CompletedView& completed, const data::Dataset& dataset);
+struct Needs {
+  std::vector<Needed> fields;
+  std::string places;  // the auxiliary variant of the places of a section; empty: none
+};
+Result<Needs> needs_of(const CompletedView& completed, const data::Dataset& dataset);
 
 }  // namespace windsplat::scene

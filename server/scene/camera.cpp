@@ -3,10 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
+#include <optional>
+#include <vector>
 
 #include "server/scene/angles.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/section.hpp"
 
 namespace windsplat::scene {
 
@@ -54,6 +60,45 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   }
 }
 
+// The distance and height that show the points, which may reach that much farther, with a margin.
+class Frame {
+ public:
+  Frame(const OrbitFrame& frame, const glm::dvec3& target, double fov_y,
+        const protocol::ImageView& image, double nearest)
+      : frame_(frame),
+        target_(target),
+        aspect_(static_cast<double>(image.width) / image.height),
+        slope_y_(std::tan(0.5 * fov_y * radians_per_degree) / margin),
+        nearest_(nearest) {}
+
+  void add(const glm::dvec3& point, double reach) {
+    const glm::dvec3 p = point - target_;
+    const double x = std::abs(glm::dot(p, frame_.right)) + reach;
+    const double y = std::abs(glm::dot(p, frame_.up)) + reach;
+    const double depth = glm::dot(p, frame_.forward);
+    // The point lies at view depth distance + depth and must be within both slopes.
+    const double needed = std::max({x / (slope_y_ * aspect_), y / slope_y_, nearest_}) - depth;
+    framing_.distance = std::max(framing_.distance, needed);
+    framing_.height = std::max({framing_.height, 2.0 * margin * y, 2.0 * margin * x / aspect_});
+  }
+
+  [[nodiscard]] Framing framing() const {
+    return {std::min(framing_.distance, distance_max), std::min(framing_.height, distance_max)};
+  }
+
+ private:
+  const OrbitFrame& frame_;
+  const glm::dvec3 target_;
+  const double aspect_;
+  const double slope_y_;
+  const double nearest_;
+  Framing framing_{0, 0};
+};
+
+double nearest_to(const Lattice& lattice) {
+  return 0.01 * glm::length(lattice.box_max - lattice.box_min);
+}
+
 // Half a cell: the extent of a curved lattice beyond its samples.
 double outline_reach(const Lattice& lattice) {
   double reach = 0;
@@ -87,25 +132,10 @@ OrbitFrame orbit_frame(double azimuth, double elevation) {
 
 Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dvec3& target,
                   double fov_y, const protocol::ImageView& image) {
-  const double aspect = static_cast<double>(image.width) / image.height;
-  const double slope_y = std::tan(0.5 * fov_y * radians_per_degree) / margin;
-  const double slope_x = slope_y * aspect;
-  const double diagonal = glm::length(lattice.box_max - lattice.box_min);
-  Framing framing{0, 0};
+  Frame framed(frame, target, fov_y, image, nearest_to(lattice));
   const double reach = outline_reach(lattice);
-  each_outline_point(lattice, [&](const glm::dvec3& corner) {
-    const glm::dvec3 p = corner - target;
-    const double x = std::abs(glm::dot(p, frame.right)) + reach;
-    const double y = std::abs(glm::dot(p, frame.up)) + reach;
-    const double depth = glm::dot(p, frame.forward);
-    // The corner lies at view depth distance + depth and must be within both slopes.
-    const double needed = std::max({x / slope_x, y / slope_y, 0.01 * diagonal}) - depth;
-    framing.distance = std::max(framing.distance, needed);
-    framing.height = std::max({framing.height, 2.0 * margin * y, 2.0 * margin * x / aspect});
-  });
-  framing.distance = std::min(framing.distance, distance_max);
-  framing.height = std::min(framing.height, distance_max);
-  return framing;
+  each_outline_point(lattice, [&](const glm::dvec3& point) { framed.add(point, reach); });
+  return framed.framing();
 }
 
 double front_azimuth(const Lattice& lattice) {
@@ -125,6 +155,95 @@ void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double 
   view.camera.height = std::clamp(framing.height / zoom, 1e-6, distance_max);
   const bool upright = std::abs(elevation) < 89.9;
   view.camera.up = upright ? protocol::Vec3{0, 0, 1} : from_glm(frame.up);
+}
+
+namespace {
+
+// The plane of a slice. None on a curved one, which has no normal: on the sphere, and across the
+// horizontal axes of a curvilinear map.
+struct Face {
+  glm::dvec3 point, normal;
+};
+std::optional<Face> face_of(const protocol::GeometryView& geometry, const Lattice& lattice) {
+  if (const auto& plane = geometry.plane) {
+    return Face{to_glm(plane->point), glm::normalize(to_glm(plane->normal))};
+  }
+  const auto& slice = geometry.slice;
+  const bool flat = geometry.mapping == protocol::GeometryMapping::flat;
+  const bool level = slice && slice->axis == protocol::GridAxis::z &&
+                     geometry.mapping != protocol::GeometryMapping::sphere;
+  if (!slice || !(flat || level)) return std::nullopt;
+  const auto axis = static_cast<int>(slice->axis);
+  const std::vector<double>& positions = lattice.positions[axis];
+  const auto below = static_cast<std::size_t>(slice->index);
+  const std::size_t above = std::min(below + 1, positions.size() - 1);
+  Face face{0.5 * (lattice.box_min + lattice.box_max), glm::dvec3(0)};
+  face.normal[axis] = 1;
+  face.point[axis] = std::lerp(positions[below], positions[above], slice->index - below);
+  return face;
+}
+
+// The direction along the normal that is nearer to that of the whole box; if both are as near,
+// westward, which shows the axes y and z as a plot does.
+glm::dvec3 facing(const glm::dvec3& normal, const glm::dvec3& usual) {
+  constexpr double rounding = 1e-9;
+  const double nearer = glm::dot(normal, usual);
+  const double sign = std::abs(nearer) > rounding     ? nearer
+                      : std::abs(normal.x) > rounding ? -normal.x
+                                                      : -normal.z;
+  return sign < 0 ? -normal : normal;
+}
+
+// Looks at the part of a plane in the box.
+void face(const Face& plane, const Lattice& lattice, protocol::View& view) {
+  constexpr double upright_sine = 1.7e-3;  // of 0.1 degrees, as in orbits
+  protocol::CameraView& camera = view.camera;
+  OrbitFrame frame = orbit_frame(front_azimuth(lattice), default_elevation);
+  frame.forward = facing(plane.normal, frame.forward);
+  const glm::dvec3 up = to_glm(camera.up);
+  const double length = glm::length(up);
+  const bool parallel = !(glm::length(glm::cross(frame.forward, up)) > upright_sine * length);
+  if (parallel) camera.up = {0, 1, 0};  // north
+  frame.right = glm::normalize(glm::cross(frame.forward, to_glm(camera.up)));
+  frame.up = glm::cross(frame.right, frame.forward);
+  glm::dvec3 low(std::numeric_limits<double>::infinity());
+  glm::dvec3 high = -low;
+  std::vector<glm::dvec3> points;
+  if (lattice.places) {
+    each_outline_point(lattice, [&](const glm::dvec3& point) { points.push_back(point); });
+  } else {
+    points = points_in_box(lattice, plane.point, plane.normal);
+  }
+  for (const glm::dvec3& point : points) {
+    const glm::dvec3 p(glm::dot(point, frame.right), glm::dot(point, frame.up),
+                       glm::dot(point, frame.forward));
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  const glm::dvec3 middle = 0.5 * (low + high);
+  const glm::dvec3 target = middle.x * frame.right + middle.y * frame.up + middle.z * frame.forward;
+  Frame framed(frame, target, camera.fov_y, view.image, nearest_to(lattice));
+  for (const glm::dvec3& point : points) framed.add(point, outline_reach(lattice));
+  const Framing framing = framed.framing();
+  camera.target = from_glm(target);
+  camera.eye = from_glm(target - frame.forward * framing.distance);
+  if (!camera.height) camera.height = std::max(framing.height, 1e-6);
+}
+
+}  // namespace
+
+void complete_camera(protocol::View& view, const Lattice& lattice) {
+  protocol::CameraView& camera = view.camera;
+  if (camera.eye && camera.target && camera.height) return;
+  if (!camera.eye && !camera.target) {
+    if (const auto plane = face_of(view.geometry, lattice)) return face(*plane, lattice, view);
+  }
+  if (!camera.target) camera.target = from_glm(0.5 * (lattice.box_min + lattice.box_max));
+  const OrbitFrame frame = orbit_frame(front_azimuth(lattice), default_elevation);
+  const glm::dvec3 target = to_glm(*camera.target);
+  const Framing framing = frame_box(lattice, frame, target, camera.fov_y, view.image);
+  if (!camera.eye) camera.eye = from_glm(target - frame.forward * framing.distance);
+  if (!camera.height) camera.height = std::max(framing.height, 1e-6);
 }
 
 Result<Camera> resolve_camera(const protocol::View& completed, const Lattice& lattice) {

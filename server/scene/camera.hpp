@@ -37,6 +37,12 @@ Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dv
 void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double elevation,
            double zoom);
 
+// Fills in what the view does not state of its camera: it looks from front_azimuth() and
+// default_elevation and shows the whole box. If the view states neither eye nor target and shows a
+// slice or plane, it looks along its normal, from the side nearer to that, and shows the part in
+// the box; `up` becomes north if it is parallel to the normal.
+void complete_camera(protocol::View& view, const Lattice& lattice);
+
 // The camera of a completed view. Errors: invalid with a pointer (eye equal to target; up parallel
 // to the view direction or zero).
 Result<Camera> resolve_camera(const protocol::View& completed, const Lattice& lattice);

@@ -211,23 +211,6 @@ Result<Range> default_color_range(const View& view, const Placed& placed,
   return Range{0, 1};
 }
 
-void complete_camera(View& view, const Lattice& lattice) {
-  protocol::CameraView& camera = view.camera;
-  if (camera.eye && camera.target && camera.height) return;
-  View framed = view;
-  const double azimuth = front_azimuth(lattice);
-  orbit(framed, lattice, azimuth, default_elevation, 1);
-  if (!camera.target) camera.target = framed.camera.target;
-  const glm::dvec3 target((*camera.target)[0], (*camera.target)[1], (*camera.target)[2]);
-  const OrbitFrame frame = orbit_frame(azimuth, default_elevation);
-  const Framing framing = frame_box(lattice, frame, target, camera.fov_y, view.image);
-  if (!camera.eye) {
-    const glm::dvec3 eye = target - frame.forward * framing.distance;
-    camera.eye = protocol::Vec3{eye.x, eye.y, eye.z};
-  }
-  if (!camera.height) camera.height = std::max(framing.height, 1e-6);
-}
-
 Result<void> check_extinction(const protocol::ScalarView& scalar, const std::string& pointer) {
   if (!scalar.extinction) return {};
   for (std::size_t n = 0; n < scalar.extinction->size(); ++n) {

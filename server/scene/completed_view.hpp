@@ -20,7 +20,7 @@ class CompletedView {
  public:
   [[nodiscard]] const protocol::View& view() const { return view_; }
   // The placement of the samples of the dataset for this view.
-  [[nodiscard]] const Placed& placed() const { return *placed_; }
+  [[nodiscard]] const std::shared_ptr<const Placed>& placed() const { return placed_; }
   [[nodiscard]] const Lattice& lattice() const { return placed_->lattice; }
   [[nodiscard]] const Camera& camera() const { return camera_; }
   // Additional halvings of the data, if the view does not set the level of detail (detail.hpp,

@@ -69,12 +69,13 @@ Slice layer_near(const protocol::PlaneView& plane, const Lattice& lattice) {
 
 Result<void> check_plane(const protocol::GeometryView& geometry) {
   const std::string pointer = "/geometry/plane";
-  if (geometry.slice) return invalid_at(pointer, "a view has a slice or a plane, not both");
+  if (geometry.slice)
+    return invalid_at(pointer, "a view has a slice or a plane, not both: set one to null");
   if (geometry.height_field) {
-    return invalid_at(pointer, "is not available with heightField: use a slice");
+    return invalid_at(pointer, "is not available with heightField: use geometry.slice");
   }
   if (geometry.mapping != protocol::GeometryMapping::flat) {
-    return invalid_at(pointer, "requires the mapping flat: use a slice");
+    return invalid_at(pointer, "requires the mapping flat: use geometry.slice");
   }
   return {};
 }

@@ -18,7 +18,12 @@ std::vector<std::string> preset_names() { return {names.begin(), names.end()}; }
 Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
                           const std::string& preset) {
   if (preset == "default") {
-    orbit(completed, lattice, front_azimuth(lattice), default_elevation, 1);
+    protocol::CameraView& camera = completed.camera;
+    camera.eye.reset();
+    camera.target.reset();
+    camera.height.reset();
+    camera.up = protocol::CameraView{}.up;
+    complete_camera(completed, lattice);
   } else if (preset == "winds") {
     completed.scalars.emplace();
   } else if (preset == "clouds") {

@@ -7,9 +7,10 @@
 #include <limits>
 #include <numbers>
 #include <sstream>
+#include <thread>
 #include <utility>
-#include <vector>
 
+#include "server/base/thread_pool.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/refusal.hpp"
@@ -19,7 +20,6 @@ namespace windsplat::scene {
 namespace {
 
 using data::Volume;
-using VolumePtr = std::shared_ptr<const Volume>;
 
 // The samples next to a place, and the share of the second along each axis.
 struct Neighbours {
@@ -35,13 +35,15 @@ void snap(int axis, double part, Neighbours& at) {
   at.part[axis] = part > rounding && part <= 1 - rounding ? part : 0;
 }
 
+// `at.low` of the previous sample is where the search begins.
 void seek(const std::vector<double>& positions, double x, int axis, Neighbours& at) {
-  const auto above = std::upper_bound(positions.begin(), positions.end(), x);
-  if (above == positions.begin()) return;
-  const auto low = static_cast<std::size_t>(above - positions.begin()) - 1;
+  auto low = static_cast<std::size_t>(at.low[axis]);
+  while (low > 0 && positions[low] > x) --low;
+  while (low + 1 < positions.size() && positions[low + 1] <= x) ++low;
   at.low[axis] = static_cast<int>(low);
-  if (above == positions.end()) return;
-  snap(axis, (x - positions[low]) / (*above - positions[low]), at);
+  at.part[axis] = 0;
+  if (x < positions[low] || low + 1 == positions.size()) return;
+  snap(axis, (x - positions[low]) / (positions[low + 1] - positions[low]), at);
 }
 
 glm::dvec3 place_of(const Section& section, int i, int j, int k) {
@@ -51,11 +53,11 @@ glm::dvec3 place_of(const Section& section, int i, int j, int k) {
   return at;
 }
 
-// False outside of the box.
+// False outside of the box. `at`: neighbours of any sample, best those of the previous one.
 bool find_neighbours(const Section& section, int i, int j, int k, Neighbours& at) {
-  at = {{i, j, k}, {0, 0, 0}};
   const Lattice& whole = *section.whole;
   if (!section.oblique) {
+    at = {{i, j, k}, {0, 0, 0}};
     at.low[section.axis] = static_cast<int>(section.index);
     snap(section.axis, section.index - std::floor(section.index), at);
     return true;
@@ -64,7 +66,6 @@ bool find_neighbours(const Section& section, int i, int j, int k, Neighbours& at
   for (int a = 0; a < 3; ++a) {
     const double margin = rounding * (whole.box_max[a] - whole.box_min[a]);
     if (place[a] < whole.box_min[a] - margin || place[a] > whole.box_max[a] + margin) return false;
-    at.low[a] = 0;
     seek(whole.positions[a], place[a], a, at);
   }
   return true;
@@ -123,6 +124,37 @@ float as_float(double value) {
   return static_cast<float>(value < -most ? -most : value > most ? most : value);
 }
 
+// Calls visit(n, i, j, k, neighbours) for each sample, on several threads if there are many;
+// `neighbours` are those left by the previous call on the thread.
+template <class Visit>
+void each_sample(const Section& section, const Visit& visit) {
+  constexpr std::size_t block = 4096;
+  constexpr std::size_t blocks_a_thread = 16;
+  const std::size_t samples = samples_of(section);
+  const std::size_t blocks = (samples + block - 1) / block;
+  const auto processors = std::size_t{std::max(1U, std::thread::hardware_concurrency())};
+  ThreadPool pool(
+      static_cast<unsigned>(std::clamp(blocks / blocks_a_thread, std::size_t{1}, processors)));
+  const auto [nx, ny, nz] = section.dims;
+  pool.run(blocks, [&, nx = nx, ny = ny](std::size_t number, unsigned) {
+    const std::size_t end = std::min(samples, (number + 1) * block);
+    std::size_t n = number * block;
+    const std::size_t row = n / static_cast<std::size_t>(nx);
+    int i = static_cast<int>(n % static_cast<std::size_t>(nx));
+    int j = static_cast<int>(row % static_cast<std::size_t>(ny));
+    int k = static_cast<int>(row / static_cast<std::size_t>(ny));
+    Neighbours neighbours;
+    for (; n < end; ++n) {
+      visit(n, i, j, k, neighbours);
+      if (++i < nx) continue;
+      i = 0;
+      if (++j < ny) continue;
+      j = 0;
+      ++k;
+    }
+  });
+}
+
 // A volume of which visit(neighbours, values) sets the components of each sample that lies
 // in the box; the others are masked.
 template <class Visit>
@@ -132,20 +164,14 @@ Volume filled(const Section& section, int components, const Visit& visit) {
   out.components = components;
   const std::size_t samples = samples_of(section);
   out.values = data::Samples(samples * static_cast<std::size_t>(components));
-  std::size_t at = 0;
-  Neighbours neighbours;
-  for (int k = 0; k < section.dims[2]; ++k) {
-    for (int j = 0; j < section.dims[1]; ++j) {
-      for (int i = 0; i < section.dims[0]; ++i, ++at) {
-        std::array<double, 3> values{};
-        values.fill(std::numeric_limits<double>::quiet_NaN());
-        if (find_neighbours(section, i, j, k, neighbours)) visit(neighbours, values);
-        for (int c = 0; c < components; ++c) {
-          out.values[static_cast<std::size_t>(c) * samples + at] = as_float(values[c]);
-        }
-      }
+  each_sample(section, [&](std::size_t n, int i, int j, int k, Neighbours& neighbours) {
+    std::array<double, 3> values{};
+    values.fill(std::numeric_limits<double>::quiet_NaN());
+    if (find_neighbours(section, i, j, k, neighbours)) visit(neighbours, values);
+    for (int c = 0; c < components; ++c) {
+      out.values[static_cast<std::size_t>(c) * samples + n] = as_float(values[c]);
     }
-  }
+  });
   finish_volume(out);
   return out;
 }
@@ -214,32 +240,13 @@ struct Extent {
   double high = -std::numeric_limits<double>::infinity();
 };
 
-// The extents along the directions of the plane of its intersection with the box: the hull of its
-// points on the edges of the box. Empty if there are none.
-std::array<Extent, 3> extents_in_box(const Section& section, const glm::dvec3& point) {
-  const Lattice& whole = *section.whole;
+// The extents of points along the directions of a plane.
+std::array<Extent, 3> extents_of(const std::vector<glm::dvec3>& points, const Section& section) {
   std::array<Extent, 3> extents;
-  const auto corner = [&](unsigned bits) {
-    glm::dvec3 at = whole.box_min;
-    for (int a = 0; a < 3; ++a) {
-      if ((bits >> static_cast<unsigned>(a) & 1U) != 0) at[a] = whole.box_max[a];
-    }
-    return at;
-  };
-  const glm::dvec3& normal = section.along[section.axis];
-  for (unsigned bits = 0; bits < 8; ++bits) {
-    for (unsigned a = 0; a < 3; ++a) {
-      if ((bits >> a & 1U) != 0) continue;
-      const glm::dvec3 from = corner(bits);
-      const glm::dvec3 to = corner(bits | 1U << a);
-      const double before = glm::dot(normal, from - point);
-      const double after = glm::dot(normal, to - point);
-      if (before * after > 0 || before == after) continue;
-      const glm::dvec3 met = from + (to - from) * (before / (before - after));
-      for (int c = 0; c < 3; ++c) {
-        const double at = glm::dot(section.along[c], met);
-        extents[c] = {std::min(extents[c].low, at), std::max(extents[c].high, at)};
-      }
+  for (const glm::dvec3& point : points) {
+    for (int c = 0; c < 3; ++c) {
+      const double at = glm::dot(section.along[c], point);
+      extents[c] = {std::min(extents[c].low, at), std::max(extents[c].high, at)};
     }
   }
   return extents;
@@ -258,11 +265,13 @@ Result<Section> make_plane(const protocol::PlaneView& plane, const Lattice& whol
   const glm::dvec3 point(plane.point[0], plane.point[1], plane.point[2]);
   set_directions(glm::normalize(glm::dvec3(plane.normal[0], plane.normal[1], plane.normal[2])),
                  section);
-  const auto extents = extents_in_box(section, point);
-  if (!(extents[0].low <= extents[0].high)) {
+  const auto met = points_in_box(whole, point, section.along[section.axis]);
+  const auto extents = extents_of(met, section);
+  if (met.empty()) {
     return invalid_at("/geometry/plane/point", "the plane misses the box of the data, from " +
                                                    text_of(whole.box_min) + " to " +
-                                                   text_of(whole.box_max) + " in the world");
+                                                   text_of(whole.box_max) +
+                                                   " in the world: move the point into it");
   }
   double samples = 1;
   section.first = glm::dot(section.along[section.axis], point) * section.along[section.axis];
@@ -279,7 +288,8 @@ Result<Section> make_plane(const protocol::PlaneView& plane, const Lattice& whol
   if (samples > static_cast<double>(plane_samples_max)) {
     std::ostringstream text;
     text << "the plane has " << static_cast<std::int64_t>(samples)
-         << " samples, more than the limit of " << plane_samples_max;
+         << " samples, more than the limit of " << plane_samples_max
+         << ": a layer (/geometry/slice) has no limit";
     return invalid_at("/geometry/plane", text.str());
   }
   return section;
@@ -289,18 +299,11 @@ void append(const std::vector<double>& values, std::vector<double>& to) {
   to.insert(to.end(), values.begin(), values.end());
 }
 
-// Everything that determines the places of the samples.
+// Determines what is sampled: places in the grid, and of a plane also the placement of the grid.
 std::vector<double> numbers_of(const Section& section) {
   std::vector<double> out{static_cast<double>(section.axis), section.oblique ? 1.0 : 0.0,
                           section.index};
-  if (!section.oblique) return out;
-  for (int a = 0; a < 3; ++a) {
-    const auto& along = section.along[a];
-    out.insert(out.end(),
-               {static_cast<double>(section.dims[a]), section.pitch[a], along.x, along.y, along.z,
-                section.first[a], section.whole->box_min[a], section.whole->box_max[a]});
-    append(section.whole->positions[a], out);
-  }
+  if (section.oblique) append(section.placement, out);
   return out;
 }
 
@@ -315,6 +318,18 @@ void append_factors(const ComponentFactors& factors, std::vector<double>& to) {
 std::string key_of(const char* what, const std::vector<double>& numbers) {
   return what + data::digest_of({reinterpret_cast<const char*>(numbers.data()),
                                  numbers.size() * sizeof(double)});
+}
+
+// What determines the places of the samples of a dataset, and the plane.
+std::vector<double> placement_of(const protocol::GeometryView& geometry) {
+  std::vector<double> out{static_cast<double>(geometry.mapping),
+                          static_cast<double>(geometry.vertical)};
+  out.insert(out.end(), geometry.scale.begin(), geometry.scale.end());
+  if (geometry.plane) {
+    out.insert(out.end(), geometry.plane->point.begin(), geometry.plane->point.end());
+    out.insert(out.end(), geometry.plane->normal.begin(), geometry.plane->normal.end());
+  }
+  return out;
 }
 
 std::uint64_t bytes_of(const Section& section, std::size_t components) {
@@ -333,15 +348,45 @@ bool is_section(const protocol::GeometryView& geometry) {
 }
 
 Result<Section> make_section(const protocol::GeometryView& geometry, const Lattice& whole) {
-  if (geometry.plane) return make_plane(*geometry.plane, whole);
+  if (geometry.plane) {
+    auto plane = make_plane(*geometry.plane, whole);
+    if (plane) plane->placement = placement_of(geometry);
+    return plane;
+  }
   Section section;
   section.whole = &whole;
+  section.placement = placement_of(geometry);
+  section.heights = geometry.height_field.value_or("");
   section.axis = static_cast<int>(geometry.slice->axis);
   section.index = geometry.slice->index;
   section.dims = whole.dims;
   section.dims[section.axis] = 1;
   for (std::size_t a = 0; a < 3; ++a) section.pitch[a] = cell_size(whole, a);
   return section;
+}
+
+std::vector<glm::dvec3> points_in_box(const Lattice& lattice, const glm::dvec3& point,
+                                      const glm::dvec3& normal) {
+  std::vector<glm::dvec3> points;
+  const auto corner = [&](unsigned bits) {
+    glm::dvec3 at = lattice.box_min;
+    for (int a = 0; a < 3; ++a) {
+      if ((bits >> static_cast<unsigned>(a) & 1U) != 0) at[a] = lattice.box_max[a];
+    }
+    return at;
+  };
+  for (unsigned bits = 0; bits < 8; ++bits) {
+    for (unsigned a = 0; a < 3; ++a) {
+      if ((bits >> a & 1U) != 0) continue;
+      const glm::dvec3 from = corner(bits);
+      const glm::dvec3 to = corner(bits | 1U << a);
+      const double before = glm::dot(normal, from - point);
+      const double after = glm::dot(normal, to - point);
+      if (before * after > 0 || before == after) continue;
+      points.push_back(from + (to - from) * (before / (before - after)));
+    }
+  }
+  return points;
 }
 
 std::vector<double> along_section(const Section& section, int axis, std::vector<double> values) {
@@ -351,7 +396,15 @@ std::vector<double> along_section(const Section& section, int axis, std::vector<
   return {value_at(values, axis, at)};
 }
 
-Result<Lattice> lattice_of(const Section& section, const data::Dataset& dataset) {
+std::string places_of(const Section& section) {
+  if (!section.oblique && !section.whole->places) return "";
+  std::vector<double> numbers = numbers_of(section);
+  append(section.placement, numbers);
+  return key_of("places", numbers) + section.heights;
+}
+
+Result<Lattice> lattice_of(const Section& section, data::Dataset& dataset) {
+  using Places = std::vector<std::array<float, 3>>;
   const Lattice& whole = *section.whole;
   Lattice out = whole;
   out.dims = section.dims;
@@ -365,90 +418,78 @@ Result<Lattice> lattice_of(const Section& section, const data::Dataset& dataset)
     }
     out.spacing[a].assign(static_cast<std::size_t>(section.dims[a]), section.pitch[a]);
   }
-  if (!section.oblique && !whole.places) return out;
-  struct Held {
-    std::shared_ptr<const void> room;
-    std::vector<std::array<float, 3>> places;
-  };
-  const auto held = std::make_shared<Held>();
-  auto room = dataset.reserve(samples_of(section) * sizeof(held->places[0]));
-  if (!room) return room.error();
-  held->room = std::move(*room);
-  held->places.reserve(samples_of(section));
-  for (int k = 0; k < section.dims[2]; ++k) {
-    for (int j = 0; j < section.dims[1]; ++j) {
-      for (int i = 0; i < section.dims[0]; ++i) {
-        held->places.push_back(rounded(section.oblique ? place_of(section, i, j, k)
-                                                       : place_between(section, i, j, k)));
-      }
-    }
-  }
-  out.places = std::shared_ptr<const std::vector<std::array<float, 3>>>(held, &held->places);
+  const std::string key = places_of(section);
+  if (key.empty()) return out;
+  const std::size_t samples = samples_of(section);
+  auto kept = dataset.auxiliary(key, samples * sizeof(Places::value_type), [&] {
+    auto places = std::make_shared<Places>(samples);
+    each_sample(section, [&](std::size_t n, int i, int j, int k, Neighbours&) {
+      (*places)[n] =
+          rounded(section.oblique ? place_of(section, i, j, k) : place_between(section, i, j, k));
+    });
+    return places;
+  });
+  if (!kept) return kept.error();
+  out.places = std::static_pointer_cast<const Places>(*kept);
   return out;
 }
 
-Result<VolumePtr> sampled(const Section& section, data::Dataset& dataset, const std::string& field,
-                          std::size_t step) {
-  const data::FieldInfo* const info = dataset.info().find(field);
-  const std::size_t components = info == nullptr ? 1 : info->components.size();
-  return dataset.derived(field, step, key_of("section", numbers_of(section)),
-                         bytes_of(section, components), [&](const Volume& volume) {
-                           return filled(section, volume.components,
-                                         [&](const Neighbours& at, auto& values) {
-                                           const glm::dvec3 value = vector_at(volume, at);
-                                           for (int c = 0; c < volume.components; ++c)
-                                             values[c] = value[c];
-                                         });
-                         });
+data::Derivation sampled(const Section& section, int components) {
+  return {key_of("section", numbers_of(section)),
+          bytes_of(section, static_cast<std::size_t>(components)), [section](const Volume& volume) {
+            return filled(section, volume.components, [&](const Neighbours& at, auto& values) {
+              const glm::dvec3 value = vector_at(volume, at);
+              for (int c = 0; c < volume.components; ++c) values[c] = value[c];
+            });
+          }};
 }
 
-Result<VolumePtr> sampled_vectors(const Section& section, data::Dataset& dataset,
-                                  const std::string& field, std::size_t step,
-                                  const ComponentFactors& factors) {
+data::Derivation sampled_vectors(const Section& section, const ComponentFactors& factors) {
   std::vector<double> numbers = numbers_of(section);
   append_factors(factors, numbers);
-  return dataset.derived(
-      field, step, key_of("vectors", numbers), bytes_of(section, 3), [&](const Volume& volume) {
+  return {
+      key_of("vectors", numbers), bytes_of(section, 3), [section, factors](const Volume& volume) {
         return filled(section, 3, [&](const Neighbours& at, auto& values) {
           const glm::dvec3 vector = vector_at(volume, at);
           const glm::dvec3 turned = glm::length(vector) * unit(drawn_along(vector, factors, at));
           for (int a = 0; a < 3; ++a) values[a] = glm::dot(turned, section.along[a]);
         });
-      });
+      }};
 }
 
-Result<VolumePtr> sampled_colors(const Section& section, data::Dataset& dataset,
-                                 const std::string& field, std::size_t step,
-                                 const ComponentFactors& factors, const VectorLayer& layer) {
+data::Derivation sampled_colors(const Section& section, const ComponentFactors& factors,
+                                const VectorLayer& layer) {
   const auto [bottom, top] = height_range(*section.whole);
   const auto [low, high] = layer.color.range;
   const double full = layer.magnitude_range[1];
   const double weight = layer.rise_weight;
+  const LineColor by = layer.color_by;
   std::vector<double> numbers = numbers_of(section);
-  numbers.push_back(static_cast<double>(layer.color_by));
-  if (layer.color_by != LineColor::world_z) append_factors(factors, numbers);
-  if (layer.color_by == LineColor::rise) {
+  numbers.push_back(static_cast<double>(by));
+  if (by != LineColor::world_z) append_factors(factors, numbers);
+  if (by == LineColor::rise) {
     numbers.insert(numbers.end(), {low, high, layer.length, full, weight, bottom, top});
   }
-  const auto color = [&, bottom = bottom, top = top, low = low, high = high](const Volume& volume,
-                                                                             const Neighbours& at) {
+  const auto color = [section, factors, by, full, weight, length = layer.length, bottom = bottom,
+                      top = top, low = low,
+                      high = high](const Volume& volume, const Neighbours& at) {
     const double z = value_at(section.whole->positions[2], 2, at);
-    if (layer.color_by == LineColor::world_z) return z;
+    if (by == LineColor::world_z) return z;
     const glm::dvec3 vector = vector_at(volume, at);
     const glm::dvec3 direction = unit(drawn_along(vector, factors, at));
-    if (layer.color_by == LineColor::direction) {
+    if (by == LineColor::direction) {
       const glm::dvec3& normal = section.along[section.axis];
       return bearing(direction - glm::dot(direction, normal) * normal);
     }
     const double part = full > 0 ? std::min(glm::length(vector) / full, 1.0) : 1.0;
-    const double rise = direction.z * part * layer.length;
+    const double rise = direction.z * part * length;
     return (1 - weight) * (z - bottom) / (top - bottom) + weight * (rise - low) / (high - low);
   };
-  return dataset.derived(
-      field, step, key_of("colors", numbers), bytes_of(section, 1), [&](const Volume& volume) {
-        return filled(section, 1,
-                      [&](const Neighbours& at, auto& values) { values[0] = color(volume, at); });
-      });
+  return {key_of("colors", numbers), bytes_of(section, 1), [section, color](const Volume& volume) {
+            return filled(section, 1, [&](const Neighbours& at, auto& values) {
+              values[0] = color(volume, at);
+            });
+          }};
 }
 
 }  // namespace windsplat::scene

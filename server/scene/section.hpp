@@ -25,9 +25,14 @@ constexpr std::int64_t plane_samples_max = std::int64_t{1} << 22U;
 // Whether the view draws samples between those of the data.
 bool is_section(const protocol::GeometryView& geometry);
 
-// Has one sample along `axis`. The lattice of the data, `whole`, must outlive it.
+// Has one sample along `axis`. The lattice of the data, `whole`, must outlive it and what is
+// derived from it, unless `owner` keeps it.
 struct Section {
   const Lattice* whole = nullptr;
+  std::shared_ptr<const void> owner;
+  // Identify the places of the samples of the data among those of the dataset, and the plane.
+  std::vector<double> placement;
+  std::string heights;  // name of the height field, if there is one
   int axis = 2;
   std::array<int, 3> dims{1, 1, 1};
   double index = 0;  // of a layer, in samples of the data
@@ -43,30 +48,31 @@ struct Section {
 // Takes the same time for any number of samples. Errors: invalid at /geometry/plane.
 Result<Section> make_section(const protocol::GeometryView& geometry, const Lattice& whole);
 
-// The box is that of the whole grid. Errors: out_of_memory.
-Result<Lattice> lattice_of(const Section& section, const data::Dataset& dataset);
+// The box is that of the whole grid. The places of the samples, unless they are on a rectilinear
+// lattice, are kept by the dataset. Errors: those of Dataset::auxiliary().
+Result<Lattice> lattice_of(const Section& section, data::Dataset& dataset);
+// The variant under which the places are kept; empty: there are none.
+std::string places_of(const Section& section);
+
+// The points where a plane meets the edges of the box; their hull is its part in the box.
+std::vector<glm::dvec3> points_in_box(const Lattice& lattice, const glm::dvec3& point,
+                                      const glm::dvec3& normal);
 
 // The values of an array that is indexed by a sample along an axis, along a layer.
 std::vector<double> along_section(const Section& section, int axis, std::vector<double> values);
 
-// A field interpolated linearly along each axis. In the outer half of the outermost cells it has
-// their value; outside of the box, and where a sample with a share in it is masked, it is masked.
-// Shared and counted as a level. Errors: those of Dataset::derived().
-Result<std::shared_ptr<const data::Volume>> sampled(const Section& section, data::Dataset& dataset,
-                                                    const std::string& field, std::size_t step);
+// A field of that many components interpolated linearly along each axis. In the outer half of the
+// outermost cells it has their value; outside of the box, and where a sample with a share in it is
+// masked, it is masked. Computed on several threads.
+data::Derivation sampled(const Section& section, int components);
 
 // The same for the vectors of a plane, along its own directions: with the magnitude of the data,
 // and the direction in which the factors draw them.
-Result<std::shared_ptr<const data::Volume>> sampled_vectors(const Section& section,
-                                                            data::Dataset& dataset,
-                                                            const std::string& field,
-                                                            std::size_t step,
-                                                            const ComponentFactors& factors);
+data::Derivation sampled_vectors(const Section& section, const ComponentFactors& factors);
 
 // What determines the colour of a plane's lines, for line colours that depend on the axes: world_z,
 // rise (the position on the map) or direction. `layer` has length, magnitude range and colours.
-Result<std::shared_ptr<const data::Volume>> sampled_colors(
-    const Section& section, data::Dataset& dataset, const std::string& field, std::size_t step,
-    const ComponentFactors& factors, const VectorLayer& layer);
+data::Derivation sampled_colors(const Section& section, const ComponentFactors& factors,
+                                const VectorLayer& layer);
 
 }  // namespace windsplat::scene

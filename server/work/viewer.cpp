@@ -71,11 +71,14 @@ Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Data
   if (!completed) return completed.error();
   const auto drawn = frame::at_setting(*completed, wanted.setting);
   if (!drawn) return drawn.error();
-  const std::vector<scene::Shown> shown = scene::shown_by(*drawn, dataset);
+  const auto needs = scene::needs_of(*drawn, dataset);
+  if (!needs) return needs.error();
+  std::optional<data::ResidentKey> places;
+  if (!needs->places.empty()) places = dataset.auxiliary_key(needs->places);
   std::vector<data::PrefetchRequest> requests;
   for (const int step : wanted.steps) {
-    for (const auto& [field, how] : shown) {
-      requests.push_back({dataset, field, static_cast<std::size_t>(step), how});
+    for (const auto& [field, how] : needs->fields) {
+      requests.push_back({dataset, field, static_cast<std::size_t>(step), how, places});
     }
   }
   return requests;

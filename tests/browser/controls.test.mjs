@@ -200,6 +200,34 @@ test("a slice is selected by axis and layer and can be removed", () =>
     assert.equal(await lastPatch(page, "geometry", "slice"), null);
   }));
 
+test("the default camera faces a slice or plane, and a globe ends the plane", () =>
+  withPage(async (page) => {
+    const faces = (azimuth, elevation) =>
+      page.waitForFunction(
+        ([a, e]) => {
+          const { azimuth, elevation } = document.querySelector("#picture").dataset;
+          return Math.abs(azimuth - a) < 0.1 && Math.abs(elevation - e) < 0.1;
+        },
+        [azimuth, elevation],
+      );
+    await unfold(page, "Geometry");
+    await choose(page, "slice", /^across z/);
+    await faces(0, 90);
+    await choose(page, "slice", /^across x/);
+    await faces(90, 0);
+    await choose(page, "slice", /^oblique plane$/);
+    await faces(-45, 0);
+    await finalPicture(page);
+    await shot(page, "plane");
+    await choose(page, "shape", /^sphere/);
+    const { mapping, plane } = await lastPatch(page, "geometry");
+    assert.deepEqual([mapping, plane], ["sphere", null]);
+    await page.locator("#panel .panel-note", { hasText: /^An oblique plane needs/ }).waitFor();
+    const offered = await control(page, "slice").locator("option").allTextContents();
+    assert.ok(!offered.includes("oblique plane"), `${offered}`);
+    await faces(0, 35);
+  }));
+
 test("a globe is offered for longitudes, and heights replace the vertical axis", () =>
   withPage(async (page) => {
     await unfold(page, "Geometry");

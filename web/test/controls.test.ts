@@ -13,6 +13,7 @@ import {
   methodHints,
   methodOptions,
   planePatch,
+  shapePatch,
   sliceIndexMax,
   sliceOptions,
   slicePatch,
@@ -87,8 +88,23 @@ test("a plane keeps its other numbers, and a normal without a direction is not s
   assert.equal(controlStates(plane).combined, true);
 });
 
+test("an oblique plane is offered on flat grids only, and ends where the server refuses it", () => {
+  const plane = { point: [0, 0, 0], normal: [1, 1, 0] };
+  for (const bent of [{ mapping: "sphere" }, { mapping: "curvilinear" }, { heightField: "zg" }]) {
+    const view = { geometry: bent } as View;
+    assert.deepEqual(Object.values(sliceOptions(dataset, view)), ["all", "x", "z"]);
+    assert.match(sliceText(dataset, view), /oblique plane needs a flat/);
+    const shown = { geometry: { plane } } as View;
+    assert.deepEqual(shapePatch(shown, view.geometry!), { geometry: { ...bent, plane: null } });
+    assert.deepEqual(shapePatch({}, view.geometry!), view);
+  }
+  const flat = { geometry: { mapping: "flat", heightField: null, plane } } as View;
+  assert.ok(Object.values(sliceOptions(dataset, flat)).includes("plane"));
+  assert.deepEqual(shapePatch(flat, { mapping: "flat" }), { geometry: { mapping: "flat" } });
+});
+
 test("a slice starts in the middle of an axis with layers and shows its position", () => {
-  assert.deepEqual(Object.values(sliceOptions(dataset)), ["all", "x", "z", "plane"]);
+  assert.deepEqual(Object.values(sliceOptions(dataset, {})), ["all", "x", "z", "plane"]);
   assert.equal(sliceIndexMax(dataset, "x"), 3);
   assert.deepEqual(slicePatch(dataset, "z"), {
     geometry: { slice: { axis: "z", index: 2 }, plane: null },

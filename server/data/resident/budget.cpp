@@ -14,6 +14,8 @@ namespace windsplat::data {
 
 namespace {
 
+constexpr const char* other_memory = "memory other than fields";
+
 // Other threads wait for the result, so exceptions become errors.
 Result<Resident> made(const Budget::Make& make) {
   try {
@@ -52,7 +54,7 @@ Result<Resident> Budget::get(const ResidentKey& key, std::uint64_t bytes, Urgenc
     }
     if (!there_is_room) {
       ++counts_.refusals;
-      return no_room("the field", bytes);
+      return no_room(std::get<1>(key) == no_field ? other_memory : "the field", bytes);
     }
     // Another thread may have started the same load during the wait.
     if (entries_.count(key) == 0) break;
@@ -222,6 +224,7 @@ bool Budget::is_derived(const ResidentKey& key) const {
     return at != entries_.end() && at->second->listed;
   };
   if (variant == packed_variant) return false;
+  if (field == no_field) return true;
   return is_kept(packed_variant) || (!variant.empty() && is_kept(""));
 }
 
@@ -406,7 +409,7 @@ Result<void> Reservation::take(std::uint64_t bytes, Urgency urgency, const OwnPi
   }
   if (!there_is_room) {
     ++budget_->counts_.refusals;
-    return budget_->no_room("memory other than fields", bytes);
+    return budget_->no_room(other_memory, bytes);
   }
   set(bytes);
   return {};
@@ -430,7 +433,7 @@ Result<void> Reservation::resize(std::uint64_t bytes, Urgency urgency) {
       !(in_turn &&
         budget_->wait_for_room(bytes - bytes_, budget_->turn_.own, budget_->turn_.cancel, lock))) {
     ++budget_->counts_.refusals;
-    return budget_->no_room("memory other than fields", bytes - bytes_);
+    return budget_->no_room(other_memory, bytes - bytes_);
   }
   set(bytes);
   return {};

@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <list>
 #include <map>
 #include <memory>
@@ -28,6 +29,8 @@ namespace windsplat::data {
 // loaded).
 using ResidentKey = std::tuple<std::uint64_t, std::size_t, std::size_t, std::string>;
 using Resident = std::shared_ptr<const void>;
+// The field of the keys of what belongs to no field (Dataset::auxiliary()).
+inline constexpr std::size_t no_field = std::numeric_limits<std::size_t>::max();
 
 enum class Urgency {
   in_turn,   // exclusive: waits for volumes that others reference, see Budget::get()
@@ -140,8 +143,8 @@ class Budget {
     return requested_.count(key) > 0;
   }
   void drop_all(std::uint64_t owner, bool held_too);
-  // Whether a volume can be recomputed cheaply: from its packed form, or as the level of a
-  // resident volume.
+  // Whether a volume can be recomputed cheaply: from its packed form, from a resident volume, or
+  // without a field.
   [[nodiscard]] bool is_derived(const ResidentKey& key) const;
   [[nodiscard]] bool may_go(const ResidentKey& key, Urgency urgency) const;
   [[nodiscard]] std::uint64_t evictable_for(Urgency urgency) const;

@@ -259,12 +259,12 @@ Urgency Dataset::urgency() const {
   return manner_ == Manner::prefetch ? Urgency::prefetch : Urgency::demand;
 }
 
-Result<VolumePtr> Dataset::get(const ResidentKey& key, std::uint64_t bytes,
-                               const Budget::Make& make) {
+Result<Resident> Dataset::get(const ResidentKey& key, std::uint64_t bytes,
+                              const Budget::Make& make) {
   auto kept = state_->budget->get(key, bytes, urgency(), make, own_ ? *own_ : OwnPins(),
                                   cancel_ ? &*cancel_ : nullptr);
   if (kept && own_) own_->insert(kept->get());
-  return as_volume(kept);
+  return kept;
 }
 
 Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
@@ -277,30 +277,30 @@ Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
   }
-  return get(key, values_of(state_->info, *index) * sizeof(float),
-             [&] { return state_->load(*index, step, urgency()); });
+  return as_volume(get(key, values_of(state_->info, *index) * sizeof(float),
+                       [&] { return state_->load(*index, step, urgency()); }));
 }
 
 Result<VolumePtr> Dataset::level(const std::string& field, std::size_t step,
                                  const Coarsening& how) {
-  if (how.halvings == std::array{0, 0, 0}) {
-    return volume(field, step);
-  }
-  return derived(field, step, digest_of(key_of(how)), level_bytes(field, how),
-                 [&](const Volume& fine) {
-                   state_->add(&Counts::levels);
-                   return coarsen(fine, how);
-                 });
+  return derived(field, step, reduction(field, how));
+}
+
+Derivation Dataset::reduction(const std::string& field, const Coarsening& how) const {
+  if (how.halvings == std::array{0, 0, 0}) return {};
+  return {digest_of(data::key_of(how)), level_bytes(field, how),
+          [state = state_, how](const Volume& fine) {
+            state->add(&Counts::levels);
+            return coarsen(fine, how);
+          }};
 }
 
 Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
-                                   const std::string& variant, std::uint64_t bytes,
-                                   const std::function<Volume(const Volume&)>& make) {
+                                   const Derivation& how) {
+  if (how.variant.empty()) return volume(field, step);
   const Result<std::size_t> index = state_->find(field, step);
-  if (!index) {
-    return index.error();
-  }
-  const ResidentKey key{state_->owner, *index, step, variant};
+  if (!index) return index.error();
+  const ResidentKey key{state_->owner, *index, step, how.variant};
   if (manner_ == Manner::resident_only) {
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
@@ -311,14 +311,28 @@ Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
   }
   // Keep a reference, so that the volume is not evicted before the result is computed from it.
   const auto fine = volume(field, step);
-  if (!fine) {
-    return fine.error();
-  }
-  auto made = get(key, bytes, [&] {
-    return guarded(state_->info.fields[*index], [&]() -> Result<Volume> { return make(**fine); });
+  if (!fine) return fine.error();
+  const auto made = get(key, how.bytes, [&] {
+    return guarded(state_->info.fields[*index],
+                   [&]() -> Result<Volume> { return how.make(**fine); });
   });
   if (own_) own_->erase(own_->find(fine->get()));  // the volume is not yet shared
-  return made;
+  return as_volume(made);
+}
+
+Result<Resident> Dataset::auxiliary(const std::string& variant, std::uint64_t bytes,
+                                    const std::function<Resident()>& make) {
+  const ResidentKey key = auxiliary_key(variant);
+  if (manner_ == Manner::resident_only) {
+    Resident there = state_->budget->find_now(key);
+    if (there) return there;
+    return make_error(ErrorKind::not_resident, "a part of the view is not in memory yet");
+  }
+  return get(key, bytes, [&]() -> Result<Resident> { return make(); });
+}
+
+ResidentKey Dataset::auxiliary_key(const std::string& variant) const {
+  return {state_->owner, no_field, 0, variant};
 }
 
 std::uint64_t Dataset::level_bytes(const std::string& field, const Coarsening& how) const {
@@ -347,12 +361,11 @@ Result<std::shared_ptr<const void>> Dataset::reserve(std::uint64_t bytes) const 
   return std::shared_ptr<const void>(held);
 }
 
-std::vector<ResidentKey> Dataset::keys_of(const std::string& field, std::size_t step,
-                                          const Coarsening& how) const {
+std::optional<ResidentKey> Dataset::key_of(const std::string& field, std::size_t step,
+                                           const Derivation& how) const {
   const Result<std::size_t> index = state_->find(field, step);
-  if (!index) return {};
-  if (how.halvings == std::array{0, 0, 0}) return {{state_->owner, *index, step, ""}};
-  return {{state_->owner, *index, step, digest_of(key_of(how))}};
+  if (!index) return std::nullopt;
+  return ResidentKey{state_->owner, *index, step, how.variant};
 }
 
 std::any Dataset::kept(const std::string& key) const {

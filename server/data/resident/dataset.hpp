@@ -24,6 +24,13 @@ enum class Storage {
   packed16,  // 16 bits per value, unpacked for rendering (packed.hpp)
 };
 
+// A volume that is computed from a field at a step; by default the field itself.
+struct Derivation {
+  std::string variant;      // identifies it among those of the field; empty: the field itself
+  std::uint64_t bytes = 0;  // of the volume
+  std::function<Volume(const Volume&)> make;
+};
+
 // One opened dataset. A handle: copies refer to the same dataset. Thread-safe.
 class Dataset {
  public:
@@ -48,11 +55,18 @@ class Dataset {
   Result<std::shared_ptr<const Volume>> level(const std::string& field, std::size_t step,
                                               const Coarsening& how);
 
-  // A volume of `bytes` bytes that make() computes from the field at the step, identified by
-  // `variant`: on first need, and shared, counted and refused like a level.
+  // The same for any volume that is computed from the field.
   Result<std::shared_ptr<const Volume>> derived(const std::string& field, std::size_t step,
-                                                const std::string& variant, std::uint64_t bytes,
-                                                const std::function<Volume(const Volume&)>& make);
+                                                const Derivation& how);
+  // The computation of level().
+  [[nodiscard]] Derivation reduction(const std::string& field, const Coarsening& how) const;
+
+  // The result of make(), which takes `bytes` bytes and follows from the description of the dataset
+  // and `variant`: computed on first need, shared, counted and evicted like a level. Errors:
+  // out_of_memory, not_resident.
+  Result<Resident> auxiliary(const std::string& variant, std::uint64_t bytes,
+                             const std::function<Resident()>& make);
+  [[nodiscard]] ResidentKey auxiliary_key(const std::string& variant) const;
 
   // Bytes of the field at a step, reduced in that way; 0: no such field.
   [[nodiscard]] std::uint64_t level_bytes(const std::string& field, const Coarsening& how) const;
@@ -72,10 +86,9 @@ class Dataset {
   // in_turn() waits for room; meanwhile others get only the room that it does not need. Errors:
   // out_of_memory, cancelled.
   [[nodiscard]] Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) const;
-  // The keys under which level() stores its result and the original volume; empty: no such field or
-  // step.
-  [[nodiscard]] std::vector<ResidentKey> keys_of(const std::string& field, std::size_t step,
-                                                 const Coarsening& how) const;
+  // The key under which derived() stores its result; nullopt: no such field or step.
+  [[nodiscard]] std::optional<ResidentKey> key_of(const std::string& field, std::size_t step,
+                                                  const Derivation& how) const;
 
   // A single cached value that is derived from this dataset and slow to recompute; a new value
   // replaces the last. Empty unless stored under this key.
@@ -152,8 +165,7 @@ class Dataset {
       : state_(std::move(state)), manner_(manner) {}
 
   [[nodiscard]] Urgency urgency() const;
-  Result<std::shared_ptr<const Volume>> get(const ResidentKey& key, std::uint64_t bytes,
-                                            const Budget::Make& make);
+  Result<Resident> get(const ResidentKey& key, std::uint64_t bytes, const Budget::Make& make);
 
   std::shared_ptr<State> state_;
   Manner manner_ = Manner::demand;

@@ -1,7 +1,6 @@
 // Owners in turn, the earliest request of each first; failed requests wait for new ones.
 #include "server/data/resident/prefetch_thread.hpp"
 
-#include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -60,7 +59,7 @@ struct PrefetchThread::State {
   }
   static bool try_to_load(const PrefetchRequest& request) {
     const auto loaded =
-        request.dataset.prefetching().level(request.field, request.step, request.how);
+        request.dataset.prefetching().derived(request.field, request.step, request.how);
     if (loaded) return true;
     const Error& error = loaded.error();
     if (error.kind == ErrorKind::out_of_memory) return false;
@@ -111,11 +110,11 @@ void PrefetchThread::request_prefetch(std::uint64_t owner, std::vector<PrefetchR
   std::vector<ResidentKey> keys;
   std::deque<PrefetchRequest> absent;
   for (PrefetchRequest& request : requests) {
-    const auto own = request.dataset.keys_of(request.field, request.step, request.how);
-    keys.insert(keys.end(), own.begin(), own.end());
-    const bool there = std::all_of(
-        own.begin(), own.end(), [&](const ResidentKey& key) { return state_->budget->has(key); });
-    if (!there) absent.push_back(std::move(request));
+    if (request.with) keys.push_back(*request.with);
+    const auto own = request.dataset.key_of(request.field, request.step, request.how);
+    if (!own) continue;
+    keys.push_back(*own);
+    if (!state_->budget->has(*own)) absent.push_back(std::move(request));
   }
   state_->budget->request_prefetch(owner, keys);
   {

@@ -20,12 +20,14 @@
 
 namespace windsplat::data {
 
-// A prefetch request.
+// A prefetch request: a field at a step, or what is derived from it. `with`, which is shown
+// together with it, is not loaded, but not evicted either.
 struct PrefetchRequest {
   Dataset dataset;
   std::string field;
   std::size_t step = 0;
-  Coarsening how;
+  Derivation how;
+  std::optional<ResidentKey> with;
 };
 
 struct StoreOptions {

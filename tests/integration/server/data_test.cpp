@@ -9,6 +9,8 @@
 #include <thread>
 
 #include "server/data/open/open.hpp"
+#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/transport/server_parts.hpp"
 #include "server/work/drawing.hpp"
 #include "server/work/viewer.hpp"
@@ -331,6 +333,34 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   done.get_future().wait();
   EXPECT_FALSE(dataset->seen(scalar, 0)) << "the prefetch request was withdrawn";
   EXPECT_TRUE(dataset->seen(vector, 0));
+}
+
+// The next step of a section is drawn without a load: its fields are sampled ahead.
+TEST(Viewer, PrefetchCoversTheFieldsOfSections) {
+  const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  const auto dataset = store->add("climate:32x16x6").value();
+  transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
+  work::Viewer viewer(parts.backend, 1, "192.0.2.1");
+  protocol::View layer;
+  layer.dataset = dataset->info().id;
+  protocol::View plane = layer;
+  layer.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 2.5};
+  plane.geometry.plane = protocol::PlaneView{{0, 0, 0}, {1, 2, 3}};
+  plane.vector.color.by = protocol::ColorBy::direction;
+  for (const protocol::View& view : {layer, plane}) {
+    ASSERT_TRUE(scene::build_scene(view, *dataset)) << "step 0 is shown";
+    viewer.start(session::Prefetch{view, {1}, {}});
+    protocol::View next = view;
+    next.step = 1;
+    const auto completed = scene::complete(next, *dataset).value();
+    data::Dataset resident = dataset->resident_only();
+    bool drawable = false;
+    for (int i = 0; i < 5000 && !drawable; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      drawable = scene::build_scene(completed, resident).has_value();
+    }
+    EXPECT_TRUE(drawable);
+  }
 }
 
 TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {

@@ -21,6 +21,7 @@
 #include "server/scene/completed_view.hpp"
 #include "server/scene/lattice.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/slices/planes.hpp"
 #include "tests/numerics/truth/random_scenes.hpp"
 #include "tests/unit/scene/fake.hpp"
 
@@ -32,80 +33,6 @@ using protocol::PlaneView;
 using protocol::SliceView;
 using protocol::Vec3;
 using protocol::View;
-
-constexpr std::array<int, 3> dims{9, 7, 5};
-
-// Axes in one unit, so that the world is a scaled copy: uneven ones, or spacings of 1, 1 and 2.
-data::Grid box_grid(bool uneven) {
-  data::Grid grid;
-  for (std::size_t a = 0; a < 3; ++a) {
-    std::vector<double> at;
-    for (int i = 0; i < dims[a]; ++i) {
-      at.push_back((a == 2 ? 2.0 : 1.0) * (i + (uneven ? 0.3 * std::sin(2.0 * i) : 0.0)));
-    }
-    grid.axes[a] = axis(data::AxisKind::cartesian, "km", std::move(at));
-  }
-  return grid;
-}
-
-using Value = std::function<double(const glm::dvec3& at)>;  // at world positions
-
-// A wind with components v, v + 1 and v + 2 and a scalar of value v. Positions are those of the
-// default placement.
-std::unique_ptr<data::Dataset> dataset_with(const data::Grid& grid, const Value& value) {
-  class Source final : public data::Source {
-   public:
-    Source(data::Grid grid, Value value)
-        : fake_(std::move(grid), {wind_info(), scalar_info("cloud", "1")}, 1),
-          value_(std::move(value)),
-          lattice_(place_lattice(fake_.info().grid, {}).value()) {}
-    [[nodiscard]] const data::DatasetInfo& info() const override { return fake_.info(); }
-    Result<data::Volume> read(std::size_t field, std::size_t step) override {
-      auto volume = fake_.read(field, step).value();
-      std::size_t n = 0;
-      for (const double z : lattice_.positions[2]) {
-        for (const double y : lattice_.positions[1]) {
-          for (const double x : lattice_.positions[0]) {
-            for (int c = 0; c < volume.components; ++c) {
-              volume.values[static_cast<std::size_t>(c) * volume.samples() + n] =
-                  static_cast<float>(value_({x, y, z}) + c);
-            }
-            ++n;
-          }
-        }
-      }
-      data::finish_volume(volume);
-      return volume;
-    }
-
-   private:
-    FakeSource fake_;
-    Value value_;
-    Lattice lattice_;
-  };
-  return dataset_of(std::make_unique<Source>(grid, value));
-}
-
-double linear(const glm::dvec3& at) { return 2 + 0.7 * at.x - 0.4 * at.y + 1.1 * at.z; }
-
-View plane_view(const Vec3& point, const Vec3& normal) {
-  View view;
-  view.geometry.plane = PlaneView{point, normal};
-  view.vector.min_magnitude = 0;
-  view.image.width = 120;
-  view.image.height = 90;
-  view.method.detail = protocol::Detail::full;
-  view.scalars.emplace();
-  view.scalars->emplace_back().field = "cloud";
-  view.scalars->front().extinction = {{0, 1}, {4, 3}};
-  view.scalars->front().min_optical_depth = 0;
-  return view;
-}
-
-glm::dvec3 place(const Scene& scene, std::size_t n) {
-  const auto& at = scene.lattice.places->at(n);
-  return {at[0], at[1], at[2]};
-}
 
 // The direction of the lattice of a plane along an axis with two samples or more.
 glm::dvec3 direction(const Scene& scene, int axis) {
@@ -214,32 +141,22 @@ TEST(Plane, IsRefusedWithItsReason) {
   auto dataset = dataset_of(std::make_unique<FakeSource>(
       atmosphere_grid(), std::vector<data::FieldInfo>{wind_info(), scalar_info("cloud", "1")}, 1));
   EXPECT_EQ(refusal(plane_view({0, 0, 0}, {1, 2, 3}), *dataset), "");
-  EXPECT_THAT(refusal(plane_view({0, 0, 5}, {0, 0, 1}), *dataset),
-              AllOf(HasSubstr("/geometry/plane/point"), HasSubstr("misses the box")));
+  EXPECT_THAT(
+      refusal(plane_view({0, 0, 5}, {0, 0, 1}), *dataset),
+      AllOf(HasSubstr("/geometry/plane/point"), HasSubstr("misses the box"),
+            HasSubstr("(-1, -0.75, -0.15) to (1, 0.75, 0.15)"), HasSubstr("move the point")));
   View both = plane_view({0, 0, 0}, {0, 0, 1});
   both.geometry.slice = SliceView{GridAxis::z, 1};
-  EXPECT_THAT(refusal(both, *dataset), AllOf(HasSubstr("/geometry/plane"), HasSubstr("not both")));
+  EXPECT_THAT(refusal(both, *dataset),
+              AllOf(HasSubstr("/geometry/plane"), HasSubstr("not both"), HasSubstr("null")));
   View sphere = plane_view({0, 0, 0}, {0, 0, 1});
   sphere.geometry.mapping = protocol::GeometryMapping::sphere;
-  EXPECT_THAT(refusal(sphere, *dataset), HasSubstr("mapping flat"));
+  EXPECT_THAT(refusal(sphere, *dataset),
+              AllOf(HasSubstr("mapping flat"), HasSubstr("geometry.slice")));
   View raised = plane_view({0, 0, 0}, {0, 0, 1});
   raised.geometry.height_field = "cloud";
-  EXPECT_THAT(refusal(raised, *dataset), HasSubstr("heightField"));
-}
-
-TEST(Plane, SampledFieldsAreSharedAndCountAsResident) {
-  auto dataset = dataset_with(box_grid(false), linear);
-  View view = plane_view({0, 0, 0}, {1, 2, 3});
-  View whole = view;
-  whole.geometry.plane.reset();
-  static_cast<void>(built(whole, *dataset));
-  const auto before = dataset->resident_bytes();
-  const Scene scene = built(view, *dataset);
-  EXPECT_EQ(dataset->resident_bytes() - before,
-            scene.vector->field->bytes() + scene.scalars[0].field->bytes());
-  const Scene again = built(view, *dataset);
-  EXPECT_EQ(again.vector->field, scene.vector->field);
-  EXPECT_EQ(again.scalars[0].field, scene.scalars[0].field);
+  EXPECT_THAT(refusal(raised, *dataset),
+              AllOf(HasSubstr("heightField"), HasSubstr("geometry.slice")));
 }
 
 TEST(Plane, HasALimitedNumberOfSamples) {

@@ -279,7 +279,7 @@ TEST(WithoutMemory, PrefetchRequestsAreWithdrawnAndAStoreIsDestroyed) {
   const auto dataset = store.add("climate:16x16x8").value();
   const std::string field = dataset->info().fields.front().name;
   ASSERT_TRUE(dataset->volume(field, 0)) << "so that no thread works on a prefetch request";
-  store.request_prefetch(1, {{*dataset, field, 0, {}}});
+  store.request_prefetch(1, {{*dataset, field, 0, {}, {}}});
   const Spent spent = spent_by([&] {
     store.request_prefetch(2, {});
     store.request_prefetch(1, {});

@@ -3,13 +3,19 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/presets.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::scene {
@@ -177,6 +183,121 @@ TEST(Camera, InvalidCamerasAreRefusedByName) {
   EXPECT_EQ(pointer_of(complete(view, *dataset)), "accepted");
   view.camera.target = view.camera.eye;
   EXPECT_EQ(pointer_of(complete(view, *dataset)), "/camera/eye");
+}
+
+// ---- default cameras of slices and planes ----
+
+struct Shown {
+  std::string name;
+  protocol::GeometryView geometry;
+  glm::dvec3 forward;  // expected
+  std::vector<glm::dvec3> corners;
+};
+
+// The box reaches to 1, 0.75 and 0.15.
+std::vector<Shown> shown_sections() {
+  using protocol::GridAxis;
+  std::vector<Shown> out;
+  const auto slice = [&](GridAxis axis, double index, const glm::dvec3& forward) {
+    out.push_back({"slice " + std::to_string(out.size()), {}, forward, {}});
+    out.back().geometry.slice = protocol::SliceView{axis, index};
+  };
+  const auto corners = [&](const glm::dvec3& a, const glm::dvec3& b) {
+    for (const double x : {a.x, b.x}) {
+      for (const double y : {a.y, b.y}) {
+        for (const double z : {a.z, b.z}) out.back().corners.emplace_back(x, y, z);
+      }
+    }
+  };
+  slice(GridAxis::x, 0, {-1, 0, 0});
+  corners({-0.75, -0.75, -0.15}, {-0.75, 0.75, 0.15});
+  slice(GridAxis::y, 2, {0, 1, 0});
+  corners({-1, 0.5, -0.15}, {1, 0.5, 0.15});
+  slice(GridAxis::y, 0.5, {0, 1, 0});
+  corners({-1, -0.25, -0.15}, {1, -0.25, 0.15});
+  for (const bool turned : {false, true}) {
+    out.push_back({"plane", {}, glm::normalize(glm::dvec3(1, 1, 0)), {}});
+    const double sign = turned ? -2 : 1;
+    out.back().geometry.plane = protocol::PlaneView{{0.1, 0.1, 0}, {sign, sign, 0}};
+    for (const double z : {-0.15, 0.15}) {
+      out.back().corners.emplace_back(-0.55, 0.75, z);
+      out.back().corners.emplace_back(0.95, -0.75, z);
+    }
+  }
+  slice(GridAxis::z, 0, {0, 0, -1});
+  return out;
+}
+
+TEST(Camera, DefaultFacesTheSliceOrPlaneWithTheUsualMargin) {
+  auto dataset = atmosphere();
+  const Lattice lattice = *place_lattice(dataset->info().grid, {});
+  ASSERT_NEAR(lattice.box_max.y, 0.75, 1e-12);
+  ASSERT_NEAR(lattice.box_max.z, 0.15, 1e-12);
+  for (Shown shown : shown_sections()) {
+    if (shown.corners.empty()) {
+      for (const double x : {-1, 1}) {
+        for (const double y : {-0.75, 0.75}) {
+          shown.corners.emplace_back(x, y, lattice.positions[2][0]);
+        }
+      }
+    }
+    for (const auto projection :
+         {protocol::Projection::perspective, protocol::Projection::orthographic}) {
+      protocol::View view;
+      view.geometry = shown.geometry;
+      view.camera.projection = projection;
+      const auto full = complete(view, *dataset);
+      ASSERT_TRUE(full) << shown.name;
+      const Camera& camera = full->camera();
+      EXPECT_NEAR(glm::length(camera.forward - shown.forward), 0, 1e-9) << shown.name;
+      const glm::dvec3 up = shown.forward.z == 0 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+      EXPECT_NEAR(glm::length(camera.up - up), 0, 1e-9) << shown.name;
+      double widest = 0;
+      for (const glm::dvec3& corner : shown.corners) {
+        const Pixel at = project(camera, corner);
+        widest = std::max({widest, std::abs(at.x / 640 - 1), std::abs(at.y / 360 - 1)});
+      }
+      EXPECT_NEAR(widest, 1 / 1.04, 1e-6) << shown.name;
+      auto preset = full->view();
+      preset.camera.eye = protocol::Vec3{3, 3, 3};
+      preset.camera.up = {0, 1, 1};
+      ASSERT_TRUE(apply_preset(preset, lattice, "default"));
+      EXPECT_EQ(preset.camera, full->view().camera) << shown.name;
+    }
+  }
+}
+
+TEST(Camera, StatedPartsAreKeptWithASlice) {
+  auto dataset = atmosphere();
+  const auto camera_of = [&](const protocol::View& view) {
+    return complete(view, *dataset).value().view().camera;
+  };
+  for (int stated = 0; stated < 2; ++stated) {
+    protocol::View view;
+    (stated == 0 ? view.camera.eye : view.camera.target) = protocol::Vec3{0.3, -2, 1};
+    const auto whole = camera_of(view);
+    view.geometry.slice = protocol::SliceView{protocol::GridAxis::x, 1};
+    EXPECT_EQ(camera_of(view), whole);
+  }
+  protocol::View view;
+  view.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 1};
+  view.camera.up = {1, 0, 0.5};
+  view.camera.height = 0.7;
+  EXPECT_EQ(camera_of(view).up, view.camera.up);
+  EXPECT_EQ(camera_of(view).height, view.camera.height);
+  EXPECT_NEAR(complete(view, *dataset)->camera().up.x, 1, 1e-9);
+}
+
+// It has no normal.
+TEST(Camera, DefaultShowsTheWholeGlobeWithASlice) {
+  auto dataset = atmosphere();
+  protocol::View view;
+  view.geometry.mapping = protocol::GeometryMapping::sphere;
+  const auto whole = complete(view, *dataset)->view().camera;
+  for (const auto axis : {protocol::GridAxis::x, protocol::GridAxis::y, protocol::GridAxis::z}) {
+    view.geometry.slice = protocol::SliceView{axis, 1};
+    EXPECT_EQ(complete(view, *dataset)->view().camera, whole);
+  }
 }
 
 TEST(DepthCue, EndsAtTheNearestAndFarthestCornersOfTheBox) {

@@ -50,6 +50,32 @@ TEST(Dataset, ReportsUnknownFieldsAndSteps) {
   EXPECT_EQ(dataset->loads(), 0U);
 }
 
+TEST(Dataset, AuxiliaryDataAreSharedAndEvictedBeforeWhatIsReadFromFiles) {
+  const auto dataset = make_dataset(4);
+  int made = 0;
+  const auto get = [&](Dataset dataset, const std::string& variant) {
+    return dataset.auxiliary(variant, kVolumeBytes,
+                             [&] { return std::make_shared<const int>(++made); });
+  };
+  EXPECT_EQ(get(dataset->resident_only(), "a").error().kind, ErrorKind::not_resident);
+  const auto first = get(*dataset, "a").value();
+  EXPECT_EQ(get(*dataset, "a").value(), first);
+  EXPECT_EQ(get(dataset->resident_only(), "a").value(), first);
+  ASSERT_TRUE(get(*dataset, "b"));
+  EXPECT_EQ(made, 2);
+  EXPECT_EQ(dataset->resident_bytes(), 2 * kVolumeBytes);
+  ASSERT_TRUE(dataset->volume("a", 0));
+  ASSERT_TRUE(dataset->volume("a", 1));
+  ASSERT_TRUE(get(dataset->resident_only(), "b")) << "used last";
+  ASSERT_TRUE(dataset->volume("a", 2));
+  EXPECT_FALSE(get(dataset->resident_only(), "b")) << "`a` is referenced";
+  EXPECT_TRUE(dataset->resident_only().volume("a", 0));
+  const auto held = dataset->volume("a", 2);
+  const auto refused = dataset->auxiliary("c", 3 * kVolumeBytes, [] { return nullptr; });
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::out_of_memory);
+}
+
 TEST(Dataset, ConcurrentThreadsShareOneLoad) {
   auto source = std::make_unique<FakeSource>();
   auto gate = std::make_shared<FakeSource::Gate>();

@@ -103,7 +103,7 @@ struct Fixture {
 
   void request_prefetch(const std::vector<std::size_t>& steps, std::uint64_t owner = 1) {
     std::vector<PrefetchRequest> requests;
-    for (const std::size_t step : steps) requests.push_back({*dataset, "f", step, {}});
+    for (const std::size_t step : steps) requests.push_back({*dataset, "f", step, {}, {}});
     store.request_prefetch(owner, requests);
   }
   [[nodiscard]] bool is_resident(std::size_t step) const {
@@ -213,10 +213,23 @@ TEST(Resident, RequestedAverageStaysThoughItCouldBeRecomputed) {
   half.widths.fill(std::vector<double>(edge, 1));
   ASSERT_TRUE(f.dataset->level("f", 0, half));
   for (const std::size_t step : {1, 2}) ASSERT_TRUE(f.dataset->volume("f", step));
-  f.store.request_prefetch(1, {{*f.dataset, "f", 0, half}});
+  f.store.request_prefetch(1, {{*f.dataset, "f", 0, f.dataset->reduction("f", half), {}}});
   ASSERT_TRUE(f.dataset->volume("f", 3));
   EXPECT_TRUE(f.dataset->resident_only().level("f", 0, half));
   EXPECT_FALSE(f.is_resident(0)) << "the oldest without a request";
+}
+
+TEST(Resident, WhatIsShownWithARequestedVolumeStays) {
+  Fixture f(3);
+  const auto get = [&](Dataset dataset) {
+    return dataset.auxiliary("a", volume_bytes, [] { return std::make_shared<const int>(1); });
+  };
+  ASSERT_TRUE(get(*f.dataset));
+  for (const std::size_t step : {0, 1}) ASSERT_TRUE(f.dataset->volume("f", step));
+  f.store.request_prefetch(1, {{*f.dataset, "f", 1, {}, f.dataset->auxiliary_key("a")}});
+  ASSERT_TRUE(f.dataset->volume("f", 2));
+  EXPECT_TRUE(get(f.dataset->resident_only()));
+  EXPECT_FALSE(f.is_resident(0));
 }
 
 TEST(Resident, OwnersOfPrefetchRequestsTakeTurns) {

@@ -146,7 +146,7 @@ const bindings: Binding[] = [
   {
     keys: ["Home", "0"],
     shown: "0",
-    does: "whole volume, upright",
+    does: "whole volume or slice, upright",
     run: () => app.cameras.reset(),
   },
   ...looks.map(({ key, name, angles }) => ({

@@ -83,15 +83,28 @@ export const obliquePlane = "plane";
 
 const sliceAxes: readonly SliceAxis[] = ["x", "y", "z"];
 
-// Axes with one sample are omitted: their slice would be the whole volume.
-export function sliceOptions(dataset: Dataset): Options {
+const isBent = ({ geometry = {} }: View): boolean =>
+  (geometry.mapping ?? "flat") !== "flat" || (geometry.heightField ?? null) !== null;
+
+// Another shape or height field. It ends an oblique plane if the grid is no longer flat.
+export function shapePatch(
+  view: View,
+  shape: Pick<NonNullable<View["geometry"]>, "mapping" | "heightField">,
+): Patch {
+  const bent = isBent({ geometry: { ...view.geometry, ...shape } });
+  return { geometry: bent && view.geometry?.plane ? { ...shape, plane: null } : shape };
+}
+
+// Axes with one sample are omitted, because their slice would be the whole volume, and the plane
+// where the server refuses it.
+export function sliceOptions(dataset: Dataset, view: View): Options {
   const options: Options = { "off: whole volume": wholeVolume };
   for (const axis of sliceAxes) {
     const { name } = dataset.axes[axis];
     if (dataset.dims[axis] < 2) continue;
     options[name === axis ? `across ${axis}` : `across ${axis}: ${name}`] = axis;
   }
-  options["oblique plane"] = obliquePlane;
+  if (!isBent(view)) options["oblique plane"] = obliquePlane;
   return options;
 }
 
@@ -119,9 +132,12 @@ export function planePatch(view: View, key: "point" | "normal", at: number, to: 
   return { geometry: { plane: { ...plane, [key]: values } } };
 }
 
-// Position of the slice in the coordinate of its axis.
+// Position of the slice in the coordinate of its axis, or why there is no oblique plane.
 export function sliceText(dataset: Dataset, view: View): string {
   const slice = view.geometry?.slice;
+  if (!slice && isBent(view)) {
+    return "An oblique plane needs a flat shape, and heights from the vertical axis.";
+  }
   if (!slice) return "";
   const axis = dataset.axes[slice.axis];
   const low = Math.floor(slice.index);

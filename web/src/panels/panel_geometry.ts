@@ -10,6 +10,7 @@ import {
   ownHeight,
   obliquePlane,
   planePatch,
+  shapePatch,
   sliceIndexMax,
   sliceOptions,
   slicePatch,
@@ -17,6 +18,9 @@ import {
   wholeVolume,
 } from "./controls";
 import { keyAccess, type PanelKit } from "./panel_kit";
+import type { Dataset } from "../wire/protocol";
+
+type Mapping = Dataset["mappings"][number];
 
 export interface CameraSwitch {
   camera(): Camera | null;
@@ -28,7 +32,15 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
   const dataset = kit.host.dataset();
   addSlice(folder, kit);
   const mappings = mappingOptions(dataset);
-  const mapping = kit.choice(folder, "shape", keyAccess("/geometry/mapping"), mappings);
+  const mapping = kit.choice(
+    folder,
+    "shape",
+    {
+      ...keyAccess<string>("/geometry/mapping"),
+      set: (shape) => shapePatch(kit.host.view(), { mapping: shape as Mapping }),
+    },
+    mappings,
+  );
   if (Object.keys(mappings).length < 2) {
     kit.showWhen(() => kit.host.view().geometry?.mapping !== "flat", mapping);
   }
@@ -46,7 +58,8 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
       {
         pointer: "/geometry/heightField",
         get: (view) => view.geometry?.heightField ?? ownHeight,
-        set: (name) => ({ geometry: { heightField: name === ownHeight ? null : name } }),
+        set: (name) =>
+          shapePatch(kit.host.view(), { heightField: name === ownHeight ? null : name }),
       },
       heightOptions(dataset),
     );
@@ -88,7 +101,7 @@ function addSlice(folder: GUI, kit: PanelKit): void {
       get: (view) => slice()?.axis ?? (view.geometry?.plane ? obliquePlane : wholeVolume),
       set: (axis) => slicePatch(dataset, axis),
     },
-    sliceOptions(dataset),
+    (view) => sliceOptions(dataset, view),
   );
   const index = kit.number(
     folder,

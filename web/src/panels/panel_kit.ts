@@ -184,18 +184,26 @@ export class PanelKit {
     return this.bind(folder.add(model, "value"), label, model, access);
   }
 
-  // A value that is not among the options is still listed while the view contains it.
-  choice(folder: GUI, label: string, access: Access<string>, options: Options): Controller {
+  // The options may depend on the view. A value that is not among them is still listed while the
+  // view contains it.
+  choice(
+    folder: GUI,
+    label: string,
+    access: Access<string>,
+    options: Options | ((view: View) => Options),
+  ): Controller {
+    const now = (): Options =>
+      typeof options === "function" ? options(this.host.view()) : options;
     const withOwn = (value: string): Options =>
-      Object.values(options).includes(value) ? options : { ...options, [value]: value };
-    const model = { value: access.get(this.host.view()) ?? Object.values(options)[0] ?? "" };
-    const controller = folder.add(model, "value", withOwn(model.value));
-    let offered = model.value;
+      Object.values(now()).includes(value) ? now() : { ...now(), [value]: value };
+    const model = { value: access.get(this.host.view()) ?? Object.values(now())[0] ?? "" };
+    let offered = withOwn(model.value);
+    const controller = folder.add(model, "value", offered);
     this.onRefresh(() => {
-      const value = access.get(this.host.view());
-      if (value === undefined || value === null || value === offered) return;
-      offered = value;
-      controller.options(withOwn(value));
+      const next = withOwn(access.get(this.host.view()) ?? model.value);
+      if (JSON.stringify(next) === JSON.stringify(offered)) return;
+      offered = next;
+      controller.options(next);
     });
     return this.bind(controller, label, model, access);
   }
