@@ -205,14 +205,14 @@ export function extremesSection(extremes: StudyExtremes): HTMLElement {
   const refused = cases.filter(({ outcome }) => outcome === "refused").length;
   const words = [
     `${cases.length} cases, of which ${refused} beyond a limit were refused as expected and`,
-    `${failed} failed. A case fails if a pixel is not finite or leaves [0, 1], if opacity decreases`,
-    "along a sweep in which it must not, if the measured error of a frame (if none was measured, the",
-    "bound of its estimate) is below a quarter of a true error above 1e-4, if it cannot be drawn, or",
-    "if it is drawn although it lies beyond a limit. The column “truth” of the",
+    `${failed} failed. A case fails if a pixel is not finite or leaves [0, 1], if opacity`,
+    "decreases along a sweep in which it must not, if the measured error of a frame (if none was",
+    "measured, the bound of its estimate) is below a quarter of a true error above 1e-4, if it",
+    "cannot be drawn, or if it is drawn although it lies beyond a limit. The column “truth” of the",
     "tables of cases states what a picture is compared with: the rendering integral by brute force",
     "(integrator), which shares no code with the engine; the reference of the engine, where the",
-    "integrator does not apply; or a closed form. RMSE is that of linear premultiplied RGBA. Estimates",
-    "are those without calibration.",
+    "integrator does not apply; or a closed form. RMSE is that of linear premultiplied RGBA.",
+    "Estimates are those without calibration.",
   ];
   const section = element("section", {}, element("p", {}, words.join(" ")), trustTable(extremes));
   for (const group of new Set(trust.map((one) => one.group))) {
