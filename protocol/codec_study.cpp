@@ -163,6 +163,7 @@ Json extremes_json(const StudyExtremes& extremes) {
                          {"failed", one.failed},
                          {"worst", one.worst},
                          {"worstAt", one.worst_at},
+                         {"measured", one.measured},
                          {"leastReported", one.least_reported},
                          {"estimated", one.estimated},
                          {"withinBound", one.within_bound},

@@ -151,6 +151,7 @@ struct StudyTrust {
   std::size_t cases = 0, refused = 0, failed = 0;
   double worst = 0;
   std::string worst_at;
+  std::size_t measured = 0;
   double least_reported = 0;
   std::size_t estimated = 0, within_bound = 0;
   std::vector<std::pair<double, std::string>> within;  // limit of the error, values

@@ -243,36 +243,45 @@ void bend_pass(const Scene& scene, const SampleWays& ways, PassPlan& pass) {
   for (int c = 0; c < 3; ++c) to.cell_max[c] = 1.01F * widest[c] + least;
 }
 
-// The length of a cell along the line of sight, world units, from the lattice's mean cells.
-double cell_along_view(const Scene& scene) {
+// The length along the line of sight of the cells of a stride, world units, from the lattice's mean
+// cells. No cell is wider than the box, nor a slice thicker than its layer.
+double cell_along_view(const Scene& scene, int stride) {
   double cells2 = 0;
   for (int a = 0; a < 3; ++a) {
     const auto& spacing = scene.lattice.spacing[a];
     const double total = std::accumulate(spacing.begin(), spacing.end(), 0.0);
-    const double cells = scene.camera.forward[a] * static_cast<double>(spacing.size()) / total;
+    const bool sliced = scene.slice && scene.slice->axis == a;
+    const int merged = sliced ? 1 : std::min(stride, static_cast<int>(spacing.size()));
+    const double count = static_cast<double>(spacing.size()) / merged;
+    const double cells = scene.camera.forward[a] * count / total;
     cells2 += cells * cells;
   }
   return 1.0 / std::sqrt(cells2);
 }
 
-// Sets the slab depth, a multiple of the cells of the coarsest medium (without a medium: of the
-// lines). There are at most slabs_max slabs across the volume.
-void plan_slabs(const Scene& scene, RenderPlan& plan) {
+// The depth of slabs that the scene asks for: a multiple of the cells of the coarsest medium
+// (without a medium: of the lines).
+double slab_depth_asked(const Scene& scene) {
+  int stride = scene.scalars.empty() && scene.vector ? scene.vector->stride : 1;
+  for (const scene::ScalarLayer& scalar : scene.scalars) stride = std::max(stride, scalar.stride);
+  const double thickness = scene.method == scene::Method::slab ? scene.slab_thickness : 1.0;
+  return thickness * cell_along_view(scene, stride);
+}
+
+// There are at most slabs_max slabs across the volume.
+double slab_depth_least(const Scene& scene) {
   constexpr double slabs_max = 16384;
-  for (PassPlan& pass : plan.passes) pass.kernel.by_depth = 1;
-  int stride = 0;
-  for (const PassPlan& pass : plan.passes) {
-    if (!pass.scalars.empty()) stride = std::max(stride, pass.stride);
-  }
-  if (stride == 0 && !plan.passes.empty()) stride = plan.passes.front().stride;
   double diagonal2 = 0;
   for (int a = 0; a < 3; ++a) {
     const double edge = scene.lattice.box_max[a] - scene.lattice.box_min[a];
     diagonal2 += edge * edge;
   }
-  const double thickness = plan.slabs ? scene.slab_thickness : 1.0;
-  plan.slab_depth = std::max(thickness * std::max(stride, 1) * cell_along_view(scene),
-                             std::sqrt(diagonal2) / slabs_max);
+  return std::sqrt(diagonal2) / slabs_max;
+}
+
+void plan_slabs(const Scene& scene, RenderPlan& plan) {
+  for (PassPlan& pass : plan.passes) pass.kernel.by_depth = 1;
+  plan.slab_depth = std::max(slab_depth_asked(scene), slab_depth_least(scene));
   if (!plan.slabs) return;
   for (PassPlan& pass : plan.passes) {
     if (!pass.scalars.empty()) pass.kernel.partial = partial_footprints().data();
@@ -402,6 +411,10 @@ int eye_index(const Camera& camera, int axis, const std::vector<double>& positio
     ++index;
   }
   return index;
+}
+
+bool has_thicker_slabs(const Scene& scene) {
+  return scene.method == scene::Method::slab && slab_depth_asked(scene) < slab_depth_least(scene);
 }
 
 void visit_order(int count, int eye, std::vector<int>& order) {

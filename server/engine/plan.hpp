@@ -108,4 +108,7 @@ struct RenderPlan {
 // `ways` if the curved lattice is the same.
 void make_plan(const scene::Scene& scene, RenderPlan& plan);
 
+// Whether slabs are drawn thicker than the scene asks for, because their number is limited.
+bool has_thicker_slabs(const scene::Scene& scene);
+
 }  // namespace windsplat::engine

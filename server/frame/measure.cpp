@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/base/trim_storage.hpp"
+#include "server/engine/plan.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::frame {
@@ -33,17 +34,24 @@ bool is_exact(const scene::Scene& scene) {
          scene.stop_transmittance <= quality::stop_of_the_truth;
 }
 
-// The view with analytic slabs of its thickness divided by `thinner`, from every sample if
-// possible. The second value: whether every sample is used.
+// Thickness of slabs in cells of which the error is known to be of second order: half of the
+// view's, and no more than half a cell. Thicker slabs may hide structure together with those of
+// twice their thickness, so that the difference of the two tells nothing.
+double reference_thickness(const scene::CompletedView& completed) {
+  return 0.5 * std::min(completed.view().method.slab_thickness, 1.0);
+}
+
+// The view with analytic slabs of a thickness, from every sample if possible. The second value:
+// whether every sample is used.
 Result<std::pair<scene::Scene, bool>> finer_scene(const scene::CompletedView& completed,
-                                                  data::Dataset& dataset, int thinner,
+                                                  data::Dataset& dataset, double thickness,
                                                   double samples_max) {
   const auto finer = completed.coarsened(0).with([&](protocol::View& view) {
     protocol::MethodView& method = view.method;
     method.name = protocol::MethodName::slab;
     method.compositing = protocol::Compositing::analytic;
     method.stop_transmittance = std::min(method.stop_transmittance, quality::stop_of_the_truth);
-    method.slab_thickness /= thinner;
+    method.slab_thickness = thickness;
   });
   if (!finer) return finer.error();
   const bool few = samples_of(completed.lattice()) <= samples_max;
@@ -193,15 +201,19 @@ class CalibrationRun {
     const auto own = scene::build_scene(completed_, dataset_);
     if (!own) return own.error();
     const std::array<int, 3> own_level = own->level;
-    for (const int thinner : {2, 4}) {
-      const auto finer = finer_scene(completed_, dataset_, thinner, truth_samples_max);
+    const double half = reference_thickness(completed_);
+    for (const double thickness : {half, half / 2}) {
+      const auto finer = finer_scene(completed_, dataset_, thickness, truth_samples_max);
       if (!finer) return finer.error();
+      if (engine::has_thicker_slabs(finer->first)) return {};
       const Clock::time_point start = Clock::now();
-      auto drawn = thinner == 2 ? draw_half(finer->first) : draw_quarter(finer->first);
+      auto drawn = thickness == half ? draw_half(finer->first) : draw_quarter(finer->first);
       if (!drawn) return drawn.error();
       ms_.push_back(milliseconds_since(start));
-      told_ = finer->first.level == own_level && is_exact(*own);
+      told_ = finer->first.level == own_level && is_exact(*own) &&
+              half == completed_.view().method.slab_thickness / 2;
     }
+    known_ = true;
     if (!told_) return {};
     tell_run({protocol::MethodName::slab, 0, 0, 2}, truth_.error_of_half, ms_[0]);
     tell_run({protocol::MethodName::slab, 0, 0, 4}, truth_.error_of_quarter, ms_[1]);
@@ -254,7 +266,7 @@ class CalibrationRun {
     const auto scene = scene::build_scene(*drawn, dataset_);
     if (!scene) return scene.error();
     quality::Measured out;
-    const bool full = setting.half_level == 0;
+    const bool full = known_ && setting.half_level == 0;
     double beyond = 0;
     // The first rendering fills caches that are independent of the camera.
     constexpr double quick_ms = 20;  // shorter renderings are repeated, because other load disturbs
@@ -273,6 +285,7 @@ class CalibrationRun {
       out.error = std::sqrt(std::max(0.0, truth_.squares + beyond) / values);
       return out;
     }
+    if (!known_) return out;
     const engine::Image& picture = workspace_.space.image();
     out.error = apart(picture, truth_.rgba, completed_.view().image.width,
                       completed_.view().image.height, pool_);
@@ -311,8 +324,9 @@ class CalibrationRun {
   quality::Viewpoint viewpoint_;
   Truth truth_;
   std::vector<double> ms_;
-  bool told_ = false;  // the two renderings of the reference are pictures of settings too and have
-                       // been reported
+  bool known_ = false;  // the reference; without it only times are measured
+  bool told_ = false;   // the two renderings of the reference are pictures of settings too and have
+                        // been reported
 };
 
 }  // namespace
@@ -338,11 +352,14 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
   constexpr double samples_always = 4e6;
   const scene::Scene& scene = prepared.scene;
   data::Dataset resident = dataset.resident_only();
+  const double thickness = reference_thickness(prepared.completed);
   const auto finer =
-      finer_scene(prepared.completed, resident, 2,
+      finer_scene(prepared.completed, resident, thickness,
                   std::min(truth_samples_max,
                            std::max(samples_always, times_as_many * samples_of(scene.lattice))));
-  if (!finer || !finer->second) return std::optional<double>();
+  if (!finer || !finer->second || engine::has_thicker_slabs(finer->first)) {
+    return std::optional<double>();
+  }
   // The picture itself is encoded afterwards.
   std::vector<float>& rgba = workspace.space.image().rgba;
   std::vector<float> copy;
@@ -356,7 +373,8 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
   if (!work) return work.error();
   const bool order_two =
       scene.method == scene::Method::slab && scene.level == finer->first.level && is_exact(scene);
-  return std::optional(rms(left) * (order_two ? 4.0 / 3 : 1.0));
+  const double ratio2 = std::pow(scene.slab_thickness / thickness, 2);
+  return std::optional(rms(left) * (order_two ? ratio2 / (ratio2 - 1) : 1.0));
 }
 
 Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,

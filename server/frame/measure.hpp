@@ -26,20 +26,22 @@ quality::Viewpoint viewpoint_of(const scene::CompletedView& completed);
 bool is_measured(const Prepared& prepared);
 
 // Linear RMSE over premultiplied RGBA of the picture in the workspace, which is replaced by the
-// differences. The finer rendering uses slabs of half the thickness, from every sample. The error
-// of slabs is of order 2 in their thickness, so it is 4/3 of the difference; for other pictures it
-// is the difference. Empty if the finer rendering is not possible: merged data of which not every
-// sample is resident, or with more than four times the samples drawn. Reads no file. Errors: those
-// of the engine.
+// differences. The finer rendering uses slabs of half the thickness and of at most half a cell,
+// from every sample. The error of slabs is of order 2 in their thickness, so it is r^2 / (r^2 - 1)
+// of the difference, r being the ratio of the thicknesses; for other pictures it is the difference.
+// Empty if the finer rendering is not possible: merged data of which not every sample is resident,
+// or with more than four times the samples drawn, or more slabs than the engine draws. Reads no
+// file. Errors: those of the engine.
 Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dataset& dataset,
                                              ThreadPool& pool, const CancelToken& cancel,
                                              Workspace& workspace);
 
 // Draws the view at every setting allowed for it and compares each picture with the reference,
-// which is extrapolated from slabs of half and a quarter of the thickness of the view. Reports each
-// result when it is known, in no particular order. Pictures of more than retained_pixels are
-// calibrated at a smaller size, that of `viewpoint`. Times are those of drawing only. Errors:
-// cancelled; not_resident; those of scenes.
+// which is extrapolated from slabs of half and a quarter of the thickness of the view, and of at
+// most half and a quarter of a cell; where these would be more slabs than the engine draws, only
+// times are measured. Reports each result when it is known, in no particular order. Pictures of
+// more than retained_pixels are calibrated at a smaller size, that of `viewpoint`. Times are those
+// of drawing only. Errors: cancelled; not_resident; those of scenes.
 struct CalibrationSample {
   std::size_t setting = 0;
   quality::Viewpoint viewpoint;

@@ -269,9 +269,6 @@ Result<Report> study_extremes(const std::vector<std::string>& group_names,
   auto extremes = run_extremes(group_names, pool, cancel, listen);
   if (!extremes) return extremes.error();
   report.extremes = std::move(*extremes);
-  auto stability = stiffness_sweep(pool, cancel);
-  if (!stability) return stability.error();
-  report.stability = std::move(*stability);
   report.seconds = seconds_since(start);
   return report;
 }

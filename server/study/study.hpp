@@ -80,8 +80,8 @@ using Listener = std::function<void(const Progress&)>;
 Result<Report> run_study(const std::vector<Subject>& subjects, const Options& options,
                          ThreadPool& pool, const CancelToken& cancel, const Listener& listen);
 
-// A report of extreme cases (extremes.hpp) and stability, without scenes, for a folder that is
-// made. Errors: those of run_extremes(); internal (the folder).
+// A report of extreme cases only (extremes.hpp), for a folder that is made. Errors: those of
+// run_extremes(); internal (the folder).
 Result<Report> study_extremes(const std::vector<std::string>& group_names,
                               const std::filesystem::path& folder, ThreadPool& pool,
                               const CancelToken& cancel, const GroupListener& listen);

@@ -168,6 +168,7 @@ test("a report of extreme cases states where each method may be trusted", () => 
   return withReport(
     async (page) => {
       assert.equal(await page.title(), "windsplat: extreme cases");
+      assert.equal(await page.locator("#stability").count(), 0);
       const [trusted] = await rowsOf(page, "may be trusted");
       assert.deepEqual(
         trusted.map((row) => [row[0], row[1], ...row.slice(5, 7)]),

@@ -104,6 +104,20 @@ TEST(Slab, HalvingTheThicknessQuartersTheError) {
 
 // Lines are in exact order for any slabs: when a brick spans hundreds of slabs, and when one slab
 // contains all lines.
+// Any stride beyond the samples of an axis leaves one cell along it, as wide as the box.
+TEST(Slab, StridesBeyondTheBoxHaveSlabsOfItsSize) {
+  for (const bool perspective : {false, true}) {
+    Scene scene = blobs(4, 48, 0.4, perspective);
+    scene.method = Method::slab;
+    const auto picture = [&scene](int stride) {
+      for (scene::ScalarLayer& scalar : scene.scalars) scalar.stride = stride;
+      return render(scene).image.rgba;
+    };
+    EXPECT_EQ(picture(64), picture(20));
+    EXPECT_NE(picture(64), picture(10));
+  }
+}
+
 TEST(Slab, LinesDoNotDependOnTheThickness) {
   for (const bool perspective : {false, true}) {
     Scene scene = blobs(6, 64, 0.4, perspective);

@@ -20,7 +20,7 @@ function introduction(study: Study): string {
   return [
     `windsplat ${machine.windsplat} (${machine.kernels}), built by ${machine.compiler},`,
     `on ${machine.processor}, ${machine.system}:`,
-    `${machine.threads} of ${machine.hardwareThreads} threads.`,
+    `render threads: ${machine.threads}, hardware threads: ${machine.hardwareThreads}.`,
     study.extremes ? "" : `Each time is the median of ${study.runs} runs after one to warm up.`,
     study.extremes ? "" : `${study.measured} points measured${skipped}.`,
     `${fixed(study.seconds, 1)} s in all.`,
@@ -127,13 +127,13 @@ function stabilitySection(study: Study): HTMLElement {
 }
 
 const study = JSON.parse(document.getElementById("study")!.textContent!) as Study;
-if (study.extremes) document.title = "windsplat: extreme cases";
+document.title = `windsplat: ${study.extremes ? "extreme cases" : "error against run time"}`;
 document
   .getElementById("report")!
   .append(
     element("h1", {}, document.title),
     element("p", {}, introduction(study)),
-    ...(study.extremes ? [extremesSection(study.extremes)] : [summaryTable(study)]),
-    ...study.scenes.map(sceneSection),
-    stabilitySection(study),
+    ...(study.extremes
+      ? [extremesSection(study.extremes)]
+      : [summaryTable(study), ...study.scenes.map(sceneSection), stabilitySection(study)]),
   );

@@ -11,12 +11,13 @@ def error(value):
 
 def rows(trust):
     limits = [f"RMSE <= {one['limit']:g}" for one in trust[0]["within"]]
-    yield ["group", "method", "cases", "refused", "failed", "largest RMSE", "at", "measured / true",
-           "within bound", *limits]
+    yield ["group", "method", "cases", "refused", "failed", "largest RMSE", "at", "measured",
+           "measured / true", "within bound", *limits]
     for one in trust:
         least = one["leastReported"]
         yield [one["group"], one["method"], one["cases"], one["refused"], one["failed"],
-               error(one["worst"]), one["worstAt"], "" if least is None else f"{least:.2f}",
+               error(one["worst"]), one["worstAt"], one["measured"] or "",
+               "" if least is None else f"{least:.2f}",
                f"{one['withinBound']} of {one['estimated']}" if one["estimated"] else "",
                *(values["values"] for values in one["within"])]
 

@@ -53,7 +53,7 @@ View base_view(Projection projection, double extinction = 0.5) {
 }
 
 Case numbered(double value, View view, std::shared_ptr<data::Dataset> dataset) {
-  return {text_of(value), value, std::move(view), std::move(dataset)};
+  return {text_of(value), value, std::move(view), std::move(dataset), false, {}};
 }
 
 // A case for each value: change(view, value) of the base view.
@@ -70,18 +70,30 @@ std::vector<Case> vary(Projection projection, const std::vector<double>& values,
   return cases;
 }
 
+// Of values beyond one of the limits of a view.
+void refuse_beyond(double least, double most, const char* by_design, std::vector<Case>& cases) {
+  for (Case& one : cases) {
+    if (one.value < least || one.value > most) one.refused_by_design = by_design;
+  }
+}
+
 // The edge of the box is 2; the last extinction is beyond the limit of a view.
 std::vector<Case> depths(Projection projection) {
-  return vary(projection, {1e-30, 1e-20, 1e-10, 1e-6, 1e-4, 1e-3, 1e-2, 0.1,  0.3,  1,    3,
-                           10,    30,    100,   1e3,  1e4,  1e6,  1e8,  1e12, 1e20, 1e30, 3e30},
-              [](View& view, double value) {
-                view.scalars->front().extinction = {{{0.0, 0.0}, {1.0, value / 2}}};
-              });
+  std::vector<Case> cases =
+      vary(projection, {1e-30, 1e-20, 1e-10, 1e-6, 1e-4, 1e-3, 1e-2, 0.1,  0.3,  1,    3,
+                        10,    30,    100,   1e3,  1e4,  1e6,  1e8,  1e12, 1e20, 1e30, 3e30},
+           [](View& view, double value) {
+             view.scalars->front().extinction = {{{0.0, 0.0}, {1.0, value / 2}}};
+           });
+  refuse_beyond(0, 2e30, "/scalars/0/extinction/1/1", cases);
+  return cases;
 }
 
 std::vector<Case> opacities(Projection projection) {
-  return vary(projection, {0, 1e-6, 1e-3, 0.1, 0.5, 0.9, 1, 1.1},
-              [](View& view, double value) { view.vector.opacity = value; });
+  std::vector<Case> cases = vary(projection, {0, 1e-6, 1e-3, 0.1, 0.5, 0.9, 1, 1.1},
+                                 [](View& view, double value) { view.vector.opacity = value; });
+  refuse_beyond(0, 1, "/vector/opacity", cases);
+  return cases;
 }
 
 std::vector<Case> magnitudes(Projection projection) {
@@ -193,6 +205,8 @@ std::vector<Case> axes(Projection projection) {
   return cases;
 }
 
+// The narrowest cell may be 1e-7 times as wide as the widest.
+constexpr double aspect_max = 1e7;
 const std::vector<double> aspects{1, 10, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8};
 
 // Flat cells, of an optical depth of 0.25 across.
@@ -204,6 +218,7 @@ std::vector<Case> plates(Projection projection) {
         numbered(aspect, base_view(projection, aspect / 2),
                  make_dataset(waves(box_grid({side, side, side}, {1, 1, 1 / aspect})))));
   }
+  refuse_beyond(1, aspect_max, "the narrowest cell of axis", cases);
   return cases;
 }
 
@@ -221,25 +236,33 @@ std::vector<Case> needles(Projection projection) {
         numbered(aspect, std::move(view),
                  make_dataset(waves(box_grid({side, side, side}, {1 / aspect, 1 / aspect, 1})))));
   }
+  refuse_beyond(1, aspect_max, "the narrowest cell of axis", cases);
   return cases;
 }
 
 const std::vector<double> angles{0.0009, 0.001, 0.01, 0.1, 1,   5,   15,  35,
                                  60,     90,    120,  150, 170, 178, 179, 179.5};
 
+void refuse_angles(std::vector<Case>& cases) { refuse_beyond(0.001, 179, "/camera/fovY", cases); }
+
 std::vector<Case> fields_of_view(Projection projection) {
   if (projection == Projection::orthographic) return {};
-  return vary(projection, angles, [](View& view, double value) { view.camera.fov_y = value; });
+  std::vector<Case> cases =
+      vary(projection, angles, [](View& view, double value) { view.camera.fov_y = value; });
+  refuse_angles(cases);
+  return cases;
 }
 
 // The eye stays where it is.
 std::vector<Case> zooms(Projection projection) {
   if (projection == Projection::orthographic) return {};
-  return vary(projection, angles, [](View& view, double value) {
+  std::vector<Case> cases = vary(projection, angles, [](View& view, double value) {
     view.camera.eye = {{1.2, -2.4, 1.3}};
     view.camera.target = {{0.1, 0, 0}};
     view.camera.fov_y = value;
   });
+  refuse_angles(cases);
+  return cases;
 }
 
 // The samples of the cube lie at -0.75, -0.25, 0.25 and 0.75 along each axis.
@@ -286,12 +309,16 @@ std::vector<Case> strides(Projection projection) {
     view.vector.stride = view.scalars->front().stride = static_cast<int>(value);
     cases.push_back(numbered(value, std::move(view), dataset));
   }
+  refuse_beyond(1, 64, "/vector/stride", cases);
   return cases;
 }
 
 std::vector<Case> thicknesses(Projection projection) {
-  return vary(projection, {0.04, 0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64, 65},
-              [](View& view, double value) { view.method.slab_thickness = value; });
+  std::vector<Case> cases =
+      vary(projection, {0.04, 0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64, 65},
+           [](View& view, double value) { view.method.slab_thickness = value; });
+  refuse_beyond(0.05, 64, "/method/slabThickness", cases);
+  return cases;
 }
 
 std::vector<Case> pictures(Projection projection) {
@@ -314,6 +341,8 @@ std::vector<Case> pictures(Projection projection) {
     made.view = base_view(projection);
     made.view.image.width = size[0];
     made.view.image.height = size[1];
+    if (size[0] > 8192) made.refused_by_design = "/image/width";
+    if (size[0] == 8192 && size[1] > 4320) made.refused_by_design = "/image: ";
     cases.push_back(std::move(made));
   }
   return cases;
@@ -379,6 +408,7 @@ std::vector<Case> mappings(Projection projection) {
       protocol::VectorSpace::world;
   add_globe("sphere of one layer", {10, 5, 1}, false, BodyShow::automatic);
   add("sphere of a box", waves(cube_grid())).geometry.mapping = GeometryMapping::sphere;
+  cases.back().refused_by_design = "/geometry/mapping: sphere requires longitudes and latitudes";
   return cases;
 }
 

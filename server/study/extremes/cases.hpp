@@ -18,7 +18,8 @@ struct Case {
   protocol::View view;  // not completed, nor within the limits of a view; without an eye it is
                         // framed obliquely
   std::shared_ptr<data::Dataset> dataset;
-  bool invisible = false;  // its picture is empty
+  bool invisible = false;         // its picture is empty
+  std::string refused_by_design;  // what the error names, of a case beyond a limit; empty: none is
 };
 
 struct Group {

@@ -59,12 +59,6 @@ const char* text_of(protocol::GeometryView const& geometry) {
   return "";
 }
 
-// Errors that state what is wrong with a view or its data.
-bool is_refusal(ErrorKind kind) {
-  return kind == ErrorKind::invalid || kind == ErrorKind::malformed ||
-         kind == ErrorKind::too_large || kind == ErrorKind::bad_data;
-}
-
 struct TrueLight {
   std::string key;  // what it is the truth of
   TruthKind kind = TruthKind::integrator;
@@ -145,11 +139,8 @@ class Battery {
       result.height = one.view.image.height;
       auto drawn =
           subject ? draw(group, one, *subject, method, result) : Result<void>(subject.error());
-      if (!drawn) {
-        if (drawn.error().kind == ErrorKind::cancelled) return drawn;
-        result.refused = is_refusal(drawn.error().kind);
-        result.message = printable(drawn.error().message, 400);
-      }
+      if (!drawn && drawn.error().kind == ErrorKind::cancelled) return drawn;
+      judge_refusal(one.refused_by_design, drawn, result);
       cases_.push_back(std::move(result));
     }
     return {};
@@ -189,6 +180,7 @@ class Battery {
     if (auto known = find_truth(one, prepared->scene, result); !known) return known;
     if (method != MethodName::reference) report_error(*prepared, workspace.drawn, result);
     Observed observed{rgba, truth_.pixels, truth_.rgba, result.measured};
+    if (!result.measured && !std::isnan(result.bound)) observed.reported = result.bound;
     // The reference is no truth of itself.
     const bool itself = method == MethodName::reference && truth_.kind == TruthKind::reference;
     if (itself) observed.truth = {};

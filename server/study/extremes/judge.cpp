@@ -68,6 +68,12 @@ std::string values_within(const std::vector<Column>& columns, double limit) {
   return text;
 }
 
+// Errors that state what is wrong with a view or its data.
+bool is_refusal(ErrorKind kind) {
+  return kind == ErrorKind::invalid || kind == ErrorKind::malformed ||
+         kind == ErrorKind::too_large || kind == ErrorKind::bad_data;
+}
+
 }  // namespace
 
 const char* name_of(TruthKind kind) {
@@ -84,6 +90,16 @@ const char* name_of(TruthKind kind) {
 
 const char* outcome_of(const CaseResult& one) {
   return one.refused ? "refused" : one.failed() ? "failed" : "good";
+}
+
+void judge_refusal(const std::string& by_design, const Result<void>& drawn, CaseResult& result) {
+  constexpr std::size_t message_max = 400;
+  if (!drawn) result.message = printable(drawn.error().message, message_max);
+  if (by_design.empty()) return;
+  result.refused = !drawn && is_refusal(drawn.error().kind) &&
+                   result.message.find(by_design) != std::string::npos;
+  if (result.refused) return;
+  result.message = (drawn ? "not refused" : result.message) + "; expected: " + by_design;
 }
 
 Verdict judge(const Observed& observed) {
@@ -107,8 +123,8 @@ Verdict judge(const Observed& observed) {
     if (std::isnan(verdict.rmse)) verdict.rmse = std::numeric_limits<double>::infinity();
     verdict.max = most;
   }
-  if (observed.measured && verdict.rmse > honest_from) {
-    verdict.honest = *observed.measured >= honest_share * verdict.rmse;
+  if (observed.reported && verdict.rmse > honest_from) {
+    verdict.honest = *observed.reported >= honest_share * verdict.rmse;
   }
   return verdict;
 }
@@ -129,6 +145,7 @@ void add_error(const CaseResult& one, Trust& trust) {
     trust.worst = rmse;
     trust.worst_at = one.label;
   }
+  trust.measured += one.measured ? 1 : 0;
   if (one.measured && rmse > honest_from) {
     const double share = *one.measured / rmse;
     if (std::isnan(trust.least_reported) || !(share >= trust.least_reported)) {

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "server/base/error.hpp"
+
 namespace windsplat::study {
 
 // What a picture is compared with. integrator: the brute-force integral of server/study/truth,
@@ -31,13 +33,13 @@ struct Observed {
   std::span<const float> rgba;
   std::span<const std::size_t> pixels;  // those with a truth
   std::span<const double> truth;        // RGBA of each of them; empty: not compared
-  std::optional<double> measured;       // the error measured for the frame
+  std::optional<double> reported;       // measured for the frame, else the bound of its estimate
 };
 
 struct Verdict {
   bool finite = true;
   bool bounded = true;           // every channel within [0, 1]
-  bool honest = true;            // the measured error is not below a quarter of the true one
+  bool honest = true;            // the reported error is not below a quarter of the true one
   std::optional<bool> monotone;  // of a sweep in which opacity must not decrease
   double rmse = std::numeric_limits<double>::quiet_NaN();  // against the truth; NaN: not compared
   double max = std::numeric_limits<double>::quiet_NaN();
@@ -56,8 +58,8 @@ struct CaseResult {
   std::string method, projection, mapping;
   std::array<int, 3> samples{};
   int width = 0, height = 0;
-  bool refused = false;
-  std::string message;  // why it was refused, or why it could not be drawn
+  bool refused = false;  // by design: by an error that names its limit
+  std::string message;   // why it was refused, or why it could not be drawn
   TruthKind truth = TruthKind::integrator;
   Verdict verdict;
   std::optional<double> measured;
@@ -65,9 +67,13 @@ struct CaseResult {
   double estimate = std::numeric_limits<double>::quiet_NaN();
   double bound = std::numeric_limits<double>::quiet_NaN();
 
-  // Neither drawn without fault nor refused.
+  // Neither drawn without fault nor refused by design.
   [[nodiscard]] bool failed() const { return !refused && (!message.empty() || !verdict.good()); }
 };
+
+// Sets `refused` and `message` of a case that was drawn or not. by_design: what the error of a case
+// beyond a limit names; empty: the case must be drawn.
+void judge_refusal(const std::string& by_design, const Result<void>& drawn, CaseResult& result);
 
 const char* outcome_of(const CaseResult& one);  // "good", "failed" or "refused"
 
@@ -76,8 +82,9 @@ struct Trust {
   std::string group;
   std::string method;
   std::size_t cases = 0, refused = 0, failed = 0;
-  double worst = 0;      // largest RMS error; NaN: none was compared
-  std::string worst_at;  // its value
+  double worst = 0;          // largest RMS error; NaN: none was compared
+  std::string worst_at;      // its value
+  std::size_t measured = 0;  // compared cases with a measured error
   // The smallest measured error over the true one, where that exceeds honest_from; NaN: nowhere.
   double least_reported = 0;
   std::size_t estimated = 0, within_bound = 0;  // compared cases with an estimate; those within it

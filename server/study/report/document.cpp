@@ -175,6 +175,7 @@ protocol::StudyExtremes document_of(const Extremes& extremes) {
     to.failed = trust.failed;
     to.worst = trust.worst;
     to.worst_at = trust.worst_at;
+    to.measured = trust.measured;
     to.least_reported = trust.least_reported;
     to.estimated = trust.estimated;
     to.within_bound = trust.within_bound;

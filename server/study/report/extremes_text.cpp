@@ -34,8 +34,8 @@ std::string faults(const CaseResult& one) {
   if (!one.verdict.bounded) add("outside [0, 1]");
   if (!one.verdict.monotone.value_or(true)) add("opacity decreases");
   if (!one.verdict.honest) {
-    std::string errors = "measured error ";
-    errors += format_number("%.1e", one.measured.value_or(0));
+    std::string errors = one.measured ? "measured error " : "bound of the estimate ";
+    errors += format_number("%.1e", one.measured.value_or(one.bound));
     errors += ", true error ";
     errors += format_number("%.1e", one.verdict.rmse);
     add(errors);
@@ -50,7 +50,7 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows) {
     for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
   }
   constexpr std::size_t numbers_from = 2;
-  constexpr std::size_t numbers_to = 8;
+  constexpr std::size_t numbers_to = 9;
   std::string text;
   for (const auto& row : rows) {
     std::string line;
@@ -68,7 +68,8 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows) {
 
 std::string trust_table(const Extremes& extremes) {
   std::vector<std::vector<std::string>> rows{{"group", "method", "cases", "refused", "failed",
-                                              "largest RMSE", "measured/true", "in bound", "at"}};
+                                              "largest RMSE", "measured", "measured/true",
+                                              "in bound", "at"}};
   for (const double limit : trust_limits) {
     std::string head = "RMSE <= ";
     head += format_number("%g", limit);
@@ -81,11 +82,12 @@ std::string trust_table(const Extremes& extremes) {
                                  std::to_string(trust.refused),
                                  std::to_string(trust.failed),
                                  format_number("%.1e", trust.worst),
+                                 std::to_string(trust.measured),
                                  format_number("%.2f", trust.least_reported),
                                  std::string(1, '-'),
                                  trust.worst_at};
     if (trust.estimated > 0) {
-      row[7] = std::to_string(trust.within_bound) + "/" + std::to_string(trust.estimated);
+      row[8] = std::to_string(trust.within_bound) + "/" + std::to_string(trust.estimated);
     }
     row.insert(row.end(), trust.within.begin(), trust.within.end());
     rows.push_back(std::move(row));

@@ -71,6 +71,43 @@ std::vector<Surface> combined(const std::vector<Surface>& surfaces) {
   return {all};
 }
 
+// The straight line of sight of a pixel; a step of 1 is a view depth of 1.
+struct Sight {
+  Vec origin, way;
+};
+
+Sight sight_of(const scene::Camera& camera, Real x, Real y) {
+  const Real pixel = 2 * static_cast<Real>(camera.half_height) / camera.height;
+  const Vec aside = (pixel * (x - camera.width / 2.0L)) * vec(camera.right) -
+                    (pixel * (y - camera.height / 2.0L)) * vec(camera.up);
+  if (camera.perspective) return {vec(camera.eye), vec(camera.forward) + aside};
+  return {vec(camera.eye) + aside, vec(camera.forward)};
+}
+
+// Where a line of sight enters a sphere about the origin, or passes through a rectangle.
+std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera, Real x, Real y) {
+  const auto [origin, way] = sight_of(camera, x, y);
+  Vec normal{0, 0, 1};
+  Real depth = 0;
+  if (body.shape == scene::BodyShape::sphere) {
+    const Real radius = body.radius;
+    const Real middle = -dot(origin, way) / dot(way, way);
+    const Real beside = length(origin + middle * way);
+    if (beside >= radius) return {};
+    depth = middle - std::sqrt((radius * radius - beside * beside) / dot(way, way));
+    normal = (1 / radius) * (origin + depth * way);
+  } else {
+    depth = (body.height - origin.z) / way.z;
+    const Vec at = origin + depth * way;
+    const bool within = at.x > body.low.x && at.x < body.high.x && at.y > body.low.y &&
+                        at.y < body.high.y && std::isfinite(depth);
+    if (!within) return {};
+  }
+  if (camera.perspective && !(depth > camera.near)) return {};
+  const Real bright = 0.6L + 0.4L * std::abs(dot(normal, way)) / length(way);
+  return Surface{depth, 1, bright * Vec{body.color[0], body.color[1], body.color[2]}};
+}
+
 // A splat on a ray: the distance from its centre at view depth z is
 // sqrt(least^2 + (cells (z - middle))^2) cells.
 struct Stretch {
@@ -84,11 +121,7 @@ class Ray {
  public:
   Ray(const Scene& scene, const std::vector<Splat>& splats, Real x, Real y) {
     const scene::Camera& camera = scene.camera;
-    const Real pixel = 2 * static_cast<Real>(camera.half_height) / camera.height;
-    const Vec aside = (pixel * (x - camera.width / 2.0L)) * vec(camera.right) -
-                      (pixel * (y - camera.height / 2.0L)) * vec(camera.up);
-    const Vec origin = camera.perspective ? vec(camera.eye) : vec(camera.eye) + aside;
-    const Vec way = camera.perspective ? vec(camera.forward) + aside : vec(camera.forward);
+    const auto [origin, way] = sight_of(camera, x, y);
     start_ = camera.perspective ? Real(camera.near) : -std::numeric_limits<Real>::infinity();
     for (const Splat& splat : splats) add(splat, splat.centre - origin, way);
   }
@@ -225,8 +258,15 @@ std::vector<Light> integrate(const Scene& scene, std::span<const Pixel> pixels, 
       const auto surface = meet(scene, line, x, y);
       if (surface && surface->opacity > 0) surfaces.push_back(*surface);
     }
+    std::optional<Surface> body;
+    if (scene.body) body = meet(*scene.body, scene.camera, x, y);
+    if (body) {
+      std::erase_if(surfaces, [&](const Surface& one) { return one.depth >= body->depth; });
+    }
     if (scene.vector && scene.vector->combine_or) surfaces = combined(surfaces);
+    if (body) surfaces.push_back(*body);
     out.push_back(Ray(scene, splats, x, y).follow(std::move(surfaces), steps));
+    out.back().body = body.has_value();
   }
   return out;
 }

@@ -19,17 +19,18 @@ struct Light {
   std::array<double, 3> rgb{};
   double alpha = 0;
   double depth = 0;
+  bool body = false;  // it ends at the body
 };
 
 struct Pixel {
   int x = 0, y = 0;
 };
 
-// One entry per pixel. The method, compositing, stop_transmittance, tolerance of optical depth and
-// body of the scene are ignored. `steps`: intervals between two places where a kernel begins or
-// ends or a line is met; colours converge with its square, optical depths much faster (1e-9).
-// Opaque intervals are divided further. Curved lattices must have two samples or more along every
-// axis.
+// One entry per pixel. The method, compositing, stop_transmittance and tolerance of optical depth
+// of the scene are ignored. A body has sharp edges: pixels that it covers in part differ. `steps`:
+// intervals between two places where a kernel begins or ends or a line is met; colours converge
+// with its square, optical depths much faster (1e-9). Opaque intervals are divided further. Curved
+// lattices must have two samples or more along every axis.
 std::vector<Light> integrate(const scene::Scene& scene, std::span<const Pixel> pixels,
                              int steps = 16);
 // Every pixel, row 0 on top.

@@ -93,6 +93,7 @@ TEST(CliStudy, ExtremeCasesOfAGroupPassAndAreReported) {
     EXPECT_EQ(one.value("truth", "none"), one.at("value") > 1 ? "none" : "integrator");
   }
   EXPECT_EQ(study.at("extremes").at("trust").size(), 3U);
+  EXPECT_EQ(study.at("stability").size(), 0U);
   EXPECT_THAT(read_file(out + "/extremes.csv"), HasSubstr("\nopacity,0.5,slab,perspective,flat,"));
   EXPECT_THAT(read_file(out + "/index.html"), HasSubstr("\"extremes\""));
 }

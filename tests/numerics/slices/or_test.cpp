@@ -120,19 +120,25 @@ TEST_P(RandomOr, LinesLieOverTheMedium) {
   }
 }
 
+// A ball, or a ground, within the box.
+scene::Body body_of(std::uint32_t seed) {
+  scene::Body body;
+  body.color = {0.2F, 0.3F, 0.1F};
+  body.radius = 0.3;
+  if (seed % 2 == 0) {
+    body.shape = scene::BodyShape::ground;
+    body.low = {-0.4, -0.3};
+    body.high = {0.4, 0.5};
+    body.height = -0.05;
+  }
+  return body;
+}
+
 TEST_P(RandomOr, ABodyHidesTheLinesBehindIt) {
   Scene scene = random_or(GetParam());
   if (!scene.vector) return;
   scene.scalars.clear();
-  scene.body = scene::Body{};
-  scene.body->color = {0.2F, 0.3F, 0.1F};
-  scene.body->radius = 0.3;
-  if (GetParam() % 2 == 0) {
-    scene.body->shape = scene::BodyShape::ground;
-    scene.body->low = {-0.4, -0.3};
-    scene.body->high = {0.4, 0.5};
-    scene.body->height = -0.05;
-  }
+  scene.body = body_of(GetParam());
   const std::vector<double> reference = reference_picture(scene);
   for (const Method method : {Method::kernel, Method::slab}) {
     scene.method = method;
@@ -143,6 +149,90 @@ TEST_P(RandomOr, ABodyHidesTheLinesBehindIt) {
         most = std::max(most, std::abs(static_cast<double>(picture.image.rgba[i]) - reference[i]));
       }
       EXPECT_LT(most, 5e-4) << table->name;  // at the limb
+    }
+  }
+}
+
+// Pixels that a body covers wholly or not at all: their neighbours are covered alike.
+std::vector<std::size_t> away_from_edges(const Scene& scene,
+                                         const std::vector<truth::Light>& light) {
+  const int width = scene.camera.width;
+  std::vector<std::size_t> out;
+  for (int y = 1; y + 1 < scene.camera.height; ++y) {
+    for (int x = 1; x + 1 < width; ++x) {
+      const auto at = static_cast<std::size_t>(y * width + x);
+      bool alike = true;
+      for (int dy = -width; dy <= width; dy += width) {
+        for (int dx = -1; dx <= 1; ++dx)
+          alike = alike && light[at + dy + dx].body == light[at].body;
+      }
+      if (alike) out.push_back(at);
+    }
+  }
+  return out;
+}
+
+// Without lines or medium if there is nothing to compare. A ground seen on edge is narrower than a
+// pixel and covers none wholly.
+Scene random_or_before_a_body(std::uint32_t seed) {
+  Scene scene = random_or(seed);
+  scene.body = body_of(seed);
+  scene.camera.width = 30;
+  scene.camera.height = 24;
+  const bool on_edge = std::abs(scene.camera.forward.z) < 0.2;
+  if (scene.body->shape == scene::BodyShape::ground && on_edge) scene.vector.reset();
+  return scene;
+}
+
+TEST_P(RandomOr, LinesAndAMediumBeforeABodyEqualTheTruth) {
+  Scene scene = random_or_before_a_body(GetParam());
+  if (!scene.vector || scene.scalars.empty()) return;
+  const auto light = truth::integrate(scene);
+  const auto pixels = away_from_edges(scene, light);
+  const auto most = [&](const auto& rgba) {
+    double error = 0;
+    for (const std::size_t at : pixels) {
+      for (std::size_t c = 0; c < 4; ++c) {
+        const double expected = c < 3 ? light[at].rgb[c] : light[at].alpha;
+        error = std::max(error, std::abs(static_cast<double>(rgba[4 * at + c]) - expected));
+      }
+    }
+    return error;
+  };
+  EXPECT_LT(most(reference_picture(scene)), 1e-5);
+  scene.method = Method::slab;
+  scene.slab_thickness = 0.1;
+  for (const engine::kernels::Table* table : engine::kernels::usable_tables()) {
+    EXPECT_LT(most(render_with(*table, scene).image.rgba), 2e-3) << table->name;
+  }
+}
+
+// The lines before the body lie over its medium and the body: I = L + (1 - A) M.
+TEST_P(RandomOr, LinesBeforeABodyLieOverItsMedium) {
+  Scene scene = random_or_before_a_body(GetParam());
+  if (!scene.vector || scene.scalars.empty()) return;
+  Scene lines = scene;
+  lines.scalars.clear();
+  lines.body->color = {};
+  const auto before_black = truth::integrate(lines);
+  lines.body->color = {1, 1, 1};
+  const auto before_white = truth::integrate(lines);
+  lines.vector.reset();
+  const auto white = truth::integrate(lines);
+  for (const Method method : {Method::kernel, Method::slab}) {
+    scene.method = method;
+    Scene under = scene;
+    under.vector.reset();
+    const auto both = render(scene);
+    const auto below = render(under);
+    for (const std::size_t at : away_from_edges(scene, white)) {
+      const double left =
+          white[at].body ? (before_white[at].rgb[0] - before_black[at].rgb[0]) / white[at].rgb[0]
+                         : 1 - before_black[at].alpha;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double medium = below.image.rgba[4 * at + c];
+        ASSERT_NEAR(both.image.rgba[4 * at + c], before_black[at].rgb[c] + left * medium, 1e-4);
+      }
     }
   }
 }

@@ -95,6 +95,37 @@ TEST_F(Measure, MeasuredFrameErrorIsItsErrorAgainstTheIntegral) {
   }
 }
 
+// The whole volume lies within few slabs, as it does in slabs of half the thickness.
+TEST_F(Measure, ErrorOfSlabsThickerThanTheVolumeIsItsErrorAgainstTheIntegral) {
+  for (const double thickness : {16.0, 32.0, 64.0}) {
+    view.method.slab_thickness = thickness;
+    const Frame frame = drawn(protocol::MethodName::slab, Format::npy);
+    ASSERT_TRUE(frame.error);
+    const double truth = true_error(frame);
+    EXPECT_NEAR(*frame.error / truth, 1, 0.3) << thickness << ' ' << truth;
+    const auto found = calibrated();
+    EXPECT_NEAR(found.at(quality::own_setting(frame.view)).error.value() / truth, 1, 0.3)
+        << thickness;
+  }
+}
+
+// The cells are so flat that the number of slabs is limited, whatever their thickness.
+TEST_F(Measure, NoErrorIsMeasuredWhereSlabsCannotBeThinner) {
+  view.geometry.scale = {1e3, 1e3, 1e-3};
+  view.camera.eye.reset();
+  view = completed().view();
+  for (const auto method : {protocol::MethodName::slab, protocol::MethodName::kernel}) {
+    EXPECT_FALSE(drawn(method, Format::npy).error);
+  }
+  view.method.name = protocol::MethodName::slab;
+  const auto found = calibrated();
+  EXPECT_GT(found.size(), 1U);
+  for (const auto& [setting, measured] : found) {
+    EXPECT_FALSE(measured.error) << setting;
+    EXPECT_GT(measured.ms.value(), 0) << setting;
+  }
+}
+
 // Errors that thinner slabs reduce less or not at all: compositing rule and early termination.
 TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
   const protocol::MethodView usual = view.method;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -26,13 +27,13 @@ struct Sample {
   std::vector<float> rgba{0.25F, 0.25F, 0.25F, 0.25F, 0.5F, 0.5F, 0.5F, 0.5F};
   std::vector<std::size_t> pixels{0, 1};
   std::vector<double> truth{rgba.begin(), rgba.end()};
-  std::optional<double> measured;
-  [[nodiscard]] Verdict verdict() const { return judge({rgba, pixels, truth, measured}); }
+  std::optional<double> reported;
+  [[nodiscard]] Verdict verdict() const { return judge({rgba, pixels, truth, reported}); }
 };
 
 TEST(Judge, PictureThatEqualsItsTruthIsGood) {
   Sample sample;
-  sample.measured = 0;
+  sample.reported = 0;
   const Verdict verdict = sample.verdict();
   EXPECT_TRUE(verdict.good());
   EXPECT_EQ(verdict.rmse, 0);
@@ -73,24 +74,24 @@ TEST(Judge, ChannelsOutsideTheUnitIntervalAreFaults) {
   EXPECT_TRUE(rounded.verdict().bounded);
 }
 
-TEST(Judge, MeasuredErrorBelowAQuarterOfTheTrueOneIsDishonest) {
+TEST(Judge, ReportedErrorBelowAQuarterOfTheTrueOneIsDishonest) {
   Sample sample;
   for (double& value : sample.truth) value += 0.01;
-  sample.measured = 0.0024;
+  sample.reported = 0.0024;
   EXPECT_FALSE(sample.verdict().honest);
   EXPECT_FALSE(sample.verdict().good());
-  sample.measured = std::numeric_limits<double>::quiet_NaN();
+  sample.reported = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(sample.verdict().honest);
-  sample.measured = 0.0026;
+  sample.reported = 0.0026;
   EXPECT_TRUE(sample.verdict().honest);
-  sample.measured.reset();
+  sample.reported.reset();
   EXPECT_TRUE(sample.verdict().honest);
 }
 
 TEST(Judge, ErrorsThatNobodySeesNeedNotBeReported) {
   Sample sample;
   for (double& value : sample.truth) value += 0.9e-4;
-  sample.measured = 0;
+  sample.reported = 0;
   EXPECT_TRUE(sample.verdict().honest);
 }
 
@@ -105,6 +106,36 @@ TEST(Judge, OpacityThatDecreasesIsNotMonotone) {
   CaseResult result;
   result.verdict.monotone = false;
   EXPECT_TRUE(result.failed());
+}
+
+// A case by design beyond the limit of opacities.
+CaseResult beyond_opacity(const Result<void>& drawn) {
+  CaseResult result;
+  judge_refusal("/vector/opacity", drawn, result);
+  return result;
+}
+
+TEST(Judge, OnlyTheRefusalThatADesignStatesIsOne) {
+  const Result<void> stated =
+      make_error_at(ErrorKind::invalid, "/vector/opacity", "must be at most 1");
+  EXPECT_TRUE(beyond_opacity(stated).refused);
+  EXPECT_FALSE(beyond_opacity(stated).failed());
+  const std::array<Result<void>, 3> others{
+      make_error_at(ErrorKind::invalid, "/vector/stride", "must be at least 1"),
+      make_error_at(ErrorKind::internal, "/vector/opacity", "is out of order"), Result<void>()};
+  for (const Result<void>& other : others) {
+    const CaseResult result = beyond_opacity(other);
+    EXPECT_FALSE(result.refused) << result.message;
+    EXPECT_TRUE(result.failed()) << result.message;
+    EXPECT_THAT(result.message, HasSubstr("expected: /vector/opacity"));
+  }
+  CaseResult unexpected;
+  judge_refusal("", stated, unexpected);
+  EXPECT_FALSE(unexpected.refused);
+  EXPECT_TRUE(unexpected.failed());
+  CaseResult drawn;
+  judge_refusal("", {}, drawn);
+  EXPECT_FALSE(drawn.failed());
 }
 
 CaseResult result_at(double value, double rmse, const std::string& projection = "perspective") {
@@ -167,6 +198,7 @@ TEST(Trust, ReportedErrorsAreComparedWhereTheErrorIsVisible) {
   }
   const Trust trust = trust_of(cases)[0];
   EXPECT_NEAR(trust.least_reported, 0.3, 1e-12);
+  EXPECT_EQ(trust.measured, 3U);
   EXPECT_EQ(trust.estimated, 3U);
   EXPECT_EQ(trust.within_bound, 2U);
 }
