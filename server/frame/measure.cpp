@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "server/base/trim_storage.hpp"
+#include "server/frame/content.hpp"
+#include "server/quality/laws.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::frame {
@@ -189,7 +191,7 @@ class CalibrationRun {
   }
 
   Result<void> draw_truth() {
-    viewpoint_ = viewpoint_of(completed_);
+    viewpoint_ = viewpoint_of(completed_, dataset_);
     const auto own = scene::build_scene(completed_, dataset_);
     if (!own) return own.error();
     const std::array<int, 3> own_level = own->level;
@@ -245,7 +247,9 @@ class CalibrationRun {
 
   void tell_run(const quality::Setting& setting, double error, double ms) {
     if (!quality::is_allowed(setting, completed_.view())) return;
-    report_({quality::index_of(setting).value(), viewpoint_, {error, ms}});
+    report_({quality::index_of(setting).value(),
+             viewpoint_,
+             {std::max(quality::error_least, error), ms}});
   }
 
   Result<quality::Measured> measure(const quality::Setting& setting) {
@@ -270,7 +274,8 @@ class CalibrationRun {
     }
     if (full) {
       const double values = static_cast<double>(truth_.rgba.size());
-      out.error = std::sqrt(std::max(0.0, truth_.squares + beyond) / values);
+      out.error = std::max(quality::error_least,
+                           std::sqrt(std::max(0.0, truth_.squares + beyond) / values));
       return out;
     }
     const engine::Image& picture = workspace_.space.image();
@@ -317,9 +322,14 @@ class CalibrationRun {
 
 }  // namespace
 
-quality::Viewpoint viewpoint_of(const scene::CompletedView& completed) {
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed,
+                                const data::Dataset& dataset) {
   quality::Viewpoint viewpoint = quality::viewpoint_of(completed.view());
   viewpoint.detail = scene::detail_shown(completed);
+  data::Dataset resident = dataset.resident_only();
+  if (const auto scene = scene::build_scene(completed, resident)) {
+    viewpoint.content = content_of(*scene);
+  }
   return viewpoint;
 }
 
@@ -356,7 +366,7 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
   if (!work) return work.error();
   const bool order_two =
       scene.method == scene::Method::slab && scene.level == finer->first.level && is_exact(scene);
-  return std::optional(rms(left) * (order_two ? 4.0 / 3 : 1.0));
+  return std::optional(std::max(quality::error_least, rms(left) * (order_two ? 4.0 / 3 : 1.0)));
 }
 
 Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,
