@@ -2,7 +2,9 @@
 #include "server/quality/laws.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 
 #include "server/quality/coefficients.hpp"
 
@@ -68,16 +70,30 @@ Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& 
 
 namespace {
 
+// Few lines and a thin medium add little light, and many layers of lines and an opaque medium vary
+// little: errors are greatest in between. Lines of cells below a pixel blend.
+Terms terms_of(const Features& features) {
+  Terms out{};
+  std::copy(features.begin(), features.end(), out.begin());
+  const double cell = features[5];
+  const double lines = features[7];
+  const double layers = features[8];
+  const double depth = features[13];
+  const std::array<double, 4> products{cell * cell, layers * layers, lines * cell, depth * depth};
+  std::copy(products.begin(), products.end(), out.begin() + features_count);
+  return out;
+}
+
 // By the law of the main cause alone.
 double error_of_cause(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   const Cause cause = cause_of(setting, viewpoint);
   const Law& law = law_of(kind, cause);
-  const Features features = features_of(kind, setting, viewpoint);
-  double log_error = law.base;
+  Features features = features_of(kind, setting, viewpoint);
   for (std::size_t i = 0; i < features_count; ++i) {
-    const double feature = std::clamp(features[i], fitted_least[i], fitted_most[i]);
-    log_error += law.slope[i] * feature;
+    features[i] = std::clamp(features[i], law.least[i], law.most[i]);
   }
+  const Terms terms = terms_of(features);
+  double log_error = std::inner_product(terms.begin(), terms.end(), law.slope.begin(), law.base);
   if (cause == Cause::slab && kind.medium) {
     log_error += order_of_slabs * std::log(kind.thickness / setting.thinner);
   }
@@ -89,8 +105,9 @@ double error_of_cause(const Kind& kind, const Setting& setting, const Viewpoint&
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   // A smaller picture and merged samples have the error of the method too.
   const Setting whole{setting.method, 0, 0, setting.thinner};
-  const double error =
-      std::max(error_of_cause(kind, setting, viewpoint), error_of_cause(kind, whole, viewpoint));
+  const bool is_whole = setting == whole;
+  const double of_method = is_whole ? 0 : error_of_cause(kind, whole, viewpoint);
+  const double error = std::hypot(error_of_cause(kind, setting, viewpoint), of_method);
   return {std::clamp(std::hypot(error, kind.rule / setting.thinner, kind.stop), error_least, 1.0),
           law_of(kind, cause_of(setting, viewpoint)).scatter};
 }

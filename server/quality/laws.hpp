@@ -21,10 +21,17 @@ struct Scatter {
 inline constexpr std::size_t features_count = 22;
 using Features = std::array<double, features_count>;
 
-// error = exp(base + sum of slope times feature).
+// The features, then squares and products of some (laws.cpp).
+inline constexpr std::size_t terms_count = features_count + 4;
+using Terms = std::array<double, terms_count>;
+
+// error = exp(base + sum of slopes times terms). The features are clamped to the range that was
+// fitted, so that the law is constant beyond it.
 struct Law {
   double base = 0;
-  Features slope{};
+  Terms slope{};
+  Features least{};
+  Features most{};
   Scatter scatter;
 };
 

@@ -13,7 +13,9 @@
 #include "server/base/thread_pool.hpp"
 #include "server/frame/measure.hpp"
 #include "server/quality/laws.hpp"
+#include "server/quality/pick.hpp"
 #include "server/quality/table.hpp"
+#include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "tests/bench/support.hpp"
 #include "tests/numerics/family/family.hpp"
@@ -91,7 +93,8 @@ Measurements read(const std::string& path) {
 
 // One line for each measurement: member, scene, viewpoint, setting, error; the estimates without
 // measurements, after that of a final frame and after a calibration run, both at the first
-// viewpoint of the scene; cause, content, features.
+// viewpoint of the scene; the 95 % bounds of the first and the last estimate; cause, content,
+// features.
 void list(const Measurements& measurements) {
   const auto members = all_members();
   std::unique_ptr<data::Dataset> dataset;
@@ -106,7 +109,9 @@ void list(const Measurements& measurements) {
     }
     const auto completed = completed_view(*dataset, static_cast<std::size_t>(at[0]), at[1], at[2]);
     const quality::Kind kind = quality::signature_of(completed.view()).kind;
+    value_or_give_up(scene::build_scene(completed, *dataset));  // merged data become resident
     const quality::Viewpoint viewpoint = frame::viewpoint_of(completed, *dataset);
+    if (!viewpoint.content) give_up("the content of a view is unknown");
     const bool first = at[0] != last[0] || at[1] != last[1];
     last = at;
     if (first) {
@@ -116,10 +121,12 @@ void list(const Measurements& measurements) {
     }
     for (const Row& row : rows) {
       const quality::Setting& setting = quality::settings[row.setting];
-      std::printf("%d,%d,%d,%zu,%.4g,%.4g,%.4g,%.4g,%d,%d", at[0], at[1], at[2], row.setting,
-                  row.error, untaught->forecast(row.setting, viewpoint).error,
-                  after_final->forecast(row.setting, viewpoint).error,
-                  calibrated->forecast(row.setting, viewpoint).error,
+      const quality::Forecast before = untaught->forecast(row.setting, viewpoint);
+      const quality::Forecast after = calibrated->forecast(row.setting, viewpoint);
+      std::printf("%d,%d,%d,%zu,%.4g,%.4g,%.4g,%.4g,%.4g,%.4g,%d,%d", at[0], at[1], at[2],
+                  row.setting, row.error, before.error,
+                  after_final->forecast(row.setting, viewpoint).error, after.error,
+                  quality::error_bound(before), quality::error_bound(after),
                   static_cast<int>(quality::cause_of(setting, viewpoint)), at[1] % 3);
       for (const double feature : quality::features_of(kind, setting, viewpoint)) {
         std::printf(",%.5g", feature);

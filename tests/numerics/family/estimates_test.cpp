@@ -12,6 +12,7 @@
 #include "server/quality/laws.hpp"
 #include "server/quality/table.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
 #include "tests/numerics/family/family.hpp"
 
@@ -92,6 +93,27 @@ TEST(Estimates, NoErrorIsBelowThatOfSinglePrecision) {
     least = std::min({least, one.measured, one.estimated, one.learned});
   }
   EXPECT_GE(least, quality::error_least);
+}
+
+// Also where the view merges samples, whose means are computed when the run needs them.
+TEST(Estimates, CalibrationRunsKnowWhatTheirViewsShow) {
+  const FamilyMember member = strangers()[0];
+  const auto dataset = formula_dataset(member.field, member.formula);
+  protocol::View view = random_view(*dataset, 32, 0, 161);
+  const auto near = scene::complete(view, *dataset).value();
+  scene::orbit(view, near.lattice(), 30, 20, 0.1);
+  const auto far = scene::complete(view, *dataset).value();
+  ASSERT_LT(scene::detail_shown(far), 1) << "merges samples";
+  ThreadPool pool(2);
+  const CancelToken cancel;
+  frame::Workspace workspace;
+  int count = 0;
+  const auto done = frame::calibrate(far, *dataset, pool, cancel, workspace, [&](const auto& one) {
+    EXPECT_TRUE(one.viewpoint.content);
+    ++count;
+  });
+  EXPECT_TRUE(done);
+  EXPECT_GT(count, 5);
 }
 
 // Twice the extinction is twice the optical depth of a cell and of the rays; lengths are in heights

@@ -52,6 +52,27 @@ TEST(Laws, FewerPixelsAndCoarserDataIncreaseTheError) {
   }
 }
 
+// Also where the error of the method dominates that of fewer pixels: otherwise nothing would favour
+// the larger of two pictures.
+TEST(Laws, EverySmallerPictureHasAGreaterError) {
+  const Kind lines{true, false, 0.16, 1.4, 1, 1};
+  Viewpoint smooth{2, {}, 640, 480};
+  smooth.content = Content{};
+  smooth.content->bend = smooth.content->wide_bend = 1e-4;
+  smooth.content->layers = 5;
+  smooth.content->length = 0.5;
+  for (const Viewpoint& viewpoint : {Viewpoint{2, {}, 640, 480}, smooth}) {
+    for (const Kind& kind : {lines, media, both}) {
+      double last = 0;
+      for (const int half_level : {0, 1, 2, 3, 4, 5, 6, 8}) {
+        const double error = error_of(kind, {MethodName::kernel, half_level, 0}, viewpoint);
+        EXPECT_GT(error, last) << "half level " << half_level;
+        last = error;
+      }
+    }
+  }
+}
+
 TEST(Laws, LinesAloneAreExactWithSlabs) {
   const Kind lines{true, false, 0.16, 1.4, 1, 1};
   EXPECT_NEAR(error_of(lines, {MethodName::slab, 0, 0}), error_least, 1e-3 * error_least);
