@@ -6,7 +6,7 @@
 
 namespace windsplat::frame {
 
-// The same for the same scene. Takes less than a millisecond: at most 4096 samples with their
+// The same for the same scene. Takes a few milliseconds: at most 4096 samples with their
 // neighbours, spread evenly over the drawn lattice, are projected onto a coarse grid of the picture
 // and composited in order of depth. The body is ignored.
 quality::Content content_of(const scene::Scene& scene);

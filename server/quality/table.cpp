@@ -16,10 +16,14 @@ namespace {
 constexpr double ms_least = 1e-3;
 constexpr double near = 0.5;  // distance below which a calibration run adds no information
 constexpr std::size_t nearest_max = 8;
-// Correlations of the errors of settings of the same and of different causes (the residuals of the
-// laws over the generated family).
-constexpr double alike = 0.8;
-constexpr double unlike = 0.4;
+// Correlations of the errors of settings by cause: order of kernels, fewer pixels, merged samples,
+// slabs (the residuals of the laws over the generated family).
+constexpr std::array<std::array<double, 4>, 4> correlations{{
+    {0.85, 0.25, 0.2, 0.5},
+    {0.25, 0.85, 0.5, 0.35},
+    {0.2, 0.5, 0.85, 0.15},
+    {0.5, 0.35, 0.15, 0.85},
+}};
 
 // Linear RMSE of a JPEG of quality 90, the median of the samples (docs/benchmarks/error.md).
 constexpr double encoding_error_of_lines = 9.5e-3;
@@ -106,7 +110,7 @@ Kriged krige_times(std::vector<TimeObservation> times, const Scatter& scatter) {
 // Correlation of the errors of two settings, beyond what the laws express.
 double correlation(std::size_t a, Cause cause_a, std::size_t b, Cause cause_b) {
   if (a == b && cause_a == cause_b) return 1;
-  return cause_a == cause_b ? alike : unlike;
+  return correlations[static_cast<std::size_t>(cause_a)][static_cast<std::size_t>(cause_b)];
 }
 
 // Encoding error decreases with the distance of the eye.
@@ -120,13 +124,19 @@ struct ErrorObservation {
   Cause cause = Cause::kernel;
   const Viewpoint* viewpoint = nullptr;
   double log_ratio = 0;
+  double spread = 1;  // standard deviation of log_ratio without measurements
   double apart = 0;   // distance from the requested viewpoint
   double shared = 0;  // covariance with the requested error
 };
 
 namespace {
 
-// `errors` are those of all settings. Uses the ones that correlate most.
+double spread_of(const Scatter& scatter) {
+  return std::hypot(scatter.signature, scatter.viewpoint);
+}
+
+// `errors` are those of all settings, in units of the spread of their cause. Uses the ones that
+// correlate most.
 Kriged krige_errors(std::size_t setting, Cause cause, std::vector<ErrorObservation> errors,
                     const Scatter& scatter) {
   const auto covariance = [&](const ErrorObservation& a, std::size_t b, Cause cause_b,
@@ -140,9 +150,10 @@ Kriged krige_errors(std::size_t setting, Cause cause, std::vector<ErrorObservati
       errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(count), errors.end(),
       [](const ErrorObservation& a, const ErrorObservation& b) { return a.shared > b.shared; });
   const double noise = squared(scatter.noise);
+  const double own_spread = spread_of(scatter);
   return krige(
       count, squared(scatter.signature) + squared(scatter.viewpoint) + noise,
-      [&](std::size_t i) { return errors[i].log_ratio; },
+      [&](std::size_t i) { return errors[i].log_ratio * own_spread / errors[i].spread; },
       [&](std::size_t i) { return errors[i].shared; },
       [&](std::size_t i, std::size_t j) {
         const ErrorObservation& b = errors[j];
@@ -158,7 +169,7 @@ Forecast prior(const Kind& kind, const Setting& setting, const Viewpoint& viewpo
   const Expected error = expected_error(kind, setting, viewpoint);
   Forecast out;
   out.error = error.value;
-  out.spread = std::hypot(error.scatter.signature, error.scatter.viewpoint);
+  out.spread = spread_of(error.scatter);
   out.ms = expected_ms(kind, setting, viewpoint).value;
   return out;
 }
@@ -212,7 +223,9 @@ std::vector<ErrorObservation> Table::errors_near(const Viewpoint& viewpoint) con
     for (const Entry& entry : entries_[i]) {
       if (!entry.log_error) continue;
       errors.push_back({i, cause_of(settings[i], entry.viewpoint), &entry.viewpoint,
-                        *entry.log_error, distance(entry.viewpoint, viewpoint), 0});
+                        *entry.log_error,
+                        spread_of(expected_error(kind_, settings[i], entry.viewpoint).scatter),
+                        distance(entry.viewpoint, viewpoint), 0});
     }
   }
   return errors;

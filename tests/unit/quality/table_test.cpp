@@ -65,6 +65,22 @@ TEST(Table, AMeasurementCorrectsOtherSettingsInProportionToWhatTheyShare) {
   EXPECT_FALSE(table.forecast(smaller, sight_at(0)).measured);
 }
 
+// In units of their spreads, two settings say as much about each other: an uncertain estimate that
+// is wrong does not change a certain one by as much.
+TEST(Table, SettingsCorrectEachOtherByTheSameShareOfTheirSpreads) {
+  const std::size_t slab = own_setting(protocol::View{});
+  ASSERT_EQ(settings[slab].method, MethodName::slab);
+  const auto response = [](std::size_t measured, std::size_t other) {
+    const Forecast before = prior(kind, settings[measured], sight_at(0));
+    const Forecast untold = prior(kind, settings[other], sight_at(0));
+    Table table(kind);
+    table.add(measured, sight_at(0), {before.error * std::exp(before.spread), {}});
+    return std::log(table.forecast(other, sight_at(0)).error / untold.error) / untold.spread;
+  };
+  EXPECT_GT(response(slab, half), 0.1);
+  EXPECT_NEAR(response(slab, half) / response(half, slab), 1, 0.05);
+}
+
 // A viewpoint of unknown content has that of the nearest measured one.
 TEST(Table, UnknownContentIsThatOfTheNearestMeasurement) {
   Table table(kind);
