@@ -193,7 +193,7 @@ class CalibrationRun {
   Result<void> draw_truth() {
     const auto own = scene::build_scene(completed_, dataset_);
     if (!own) return own.error();
-    viewpoint_ = viewpoint_of(completed_, dataset_);  // its content is that of the data now resident
+    viewpoint_ = viewpoint_of(completed_, dataset_);  // of the data that are now resident
     const std::array<int, 3> own_level = own->level;
     for (const int thinner : {2, 4}) {
       const auto finer = finer_scene(completed_, dataset_, thinner, truth_samples_max);
