@@ -41,9 +41,9 @@ Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const pr
                                                data::Dataset resident) {
   const auto completed = scene::complete(view, resident);
   if (!completed) return naming_the_way_out(completed.error());
-  return quality::curve(
-      completed->view(),
-      tables.forecasts(quality::signature_of(completed->view()), frame::viewpoint_of(*completed)));
+  return quality::curve(completed->view(),
+                        tables.forecasts(quality::signature_of(completed->view()),
+                                         frame::viewpoint_of(*completed, resident)));
 }
 
 }  // namespace

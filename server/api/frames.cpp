@@ -123,12 +123,14 @@ bool is_chosen(const protocol::View& view) {
   return view.quality.budget_ms || view.quality.max_error;
 }
 
-quality::Setting setting_of(quality::Tables& tables, const scene::CompletedView& completed) {
+quality::Setting setting_of(quality::Tables& tables, const scene::CompletedView& completed,
+                            const data::Dataset& dataset) {
   const protocol::View& view = completed.view();
   if (!is_chosen(view) || view.method.name == protocol::MethodName::reference) {
     return frame::own_setting(completed);
   }
-  const auto known = tables.forecasts(quality::signature_of(view), frame::viewpoint_of(completed));
+  const auto known =
+      tables.forecasts(quality::signature_of(view), frame::viewpoint_of(completed, dataset));
   const quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
   return quality::settings[quality::pick(view, known, aim).setting];
 }
@@ -154,8 +156,8 @@ Result<work::PreparedPtr> prepare(quality::Tables& tables, const Picture& pictur
       return work::PreparedPtr();
     }
   }
-  return work::prepare_picture(*completed, setting_of(tables, *completed), picture.encoding,
-                               dataset, loading);
+  return work::prepare_picture(*completed, setting_of(tables, *completed, dataset),
+                               picture.encoding, dataset, loading);
 }
 
 Result<http::Response> draw(work::Backend& backend, const Picture& picture,

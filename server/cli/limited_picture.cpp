@@ -54,7 +54,7 @@ std::string short_text(double value) {
 Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
                                         const CancelToken& cancel) {
   const quality::SceneSignature signature = quality::signature_of(completed.view());
-  if (!tables_.begin_study(signature, frame::viewpoint_of(completed))) return {};
+  if (!tables_.begin_study(signature, frame::viewpoint_of(completed, dataset_))) return {};
   // Loads the levels of coarser settings as far as memory allows; the run itself loads nothing.
   for (const int coarser : {0, 1, 2}) {
     quality::Setting setting = frame::own_setting(completed);
@@ -78,7 +78,8 @@ Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
 quality::Setting LimitedPictures::setting_of(const scene::CompletedView& completed) {
   const protocol::View& view = completed.view();
   if (!is_limited(view)) return frame::own_setting(completed);
-  auto known = tables_.forecasts(quality::signature_of(view), frame::viewpoint_of(completed));
+  auto known =
+      tables_.forecasts(quality::signature_of(view), frame::viewpoint_of(completed, dataset_));
   for (std::size_t i = 0; i < known.size(); ++i) {
     known[i].ms += encode_ms_a_pixel_ * quality::pixels_at(view, quality::settings[i]);
   }

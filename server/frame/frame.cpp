@@ -8,6 +8,7 @@
 #include "server/base/check.hpp"
 #include "server/base/trim_storage.hpp"
 #include "server/engine/reference/reference.hpp"
+#include "server/frame/content.hpp"
 #include "server/frame/measure.hpp"
 #include "server/image/decode.hpp"
 #include "server/quality/setting.hpp"
@@ -216,6 +217,7 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.view.image = prepared.asked;
   drawn.detail = scene::detail_shown(prepared.completed) * prepared.asked.height / drawn.height;
   drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());
+  if (prepared.encoding.measure) drawn.content = content_of(scene);
   if (is_measured(prepared)) {
     const Clock::time_point measured_from = Clock::now();
     auto error = measured_error(prepared, dataset, pool, cancel, workspace);

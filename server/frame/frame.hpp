@@ -17,6 +17,7 @@
 #include "server/image/encode.hpp"
 #include "server/image/jpeg_encoder.hpp"
 #include "server/image/ycc.hpp"
+#include "server/quality/content.hpp"
 #include "server/quality/setting.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/scene.hpp"
@@ -40,7 +41,8 @@ struct Frame {
   protocol::View view;  // the completed view that was drawn, with the requested size of the picture
   int width = 0;        // rendered width
   int height = 0;
-  double detail = 0;  // at the size of the view (scene::detail_shown)
+  double detail = 0;                        // at the size of the view (scene::detail_shown)
+  std::optional<quality::Content> content;  // if the encoding asks for measurements
   engine::WorkReport work;
   std::int64_t render_us = 0;  // time of scene and engine, including the tone mapping of JPEG tiles
   std::int64_t measure_us = 0;

@@ -12,6 +12,8 @@
 
 #include "server/base/trim_storage.hpp"
 #include "server/engine/plan.hpp"
+#include "server/frame/content.hpp"
+#include "server/quality/laws.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::frame {
@@ -197,9 +199,9 @@ class CalibrationRun {
   }
 
   Result<void> draw_truth() {
-    viewpoint_ = viewpoint_of(completed_);
     const auto own = scene::build_scene(completed_, dataset_);
     if (!own) return own.error();
+    viewpoint_ = viewpoint_of(completed_, dataset_);  // of the data that are now resident
     const std::array<int, 3> own_level = own->level;
     const double half = reference_thickness(completed_);
     for (const double thickness : {half, half / 2}) {
@@ -257,7 +259,9 @@ class CalibrationRun {
 
   void tell_run(const quality::Setting& setting, double error, double ms) {
     if (!quality::is_allowed(setting, completed_.view())) return;
-    report_({quality::index_of(setting).value(), viewpoint_, {error, ms}});
+    report_({quality::index_of(setting).value(),
+             viewpoint_,
+             {std::max(quality::error_least, error), ms}});
   }
 
   Result<quality::Measured> measure(const quality::Setting& setting) {
@@ -282,7 +286,8 @@ class CalibrationRun {
     }
     if (full) {
       const double values = static_cast<double>(truth_.rgba.size());
-      out.error = std::sqrt(std::max(0.0, truth_.squares + beyond) / values);
+      out.error = std::max(quality::error_least,
+                           std::sqrt(std::max(0.0, truth_.squares + beyond) / values));
       return out;
     }
     if (!known_) return out;
@@ -331,9 +336,14 @@ class CalibrationRun {
 
 }  // namespace
 
-quality::Viewpoint viewpoint_of(const scene::CompletedView& completed) {
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed,
+                                const data::Dataset& dataset) {
   quality::Viewpoint viewpoint = quality::viewpoint_of(completed.view());
   viewpoint.detail = scene::detail_shown(completed);
+  data::Dataset resident = dataset.resident_only();
+  if (const auto scene = scene::build_scene(completed, resident)) {
+    viewpoint.content = content_of(*scene);
+  }
   return viewpoint;
 }
 
@@ -374,7 +384,8 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
   const bool order_two =
       scene.method == scene::Method::slab && scene.level == finer->first.level && is_exact(scene);
   const double ratio2 = std::pow(scene.slab_thickness / thickness, 2);
-  return std::optional(rms(left) * (order_two ? ratio2 / (ratio2 - 1) : 1.0));
+  const double error = rms(left) * (order_two ? ratio2 / (ratio2 - 1) : 1.0);
+  return std::optional(std::max(quality::error_least, error));
 }
 
 Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,

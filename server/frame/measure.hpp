@@ -19,8 +19,9 @@ namespace windsplat::frame {
 // from the level of the picture.
 inline constexpr double truth_samples_max = 32.0 * 1024 * 1024;
 
-// The viewpoint of a completed view.
-quality::Viewpoint viewpoint_of(const scene::CompletedView& completed);
+// The viewpoint of a completed view. Its content is unknown unless its data are resident.
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed,
+                                const data::Dataset& dataset);
 
 // Whether the frame will be measured: only pictures of full size, up to retained_pixels.
 bool is_measured(const Prepared& prepared);

@@ -1,76 +1,115 @@
-// Power laws, fitted to calibration runs of the samples in five scenes (docs/benchmarks/error.md).
+// Products of powers, fitted to generated data (docs/design/quality-control.md).
 #include "server/quality/laws.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
+
+#include "server/quality/coefficients.hpp"
 
 namespace windsplat::quality {
 namespace {
 
-// The conditions at which the laws equal their factors: a picture 480 pixels high, lines a tenth of
-// its height long with a radius of 1.4 pixels, a medium of optical depth 1 along the length of a
-// line.
-constexpr double pixels_high_of_laws = 480;
-constexpr double height_of_laws = 10;  // height of the picture in lengths of a line
-constexpr double radius_of_laws = 1.4;
-
-// error = factor (height / length)^by_height (pixels high)^by_pixels.
-struct Law {
-  double factor = 0;
-  double by_height = 0;
-  double by_pixels = 0;
-  Scatter scatter;
-};
-
-Law law_of_lines(const Kind& kind, const Setting& setting, bool merged) {
-  const bool slab = setting.method == protocol::MethodName::slab;
-  if (setting.coarser > 0 || merged) {
-    const double factor = kind.medium ? 0.09 : 0.11;
-    return {
-        factor * std::pow(1.55, std::max(0, setting.coarser - 1)), -0.65, 0.1, {0.35, 0.3, 0.06}};
-  }
-  if (setting.half_level > 0) {
-    const double factor = (slab ? 0.022 : 0.027) * (kind.medium ? 1.05 : 1.5);
-    return {factor * std::pow(1.2, setting.half_level - 1), -0.4, 0, {0.45, 0.35, 0.06}};
-  }
-  if (!slab) {
-    return {0.013 * kind.radius / radius_of_laws, -0.1, 0.3, {0.4, 0.45, 0.06}};
-  }
-  if (!kind.medium) return {error_least, 0, 0, {0.5, 0.3, 0.06}};
-  const double thickness = kind.thickness / setting.thinner;
-  return {2.8e-4 * std::pow(kind.depth, 0.7) * thickness * thickness, -0.25, 0, {0.6, 0.75, 0.06}};
+double logarithm(double value, double least, double most = 1e30) {
+  return std::log(std::clamp(value, least, most));
 }
 
-Law law_of_media(const Kind& kind, const Setting& setting, bool merged) {
-  const bool slab = setting.method == protocol::MethodName::slab;
-  if (setting.coarser > 0 || merged) {
-    return {0.032 * std::pow(2.4, std::max(0, setting.coarser - 1)), -0.35, 0, {0.5, 0.4, 0.06}};
-  }
-  if (setting.half_level > 0) {
-    return {6.5e-4 * std::pow(2.0, 0.8 * (setting.half_level - 1)), 0.7, -1.5, {0.7, 0.5, 0.06}};
-  }
-  if (!slab) return {2.2e-4, -0.1, 0, {0.8, 0.9, 0.06}};
-  const double thickness = kind.thickness / setting.thinner;
-  return {1e-4 * thickness * thickness, -0.4, 0, {0.7, 0.8, 0.06}};
+const Law& law_of(const Kind& kind, Cause cause) {
+  const std::size_t content = kind.lines && kind.medium ? 2 : kind.medium ? 1 : 0;
+  return laws[3 * static_cast<std::size_t>(cause) + content];
 }
 
 }  // namespace
 
-bool is_merged(const Setting& setting, const Viewpoint& viewpoint) {
-  return setting.half_level == 0 && setting.coarser == 0 && viewpoint.detail > 0 &&
-         viewpoint.detail < 1;
+Cause cause_of(const Setting& setting, const Viewpoint& viewpoint) {
+  const bool merges = viewpoint.detail > 0 && viewpoint.detail < 1;
+  if (setting.coarser > 0 || (merges && setting.half_level == 0)) return Cause::merged;
+  if (setting.half_level > 0) return Cause::smaller;
+  return setting.method == protocol::MethodName::slab ? Cause::slab : Cause::kernel;
 }
 
-Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
-  const bool merged = is_merged(setting, viewpoint);
-  const Law law =
-      kind.lines ? law_of_lines(kind, setting, merged) : law_of_media(kind, setting, merged);
-  double error = law.factor * std::pow(viewpoint.pixels_high / pixels_high_of_laws, law.by_pixels);
-  if (kind.length > 0) {
-    error *= std::pow(viewpoint.height / (height_of_laws * kind.length), law.by_height);
+Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
+  constexpr double radius_height = 720;  // height of the picture for which the radius is given
+  const Content content = viewpoint.content.value_or(Content());
+  const double pixels = viewpoint.pixels_high;
+  const bool merges = viewpoint.detail > 0 && viewpoint.detail < 1;
+  Features out{
+      static_cast<double>(setting.half_level),
+      static_cast<double>(setting.coarser),
+      setting.method == protocol::MethodName::slab ? 1.0 : 0.0,
+      merges ? 1.0 : 0.0,
+      viewpoint.detail > 0 ? logarithm(viewpoint.detail, 0.2, 5) : 0,
+      logarithm(content.cell * pixels, 0.1, 300),
+      logarithm(content.finest_cell / std::max(content.cell, 1e-30), 0.02),
+  };
+  std::size_t n = 7;
+  if (kind.lines) {
+    out[n + 0] = logarithm(content.lines, 1e-3);
+    out[n + 1] = logarithm(content.layers, 0.03, 100);
+    out[n + 2] = logarithm(content.length * pixels, 0.3);
+    out[n + 3] = logarithm(kind.radius * pixels / radius_height, 0.1);
+    out[n + 4] = std::log(content.shade + 0.01);
+    out[n + 5] = content.gaps;
   }
+  n += 6;
+  if (kind.medium) {
+    out[n + 0] = logarithm(content.depth, 1e-3, 1e3);
+    out[n + 1] = logarithm(content.cell_depth, 1e-5, 1e2);
+    out[n + 2] = std::log(content.tint + 0.003);
+    out[n + 3] = logarithm(content.step, 1e-5);
+    out[n + 4] = logarithm(content.bend, 1e-5);
+    out[n + 5] = logarithm(content.wide_bend, 1e-5);
+    out[n + 6] = logarithm(content.order, 1e-7);
+    out[n + 7] = logarithm(content.step_cell * pixels, 0.1);
+  }
+  n += 8;
+  if (kind.lines && kind.medium) out[n] = logarithm(content.line_depth, 1e-5, 1e2);
+  return out;
+}
+
+namespace {
+
+// Few lines and a thin medium add little light, and many layers of lines and an opaque medium vary
+// little: errors are greatest in between. Lines of cells below a pixel blend.
+Terms terms_of(const Features& features) {
+  Terms out{};
+  std::copy(features.begin(), features.end(), out.begin());
+  const double cell = features[5];
+  const double lines = features[7];
+  const double layers = features[8];
+  const double depth = features[13];
+  const std::array<double, 4> products{cell * cell, layers * layers, lines * cell, depth * depth};
+  std::copy(products.begin(), products.end(), out.begin() + features_count);
+  return out;
+}
+
+// By the law of the main cause alone.
+double error_of_cause(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
+  const Cause cause = cause_of(setting, viewpoint);
+  const Law& law = law_of(kind, cause);
+  Features features = features_of(kind, setting, viewpoint);
+  for (std::size_t i = 0; i < features_count; ++i) {
+    features[i] = std::clamp(features[i], law.least[i], law.most[i]);
+  }
+  const Terms terms = terms_of(features);
+  double log_error = std::inner_product(terms.begin(), terms.end(), law.slope.begin(), law.base);
+  if (cause == Cause::slab && kind.medium) {
+    log_error += order_of_slabs * std::log(kind.thickness / setting.thinner);
+  }
+  return std::exp(std::min(log_error, 0.0));
+}
+
+}  // namespace
+
+Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
+  // A smaller picture and merged samples have the error of the method too.
+  const Setting whole{setting.method, 0, 0, setting.thinner};
+  const bool is_whole = setting == whole;
+  const double of_method = is_whole ? 0 : error_of_cause(kind, whole, viewpoint);
+  const double error = std::hypot(error_of_cause(kind, setting, viewpoint), of_method);
   return {std::clamp(std::hypot(error, kind.rule / setting.thinner, kind.stop), error_least, 1.0),
-          law.scatter};
+          law_of(kind, cause_of(setting, viewpoint)).scatter};
 }
 
 // Proportional to pixels, with a constant share for samples.

@@ -1,6 +1,9 @@
-// Fitted laws of the error and time of settings as functions of scene and viewpoint; the priors of
+// Fitted laws of the error and time of settings as functions of what a view shows; the priors of
 // all forecasts.
 #pragma once
+
+#include <array>
+#include <cstddef>
 
 #include "server/quality/setting.hpp"
 #include "server/quality/view_traits.hpp"
@@ -14,18 +17,42 @@ struct Scatter {
   double noise = 0;      // standard deviation of one measurement
 };
 
+// Quantities on which errors depend (laws.cpp), as logarithms unless they are shares or counts.
+inline constexpr std::size_t features_count = 22;
+using Features = std::array<double, features_count>;
+
+// The features, then squares and products of some (laws.cpp).
+inline constexpr std::size_t terms_count = features_count + 4;
+using Terms = std::array<double, terms_count>;
+
+// error = exp(base + sum of slopes times terms). The features are clamped to the range that was
+// fitted, so that the law is constant beyond it.
+struct Law {
+  double base = 0;
+  Terms slope{};
+  Features least{};
+  Features most{};
+  Scatter scatter;
+};
+
 struct Expected {
   double value = 0;
   Scatter scatter;
 };
 
-// Resolution of measured errors: pictures and references are of single precision. Smaller errors
-// are reported as this value.
-inline constexpr double error_least = 1e-5;
+// The error of single precision: pictures and references have it, and no smaller error is reported.
+inline constexpr double error_least = 5e-6;
 
-// Whether the setting draws the view at its own size and level, but that level already merges
-// samples.
-bool is_merged(const Setting& setting, const Viewpoint& viewpoint);
+// Settings whose errors have the same main cause: the order of kernels, fewer pixels, merged
+// samples, the thickness of slabs. `merged` also if the view itself merges samples.
+enum class Cause { kernel, smaller, merged, slab };
+Cause cause_of(const Setting& setting, const Viewpoint& viewpoint);
+
+Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
+
+// The power of errors in the thickness of slabs, in cells, is not fitted: it is the order of the
+// method.
+inline constexpr double order_of_slabs = 2;
 
 // Linear RMSE, and milliseconds of rendering on the machine on which the laws were fitted.
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "server/quality/laws.hpp"
@@ -13,7 +15,15 @@ namespace {
 
 constexpr double ms_least = 1e-3;
 constexpr double near = 0.5;  // distance below which a calibration run adds no information
-constexpr std::size_t nearest_max = 6;
+constexpr std::size_t nearest_max = 8;
+// Correlations of the errors of settings by cause: order of kernels, fewer pixels, merged samples,
+// slabs (the residuals of the laws over the generated family).
+constexpr std::array<std::array<double, 4>, 4> correlations{{
+    {0.85, 0.25, 0.2, 0.5},
+    {0.25, 0.85, 0.5, 0.35},
+    {0.2, 0.5, 0.85, 0.15},
+    {0.5, 0.35, 0.15, 0.85},
+}};
 
 // Linear RMSE of a JPEG of quality 90, the median of the samples (docs/benchmarks/error.md).
 constexpr double encoding_error_of_lines = 9.5e-3;
@@ -32,37 +42,37 @@ double relative_quantisation_error(int quality) {
   return lost(quality) / lost(90);
 }
 
+struct Kriged {
+  double log_ratio = 0;
+  double variance = 0;  // with the noise of a new measurement
+};
+
+double squared(double x) { return x * x; }
+
 // The logarithm of a measured over an expected value.
-struct Observation {
+struct TimeObservation {
   const Viewpoint* viewpoint = nullptr;
   double log_ratio = 0;
   double apart = 0;  // distance from the requested viewpoint
 };
 
-struct Kriged {
-  double log_ratio = 0;
-  double variance = 0;  // noise of a new measurement
-};
-
-double squared(double x) { return x * x; }
-
-// C = signature^2 + viewpoint^2 exp(-distance) + noise^2 [same measurement]; the mean is 0. Solves
-// C w = c by Cholesky factorisation, with the forward substitution of c row by row.
-Kriged krige(const std::vector<Observation>& observations, const Scatter& scatter) {
-  const double of_signature = squared(scatter.signature);
-  const double of_viewpoint = squared(scatter.viewpoint);
+// Simple kriging with mean 0: solves C w = c by Cholesky factorisation, with the forward
+// substitution of c row by row. `own` is the variance of a new measurement, requested(i) the
+// covariance of observation i with the requested value, between(i, j) that of two observations,
+// which includes the noise where i = j.
+template <class Known, class Requested, class Between>
+Kriged krige(std::size_t count, double own, const Known& known_at, const Requested& requested,
+             const Between& between) {
   std::array<std::array<double, nearest_max>, nearest_max> factor{};
   std::array<double, nearest_max> asked{};
   std::array<double, nearest_max> known{};
   Kriged out;
-  out.variance = of_signature + of_viewpoint + squared(scatter.noise);
-  for (std::size_t i = 0; i < observations.size(); ++i) {
-    asked[i] = of_signature + of_viewpoint * std::exp(-observations[i].apart);
-    known[i] = observations[i].log_ratio;
+  out.variance = own;
+  for (std::size_t i = 0; i < count; ++i) {
+    asked[i] = requested(i);
+    known[i] = known_at(i);
     for (std::size_t j = 0; j <= i; ++j) {
-      double c = of_signature + of_viewpoint * std::exp(-distance(*observations[i].viewpoint,
-                                                                  *observations[j].viewpoint));
-      if (i == j) c += squared(scatter.noise);
+      double c = between(i, j);
       for (std::size_t k = 0; k < j; ++k) c -= factor[i][k] * factor[j][k];
       factor[i][j] = i == j ? std::sqrt(c) : c / factor[j][j];
     }
@@ -78,11 +88,29 @@ Kriged krige(const std::vector<Observation>& observations, const Scatter& scatte
   return out;
 }
 
-void keep_nearest(std::vector<Observation>& observations) {
-  if (observations.size() <= nearest_max) return;
-  std::stable_sort(observations.begin(), observations.end(),
-                   [](const Observation& a, const Observation& b) { return a.apart < b.apart; });
-  observations.resize(nearest_max);
+// signature^2 + viewpoint^2 exp(-distance), and noise^2 for the same measurement.
+Kriged krige_times(std::vector<TimeObservation> times, const Scatter& scatter) {
+  std::stable_sort(
+      times.begin(), times.end(),
+      [](const TimeObservation& a, const TimeObservation& b) { return a.apart < b.apart; });
+  times.resize(std::min(times.size(), nearest_max));
+  const auto shared = [&](double apart) {
+    return squared(scatter.signature) + squared(scatter.viewpoint) * std::exp(-apart);
+  };
+  return krige(
+      times.size(), shared(0) + squared(scatter.noise),
+      [&](std::size_t i) { return times[i].log_ratio; },
+      [&](std::size_t i) { return shared(times[i].apart); },
+      [&](std::size_t i, std::size_t j) {
+        return shared(distance(*times[i].viewpoint, *times[j].viewpoint)) +
+               (i == j ? squared(scatter.noise) : 0);
+      });
+}
+
+// Correlation of the errors of two settings, beyond what the laws express.
+double correlation(std::size_t a, Cause cause_a, std::size_t b, Cause cause_b) {
+  if (a == b && cause_a == cause_b) return 1;
+  return correlations[static_cast<std::size_t>(cause_a)][static_cast<std::size_t>(cause_b)];
 }
 
 // Encoding error decreases with the distance of the eye.
@@ -90,22 +118,70 @@ double encoded_detail(const Viewpoint& viewpoint) { return 1 / std::sqrt(viewpoi
 
 }  // namespace
 
+// The logarithm of a measured over an expected error.
+struct ErrorObservation {
+  std::size_t setting = 0;
+  Cause cause = Cause::kernel;
+  const Viewpoint* viewpoint = nullptr;
+  double log_ratio = 0;
+  double spread = 1;  // standard deviation of log_ratio without measurements
+  double apart = 0;   // distance from the requested viewpoint
+  double shared = 0;  // covariance with the requested error
+};
+
+namespace {
+
+double spread_of(const Scatter& scatter) {
+  return std::hypot(scatter.signature, scatter.viewpoint);
+}
+
+// `errors` are those of all settings, in units of the spread of their cause. Uses the ones that
+// correlate most.
+Kriged krige_errors(std::size_t setting, Cause cause, std::vector<ErrorObservation> errors,
+                    const Scatter& scatter) {
+  const auto covariance = [&](const ErrorObservation& a, std::size_t b, Cause cause_b,
+                              double apart) {
+    return correlation(a.setting, a.cause, b, cause_b) *
+           (squared(scatter.signature) + squared(scatter.viewpoint) * std::exp(-apart));
+  };
+  for (ErrorObservation& e : errors) e.shared = covariance(e, setting, cause, e.apart);
+  const std::size_t count = std::min(errors.size(), nearest_max);
+  std::partial_sort(
+      errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(count), errors.end(),
+      [](const ErrorObservation& a, const ErrorObservation& b) { return a.shared > b.shared; });
+  const double noise = squared(scatter.noise);
+  const double own_spread = spread_of(scatter);
+  return krige(
+      count, squared(scatter.signature) + squared(scatter.viewpoint) + noise,
+      [&](std::size_t i) { return errors[i].log_ratio * own_spread / errors[i].spread; },
+      [&](std::size_t i) { return errors[i].shared; },
+      [&](std::size_t i, std::size_t j) {
+        const ErrorObservation& b = errors[j];
+        return covariance(errors[i], b.setting, b.cause,
+                          distance(*errors[i].viewpoint, *b.viewpoint)) +
+               (i == j ? noise : 0);
+      });
+}
+
+}  // namespace
+
 Forecast prior(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   const Expected error = expected_error(kind, setting, viewpoint);
   Forecast out;
   out.error = error.value;
-  out.spread = std::hypot(error.scatter.signature, error.scatter.viewpoint);
+  out.spread = spread_of(error.scatter);
   out.ms = expected_ms(kind, setting, viewpoint).value;
   return out;
 }
 
-void Table::add(std::size_t setting, const Viewpoint& viewpoint, const Measured& measured) {
+void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& measured) {
   const auto is_bad = [](const std::optional<double>& value) {
     return value && !std::isfinite(*value);
   };
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
-  Entry entry{viewpoint, {}, {}, is_merged(how, viewpoint)};
+  const Viewpoint viewpoint = filled(seen);
+  Entry entry{viewpoint, {}, {}};
   if (measured.error) {
     const double error = std::max(*measured.error, error_least);
     entry.log_error = std::log(error / expected_error(kind_, how, viewpoint).value);
@@ -123,42 +199,78 @@ void Table::add(std::size_t setting, const Viewpoint& viewpoint, const Measured&
   entries.erase(oldest == entries.end() - 1 ? entries.begin() : oldest);
 }
 
-Forecast Table::forecast(std::size_t setting, const Viewpoint& viewpoint) const {
-  const Setting& how = settings[setting];
-  const bool merged = is_merged(how, viewpoint);
-  Forecast out = prior(kind_, how, viewpoint);
-  std::vector<Observation> errors;
-  std::vector<Observation> times;
-  for (const Entry& entry : entries_[setting]) {
-    const double apart = distance(entry.viewpoint, viewpoint);
-    // Merged data and data in full detail follow different laws.
-    if (entry.log_error && entry.merged == merged) {
-      errors.push_back({&entry.viewpoint, *entry.log_error, apart});
+Viewpoint Table::filled(Viewpoint viewpoint) const {
+  if (viewpoint.content) return viewpoint;
+  const Viewpoint* nearest = nullptr;
+  for (const std::deque<Entry>& entries : entries_) {
+    for (const Entry& entry : entries) {
+      if (!entry.viewpoint.content) continue;
+      if (nearest == nullptr ||
+          distance(entry.viewpoint, viewpoint) < distance(*nearest, viewpoint)) {
+        nearest = &entry.viewpoint;
+      }
     }
-    if (entry.log_ms) times.push_back({&entry.viewpoint, *entry.log_ms, apart});
   }
+  if (nearest != nullptr) {
+    viewpoint.content = scaled(*nearest->content, nearest->height / viewpoint.height);
+  }
+  return viewpoint;
+}
+
+std::vector<ErrorObservation> Table::errors_near(const Viewpoint& viewpoint) const {
+  std::vector<ErrorObservation> errors;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    for (const Entry& entry : entries_[i]) {
+      if (!entry.log_error) continue;
+      errors.push_back({i, cause_of(settings[i], entry.viewpoint), &entry.viewpoint,
+                        *entry.log_error,
+                        spread_of(expected_error(kind_, settings[i], entry.viewpoint).scatter),
+                        distance(entry.viewpoint, viewpoint), 0});
+    }
+  }
+  return errors;
+}
+
+Forecast Table::forecast_at(std::size_t setting, const Viewpoint& viewpoint,
+                            const std::vector<ErrorObservation>& errors) const {
+  const Setting& how = settings[setting];
+  Forecast out = prior(kind_, how, viewpoint);
   if (!errors.empty()) {
-    out.measured = std::any_of(errors.begin(), errors.end(),
-                               [](const Observation& o) { return o.apart < near; });
-    keep_nearest(errors);
-    const Kriged kriged = krige(errors, expected_error(kind_, how, viewpoint).scatter);
-    out.error = std::max(error_least, out.error * std::exp(kriged.log_ratio));
+    const Cause cause = cause_of(how, viewpoint);
+    out.measured = std::any_of(errors.begin(), errors.end(), [&](const ErrorObservation& e) {
+      return e.setting == setting && e.cause == cause && e.apart < near;
+    });
+    const Kriged kriged =
+        krige_errors(setting, cause, errors, expected_error(kind_, how, viewpoint).scatter);
+    out.error = std::clamp(out.error * std::exp(kriged.log_ratio), error_least, 1.0);
     out.spread = std::sqrt(kriged.variance);
   }
+  std::vector<TimeObservation> times;
+  for (const Entry& entry : entries_[setting]) {
+    if (!entry.log_ms) continue;
+    times.push_back({&entry.viewpoint, *entry.log_ms, distance(entry.viewpoint, viewpoint)});
+  }
   if (!times.empty()) {
-    keep_nearest(times);
-    out.ms *= std::exp(krige(times, expected_ms(kind_, how, viewpoint).scatter).log_ratio);
+    const Scatter scatter = expected_ms(kind_, how, viewpoint).scatter;
+    out.ms *= std::exp(krige_times(std::move(times), scatter).log_ratio);
     out.timed = true;
   }
   return out;
 }
 
-Forecasts Table::forecasts(const Viewpoint& viewpoint) const {
+Forecast Table::forecast(std::size_t setting, const Viewpoint& seen) const {
+  const Viewpoint viewpoint = filled(seen);
+  return forecast_at(setting, viewpoint, errors_near(viewpoint));
+}
+
+Forecasts Table::forecasts(const Viewpoint& seen) const {
+  const Viewpoint viewpoint = filled(seen);
+  const std::vector<ErrorObservation> errors = errors_near(viewpoint);
   Forecasts out;
   double log_ratio = 0;
   int timed = 0;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i] = forecast(i, viewpoint);
+    out[i] = forecast_at(i, viewpoint, errors);
     if (!out[i].timed) continue;
     log_ratio += std::log(out[i].ms / prior(kind_, settings[i], viewpoint).ms);
     ++timed;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <vector>
 
 #include "server/quality/setting.hpp"
 #include "server/quality/view_traits.hpp"
@@ -27,8 +28,10 @@ struct Forecast {
 };
 using Forecasts = std::array<Forecast, settings_count>;
 
-// The forecast without measurements: laws fitted to many views of the samples.
+// The forecast without measurements: laws fitted to many views of generated data.
 Forecast prior(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
+
+struct ErrorObservation;
 
 // Measurements of one scene signature; keeps the newest of each setting.
 class Table {
@@ -42,9 +45,11 @@ class Table {
 
   // Forecasts of all settings. Times without measurements are estimated from those with.
   [[nodiscard]] Forecasts forecasts(const Viewpoint& viewpoint) const;
-  // The prior corrected by the nearest measurements: simple kriging of the logarithms of measured
-  // over expected values, with a covariance that decays with the distance of viewpoints to a
-  // constant part of the signature. The spread is the kriging standard deviation.
+  // The prior corrected by measurements: simple kriging of the logarithms of measured over expected
+  // values. Errors correlate with those of other settings too, most if they have the same cause,
+  // and more so the nearer the viewpoints are; a constant part belongs to the signature. The spread
+  // is the kriging standard deviation. A viewpoint of unknown content has that of the nearest
+  // measured one.
   [[nodiscard]] Forecast forecast(std::size_t setting, const Viewpoint& viewpoint) const;
 
   // Whether a calibration run at this viewpoint would add information; begin and end of one.
@@ -64,8 +69,12 @@ class Table {
     // Logarithms of measured over expected values.
     std::optional<double> log_error;
     std::optional<double> log_ms;
-    bool merged = false;
   };
+  // The viewpoint with the content of the nearest measured one, if its own is unknown.
+  [[nodiscard]] Viewpoint filled(Viewpoint viewpoint) const;
+  [[nodiscard]] Forecast forecast_at(std::size_t setting, const Viewpoint& viewpoint,
+                                     const std::vector<ErrorObservation>& errors) const;
+  [[nodiscard]] std::vector<ErrorObservation> errors_near(const Viewpoint& viewpoint) const;
 
   Kind kind_;
   std::array<std::deque<Entry>, settings_count> entries_;

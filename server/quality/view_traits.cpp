@@ -49,6 +49,9 @@ Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise) {
           ? *view.camera.height
           : 2 * length * std::tan(0.5 * radians_per_degree * view.camera.fov_y);
   viewpoint.detail *= otherwise.height / viewpoint.height;
+  if (viewpoint.content) {
+    viewpoint.content = scaled(*viewpoint.content, otherwise.height / viewpoint.height);
+  }
   return viewpoint;
 }
 

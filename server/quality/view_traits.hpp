@@ -1,9 +1,11 @@
 // The properties of a view that determine its error and time: scene signature and viewpoint.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "protocol/view.hpp"
+#include "server/quality/content.hpp"
 
 namespace windsplat::quality {
 
@@ -16,10 +18,11 @@ struct Viewpoint {
   // Size of the finest cells relative to that below which samples are merged; 0: never merged,
   // or unknown.
   double detail = 0;
+  std::optional<Content> content = std::nullopt;  // empty: unknown
 };
 
 // The viewpoint of a view; values that the view leaves to defaults are taken from `otherwise`. The
-// detail is that of `otherwise` scaled by the size of the volume in the picture.
+// detail and the content are those of `otherwise`, scaled by the size of the volume in the picture.
 Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise = {});
 
 // Stop transmittance of reference pictures; below it nothing is visible in 8 bits.

@@ -120,7 +120,7 @@ class Calibrator {
     if (!errors) return errors.error();
     const auto completed = frame::complete(view, *subject_.dataset);
     if (!completed) return completed.error();
-    const quality::Viewpoint viewpoint = frame::viewpoint_of(*completed);
+    const quality::Viewpoint viewpoint = frame::viewpoint_of(*completed, *subject_.dataset);
     const quality::Forecasts forecasts = table.forecasts(viewpoint);
     for (std::size_t i = 0; i < errors->size(); ++i) {
       if (std::isnan((*errors)[i])) continue;

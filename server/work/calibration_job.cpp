@@ -56,10 +56,12 @@ class Study {
   bool complete_ = false;
 };
 
-std::shared_ptr<Study> begin(Backend& backend, const scene::CompletedView& completed) {
+std::shared_ptr<Study> begin(Backend& backend, const scene::CompletedView& completed,
+                             const data::Dataset& dataset) {
   if (!frame::is_worth_calibrating(completed.view())) return nullptr;
   quality::SceneSignature signature = quality::signature_of(completed.view());
-  if (!backend.quality.begin_study(signature, frame::viewpoint_of(completed))) return nullptr;
+  if (!backend.quality.begin_study(signature, frame::viewpoint_of(completed, dataset)))
+    return nullptr;
   return std::make_shared<Study>(backend, completed, std::move(signature));
 }
 
@@ -76,7 +78,7 @@ void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::V
       data::Dataset prefetching = dataset->prefetching();
       const auto completed = completion->of(view, prefetching);
       if (!completed) return completed.error();
-      study = begin(backend, *completed);
+      study = begin(backend, *completed, prefetching);
       if (!study) return make_error(ErrorKind::not_found, "no settings to calibrate");
       return study->load(prefetching, unwanted);
     });

@@ -10,6 +10,7 @@ Observation observed_in(const frame::Frame& drawn, const quality::Setting& setti
   }
   Observation observed{quality::signature_of(asked), quality::viewpoint_of(asked)};
   observed.viewpoint.detail = drawn.detail;
+  observed.viewpoint.content = drawn.content;
   return observed;
 }
 

@@ -11,19 +11,6 @@
 #include "server/base/pcg3d.hpp"
 
 namespace windsplat::test {
-namespace {
-
-using Point = std::array<double, 3>;
-
-// Vector and scalar at a sample. `at`: position in [0, 1] along each axis; `index`: its indices.
-struct Values {
-  std::array<double, 3> flow{};
-  double cloud = 0;
-};
-using TrialFormula = std::function<Values(const Point& at, const std::array<int, 3>& index)>;
-
-constexpr double two_pi = 6.283185307179586;
-constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 // Uniform in [-1, 1).
 double hashed(int i, int j, int k, std::uint32_t salt) {
@@ -33,7 +20,6 @@ double hashed(int i, int j, int k, std::uint32_t salt) {
   return bits[0] / 2147483648.0 - 1;
 }
 
-// Trilinear interpolation of hashed values on a lattice of `cells` cells along each axis.
 double noise(const Point& at, int cells, std::uint32_t salt) {
   std::array<int, 3> low{};
   Point f{};
@@ -54,7 +40,6 @@ double noise(const Point& at, int cells, std::uint32_t salt) {
   return sum;
 }
 
-// Octaves of 2, 4, ... `finest` cells whose amplitude falls by `decay` each.
 double turbulence(const Point& at, int finest, double decay, std::uint32_t salt) {
   double sum = 0;
   double amplitude = 1;
@@ -63,6 +48,11 @@ double turbulence(const Point& at, int finest, double decay, std::uint32_t salt)
   }
   return sum;
 }
+
+namespace {
+
+constexpr double two_pi = 6.283185307179586;
+constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 Values turbulent(const Point& at, int finest, double decay) {
   Values out;
@@ -170,7 +160,7 @@ TrialFormula formula_of(const std::string& name) {
 
 class TrialSource final : public data::Source {
  public:
-  explicit TrialSource(const TrialField& field) : formula_(formula_of(field.name)) {
+  TrialSource(const TrialField& field, TrialFormula formula) : formula_(std::move(formula)) {
     info_.id = info_.title = info_.digest = field.name;
     info_.source = "formula";
     info_.format = "trial";
@@ -250,9 +240,13 @@ const std::vector<TrialField>& trial_fields() {
   return fields;
 }
 
+std::unique_ptr<data::Dataset> formula_dataset(const TrialField& field, TrialFormula formula) {
+  return std::make_unique<data::Dataset>(std::make_unique<TrialSource>(field, std::move(formula)),
+                                         "trial", std::uint64_t{1} << 30U);
+}
+
 std::unique_ptr<data::Dataset> trial_dataset(const TrialField& field) {
-  return std::make_unique<data::Dataset>(std::make_unique<TrialSource>(field), "trial",
-                                         std::uint64_t{1} << 30U);
+  return formula_dataset(field, formula_of(field.name));
 }
 
 }  // namespace windsplat::test

@@ -37,8 +37,9 @@ std::size_t Chooser::choose(const protocol::View& view, const quality::Forecasts
     }
     // The tried setting did not fit.
     constexpr Micros of_the_try = 500'000;
-    if (tried_at_ && now - *tried_at_ < of_the_try) {
+    if (tried_ == chosen_ && now - *tried_at_ < of_the_try) {
       try_after_ = std::min(2 * std::max(try_after_, retry_us), try_after_most);
+      tried_.reset();
     }
   }
   slack_ = 0;
@@ -81,7 +82,8 @@ std::size_t Chooser::patient(const quality::Choice& calm, const quality::Forecas
       next = i;
     }
   }
-  return next.value_or(wanted);
+  tried_ = next.value_or(wanted);
+  return *tried_;
 }
 
 }  // namespace windsplat::session

@@ -38,7 +38,8 @@ class Chooser {
   bool measured_ = false;
   std::optional<std::size_t> chosen_;  // setting of the newest frame; reset after a rest
   Micros chosen_at_ = 0;
-  int slack_ = 0;  // consecutive frames that would have allowed a slower setting
+  int slack_ = 0;                     // consecutive frames that would have allowed a slower setting
+  std::optional<std::size_t> tried_;  // setting tried last; empty once it did not fit
   std::optional<Micros> tried_at_;
   Micros try_after_ = try_after_first;
 };

@@ -14,6 +14,7 @@
 #include "server/engine/reference/reference.hpp"
 #include "server/frame/frame.hpp"
 #include "server/frame/measure.hpp"
+#include "server/quality/pick.hpp"
 #include "server/quality/tables.hpp"
 #include "server/study/extremes/cases.hpp"
 #include "server/study/scenes.hpp"
@@ -178,7 +179,9 @@ class Battery {
       if (!drawn) return drawn;
     }
     if (auto known = find_truth(one, prepared->scene, result); !known) return known;
-    if (method != MethodName::reference) report_error(*prepared, workspace.drawn, result);
+    if (method != MethodName::reference) {
+      report_error(*prepared, *one.dataset, workspace.drawn, result);
+    }
     Observed observed{rgba, truth_.pixels, truth_.rgba, result.measured};
     if (!result.measured && !std::isnan(result.bound)) observed.reported = result.bound;
     // The reference is no truth of itself.
@@ -190,15 +193,15 @@ class Battery {
   }
 
   // The errors that the frame reports: the measured one, and the estimate in its absence.
-  static void report_error(const frame::Prepared& prepared, const frame::Frame& drawn,
-                           CaseResult& result) {
+  static void report_error(const frame::Prepared& prepared, const data::Dataset& dataset,
+                           const frame::Frame& drawn, CaseResult& result) {
     result.measured = drawn.error;
-    const auto forecast = quality::Tables().forecast(
-        quality::signature_of(prepared.completed.view()),
-        quality::index_of(prepared.setting).value(), frame::viewpoint_of(prepared.completed));
-    constexpr double spreads = 1.65;  // 95 % of errors
+    const auto forecast =
+        quality::Tables().forecast(quality::signature_of(prepared.completed.view()),
+                                   quality::index_of(prepared.setting).value(),
+                                   frame::viewpoint_of(prepared.completed, dataset));
     result.estimate = forecast.error;
-    result.bound = forecast.error * std::exp(spreads * forecast.spread);
+    result.bound = quality::error_bound(forecast);
   }
 
   void check_monotone(const std::vector<float>& rgba, double stop, CaseResult& result) {

@@ -226,7 +226,7 @@ TEST_F(Measure, CalibrationErrorsHaveTheSameBitsForAnyNumberOfThreads) {
 // From far away the view merges its data: slabs of any thickness then have equal errors.
 TEST_F(Measure, CalibrationRunRendersAveragesAsFramesDo) {
   scene::orbit(view, completed().lattice(), 20, 30, 0.05);
-  EXPECT_LT(viewpoint_of(completed()).detail, 1);
+  EXPECT_LT(viewpoint_of(completed(), *dataset).detail, 1);
   auto found = calibrated();
   const auto error_of = [&](int thinner) {
     return found.at(quality::index_of({protocol::MethodName::slab, 0, 0, thinner}).value())

@@ -1,0 +1,14 @@
+// Scene -> what determines the errors of its pictures, from a few thousand of its samples.
+#pragma once
+
+#include "server/quality/content.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::frame {
+
+// The same for the same scene. Takes a few milliseconds: at most 4096 samples with their
+// neighbours, spread evenly over the drawn lattice, are projected onto a coarse grid of the picture
+// and composited in order of depth. The body is ignored.
+quality::Content content_of(const scene::Scene& scene);
+
+}  // namespace windsplat::frame

@@ -1,0 +1,37 @@
+// What a view shows, as far as it determines the errors of its pictures.
+#pragma once
+
+namespace windsplat::quality {
+
+// Lengths are in heights of the picture. Means are over what is visible, weighted by its light. The
+// defaults are those of a typical view.
+struct Content {
+  double lines = 0.2;         // RMS over the picture of the opacity of its lines
+  double layers = 0.5;        // lines over one another where there are any, times their opacity
+  double length = 0.08;       // length of a line as projected
+  double shade = 0.03;        // |difference| of the colours of neighbouring lines
+  double gaps = 0.02;         // share of the neighbours of a line that have none
+  double line_depth = 0.02;   // optical depth of the medium of one cell at a line
+  double depth = 1;           // optical depth of the medium along a ray
+  double cell_depth = 0.06;   // optical depth of the medium of one cell
+  double tint = 0.1;          // |difference| of the colours of the medium of neighbours along a ray
+  double cell = 0.03;         // cube root of the volume of a cell
+  double finest_cell = 0.03;  // the narrowest edge of a cell
+  // The light of the medium alone: root of the integral of squares over the picture.
+  double step = 0.06;       // its difference from one cell to the next
+  double bend = 0.08;       // its second difference
+  double wide_bend = 0.1;   // the same over two cells on either side
+  double order = 4e-3;      // its change if neighbouring cells changed places along the ray
+  double step_cell = 0.03;  // width of the cells where it differs
+};
+
+// The same content `times` as large in the picture.
+inline Content scaled(Content content, double times) {
+  content.length *= times;
+  content.cell *= times;
+  content.finest_cell *= times;
+  content.step_cell *= times;
+  return content;
+}
+
+}  // namespace windsplat::quality
