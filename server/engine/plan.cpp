@@ -414,7 +414,8 @@ int eye_index(const Camera& camera, int axis, const std::vector<double>& positio
 }
 
 bool has_thicker_slabs(const Scene& scene) {
-  return scene.method == scene::Method::slab && slab_depth_asked(scene) < slab_depth_least(scene);
+  return scene.method == scene::Method::slab && !scene.scalars.empty() &&
+         slab_depth_asked(scene) < slab_depth_least(scene);
 }
 
 void visit_order(int count, int eye, std::vector<int>& order) {

@@ -204,6 +204,7 @@ class CalibrationRun {
     viewpoint_ = viewpoint_of(completed_, dataset_);  // of the data that are now resident
     const std::array<int, 3> own_level = own->level;
     const double half = reference_thickness(completed_);
+    bool told = false;
     for (const double thickness : {half, half / 2}) {
       const auto finer = finer_scene(completed_, dataset_, thickness, truth_samples_max);
       if (!finer) return finer.error();
@@ -212,10 +213,11 @@ class CalibrationRun {
       auto drawn = thickness == half ? draw_half(finer->first) : draw_quarter(finer->first);
       if (!drawn) return drawn.error();
       ms_.push_back(milliseconds_since(start));
-      told_ = finer->first.level == own_level && is_exact(*own) &&
-              half == completed_.view().method.slab_thickness / 2;
+      told = finer->first.level == own_level && is_exact(*own) &&
+             half == completed_.view().method.slab_thickness / 2;
     }
     known_ = true;
+    told_ = told;
     if (!told_) return {};
     tell_run({protocol::MethodName::slab, 0, 0, 2}, truth_.error_of_half, ms_[0]);
     tell_run({protocol::MethodName::slab, 0, 0, 4}, truth_.error_of_quarter, ms_[1]);

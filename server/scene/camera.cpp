@@ -203,7 +203,8 @@ void face(const Face& plane, const Lattice& lattice, protocol::View& view) {
   const glm::dvec3 up = to_glm(camera.up);
   const double length = glm::length(up);
   const bool parallel = !(glm::length(glm::cross(frame.forward, up)) > upright_sine * length);
-  if (parallel) camera.up = {0, 1, 0};  // north
+  const bool level = std::abs(frame.forward.z) > 0.5;
+  if (parallel) camera.up = level ? protocol::Vec3{0, 1, 0} : protocol::Vec3{0, 0, 1};
   frame.right = glm::normalize(glm::cross(frame.forward, to_glm(camera.up)));
   frame.up = glm::cross(frame.right, frame.forward);
   glm::dvec3 low(std::numeric_limits<double>::infinity());

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <utility>
 
 #include "server/data/model/digest.hpp"

@@ -5,13 +5,16 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <sstream>
+#include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
+#include "server/base/check.hpp"
 #include "server/base/thread_pool.hpp"
-#include "server/data/model/digest.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/refusal.hpp"
 
@@ -124,6 +127,19 @@ float as_float(double value) {
   return static_cast<float>(value < -most ? -most : value > most ? most : value);
 }
 
+// A few threads, beside those that render. One suffices if the system permits no more.
+std::unique_ptr<ThreadPool> make_pool(std::size_t threads) {
+  constexpr std::size_t threads_max = 4;
+  const auto processors = std::size_t{std::max(1U, std::thread::hardware_concurrency())};
+  const std::size_t most = std::min(threads_max, processors);
+  try {
+    return std::make_unique<ThreadPool>(
+        static_cast<unsigned>(std::clamp(threads, std::size_t{1}, most)));
+  } catch (const std::system_error&) {
+    return std::make_unique<ThreadPool>(1);
+  }
+}
+
 // Calls visit(n, i, j, k, neighbours) for each sample, on several threads if there are many;
 // `neighbours` are those left by the previous call on the thread.
 template <class Visit>
@@ -132,11 +148,9 @@ void each_sample(const Section& section, const Visit& visit) {
   constexpr std::size_t blocks_a_thread = 16;
   const std::size_t samples = samples_of(section);
   const std::size_t blocks = (samples + block - 1) / block;
-  const auto processors = std::size_t{std::max(1U, std::thread::hardware_concurrency())};
-  ThreadPool pool(
-      static_cast<unsigned>(std::clamp(blocks / blocks_a_thread, std::size_t{1}, processors)));
+  const auto pool = make_pool(blocks / blocks_a_thread);
   const auto [nx, ny, nz] = section.dims;
-  pool.run(blocks, [&, nx = nx, ny = ny](std::size_t number, unsigned) {
+  pool->run(blocks, [&, nx = nx, ny = ny](std::size_t number, unsigned) {
     const std::size_t end = std::min(samples, (number + 1) * block);
     std::size_t n = number * block;
     const std::size_t row = n / static_cast<std::size_t>(nx);
@@ -315,9 +329,10 @@ void append_factors(const ComponentFactors& factors, std::vector<double>& to) {
   append(factors.rates->z, to);
 }
 
+// All bytes of the numbers, which clients choose: two planes with the same digest could be found.
 std::string key_of(const char* what, const std::vector<double>& numbers) {
-  return what + data::digest_of({reinterpret_cast<const char*>(numbers.data()),
-                                 numbers.size() * sizeof(double)});
+  return what + std::string(reinterpret_cast<const char*>(numbers.data()),
+                            numbers.size() * sizeof(double));
 }
 
 // What determines the places of the samples of a dataset, and the plane.
@@ -431,6 +446,7 @@ Result<Lattice> lattice_of(const Section& section, data::Dataset& dataset) {
   });
   if (!kept) return kept.error();
   out.places = std::static_pointer_cast<const Places>(*kept);
+  WINDSPLAT_CHECK(out.places->size() == samples);
   return out;
 }
 

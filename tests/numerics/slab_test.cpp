@@ -102,8 +102,6 @@ TEST(Slab, HalvingTheThicknessQuartersTheError) {
   }
 }
 
-// Lines are in exact order for any slabs: when a brick spans hundreds of slabs, and when one slab
-// contains all lines.
 // Any stride beyond the samples of an axis leaves one cell along it, as wide as the box.
 TEST(Slab, StridesBeyondTheBoxHaveSlabsOfItsSize) {
   for (const bool perspective : {false, true}) {
@@ -118,6 +116,8 @@ TEST(Slab, StridesBeyondTheBoxHaveSlabsOfItsSize) {
   }
 }
 
+// Lines are in exact order for any slabs: when a brick spans hundreds of slabs, and when one slab
+// contains all lines.
 TEST(Slab, LinesDoNotDependOnTheThickness) {
   for (const bool perspective : {false, true}) {
     Scene scene = blobs(6, 64, 0.4, perspective);

@@ -126,6 +126,31 @@ TEST_F(Measure, NoErrorIsMeasuredWhereSlabsCannotBeThinner) {
   }
 }
 
+// Between cells whose slabs can all be thinner and cells whose slabs cannot lie those of which
+// slabs of half a cell are possible and slabs of a quarter are not (a range of a factor of 2).
+TEST_F(Measure, CalibrationReportsEverySettingHoweverFlatTheCells) {
+  view.method.name = protocol::MethodName::slab;
+  view.method.compositing = protocol::Compositing::analytic;
+  view.method.stop_transmittance = 0;
+  view.method.slab_thickness = 1;
+  view.method.detail = protocol::Detail::full;
+  std::size_t without_error = 0;
+  std::size_t with_error = 0;
+  for (const double scale : {2.0, 3.0, 4.5, 6.75, 10.0}) {
+    view.geometry.scale = {1e3, 1e3, scale};
+    view.camera.eye.reset();
+    view = completed().view();
+    const auto found = calibrated();
+    for (std::size_t i = 0; i < quality::settings_count; ++i) {
+      if (!quality::is_allowed(quality::settings[i], view)) continue;
+      ASSERT_TRUE(found.contains(i)) << scale << ' ' << i;
+      ++(found.at(i).error ? with_error : without_error);
+    }
+  }
+  EXPECT_GT(with_error, 0U);
+  EXPECT_GT(without_error, 0U);
+}
+
 // Errors that thinner slabs reduce less or not at all: compositing rule and early termination.
 TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
   const protocol::MethodView usual = view.method;

@@ -267,6 +267,23 @@ TEST(Camera, DefaultFacesTheSliceOrPlaneWithTheUsualMargin) {
   }
 }
 
+TEST(Camera, ADirectionUpAlongTheNormalOfASliceIsReplaced) {
+  auto dataset = atmosphere();
+  for (const auto axis : {protocol::GridAxis::x, protocol::GridAxis::y, protocol::GridAxis::z}) {
+    for (const double sign : {-1.0, 1.0}) {
+      protocol::View view;
+      view.geometry.slice = protocol::SliceView{axis, 1};
+      const auto a = static_cast<int>(axis);
+      view.camera.up = {0, 0, 0};
+      view.camera.up.at(static_cast<std::size_t>(a)) = sign;
+      const auto full = complete(view, *dataset);
+      ASSERT_TRUE(full) << a << ' ' << full.error().message;
+      EXPECT_NEAR(std::abs(full->camera().forward[a]), 1, 1e-9);
+      EXPECT_NEAR(full->camera().up[a == 2 ? 1 : 2], 1, 1e-9) << a;
+    }
+  }
+}
+
 TEST(Camera, StatedPartsAreKeptWithASlice) {
   auto dataset = atmosphere();
   const auto camera_of = [&](const protocol::View& view) {

@@ -43,8 +43,8 @@ export class CameraControl {
     this.host.change({ camera: patch });
   }
 
-  // Resets the camera; the server then frames the whole box, or faces the
-  // slice, for the present picture size.
+  // Resets the camera; the server then frames the whole box, or faces the slice, for the present
+  // picture size.
   reset(): void {
     this.host.change({ camera: { eye: null, target: null, up: null, height: null } });
   }
