@@ -8,7 +8,6 @@
 namespace windsplat::transport {
 namespace {
 
-constexpr int close_over_quota = 1013;
 constexpr std::chrono::seconds throttle_max{10};
 
 }  // namespace
@@ -46,9 +45,8 @@ void SessionWork::start(const session::StartRender& effect) {
   const std::chrono::microseconds wait(admission_.throttle_delay(address_));
   if (wait.count() == 0) return begin(effect);
   if (wait > throttle_max) {
-    return owner_.close(close_over_quota, "this address exceeded its quota; try again in " +
-                                              std::to_string(wait / std::chrono::seconds(1)) +
-                                              " s");
+    return owner_.close(close_full, "this address exceeded its quota; try again in " +
+                                        std::to_string(wait / std::chrono::seconds(1)) + " s");
   }
   throttled_ = effect;
   timer_.expires_after(wait);

@@ -10,6 +10,12 @@
 
 namespace windsplat::transport {
 
+// Close codes (RFC 6455, section 7.4.1, and its IANA registry).
+inline constexpr int close_policy = 1008;
+inline constexpr int close_too_big = 1009;
+inline constexpr int close_fault = 1011;
+inline constexpr int close_full = 1013;
+
 class StreamOwner : public std::enable_shared_from_this<StreamOwner> {
  public:
   StreamOwner(std::uint64_t id, std::string request_id)

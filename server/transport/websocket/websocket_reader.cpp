@@ -7,13 +7,6 @@
 #include "protocol/limits.hpp"
 
 namespace windsplat::transport {
-namespace {
-
-constexpr int close_policy = 1008;
-constexpr int close_too_big = 1009;
-
-}  // namespace
-
 WebSocketReader::WebSocketReader(StreamOwner& owner, WebSocketStream& socket,
                                  access::Admission& admission, const std::string& address,
                                  const WriteQueue& queue, StreamEvents& events)

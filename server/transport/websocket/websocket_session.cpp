@@ -19,9 +19,6 @@
 namespace windsplat::transport {
 namespace {
 
-constexpr int close_policy = 1008;
-constexpr int close_full = 1013;
-constexpr int close_fault = 1011;
 constexpr std::chrono::seconds handshake_timeout{5};
 constexpr std::chrono::seconds silence_timeout{60};  // a ping is sent after half of it
 constexpr std::chrono::seconds close_timeout{2};
