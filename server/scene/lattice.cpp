@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <iomanip>
 #include <limits>
 #include <sstream>
@@ -239,6 +240,30 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
   }
   if (auto ok = check_aspect(grid, geometry, lattice); !ok) return ok.error();
   return lattice;
+}
+
+std::vector<glm::dvec3> points_in_box(const Lattice& lattice, const glm::dvec3& point,
+                                      const glm::dvec3& normal) {
+  std::vector<glm::dvec3> points;
+  const auto corner = [&](unsigned bits) {
+    glm::dvec3 at = lattice.box_min;
+    for (int a = 0; a < 3; ++a) {
+      if ((bits >> static_cast<unsigned>(a) & 1U) != 0) at[a] = lattice.box_max[a];
+    }
+    return at;
+  };
+  for (unsigned bits = 0; bits < 8; ++bits) {
+    for (unsigned a = 0; a < 3; ++a) {
+      if ((bits >> a & 1U) != 0) continue;
+      const glm::dvec3 from = corner(bits);
+      const glm::dvec3 to = corner(bits | 1U << a);
+      const double before = glm::dot(normal, from - point);
+      const double after = glm::dot(normal, to - point);
+      if (before * after > 0 || before == after) continue;
+      points.push_back(from + (to - from) * (before / (before - after)));
+    }
+  }
+  return points;
 }
 
 }  // namespace windsplat::scene

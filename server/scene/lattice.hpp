@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <glm/vec3.hpp>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
@@ -28,5 +30,9 @@ Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryVi
 
 // Mean width of the lattice's cells along an axis, world units.
 double cell_size(const Lattice& lattice, std::size_t axis);
+
+// The points where a plane meets the edges of the box; their hull is its part in the box.
+std::vector<glm::dvec3> points_in_box(const Lattice& lattice, const glm::dvec3& point,
+                                      const glm::dvec3& normal);
 
 }  // namespace windsplat::scene

@@ -380,30 +380,6 @@ Result<Section> make_section(const protocol::GeometryView& geometry, const Latti
   return section;
 }
 
-std::vector<glm::dvec3> points_in_box(const Lattice& lattice, const glm::dvec3& point,
-                                      const glm::dvec3& normal) {
-  std::vector<glm::dvec3> points;
-  const auto corner = [&](unsigned bits) {
-    glm::dvec3 at = lattice.box_min;
-    for (int a = 0; a < 3; ++a) {
-      if ((bits >> static_cast<unsigned>(a) & 1U) != 0) at[a] = lattice.box_max[a];
-    }
-    return at;
-  };
-  for (unsigned bits = 0; bits < 8; ++bits) {
-    for (unsigned a = 0; a < 3; ++a) {
-      if ((bits >> a & 1U) != 0) continue;
-      const glm::dvec3 from = corner(bits);
-      const glm::dvec3 to = corner(bits | 1U << a);
-      const double before = glm::dot(normal, from - point);
-      const double after = glm::dot(normal, to - point);
-      if (before * after > 0 || before == after) continue;
-      points.push_back(from + (to - from) * (before / (before - after)));
-    }
-  }
-  return points;
-}
-
 std::vector<double> along_section(const Section& section, int axis, std::vector<double> values) {
   if (axis != section.axis || section.oblique) return values;
   Neighbours at;

@@ -54,10 +54,6 @@ Result<Lattice> lattice_of(const Section& section, data::Dataset& dataset);
 // The variant under which the places are kept; empty: there are none.
 std::string places_of(const Section& section);
 
-// The points where a plane meets the edges of the box; their hull is its part in the box.
-std::vector<glm::dvec3> points_in_box(const Lattice& lattice, const glm::dvec3& point,
-                                      const glm::dvec3& normal);
-
 // The values of an array that is indexed by a sample along an axis, along a layer.
 std::vector<double> along_section(const Section& section, int axis, std::vector<double> values);
 
