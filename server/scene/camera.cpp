@@ -12,7 +12,6 @@
 
 #include "server/scene/angles.hpp"
 #include "server/scene/lattice.hpp"
-#include "server/scene/section.hpp"
 
 namespace windsplat::scene {
 
