@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 
+#include "protocol/limits.hpp"
 #include "server/quality/setting.hpp"
 #include "server/quality/view_traits.hpp"
 
@@ -41,7 +42,7 @@ struct Expected {
 };
 
 // The error of single precision: pictures and references have it, and no smaller error is reported.
-inline constexpr double error_least = 5e-6;
+inline constexpr double error_least = protocol::limits::max_error_min;
 
 // Settings whose errors have the same main cause: the order of kernels, fewer pixels, merged
 // samples, the thickness of slabs. `merged` also if the view itself merges samples.

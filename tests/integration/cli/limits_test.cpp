@@ -65,9 +65,9 @@ TEST_F(CliLimits, RenderKeepsTheErrorBoundOfTheView) {
 
 TEST_F(CliLimits, RenderSaysThatTheErrorBoundCannotBeKept) {
   std::string err;
-  const json report = report_of({"--size", "96x72", "--set", "/quality/maxError=0.000001"}, &err);
-  EXPECT_GT(report["error"]["value"], 1e-6);
-  EXPECT_THAT(err, HasSubstr("exceeds /quality/maxError 1e-06"));
+  const json report = report_of({"--size", "96x72", "--set", "/quality/maxError=0.000005"}, &err);
+  EXPECT_GT(report["error"]["value"], 5e-6);
+  EXPECT_THAT(err, HasSubstr("exceeds /quality/maxError 5e-06"));
 }
 
 TEST_F(CliLimits, RenderChoosesTheSettingByTheTimeBudget) {
@@ -77,7 +77,6 @@ TEST_F(CliLimits, RenderChoosesTheSettingByTheTimeBudget) {
   std::string err;
   const json tight = report_of({"--size", "640x480", "--set", "/quality/budgetMs=1"}, &err);
   EXPECT_LT(tight["width"], 640);
-  EXPECT_EQ(tight["method"], "kernel");
   EXPECT_NE(tight["error"]["kind"], "none");
   const double ms = tight["renderMs"].get<double>() + tight["encodeMs"].get<double>();
   if (ms > 1) {

@@ -34,6 +34,7 @@ export interface ForecastHost {
 const restMs = 1000; // time without a change before the forecast is requested
 // interval of repeated requests, as calibration continues while the view is at rest
 const againMs = 5000;
+const errorMin = 5e-6; // the least quality.maxError of the server
 const [width, height, left, right, top, bottom] = [284, 176, 36, 8, 12, 30]; // drawing units
 const [inner, tall] = [width - left - right, height - top - bottom];
 
@@ -116,7 +117,7 @@ export class ForecastPlot {
   }
 
   private setLimit(error: number): void {
-    this.host.setMaxError(clamp(error, 1e-6, 1));
+    this.host.setMaxError(clamp(error, errorMin, 1));
   }
 
   private fit(): void {
@@ -209,7 +210,7 @@ export class ForecastPlot {
     if (error === null) return;
     const [, y] = this.at(1, error);
     this.limit.element.setAttribute("transform", `translate(0 ${y})`);
-    this.updateAria(this.limit, 1e-6, error, 1, errorText(error, errorMetric.value));
+    this.updateAria(this.limit, errorMin, error, 1, errorText(error, errorMetric.value));
   }
 
   // A slider role requires a value, so the role is set with the first value.
