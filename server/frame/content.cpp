@@ -234,9 +234,10 @@ class Sampling {
       if (!next) continue;
       ++count;
       const Medium other = medium(*next);
-      if (here.extinction > 0 && other.extinction > 0) {
-        const glm::dvec3 step = glm::normalize(place(*next) - place(i));
-        const double along = std::pow(glm::dot(step, scene_.camera.forward), 2);
+      const glm::dvec3 step = place(*next) - place(i);
+      const double length2 = glm::dot(step, step);  // 0 where layers of terrain coincide
+      if (here.extinction > 0 && other.extinction > 0 && length2 > 0) {
+        const double along = std::pow(glm::dot(step, scene_.camera.forward), 2) / length2;
         const glm::dvec3 change = here.color() - other.color();
         tint += along * glm::dot(change, change);
       }
@@ -296,7 +297,9 @@ class Sampling {
       const auto last = neighbour(through, a, -1);
       if (!next && !last) continue;
       const glm::dvec3 edge = next ? place(*next) - at : at - place(*last);
-      out.rate[a] = glm::dot(way, edge) / glm::dot(edge, edge);
+      const double length2 = glm::dot(edge, edge);
+      if (length2 == 0) continue;
+      out.rate[a] = glm::dot(way, edge) / length2;
       if (std::abs(out.rate[a]) > std::abs(out.rate[out.axis])) out.axis = a;
     }
     if (out.rate[out.axis] == 0) return std::nullopt;

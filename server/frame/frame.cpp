@@ -217,14 +217,18 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.view.image = prepared.asked;
   drawn.detail = scene::detail_shown(prepared.completed) * prepared.asked.height / drawn.height;
   drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());
-  if (prepared.encoding.measure) drawn.content = content_of(scene);
+  const Clock::time_point measured_from = Clock::now();
+  // Content is that of the view, not of coarser data.
+  if (prepared.encoding.measure && prepared.setting.coarser == 0 &&
+      scene.method != scene::Method::reference) {
+    drawn.content = content_of(scene);
+  }
   if (is_measured(prepared)) {
-    const Clock::time_point measured_from = Clock::now();
     auto error = measured_error(prepared, dataset, pool, cancel, workspace);
     if (!error) return given_up(error.error(), workspace);
     drawn.error = *error;
-    drawn.measure_us = microseconds(measured_from, Clock::now());
   }
+  drawn.measure_us = microseconds(measured_from, Clock::now());
   return {};
 }
 

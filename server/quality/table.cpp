@@ -185,6 +185,7 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   if (measured.error) {
     const double error = std::max(*measured.error, error_least);
     entry.log_error = std::log(error / expected_error(kind_, how, viewpoint).value);
+    if (!std::isfinite(*entry.log_error)) return;
   }
   if (measured.ms) {
     entry.log_ms =

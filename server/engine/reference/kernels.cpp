@@ -16,7 +16,9 @@ using scene::Scene;
 // The same bound as in the engine: opaque over any distance, with finite sums.
 constexpr double extinction_max = 1e30;
 
-double extinction(const ScalarLayer& layer, double value) {
+}  // namespace
+
+double table_extinction(const ScalarLayer& layer, double value) {
   const auto& points = layer.extinction;
   const auto at = [&](std::size_t p) { return std::min(points[p][1], extinction_max); };
   if (value < points.front()[0]) return at(0);
@@ -30,6 +32,8 @@ double extinction(const ScalarLayer& layer, double value) {
   }
   return rho;
 }
+
+namespace {
 
 // p^T t^2 A A^T q.
 double spread(const KernelPosition& position, const Vec& p, const Vec& q) {
@@ -68,7 +72,7 @@ Density make_density(const std::vector<const ScalarLayer*>& layers,
   for (const ScalarLayer* layer : layers) {
     const auto value = static_cast<double>(layer->field->values[position.index]);
     if (std::isnan(value)) continue;
-    const double rho = extinction(*layer, value);
+    const double rho = table_extinction(*layer, value);
     if (rho <= 0) continue;
     density.rho += rho;
     density.color = plus(density.color, rho, table_color(layer->color, value));

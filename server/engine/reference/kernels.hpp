@@ -154,6 +154,8 @@ struct Density {
 Density make_density(const std::vector<const scene::ScalarLayer*>& layers,
                      const KernelPosition& position);
 
+// Extinction of a value, at most 1e30. At a step, that of the second point.
+double table_extinction(const scene::ScalarLayer& layer, double value);
 // The straight linear colour of a value.
 Vec table_color(const scene::ColorTable& table, double value);
 

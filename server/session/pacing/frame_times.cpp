@@ -16,12 +16,14 @@ constexpr double own_share = 0.3;
 
 quality::Forecasts FrameTimes::uncorrected(const protocol::View& view) const {
   quality::SceneSignature signature = quality::signature_of(view);
+  quality::Viewpoint last = viewpoint_;
   if (signature.key == drawn_key_) {
     signature = signature_;
   } else {
     signature.key.clear();
+    last.content.reset();
   }
-  const quality::Viewpoint viewpoint = quality::viewpoint_of(view, viewpoint_);
+  const quality::Viewpoint viewpoint = quality::viewpoint_of(view, last);
   if (forecaster_) return forecaster_(signature, viewpoint);
   return quality::Table(signature.kind).forecasts(viewpoint);
 }
@@ -82,6 +84,7 @@ void FrameTimes::learn_final(Micros cost, const protocol::View& view, Micros now
 
 void FrameTimes::forget() {
   drawn_key_.clear();
+  viewpoint_ = {};
   measured_ = {};
   final_factor_.reset();
 }

@@ -134,5 +134,30 @@ TEST(Chooser, ExcludesPicturesTheLinkCannotCarry) {
   EXPECT_GT(quality::pixels_at(view, settings[chosen]), 40'000);
 }
 
+// What the last view shows says nothing about another scene or dataset.
+TEST(FrameTimes, ContentIsOfTheSameSceneOnly) {
+  std::vector<quality::Viewpoint> asked;
+  FrameTimes times{[&](const auto& /*signature*/, const quality::Viewpoint& at) {
+    asked.push_back(at);
+    return calibrated(10);
+  }};
+  protocol::View view;
+  Drawn drawn;
+  drawn.viewpoint = viewpoint;
+  drawn.viewpoint.detail = 2;
+  drawn.viewpoint.content.emplace();
+  times.complete(view, drawn);
+  static_cast<void>(times.forecast(view, 0));
+  EXPECT_TRUE(asked.back().content);
+  protocol::View other = view;
+  other.vector.length = 7;
+  static_cast<void>(times.forecast(other, 0));
+  EXPECT_FALSE(asked.back().content);
+  times.forget();
+  static_cast<void>(times.forecast(view, 0));
+  EXPECT_FALSE(asked.back().content);
+  EXPECT_EQ(asked.back().detail, 0);
+}
+
 }  // namespace
 }  // namespace windsplat::session
