@@ -13,10 +13,13 @@
 
 #include "server/base/pcg3d.hpp"
 #include "server/data/model/volume.hpp"
+#include "server/engine/reference/kernels.hpp"
 #include "server/frame/medium_sample.hpp"
 
 namespace windsplat::frame {
 namespace {
+
+namespace reference = engine::reference;
 
 constexpr std::int64_t samples_max = 4096;
 constexpr int columns = 10;
@@ -28,7 +31,6 @@ struct Line {
   bool drawn = false;
   glm::dvec3 color{0, 0, 0};
   double magnitude = 0;  // relative to the full one, at most 1
-  glm::dvec3 direction{0, 0, 0};
 };
 
 // What a sample adds to the picture.
@@ -59,7 +61,8 @@ struct Mean {
 
 class Sampling {
  public:
-  explicit Sampling(const scene::Scene& scene) : scene_(scene), high_(scene.lattice.dims) {
+  explicit Sampling(const scene::Scene& scene)
+      : scene_(scene), view_(reference::make_view(scene.camera)), high_(scene.lattice.dims) {
     if (scene.slice) {
       const auto axis = static_cast<std::size_t>(scene.slice->axis);
       low_[axis] = scene.slice->sample;
@@ -160,7 +163,6 @@ class Sampling {
     out.drawn = magnitude > 0 && magnitude >= layer.min_magnitude;
     if (!out.drawn) return out;
     out.magnitude = std::min(1.0, magnitude / layer.magnitude_range[1]);
-    for (int c = 0; c < 3; ++c) out.direction[c] = v[static_cast<std::size_t>(c)] / magnitude;
     using scene::LineColor;
     double value = place(i).z;
     if (layer.color_by == LineColor::magnitude) value = magnitude;
@@ -205,19 +207,36 @@ class Sampling {
     out.tau = each * rho * volume * scale * scale / bin_area;
     out.cell_depth = rho * fine_edge;
     const Line own = line(i);
-    add_line(own, each, scale, bin_area, *std::max_element(edges.begin(), edges.end()), out);
+    add_line(i, own, each, scale, bin_area, *std::max_element(edges.begin(), edges.end()), out);
     compare(i, here, own, out);
     return out;
   }
 
-  void add_line(const Line& own, double each, double scale, double bin_area, double widest,
-                Projected& out) const {
-    if (!own.drawn) return;
+  // The line of a sample from tail to head as it is drawn, world units. At a coarser level, rates
+  // are those of the first sample of the group.
+  [[nodiscard]] std::optional<reference::DrawnVector> drawn_vector(const Index& i) const {
     const scene::VectorLayer& layer = *scene_.vector;
-    const double across =
-        std::sqrt(std::max(0.0, 1 - std::pow(glm::dot(own.direction, scene_.camera.forward), 2)));
-    const double whole = std::min(layer.length * own.magnitude, layer.span * layer.stride * widest);
-    out.length = whole * scale * across;
+    std::array<reference::AxisPosition, 3> at;
+    for (std::size_t a = 0; a < 3; ++a) {
+      at[a] = {i[a], 1, scene_.lattice.spacing[a][static_cast<std::size_t>(i[a])]};
+    }
+    reference::KernelPosition position = reference::make_kernel_position(scene_, view_, at);
+    if (!position.has_cell) return std::nullopt;
+    for (std::size_t a = 0; a < 3; ++a) position.sample[a] <<= layer.halvings[a];
+    return reference::read_vector(scene_, layer, position);
+  }
+
+  void add_line(const Index& i, const Line& own, double each, double scale, double bin_area,
+                double widest, Projected& out) const {
+    if (!own.drawn) return;
+    const auto drawn = drawn_vector(i);
+    if (!drawn) return;
+    const scene::VectorLayer& layer = *scene_.vector;
+    const double whole = reference::length(drawn->extent);
+    const double across = std::hypot(reference::dot(drawn->extent, view_.right),
+                                     reference::dot(drawn->extent, view_.down));
+    const double most = layer.span * layer.stride * widest;
+    out.length = scale * across * (whole > most ? most / whole : 1);
     const double wide = width();
     const double lines = each * merged_ / std::pow(layer.stride, 3);
     out.cover = lines * layer_opacity() * wide * (out.length + wide) / bin_area;
@@ -316,7 +335,7 @@ class Sampling {
     std::array<glm::dvec4, 9> light{};
     std::array<double, 9> transmitted{1, 1, 1, 1, 1, 1, 1, 1, 1};
     glm::dvec3 order{0, 0, 0};
-    int inside = 0;  // steps of the ray within the lattice
+    int inside = 0;  // steps of the ray within the lattice, each of `stride` cells
     glm::dvec3 last_color{0, 0, 0};
     double last_absorbed = 0;
 
@@ -375,7 +394,8 @@ class Sampling {
     const double scale = 0.5 / (camera.half_height * (camera.perspective ? ray->depth : 1));
     const double face = edge(through, 0) * edge(through, 1) * edge(through, 2) / ray->length *
                         ray->stride;  // area of a cell across the ray
-    const double area = each * face * scale * scale / lights.inside;
+    const double cells = static_cast<double>(lights.inside) * ray->stride;
+    const double area = each * face * scale * scale / cells;
     const auto square = [](const glm::dvec4& v) { return glm::dot(v, v) / 4; };
     double step = 0;
     double bend = 0;
@@ -408,6 +428,7 @@ class Sampling {
 
  private:
   const scene::Scene& scene_;
+  const reference::View view_;
   Index low_{0, 0, 0};
   Index high_;
   std::int64_t count_ = 1;

@@ -85,6 +85,19 @@ struct KernelPosition {
 KernelPosition make_kernel_position(const scene::Scene& scene, const View& view,
                                     const std::array<AxisPosition, 3>& positions);
 
+// The vector at a kernel position as drawn: `unit` along the axes of the cell (shorter than 1 if a
+// slice removed a component), `extent` from tail to head in world units.
+// On a curved lattice the components are along the edges of the cell.
+struct DrawnVector {
+  double magnitude = 0;  // magnitude of the data
+  double rise = 0;       // from tail to head along the vertical of the cell, before a slice
+  Vec unit{};
+  Vec extent{};
+};
+// Empty if masked, below min_magnitude or without a direction.
+std::optional<DrawnVector> read_vector(const scene::Scene& scene, const scene::VectorLayer& layer,
+                                       const KernelPosition& position);
+
 // A projected line: ends in camera space (right, down, forward) and in pixels, q at both ends (-1/2
 // at the tail of the unclipped line, 1/2 at its head), linear colour, not premultiplied.
 template <class Real>

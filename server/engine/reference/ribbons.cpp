@@ -44,14 +44,7 @@ Jitter jitter_of(const VectorLayer& layer, const std::array<int, 3>& sample) {
 
 // ---- lines ----
 
-// The vector at a kernel position as drawn: `unit` along the axes of the cell (shorter than 1 if a
-// slice removed a component), `extent` from tail to head in world units.
-struct DrawnVector {
-  double magnitude = 0;  // magnitude of the data
-  double rise = 0;       // from tail to head along the vertical of the cell, before a slice
-  Vec unit{};
-  Vec extent{};
-};
+}  // namespace
 
 std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& layer,
                                        const KernelPosition& position) {
@@ -91,6 +84,8 @@ std::optional<DrawnVector> read_vector(const Scene& scene, const VectorLayer& la
   drawn.extent = scaled(along, part * layer.length);
   return drawn;
 }
+
+namespace {
 
 // The part of a line within its kernel box, as q; empty if low > high. Liang-Barsky in cells.
 struct Part {

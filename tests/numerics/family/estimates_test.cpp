@@ -2,14 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <memory>
 #include <optional>
 #include <vector>
 
-#include "server/frame/content.hpp"
 #include "server/frame/measure.hpp"
 #include "server/quality/laws.hpp"
 #include "server/quality/table.hpp"
@@ -17,7 +15,6 @@
 #include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
 #include "tests/numerics/family/family.hpp"
-#include "tests/numerics/scenes.hpp"
 
 namespace windsplat::test {
 namespace {
@@ -117,76 +114,6 @@ TEST(Estimates, CalibrationRunsKnowWhatTheirViewsShow) {
   });
   EXPECT_TRUE(done);
   EXPECT_GT(count, 5);
-}
-
-// Twice the extinction is twice the optical depth of a cell and of the rays; lengths are in heights
-// of the picture, so that its size makes no difference.
-TEST(Content, FollowsExtinctionAndNotTheSizeOfThePicture) {
-  const FamilyMember member = strangers()[0];
-  const auto dataset = formula_dataset(member.field, member.formula);
-  protocol::View view = random_view(*dataset, 31, 0);
-  const auto content = [&] {
-    const auto completed = scene::complete(view, *dataset).value();
-    return frame::content_of(scene::build_scene(completed, *dataset).value());
-  };
-  for (auto& point : *view.scalars->front().extinction) point[1] *= 1e-4;
-  const quality::Content thin = content();
-  for (auto& point : *view.scalars->front().extinction) point[1] *= 2;
-  const quality::Content twice = content();
-  EXPECT_NEAR(twice.cell_depth / thin.cell_depth, 2, 1e-3);
-  EXPECT_NEAR(twice.depth / thin.depth, 2, 1e-2);
-  EXPECT_NEAR(twice.step / thin.step, 2, 1e-2);
-  EXPECT_NEAR(twice.cell, thin.cell, 1e-6);
-  view.image.width *= 2;
-  view.image.height *= 2;
-  const quality::Content large = content();
-  EXPECT_NEAR(large.cell / twice.cell, 1, 1e-6);
-  EXPECT_NEAR(large.step / twice.step, 1, 1e-6);
-}
-
-// Layers of terrain may coincide in some columns, so that edges of cells have no length.
-TEST(Content, IsFiniteWhereLayersCoincide) {
-  const FamilyMember member = strangers()[0];
-  const auto dataset = formula_dataset(member.field, member.formula);
-  const auto completed = scene::complete(random_view(*dataset, 31, 0), *dataset).value();
-  scene::Scene scene = scene::build_scene(completed, *dataset).value();
-  const auto& [nx, ny, nz] = scene.lattice.dims;
-  ASSERT_GT(nz, 3);
-  auto places = std::make_shared<std::vector<std::array<float, 3>>>();
-  for (int n = 0; n < nx * ny * nz; ++n) {
-    const int k = n / (nx * ny);
-    const bool joined = n % nx < nx / 2;
-    const auto at = [&](int axis, int i) {
-      return static_cast<float>(scene.lattice.positions[axis][static_cast<std::size_t>(i)]);
-    };
-    places->push_back({at(0, n % nx), at(1, n / nx % ny), at(2, joined ? k / 2 * 2 : k)});
-  }
-  scene.lattice.places = places;
-  const quality::Content content = frame::content_of(scene);
-  for (const double value : {content.lines, content.shade, content.line_depth, content.depth,
-                             content.cell_depth, content.tint, content.cell, content.step,
-                             content.bend, content.wide_bend, content.order, content.step_cell}) {
-    EXPECT_TRUE(std::isfinite(value)) << value;
-  }
-  EXPECT_GT(content.step, 0);
-}
-
-// At a step of the extinction a value has that of the second point, as in pictures.
-TEST(Content, AValueAtAStepIsAsDenseAsItIsDrawn) {
-  const FamilyMember member = strangers()[0];
-  const auto dataset = formula_dataset(member.field, member.formula);
-  const auto completed = scene::complete(random_view(*dataset, 31, 0), *dataset).value();
-  scene::Scene scene = scene::build_scene(completed, *dataset).value();
-  ASSERT_EQ(scene.scalars.size(), 1U);
-  scene::ScalarLayer& layer = scene.scalars.front();
-  layer.field = make_volume(scene.lattice, 1, [](int, double, double, double) { return 1.0F; });
-  layer.extinction = {{1, 0}, {1, 10}};
-  const quality::Content at_step = frame::content_of(scene);
-  layer.extinction = {{0, 10}, {2, 10}};
-  const quality::Content dense = frame::content_of(scene);
-  EXPECT_GT(dense.cell_depth, 0);
-  EXPECT_DOUBLE_EQ(at_step.cell_depth, dense.cell_depth);
-  EXPECT_DOUBLE_EQ(at_step.depth, dense.depth);
 }
 
 }  // namespace

@@ -1,0 +1,156 @@
+// What a view shows, for scenes of which it is known.
+#include "server/frame/content.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "server/scene/build.hpp"
+#include "server/scene/completed_view.hpp"
+#include "tests/numerics/family/family.hpp"
+#include "tests/numerics/scenes.hpp"
+
+namespace windsplat::test {
+namespace {
+
+// Twice the extinction is twice the optical depth of a cell and of the rays; lengths are in heights
+// of the picture, so that its size makes no difference.
+TEST(Content, FollowsExtinctionAndNotTheSizeOfThePicture) {
+  const FamilyMember member = strangers()[0];
+  const auto dataset = formula_dataset(member.field, member.formula);
+  protocol::View view = random_view(*dataset, 31, 0);
+  const auto content = [&] {
+    const auto completed = scene::complete(view, *dataset).value();
+    return frame::content_of(scene::build_scene(completed, *dataset).value());
+  };
+  for (auto& point : *view.scalars->front().extinction) point[1] *= 1e-4;
+  const quality::Content thin = content();
+  for (auto& point : *view.scalars->front().extinction) point[1] *= 2;
+  const quality::Content twice = content();
+  EXPECT_NEAR(twice.cell_depth / thin.cell_depth, 2, 1e-3);
+  EXPECT_NEAR(twice.depth / thin.depth, 2, 1e-2);
+  EXPECT_NEAR(twice.step / thin.step, 2, 1e-2);
+  EXPECT_NEAR(twice.cell, thin.cell, 1e-6);
+  view.image.width *= 2;
+  view.image.height *= 2;
+  const quality::Content large = content();
+  EXPECT_NEAR(large.cell / twice.cell, 1, 1e-6);
+  EXPECT_NEAR(large.step / twice.step, 1, 1e-6);
+}
+
+// Layers of terrain may coincide in some columns, so that edges of cells have no length.
+TEST(Content, IsFiniteWhereLayersCoincide) {
+  const FamilyMember member = strangers()[0];
+  const auto dataset = formula_dataset(member.field, member.formula);
+  const auto completed = scene::complete(random_view(*dataset, 31, 0), *dataset).value();
+  scene::Scene scene = scene::build_scene(completed, *dataset).value();
+  const auto& [nx, ny, nz] = scene.lattice.dims;
+  ASSERT_GT(nz, 3);
+  auto places = std::make_shared<std::vector<std::array<float, 3>>>();
+  for (int n = 0; n < nx * ny * nz; ++n) {
+    const int k = n / (nx * ny);
+    const bool joined = n % nx < nx / 2;
+    const auto at = [&](int axis, int i) {
+      return static_cast<float>(scene.lattice.positions[axis][static_cast<std::size_t>(i)]);
+    };
+    places->push_back({at(0, n % nx), at(1, n / nx % ny), at(2, joined ? k / 2 * 2 : k)});
+  }
+  scene.lattice.places = places;
+  const quality::Content content = frame::content_of(scene);
+  for (const double value : {content.lines, content.shade, content.line_depth, content.depth,
+                             content.cell_depth, content.tint, content.cell, content.step,
+                             content.bend, content.wide_bend, content.order, content.step_cell}) {
+    EXPECT_TRUE(std::isfinite(value)) << value;
+  }
+  EXPECT_GT(content.step, 0);
+}
+
+// At a step of the extinction a value has that of the second point, as in pictures.
+TEST(Content, AValueAtAStepIsAsDenseAsItIsDrawn) {
+  const FamilyMember member = strangers()[0];
+  const auto dataset = formula_dataset(member.field, member.formula);
+  const auto completed = scene::complete(random_view(*dataset, 31, 0), *dataset).value();
+  scene::Scene scene = scene::build_scene(completed, *dataset).value();
+  ASSERT_EQ(scene.scalars.size(), 1U);
+  scene::ScalarLayer& layer = scene.scalars.front();
+  layer.field = make_volume(scene.lattice, 1, [](int, double, double, double) { return 1.0F; });
+  layer.extinction = {{1, 0}, {1, 10}};
+  const quality::Content at_step = frame::content_of(scene);
+  layer.extinction = {{0, 10}, {2, 10}};
+  const quality::Content dense = frame::content_of(scene);
+  EXPECT_GT(dense.cell_depth, 0);
+  EXPECT_DOUBLE_EQ(at_step.cell_depth, dense.cell_depth);
+  EXPECT_DOUBLE_EQ(at_step.depth, dense.depth);
+}
+
+// A thin medium that grows by the same optical depth from one column to the next, seen along its
+// columns: half of the neighbours differ by that depth, everywhere in the picture.
+TEST(Content, TheLightOfAMediumIsThatOfAnyNumberOfCellsAlongARay) {
+  constexpr double per_column = 1e-3;
+  for (const int cells : {16, 64, 128, 256}) {
+    scene::Scene scene;
+    scene.lattice = even_lattice({24, 24, cells}, {1, 1, 32.0 / cells});
+    scene.camera = look({0, 0, 0}, {0, 0, -1}, 100, 120, 90, false, 4);
+    const auto field = make_volume(scene.lattice, 1, [&](int, double x, double, double) {
+      return static_cast<float>(per_column * (x + 12) / 32);
+    });
+    scene.scalars.push_back(medium(field, {1, 1, 1}));
+    const double picture = 120.0 / 90.0;  // its area in squares of its height
+    EXPECT_NEAR(frame::content_of(scene).step / (per_column * std::sqrt(0.5 * picture)), 1, 0.1)
+        << cells;
+  }
+}
+
+// Lines along x and z in equal parts, as the components of the data are.
+scene::Scene scene_of_lines(const glm::dvec3& forward) {
+  scene::Scene scene;
+  scene.lattice = even_lattice({6, 6, 6}, {1, 1, 1});
+  scene.camera = look({0, 0, 0}, forward, 100, 100, 100, false, 4);
+  const auto field = make_volume(scene.lattice, 3, [](int component, double, double, double) {
+    return component == 1 ? 0.0F : 1.0F;
+  });
+  scene.vector = plain_lines(field, {1, 1, 1});
+  scene.vector->length = 2;
+  scene.vector->magnitude_range = {0, std::sqrt(2.0)};
+  return scene;
+}
+
+TEST(Content, LinesAreSeenInTheDirectionInWhichTheyAreDrawn) {
+  const glm::dvec3 along_x{1, 0, 0};
+  const glm::dvec3 along_z{0, 0, -1};
+  const double whole = 2.0 / 8;  // heights of the picture
+  for (const auto& forward : {along_x, along_z}) {
+    scene::Scene scene = scene_of_lines(forward);
+    EXPECT_NEAR(frame::content_of(scene).length, whole * std::sqrt(0.5), 1e-6);
+    scene.vector->scale = {1, 1, 0};
+    EXPECT_NEAR(frame::content_of(scene).length, forward.x != 0 ? 0 : whole, 1e-6) << "scaled";
+    scene.vector->scale = {1, 1, 1};
+    scene.vector->rate_x.assign(6, 0);
+    scene.vector->rate_z.assign(6, 1);
+    EXPECT_NEAR(frame::content_of(scene).length, forward.x != 0 ? whole : 0, 1e-6) << "by rates";
+  }
+}
+
+// Cells turned by 45 degrees about y, so that x of the data is along x + z.
+TEST(Content, LinesFollowTurnedCells) {
+  scene::Scene scene = scene_of_lines({0, 0, -1});
+  const double half = std::sqrt(0.5);
+  auto places = std::make_shared<std::vector<std::array<float, 3>>>();
+  for (const double z : scene.lattice.positions[2]) {
+    for (const double y : scene.lattice.positions[1]) {
+      for (const double x : scene.lattice.positions[0]) {
+        places->push_back({static_cast<float>(half * (x - z)), static_cast<float>(y),
+                           static_cast<float>(half * (x + z))});
+      }
+    }
+  }
+  scene.lattice.places = places;
+  EXPECT_NEAR(frame::content_of(scene).length, 0, 1e-6);
+}
+
+}  // namespace
+}  // namespace windsplat::test
