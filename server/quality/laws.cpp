@@ -22,6 +22,8 @@ const Law& law_of(const Kind& kind, Cause cause) {
 
 }  // namespace
 
+const Scatter& error_scatter(const Kind& kind, Cause cause) { return law_of(kind, cause).scatter; }
+
 Cause cause_of(const Setting& setting, const Viewpoint& viewpoint) {
   const bool merges = viewpoint.detail > 0 && viewpoint.detail < 1;
   if (setting.coarser > 0 || (merges && setting.half_level == 0)) return Cause::merged;

@@ -49,6 +49,9 @@ inline constexpr double error_least = protocol::limits::max_error_min;
 enum class Cause { kernel, smaller, merged, slab };
 Cause cause_of(const Setting& setting, const Viewpoint& viewpoint);
 
+// The scatter of the errors of one cause.
+const Scatter& error_scatter(const Kind& kind, Cause cause);
+
 Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 
 // The power of errors in the thickness of slabs, in cells, is not fitted: it is the order of the

@@ -107,63 +107,123 @@ Kriged krige_times(std::vector<TimeObservation> times, const Scatter& scatter) {
       });
 }
 
-// Correlation of the errors of two settings, beyond what the laws express.
-double correlation(std::size_t a, Cause cause_a, std::size_t b, Cause cause_b) {
-  if (a == b && cause_a == cause_b) return 1;
-  return correlations[static_cast<std::size_t>(cause_a)][static_cast<std::size_t>(cause_b)];
-}
-
 // Encoding error decreases with the distance of the eye.
 double encoded_detail(const Viewpoint& viewpoint) { return 1 / std::sqrt(viewpoint.height); }
-
-}  // namespace
-
-// The logarithm of a measured over an expected error.
-struct ErrorObservation {
-  std::size_t setting = 0;
-  Cause cause = Cause::kernel;
-  const Viewpoint* viewpoint = nullptr;
-  double log_ratio = 0;
-  double spread = 1;  // standard deviation of log_ratio without measurements
-  double apart = 0;   // distance from the requested viewpoint
-  double shared = 0;  // covariance with the requested error
-};
-
-namespace {
 
 double spread_of(const Scatter& scatter) {
   return std::hypot(scatter.signature, scatter.viewpoint);
 }
 
-// `errors` are those of all settings, in units of the spread of their cause. Uses the ones that
-// correlate most.
-Kriged krige_errors(std::size_t setting, Cause cause, std::vector<ErrorObservation> errors,
-                    const Scatter& scatter) {
-  const auto covariance = [&](const ErrorObservation& a, std::size_t b, Cause cause_b,
-                              double apart) {
-    return correlation(a.setting, a.cause, b, cause_b) *
-           (squared(scatter.signature) + squared(scatter.viewpoint) * std::exp(-apart));
-  };
-  for (ErrorObservation& e : errors) e.shared = covariance(e, setting, cause, e.apart);
-  const std::size_t count = std::min(errors.size(), nearest_max);
-  std::partial_sort(
-      errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(count), errors.end(),
-      [](const ErrorObservation& a, const ErrorObservation& b) { return a.shared > b.shared; });
-  const double noise = squared(scatter.noise);
-  const double own_spread = spread_of(scatter);
-  return krige(
-      count, squared(scatter.signature) + squared(scatter.viewpoint) + noise,
-      [&](std::size_t i) { return errors[i].log_ratio * own_spread / errors[i].spread; },
-      [&](std::size_t i) { return errors[i].shared; },
-      [&](std::size_t i, std::size_t j) {
-        const ErrorObservation& b = errors[j];
-        return covariance(errors[i], b.setting, b.cause,
-                          distance(*errors[i].viewpoint, *b.viewpoint)) +
-               (i == j ? noise : 0);
-      });
+// Correlation of the errors of two causes, beyond what the laws express.
+double correlation(Cause a, Cause b) {
+  return correlations[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)];
 }
 
+// The logarithm of a measured over an expected error, in units of the spread of its cause.
+struct ErrorObservation {
+  std::size_t setting = 0;
+  Cause cause = Cause::kernel;
+  const Viewpoint* viewpoint = nullptr;
+  double log_ratio = 0;
+  double apart = 0;      // distance from the requested viewpoint
+  double closeness = 0;  // exp(-apart)
+};
+
 }  // namespace
+
+// The measured errors of a table, as seen from one viewpoint.
+class NearErrors {
+ public:
+  NearErrors(const Table& table, const Viewpoint& viewpoint) {
+    std::size_t count = 0;
+    for (const auto& entries : table.entries_) count += entries.size();
+    all_.reserve(count);
+    for (std::size_t i = 0; i < settings_count; ++i) {
+      first_[i] = all_.size();
+      for (const Table::Entry& entry : table.entries_[i]) {
+        if (!entry.log_error) continue;
+        const double apart = distance(entry.viewpoint, viewpoint);
+        all_.push_back({i, entry.cause, &entry.viewpoint, *entry.log_error / entry.spread, apart,
+                        std::exp(-apart)});
+      }
+    }
+    first_[settings_count] = all_.size();
+  }
+
+  [[nodiscard]] bool empty() const { return all_.empty(); }
+
+  // Whether the error of the setting was measured at a viewpoint near enough.
+  [[nodiscard]] bool is_measured(std::size_t setting, Cause cause) const {
+    return std::any_of(all_.data() + first_[setting], all_.data() + first_[setting + 1],
+                       [&](const auto& e) { return e.cause == cause && e.apart < near; });
+  }
+
+  // From the observations that correlate most: those of the setting itself, and those selected once
+  // for all settings of the cause.
+  [[nodiscard]] Kriged krige_at(std::size_t setting, Cause cause, const Scatter& scatter) {
+    const auto covariance = [&](const ErrorObservation& e, std::size_t b, Cause cause_b,
+                                double closeness) {
+      const bool same = e.setting == b && e.cause == cause_b;
+      return (same ? 1 : correlation(e.cause, cause_b)) *
+             (squared(scatter.signature) + squared(scatter.viewpoint) * closeness);
+    };
+    struct Candidate {
+      const ErrorObservation* error = nullptr;
+      double shared = 0;  // covariance with the requested error
+    };
+    std::array<Candidate, 2 * nearest_max + Table::measurements_max> found;
+    std::size_t count = 0;
+    const auto take = [&](const ErrorObservation& e) {
+      found[count++] = {&e, covariance(e, setting, cause, e.closeness)};
+    };
+    for (const ErrorObservation* e : nearest_by_cause(cause, covariance)) {
+      if (e->setting != setting) take(*e);
+    }
+    for (std::size_t n = first_[setting]; n < first_[setting + 1]; ++n) take(all_[n]);
+    const std::size_t used = std::min(count, nearest_max);
+    std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(used),
+                      found.begin() + static_cast<std::ptrdiff_t>(count),
+                      [](const Candidate& a, const Candidate& b) { return a.shared > b.shared; });
+    const double noise = squared(scatter.noise);
+    return krige(
+        used, squared(scatter.signature) + squared(scatter.viewpoint) + noise,
+        [&](std::size_t i) { return found[i].error->log_ratio * spread_of(scatter); },
+        [&](std::size_t i) { return found[i].shared; },
+        [&](std::size_t i, std::size_t j) {
+          const ErrorObservation& b = *found[j].error;
+          const double apart = distance(*found[i].error->viewpoint, *b.viewpoint);
+          return covariance(*found[i].error, b.setting, b.cause, std::exp(-apart)) +
+                 (i == j ? noise : 0);
+        });
+  }
+
+ private:
+  // The observations that correlate most with another setting of the cause; as many again as are
+  // used, because those of the setting itself are among them.
+  template <class Covariance>
+  const std::vector<const ErrorObservation*>& nearest_by_cause(Cause cause,
+                                                               const Covariance& covariance) {
+    std::vector<const ErrorObservation*>& nearest = by_cause_[static_cast<std::size_t>(cause)];
+    if (!nearest.empty()) return nearest;
+    std::vector<std::pair<double, const ErrorObservation*>> order;
+    order.reserve(all_.size());
+    for (const ErrorObservation& e : all_) {
+      order.emplace_back(covariance(e, settings_count, cause, e.closeness), &e);
+    }
+    const auto kept = static_cast<std::ptrdiff_t>(std::min(order.size(), 2 * nearest_max));
+    std::partial_sort(order.begin(), order.begin() + kept, order.end(),
+                      [](const auto& a, const auto& b) { return a.first > b.first; });
+    nearest.reserve(static_cast<std::size_t>(kept));
+    for (auto one = order.begin(); one != order.begin() + kept; ++one) {
+      nearest.push_back(one->second);
+    }
+    return nearest;
+  }
+
+  std::vector<ErrorObservation> all_;                    // by setting
+  std::array<std::size_t, settings_count + 1> first_{};  // of each setting
+  std::array<std::vector<const ErrorObservation*>, 4> by_cause_;
+};
 
 Forecast prior(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   const Expected error = expected_error(kind, setting, viewpoint);
@@ -181,7 +241,8 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
   const Viewpoint viewpoint = filled(seen);
-  Entry entry{viewpoint, {}, {}};
+  Entry entry{viewpoint, {}, {}, cause_of(how, viewpoint), 1};
+  entry.spread = spread_of(error_scatter(kind_, entry.cause));
   if (measured.error) {
     const double error = std::max(*measured.error, error_least);
     entry.log_error = std::log(error / expected_error(kind_, how, viewpoint).value);
@@ -218,31 +279,14 @@ Viewpoint Table::filled(Viewpoint viewpoint) const {
   return viewpoint;
 }
 
-std::vector<ErrorObservation> Table::errors_near(const Viewpoint& viewpoint) const {
-  std::vector<ErrorObservation> errors;
-  for (std::size_t i = 0; i < entries_.size(); ++i) {
-    for (const Entry& entry : entries_[i]) {
-      if (!entry.log_error) continue;
-      errors.push_back({i, cause_of(settings[i], entry.viewpoint), &entry.viewpoint,
-                        *entry.log_error,
-                        spread_of(expected_error(kind_, settings[i], entry.viewpoint).scatter),
-                        distance(entry.viewpoint, viewpoint), 0});
-    }
-  }
-  return errors;
-}
-
 Forecast Table::forecast_at(std::size_t setting, const Viewpoint& viewpoint,
-                            const std::vector<ErrorObservation>& errors) const {
+                            NearErrors& errors) const {
   const Setting& how = settings[setting];
   Forecast out = prior(kind_, how, viewpoint);
   if (!errors.empty()) {
     const Cause cause = cause_of(how, viewpoint);
-    out.measured = std::any_of(errors.begin(), errors.end(), [&](const ErrorObservation& e) {
-      return e.setting == setting && e.cause == cause && e.apart < near;
-    });
-    const Kriged kriged =
-        krige_errors(setting, cause, errors, expected_error(kind_, how, viewpoint).scatter);
+    out.measured = errors.is_measured(setting, cause);
+    const Kriged kriged = errors.krige_at(setting, cause, error_scatter(kind_, cause));
     out.error = std::clamp(out.error * std::exp(kriged.log_ratio), error_least, 1.0);
     out.spread = std::sqrt(kriged.variance);
   }
@@ -261,19 +305,20 @@ Forecast Table::forecast_at(std::size_t setting, const Viewpoint& viewpoint,
 
 Forecast Table::forecast(std::size_t setting, const Viewpoint& seen) const {
   const Viewpoint viewpoint = filled(seen);
-  return forecast_at(setting, viewpoint, errors_near(viewpoint));
+  NearErrors errors(*this, viewpoint);
+  return forecast_at(setting, viewpoint, errors);
 }
 
 Forecasts Table::forecasts(const Viewpoint& seen) const {
   const Viewpoint viewpoint = filled(seen);
-  const std::vector<ErrorObservation> errors = errors_near(viewpoint);
+  NearErrors errors(*this, viewpoint);
   Forecasts out;
   double log_ratio = 0;
   int timed = 0;
   for (std::size_t i = 0; i < out.size(); ++i) {
     out[i] = forecast_at(i, viewpoint, errors);
     if (!out[i].timed) continue;
-    log_ratio += std::log(out[i].ms / prior(kind_, settings[i], viewpoint).ms);
+    log_ratio += std::log(out[i].ms / expected_ms(kind_, settings[i], viewpoint).value);
     ++timed;
   }
   if (timed == 0) return out;

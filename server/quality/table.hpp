@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/quality/laws.hpp"
 #include "server/quality/setting.hpp"
 #include "server/quality/view_traits.hpp"
 
@@ -31,7 +32,7 @@ using Forecasts = std::array<Forecast, settings_count>;
 // The forecast without measurements: laws fitted to many views of generated data.
 Forecast prior(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 
-struct ErrorObservation;
+class NearErrors;
 
 // Measurements of one scene signature; keeps the newest of each setting.
 class Table {
@@ -64,17 +65,19 @@ class Table {
                                       const Viewpoint& viewpoint) const;
 
  private:
+  friend class NearErrors;
   struct Entry {
     Viewpoint viewpoint;
     // Logarithms of measured over expected values.
     std::optional<double> log_error;
     std::optional<double> log_ms;
+    Cause cause = Cause::kernel;
+    double spread = 1;  // standard deviation of log_error without measurements
   };
   // The viewpoint with the content of the nearest measured one, if its own is unknown.
   [[nodiscard]] Viewpoint filled(Viewpoint viewpoint) const;
   [[nodiscard]] Forecast forecast_at(std::size_t setting, const Viewpoint& viewpoint,
-                                     const std::vector<ErrorObservation>& errors) const;
-  [[nodiscard]] std::vector<ErrorObservation> errors_near(const Viewpoint& viewpoint) const;
+                                     NearErrors& errors) const;
 
   Kind kind_;
   std::array<std::deque<Entry>, settings_count> entries_;

@@ -1,6 +1,13 @@
 // Estimated against measured errors of every setting over a family of generated datasets
 // (tests/numerics/family): measure, list features, fit and judge (docs/benchmarks/error.md).
+//
+//   bench_estimates --measure=FILE [--members=N --scenes=N --views=N]
+//   bench_estimates --list=FILE
+//   bench_estimates                 the time of forecasts
 #include <array>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -18,6 +25,7 @@
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "tests/bench/support.hpp"
+#include "tests/bench/text_table.hpp"
 #include "tests/numerics/family/family.hpp"
 
 namespace windsplat::bench {
@@ -143,6 +151,36 @@ void list(const Measurements& measurements) {
   }
 }
 
+// Time of the forecasts of all settings from a table with as many measurements as it keeps.
+void time_forecasts() {
+  quality::Table table{quality::Kind()};
+  const auto viewpoint_at = [](int degrees) {
+    quality::Viewpoint viewpoint;
+    const double angle = 0.017453292519943295 * degrees;
+    viewpoint.direction = {std::sin(angle), std::cos(angle), 0};
+    viewpoint.width = 1280;
+    viewpoint.pixels_high = 720;
+    viewpoint.content.emplace();
+    return viewpoint;
+  };
+  constexpr auto kept = static_cast<int>(quality::Table::measurements_max);
+  for (int n = 0; n < kept; ++n) {
+    for (std::size_t i = 0; i < quality::settings_count; ++i) {
+      table.add(i, viewpoint_at(15 * n), {1e-3 * (1 + n), 10.0 + n});
+    }
+  }
+  std::vector<double> us;
+  double errors = 0;
+  for (int n = 0; n < 360; ++n) {
+    const auto start = std::chrono::steady_clock::now();
+    errors += table.forecasts(viewpoint_at(n)).front().error;
+    us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start)
+                     .count());
+  }
+  std::printf("forecasts of %zu settings from %zu measurements: %.0f us (mean error %.4g)\n",
+              quality::settings_count, kept * quality::settings_count, median(us), errors / 360);
+}
+
 }  // namespace
 }  // namespace windsplat::bench
 
@@ -160,9 +198,6 @@ int main(int argc, char** argv) {
     measure(measured, members, scenes, number("--views", 2));
   }
   if (!listed.empty()) list(read(listed));
-  if (measured.empty() && listed.empty()) {
-    give_up(
-        "usage: bench_estimates --measure=FILE [--members=N --scenes=N --views=N] | --list=FILE");
-  }
+  if (measured.empty() && listed.empty()) time_forecasts();
   return 0;
 }
