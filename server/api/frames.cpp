@@ -13,6 +13,7 @@
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
 #include "server/quality/pick.hpp"
+#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/presets.hpp"
@@ -123,11 +124,17 @@ bool is_chosen(const protocol::View& view) {
   return view.quality.budget_ms || view.quality.max_error;
 }
 
-quality::Setting setting_of(quality::Tables& tables, const scene::CompletedView& completed,
-                            const data::Dataset& dataset) {
+// With a limit, the data of the view become resident first: what they show decides. Errors:
+// not_resident if nothing may be loaded.
+Result<quality::Setting> setting_of(quality::Tables& tables, const scene::CompletedView& completed,
+                                    data::Dataset& dataset, work::Loading loading) {
   const protocol::View& view = completed.view();
   if (!is_chosen(view) || view.method.name == protocol::MethodName::reference) {
     return frame::own_setting(completed);
+  }
+  const auto scene = scene::build_scene(completed, dataset);
+  if (!scene && scene.error().kind == ErrorKind::not_resident && loading == work::Loading::none) {
+    return scene.error();
   }
   const auto known =
       tables.forecasts(quality::signature_of(view), frame::viewpoint_of(completed, dataset));
@@ -156,8 +163,9 @@ Result<work::PreparedPtr> prepare(quality::Tables& tables, const Picture& pictur
       return work::PreparedPtr();
     }
   }
-  return work::prepare_picture(*completed, setting_of(tables, *completed, dataset),
-                               picture.encoding, dataset, loading);
+  const auto setting = setting_of(tables, *completed, dataset, loading);
+  if (!setting) return setting.error();
+  return work::prepare_picture(*completed, *setting, picture.encoding, dataset, loading);
 }
 
 Result<http::Response> draw(work::Backend& backend, const Picture& picture,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "tests/integration/server/test_server.hpp"
 
@@ -77,6 +78,32 @@ TEST_F(Forecasts, ChosenPointIsTheRenderedSetting) {
     const Json info = Json::parse(drawn.header("windsplat-frame"));
     for (const char* key : {"method", "width", "height", "slabThickness"}) {
       EXPECT_EQ(info[key], chosen[key]) << key << " at " << budget_ms;
+    }
+  }
+}
+
+// Opaque lines have larger errors than those of a typical view. The first step determines the
+// defaults of the view; the second one is not resident.
+TEST_F(Forecasts, DecideForDataThatAreNotYetResidentAsForThoseThatAre) {
+  for (const double most : {0.005, 0.007, 0.009}) {
+    Json view = view_of(640, 480);
+    view["scalars"] = Json::array();
+    view["vector"]["opacity"] = 1;
+    view["quality"]["maxError"] = most;
+    Json other = view_of(320, 240);
+    std::vector<Json> drawn;
+    for (const int last_drawn : {0, 1}) {
+      const TestServer fresh;
+      for (int step = 0; step <= last_drawn; ++step) {
+        other["step"] = step;
+        EXPECT_EQ(post_view(fresh.port(), other.dump()).status, 200);
+      }
+      view["step"] = 1;
+      const Answer answer = post_view(fresh.port(), view.dump());
+      drawn.push_back(Json::parse(answer.header("windsplat-frame")));
+    }
+    for (const char* key : {"method", "width", "height"}) {
+      EXPECT_EQ(drawn[0][key], drawn[1][key]) << key << " at " << most;
     }
   }
 }
