@@ -370,6 +370,7 @@ Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& co
   if (!lattice) return lattice.error();
   scene.lattice = std::move(*lattice);
   scene.slice = Slice{needed.section->axis, 0};
+  scene.sampling_us = *needed.section->sampling_us;
   return scene;
 }
 

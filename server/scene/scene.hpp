@@ -165,6 +165,7 @@ struct Scene {
   double slab_thickness = 1;  // thickness in cells along the line of sight
   double stop_transmittance = 1.5e-4;
   std::array<float, 3> background{0, 0, 0};  // linear; not part of the rendered image
+  std::int64_t sampling_us = 0;              // time of sampling its section; 0: it was kept
 };
 
 }  // namespace windsplat::scene

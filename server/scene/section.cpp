@@ -2,6 +2,7 @@
 #include "server/scene/section.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -23,6 +24,7 @@ namespace windsplat::scene {
 namespace {
 
 using data::Volume;
+using Clock = std::chrono::steady_clock;
 
 // The samples next to a place, and the share of the second along each axis.
 struct Neighbours {
@@ -150,6 +152,7 @@ void each_sample(const Section& section, const Visit& visit) {
   const std::size_t blocks = (samples + block - 1) / block;
   const auto pool = make_pool(blocks / blocks_a_thread);
   const auto [nx, ny, nz] = section.dims;
+  const Clock::time_point began = Clock::now();
   pool->run(blocks, [&, nx = nx, ny = ny](std::size_t number, unsigned) {
     const std::size_t end = std::min(samples, (number + 1) * block);
     std::size_t n = number * block;
@@ -167,6 +170,8 @@ void each_sample(const Section& section, const Visit& visit) {
       ++k;
     }
   });
+  const auto took = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - began);
+  *section.sampling_us += took.count();
 }
 
 // A volume of which visit(neighbours, values) sets the components of each sample that lies

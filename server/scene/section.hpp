@@ -43,6 +43,8 @@ struct Section {
   std::array<glm::dvec3, 3> along{};  // orthonormal
   glm::dvec3 first{0, 0, 0};
   std::array<double, 3> pitch{};
+  // Time that sampling took so far, of all copies, in microseconds.
+  std::shared_ptr<std::int64_t> sampling_us = std::make_shared<std::int64_t>(0);
 };
 
 // Takes the same time for any number of samples. Errors: invalid at /geometry/plane.

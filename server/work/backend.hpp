@@ -24,7 +24,8 @@ namespace windsplat::work {
 struct BackendOptions {
   double requests_waiting_ms_max = 30'000;  // see RenderService::Options
   double wait_ms = 0;                       // delay by requests of other addresses
-  // Called on the renderer's thread with the time of a picture and the address charged.
+  // Called on the renderer's thread with the time of a picture and of sampling its section, and
+  // the address charged.
   std::function<void(const std::string& payer, std::int64_t us)> charge;
   // Limit on the cost of a picture.
   std::function<Result<void>(const frame::Cost& cost)> check_cost;

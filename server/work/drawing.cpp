@@ -25,12 +25,13 @@ void draw(const Drawing& drawing, const PreparedPtr& picture, std::int64_t queue
 }
 
 Result<void> draw_after_load(Backend& backend, const DrawingPtr& drawing, PreparedPtr picture) {
+  const std::int64_t sampling_us = picture->frame.scene.sampling_us;
   return backend.renderer.submit({drawing->kind, drawing->owner, drawing->cancel,
                                   [drawing, picture = std::move(picture)](std::int64_t queue_us) {
                                     draw(*drawing, picture, queue_us, Loading::allowed);
                                   },
-                                  true, drawing->cost_ms, drawing->payer});  // the request was
-                                                                             // admitted before
+                                  true,  // the request was admitted before
+                                  drawing->cost_ms, drawing->payer, sampling_us});
 }
 
 void load(Backend& backend, const DrawingPtr& drawing) {

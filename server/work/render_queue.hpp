@@ -28,9 +28,10 @@ struct RenderJob {
       cancel;  // raised by the submitter, by cancel_all(), or when another job takes precedence
   // Called exactly once, cancelled or not, on the renderer's thread. Must not throw.
   std::function<void(std::int64_t queue_us)> run;
-  bool admitted = false;   // continues a request that was admitted before: never refused
-  double cost_ms = 0;      // estimate; 0: unknown
-  std::string payer = {};  // address charged with the time; empty: none
+  bool admitted = false;      // continues a request that was admitted before: never refused
+  double cost_ms = 0;         // estimate; 0: unknown
+  std::string payer = {};     // address charged with the time; empty: none
+  std::int64_t spent_us = 0;  // time of other threads for this job, charged with it
 };
 
 // Usage of a shared resource by several parties. A party that becomes active again starts at the

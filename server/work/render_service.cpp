@@ -75,7 +75,9 @@ struct RenderService::State {
     }
     const std::int64_t took_us = options.now_us() - began_us;
     try {
-      if (options.charge && !next.job.payer.empty()) options.charge(next.job.payer, took_us);
+      if (options.charge && !next.job.payer.empty()) {
+        options.charge(next.job.payer, took_us + next.job.spent_us);
+      }
     } catch (const std::exception& fault) {
       log_fault("a render job could not be charged", fault);
     }

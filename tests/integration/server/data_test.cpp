@@ -363,6 +363,55 @@ TEST(Viewer, PrefetchCoversTheFieldsOfSections) {
   }
 }
 
+TEST(Drawings, SamplingOfASectionIsChargedLikeRendering) {
+  constexpr std::int64_t hour_us = 3'600'000'000;
+  const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  const auto dataset = store->add("climate:64x32x8").value();
+  protocol::View plane;
+  plane.dataset = dataset->info().id;
+  plane.geometry.plane = protocol::PlaneView{{0, 0, 0}, {1, 2, 30}};
+  const auto completed = scene::complete(plane, *dataset).value();
+  metrics::Metrics metrics;
+  std::vector<std::int64_t> charged;
+  work::BackendOptions options;
+  options.charge = [&](const std::string& payer, std::int64_t us) {
+    if (payer == "192.0.2.1") charged.push_back(us);
+  };
+  work::Backend backend(store, std::make_shared<ThreadPool>(1), metrics, std::move(options));
+  // Time of sampling; that of the picture is raised by an hour unless there was none.
+  const auto sampling_us = [&] {
+    std::promise<std::int64_t> told;
+    work::Drawing drawing;
+    drawing.dataset = dataset;
+    drawing.payer = "192.0.2.1";
+    drawing.prepare = [&](data::Dataset& data, work::Loading loading) {
+      auto picture =
+          work::prepare_picture(completed, frame::own_setting(completed), {}, data, loading);
+      if (picture && (*picture)->frame.scene.sampling_us > 0) {
+        (*picture)->frame.scene.sampling_us += hour_us;
+      }
+      return picture;
+    };
+    drawing.draw = [&](const work::PreparedPicture& picture, data::Dataset& /*dataset*/,
+                       std::int64_t /*queue_us*/, work::Loading /*loading*/) {
+      told.set_value(picture.frame.scene.sampling_us);
+    };
+    drawing.fail = [&](const Error& error) {
+      ADD_FAILURE() << error.message;
+      told.set_value(-1);
+    };
+    EXPECT_TRUE(work::submit(backend, std::move(drawing)));
+    return told.get_future().get();
+  };
+  EXPECT_GT(sampling_us(), hour_us);
+  EXPECT_EQ(sampling_us(), 0) << "it is kept";
+  backend.end();
+  ASSERT_EQ(charged.size(), 3U) << "the first found that data are missing";
+  EXPECT_LT(charged[0], hour_us);
+  EXPECT_GT(charged[1], hour_us);
+  EXPECT_LT(charged[2], hour_us);
+}
+
 TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
   Gate gate;  // declared before the parts: their threads use it until they end
   std::promise<std::string> told;
