@@ -50,8 +50,7 @@ struct Projected {
 };
 
 struct Mean {
-  double sum = 0;
-  double weight = 0;
+  double sum = 0, weight = 0;
   void add(double value, double its_weight) {
     sum += its_weight * value;
     weight += its_weight;
