@@ -15,12 +15,12 @@ namespace {
 
 http::Response no_content() { return {204, "", {{"Cache-Control", "no-store"}}, {}}; }
 
-http::Response open_in_job(work::Backend& backend, const std::string& base_path,
+http::Response open_in_job(tasks::Backend& backend, const std::string& base_path,
                            data::Location location) {
   const auto job =
       backend.jobs.submit("dataset",
                           [&backend, location = std::move(location)](
-                              const work::Jobs::Handle& handle) -> Result<protocol::JobResult> {
+                              const tasks::Jobs::Handle& handle) -> Result<protocol::JobResult> {
                             auto opened = backend.catalogue.open(location, handle.cancel);
                             backend.metrics.dataset_opened(opened.has_value());
                             if (!opened) return opened.error();
@@ -30,7 +30,7 @@ http::Response open_in_job(work::Backend& backend, const std::string& base_path,
 }
 
 // Resolves only the name; reads nothing.
-http::Response locate_and_open(const ServerOptions& options, work::Backend& backend,
+http::Response locate_and_open(const ServerOptions& options, tasks::Backend& backend,
                                const std::string& path) {
   const auto located = data::locate_beneath(options.data_root, path);
   if (located) return open_in_job(backend, options.base_path, *located);
@@ -52,8 +52,8 @@ http::Response job_response(metrics::Metrics& metrics, const std::string& base_p
   return response;
 }
 
-void post_dataset(const ServerOptions& options, work::TaskExecutor& look_ups,
-                  work::Backend& backend, const http::Request& request, http::Reply reply) {
+void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
+                  tasks::Backend& backend, const http::Request& request, http::Reply reply) {
   if (options.data_root.empty()) {
     reply(http::problem_response(403, "Forbidden",
                                  "opening files is disabled: start the server with "
@@ -76,7 +76,7 @@ void post_dataset(const ServerOptions& options, work::TaskExecutor& look_ups,
             });
 }
 
-http::Response delete_dataset(work::Catalogue& catalogue, const std::string& id,
+http::Response delete_dataset(tasks::Catalogue& catalogue, const std::string& id,
                               const http::Request& request) {
   http::QueryReader query(request.query);
   const bool forget = query.boolean("forget").value_or(false);
@@ -97,16 +97,16 @@ http::Response delete_dataset(work::Catalogue& catalogue, const std::string& id,
   return no_content();
 }
 
-http::Response get_jobs(const work::Jobs& jobs) {
+http::Response get_jobs(const tasks::Jobs& jobs) {
   return json_response(protocol::encode_jobs(jobs.list()));
 }
 
-http::Response get_job(const work::Jobs& jobs, const std::string& id) {
+http::Response get_job(const tasks::Jobs& jobs, const std::string& id) {
   const auto job = jobs.find(id);
   return job ? json_response(protocol::encode_job(*job)) : http::problem_response(job.error());
 }
 
-http::Response delete_job(work::Jobs& jobs, const std::string& id) {
+http::Response delete_job(tasks::Jobs& jobs, const std::string& id) {
   const auto cancelled = jobs.cancel(id);
   return cancelled ? no_content() : http::problem_response(cancelled.error());
 }

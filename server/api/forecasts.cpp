@@ -15,7 +15,7 @@
 namespace windsplat::api {
 namespace {
 
-Result<protocol::View> read_view(work::Backend& backend, const std::string& body) {
+Result<protocol::View> read_view(tasks::Backend& backend, const std::string& body) {
   const auto document = protocol::ViewDocument::parse(body);
   if (!document) return document.error();
   protocol::View view = document->view();
@@ -48,7 +48,7 @@ Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const pr
 
 }  // namespace
 
-void post_forecast(work::Backend& backend, const http::Request& request, http::Reply reply) {
+void post_forecast(tasks::Backend& backend, const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
                                  "Content-Type must be application/json"));

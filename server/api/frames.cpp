@@ -17,10 +17,10 @@
 #include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/presets.hpp"
-#include "server/work/drawing.hpp"
-#include "server/work/error_report.hpp"
-#include "server/work/run_guarded.hpp"
-#include "server/work/view_completion.hpp"
+#include "server/tasks/drawing.hpp"
+#include "server/tasks/error_report.hpp"
+#include "server/tasks/run_guarded.hpp"
+#include "server/tasks/view_completion.hpp"
 
 namespace windsplat::api {
 namespace {
@@ -101,7 +101,7 @@ std::string picture_etag(const protocol::View& view, const data::Dataset& datase
 }
 
 // The view of the request, with its preset and orbit.
-Result<scene::CompletedView> complete(const Picture& picture, work::ViewCompletion& completion,
+Result<scene::CompletedView> complete(const Picture& picture, tasks::ViewCompletion& completion,
                                       data::Dataset& dataset) {
   const auto completed = completion.of(picture.view, dataset);
   if (!completed) return completed.error();
@@ -127,13 +127,13 @@ bool is_chosen(const protocol::View& view) {
 // With a limit, the data of the view become resident first: what they show decides. Errors:
 // not_resident if nothing may be loaded.
 Result<quality::Setting> setting_of(quality::Tables& tables, const scene::CompletedView& completed,
-                                    data::Dataset& dataset, work::Loading loading) {
+                                    data::Dataset& dataset, tasks::Loading loading) {
   const protocol::View& view = completed.view();
   if (!is_chosen(view) || view.method.name == protocol::MethodName::reference) {
     return frame::own_setting(completed);
   }
   const auto scene = scene::build_scene(completed, dataset);
-  if (!scene && scene.error().kind == ErrorKind::not_resident && loading == work::Loading::none) {
+  if (!scene && scene.error().kind == ErrorKind::not_resident && loading == tasks::Loading::none) {
     return scene.error();
   }
   const auto known =
@@ -148,35 +148,35 @@ http::Response unchanged_response(const std::string& etag) {
 
 // Null if the client has the picture already: `reply` is called with 304. Its tag identifies the
 // completed view, which may require reading data, so it is not known earlier.
-Result<work::PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
-                                  work::ViewCompletion& completion, data::Dataset& dataset,
-                                  work::Loading loading, const http::Reply& reply) {
+Result<tasks::PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
+                                   tasks::ViewCompletion& completion, data::Dataset& dataset,
+                                   tasks::Loading loading, const http::Reply& reply) {
   const auto completed = complete(picture, completion, dataset);
   if (!completed) {
-    if (loading == work::Loading::none) return completed.error();
-    return work::with_dataset_name(completed.error(), dataset.info().id);
+    if (loading == tasks::Loading::none) return completed.error();
+    return tasks::with_dataset_name(completed.error(), dataset.info().id);
   }
   if (!is_chosen(completed->view())) {
     const std::string etag = picture_etag(completed->view(), dataset, picture.encoding);
     if (http::matches_etag(picture.if_none_match, etag)) {
       reply(unchanged_response(etag));
-      return work::PreparedPtr();
+      return tasks::PreparedPtr();
     }
   }
   const auto setting = setting_of(tables, *completed, dataset, loading);
   if (!setting) return setting.error();
-  return work::prepare_picture(*completed, *setting, picture.encoding, dataset, loading);
+  return tasks::prepare_picture(*completed, *setting, picture.encoding, dataset, loading);
 }
 
-Result<http::Response> draw(work::Backend& backend, const Picture& picture,
-                            const work::PreparedPicture& prepared, data::Dataset& dataset,
-                            std::int64_t queue_us, work::Loading loading,
+Result<http::Response> draw(tasks::Backend& backend, const Picture& picture,
+                            const tasks::PreparedPicture& prepared, data::Dataset& dataset,
+                            std::int64_t queue_us, tasks::Loading loading,
                             const CancelToken& cancel) {
   auto drawn = frame::produce(prepared.frame, dataset, *backend.pool, cancel, backend.frames);
   if (!drawn) return drawn.error();
   protocol::FrameInfo info = frame::frame_info(*drawn, drawn->view);
-  work::report_error(*drawn, work::observed_in(*drawn, prepared.frame.setting),
-                     prepared.frame.setting, prepared.frame.encoding, backend.quality, info);
+  tasks::report_error(*drawn, tasks::observed_in(*drawn, prepared.frame.setting),
+                      prepared.frame.setting, prepared.frame.encoding, backend.quality, info);
   backend.metrics.stage_took(metrics::Metrics::Stage::queue, queue_us);
   backend.metrics.stage_took(metrics::Metrics::Stage::render, drawn->render_us);
   backend.metrics.stage_took(metrics::Metrics::Stage::encode, drawn->encode_us);
@@ -188,7 +188,7 @@ Result<http::Response> draw(work::Backend& backend, const Picture& picture,
                         {"ETag", picture_etag(drawn->view, dataset, picture.encoding)}};
     // Settings chosen by the server reduce the work below the estimate; the scene of a picture that
     // waited for data was prepared elsewhere.
-    if (loading == work::Loading::none) {
+    if (loading == tasks::Loading::none) {
       backend.request_times.learn(drawn->view.dataset, drawn->view.method.name,
                                   picture.cost.kernels, drawn->render_us + drawn->encode_us);
     }
@@ -206,7 +206,7 @@ Result<http::Response> draw(work::Backend& backend, const Picture& picture,
   return response;
 }
 
-void submit_picture(work::Backend& backend, access::Admission& admission, Picture asked,
+void submit_picture(tasks::Backend& backend, access::Admission& admission, Picture asked,
                     std::shared_ptr<data::Dataset> dataset, const http::Request& request,
                     http::Reply reply) {
   if (auto refusal = admission.picture(request.address)) {
@@ -226,19 +226,19 @@ void submit_picture(work::Backend& backend, access::Admission& admission, Pictur
   // Addresses take turns, however many connections each has.
   const std::uint64_t owner =
       request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
-  work::Drawing drawing{
-      work::RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
+  tasks::Drawing drawing{
+      tasks::RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
   drawing.prepare = [&tables = backend.quality, picture, answer, cancel,
-                     completion = std::make_shared<work::ViewCompletion>(),
-                     id = request.id](data::Dataset& available, work::Loading loading) {
-    return work::run_guarded<work::PreparedPtr>(
+                     completion = std::make_shared<tasks::ViewCompletion>(),
+                     id = request.id](data::Dataset& available, tasks::Loading loading) {
+    return tasks::run_guarded<tasks::PreparedPtr>(
         "preparing a picture", cancel,
         [&] { return prepare(tables, *picture, *completion, available, loading, *answer); }, id);
   };
   drawing.draw = [&backend, picture, answer, cancel, id = request.id](
-                     const work::PreparedPicture& prepared, data::Dataset& resident,
-                     std::int64_t queue_us, work::Loading loading) {
-    auto response = work::run_guarded<http::Response>(
+                     const tasks::PreparedPicture& prepared, data::Dataset& resident,
+                     std::int64_t queue_us, tasks::Loading loading) {
+    auto response = tasks::run_guarded<http::Response>(
         "a picture", cancel,
         [&] { return draw(backend, *picture, prepared, resident, queue_us, loading, cancel); }, id);
     (*answer)(response ? std::move(*response) : http::problem_response(response.error()));
@@ -246,7 +246,7 @@ void submit_picture(work::Backend& backend, access::Admission& admission, Pictur
   drawing.payer = request.address;
   drawing.cost_ms = estimate_ms;
   drawing.fail = [answer](const Error& error) { (*answer)(http::problem_response(error)); };
-  if (const auto queued = work::submit(backend, std::move(drawing)); !queued) {
+  if (const auto queued = tasks::submit(backend, std::move(drawing)); !queued) {
     (*answer)(http::problem_response(queued.error()));
   }
 }
@@ -302,7 +302,7 @@ Result<Picture> read_view(const http::Request& request, frame::Format format) {
 
 }  // namespace
 
-void get_frame(work::Backend& backend, access::Admission& admission, frame::Format format,
+void get_frame(tasks::Backend& backend, access::Admission& admission, frame::Format format,
                const std::string& id, const http::Request& request, http::Reply reply) {
   auto dataset = backend.catalogue.find(id);
   if (!dataset) {
@@ -325,7 +325,7 @@ void get_frame(work::Backend& backend, access::Admission& admission, frame::Form
                  std::move(reply));
 }
 
-void post_frame(work::Backend& backend, access::Admission& admission, const http::Request& request,
+void post_frame(tasks::Backend& backend, access::Admission& admission, const http::Request& request,
                 http::Reply reply) {
   constexpr std::array<frame::Format, 3> formats{frame::Format::jpeg, frame::Format::png,
                                                  frame::Format::npy};

@@ -17,7 +17,7 @@
 #include "server/data/model/measure.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
-#include "server/work/run_guarded.hpp"
+#include "server/tasks/run_guarded.hpp"
 
 namespace windsplat::api {
 namespace {
@@ -32,19 +32,19 @@ constexpr std::chrono::milliseconds turn_budget{
 
 // Dataset and field of a query, resolved before loading.
 struct Subject {
-  work::Catalogue* catalogue = nullptr;
+  tasks::Catalogue* catalogue = nullptr;
   DatasetPtr dataset;
   data::FieldInfo field;
   CancelToken cancel;
 };
 
-Result<DatasetPtr> find_dataset(const work::Catalogue& catalogue, const std::string& id) {
+Result<DatasetPtr> find_dataset(const tasks::Catalogue& catalogue, const std::string& id) {
   auto dataset = catalogue.find(id);
   if (!dataset) return make_error(ErrorKind::not_found, dataset.error().message);
   return dataset;
 }
 
-Result<Subject> find_subject(work::Catalogue& catalogue, const std::string& id,
+Result<Subject> find_subject(tasks::Catalogue& catalogue, const std::string& id,
                              const std::string& field, const http::Request& request) {
   auto dataset = find_dataset(catalogue, id);
   if (!dataset) return dataset.error();
@@ -56,15 +56,15 @@ Result<Subject> find_subject(work::Catalogue& catalogue, const std::string& id,
   return Subject{&catalogue, std::move(*dataset), *found, request.cancel};
 }
 
-Result<std::shared_ptr<const data::Volume>> load(work::Catalogue& catalogue,
+Result<std::shared_ptr<const data::Volume>> load(tasks::Catalogue& catalogue,
                                                  const data::Dataset& dataset,
                                                  const std::string& field, std::size_t step,
                                                  const CancelToken& cancel) {
   auto volume = catalogue.load(
       dataset, [&](data::Dataset& loading) { return loading.volume(field, step); }, cancel);
   if (!volume)
-    return work::with_dataset_name(dataset.with_need(volume.error(), {field}), dataset.info().id,
-                                   field);
+    return tasks::with_dataset_name(dataset.with_need(volume.error(), {field}), dataset.info().id,
+                                    field);
   return volume;
 }
 
@@ -134,9 +134,9 @@ Result<std::optional<http::Response>> take_turn(Pass& pass) {
 }
 
 // Resubmits itself, so that other loads run in between. Only the first job may be refused.
-void go_on(work::TaskExecutor& loads, const std::shared_ptr<Pass>& pass, bool admitted) {
+void go_on(tasks::TaskExecutor& loads, const std::shared_ptr<Pass>& pass, bool admitted) {
   const auto run = [&loads, pass] {
-    auto answer = work::run_guarded<std::optional<http::Response>>(
+    auto answer = tasks::run_guarded<std::optional<http::Response>>(
         "a pass over all steps", pass->cancel, [&] { return take_turn(*pass); });
     if (!answer) return (*pass->reply)(http::problem_response(answer.error()));
     if (*answer) return (*pass->reply)(std::move(**answer));
@@ -206,7 +206,7 @@ http::Response histogram_response(const Subject& subject, const HistogramQuery& 
 
 // --- probe --------------------------------------------------------------------------------------
 
-http::Response probe_response(work::Catalogue& catalogue, data::Dataset& dataset,
+http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& dataset,
                               const std::array<std::optional<double>, 3>& at, int step,
                               const CancelToken& cancel) {
   const data::DatasetInfo& info = dataset.info();
@@ -242,7 +242,7 @@ http::Response step_range(const Subject& subject, std::size_t step) {
   return range_response(range, "step");
 }
 
-void answer_range_of_all(work::Backend& backend, Subject subject, const http::Request& request,
+void answer_range_of_all(tasks::Backend& backend, Subject subject, const http::Request& request,
                          http::Reply reply) {
   auto of = subject.dataset->shared_info();
   if (const auto known = backend.ranges.find(of, subject.field.name)) {
@@ -262,7 +262,7 @@ void answer_range_of_all(work::Backend& backend, Subject subject, const http::Re
 
 }  // namespace
 
-void get_histogram(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+void get_histogram(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                    const std::string& field, const http::Request& request, http::Reply reply) {
   auto subject = find_subject(catalogue, id, field, request);
   if (!subject) {
@@ -280,7 +280,7 @@ void get_histogram(work::Catalogue& catalogue, work::TaskExecutor& loads, const 
             });
 }
 
-void get_probe(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+void get_probe(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                const http::Request& request, http::Reply reply) {
   auto dataset = find_dataset(catalogue, id);
   if (!dataset) {
@@ -300,7 +300,7 @@ void get_probe(work::Catalogue& catalogue, work::TaskExecutor& loads, const std:
             });
 }
 
-void get_series(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                 const std::string& field, const http::Request& request, http::Reply reply) {
   const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
   auto subject = find_subject(catalogue, id, field, request);
@@ -331,7 +331,7 @@ void get_series(work::Catalogue& catalogue, work::TaskExecutor& loads, const std
   go_on(loads, pass, false);
 }
 
-void get_range(work::Backend& backend, const std::string& id, const std::string& field,
+void get_range(tasks::Backend& backend, const std::string& id, const std::string& field,
                const http::Request& request, http::Reply reply) {
   const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
   auto subject = find_subject(backend.catalogue, id, field, request);

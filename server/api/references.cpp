@@ -7,14 +7,14 @@
 #include "server/base/trim_storage.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
-#include "server/work/reference_job.hpp"
+#include "server/tasks/reference_job.hpp"
 
 namespace windsplat::api {
 namespace {
 
 constexpr std::string_view suffix = ".png";
 
-Result<protocol::View> read_view(work::Backend& backend, const http::Request& request) {
+Result<protocol::View> read_view(tasks::Backend& backend, const http::Request& request) {
   const auto document = protocol::ViewDocument::parse(request.body);
   if (!document) return document.error();
   protocol::View view = document->view();
@@ -38,7 +38,7 @@ Result<protocol::View> read_view(work::Backend& backend, const http::Request& re
 
 }  // namespace
 
-void post_reference(work::Backend& backend, access::Admission& admission,
+void post_reference(tasks::Backend& backend, access::Admission& admission,
                     const std::string& base_path, const http::Request& request, http::Reply reply) {
   const http::Reply answer = std::move(reply);
   if (!is_json(request.header("Content-Type"))) {
@@ -51,20 +51,20 @@ void post_reference(work::Backend& backend, access::Admission& admission,
   const auto dataset = backend.catalogue.find(view->dataset);
   if (!dataset) return answer(http::problem_response(dataset.error()));
   if (auto refusal = admission.picture(request.address)) return answer(*refusal);
-  work::Jobs::Terms terms;
+  tasks::Jobs::Terms terms;
   terms.slow = true;
   auto ticket = backend.references.admit(request.address, terms.cancel);
   if (!ticket) return answer(http::problem_response(ticket.error()));
   const auto work = [&backend, &base_path, view = std::move(*view), dataset = *dataset,
                      address = request.address,
-                     ticket = std::move(*ticket)](const work::Jobs::Handle& handle) {
-    return work::draw_reference(backend, view, *dataset, handle, address, base_path);
+                     ticket = std::move(*ticket)](const tasks::Jobs::Handle& handle) {
+    return tasks::draw_reference(backend, view, *dataset, handle, address, base_path);
   };
   answer(job_response(backend.metrics, base_path, backend.jobs.submit("reference", work, terms)));
 }
 
 // The content of an id never changes.
-http::Response get_reference(work::References& references, const std::string& name,
+http::Response get_reference(tasks::References& references, const std::string& name,
                              const http::Request& request) {
   const bool is_png = name.size() > suffix.size() && name.ends_with(suffix);
   const std::string id = is_png ? name.substr(0, name.size() - suffix.size()) : "";

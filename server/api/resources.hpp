@@ -13,7 +13,7 @@
 #include "server/frame/frame.hpp"
 #include "server/http/exchange.hpp"
 #include "server/metrics/metrics.hpp"
-#include "server/work/backend.hpp"
+#include "server/tasks/backend.hpp"
 
 namespace windsplat::api {
 
@@ -23,63 +23,63 @@ http::Response get_presets();
 http::Response get_view_schema(const http::Request& request);
 http::Response get_livez();
 http::Response get_readyz(const std::atomic<bool>& draining);
-http::Response get_metrics(const metrics::Metrics& metrics, const work::Catalogue& catalogue);
+http::Response get_metrics(const metrics::Metrics& metrics, const tasks::Catalogue& catalogue);
 
 // Runs `make` on a thread of the executor and replies with its value or error. `what` names the
 // work in the log; `of`: the dataset that it reads, if any.
-void run_later(work::TaskExecutor& executor, const http::Request& request, http::Reply reply,
+void run_later(tasks::TaskExecutor& executor, const http::Request& request, http::Reply reply,
                const char* what, const data::Dataset* of, std::function<http::Response()> make);
 bool is_json(std::string_view content_type);
 bool is_merge_patch(std::string_view content_type);
 
-http::Response get_datasets(const work::Catalogue& catalogue);
-void get_dataset(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+http::Response get_datasets(const tasks::Catalogue& catalogue);
+void get_dataset(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                  const http::Request& request, http::Reply reply);
 
 // Opens a file below a root given by --data-root, in a job.
-void post_dataset(const ServerOptions& options, work::TaskExecutor& look_ups,
-                  work::Backend& backend, const http::Request& request, http::Reply reply);
-http::Response delete_dataset(work::Catalogue& catalogue, const std::string& id,
+void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
+                  tasks::Backend& backend, const http::Request& request, http::Reply reply);
+http::Response delete_dataset(tasks::Catalogue& catalogue, const std::string& id,
                               const http::Request& request);
 // 202 with the location of the job, or the error.
 http::Response job_response(metrics::Metrics& metrics, const std::string& base_path,
                             const Result<protocol::JobDescription>& job);
-http::Response get_jobs(const work::Jobs& jobs);
-http::Response get_job(const work::Jobs& jobs, const std::string& id);
-http::Response delete_job(work::Jobs& jobs, const std::string& id);
+http::Response get_jobs(const tasks::Jobs& jobs);
+http::Response get_job(const tasks::Jobs& jobs, const std::string& id);
+http::Response delete_job(tasks::Jobs& jobs, const std::string& id);
 
-void get_probe(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+void get_probe(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                const http::Request& request, http::Reply reply);
-void get_histogram(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+void get_histogram(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                    const std::string& field, const http::Request& request, http::Reply reply);
-void get_series(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                 const std::string& field, const http::Request& request, http::Reply reply);
-void get_range(work::Backend& backend, const std::string& id, const std::string& field,
+void get_range(tasks::Backend& backend, const std::string& id, const std::string& field,
                const http::Request& request, http::Reply reply);
 
-void get_frame(work::Backend& backend, access::Admission& admission, frame::Format format,
+void get_frame(tasks::Backend& backend, access::Admission& admission, frame::Format format,
                const std::string& id, const http::Request& request, http::Reply reply);
-void post_frame(work::Backend& backend, access::Admission& admission, const http::Request& request,
+void post_frame(tasks::Backend& backend, access::Admission& admission, const http::Request& request,
                 http::Reply reply);
 
 // The reference of a view: drawn by a job, then cached.
-void post_reference(work::Backend& backend, access::Admission& admission,
+void post_reference(tasks::Backend& backend, access::Admission& admission,
                     const std::string& base_path, const http::Request& request, http::Reply reply);
-http::Response get_reference(work::References& references, const std::string& name,
+http::Response get_reference(tasks::References& references, const std::string& name,
                              const http::Request& request);
 // Estimated time and error of a picture of a posted view.
-void post_forecast(work::Backend& backend, const http::Request& request, http::Reply reply);
+void post_forecast(tasks::Backend& backend, const http::Request& request, http::Reply reply);
 
 // `view_io` runs the changes.
-void post_saved_view(views::SavedViews& views, work::TaskExecutor& view_io,
+void post_saved_view(views::SavedViews& views, tasks::TaskExecutor& view_io,
                      const std::string& base_path, const http::Request& request, http::Reply reply);
 http::Response get_view(const views::SavedViews& views, const std::string& id,
                         const http::Request& request);
-void put_view(views::SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+void put_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
               const http::Request& request, http::Reply reply);
-void patch_view(views::SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+void patch_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
                 const http::Request& request, http::Reply reply);
-void delete_view(views::SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+void delete_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
                  const http::Request& request, http::Reply reply);
 
 // An embedded file of the page; `path` as in web_assets().

@@ -57,11 +57,11 @@ constexpr const char* frame_name = "/v1/datasets/{id}/frame";
 }  // namespace
 
 std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
-                          access::Admission& admission, work::Backend& backend,
-                          work::TaskExecutor& look_ups, work::TaskExecutor& view_io) {
-  work::Catalogue& catalogue = backend.catalogue;
-  work::TaskExecutor& loads = backend.loads;
-  work::Jobs& jobs = backend.jobs;
+                          access::Admission& admission, tasks::Backend& backend,
+                          tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io) {
+  tasks::Catalogue& catalogue = backend.catalogue;
+  tasks::TaskExecutor& loads = backend.loads;
+  tasks::Jobs& jobs = backend.jobs;
   metrics::Metrics& metrics = backend.metrics;
   views::SavedViews& views = *options.views;
   const std::string& base_path = options.base_path;

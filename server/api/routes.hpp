@@ -9,7 +9,7 @@
 #include "server/access/admission.hpp"
 #include "server/api/server_options.hpp"
 #include "server/http/exchange.hpp"
-#include "server/work/backend.hpp"
+#include "server/tasks/backend.hpp"
 
 namespace windsplat::api {
 
@@ -44,8 +44,8 @@ struct Route {
 // methods that Allow states. Documented in docs/user/api.md. `look_ups` resolve posted names,
 // `view_io` changes saved views.
 std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
-                          access::Admission& admission, work::Backend& backend,
-                          work::TaskExecutor& look_ups, work::TaskExecutor& view_io);
+                          access::Admission& admission, tasks::Backend& backend,
+                          tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io);
 
 // Names by which requests are counted, besides the paths of routes().
 inline constexpr const char* route_stream = "/v1/stream";

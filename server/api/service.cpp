@@ -10,7 +10,7 @@
 #include "server/http/problem.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/presets.hpp"
-#include "server/work/run_guarded.hpp"
+#include "server/tasks/run_guarded.hpp"
 
 namespace windsplat::api {
 namespace {
@@ -45,12 +45,12 @@ bool is_merge_patch(std::string_view content_type) {
                                   "application/merge-patch+json");
 }
 
-void run_later(work::TaskExecutor& executor, const http::Request& request, http::Reply reply,
+void run_later(tasks::TaskExecutor& executor, const http::Request& request, http::Reply reply,
                const char* what, const data::Dataset* of, std::function<http::Response()> make) {
   const auto answer = std::make_shared<const http::Reply>(std::move(reply));
   const CancelToken cancel = request.cancel;
   const auto run = [what, make = std::move(make), cancel, answer, id = request.id] {
-    auto response = work::run_guarded<http::Response>(what, cancel, make, id);
+    auto response = tasks::run_guarded<http::Response>(what, cancel, make, id);
     (*answer)(response ? std::move(*response) : http::problem_response(response.error()));
   };
   const auto queued = executor.submit(
@@ -85,7 +85,7 @@ http::Response get_readyz(const std::atomic<bool>& draining) {
   return draining ? health(503, "draining") : health(200, "ready");
 }
 
-http::Response get_metrics(const metrics::Metrics& metrics, const work::Catalogue& catalogue) {
+http::Response get_metrics(const metrics::Metrics& metrics, const tasks::Catalogue& catalogue) {
   http::Response response;
   response.content_type = "text/plain; version=0.0.4; charset=utf-8";
   response.headers = {{"Cache-Control", "no-store"}};
@@ -131,13 +131,13 @@ http::Response get_view_schema(const http::Request& request) {
   return tagged_response(request, "application/schema+json", view_schema_json());
 }
 
-http::Response get_datasets(const work::Catalogue& catalogue) {
+http::Response get_datasets(const tasks::Catalogue& catalogue) {
   const auto list = catalogue.list();
   if (!list) return http::problem_response(list.error());
   return json_response(protocol::encode_dataset_list(*list));
 }
 
-void get_dataset(work::Catalogue& catalogue, work::TaskExecutor& loads, const std::string& id,
+void get_dataset(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                  const http::Request& request, http::Reply reply) {
   const auto dataset = catalogue.find(id);
   if (!dataset) {

@@ -63,7 +63,7 @@ http::Response changed_meanwhile() {
       "the saved view does not satisfy If-Match or If-None-Match; read it again");
 }
 
-void replace_later(SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+void replace_later(SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
                    const http::Request& request, http::Reply reply, SavedViews::Change change) {
   run_later(view_io, request, std::move(reply), "a change of a saved view", nullptr,
             [&views, id, may = Unchanged(views, request), change = std::move(change)] {
@@ -75,7 +75,7 @@ void replace_later(SavedViews& views, work::TaskExecutor& view_io, const std::st
 
 }  // namespace
 
-void post_saved_view(SavedViews& views, work::TaskExecutor& view_io, const std::string& base_path,
+void post_saved_view(SavedViews& views, tasks::TaskExecutor& view_io, const std::string& base_path,
                      const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
@@ -105,7 +105,7 @@ http::Response get_view(const SavedViews& views, const std::string& id,
   return tagged_response(request, "application/json", text_of(views, *saved));
 }
 
-void put_view(SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+void put_view(SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
               const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
@@ -121,7 +121,7 @@ void put_view(SavedViews& views, work::TaskExecutor& view_io, const std::string&
                 [view = std::move(*view)](const ViewDocument&) { return view; });
 }
 
-void patch_view(SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+void patch_view(SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
                 const http::Request& request, http::Reply reply) {
   const std::string type = request.header("Content-Type");
   if (!is_json(type) && !is_merge_patch(type)) {
@@ -135,7 +135,7 @@ void patch_view(SavedViews& views, work::TaskExecutor& view_io, const std::strin
                 [patch = request.body](const ViewDocument& now) { return now.patched(patch); });
 }
 
-void delete_view(SavedViews& views, work::TaskExecutor& view_io, const std::string& id,
+void delete_view(SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
                  const http::Request& request, http::Reply reply) {
   run_later(view_io, request, std::move(reply), "removing a saved view", nullptr,
             [&views, id, may = Unchanged(views, request)]() -> http::Response {

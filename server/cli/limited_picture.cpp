@@ -13,7 +13,7 @@
 #include "server/frame/measure.hpp"
 #include "server/quality/pick.hpp"
 #include "server/quality/setting.hpp"
-#include "server/work/error_report.hpp"
+#include "server/tasks/error_report.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -105,8 +105,8 @@ Result<Picture> LimitedPictures::draw_at(const scene::CompletedView& completed,
       milliseconds(drawn->encode_us) / (static_cast<double>(drawn->width) * drawn->height);
   Picture picture{std::move(*drawn), {}};
   picture.info = frame::frame_info(picture.frame, picture.frame.view);
-  work::report_error(picture.frame, work::observed_in(picture.frame, setting), setting, encoding,
-                     tables_, picture.info);
+  tasks::report_error(picture.frame, tasks::observed_in(picture.frame, setting), setting, encoding,
+                      tables_, picture.info);
   return picture;
 }
 

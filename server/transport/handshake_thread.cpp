@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "server/base/log.hpp"
-#include "server/work/run_guarded.hpp"
+#include "server/tasks/run_guarded.hpp"
 
 namespace windsplat::transport {
 namespace {
@@ -102,7 +102,7 @@ void HandshakeThread::run() {
       step->run();
     } catch (const std::exception& fault) {
       // The deadline of the handshake closes the connection.
-      work::log_fault("TLS handshake step failed", fault);
+      tasks::log_fault("TLS handshake step failed", fault);
     }
   }
 }

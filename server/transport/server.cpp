@@ -14,11 +14,11 @@
 
 #include "server/base/check.hpp"
 #include "server/base/log.hpp"
+#include "server/tasks/run_guarded.hpp"
 #include "server/transport/handshake.hpp"
 #include "server/transport/listener.hpp"
 #include "server/transport/post_or_retry.hpp"
 #include "server/transport/server_parts.hpp"
-#include "server/work/run_guarded.hpp"
 
 namespace windsplat::transport {
 namespace {
@@ -61,7 +61,7 @@ struct Server::State {
         io.poll();
         break;
       } catch (const std::exception& fault) {
-        work::log_fault("an exception reached the io loop", fault);
+        tasks::log_fault("an exception reached the io loop", fault);
       }
     }
   }
@@ -103,7 +103,7 @@ struct Server::State {
       if (!fault) parts.admission.log_refused_handshakes();
       if (fault || parts.draining) return;
       const auto look = [this] {
-        auto found = work::run_guarded<std::vector<std::string>>(
+        auto found = tasks::run_guarded<std::vector<std::string>>(
             "file check", never, [this] { return parts.backend.catalogue.look_after(); });
         std::vector<std::string> changed;
         if (found) changed = std::move(*found);
@@ -169,7 +169,7 @@ struct Server::State {
         try {
           parts.backend.catalogue.end();
         } catch (const std::exception& failure) {
-          work::log_fault("pending reads could not be ended", failure);
+          tasks::log_fault("pending reads could not be ended", failure);
         }
       });
     });
@@ -256,7 +256,7 @@ void Server::run() {
       state_->go_on();
       state_->io.run();
     } catch (const std::exception& fault) {
-      work::log_fault("an exception reached the io loop", fault);
+      tasks::log_fault("an exception reached the io loop", fault);
       std::this_thread::sleep_for(after_a_fault);
     }
   }

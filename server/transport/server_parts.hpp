@@ -10,11 +10,11 @@
 #include "server/api/server_options.hpp"
 #include "server/http/request_id.hpp"
 #include "server/metrics/metrics.hpp"
+#include "server/tasks/backend.hpp"
+#include "server/tasks/task_executor.hpp"
 #include "server/transport/connections.hpp"
 #include "server/transport/http/http_session.hpp"
 #include "server/transport/websocket/websocket_session.hpp"
-#include "server/work/backend.hpp"
-#include "server/work/task_executor.hpp"
 
 namespace windsplat::transport {
 
@@ -33,10 +33,10 @@ struct ServerParts {
   metrics::Metrics metrics;    // before the members that count
   access::Admission admission;
   std::atomic<bool> draining{false};
-  work::Backend backend;
-  work::TaskExecutor look_ups{work::look_up_settings};
-  work::TaskExecutor view_io{work::view_io_settings};
-  work::TaskExecutor file_checks{work::file_check_settings};
+  tasks::Backend backend;
+  tasks::TaskExecutor look_ups{tasks::look_up_settings};
+  tasks::TaskExecutor view_io{tasks::view_io_settings};
+  tasks::TaskExecutor file_checks{tasks::file_check_settings};
   http::RequestIds request_ids;  // used by the io thread only
   const api::Router router;
   const StreamContext streams{options, backend, admission, draining, connections};

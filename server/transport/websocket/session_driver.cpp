@@ -29,7 +29,7 @@ struct EffectRunner {
 }  // namespace
 
 SessionDriver::SessionDriver(StreamOwner& owner, WebSocketStream& socket, session::Session session,
-                             work::Backend& backend, metrics::Metrics& metrics,
+                             tasks::Backend& backend, metrics::Metrics& metrics,
                              access::Admission& admission, const std::string& address)
     : owner_(owner),
       metrics_(metrics),

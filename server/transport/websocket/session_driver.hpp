@@ -19,7 +19,7 @@ class SessionDriver final : public StreamEvents {
  public:
   // `address` is charged with the work and the bytes sent.
   SessionDriver(StreamOwner& owner, WebSocketStream& socket, session::Session session,
-                work::Backend& backend, metrics::Metrics& metrics, access::Admission& admission,
+                tasks::Backend& backend, metrics::Metrics& metrics, access::Admission& admission,
                 const std::string& address);
   ~SessionDriver() override;
 

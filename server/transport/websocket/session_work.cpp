@@ -13,9 +13,9 @@ constexpr std::chrono::seconds throttle_max{10};
 }  // namespace
 
 SessionWork::SessionWork(StreamOwner& owner, const boost::asio::any_io_executor& executor,
-                         work::Backend& backend, access::Admission& admission,
-                         const std::string& address, work::DrawnReply on_rendered,
-                         work::DescribedReply on_described)
+                         tasks::Backend& backend, access::Admission& admission,
+                         const std::string& address, tasks::DrawnReply on_rendered,
+                         tasks::DescribedReply on_described)
     : owner_(owner),
       executor_(executor),
       admission_(admission),

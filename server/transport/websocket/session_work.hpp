@@ -13,16 +13,16 @@
 
 #include "server/access/admission.hpp"
 #include "server/session/effects.hpp"
+#include "server/tasks/viewer.hpp"
 #include "server/transport/websocket/stream_owner.hpp"
-#include "server/work/viewer.hpp"
 
 namespace windsplat::transport {
 
 class SessionWork {
  public:
   SessionWork(StreamOwner& owner, const boost::asio::any_io_executor& executor,
-              work::Backend& backend, access::Admission& admission, const std::string& address,
-              work::DrawnReply on_rendered, work::DescribedReply on_described);
+              tasks::Backend& backend, access::Admission& admission, const std::string& address,
+              tasks::DrawnReply on_rendered, tasks::DescribedReply on_described);
 
   // A throttled address receives its frames later; a long delay closes the session.
   void start(const session::StartRender& effect);
@@ -45,9 +45,9 @@ class SessionWork {
   const boost::asio::any_io_executor executor_;
   access::Admission& admission_;
   const std::string& address_;
-  work::Viewer viewer_;
-  work::DrawnReply on_rendered_;
-  work::DescribedReply on_described_;
+  tasks::Viewer viewer_;
+  tasks::DrawnReply on_rendered_;
+  tasks::DescribedReply on_described_;
   boost::asio::steady_timer timer_;
   std::optional<session::StartRender> throttled_;  // starts when timer_ expires
   const std::shared_ptr<std::atomic<bool>> reply_lost_ = std::make_shared<std::atomic<bool>>(false);

@@ -33,7 +33,7 @@ bool offers_protocol(const UpgradeRequest& request) {
   return false;
 }
 
-std::optional<session::Reading> what_is_read(const work::Catalogue& catalogue,
+std::optional<session::Reading> what_is_read(const tasks::Catalogue& catalogue,
                                              const std::string& id) {
   const auto dataset = catalogue.find(id);
   const auto loading = dataset ? (*dataset)->loading() : std::nullopt;
@@ -41,7 +41,7 @@ std::optional<session::Reading> what_is_read(const work::Catalogue& catalogue,
   return session::Reading{loading->field, loading->done};
 }
 
-session::Session new_session(const api::ServerOptions& server_options, work::Backend& backend) {
+session::Session new_session(const api::ServerOptions& server_options, tasks::Backend& backend) {
   session::Options options;
   options.idle_timeout_us = session::Micros{server_options.idle_timeout_s} * 1'000'000;
   return {

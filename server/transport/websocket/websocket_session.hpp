@@ -7,9 +7,9 @@
 
 #include "server/access/admission.hpp"
 #include "server/api/server_options.hpp"
+#include "server/tasks/backend.hpp"
 #include "server/transport/connections.hpp"
 #include "server/transport/stream.hpp"
-#include "server/work/backend.hpp"
 
 namespace windsplat::transport {
 
@@ -18,7 +18,7 @@ class Wire;
 // What the sessions of a server share; outlives them.
 struct StreamContext {
   const api::ServerOptions& options;
-  work::Backend& backend;
+  tasks::Backend& backend;
   access::Admission& admission;
   const std::atomic<bool>& draining;
   Connections& connections;

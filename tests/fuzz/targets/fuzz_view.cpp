@@ -12,7 +12,7 @@
 #include "server/base/thread_pool.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/frame/frame.hpp"
-#include "server/work/catalogue.hpp"
+#include "server/tasks/catalogue.hpp"
 #include "tests/fuzz/support/check.hpp"
 
 namespace {
@@ -25,7 +25,7 @@ namespace limits = windsplat::protocol::limits;
 struct Surroundings {
   std::shared_ptr<windsplat::data::Store> store =
       std::make_shared<windsplat::data::Store>(std::uint64_t{256} << 20);
-  windsplat::work::Catalogue catalogue{store};
+  windsplat::tasks::Catalogue catalogue{store};
   std::shared_ptr<windsplat::data::Dataset> dataset = store->add("climate:8x6x4").value();
   windsplat::ThreadPool pool{1};
   windsplat::frame::Workspace space;

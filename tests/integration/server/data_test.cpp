@@ -11,9 +11,9 @@
 #include "server/data/open/open.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/tasks/drawing.hpp"
+#include "server/tasks/viewer.hpp"
 #include "server/transport/server_parts.hpp"
-#include "server/work/drawing.hpp"
-#include "server/work/viewer.hpp"
 #include "tests/integration/server/slow_source.hpp"
 #include "tests/integration/server/test_server.hpp"
 
@@ -267,7 +267,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
   std::promise<void> cancelled_ran;
   std::promise<void> other_ran;
   std::promise<void> last_ran;
-  work::TaskExecutor loads({"loads", 2, 16});  // last: its threads use all of these until they end
+  tasks::TaskExecutor loads({"loads", 2, 16});  // last: its threads use all of these until they end
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
   ASSERT_TRUE(gate.wait_for(1));
   const CancelToken unwanted;
@@ -288,7 +288,7 @@ TEST(Loads, JobsOfADatasetKeepTheirOrderAndCancelledOnesDoNotWait) {
 // The queue of one dataset is full: others are still admitted.
 TEST(Loads, EveryDatasetHasItsOwnQueue) {
   Gate gate;
-  work::TaskExecutor loads({"loads", 2, 2});
+  tasks::TaskExecutor loads({"loads", 2, 2});
   const auto one = std::make_shared<int>(1);
   const auto two = std::make_shared<int>(2);
   ASSERT_TRUE(loads.submit({{}, [&] { gate.pass(); }, false, one}));
@@ -323,7 +323,7 @@ TEST(Viewer, OnlyTheNewestWaitingPrefetchRequestIsLoaded) {
   of_scalar.scalars.emplace(1);
   of_scalar.scalars->front().field = scalar;
   of_vector.scalars.emplace();
-  work::Viewer viewer(parts.backend, 1, "192.0.2.1");
+  tasks::Viewer viewer(parts.backend, 1, "192.0.2.1");
   for (int i = 0; i < 1000; ++i) {
     viewer.start(session::Prefetch{i < 999 ? of_scalar : of_vector, {1}, {}});
   }
@@ -340,7 +340,7 @@ TEST(Viewer, PrefetchCoversTheFieldsOfSections) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add("climate:32x16x6").value();
   transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
-  work::Viewer viewer(parts.backend, 1, "192.0.2.1");
+  tasks::Viewer viewer(parts.backend, 1, "192.0.2.1");
   protocol::View layer;
   layer.dataset = dataset->info().id;
   protocol::View plane = layer;
@@ -373,34 +373,34 @@ TEST(Drawings, SamplingOfASectionIsChargedLikeRendering) {
   const auto completed = scene::complete(plane, *dataset).value();
   metrics::Metrics metrics;
   std::vector<std::int64_t> charged;
-  work::BackendOptions options;
+  tasks::BackendOptions options;
   options.charge = [&](const std::string& payer, std::int64_t us) {
     if (payer == "192.0.2.1") charged.push_back(us);
   };
-  work::Backend backend(store, std::make_shared<ThreadPool>(1), metrics, std::move(options));
+  tasks::Backend backend(store, std::make_shared<ThreadPool>(1), metrics, std::move(options));
   // Time of sampling; that of the picture is raised by an hour unless there was none.
   const auto sampling_us = [&] {
     std::promise<std::int64_t> told;
-    work::Drawing drawing;
+    tasks::Drawing drawing;
     drawing.dataset = dataset;
     drawing.payer = "192.0.2.1";
-    drawing.prepare = [&](data::Dataset& data, work::Loading loading) {
+    drawing.prepare = [&](data::Dataset& data, tasks::Loading loading) {
       auto picture =
-          work::prepare_picture(completed, frame::own_setting(completed), {}, data, loading);
+          tasks::prepare_picture(completed, frame::own_setting(completed), {}, data, loading);
       if (picture && (*picture)->frame.scene.sampling_us > 0) {
         (*picture)->frame.scene.sampling_us += hour_us;
       }
       return picture;
     };
-    drawing.draw = [&](const work::PreparedPicture& picture, data::Dataset& /*dataset*/,
-                       std::int64_t /*queue_us*/, work::Loading /*loading*/) {
+    drawing.draw = [&](const tasks::PreparedPicture& picture, data::Dataset& /*dataset*/,
+                       std::int64_t /*queue_us*/, tasks::Loading /*loading*/) {
       told.set_value(picture.frame.scene.sampling_us);
     };
     drawing.fail = [&](const Error& error) {
       ADD_FAILURE() << error.message;
       told.set_value(-1);
     };
-    EXPECT_TRUE(work::submit(backend, std::move(drawing)));
+    EXPECT_TRUE(tasks::submit(backend, std::move(drawing)));
     return told.get_future().get();
   };
   EXPECT_GT(sampling_us(), hour_us);
@@ -417,26 +417,26 @@ TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
   std::promise<std::string> told;
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(1));
-  work::Drawing drawing;
+  tasks::Drawing drawing;
   drawing.dataset = store->add("climate:8x8x4").value();
-  drawing.draw = [&](const work::PreparedPicture& /*picture*/, data::Dataset& /*dataset*/,
-                     std::int64_t /*queue_us*/, work::Loading loading) {
-    told.set_value(loading == work::Loading::allowed ? "drawn" : "drawn without loading");
+  drawing.draw = [&](const tasks::PreparedPicture& /*picture*/, data::Dataset& /*dataset*/,
+                     std::int64_t /*queue_us*/, tasks::Loading loading) {
+    told.set_value(loading == tasks::Loading::allowed ? "drawn" : "drawn without loading");
   };
   // While it loads, the maximum number of requests waits.
   drawing.prepare = [&](data::Dataset& dataset,
-                        work::Loading loading) -> Result<work::PreparedPtr> {
-    if (loading == work::Loading::none) return make_error(ErrorKind::not_resident, "not loaded");
+                        tasks::Loading loading) -> Result<tasks::PreparedPtr> {
+    if (loading == tasks::Loading::none) return make_error(ErrorKind::not_resident, "not loaded");
     const auto hold = [&](std::int64_t /*queue_us*/) { gate.pass(); };
-    const work::RenderService::Job job{work::RenderService::Kind::request, 1, {}, hold, false, 0};
+    const tasks::RenderService::Job job{tasks::RenderService::Kind::request, 1, {}, hold, false, 0};
     EXPECT_TRUE(parts.backend.renderer.submit(job));
     EXPECT_TRUE(gate.wait_for(1));
     while (parts.backend.renderer.submit(job)) {
     }
-    return work::prepare_picture(frame::complete({}, dataset).value(), {}, {}, dataset, loading);
+    return tasks::prepare_picture(frame::complete({}, dataset).value(), {}, {}, dataset, loading);
   };
   drawing.fail = [&](const Error& error) { told.set_value(error.message); };
-  ASSERT_TRUE(work::submit(parts.backend, std::move(drawing)));
+  ASSERT_TRUE(tasks::submit(parts.backend, std::move(drawing)));
   ASSERT_TRUE(gate.wait_for(1));
   gate.open();
   EXPECT_EQ(told.get_future().get(), "drawn");

@@ -1,5 +1,5 @@
 // Jobs: states, limits, cancellation; an error of the work fails only its job.
-#include "server/work/jobs.hpp"
+#include "server/tasks/jobs.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
-namespace windsplat::work {
+namespace windsplat::tasks {
 namespace {
 
 using testing::ElementsAre;
@@ -258,4 +258,4 @@ TEST(Jobs, ShutdownCancelsRunningAndWaitingJobs) {
 }
 
 }  // namespace
-}  // namespace windsplat::work
+}  // namespace windsplat::tasks

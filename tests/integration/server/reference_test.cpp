@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "server/base/trim_storage.hpp"
-#include "server/work/references.hpp"
+#include "server/tasks/references.hpp"
 #include "tests/integration/cli_program.hpp"
 #include "tests/integration/server/test_server.hpp"
 
@@ -17,7 +17,7 @@ namespace server_test {
 namespace {
 
 using windsplat::CancelToken;
-using windsplat::work::References;
+using windsplat::tasks::References;
 
 const std::string reference_view = R"({"dataset":"small","image":{"width":96,"height":64}})";
 // Takes at least some seconds.

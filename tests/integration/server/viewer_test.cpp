@@ -1,5 +1,5 @@
 // Times reported by the render jobs of a session, and sharing of scarce memory.
-#include "server/work/viewer.hpp"
+#include "server/tasks/viewer.hpp"
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ namespace {
 using namespace windsplat;  // NOLINT(google-build-using-namespace)
 
 // Whether data were prepared for the frame, so that the next one of its kind is faster.
-bool prepared(work::Viewer& viewer, std::uint64_t ticket, const protocol::View& view,
+bool prepared(tasks::Viewer& viewer, std::uint64_t ticket, const protocol::View& view,
               const quality::Setting& setting = {}) {
   std::promise<bool> told;
   viewer.start(session::StartRender{ticket, view, setting, {}},
@@ -46,7 +46,7 @@ TEST(Viewer, WaitForAveragesIsReportedLikeAWaitForFields) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
   transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
-  work::Viewer viewer(parts.backend, 1, "192.0.2.1");
+  tasks::Viewer viewer(parts.backend, 1, "192.0.2.1");
   protocol::View view = view_of_small(16, 12);
   view.method.detail = protocol::Detail::full;
   EXPECT_TRUE(prepared(viewer, 1, view));
@@ -66,7 +66,7 @@ TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
   const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
   const auto dataset = store->add(small_file()).value();
   transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
-  work::Viewer viewer(parts.backend, 1, "192.0.2.1");
+  tasks::Viewer viewer(parts.backend, 1, "192.0.2.1");
   protocol::View view = view_of_small(96, 72);
   const std::uint64_t before = scene::completions();
   EXPECT_TRUE(prepared(viewer, 1, view));
@@ -91,9 +91,9 @@ TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   transport::ServerParts parts({}, store, std::make_shared<ThreadPool>(2));
   constexpr int viewers_count = 8;
   constexpr int rounds = 5;
-  std::vector<std::unique_ptr<work::Viewer>> viewers;
+  std::vector<std::unique_ptr<tasks::Viewer>> viewers;
   for (int v = 0; v < viewers_count; ++v) {
-    viewers.push_back(std::make_unique<work::Viewer>(
+    viewers.push_back(std::make_unique<tasks::Viewer>(
         parts.backend, static_cast<std::uint64_t>(v + 1), "192.0.2.1"));
   }
   for (int round = 0; round < rounds; ++round) {
@@ -137,7 +137,7 @@ class LargePictures : public testing::Test {
                                                       std::make_shared<ThreadPool>(2));
   }
   // Why there is no frame; empty if there is one.
-  std::future<std::string> fault_of(work::Viewer& viewer, const protocol::View& view) {
+  std::future<std::string> fault_of(tasks::Viewer& viewer, const protocol::View& view) {
     const auto told = std::make_shared<std::promise<std::string>>();
     viewer.start(session::StartRender{++tickets_, view, {}, {}},
                  [told](std::uint64_t /*ticket*/, const Result<session::Drawn>& drawn) {
@@ -153,7 +153,7 @@ class LargePictures : public testing::Test {
 };
 
 TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
-  work::Viewer viewer(parts_->backend, 1, "192.0.2.1");
+  tasks::Viewer viewer(parts_->backend, 1, "192.0.2.1");
   ASSERT_EQ(fault_of(viewer, view_).get(), "") << "its data are resident from now on";
   auto others = store_->reserve(step_bytes);
   while (!others) {  // memory is released shortly after the reply
@@ -167,8 +167,8 @@ TEST_F(LargePictures, WaitForMemoryHeldByOthers) {
 }
 
 TEST_F(LargePictures, OfTwoSessionsAreRenderedInTurnWhenOneFits) {
-  work::Viewer one(parts_->backend, 1, "192.0.2.1");
-  work::Viewer other(parts_->backend, 2, "192.0.2.2");
+  tasks::Viewer one(parts_->backend, 1, "192.0.2.1");
+  tasks::Viewer other(parts_->backend, 2, "192.0.2.2");
   for (int round = 0; round < 4; ++round) {
     view_.step = round % small_steps;
     auto first = fault_of(one, view_);
@@ -181,7 +181,7 @@ TEST_F(LargePictures, OfTwoSessionsAreRenderedInTurnWhenOneFits) {
 }
 
 TEST_F(LargePictures, ThatNeverFitAreRefusedAtOnce) {
-  work::Viewer viewer(parts_->backend, 1, "192.0.2.1");
+  tasks::Viewer viewer(parts_->backend, 1, "192.0.2.1");
   view_.image.height = 2048;
   const std::string fault = fault_of(viewer, view_).get();
   EXPECT_EQ(fault.find("a picture of 2048 x 2048 pixels is too large: memory other than fields"),

@@ -1,0 +1,100 @@
+// Loads data, renders every setting in the background, and stores the results in the tables.
+#include "server/tasks/calibration_job.hpp"
+
+#include <memory>
+#include <utility>
+
+#include "server/frame/measure.hpp"
+#include "server/tasks/run_guarded.hpp"
+
+namespace windsplat::tasks {
+namespace {
+
+// An entry in the tables that marks a running calibration; removed by its destructor.
+class Study {
+ public:
+  Study(Backend& backend, scene::CompletedView completed, quality::SceneSignature signature)
+      : backend_(backend), completed_(std::move(completed)), signature_(std::move(signature)) {}
+  ~Study() {
+    backend_.quality.end_study(signature_, complete_);
+    backend_.metrics.background_done(!complete_);
+  }
+  Study(const Study&) = delete;
+  Study& operator=(const Study&) = delete;
+
+  // Prepares the levels of coarser settings as far as memory allows. Nothing is pinned: others
+  // may need the memory until the renderer is idle.
+  Result<void> load(data::Dataset& dataset, const CancelToken& unwanted) {
+    for (const int coarser : {0, 1, 2}) {
+      if (unwanted.cancelled()) return make_error(ErrorKind::cancelled, "calibration cancelled");
+      quality::Setting setting = frame::own_setting(completed_);
+      setting.coarser = coarser;
+      const auto loaded = frame::prepare(completed_, setting, dataset, {});
+      if (!loaded && coarser == 0) return loaded.error();
+    }
+    return {};
+  }
+
+  void draw(data::Dataset& dataset, const CancelToken& stop, const CancelToken& unwanted) {
+    const auto keep = [&](const frame::CalibrationSample& found) {
+      if (unwanted.cancelled()) stop.cancel();
+      backend_.quality.add(signature_, found.setting, found.viewpoint, found.measured);
+    };
+    complete_ =
+        static_cast<bool>(run_guarded<void>("a calibration run", stop, [&]() -> Result<void> {
+          const auto room =
+              backend_.catalogue.reserve(frame::calibration_bytes(completed_.view().image));
+          if (!room) return room.error();  // other users occupy the memory
+          return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
+        }));
+  }
+
+ private:
+  Backend& backend_;
+  scene::CompletedView completed_;
+  quality::SceneSignature signature_;
+  bool complete_ = false;
+};
+
+std::shared_ptr<Study> begin(Backend& backend, const scene::CompletedView& completed,
+                             const data::Dataset& dataset) {
+  if (!frame::is_worth_calibrating(completed.view())) return nullptr;
+  quality::SceneSignature signature = quality::signature_of(completed.view());
+  if (!backend.quality.begin_study(signature, frame::viewpoint_of(completed, dataset)))
+    return nullptr;
+  return std::make_shared<Study>(backend, completed, std::move(signature));
+}
+
+}  // namespace
+
+void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,
+                        const std::shared_ptr<ViewCompletion>& completion,
+                        const CancelToken& unwanted) {
+  const auto found = backend.catalogue.find(view.dataset);
+  if (!found) return;
+  const auto run = [&backend, owner, view, completion, unwanted, dataset = *found] {
+    std::shared_ptr<Study> study;
+    const auto loaded = run_guarded<void>("calibration load", unwanted, [&]() -> Result<void> {
+      data::Dataset prefetching = dataset->prefetching();
+      const auto completed = completion->of(view, prefetching);
+      if (!completed) return completed.error();
+      study = begin(backend, *completed, prefetching);
+      if (!study) return make_error(ErrorKind::not_found, "no settings to calibrate");
+      return study->load(prefetching, unwanted);
+    });
+    if (!loaded) return;
+    RenderJob job;
+    job.kind = RenderKind::background;
+    job.owner = owner;
+    job.run = [study, dataset, unwanted, stop = job.cancel](std::int64_t /*queue_us*/) {
+      if (unwanted.cancelled()) return;
+      data::Dataset resident = dataset->resident_only();
+      study->draw(resident, stop, unwanted);
+    };
+    (void)backend.renderer.submit(std::move(job));  // if refused, the calibration run ends with the
+                                                    // job
+  };
+  (void)backend.loads.submit({unwanted, run, true, (*found)->shared_info()});
+}
+
+}  // namespace windsplat::tasks

@@ -1,0 +1,165 @@
+// Describes datasets of the store and caches the descriptions.
+#include "server/tasks/catalogue.hpp"
+
+#include <utility>
+
+#include "server/scene/completed_view.hpp"
+#include "server/scene/describe.hpp"
+
+namespace windsplat::tasks {
+
+Result<std::shared_ptr<data::Dataset>> Catalogue::find(const std::string& id) const {
+  auto dataset = store_->find(id);
+  if (!dataset) return make_error_at(ErrorKind::not_found, "/dataset", dataset.error().message);
+  return dataset;
+}
+
+std::optional<protocol::DatasetDescription> Catalogue::known(const data::Dataset& dataset,
+                                                             bool brief) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = described_.find(dataset.info().id);
+  if (found == described_.end() || found->second.of.lock().get() != &dataset.info()) {
+    return std::nullopt;
+  }
+  return brief ? found->second.brief : found->second.description;
+}
+
+protocol::DatasetDescription Catalogue::refreshed(const data::Dataset& dataset,
+                                                  protocol::DatasetDescription description) const {
+  scene::add_seen_ranges(dataset, description);
+  description.resident_bytes = dataset.resident_bytes();
+  if (std::string note = store_->note(description.id); !note.empty()) {
+    description.notes.push_back(std::move(note));
+  }
+  if (const std::string problem = store_->problem(description.id); !problem.empty()) {
+    description.state = "failed";
+    description.notes.push_back(problem);
+  }
+  return description;
+}
+
+Result<std::vector<protocol::DatasetDescription>> Catalogue::list() const {
+  std::vector<protocol::DatasetDescription> out;
+  for (const auto& dataset : store_->all()) {
+    auto description = known(*dataset, true);
+    if (!description) description = scene::describe_briefly(*dataset);
+    out.push_back(refreshed(*dataset, std::move(*description)));
+  }
+  for (auto& failed : store_->failed()) {
+    protocol::DatasetDescription description;
+    description.id = description.title = std::move(failed.id);
+    description.state = "failed";
+    description.notes = {std::move(failed.problem)};
+    out.push_back(std::move(description));
+  }
+  return out;
+}
+
+Result<protocol::DatasetDescription> Catalogue::describe(const std::string& id,
+                                                         const CancelToken& cancel) {
+  const auto dataset = find(id);
+  if (!dataset) return dataset.error();
+  if (auto description = known(**dataset, false))
+    return refreshed(**dataset, std::move(*description));
+  auto description = load(
+      **dataset,
+      [](data::Dataset& loading) { return scene::describe(loading, scene::RangesOf::seen); },
+      cancel);
+  if (!description) {
+    const auto fields = scene::fields_of({}, (*dataset)->info());
+    return with_dataset_name((*dataset)->with_need(description.error(), fields), id);
+  }
+  {
+    protocol::DatasetDescription brief = scene::describe_briefly(**dataset);
+    brief.fields = description->fields;
+    const std::lock_guard lock(mutex_);
+    described_.insert_or_assign(
+        id, Described{(*dataset)->shared_info(), *description, std::move(brief)});
+  }
+  return refreshed(**dataset, std::move(*description));
+}
+
+Result<std::string> Catalogue::open(const data::Location& location, const CancelToken& cancel) {
+  const auto opened = open_and_want(location);
+  if (!opened) return opened.error();
+  const auto& [dataset, openers] = *opened;
+  std::string id = dataset->info().id;
+  // A dataset that cannot be described must not invalidate the whole list.
+  const auto description = scene::describe(*dataset, scene::RangesOf::none);
+  if (description && !cancel.cancelled()) return id;
+  no_longer_want(id, openers);
+  if (!description) return description.error();
+  return make_error(ErrorKind::cancelled, "request cancelled");
+}
+
+Result<std::pair<std::shared_ptr<data::Dataset>, Catalogue::OpenersPtr>> Catalogue::open_and_want(
+    const data::Location& location) {
+  for (;;) {
+    auto added = store_->add_or_find(location);
+    if (!added) return added.error();
+    const std::string& id = added->dataset->info().id;
+    const std::lock_guard lock(mutex_);
+    // The dataset may have been removed before this opener was registered.
+    if (const auto listed = store_->find(id); !listed || *listed != added->dataset) continue;
+    OpenersPtr& openers = openers_[id];
+    if (!openers) openers = std::make_shared<Openers>();
+    ++openers->count;
+    openers->brought = openers->brought || added->is_new;
+    return std::pair(std::move(added->dataset), openers);
+  }
+}
+
+void Catalogue::no_longer_want(const std::string& id, const OpenersPtr& openers) {
+  const std::lock_guard lock(mutex_);
+  if (--openers->count > 0) return;
+  const auto known = openers_.find(id);
+  if (known == openers_.end() || known->second != openers) return;  // removed meanwhile
+  openers_.erase(known);
+  if (openers->brought) remove(id);
+}
+
+bool Catalogue::is_opened_later(const std::string& id) const {
+  const std::lock_guard lock(mutex_);
+  const auto known = openers_.find(id);
+  return known != openers_.end() && known->second->brought;
+}
+
+void Catalogue::forget(const std::string& id) {
+  const std::lock_guard lock(mutex_);
+  const auto known = openers_.find(id);
+  if (known == openers_.end() || !known->second->brought) return;
+  openers_.erase(known);
+  remove(id);
+}
+
+void Catalogue::remove(const std::string& id) {
+  described_.erase(id);
+  (void)store_->remove(id);  // not_found: already removed
+}
+
+Result<Catalogue::Checked> Catalogue::check(const protocol::View& view) const {
+  const auto dataset = find(view.dataset);
+  if (!dataset) return dataset.error();
+  const auto outline = scene::outline(view, (*dataset)->info());
+  if (!outline) return outline.error();
+  return Checked{static_cast<int>((*dataset)->info().steps.size()),
+                 frame::cost_of(*outline, **dataset)};
+}
+
+Error with_dataset_name(Error error, const std::string& dataset, const std::string& field) {
+  if (error.kind != ErrorKind::out_of_memory) return error;
+  std::string message = "dataset '";
+  message += printable(dataset);
+  message += '\'';
+  if (!field.empty()) {
+    message += ", field '";
+    message += printable(field);
+    message += '\'';
+  }
+  message += ": ";
+  message += error.message;
+  error.message = std::move(message);
+  return error;
+}
+
+}  // namespace windsplat::tasks

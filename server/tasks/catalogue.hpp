@@ -1,0 +1,119 @@
+// The datasets of the API: lookup by id, descriptions, and checks of views.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocol/messages.hpp"
+#include "protocol/view.hpp"
+#include "server/base/cancel.hpp"
+#include "server/base/error.hpp"
+#include "server/data/files/files.hpp"
+#include "server/data/resident/store.hpp"
+#include "server/frame/cost.hpp"
+
+namespace windsplat::tasks {
+
+// Thread-safe.
+class Catalogue {
+ public:
+  explicit Catalogue(std::shared_ptr<data::Store> store) : store_(std::move(store)) {}
+
+  [[nodiscard]] Result<std::shared_ptr<data::Dataset>> find(const std::string& id) const;
+
+  // All datasets, with ranges where they are known. Loads nothing.
+  [[nodiscard]] Result<std::vector<protocol::DatasetDescription>> list() const;
+
+  // The full description. Loads the fields of the default view once: do not call on the io thread.
+  Result<protocol::DatasetDescription> describe(const std::string& id,
+                                                const CancelToken& cancel = {});
+
+  // Opens a located dataset and lists it, so that forget() can remove it; the value is its id. All
+  // callers that open a dataset share it. Errors: those of opening; cancelled, in which case the
+  // dataset is listed only if another caller still holds it. May block for a long time.
+  Result<std::string> open(const data::Location& location, const CancelToken& cancel);
+  // Replaces the prefetch requests of a session; see data::Store::request_prefetch.
+  void request_prefetch(std::uint64_t owner, std::vector<data::PrefetchRequest> requests) {
+    store_->request_prefetch(owner, std::move(requests));
+  }
+  // Reopens datasets that changed on disk and closes files that are not being read; returns the ids
+  // of the changed ones. Do not call it on the io thread.
+  std::vector<std::string> look_after() {
+    store_->release_idle();
+    return store_->look_for_changes();
+  }
+  [[nodiscard]] data::BudgetCounts counts() const { return store_->counts(); }
+  // Calls load(data::Dataset&). If memory does not suffice, waits for its turn until others release
+  // memory (data::Dataset::in_turn()) and calls it once more. `cancel` ends the wait with the error
+  // cancelled.
+  template <class Load>
+  auto load(const data::Dataset& dataset, const Load& load, const CancelToken& cancel = {}) {
+    data::Dataset handle = dataset;
+    auto loaded = load(handle);
+    if (loaded || loaded.error().kind != ErrorKind::out_of_memory) return loaded;
+    const auto turn = store_->take_turn(dataset, cancel);
+    if (!turn) {
+      loaded = make_error(ErrorKind::cancelled, "request cancelled");
+      return loaded;
+    }
+    handle = dataset.in_turn(cancel);
+    return load(handle);
+  }
+  // See data::Store::reserve().
+  Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) {
+    return store_->reserve(bytes);
+  }
+  [[nodiscard]] std::uint64_t room() const { return store_->room(); }
+  // See data::Store::end().
+  void end() { store_->end(); }
+  // Whether open() added it after the start of the server.
+  [[nodiscard]] bool is_opened_later(const std::string& id) const;
+  void forget(const std::string& id);
+  // Removes a dataset that failed to open from the list. False: no failed dataset has that id.
+  bool forget_failed(const std::string& id) { return store_->remove_failed(id); }
+
+  // Checks whether the view can be drawn, without loading. Errors: not_found (dataset), invalid
+  // (with a pointer).
+  struct Checked {
+    int steps = 0;  // number of steps of the dataset
+    frame::Cost cost;
+  };
+  [[nodiscard]] Result<Checked> check(const protocol::View& view) const;
+
+ private:
+  struct Described {
+    std::weak_ptr<const data::DatasetInfo> of;  // a reopened dataset has a new info
+    protocol::DatasetDescription description;
+    protocol::DatasetDescription brief;  // without steps and axes, of which there may be millions
+  };
+  // Number of requests that opened a dataset by open() and still hold it.
+  struct Openers {
+    int count = 0;
+    bool brought = false;  // added by one of them; removed with the last one
+  };
+  using OpenersPtr = std::shared_ptr<Openers>;  // guarded by the mutex
+  [[nodiscard]] Result<std::pair<std::shared_ptr<data::Dataset>, OpenersPtr>> open_and_want(
+      const data::Location& location);
+  void remove(const std::string& id);  // requires the mutex
+  void no_longer_want(const std::string& id, const OpenersPtr& openers);
+  // The cached description of a dataset; `brief`: for a list.
+  [[nodiscard]] std::optional<protocol::DatasetDescription> known(const data::Dataset& dataset,
+                                                                  bool brief) const;
+  [[nodiscard]] protocol::DatasetDescription refreshed(
+      const data::Dataset& dataset, protocol::DatasetDescription description) const;
+
+  std::shared_ptr<data::Store> store_;
+  mutable std::mutex mutex_;
+  std::map<std::string, Described> described_;
+  std::map<std::string, OpenersPtr> openers_;  // keyed by dataset
+};
+
+// An out-of-memory error extended by the name of what was being loaded; other errors are unchanged.
+Error with_dataset_name(Error error, const std::string& dataset, const std::string& field = "");
+
+}  // namespace windsplat::tasks

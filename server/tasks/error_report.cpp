@@ -1,0 +1,44 @@
+// Frame + tables -> the errors of its report.
+#include "server/tasks/error_report.hpp"
+
+namespace windsplat::tasks {
+
+Observation observed_in(const frame::Frame& drawn, const quality::Setting& setting) {
+  protocol::View asked = drawn.view;
+  if (asked.method.name == protocol::MethodName::slab) {
+    asked.method.slab_thickness *= setting.thinner;
+  }
+  Observation observed{quality::signature_of(asked), quality::viewpoint_of(asked)};
+  observed.viewpoint.detail = drawn.detail;
+  observed.viewpoint.content = drawn.content;
+  return observed;
+}
+
+void report_error(const frame::Frame& drawn, const Observation& observed,
+                  const quality::Setting& setting, const frame::Encoding& encoding,
+                  quality::Tables& tables, protocol::FrameInfo& info) {
+  if (drawn.view.method.name == protocol::MethodName::reference) return;
+  const auto index = quality::index_of(setting);
+  if (drawn.error) {
+    info.error_value = drawn.error;
+    info.error_kind = "measured";
+    if (index)
+      tables.add(observed.signature, *index, observed.viewpoint, {drawn.error, std::nullopt});
+  } else if (index) {
+    info.error_value = tables.forecast(observed.signature, *index, observed.viewpoint).error;
+    info.error_kind = "estimated";
+  }
+  if (encoding.format != frame::Format::jpeg) return;
+  const bool full_chroma = encoding.subsampling == image::Subsampling::s444;
+  if (drawn.jpeg_error) {
+    tables.add_encoding(observed.signature, encoding.quality, observed.viewpoint,
+                        *drawn.jpeg_error);
+  }
+  // The measured error does not include the loss from chroma subsampling.
+  info.jpeg_error = drawn.jpeg_error && full_chroma
+                        ? *drawn.jpeg_error
+                        : tables.encoding_error(observed.signature, encoding.quality, full_chroma,
+                                                observed.viewpoint);
+}
+
+}  // namespace windsplat::tasks

@@ -1,0 +1,41 @@
+// Tracks microseconds per kernel for each dataset and method; rises fast, falls slowly.
+#include "server/tasks/request_times.hpp"
+
+#include <algorithm>
+
+namespace windsplat::tasks {
+
+namespace {
+
+// With upward steps five times the downward ones, about five of six samples are below the level.
+constexpr double weight_above = 0.5;
+constexpr double weight_below = 0.1;
+
+}  // namespace
+
+void RequestTimes::learn(const std::string& dataset, protocol::MethodName method, double kernels,
+                         std::int64_t took_us) {
+  if (kernels <= 0) return;
+  const double seen = std::min(static_cast<double>(took_us) / kernels, us_a_kernel_max);
+  const std::lock_guard lock(mutex_);
+  const auto [at, is_new] = known_.try_emplace({dataset, method}, Known{seen, 0});
+  Known& known = at->second;
+  const double weight = seen > known.us_a_kernel ? weight_above : weight_below;
+  known.us_a_kernel += weight * (seen - known.us_a_kernel);
+  known.used = ++uses_;
+  if (known_.size() <= known_max) return;
+  known_.erase(std::min_element(known_.begin(), known_.end(), [](const auto& a, const auto& b) {
+    return a.second.used < b.second.used;
+  }));
+}
+
+double RequestTimes::estimate_ms(const std::string& dataset, protocol::MethodName method,
+                                 double kernels) const {
+  const std::lock_guard lock(mutex_);
+  const auto known = known_.find({dataset, method});
+  const double us_a_kernel =
+      known == known_.end() ? us_a_kernel_unknown / threads_ : known->second.us_a_kernel;
+  return us_a_kernel * kernels / 1000;
+}
+
+}  // namespace windsplat::tasks

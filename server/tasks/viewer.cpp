@@ -1,0 +1,233 @@
+// Effects of a session become render and load jobs; their results become events of the session.
+#include "server/tasks/viewer.hpp"
+
+#include <mutex>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "protocol/codec.hpp"
+#include "server/frame/frame_info.hpp"
+#include "server/scene/build.hpp"
+#include "server/tasks/calibration_job.hpp"
+#include "server/tasks/drawing.hpp"
+#include "server/tasks/error_report.hpp"
+#include "server/tasks/run_guarded.hpp"
+
+namespace windsplat::tasks {
+namespace {
+
+frame::Encoding frame_encoding(const session::Encoding& wanted) {
+  frame::Encoding encoding;
+  const bool png = wanted.codec == protocol::Codec::png;
+  encoding.format = png ? frame::Format::png : frame::Format::jpeg;
+  encoding.quality = wanted.quality;
+  encoding.subsampling = wanted.full_chroma ? image::Subsampling::s444 : image::Subsampling::s420;
+  encoding.measure = wanted.measure;
+  return encoding;
+}
+
+Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
+                            data::Dataset& dataset, std::int64_t queue_us,
+                            const CancelToken& cancel) {
+  auto drawn = frame::produce(picture.frame, dataset, *backend.pool, cancel, backend.frames);
+  if (!drawn) return drawn.error();
+  session::Drawn out;
+  out.info = frame::frame_info(*drawn, drawn->view);
+  Observation observed = observed_in(*drawn, picture.frame.setting);
+  report_error(*drawn, observed, picture.frame.setting, picture.frame.encoding, backend.quality,
+               out.info);
+  out.signature = std::move(observed.signature);
+  out.viewpoint = observed.viewpoint;
+  out.view_json = protocol::encode_view(drawn->view);
+  out.payload = std::make_shared<const std::vector<std::uint8_t>>(std::move(drawn->bytes));
+  out.queue_us = queue_us;
+  out.render_us = drawn->render_us;
+  out.measure_us = drawn->measure_us;
+  out.encode_us = drawn->encode_us;
+  backend.metrics.stage_took(metrics::Metrics::Stage::queue, out.queue_us);
+  backend.metrics.stage_took(metrics::Metrics::Stage::render, out.render_us);
+  backend.metrics.stage_took(metrics::Metrics::Stage::encode, out.encode_us);
+  return out;
+}
+
+// Serialised here, without long lists, to keep the io thread free.
+Result<protocol::DatasetDescription> encoded(Result<protocol::DatasetDescription> description) {
+  if (!description) return description;
+  description->encoded =
+      std::make_shared<const std::string>(protocol::encode_dataset(*description));
+  description->steps = {};
+  description->axes = {};
+  return description;
+}
+
+constexpr int describing_max = 4;  // limit per session
+
+Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Dataset& dataset,
+                                                                const session::Prefetch& wanted,
+                                                                ViewCompletion& completion) {
+  data::Dataset prefetching = dataset.prefetching();
+  const auto completed = completion.of(wanted.view, prefetching);
+  if (!completed) return completed.error();
+  const auto drawn = frame::at_setting(*completed, wanted.setting);
+  if (!drawn) return drawn.error();
+  const auto needs = scene::needs_of(*drawn, dataset);
+  if (!needs) return needs.error();
+  std::optional<data::ResidentKey> places;
+  if (!needs->places.empty()) places = dataset.auxiliary_key(needs->places);
+  std::vector<data::PrefetchRequest> requests;
+  for (const int step : wanted.steps) {
+    for (const auto& [field, how] : needs->fields) {
+      requests.push_back({dataset, field, static_cast<std::size_t>(step), how, places});
+    }
+  }
+  return requests;
+}
+
+}  // namespace
+
+// Pending prefetch requests. A dataset has at most one waiting job, however often the view changes;
+// the job evaluates the newest request when it runs.
+struct Viewer::PrefetchState {
+  struct Newest {
+    data::Dataset dataset;
+    session::Prefetch effect;
+  };
+  std::mutex
+      mutex;  // held while a request is submitted, so that none is submitted after it was withdrawn
+  std::optional<Newest> newest;           // set until the request is evaluated
+  const data::DatasetInfo* of = nullptr;  // dataset of the newest request; compared only
+  std::uint64_t epoch = 0;                // counts withdrawals and changes of dataset
+  std::set<const data::DatasetInfo*> queued;
+};
+
+Viewer::Viewer(Backend& backend, std::uint64_t owner, std::string payer)
+    : backend_(backend),
+      owner_(owner),
+      payer_(std::move(payer)),
+      requests_(std::make_shared<PrefetchState>()) {}
+
+void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
+  calibration_.cancel();  // the view is changing again
+  const CancelToken cancel;
+  running_.emplace(effect.ticket, cancel);
+  auto dataset = backend_.catalogue.find(effect.view.dataset);
+  if (!dataset) return reply(effect.ticket, dataset.error());
+  // A final frame may be larger than the view that was checked before.
+  if (const auto fits = backend_.check(effect.view); !fits) {
+    return reply(effect.ticket, fits.error());
+  }
+  const auto shared = std::make_shared<const DrawnReply>(std::move(reply));
+  Drawing drawing{
+      RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
+  drawing.prepare = [effect, cancel, completion = completion_](data::Dataset& available,
+                                                               Loading loading) {
+    return run_guarded<PreparedPtr>("preparing a frame", cancel, [&]() -> Result<PreparedPtr> {
+      const auto completed = completion->of(effect.view, available);
+      if (!completed) return completed.error();
+      return prepare_picture(*completed, effect.setting, frame_encoding(effect.encoding), available,
+                             loading);
+    });
+  };
+  drawing.draw = [&backend = backend_, ticket = effect.ticket, cancel, shared](
+                     const PreparedPicture& picture, data::Dataset& resident, std::int64_t queue_us,
+                     Loading loading) {
+    auto drawn = run_guarded<session::Drawn>(
+        "a frame", cancel, [&] { return draw(backend, picture, resident, queue_us, cancel); });
+    if (drawn) drawn->loaded = loading == Loading::allowed;
+    (*shared)(ticket, std::move(drawn));
+  };
+  drawing.fail = [ticket = effect.ticket, shared](const Error& error) { (*shared)(ticket, error); };
+  // Jobs of streams are refused at shutdown only.
+  if (const auto queued = submit(backend_, std::move(drawing)); !queued) {
+    (*shared)(effect.ticket, queued.error());
+  }
+}
+
+void Viewer::start(const session::Describe& effect, DescribedReply reply) {
+  const auto shared = std::make_shared<const DescribedReply>(std::move(reply));
+  if (describing_.use_count() > describing_max) {
+    const auto busy = make_error(ErrorKind::busy, "earlier requests to open datasets are pending");
+    return (*shared)(effect.id, busy);
+  }
+  const auto dataset = backend_.catalogue.find(effect.dataset);
+  const auto queued = backend_.loads.submit(
+      {gone_,
+       [&backend = backend_, effect, cancel = gone_, shared, one = describing_] {
+         (*shared)(effect.id,
+                   run_guarded<protocol::DatasetDescription>("a description", cancel, [&] {
+                     return encoded(backend.catalogue.describe(effect.dataset, cancel));
+                   }));
+       },
+       true, dataset ? (*dataset)->shared_info() : nullptr});
+  if (!queued) (*shared)(effect.id, queued.error());
+}
+
+void Viewer::start(const session::Prefetch& effect) {
+  const auto found = backend_.catalogue.find(effect.view.dataset);
+  if (effect.steps.empty() || !found) {
+    cancel_prefetch();
+    return;
+  }
+  const auto of = (*found)->shared_info();
+  {
+    const std::lock_guard lock(requests_->mutex);
+    if (requests_->of != of.get()) ++requests_->epoch;
+    requests_->of = of.get();
+    requests_->newest.emplace(PrefetchState::Newest{**found, effect});
+    if (!requests_->queued.insert(of.get()).second) return;
+  }
+  // Completing the view finds its fields and levels but may block, so the job does it.
+  const auto run = [&backend = backend_, owner = owner_, requests = requests_,
+                    completion = completion_, key = of.get()] {
+    resolve_prefetch(backend, owner, *requests, completion, key);
+  };
+  (void)backend_.loads.submit({gone_, run, true, of});
+}
+
+void Viewer::resolve_prefetch(Backend& backend, std::uint64_t owner, PrefetchState& requests,
+                              const std::shared_ptr<ViewCompletion>& completion,
+                              const data::DatasetInfo* of) {
+  std::optional<PrefetchState::Newest> newest;
+  std::uint64_t epoch = 0;
+  {
+    const std::lock_guard lock(requests.mutex);
+    requests.queued.erase(of);
+    if (!requests.newest || requests.of != of) return;
+    newest = std::exchange(requests.newest, std::nullopt);
+    epoch = requests.epoch;
+  }
+  auto found = run_guarded<std::vector<data::PrefetchRequest>>("prefetch", {}, [&] {
+    return prefetch_requests_of(newest->dataset, newest->effect, *completion);
+  });
+  const std::lock_guard lock(requests.mutex);
+  if (found && requests.epoch == epoch)
+    backend.catalogue.request_prefetch(owner, std::move(*found));
+}
+
+void Viewer::cancel_prefetch() {
+  const std::lock_guard lock(requests_->mutex);
+  requests_->newest.reset();
+  requests_->of = nullptr;
+  ++requests_->epoch;
+  backend_.catalogue.request_prefetch(owner_, {});
+}
+
+void Viewer::start(const session::Calibrate& effect) {
+  calibration_.cancel();
+  calibration_ = CancelToken();
+  submit_calibration(backend_, owner_, effect.view, completion_, calibration_);
+}
+
+void Viewer::cancel(std::uint64_t ticket) {
+  if (const auto found = running_.find(ticket); found != running_.end()) found->second.cancel();
+}
+
+void Viewer::cancel_all() {
+  gone_.cancel();
+  calibration_.cancel();
+  cancel_prefetch();
+  for (const auto& [ticket, token] : running_) token.cancel();
+}
+
+}  // namespace windsplat::tasks

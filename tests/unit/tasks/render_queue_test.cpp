@@ -1,0 +1,234 @@
+// The order of renders: shares of time, cancelled background jobs. Times are simulated.
+#include "server/tasks/render_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace windsplat::tasks {
+namespace {
+
+// Owners that always have work: each submits its next job as soon as one was started.
+class Renderer {
+ public:
+  RenderJob job(RenderKind kind, std::uint64_t owner) {
+    RenderJob out;
+    out.kind = kind;
+    out.owner = owner;
+    return out;
+  }
+  void ask(RenderKind kind, std::uint64_t owner) { queue_.push(job(kind, owner), now_us_); }
+
+  // Runs one job with the cost of its owner in `cost_us`; returns the owner.
+  std::uint64_t run(std::map<std::uint64_t, std::int64_t> cost_us, bool ask_again = true) {
+    const auto next = queue_.pop();
+    if (!next) return 0;
+    if (ask_again) ask(next->job.kind, next->job.owner);
+    const std::int64_t took = cost_us[next->job.owner];
+    now_us_ += took;
+    queue_.done(took);
+    used_us[next->job.owner] += took;
+    ++jobs[next->job.owner];
+    return next->job.owner;
+  }
+
+  std::map<std::uint64_t, std::int64_t> used_us;
+  std::map<std::uint64_t, int> jobs;
+
+ private:
+  RenderQueue queue_;
+  std::int64_t now_us_ = 0;
+};
+
+TEST(RenderQueue, GivesOwnersEqualTimesNotEqualJobCounts) {
+  Renderer renderer;
+  renderer.ask(RenderKind::stream, 1);
+  renderer.ask(RenderKind::stream, 2);
+  for (int i = 0; i < 400; ++i) renderer.run({{1, 30'000}, {2, 10'000}});
+  EXPECT_NEAR(static_cast<double>(renderer.used_us[1]), static_cast<double>(renderer.used_us[2]),
+              30'000);
+  EXPECT_NEAR(renderer.jobs[2], 3 * renderer.jobs[1], 3);
+}
+
+TEST(RenderQueue, SharesTimeEquallyBetweenStreamsAndRequests) {
+  Renderer renderer;
+  for (std::uint64_t owner = 1; owner <= 5; ++owner) renderer.ask(RenderKind::stream, owner);
+  renderer.ask(RenderKind::request, 9);
+  for (int i = 0; i < 600; ++i) {
+    renderer.run({{1, 10}, {2, 10}, {3, 10}, {4, 10}, {5, 10}, {9, 100}});
+  }
+  std::int64_t streams = 0;
+  for (std::uint64_t owner = 1; owner <= 5; ++owner) streams += renderer.used_us[owner];
+  EXPECT_NEAR(static_cast<double>(streams), static_cast<double>(renderer.used_us[9]), 100);
+}
+
+TEST(RenderQueue, IdleOwnerCannotReclaimItsUnusedShare) {
+  Renderer renderer;
+  const std::map<std::uint64_t, std::int64_t> costs{{1, 10}, {2, 10}};
+  renderer.ask(RenderKind::stream, 1);
+  renderer.ask(RenderKind::stream, 2);
+  EXPECT_NE(renderer.run(costs, false), renderer.run(costs, false));
+  renderer.ask(RenderKind::stream, 1);
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(renderer.run(costs), 1U);
+  renderer.ask(RenderKind::stream, 2);
+  renderer.jobs.clear();
+  for (int i = 0; i < 20; ++i) renderer.run(costs);
+  EXPECT_NEAR(renderer.jobs[1], 10, 1);
+  EXPECT_NEAR(renderer.jobs[2], 10, 1);
+}
+
+TEST(RenderQueue, ShortPauseDoesNotResetTheShareOfAnOwner) {
+  Renderer renderer;
+  for (std::uint64_t owner = 1; owner <= 3; ++owner) renderer.ask(RenderKind::stream, owner);
+  const std::map<std::uint64_t, std::int64_t> costs{{1, 1000}, {2, 10}, {3, 10}};
+  EXPECT_EQ(renderer.run(costs, false), 1U) << "among equals the first to arrive";
+  renderer.ask(RenderKind::stream, 1);
+  for (int i = 0; i < 198; ++i) EXPECT_NE(renderer.run(costs), 1U);
+}
+
+TEST(Shares, ForgetIdleOwnersThatAreNotAhead) {
+  Shares shares;
+  shares.come(1);
+  for (std::uint64_t party = 2; party < 1000; ++party) {
+    shares.come(party);
+    shares.begin(party);
+    shares.charge(party, 10);
+    shares.rest(party);
+    shares.begin(1);
+    shares.charge(1, 10);
+    EXPECT_LE(shares.known(), 3U);
+  }
+  shares.rest(1);
+  EXPECT_EQ(shares.known(), 0U);
+}
+
+TEST(RenderQueue, BackgroundWaitsForAllOthers) {
+  Renderer renderer;
+  const std::map<std::uint64_t, std::int64_t> costs{{1, 10}, {2, 10}, {3, 10}};
+  renderer.ask(RenderKind::background, 1);
+  renderer.ask(RenderKind::stream, 2);
+  renderer.ask(RenderKind::request, 3);
+  EXPECT_NE(renderer.run(costs, false), 1U);
+  EXPECT_NE(renderer.run(costs, false), 1U);
+  EXPECT_EQ(renderer.run(costs, false), 1U);
+}
+
+TEST(RenderQueue, RunningBackgroundJobIsCancelledByOtherJobsOnly) {
+  for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
+    RenderQueue queue;
+    RenderJob job;
+    job.kind = RenderKind::background;
+    job.owner = 1;
+    queue.push(job, 0);
+    ASSERT_TRUE(queue.pop());
+    EXPECT_FALSE(job.cancel.cancelled());
+    RenderJob other;
+    other.kind = kind;
+    other.owner = 2;
+    queue.push(other, 0);
+    EXPECT_EQ(job.cancel.cancelled(), kind != RenderKind::background);
+    queue.done(1);
+    const auto next = queue.pop();
+    ASSERT_TRUE(next);
+    EXPECT_EQ(next->job.owner, 2U) << "it is not run again";
+    EXPECT_FALSE(next->job.cancel.cancelled());
+    queue.done(1);
+    EXPECT_TRUE(queue.empty());
+  }
+}
+
+TEST(RenderQueue, NewerBackgroundJobReplacesTheOlderWithNotice) {
+  RenderQueue queue;
+  const auto push = [&](RenderKind kind, std::uint64_t owner) {
+    RenderJob job;
+    job.kind = kind;
+    job.owner = owner;
+    queue.push(job, 0);
+    return job.cancel;
+  };
+  const CancelToken other = push(RenderKind::background, 2);
+  const CancelToken older = push(RenderKind::background, 1);
+  const CancelToken newer = push(RenderKind::background, 1);
+  EXPECT_TRUE(older.cancelled());
+  EXPECT_FALSE(newer.cancelled());
+  EXPECT_FALSE(other.cancelled());
+  push(RenderKind::stream, 3);
+  std::vector<std::pair<std::uint64_t, bool>> ran;
+  while (const auto next = queue.pop()) {
+    ran.emplace_back(next->job.owner, next->job.cancel.cancelled());
+    queue.done(1);
+  }
+  const std::vector<std::pair<std::uint64_t, bool>> expected{
+      {1, true}, {3, false}, {2, false}, {1, false}};
+  EXPECT_EQ(ran, expected);
+}
+
+// Cancelled jobs of a closed session: new owners without usage run before them.
+TEST(RenderQueue, CancelledJobDoesNotWaitForItsTurn) {
+  for (const RenderKind kind : {RenderKind::stream, RenderKind::request, RenderKind::background}) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    Renderer make;
+    RenderQueue queue;
+    queue.push(make.job(kind, 1), 0);
+    queue.pop();
+    RenderJob second = make.job(kind, 1);
+    const CancelToken gone = second.cancel;
+    queue.push(std::move(second), 0);
+    queue.done(100'000);
+    for (std::uint64_t newcomer = 2; newcomer < 5; ++newcomer) {
+      queue.push(make.job(RenderKind::stream, newcomer), 0);
+    }
+    EXPECT_EQ(queue.pop()->job.owner, 2U) << "the first owner has used more";
+    queue.done(10'000);
+    gone.cancel();
+    EXPECT_EQ(queue.pop()->job.owner, 1U);
+    queue.done(0);
+    EXPECT_EQ(queue.pop()->job.owner, 3U);
+    queue.done(10'000);
+    EXPECT_EQ(queue.pop()->job.owner, 4U);
+    queue.done(10'000);
+    EXPECT_TRUE(queue.empty());
+  }
+}
+
+TEST(RenderQueue, CountsJobsThatAreStillAwaited) {
+  RenderQueue queue;
+  RenderJob job;
+  job.cost_ms = 100;
+  queue.push(job, 0);
+  RenderJob left;
+  left.cost_ms = 1000;
+  queue.push(left, 0);
+  RenderJob stream;
+  stream.kind = RenderKind::stream;
+  queue.push(stream, 0);
+  left.cancel.cancel();
+  EXPECT_EQ(queue.requests_waiting().count, 1U);
+  EXPECT_DOUBLE_EQ(queue.requests_waiting().cost_ms, 100);
+}
+
+TEST(RenderQueue, UsesTheGivenCostForJobsOfUnknownCost) {
+  RenderQueue queue;
+  RenderJob job;
+  job.payer = "a";
+  job.run = [](std::int64_t /*queue_us*/) {};
+  queue.push(job, 0);
+  job.cost_ms = 30;
+  queue.push(job, 0);
+  job.payer = "b";
+  queue.push(job, 0);
+  EXPECT_EQ(queue.requests_before("c", 50).cost_ms, 80) << "one of a's, one of b's";
+  EXPECT_EQ(queue.requests_before("c", 50).count, 2U);
+  EXPECT_EQ(queue.requests_before("b", 50).cost_ms, 50);
+  EXPECT_EQ(queue.requests_before("a", 50).cost_ms, 30);
+  EXPECT_EQ(queue.rest_ms(0), 0);
+  (void)queue.pop(1000);
+  (void)queue.pop(1000);
+  EXPECT_EQ(queue.rest_ms(11'000), 20);
+  EXPECT_EQ(queue.rest_ms(99'000), 0);
+}
+
+}  // namespace
+}  // namespace windsplat::tasks
