@@ -34,13 +34,20 @@ class Bill(unittest.TestCase):
     def test_loaded_libraries_are_listed_with_versions(self):
         loaded = set(re.findall(r"(/\S+) \(0x", output_of("ldd", PROGRAM)))
         self.assertGreater(len(loaded), 10)
-        for path in loaded:
-            path = str(pathlib.Path(path).resolve())
-            owners = subprocess.run(["dpkg", "-S", path], text=True, capture_output=True,
-                                    check=False).stdout or output_of("dpkg", "-S", path[4:])
-            package = owners.split(":")[0]
+        paths = {str(pathlib.Path(path).resolve()) for path in loaded}
+        # dpkg knows a library by its path in / or in /usr.
+        names = sorted(paths | {path.removeprefix("/usr") for path in paths})
+        lines = subprocess.run(["dpkg", "-S", *names], text=True, capture_output=True,
+                               check=False).stdout.splitlines()
+        owners = {line.split(": ")[1].removeprefix("/usr"): line.split(":")[0] for line in lines}
+        for path in paths:
+            package = owners[path.removeprefix("/usr")]
             version = output_of("dpkg-query", "-W", "-f", "${Version}\n", package).split()[0]
             self.assertEqual(self.required[package]["version"], version, path)
+
+    def test_every_component_has_a_version(self):
+        for one in self.bill["components"]:
+            self.assertTrue(one["version"], one["name"])
 
     def test_compiled_in_headers_are_listed(self):
         for name in ("libboost1.81-dev", "nlohmann-json3-dev", "libglm-dev", "libcli11-dev"):

@@ -108,7 +108,7 @@ class Suites(unittest.TestCase):
                 return name != "build release"
 
         names = []
-        Named(argparse.Namespace(thorough=False)).everything()
+        Named(argparse.Namespace(thorough=False, quick=False)).everything()
         self.assertEqual(sorted(names), ["asan ubsan", "build dev", "build release", "build tsan",
                                          "clang-tidy", "fuzz", "page unit", "tsan"])
 
@@ -124,7 +124,7 @@ class Suites(unittest.TestCase):
             return Outcome(failed={"A.b": "why"})
 
         shown = io.StringIO()
-        run = suites.Run(argparse.Namespace(thorough=False))
+        run = suites.Run(argparse.Namespace(thorough=False, quick=False))
         with mock.patch.object(suites, "LOGS", self.folder), contextlib.redirect_stdout(shown):
             self.assertFalse(run.suite("one", one))
         self.assertIn("begin of one\nend of one\n", shown.getvalue())
@@ -132,7 +132,7 @@ class Suites(unittest.TestCase):
         self.assertEqual(set(run.outcomes), {"one", "other"})
 
     def test_an_exception_of_the_runner_fails_its_suite_alone(self):
-        run = suites.Run(argparse.Namespace(thorough=False))
+        run = suites.Run(argparse.Namespace(thorough=False, quick=False))
         with mock.patch.object(suites, "LOGS", self.folder), \
                 contextlib.redirect_stdout(io.StringIO()) as shown:
             self.assertFalse(run.suite("one", lambda emit: emit(1 / 0)))

@@ -66,6 +66,9 @@ TEST(CliSystem, FailedPrintIsAnError) {
     EXPECT_THAT(full, HasSubstr("cannot write to stdout: No space left on device")) << words;
     EXPECT_THAT(shell(std::string("$W ") + words), HasSubstr("exit 0\n")) << words;
   }
+}
+
+TEST(CliStudy, FailedPrintIsAnError) {
   const Folder folder;
   const std::string study = shell("$W study tornado:8 --quick --no-reference --no-calibration -o " +
                                   folder.file("study") + " >/dev/full");
