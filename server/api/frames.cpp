@@ -13,7 +13,6 @@
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
 #include "server/quality/pick.hpp"
-#include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/presets.hpp"
@@ -124,22 +123,27 @@ bool is_chosen(const protocol::View& view) {
   return view.quality.budget_ms || view.quality.max_error;
 }
 
-// With a limit, the data of the view become resident first: what they show decides. Errors:
-// not_resident if nothing may be loaded.
-Result<quality::Setting> setting_of(quality::Tables& tables, const scene::CompletedView& completed,
-                                    data::Dataset& dataset, tasks::Loading loading) {
+// At the setting that its limits need. What the view shows decides, so its data become resident
+// first; a picture at the view's own setting is drawn from that scene. Errors: not_resident if
+// nothing may be loaded.
+Result<tasks::PreparedPtr> prepare_limited(quality::Tables& tables,
+                                           const scene::CompletedView& completed,
+                                           const frame::Encoding& encoding, data::Dataset& dataset,
+                                           tasks::Loading loading) {
   const protocol::View& view = completed.view();
-  if (!is_chosen(view) || view.method.name == protocol::MethodName::reference) {
-    return frame::own_setting(completed);
+  auto own = frame::prepare(completed, frame::own_setting(completed), dataset, encoding);
+  if (!own && own.error().kind == ErrorKind::not_resident && loading == tasks::Loading::none) {
+    return own.error();
   }
-  const auto scene = scene::build_scene(completed, dataset);
-  if (!scene && scene.error().kind == ErrorKind::not_resident && loading == tasks::Loading::none) {
-    return scene.error();
-  }
-  const auto known =
-      tables.forecasts(quality::signature_of(view), frame::viewpoint_of(completed, dataset));
+  // Where memory does not suffice for this scene, it may for that of a coarser setting.
+  const auto known = tables.forecasts(quality::signature_of(view),
+                                      frame::viewpoint_of(completed, own ? &own->scene : nullptr));
   const quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
-  return quality::settings[quality::pick(view, known, aim).setting];
+  const quality::Setting& setting = quality::settings[quality::pick(view, known, aim).setting];
+  if (own && setting == own->setting) {
+    return tasks::with_memory(std::move(*own), dataset, loading);
+  }
+  return tasks::prepare_picture(completed, setting, encoding, dataset, loading);
 }
 
 http::Response unchanged_response(const std::string& etag) {
@@ -156,16 +160,19 @@ Result<tasks::PreparedPtr> prepare(quality::Tables& tables, const Picture& pictu
     if (loading == tasks::Loading::none) return completed.error();
     return tasks::with_dataset_name(completed.error(), dataset.info().id);
   }
-  if (!is_chosen(completed->view())) {
-    const std::string etag = picture_etag(completed->view(), dataset, picture.encoding);
+  const protocol::View& view = completed->view();
+  if (!is_chosen(view)) {
+    const std::string etag = picture_etag(view, dataset, picture.encoding);
     if (http::matches_etag(picture.if_none_match, etag)) {
       reply(unchanged_response(etag));
       return tasks::PreparedPtr();
     }
   }
-  const auto setting = setting_of(tables, *completed, dataset, loading);
-  if (!setting) return setting.error();
-  return tasks::prepare_picture(*completed, *setting, picture.encoding, dataset, loading);
+  if (is_chosen(view) && view.method.name != protocol::MethodName::reference) {
+    return prepare_limited(tables, *completed, picture.encoding, dataset, loading);
+  }
+  return tasks::prepare_picture(*completed, frame::own_setting(*completed), picture.encoding,
+                                dataset, loading);
 }
 
 Result<http::Response> draw(tasks::Backend& backend, const Picture& picture,

@@ -201,7 +201,7 @@ class CalibrationRun {
   Result<void> draw_truth() {
     const auto own = scene::build_scene(completed_, dataset_);
     if (!own) return own.error();
-    viewpoint_ = viewpoint_of(completed_, dataset_);  // of the data that are now resident
+    viewpoint_ = viewpoint_of(completed_, &*own);
     const std::array<int, 3> own_level = own->level;
     const double half = reference_thickness(completed_);
     bool told = false;
@@ -338,15 +338,18 @@ class CalibrationRun {
 
 }  // namespace
 
-quality::Viewpoint viewpoint_of(const scene::CompletedView& completed,
-                                const data::Dataset& dataset) {
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const scene::Scene* scene) {
   quality::Viewpoint viewpoint = quality::viewpoint_of(completed.view());
   viewpoint.detail = scene::detail_shown(completed);
-  data::Dataset resident = dataset.resident_only();
-  if (const auto scene = scene::build_scene(completed, resident)) {
-    viewpoint.content = content_of(*scene);
-  }
+  if (scene != nullptr) viewpoint.content = content_of(*scene);
   return viewpoint;
+}
+
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed,
+                                const data::Dataset& dataset) {
+  data::Dataset resident = dataset.resident_only();
+  const auto scene = scene::build_scene(completed, resident);
+  return viewpoint_of(completed, scene ? &*scene : nullptr);
 }
 
 bool is_measured(const Prepared& prepared) {

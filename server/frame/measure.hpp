@@ -19,7 +19,9 @@ namespace windsplat::frame {
 // from the level of the picture.
 inline constexpr double truth_samples_max = 32.0 * 1024 * 1024;
 
-// The viewpoint of a completed view. Its content is unknown unless its data are resident.
+// The viewpoint of a completed view with its scene as asked for; null: its content is unknown.
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const scene::Scene* scene);
+// Builds the scene if its data are resident.
 quality::Viewpoint viewpoint_of(const scene::CompletedView& completed,
                                 const data::Dataset& dataset);
 

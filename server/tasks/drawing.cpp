@@ -59,44 +59,37 @@ void load(Backend& backend, const DrawingPtr& drawing) {
   }
 }
 
-Result<Held> room_for(const data::Dataset& dataset, int width, int height, frame::Format format) {
-  const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, format);
-  if (bytes == 0) return Held();
-  auto reserved = dataset.reserve(bytes);
-  if (reserved || reserved.error().kind != ErrorKind::out_of_memory) return reserved;
-  return make_error(ErrorKind::out_of_memory,
-                    "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
-                        " pixels is too large: " + reserved.error().message);
-}
-
 }  // namespace
+
+// After loading, so that a conflict between loading and drawing is detected at once.
+Result<PreparedPtr> with_memory(frame::Prepared prepared, const data::Dataset& dataset,
+                                Loading loading) {
+  const int width = prepared.scene.camera.width;
+  const int height = prepared.scene.camera.height;
+  const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, prepared.encoding.format);
+  Result<Held> reserved = bytes == 0 ? Held() : dataset.reserve(bytes);
+  if (!reserved) {
+    const Error& error = reserved.error();
+    if (loading == Loading::none) return make_error(ErrorKind::not_resident, error.message);
+    if (error.kind != ErrorKind::out_of_memory) return error;
+    return make_error(ErrorKind::out_of_memory, "a picture of " + std::to_string(width) + " x " +
+                                                    std::to_string(height) +
+                                                    " pixels is too large: " + error.message);
+  }
+  return std::make_shared<PreparedPicture>(
+      PreparedPicture{std::move(prepared), std::move(*reserved)});
+}
 
 Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
                                     const quality::Setting& setting,
                                     const frame::Encoding& encoding, data::Dataset& dataset,
                                     Loading loading) {
-  const protocol::ImageView& image = completed.view().image;
-  const int width = quality::edge_at(image.width, setting.half_level);
-  const int height = quality::edge_at(image.height, setting.half_level);
-  Held reserved;
-  if (loading == Loading::none) {
-    auto room = room_for(dataset, width, height, encoding.format);
-    if (!room) return make_error(ErrorKind::not_resident, room.error().message);
-    reserved = std::move(*room);
-  }
   auto prepared = frame::prepare(completed, setting, dataset, encoding);
   if (!prepared) {
     if (loading == Loading::none) return prepared.error();
     return with_dataset_name(prepared.error(), dataset.info().id);
   }
-  // Reserve after loading, so that a conflict between loading and drawing is detected at once.
-  if (loading == Loading::allowed) {
-    auto room = room_for(dataset, width, height, encoding.format);
-    if (!room) return room.error();
-    reserved = std::move(*room);
-  }
-  return std::make_shared<PreparedPicture>(
-      PreparedPicture{std::move(*prepared), std::move(reserved)});
+  return with_memory(std::move(*prepared), dataset, loading);
 }
 
 Result<void> submit(Backend& backend, Drawing asked) {

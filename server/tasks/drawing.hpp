@@ -40,10 +40,14 @@ struct Drawing {
   std::string payer;
 };
 
-// Prepares a completed view at a setting, and reserves the memory of a large picture beyond the
-// reserve that the memory limit includes. Errors: those of frame::prepare(); not_resident if data
-// or memory is missing and nothing may be loaded; otherwise out_of_memory with the bytes that the
-// picture needs and the name of the dataset.
+// Reserves the memory of a large picture beyond the reserve that the memory limit includes. Errors:
+// not_resident if memory is missing and nothing may be loaded; otherwise out_of_memory with the
+// bytes that the picture needs.
+Result<PreparedPtr> with_memory(frame::Prepared prepared, const data::Dataset& dataset,
+                                Loading loading);
+
+// Prepares a completed view at a setting with the memory of its picture. Errors: those of
+// frame::prepare(), with the name of the dataset if data may be loaded, and of with_memory().
 Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
                                     const quality::Setting& setting,
                                     const frame::Encoding& encoding, data::Dataset& dataset,
