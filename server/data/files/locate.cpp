@@ -1,6 +1,4 @@
 // Converts a path or pattern to a Location: resolves links, matches patterns and sorts names.
-#include <fnmatch.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -13,6 +11,7 @@
 #include "server/base/ascii.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
+#include "server/data/files/pattern.hpp"
 
 namespace windsplat::data {
 
@@ -57,8 +56,8 @@ std::string stem_of_pattern(const std::string& pattern) {
   std::string stem = fs::path(pattern).stem().native();
   std::string out;
   for (std::size_t i = 0; i < stem.size(); ++i) {
-    if (stem[i] == '[') {
-      const std::size_t end = stem.find(']', i);
+    if (stem[i] == '[' || stem[i] == '{') {
+      const std::size_t end = stem.find(stem[i] == '[' ? ']' : '}', i);
       i = end == std::string::npos ? stem.size() : end;
     } else if (stem[i] != '*' && stem[i] != '?') {
       out += stem[i];
@@ -69,8 +68,6 @@ std::string stem_of_pattern(const std::string& pattern) {
   }
   return out.empty() ? "series" : out;
 }
-
-bool has_wildcard(std::string_view name) { return name.find_first_of("*?[") != std::string::npos; }
 
 bool may_have_companions(const std::string& name) {
   const std::string ending = lower(fs::path(name).extension().native());
@@ -98,9 +95,10 @@ Result<Location> locate_series(const std::string& pattern) {
   out.folder = folder.native();
   out.stem = stem_of_pattern(name);
   out.pattern = (folder / name).native();
+  const std::vector<std::string> alternatives = alternatives_of(name);
   for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault)) {
     const std::string found = at->path().filename().native();
-    if (::fnmatch(name.c_str(), found.c_str(), FNM_PERIOD) != 0) continue;
+    if (alternative_matching(alternatives, found) < 0) continue;
     std::error_code broken;
     const fs::path path = fs::canonical(at->path(), broken);
     if (broken || !fs::is_regular_file(path, broken)) continue;
@@ -174,7 +172,8 @@ Result<Location> locate(const std::string& path_or_pattern) {
 
 std::string links_left_out(const Location& series) {
   if (series.kind != Location::Kind::series) return "";
-  const std::string pattern = fs::path(series.pattern).filename().native();
+  const std::vector<std::string> pattern =
+      alternatives_of(fs::path(series.pattern).filename().native());
   std::set<std::string_view> members;
   for (const Location::Member& member : series.members) members.insert(member.name);
   std::size_t links = 0;
@@ -184,7 +183,7 @@ std::string links_left_out(const Location& series) {
     std::error_code unknown;
     if (!at->is_symlink(unknown)) continue;
     const std::string name = at->path().filename().native();
-    const bool matches = ::fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0;
+    const bool matches = alternative_matching(pattern, name) >= 0;
     links += matches && members.count(name) == 0 ? 1U : 0U;
   }
   if (links == 0) return "";

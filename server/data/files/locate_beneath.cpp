@@ -2,7 +2,6 @@
 // component, and the resolved path is read back.
 #include <dirent.h>
 #include <fcntl.h>
-#include <fnmatch.h>
 #include <linux/openat2.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -20,6 +19,7 @@
 #include "server/data/files/descriptor.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
+#include "server/data/files/pattern.hpp"
 
 namespace windsplat::data {
 
@@ -108,11 +108,12 @@ Result<std::vector<std::string>> matches_in(int root, const std::string& folder,
     ::close(descriptor);
     return not_reached(folder, reason);
   }
+  const std::vector<std::string> alternatives = alternatives_of(pattern);
   std::vector<std::string> names;
   while (const dirent* entry = ::readdir(directory.get())) {
     const std::string name = entry->d_name;
     if (name == "." || name == "..") continue;
-    if (::fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) != 0) continue;
+    if (alternative_matching(alternatives, name) < 0) continue;
     names.push_back(name);
     if (names.size() > series_members_max) {
       return refused(pattern, "matches more than " + std::to_string(series_members_max) + " files");

@@ -16,7 +16,6 @@ inline constexpr std::size_t series_members_max = 100'000;
 bool comes_before(std::string_view a, std::string_view b);
 // The name without the wildcards of a pattern and without extension: "wrf_*.nc" is "wrf".
 std::string stem_of_pattern(const std::string& pattern);
-bool has_wildcard(std::string_view name);
 // Whether the file name belongs to a format whose header names companion files.
 bool may_have_companions(const std::string& name);
 // A note on the links that match the pattern of a series but are omitted: how many and why. Empty
