@@ -57,6 +57,8 @@ windsplat_program_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py
 if(NOT WINDSPLAT_SANITIZE)
   windsplat_program_test(real ${SYSTEM_PYTHON} tests/integration/real_files.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(models ${SYSTEM_PYTHON} tests/integration/model_files.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(hardening python3 tests/tidy/check_hardening.py $<TARGET_FILE:windsplat>)

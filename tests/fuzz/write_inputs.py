@@ -16,7 +16,9 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "integration"))
 import loader_inputs  # noqa: E402
+import model_files  # noqa: E402
 import model_mutations  # noqa: E402
 import model_writers  # noqa: E402
 import seeds  # noqa: E402
@@ -129,6 +131,17 @@ def files(program):
         yield from reader_input(f"mutant-{number}", model.kind, *model_writers.written(model))
 
 
+def files_of_models():
+    """Small files of models on staggered and unstructured grids."""
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        for name, write in (model_files.READ | model_files.REFUSED).items():
+            write(folder / name)
+        for path in sorted(folder.glob("*.nc")):
+            members = {"x.nc": path.read_bytes()}
+            yield from reader_input(f"model-{path.stem}", "netcdf-4", members, "x.nc")
+
+
 def reader_input(name, kind, members, path):
     """The files of a dataset as one input; nothing if they are too large."""
     kind = "netcdf" if next(iter(members.values())).startswith(b"CDF") else READERS[kind]
@@ -150,7 +163,7 @@ def main():
     shutil.rmtree(options.out, ignore_errors=True)
     for kind, inputs in (("seed", vectors()), ("seed", requests()),
                          ("seed", configurations()),
-                         ("seed", files(options.program)),
+                         ("seed", files(options.program)), ("seed", files_of_models()),
                          ("seed", loader_inputs.loader_seeds()), ("size", sizes.sizes()),
                          ("size", loader_inputs.loader_sizes())):
         for target, name, data in inputs:

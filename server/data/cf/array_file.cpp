@@ -15,6 +15,13 @@ int variable_named(const FileContents& contents, std::string_view name) {
   return -1;
 }
 
+int dimension_named(const FileContents& contents, std::string_view name) {
+  for (std::size_t d = 0; d < contents.dimensions.size(); ++d) {
+    if (contents.dimensions[d].name == name) return static_cast<int>(d);
+  }
+  return -1;
+}
+
 Result<std::vector<double>> ArrayFile::read_all(int variable) const {
   const auto& dims = contents().variables.at(static_cast<std::size_t>(variable)).dims;
   const std::vector<std::size_t> start(dims.size(), 0);

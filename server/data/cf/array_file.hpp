@@ -21,6 +21,9 @@ inline std::size_t at(int index) { return static_cast<std::size_t>(index); }
 // The index of the variable of that name, -1 if there is none.
 int variable_named(const FileContents& contents, std::string_view name);
 
+// The index of the dimension of that name, -1 if there is none.
+int dimension_named(const FileContents& contents, std::string_view name);
+
 // A numeric attribute, as doubles.
 struct Numbers {
   std::vector<double> values;  // empty if the attribute is absent or text

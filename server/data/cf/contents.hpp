@@ -14,6 +14,10 @@ struct FileDimension {
   std::size_t length = 0;
   bool unlimited = false;
   bool falls = false;  // indices run opposite to the direction of vector components
+  // Of faces of cells, if the reader knows: the dimension of their centers, and the face before the
+  // first center (cf/staggered).
+  int centers = -1;
+  int first_face = 0;
 };
 
 struct FileVariable {
@@ -30,6 +34,8 @@ struct FileVariable {
   std::string coordinates;
   std::string bounds;  // `bounds` or `climatology`
   std::string grid_mapping;
+  std::string cf_role;
+  std::string mesh;  // UGRID: the mesh that the variable lies on
   // "<name of the vector> <component index>": attribute of the netCDF writer; also set by readers
   // of formats with vectors.
   std::string vector_mark;

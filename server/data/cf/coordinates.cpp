@@ -1,6 +1,8 @@
 // Reads whole variables, unpacks value by value and converts radians to degrees.
 #include "server/data/cf/coordinates.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "server/data/cf/grid/axes.hpp"
@@ -22,6 +24,12 @@ Result<std::vector<double>> unpacked_degrees(const ArrayFile& file, int variable
     for (double& value : *values) value *= 180 / std::numbers::pi;
   }
   return values;
+}
+
+bool same_number(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+
+bool same_place(double a, double b) {
+  return same_number(a, b) || std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b)) + 1e-9;
 }
 
 }  // namespace windsplat::data::cf

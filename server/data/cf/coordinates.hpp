@@ -14,4 +14,10 @@ Result<std::vector<double>> unpacked_values(const ArrayFile& file, int variable)
 // The same for longitudes or latitudes, converted from any angular unit to degrees.
 Result<std::vector<double>> unpacked_degrees(const ArrayFile& file, int variable);
 
+// Whether numbers are equal or both NaN.
+bool same_number(double a, double b);
+
+// Whether coordinates are equal within single precision.
+bool same_place(double a, double b);
+
 }  // namespace windsplat::data::cf

@@ -19,26 +19,12 @@ namespace windsplat::data::cf {
 
 namespace {
 
-int dimension_named(const FileContents& contents, const std::string& name) {
-  for (std::size_t d = 0; d < contents.dimensions.size(); ++d) {
-    if (contents.dimensions[d].name == name) return static_cast<int>(d);
-  }
-  return -1;
-}
-
-bool same_number(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
-
 bool same_packing(const Packing& a, const Packing& b) {
   return a.packed == b.packed && same_number(a.scale, b.scale) && same_number(a.offset, b.offset) &&
          a.wrap == b.wrap && same_number(a.valid_min, b.valid_min) &&
          same_number(a.valid_max, b.valid_max) && a.valid_is_unpacked == b.valid_is_unpacked &&
          std::equal(a.missing.begin(), a.missing.end(), b.missing.begin(), b.missing.end(),
                     same_number);
-}
-
-// Whether coordinates are equal within single precision.
-bool same_place(double a, double b) {
-  return same_number(a, b) || std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b)) + 1e-9;
 }
 
 constexpr std::size_t compared_max = std::size_t{1} << 24;  // values of a coordinate

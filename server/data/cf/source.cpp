@@ -23,6 +23,7 @@
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/grid/curvilinear.hpp"
 #include "server/data/cf/grid/grid.hpp"
+#include "server/data/cf/grid/level_heights.hpp"
 #include "server/data/cf/grid/level_pressures.hpp"
 #include "server/data/cf/packing.hpp"
 #include "server/data/cf/read_blocks.hpp"
@@ -63,12 +64,19 @@ class ArraySource final : public FileSource {
       return named(pressures.error());
     }
     pressures_ = std::move(*pressures);
+    auto heights =
+        find_heights(*file_, coordinate_of(choice_.space[2]), choice_.variables, placement_, info_);
+    if (!heights) {
+      return named(heights.error());
+    }
+    heights_ = std::move(*heights);
     if (auto done = find_fields(); !done) {
       return named(done.error());
     }
     if (info_.fields.empty()) {
       return named(make_error(ErrorKind::bad_data, "every field exceeds the limit of 16 GiB"));
     }
+    tell_absent_components();
     tell_valid_values();
     tell_unwritten();
     const std::filesystem::path name(file_->name());
@@ -89,7 +97,8 @@ class ArraySource final : public FileSource {
     const auto tell = [&](double done) { report_progress(done); };
     if (plan.derived >= 0) {
       const DerivedField& rule = derived_[static_cast<std::size_t>(plan.derived)];
-      if (auto done = fill_derived(*file_, placement_, pressures_, rule, step, out, tell); !done) {
+      if (auto done = fill_derived(*file_, placement_, pressures_, heights_, rule, step, out, tell);
+          !done) {
         return done;
       }
     }
@@ -269,11 +278,12 @@ class ArraySource final : public FileSource {
 
   Result<void> find_fields() {
     const int z = choice_.space[2];
-    const bool in_water = z >= 0 && roles_.at(at(z)).kind == AxisKind::depth;
+    const bool in_water =
+        z >= 0 && (roles_.at(at(z)).kind == AxisKind::depth || is_ocean_level(coordinate_of(z)));
     auto plans = cf::find_fields(file_->contents(), choice_.variables,
                                  in_water ? AxisKind::depth : info_.grid.axes[2].kind);
-    auto derived =
-        find_derived(*file_, placement_, plans, choice_.variables, pressures_, info_.notes);
+    auto derived = find_derived(*file_, placement_, plans, choice_.variables, pressures_, heights_,
+                                info_.notes);
     if (!derived) return derived.error();
     derived_ = std::move(*derived);
     for (FieldPlan& plan : plans) {
@@ -283,6 +293,22 @@ class ArraySource final : public FileSource {
       add_field(derived_[d].info, {derived_[d].inputs, static_cast<int>(d), false, false});
     }
     return {};
+  }
+
+  // A velocity that is not shown, or only in part, must not go unnoticed.
+  void tell_absent_components() {
+    std::string text;
+    for (const LeftOut& left : info_.left_out) {
+      const int v = variable_named(file_->contents(), left.name);
+      if (v < 0 || !is_velocity_component(file_->contents().variables[at(v)])) continue;
+      text += (text.empty() ? "" : "; ") + in_quotes(left.name) + ": " + left.reason;
+    }
+    if (!text.empty()) info_.notes.push_back("components of a velocity are not shown: " + text);
+  }
+
+  [[nodiscard]] bool is_ocean_level(int coordinate) const {
+    return coordinate >= 0 &&
+           file_->contents().variables.at(at(coordinate)).standard_name.starts_with("ocean_");
   }
 
   void tell_valid_values() {
@@ -392,6 +418,7 @@ class ArraySource final : public FileSource {
   Placement placement_;
   DatasetInfo info_;
   PressureLevels pressures_;
+  LevelHeights heights_;
   bool follows_other_axes_ = false;  // rows may not run east
   ToAxes to_axes_;
   std::optional<GridBearing> bearing_;

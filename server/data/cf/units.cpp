@@ -70,6 +70,15 @@ std::optional<double> metres_in(std::string_view unit) { return find(lengths, un
 
 std::optional<double> pascals_in(std::string_view unit) { return find(pressures, unit); }
 
+bool is_speed(std::string_view unit) {
+  constexpr auto known = std::to_array<std::string_view>(
+      {"m/s",           "m s-1",          "m s**-1",   "m s^-1",       "m.s-1",   "ms-1",
+       "m/sec",         "cm/s",           "cm s-1",    "km/h",         "km/s",    "km s-1",
+       "knots",         "knot",           "kt",        "kts",          "meter/s", "metre/s",
+       "meters/second", "meter second-1", "meter/sec", "centimeter/s", "mm/s",    "meter sec-1"});
+  return is_one_of(lower(unit), known);
+}
+
 std::optional<double> pascals_per_second_in(std::string_view unit) {
   for (const std::string_view ending : {"/s", " s-1", " s^-1", " s**-1", "*s-1", ".s-1", "/sec"}) {
     if (unit.size() > ending.size() && unit.ends_with(ending)) {

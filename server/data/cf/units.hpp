@@ -8,6 +8,7 @@ namespace windsplat::data {
 
 std::optional<double> metres_in(std::string_view unit);   // nullopt: not a length
 std::optional<double> pascals_in(std::string_view unit);  // nullopt: not a pressure
+bool is_speed(std::string_view unit);                     // a known unit of speed; false if empty
 std::optional<double> pascals_per_second_in(std::string_view unit);
 
 // The standard name of omega, in Pa s-1.

@@ -6,11 +6,16 @@
 #include <exception>
 #include <new>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "server/base/ascii.hpp"
+#include "server/data/cf/joined.hpp"
 #include "server/data/cf/series.hpp"
 #include "server/data/cf/source.hpp"
+#include "server/data/cf/staggered/collocated_file.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/files/pattern.hpp"
 #include "server/data/formats/dx/file.hpp"
 #include "server/data/formats/grads/file.hpp"
 #include "server/data/formats/grib/open.hpp"
@@ -49,17 +54,18 @@ Result<std::string> first_bytes(Files& files) {
   return (*input)->head(4096);
 }
 
-template <class File>
-SourceResult source_of(const Files& files, Result<std::unique_ptr<File>> file) {
+SourceResult source_of(const Files& files, Result<std::unique_ptr<cf::ArrayFile>> file) {
   if (!file) return file.error();
   (*file)->set_stored_bytes(files.opened_bytes());
   return cf::make_source(std::move(*file));
 }
 
 template <class File>
-Result<std::unique_ptr<cf::ArrayFile>> as_arrays(Result<std::unique_ptr<File>> file) {
+Result<std::unique_ptr<cf::ArrayFile>> as_arrays(const Files& files,
+                                                 Result<std::unique_ptr<File>> file) {
   if (!file) return file.error();
-  return std::unique_ptr<cf::ArrayFile>(std::move(*file));
+  (*file)->set_stored_bytes(files.opened_bytes());  // limits the reading of coordinates
+  return cf::collocated(std::move(*file));
 }
 
 // Only netCDF and HDF5 have groups; for other formats a group after '#/' must not be ignored.
@@ -84,28 +90,57 @@ Result<std::unique_ptr<cf::ArrayFile>> open_arrays(const std::shared_ptr<Files>&
   }
   if (grib::is_grib(**input)) {
     if (auto plain = without_group(*files, name); !plain) return plain.error();
-    return as_arrays(grib::open(std::move(*input)));
+    return as_arrays(*files, grib::open(std::move(*input)));
   }
   if (raw::is_json(*head)) {
     return (*input)->fault(
         "is JSON, but not a description of raw files, which has \"windsplat\": \"raw\" in its "
         "first 4096 bytes");
   }
-  return as_arrays(netcdf::File::open(std::move(*input), files->location().inside));
+  return as_arrays(*files, netcdf::File::open(std::move(*input), files->location().inside));
 }
 
-SourceResult open_series(const std::shared_ptr<Files>& files) {
-  const auto& members = files->location().members;
-  const std::string& pattern = files->location().pattern;
-  auto series = cf::SeriesFile::open(
-      files->location().stem, members.size(),
-      [files](std::size_t m) {
-        auto member = open_arrays(files, files->location().members[m].name);
-        if (member) (*member)->set_stored_bytes(files->opened_bytes());
-        return member;
-      },
-      pattern.substr(pattern.find_last_of('/') + 1));
-  return source_of(*files, std::move(series));
+using ArraysResult = Result<std::unique_ptr<cf::ArrayFile>>;
+
+// Files with the same variables, joined along time.
+ArraysResult open_along_time(const std::shared_ptr<Files>& files, std::vector<std::string> members,
+                             const std::string& pattern) {
+  const std::size_t count = members.size();
+  const auto open_member = [files, members = std::move(members)](std::size_t m) {
+    auto member = open_arrays(files, members[m]);
+    if (member) (*member)->set_stored_bytes(files->opened_bytes());
+    return member;
+  };
+  auto series = cf::SeriesFile::open(files->location().stem, count, open_member, pattern);
+  if (!series) return series.error();
+  (*series)->set_stored_bytes(files->opened_bytes());
+  return std::unique_ptr<cf::ArrayFile>(std::move(*series));
+}
+
+// The files that a pattern matches: along time, and for a list in braces joined by variables.
+ArraysResult open_series(const std::shared_ptr<Files>& files) {
+  const Location& location = files->location();
+  const std::string pattern = location.pattern.substr(location.pattern.find_last_of('/') + 1);
+  const std::vector<std::string> alternatives = alternatives_of(pattern);
+  std::vector<std::vector<std::string>> members(alternatives.size());
+  for (const Location::Member& member : location.members) {
+    const int part = alternative_matching(alternatives, member.name);
+    if (part >= 0) members[static_cast<std::size_t>(part)].push_back(member.name);
+  }
+  std::vector<std::unique_ptr<cf::ArrayFile>> parts;
+  for (std::size_t n = 0; n < alternatives.size(); ++n) {
+    if (members[n].empty()) {
+      return make_error(ErrorKind::not_found, in_quotes(alternatives[n]) + ": no file matches");
+    }
+    const bool one = alternatives.size() > 1 && members[n].size() == 1;
+    auto part = one ? open_arrays(files, members[n].front())
+                    : open_along_time(files, std::move(members[n]), alternatives[n]);
+    if (!part) return part.error();
+    (*part)->set_stored_bytes(files->opened_bytes());
+    parts.push_back(std::move(*part));
+  }
+  if (parts.size() == 1) return std::move(parts.front());
+  return as_arrays(*files, cf::JoinedFile::open(location.stem, pattern, std::move(parts)));
 }
 
 SourceResult open_by_content(const std::shared_ptr<Files>& files) {
@@ -115,12 +150,14 @@ SourceResult open_by_content(const std::shared_ptr<Files>& files) {
     const auto plain = without_group(*files, files->location().members.front().name);
     return plain ? vtk::open(files) : SourceResult(plain.error());
   }
-  if (zarr::is_store(*files)) return source_of(*files, zarr::Store::open(files));
+  if (zarr::is_store(*files)) return source_of(*files, as_arrays(*files, zarr::Store::open(files)));
   if (files->location().kind == Location::Kind::folder) {
     return make_error(ErrorKind::bad_data,
                       in_quotes(files->location().stem) + " is a directory, but not a Zarr store");
   }
-  if (files->location().kind == Location::Kind::series) return open_series(files);
+  if (files->location().kind == Location::Kind::series) {
+    return source_of(*files, open_series(files));
+  }
   return source_of(*files, open_arrays(files, files->location().members.front().name));
 }
 

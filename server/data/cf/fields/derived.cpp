@@ -62,12 +62,13 @@ class DerivedFinder {
  public:
   DerivedFinder(const ArrayFile& file, const Placement& grid, const std::vector<FieldPlan>& plans,
                 const std::vector<int>& variables, const PressureLevels& pressures,
-                std::vector<std::string>& notes)
+                const LevelHeights& heights, std::vector<std::string>& notes)
       : file_(file),
         grid_(grid),
         plans_(plans),
         variables_(variables),
         pressures_(pressures),
+        heights_(heights),
         notes_(notes) {}
 
   Result<std::vector<DerivedField>> find() {
@@ -146,9 +147,16 @@ class DerivedFinder {
 
   void add_height() {
     if (grid_.space[2] < 0) return;
+    if (heights_.parametric) {
+      DerivedField& field = add_scalar("height", DerivedField::Rule::level_height, "m");
+      field.info.standard_name = "altitude";
+      field.info.long_name = "height of the levels";
+      return;
+    }
     for (const int v : variables_) {
       const double scale = metres_of(variable(v));
       if (scale == 0) continue;
+      if (scale == 1 && variable(v).name == "height") return;  // the file has it
       DerivedField& field = add_scalar("height", DerivedField::Rule::height, "m");
       field.info.standard_name = "geopotential_height";
       field.info.long_name = "height above sea level, from " + variable(v).name;
@@ -254,6 +262,7 @@ class DerivedFinder {
   const std::vector<FieldPlan>& plans_;
   const std::vector<int>& variables_;
   const PressureLevels& pressures_;
+  const LevelHeights& heights_;
   std::vector<std::string>& notes_;
   std::vector<DerivedField> found_;
 };
@@ -305,13 +314,15 @@ Result<std::vector<DerivedField>> find_derived(const ArrayFile& file, const Plac
                                                const std::vector<FieldPlan>& plans,
                                                const std::vector<int>& variables,
                                                const PressureLevels& pressures,
+                                               const LevelHeights& heights,
                                                std::vector<std::string>& notes) {
-  return DerivedFinder(file, grid, plans, variables, pressures, notes).find();
+  return DerivedFinder(file, grid, plans, variables, pressures, heights, notes).find();
 }
 
 Result<void> fill_derived(const ArrayFile& file, const Placement& grid,
-                          const PressureLevels& pressures, const DerivedField& field,
-                          std::size_t step, float* out, const Progress& tell) {
+                          const PressureLevels& pressures, const LevelHeights& heights,
+                          const DerivedField& field, std::size_t step, float* out,
+                          const Progress& tell) {
   const std::size_t layer = grid.layer();
   const std::size_t samples = layer * grid.length[2];
   if (field.rule == DerivedField::Rule::height) {
@@ -320,6 +331,15 @@ Result<void> fill_derived(const ArrayFile& file, const Placement& grid,
       out[n] = static_cast<float>(static_cast<double>(out[n]) * field.scale);
     }
     return done;
+  }
+  if (field.rule == DerivedField::Rule::level_height) {
+    ParametricHeights at_levels(*heights.parametric);
+    if (auto done = at_levels.load(file, grid, step); !done) return done;
+    for (std::size_t n = 0; n < samples; ++n) {
+      out[n] = static_cast<float>(at_levels.at(n / layer, n % layer));
+    }
+    tell(1);
+    return {};
   }
   Pressures at_samples(pressures, grid);
   if (auto done = at_samples.load(file, grid, step); !done) return done;

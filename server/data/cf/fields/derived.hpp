@@ -11,6 +11,7 @@
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
 #include "server/data/cf/fields/fields.hpp"
+#include "server/data/cf/grid/level_heights.hpp"
 #include "server/data/cf/grid/level_pressures.hpp"
 #include "server/data/cf/read_blocks.hpp"
 #include "server/data/model/dataset_info.hpp"
@@ -22,6 +23,7 @@ struct DerivedField {
   enum class Rule {
     pressure,         // pressure of every sample, in the units of the surface pressure
     height,           // inputs[0] times scale, in metres
+    level_height,     // height of the parametric level, in metres
     standard_height,  // height of the pressure of the sample in the standard atmosphere
     rise,             // inputs: u, v, omega: w = -omega R T / (p g) as the third component
   };
@@ -39,11 +41,13 @@ Result<std::vector<DerivedField>> find_derived(const ArrayFile& file, const Plac
                                                const std::vector<FieldPlan>& plans,
                                                const std::vector<int>& variables,
                                                const PressureLevels& pressures,
+                                               const LevelHeights& heights,
                                                std::vector<std::string>& notes);
 
 // The field at a step, all components. Errors: bad_data.
 Result<void> fill_derived(const ArrayFile& file, const Placement& grid,
-                          const PressureLevels& pressures, const DerivedField& field,
-                          std::size_t step, float* out, const Progress& tell);
+                          const PressureLevels& pressures, const LevelHeights& heights,
+                          const DerivedField& field, std::size_t step, float* out,
+                          const Progress& tell);
 
 }  // namespace windsplat::data::cf

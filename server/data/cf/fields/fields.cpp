@@ -18,16 +18,8 @@ bool contains(std::string_view text, std::string_view part) {
   return text.find(part) != std::string_view::npos;
 }
 
-// Whether units are those of a horizontal velocity; absent units are accepted.
-bool is_velocity(const std::string& units) {
-  constexpr auto known_units = std::to_array<std::string_view>(
-      {"",        "m/s",           "m s-1",          "m s**-1",   "m s^-1",       "m.s-1",
-       "ms-1",    "m/sec",         "cm/s",           "cm s-1",    "km/h",         "km/s",
-       "km s-1",  "knots",         "knot",           "kt",        "kts",          "meter/s",
-       "metre/s", "meters/second", "meter second-1", "meter/sec", "centimeter/s", "mm/s"});
-  const std::string text = lower(units);
-  return std::find(known_units.begin(), known_units.end(), text) != known_units.end();
-}
+// Whether units are those of a velocity; absent units are accepted.
+bool is_velocity(const std::string& units) { return units.empty() || is_speed(units); }
 
 class FieldFinder {
  public:
@@ -267,6 +259,21 @@ class FieldFinder {
 };
 
 }  // namespace
+
+bool is_velocity_component(const FileVariable& variable) {
+  const std::string& name = variable.standard_name;
+  const bool of_flow = contains(name, "wind") || contains(name, "velocity");
+  if (of_flow && (name.starts_with("eastward_") || name.starts_with("northward_") ||
+                  name.starts_with("upward_") || name.starts_with("x_") || name.starts_with("y_") ||
+                  contains(name, "_x_") || contains(name, "_y_"))) {
+    return true;
+  }
+  constexpr auto usual = std::to_array<std::string_view>(
+      {"u",        "v",        "w",        "ua",   "va",   "wa",   "uo",   "vo",
+       "wo",       "uwnd",     "vwnd",     "ugrd", "vgrd", "uvel", "vvel", "wvel",
+       "vozocrtx", "vomecrty", "vovecrtz", "ucx",  "ucy",  "ucz"});
+  return is_speed(variable.units) && is_one_of(lower(variable.name), usual);
+}
 
 std::vector<FieldPlan> find_fields(const FileContents& contents, const std::vector<int>& variables,
                                    AxisKind vertical) {

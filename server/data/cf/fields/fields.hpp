@@ -14,6 +14,9 @@ struct FieldPlan {
   std::vector<int> variables;  // one per component, indices into FileContents::variables
 };
 
+// Whether a variable is by its name a component of a velocity.
+bool is_velocity_component(const FileVariable& variable);
+
 // variables: those on the chosen grid. vertical: the kind of its z axis (with a depth axis, u and v
 // are a current). Components are identified by the attribute of the netCDF writer, then by
 // standard_name (eastward_, northward_, upward_...), then by common names (u v w, ua va wap, ugrd

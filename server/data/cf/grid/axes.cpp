@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/base/ascii.hpp"
+#include "server/data/cf/grid/cell_lists.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/cf/units.hpp"
 
@@ -374,9 +375,12 @@ bool is_position(const FileVariable& variable) {
 }
 
 std::vector<DimensionRole> classify_dimensions(const FileContents& contents) {
+  const std::vector<bool> lists = find_cell_lists(contents);
   std::vector<DimensionRole> out;
   for (std::size_t d = 0; d < contents.dimensions.size(); ++d) {
     out.push_back(classify(contents, static_cast<int>(d)));
+    const bool is_place = out[d].role != Role::time && out[d].role != Role::z;
+    if (lists[d] && is_place) out[d] = {.role = Role::other, .is_list = true};
   }
   return out;
 }
@@ -400,8 +404,11 @@ Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& r
       unknown.push_back(dimension);
     } else if (role == Role::other) {
       if (length != 1) {
+        const bool is_list = roles.at(static_cast<std::size_t>(dimension)).is_list;
         layout.problem = "its dimension '" + printable(dimension_name(contents, dimension)) +
-                         "' is neither space nor time";
+                         (is_list ? "' lists the cells, edges, nodes or stations of an "
+                                    "unstructured grid, which is not supported"
+                                  : "' is neither space nor time");
         return layout;
       }
     } else if (length != 1 && !assign_role(layout, role, dimension)) {

@@ -22,6 +22,7 @@ struct DimensionRole {
   bool kind_is_sure = false;   // false: only the role is known, e.g. vertical
   bool positive_down = false;  // larger coordinates lie lower
   int coordinate = -1;         // the 1-D variable that gives its coordinates; -1: none
+  bool is_list = false;        // cells or stations in a list; `role` is then other
 };
 
 // Classifies dimensions; the result has one entry per dimension of the file. Evidence in order of

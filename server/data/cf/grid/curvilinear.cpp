@@ -57,19 +57,6 @@ bool is_longitude(const FileVariable& variable) {
   return name == "longitude" || (name != "latitude" && is_east(lower(variable.units)));
 }
 
-// The 2-D longitude or latitude variable on exactly these two dimensions; -1 if there is none.
-int position_on(const FileContents& contents, int a, int b, bool longitude) {
-  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
-    const FileVariable& variable = contents.variables[v];
-    const bool fits =
-        variable.dims == std::vector<int>{a, b} || variable.dims == std::vector<int>{b, a};
-    if (fits && variable.numeric && is_position(variable) && is_longitude(variable) == longitude) {
-      return static_cast<int>(v);
-    }
-  }
-  return -1;
-}
-
 // 2-D values in the order of the file, slower dimension first.
 struct Table {
   std::vector<double> values;
@@ -125,6 +112,18 @@ std::shared_ptr<const Columns> columns_of(std::array<Table, 2> tables, int x,
 }
 
 }  // namespace
+
+int position_on(const FileContents& contents, int a, int b, bool longitude) {
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    const FileVariable& variable = contents.variables[v];
+    const bool fits =
+        variable.dims == std::vector<int>{a, b} || variable.dims == std::vector<int>{b, a};
+    if (fits && variable.numeric && is_position(variable) && is_longitude(variable) == longitude) {
+      return static_cast<int>(v);
+    }
+  }
+  return -1;
+}
 
 Result<Bearing> find_bearing(const ArrayFile& file, const std::vector<DimensionRole>& roles,
                              GridChoice& choice) {

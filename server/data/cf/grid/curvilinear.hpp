@@ -31,6 +31,9 @@ Result<Bearing> find_bearing(const ArrayFile& file, const std::vector<DimensionR
 // rotated pole). Null if 2-D longitudes or latitudes are absent or incomplete.
 Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const Placement& grid);
 
+// The 2-D longitude or latitude variable on exactly these two dimensions; -1 if there is none.
+int position_on(const FileContents& contents, int a, int b, bool longitude);
+
 // The grid mapping variable of one of `variables`; -1 if there is none.
 int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables);
 

@@ -23,27 +23,6 @@ int term_variable(const FileContents& contents, std::string_view name) {
   return name.empty() ? -1 : variable_named(contents, name);
 }
 
-// "a: hyam b: hybm p0: P0 ps: PS" -> names by term.
-std::map<std::string, std::string> terms_of(const std::string& text) {
-  std::map<std::string, std::string> terms;
-  std::string term;
-  std::size_t from = 0;
-  while (from < text.size()) {
-    const std::size_t to = std::min(text.find_first_of(" \t\n\r", from), text.size());
-    std::string word = text.substr(from, to - from);
-    from = to + 1;
-    if (word.empty()) continue;
-    if (word.back() == ':') {
-      word.pop_back();
-      term = lower(word);
-    } else if (!term.empty()) {
-      terms[term] = word;
-      term.clear();
-    }
-  }
-  return terms;
-}
-
 // Terms by the attributes of NCL and by common names, for files without formula_terms.
 std::map<std::string, std::string> usual_terms(const ArrayFile& file, int coordinate,
                                                const Placement& grid) {
@@ -69,18 +48,6 @@ std::map<std::string, std::string> usual_terms(const ArrayFile& file, int coordi
     if (surface >= 0) terms["ps"] = contents.variables[at(surface)].name;
   }
   return terms;
-}
-
-bool on_columns(const FileContents& contents, const Placement& grid, int variable) {
-  const FileVariable& found = contents.variables[at(variable)];
-  std::size_t horizontal = 0;
-  for (const int d : found.dims) {
-    const bool here = d == grid.space[0] || d == grid.space[1];
-    horizontal += here ? 1 : 0;
-    if (!here && d != grid.time && contents.dimensions[at(d)].length != 1) return false;
-  }
-  const std::size_t wanted = (grid.space[0] >= 0 ? 1U : 0U) + (grid.space[1] >= 0 ? 1U : 0U);
-  return found.numeric && horizontal == wanted;
 }
 
 // Reads one value per level, lowest level first; empty if the variable has other dimensions.
@@ -198,6 +165,38 @@ Result<bool> hybrid_levels(const ArrayFile& file, const Placement& grid,
 
 }  // namespace
 
+std::map<std::string, std::string> formula_terms(const std::string& text) {
+  std::map<std::string, std::string> terms;
+  std::string term;
+  std::size_t from = 0;
+  while (from < text.size()) {
+    const std::size_t to = std::min(text.find_first_of(" \t\n\r", from), text.size());
+    std::string word = text.substr(from, to - from);
+    from = to + 1;
+    if (word.empty()) continue;
+    if (word.back() == ':') {
+      word.pop_back();
+      term = lower(word);
+    } else if (!term.empty()) {
+      terms[term] = word;
+      term.clear();
+    }
+  }
+  return terms;
+}
+
+bool on_columns(const FileContents& contents, const Placement& grid, int variable) {
+  const FileVariable& found = contents.variables[at(variable)];
+  std::size_t horizontal = 0;
+  for (const int d : found.dims) {
+    const bool here = d == grid.space[0] || d == grid.space[1];
+    horizontal += here ? 1 : 0;
+    if (!here && d != grid.time && contents.dimensions[at(d)].length != 1) return false;
+  }
+  const std::size_t wanted = (grid.space[0] >= 0 ? 1U : 0U) + (grid.space[1] >= 0 ? 1U : 0U);
+  return found.numeric && horizontal == wanted;
+}
+
 bool is_surface_pressure(const FileVariable& variable) {
   const std::string name = lower(variable.name);
   const bool usual = name == "ps" || name == "sp" || name == "psfc" || name == "pres_sfc" ||
@@ -221,7 +220,7 @@ Result<std::optional<HybridLevels>> find_hybrid(const ArrayFile& file, const Pla
                                                 int coordinate) {
   using Found = std::optional<HybridLevels>;
   if (grid.space[2] < 0) return Found();
-  auto terms = terms_of(coordinate < 0 ? "" : file.text_of(coordinate, "formula_terms"));
+  auto terms = formula_terms(coordinate < 0 ? "" : file.text_of(coordinate, "formula_terms"));
   const bool by_formula = terms.count("ps") != 0;
   if (!by_formula) terms = usual_terms(file, coordinate, grid);
   HybridLevels out;

@@ -2,6 +2,7 @@
 // Vertical coordinate of a file -> p(level, column) = a(level) + b(level) * surface pressure.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,12 @@
 #include "server/data/cf/read_blocks.hpp"
 
 namespace windsplat::data::cf {
+
+// "a: hyam b: hybm p0: P0 ps: PS" -> names of variables by lower-case term.
+std::map<std::string, std::string> formula_terms(const std::string& text);
+
+// Whether a variable has one value for each column of the grid, at each step or for all.
+bool on_columns(const FileContents& contents, const Placement& grid, int variable);
 
 struct HybridLevels {
   std::vector<double> a;  // Pa, one per level, lowest first

@@ -292,6 +292,8 @@ Result<void> File::scan_variable(const Place& place, bool above) {
     variable.bounds = text(place, "climatology");
   }
   variable.grid_mapping = text(place, "grid_mapping");
+  variable.cf_role = text(place, "cf_role");
+  variable.mesh = text(place, "mesh");
   variable.vector_mark = text(place, "windsplat_vector");
   variable.is_unsigned = lower(text(place, "_Unsigned")) == "true";
   int attribute = 0;

@@ -238,6 +238,8 @@ class StoreScan {
     variable.bounds = text_in(attributes, "bounds");
     if (variable.bounds.empty()) variable.bounds = text_in(attributes, "climatology");
     variable.grid_mapping = text_in(attributes, "grid_mapping");
+    variable.cf_role = text_in(attributes, "cf_role");
+    variable.mesh = text_in(attributes, "mesh");
     variable.vector_mark = text_in(attributes, "windsplat_vector");
     variable.is_unsigned = lower(text_in(attributes, "_Unsigned")) == "true";
     variable.packed =

@@ -1,0 +1,65 @@
+#include "server/data/cf/grid/cell_lists.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+
+#include "server/base/ascii.hpp"
+#include "server/data/cf/array_file.hpp"
+#include "server/data/cf/grid/axes.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+// MPAS, ICON, CAM-SE, FESOM, FVCOM, SCHISM.
+constexpr auto usual_names = std::to_array<std::string_view>(
+    {"ncells", "nedges", "nvertices", "ncol", "nod2", "nod2d", "nodes_2d", "nod_n", "elem", "nele",
+     "nschism_hgrid_node", "nschism_hgrid_face"});
+
+// Longitudes (-1) or latitudes (1) by attributes, or in radians by name (lonCell); 0: neither.
+int side_of(const FileVariable& variable) {
+  const std::string units = lower(variable.units);
+  const std::string standard_name = lower(variable.standard_name);
+  const std::string name = lower(variable.name);
+  if (standard_name == "longitude" || is_east(units)) return -1;
+  if (standard_name == "latitude" || is_position(variable)) return 1;
+  if (!is_radian(units)) return 0;
+  if (name.find("lon") != std::string::npos) return -1;
+  return name.find("lat") != std::string::npos ? 1 : 0;
+}
+
+bool is_connectivity(const FileVariable& variable) {
+  return lower(variable.cf_role).ends_with("_connectivity");
+}
+
+}  // namespace
+
+std::vector<bool> find_cell_lists(const FileContents& contents) {
+  const std::size_t count = contents.dimensions.size();
+  std::vector<bool> found(count, false);
+  std::vector<std::array<bool, 2>> placed(count, {false, false});  // by longitude, by latitude
+  for (const FileVariable& variable : contents.variables) {
+    if (variable.dims.size() == 1 && variable.numeric) {
+      const int side = side_of(variable);
+      if (side != 0) placed.at(at(variable.dims[0])).at(side < 0 ? 0 : 1) = true;
+    }
+    // The nodes of each cell, or the cells of each node: the list is the longer dimension.
+    if (variable.dims.size() == 2 && is_connectivity(variable)) {
+      const auto length = [&](int d) { return contents.dimensions.at(at(d)).length; };
+      const bool first = length(variable.dims[0]) >= length(variable.dims[1]);
+      found.at(at(variable.dims[first ? 0 : 1])) = true;
+    }
+    if (!variable.mesh.empty() && !variable.dims.empty()) {
+      found.at(at(variable.dims.back())) = true;
+    }
+  }
+  for (std::size_t d = 0; d < count; ++d) {
+    const bool named = is_one_of(lower(contents.dimensions[d].name), usual_names);
+    found[d] = found[d] || named || (placed[d][0] && placed[d][1]);
+  }
+  return found;
+}
+
+}  // namespace windsplat::data::cf

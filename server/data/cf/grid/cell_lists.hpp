@@ -1,0 +1,14 @@
+// Dimensions that number cells, edges, nodes or stations in a list instead of along an axis.
+#pragma once
+
+#include <vector>
+
+#include "server/data/cf/contents.hpp"
+
+namespace windsplat::data::cf {
+
+// One entry per dimension. Evidence: 1-D longitudes and 1-D latitudes on the same dimension; UGRID
+// (version 1.0: cf_role, mesh); the usual names of models without either.
+std::vector<bool> find_cell_lists(const FileContents& contents);
+
+}  // namespace windsplat::data::cf

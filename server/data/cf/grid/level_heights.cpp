@@ -1,0 +1,314 @@
+#include "server/data/cf/grid/level_heights.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "server/base/ascii.hpp"
+#include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/grid/vertical.hpp"
+#include "server/data/cf/units.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+using LevelTerms = std::array<double, 3>;
+using ColumnTerms = std::array<double, 2>;
+
+// Names as in appendix D: column = {depth, eta}, level = {s or sigma, C}, constant = depth_c.
+double ocean_sigma(const LevelTerms& level, const ColumnTerms& column, double /*constant*/) {
+  return column[1] + level[0] * (column[0] + column[1]);
+}
+double ocean_s_g1(const LevelTerms& level, const ColumnTerms& column, double constant) {
+  const double s = constant * level[0] + (column[0] - constant) * level[1];
+  return s + column[1] * (1 + s / column[0]);
+}
+double ocean_s_g2(const LevelTerms& level, const ColumnTerms& column, double constant) {
+  const double s = (constant * level[0] + column[0] * level[1]) / (constant + column[0]);
+  return column[1] + (column[1] + column[0]) * s;
+}
+// level = {sigma, zlev}; NaN in sigma below the sigma levels.
+double ocean_sigma_z(const LevelTerms& level, const ColumnTerms& column, double constant) {
+  if (std::isnan(level[0])) return level[1];
+  return column[1] + level[0] * (std::min(constant, column[0]) + column[1]);
+}
+// column = {orog}, level = {a, b}.
+double hybrid_height(const LevelTerms& level, const ColumnTerms& column, double /*constant*/) {
+  return level[0] + level[1] * column[0];
+}
+// column = {zsurf1, zsurf2}, level = {a, b1, b2}, constant = ztop.
+double sleve(const LevelTerms& level, const ColumnTerms& column, double constant) {
+  return level[0] * constant + level[1] * column[0] + level[2] * column[1];
+}
+
+struct KnownFormula {
+  std::string_view standard_name;
+  ParametricLevels::Formula formula;
+  std::array<const char*, 3> levels;  // terms; null: none
+  std::array<const char*, 2> columns;
+  const char* constant;
+  bool second_is_optional;  // absent: 0
+};
+constexpr auto known_formulas = std::to_array<KnownFormula>({
+    {"ocean_sigma_coordinate",
+     ocean_sigma,
+     {"sigma", nullptr, nullptr},
+     {"depth", "eta"},
+     nullptr,
+     true},
+    {"ocean_s_coordinate_g1", ocean_s_g1, {"s", "c", nullptr}, {"depth", "eta"}, "depth_c", true},
+    {"ocean_s_coordinate_g2", ocean_s_g2, {"s", "c", nullptr}, {"depth", "eta"}, "depth_c", true},
+    {"ocean_sigma_z_coordinate",
+     ocean_sigma_z,
+     {"sigma", "zlev", nullptr},
+     {"depth", "eta"},
+     "depth_c",
+     true},
+    {"atmosphere_hybrid_height_coordinate",
+     hybrid_height,
+     {"a", "b", nullptr},
+     {"orog", nullptr},
+     nullptr,
+     true},
+    {"atmosphere_sleve_coordinate", sleve, {"a", "b1", "b2"}, {"zsurf1", "zsurf2"}, "ztop", false},
+});
+
+using Terms = std::map<std::string, std::string>;
+
+// The terms of ROMS' files that lack formula_terms.
+std::pair<std::string, Terms> terms_of_roms(const ArrayFile& file) {
+  const FileContents& contents = file.contents();
+  const int transform = variable_named(contents, "Vtransform");
+  if (transform < 0 || !contents.variables[at(transform)].numeric) return {};
+  const auto number = unpacked_values(file, transform);
+  if (!number || number->size() != 1) return {};
+  if (number->front() != 1 && number->front() != 2) return {};
+  return {number->front() == 1 ? "ocean_s_coordinate_g1" : "ocean_s_coordinate_g2",
+          {{"s", "s_rho"}, {"c", "Cs_r"}, {"eta", "zeta"}, {"depth", "h"}, {"depth_c", "hc"}}};
+}
+
+class HeightFinder {
+ public:
+  HeightFinder(const ArrayFile& file, int coordinate, const std::vector<int>& variables,
+               const Placement& grid, DatasetInfo& info)
+      : file_(file), coordinate_(coordinate), variables_(variables), grid_(grid), info_(info) {}
+
+  Result<LevelHeights> find() {
+    LevelHeights heights;
+    if (grid_.space[2] < 0) return heights;
+    auto parametric = find_parametric();
+    if (!parametric) return parametric.error();
+    heights.parametric = std::move(*parametric);
+    const Axis& axis = info_.grid.axes[2];
+    const bool is_bare =
+        axis.kind == AxisKind::level || (axis.kind == AxisKind::cartesian && coordinate_ < 0);
+    if (!heights.parametric && is_bare) heights.variable = find_variable();
+    if (!heights.parametric && heights.variable < 0) return LevelHeights();
+    if (auto done = place(heights); !done) return done.error();
+    return heights;
+  }
+
+ private:
+  [[nodiscard]] const FileVariable& variable(int v) const {
+    return file_.contents().variables.at(at(v));
+  }
+
+  [[nodiscard]] int numeric_named(const std::string& name) const {
+    const int v = name.empty() ? -1 : variable_named(file_.contents(), name);
+    return v >= 0 && variable(v).numeric ? v : -1;
+  }
+
+  Result<std::optional<ParametricLevels>> find_parametric() {
+    std::string name = coordinate_ < 0 ? "" : variable(coordinate_).standard_name;
+    Terms terms;
+    if (coordinate_ >= 0) terms = formula_terms(file_.text_of(coordinate_, "formula_terms"));
+    if (terms.empty()) std::tie(name, terms) = terms_of_roms(file_);
+    const auto* known =
+        std::find_if(known_formulas.begin(), known_formulas.end(),
+                     [&](const KnownFormula& one) { return one.standard_name == lower(name); });
+    using Found = std::optional<ParametricLevels>;
+    if (known == known_formulas.end() || terms.empty()) return Found();
+    ParametricLevels out;
+    out.formula = known->formula;
+    std::string missing;
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (known->columns.at(i) == nullptr) continue;
+      const int v = numeric_named(terms[known->columns.at(i)]);
+      if (v >= 0 && on_columns(file_.contents(), grid_, v)) {
+        out.columns.at(i) = v;
+      } else if (i == 0 || !known->second_is_optional) {
+        missing = known->columns.at(i);
+      }
+    }
+    if (known->constant != nullptr) {
+      const auto value = single_value(terms[known->constant]);
+      if (!value) return value.error();
+      if (!*value) missing = known->constant;
+      out.constant = value->value_or(0);
+    }
+    if (auto done = read_levels(*known, terms, out, missing); !done) return done.error();
+    if (missing.empty()) return Found(std::move(out));
+    info_.notes.push_back("the levels' heights are unknown: " + std::string(known->standard_name) +
+                          " lacks its term " + in_quotes(missing));
+    return Found();
+  }
+
+  Result<void> read_levels(const KnownFormula& known, Terms& terms, ParametricLevels& out,
+                           std::string& missing) const {
+    out.levels.assign(grid_.length[2], LevelTerms{});
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (known.levels.at(i) == nullptr) continue;
+      const int v = numeric_named(terms[known.levels.at(i)]);
+      if (v < 0 || variable(v).dims != std::vector{grid_.space[2]}) {
+        missing = known.levels.at(i);
+        continue;
+      }
+      auto values = unpacked_values(file_, v);
+      if (!values) return values.error();
+      if (grid_.turned[2]) std::reverse(values->begin(), values->end());
+      for (std::size_t k = 0; k < values->size(); ++k) out.levels[k].at(i) = (*values)[k];
+    }
+    return {};
+  }
+
+  [[nodiscard]] Result<std::optional<double>> single_value(const std::string& name) const {
+    const int v = numeric_named(name);
+    if (v < 0) return std::optional<double>();
+    for (const int d : variable(v).dims) {
+      if (file_.contents().dimensions[at(d)].length != 1) return std::optional<double>();
+    }
+    auto values = unpacked_values(file_, v);
+    if (!values) return values.error();
+    if (values->size() != 1 || !std::isfinite(values->front())) return std::optional<double>();
+    return std::optional(values->front());
+  }
+
+  // A height in metres above sea level at every sample; -1 if there is none.
+  [[nodiscard]] int find_variable() const {
+    for (const int v : variables_) {
+      const FileVariable& one = variable(v);
+      const auto along_levels = std::count(one.dims.begin(), one.dims.end(), grid_.space[2]);
+      const bool named = one.standard_name == "geopotential_height" ||
+                         one.standard_name == "altitude" ||
+                         one.standard_name == "height_above_geopotential_datum";
+      if (named && along_levels == 1 && metres_in(one.units) == 1.0) return v;
+    }
+    return -1;
+  }
+
+  // Sums and counts of the heights of each level at the first step.
+  Result<std::vector<double>> means(const LevelHeights& heights) const {
+    std::vector<double> out(grid_.length[2], std::numeric_limits<double>::quiet_NaN());
+    const std::size_t layer = grid_.layer();
+    std::vector<float> values(layer);
+    std::optional<ParametricHeights> formula;
+    if (heights.parametric) {
+      formula.emplace(*heights.parametric);
+      if (auto loaded = formula->load(file_, grid_, 0); !loaded) return loaded.error();
+    }
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      if (!formula) {
+        auto read =
+            read_variable(file_, grid_, heights.variable, 0, {k, 1}, values.data(), [](double) {});
+        if (!read) return read.error();
+      }
+      double sum = 0;
+      std::size_t count = 0;
+      for (std::size_t n = 0; n < layer; ++n) {
+        const double z = formula ? formula->at(k, n) : static_cast<double>(values[n]);
+        if (!std::isfinite(z)) continue;
+        sum += z;
+        ++count;
+      }
+      if (count > 0) out[k] = sum / static_cast<double>(count);
+    }
+    return out;
+  }
+
+  [[nodiscard]] Result<void> charge(const LevelHeights& heights) const {
+    const Levels all{0, grid_.length[2]};
+    std::vector<int> read{heights.variable};
+    if (heights.parametric) {
+      read.assign(heights.parametric->columns.begin(), heights.parametric->columns.end());
+    }
+    for (const int v : read) {
+      if (v < 0) continue;
+      if (auto fine = file_.charge(v, decoded_step_bytes(file_, grid_, v, all)); !fine) return fine;
+    }
+    return {};
+  }
+
+  Result<void> place(const LevelHeights& heights) {
+    Axis& axis = info_.grid.axes[2];
+    if (auto fine = charge(heights); !fine) {
+      info_.notes.push_back("levels of unknown mean height (" + fine.error().message +
+                            "): they are placed as in the file");
+      return {};
+    }
+    const auto mean = means(heights);
+    if (!mean) return mean.error();
+    bool rises = std::isfinite(mean->front());
+    for (std::size_t k = 1; k < mean->size(); ++k) rises = rises && (*mean)[k] > (*mean)[k - 1];
+    if (!rises) {
+      info_.notes.emplace_back("levels whose mean heights do not rise: placed as in the file");
+      return {};
+    }
+    axis.coordinates = *mean;
+    axis.kind = AxisKind::height;
+    axis.standard_name = "altitude";
+    axis.units = "m";
+    info_.notes.emplace_back(
+        "levels are placed at their mean heights at the first step; the field \"height\" has the "
+        "height of every sample (geometry.heightField)");
+    const auto placed = [&](const LeftOut& left) { return left.name == axis.name; };
+    info_.left_out.erase(std::remove_if(info_.left_out.begin(), info_.left_out.end(), placed),
+                         info_.left_out.end());
+    for (LeftOut& left : info_.left_out) {
+      if (!heights.parametric) break;
+      for (const int v : heights.parametric->columns) {
+        if (v >= 0 && left.name == variable(v).name) left.reason = "gives the height of the levels";
+      }
+    }
+    return {};
+  }
+
+  const ArrayFile& file_;
+  int coordinate_;
+  const std::vector<int>& variables_;
+  const Placement& grid_;
+  DatasetInfo& info_;
+};
+
+}  // namespace
+
+Result<void> ParametricHeights::load(const ArrayFile& file, const Placement& grid,
+                                     std::size_t step) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    columns_.at(i).assign(grid.layer(), 0.0F);
+    if (levels_.columns.at(i) < 0) continue;
+    auto read = read_variable(file, grid, levels_.columns.at(i), step, {0, grid.length[2]},
+                              columns_.at(i).data(), [](double) {});
+    if (!read) return read;
+  }
+  return {};
+}
+
+double ParametricHeights::at(std::size_t level, std::size_t column) const {
+  const ColumnTerms values{static_cast<double>(columns_[0][column]),
+                           static_cast<double>(columns_[1][column])};
+  return levels_.formula(levels_.levels[level], values, levels_.constant);
+}
+
+Result<LevelHeights> find_heights(const ArrayFile& file, int coordinate,
+                                  const std::vector<int>& variables, const Placement& grid,
+                                  DatasetInfo& info) {
+  return HeightFinder(file, coordinate, variables, grid, info).find();
+}
+
+}  // namespace windsplat::data::cf

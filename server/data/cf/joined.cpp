@@ -1,0 +1,282 @@
+// Finds the common dimensions of the parts, then lists the variables of all.
+#include "server/data/cf/joined.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+
+#include "server/base/ascii.hpp"
+#include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/grid/curvilinear.hpp"
+#include "server/data/cf/time.hpp"
+#include "server/data/model/digest.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+// Degrees of the columns of a part: longitudes and latitudes of rows of `width` columns.
+struct Positions {
+  std::array<int, 2> dimensions{-1, -1};  // of rows and of columns, in the part
+  std::vector<double> longitude;
+  std::vector<double> latitude;
+  std::size_t width = 0;
+};
+
+// The 2-D positions of a file; empty unless it has exactly one pair of them.
+Result<std::optional<Positions>> positions_in(const ArrayFile& file) {
+  const FileContents& contents = file.contents();
+  std::optional<Positions> found;
+  for (const FileVariable& variable : contents.variables) {
+    if (!variable.numeric || variable.dims.size() != 2 || !is_position(variable)) continue;
+    const std::array<int, 2> dims{variable.dims[0], variable.dims[1]};
+    if (found && found->dimensions == dims) continue;
+    const int longitude = position_on(contents, dims[0], dims[1], true);
+    const int latitude = position_on(contents, dims[0], dims[1], false);
+    if (longitude < 0 || latitude < 0) continue;
+    if (found) return std::optional<Positions>();
+    found = Positions{dims, {}, {}, contents.dimensions.at(at(dims[1])).length};
+    for (const int v : {longitude, latitude}) {
+      auto values = unpacked_degrees(file, v);
+      if (!values) return values.error();
+      (v == longitude ? found->longitude : found->latitude) = std::move(*values);
+    }
+  }
+  return found;
+}
+
+// How far the positions `b` lie from `a`, in cells along rows and columns: the mean over the
+// samples with neighbours, from the nearest combination of the steps to both.
+std::optional<std::array<double, 2>> offset_between(const Positions& a, const Positions& b) {
+  const std::size_t width = a.width;
+  const std::size_t height = a.longitude.size() / std::max<std::size_t>(width, 1);
+  if (b.width != width || b.longitude.size() != a.longitude.size() || width < 2 || height < 2) {
+    return std::nullopt;
+  }
+  std::array<double, 2> sum{0, 0};
+  std::size_t count = 0;
+  for (std::size_t j = 0; j + 1 < height; ++j) {
+    for (std::size_t i = 0; i + 1 < width; ++i) {
+      const std::size_t n = j * width + i;
+      const double shrink = std::cos(a.latitude[n] * 0.017453292519943295);
+      const auto step = [&](const Positions& to, std::size_t m) {
+        return std::array<double, 2>{
+            std::remainder(to.longitude[m] - a.longitude[n], 360.0) * shrink,
+            to.latitude[m] - a.latitude[n]};
+      };
+      const auto along_rows = step(a, n + width);
+      const auto along_columns = step(a, n + 1);
+      const auto way = step(b, n);
+      const double area = along_rows[0] * along_columns[1] - along_rows[1] * along_columns[0];
+      const double rows = (way[0] * along_columns[1] - way[1] * along_columns[0]) / area;
+      const double columns = (along_rows[0] * way[1] - along_rows[1] * way[0]) / area;
+      if (!std::isfinite(rows) || !std::isfinite(columns)) continue;
+      sum[0] += rows;
+      sum[1] += columns;
+      ++count;
+    }
+  }
+  if (count == 0) return std::nullopt;
+  return std::array<double, 2>{sum[0] / static_cast<double>(count),
+                               sum[1] / static_cast<double>(count)};
+}
+
+Error cannot_join(const ArrayFile& part, const ArrayFile& first, const std::string& what) {
+  return make_error(ErrorKind::bad_data, in_quotes(part.origin()) + " cannot be joined with " +
+                                             in_quotes(first.origin()) + ": " + what);
+}
+
+int add_dimension(FileContents& contents, FileDimension dimension) {
+  const std::string wanted = dimension.name;
+  for (int n = 2; std::any_of(contents.dimensions.begin(), contents.dimensions.end(),
+                              [&](const FileDimension& d) { return d.name == dimension.name; });
+       ++n) {
+    dimension.name = wanted + '_' + std::to_string(n);
+  }
+  contents.dimensions.push_back(std::move(dimension));
+  return static_cast<int>(contents.dimensions.size()) - 1;
+}
+
+// Whether two dimensions with coordinates have the same ones.
+Result<bool> same_coordinates(const ArrayFile& first, int own, const ArrayFile& part, int other,
+                              bool is_time) {
+  const int own_coordinate = classify_dimensions(first.contents()).at(at(own)).coordinate;
+  const int second = classify_dimensions(part.contents()).at(at(other)).coordinate;
+  auto a = unpacked_values(first, own_coordinate);
+  if (!a) return a.error();
+  auto b = unpacked_values(part, second);
+  if (!b) return b.error();
+  const FileVariable& to = first.contents().variables.at(at(own_coordinate));
+  const FileVariable& from = part.contents().variables.at(at(second));
+  if (is_time) {
+    const auto times = convert_times(*b, {from.units, from.calendar}, {to.units, to.calendar});
+    if (!times) return false;
+    b = *times;
+  } else if (from.units != to.units) {
+    return false;
+  }
+  return std::equal(a->begin(), a->end(), b->begin(), b->end(), same_place);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<JoinedFile>> JoinedFile::open(
+    std::string name, std::string origin, std::vector<std::unique_ptr<ArrayFile>> parts) {
+  std::unique_ptr<JoinedFile> joined(new JoinedFile(std::move(name), std::move(origin)));
+  joined->parts_ = std::move(parts);
+  if (const auto bytes = joined->parts_.front()->stored_bytes()) joined->set_stored_bytes(*bytes);
+  joined->contents_.title = joined->parts_.front()->contents().title;
+  for (const auto& part : joined->parts_) {
+    if (auto added = joined->add(*part); !added) return added.error();
+  }
+  joined->contents_.notes.push_back(std::to_string(joined->parts_.size()) +
+                                    " parts with different variables joined");
+  return joined;
+}
+
+std::string JoinedFile::identity() const {
+  std::string all;
+  for (const auto& part : parts_) all += part->identity() + '\n';
+  return digest_of(all);
+}
+
+Result<void> JoinedFile::add(const ArrayFile& part) {
+  const FileContents& added = part.contents();
+  std::vector<int> dimensions;  // of the joined file, by dimension of the part
+  for (std::size_t d = 0; d < added.dimensions.size(); ++d) {
+    auto own = dimension_of(part, static_cast<int>(d));
+    if (!own) return own.error();
+    dimensions.push_back(*own);
+  }
+  if (&part != parts_.front().get()) {
+    if (auto placed = place_faces(part, dimensions); !placed) return placed;
+  }
+  for (std::size_t v = 0; v < added.variables.size(); ++v) {
+    add_variable(part, static_cast<int>(v), dimensions);
+  }
+  contents_.left_out.insert(contents_.left_out.end(), added.left_out.begin(), added.left_out.end());
+  for (const std::string& note : added.notes) {
+    if (std::count(contents_.notes.begin(), contents_.notes.end(), note) == 0) {
+      contents_.notes.push_back(note);
+    }
+  }
+  return {};
+}
+
+// The common dimension of a part's dimension, added if there is none.
+Result<int> JoinedFile::dimension_of(const ArrayFile& part, int dimension) {
+  const std::vector<DimensionRole> own_roles = classify_dimensions(contents_);
+  const FileDimension& wanted = part.contents().dimensions.at(at(dimension));
+  const DimensionRole role = classify_dimensions(part.contents()).at(at(dimension));
+  for (std::size_t d = 0; d < contents_.dimensions.size(); ++d) {
+    const int own = static_cast<int>(d);
+    const FileDimension& found = contents_.dimensions[d];
+    const bool named = found.name == wanted.name;
+    const bool both = own_roles[d].coordinate >= 0 && role.coordinate >= 0;
+    const bool is_time = role.role == Role::time && own_roles[d].role == Role::time;
+    const bool alike = role.role != Role::unknown && role.role == own_roles[d].role;
+    if (!named && !(both && alike)) continue;
+    if (found.length == wanted.length) {
+      if (!both) {
+        if (named) return own;
+        continue;
+      }
+      const auto same = same_coordinates(*this, own, part, dimension, is_time);
+      if (!same) return same.error();
+      if (*same) return own;
+    }
+    if (is_time) {
+      return cannot_join(part, *parts_.front(),
+                         "its times are others (" + std::to_string(wanted.length) + " and " +
+                             std::to_string(found.length) + " steps)");
+    }
+  }
+  FileDimension added = wanted;
+  added.centers = -1;  // an index of the part's dimensions
+  return add_dimension(contents_, std::move(added));
+}
+
+// Gives dimensions of their own to a part whose columns lie half a cell beside those of the others.
+Result<void> JoinedFile::place_faces(const ArrayFile& part, std::vector<int>& dimensions) {
+  const auto own = positions_in(*this);
+  if (!own) return own.error();
+  const auto others = positions_in(part);
+  if (!others) return others.error();
+  if (!*own || !*others) return {};
+  const std::array<int, 2> common{dimensions.at(at((*others)->dimensions[0])),
+                                  dimensions.at(at((*others)->dimensions[1]))};
+  if (common != (*own)->dimensions) return {};
+  const auto offset = offset_between(**own, **others);
+  if (!offset) return {};
+  constexpr double tolerance = 0.1;  // cells; grids are stretched and curved
+  for (std::size_t a = 0; a < 2; ++a) {
+    const double cells = offset->at(a);
+    if (std::abs(cells) <= tolerance) continue;
+    if (std::abs(std::abs(cells) - 0.5) > tolerance) {
+      return cannot_join(part, *parts_.front(), "its longitudes and latitudes are others");
+    }
+    FileDimension faces = contents_.dimensions.at(at(common.at(a)));
+    faces.name += "_faces";
+    faces.centers = common.at(a);
+    faces.first_face = cells > 0 ? -1 : 0;
+    dimensions.at(at((*others)->dimensions.at(a))) = add_dimension(contents_, std::move(faces));
+  }
+  return {};
+}
+
+void JoinedFile::add_variable(const ArrayFile& part, int variable,
+                              const std::vector<int>& dimensions) {
+  FileVariable added = part.contents().variables.at(at(variable));
+  if (variable_named(contents_, added.name) >= 0) {
+    // Coordinates are repeated in every file.
+    if (added.dims.size() > 2 && !is_position(added)) {
+      contents_.left_out.push_back({added.name, "in several files: that of " +
+                                                    in_quotes(parts_.front()->origin()) +
+                                                    " or of the next one that has it is used"});
+    }
+    return;
+  }
+  for (int& d : added.dims) d = dimensions.at(at(d));
+  contents_.variables.push_back(std::move(added));
+  places_.push_back({&part, variable});
+}
+
+Numbers JoinedFile::numbers(int variable, const char* attribute) const {
+  return place_of(variable).part->numbers(place_of(variable).variable, attribute);
+}
+
+std::string JoinedFile::text_of(int variable, const char* attribute) const {
+  return place_of(variable).part->text_of(place_of(variable).variable, attribute);
+}
+
+std::vector<std::size_t> JoinedFile::chunk(int variable) const {
+  return place_of(variable).part->chunk(place_of(variable).variable);
+}
+
+std::size_t JoinedFile::chunk_cost_bytes(int variable) const {
+  return place_of(variable).part->chunk_cost_bytes(place_of(variable).variable);
+}
+
+Unwritten JoinedFile::unwritten(int variable, std::size_t most) const {
+  return place_of(variable).part->unwritten(place_of(variable).variable, most);
+}
+
+void JoinedFile::forget_chunks(int variable) const {
+  place_of(variable).part->forget_chunks(place_of(variable).variable);
+}
+
+Result<void> JoinedFile::read(int variable, const std::vector<std::size_t>& start,
+                              const std::vector<std::size_t>& count, double* out) const {
+  return place_of(variable).part->read(place_of(variable).variable, start, count, out);
+}
+
+Result<void> JoinedFile::read(int variable, const std::vector<std::size_t>& start,
+                              const std::vector<std::size_t>& count, float* out) const {
+  return place_of(variable).part->read(place_of(variable).variable, start, count, out);
+}
+
+}  // namespace windsplat::data::cf

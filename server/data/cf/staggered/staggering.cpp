@@ -1,0 +1,238 @@
+// Evidence for staggered dimensions.
+#include "server/data/cf/staggered/staggering.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+
+#include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/grid/axes.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+// Longer dimensions are not compared by their coordinates.
+constexpr std::size_t compared_length_max = 100'000;
+
+class StaggerFinder {
+ public:
+  explicit StaggerFinder(const ArrayFile& file)
+      : file_(file), contents_(file.contents()), found_(contents_.dimensions.size()) {}
+
+  Result<std::vector<Stagger>> find() {
+    by_reader();
+    by_sgrid();
+    by_suffix("_stag");
+    by_roms_names();
+    if (auto done = by_coordinates(); !done) return done.error();
+    return std::move(found_);
+  }
+
+ private:
+  [[nodiscard]] std::size_t length(int dimension) const {
+    return contents_.dimensions.at(at(dimension)).length;
+  }
+
+  // Ignores dimensions that are absent, known already or of a length that does not fit.
+  void add(int faces, int centers, bool aligned, std::ptrdiff_t first) {
+    if (faces < 0 || centers < 0 || faces == centers || found_.at(at(faces)).centers >= 0) return;
+    const auto difference =
+        static_cast<std::ptrdiff_t>(length(faces)) - static_cast<std::ptrdiff_t>(length(centers));
+    if (aligned ? difference != 0 : std::abs(difference) > 1) return;
+    found_[at(faces)] = {centers, aligned, first};
+  }
+
+  // Where a center lies among faces, if only the lengths of both dimensions are known.
+  void add_between(int faces, int centers) {
+    if (faces < 0 || centers < 0) return;
+    if (length(faces) == length(centers) + 1) add(faces, centers, false, 0);
+    if (length(faces) + 1 == length(centers)) add(faces, centers, false, -1);
+    if (length(faces) == length(centers)) add(faces, centers, true, 0);
+  }
+
+  void by_reader() {
+    for (std::size_t d = 0; d < found_.size(); ++d) {
+      const FileDimension& dimension = contents_.dimensions[d];
+      add(static_cast<int>(d), dimension.centers, false, dimension.first_face);
+    }
+  }
+
+  // "face: node (padding: both)": padding tells which ends have a face beyond the last node.
+  struct Pair {
+    int dimension = -1;
+    int nodes = -1;
+    std::string padding;
+  };
+  [[nodiscard]] std::vector<Pair> pairs_in(std::string text) const {
+    constexpr std::string_view punctuation = ":()";
+    for (char& c : text) {
+      if (punctuation.find(c) != std::string_view::npos) c = ' ';
+    }
+    std::istringstream words(text);
+    std::vector<Pair> out;
+    for (std::string word; words >> word;) {
+      std::string second;
+      if (!(words >> second)) break;
+      if (word == "padding") {
+        if (!out.empty()) out.back().padding = second;
+      } else {
+        out.push_back({dimension_named(contents_, word), dimension_named(contents_, second), {}});
+      }
+    }
+    return out;
+  }
+
+  void by_sgrid() {
+    for (std::size_t v = 0; v < contents_.variables.size(); ++v) {
+      const int topology = static_cast<int>(v);
+      if (file_.text_of(topology, "cf_role") != "grid_topology") continue;
+      std::map<int, int> center_of;  // by dimension of the nodes
+      const auto is_low = [](const std::string& padding) {
+        return padding == "both" || padding == "low";
+      };
+      for (const char* name : {"face_dimensions", "volume_dimensions", "vertical_dimensions"}) {
+        for (const Pair& pair : pairs_in(file_.text_of(topology, name))) {
+          if (pair.dimension < 0 || pair.nodes < 0) continue;
+          center_of[pair.nodes] = pair.dimension;
+          add(pair.nodes, pair.dimension, false, is_low(pair.padding) ? -1 : 0);
+        }
+      }
+      for (const char* name : {"edge1_dimensions", "edge2_dimensions", "edge3_dimensions",
+                               "face1_dimensions", "face2_dimensions", "face3_dimensions"}) {
+        for (const Pair& pair : pairs_in(file_.text_of(topology, name))) {
+          const auto center = center_of.find(pair.nodes);
+          if (pair.dimension < 0 || center == center_of.end()) continue;
+          const Stagger nodes = found_.at(at(pair.nodes));
+          const bool padded = !pair.padding.empty() && pair.padding != "none";
+          // Without padding the dimension numbers the nodes; with it, the centers.
+          add(pair.dimension, center->second, padded, padded ? 0 : nodes.first);
+        }
+      }
+    }
+  }
+
+  // WRF: west_east_stag beside west_east.
+  void by_suffix(std::string_view suffix) {
+    for (std::size_t d = 0; d < found_.size(); ++d) {
+      const std::string& name = contents_.dimensions[d].name;
+      if (!name.ends_with(suffix)) continue;
+      add_between(static_cast<int>(d),
+                  dimension_named(contents_, name.substr(0, name.size() - suffix.size())));
+    }
+  }
+
+  void by_roms_names() {
+    for (const std::string axis : {"xi", "eta"}) {
+      const int centers = dimension_named(contents_, axis + "_rho");
+      for (const char* points : {"_u", "_v", "_psi"}) {
+        add_between(dimension_named(contents_, axis + points), centers);
+      }
+    }
+    add_between(dimension_named(contents_, "s_w"), dimension_named(contents_, "s_rho"));
+  }
+
+  // How many variables of two or more dimensions run along a dimension.
+  [[nodiscard]] std::ptrdiff_t uses(int dimension) const {
+    return std::count_if(contents_.variables.begin(), contents_.variables.end(),
+                         [dimension](const FileVariable& variable) {
+                           return variable.numeric && variable.dims.size() > 1 &&
+                                  std::count(variable.dims.begin(), variable.dims.end(),
+                                             dimension) > 0;
+                         });
+  }
+
+  // The first face of the first center, if every center lies between two faces. Both ascending.
+  [[nodiscard]] static std::optional<std::ptrdiff_t> interleaved(
+      const std::vector<double>& faces, const std::vector<double>& centers) {
+    const auto between = [&](std::ptrdiff_t first) {
+      const auto count = static_cast<std::ptrdiff_t>(faces.size());
+      for (std::ptrdiff_t i = 0; i < static_cast<std::ptrdiff_t>(centers.size()); ++i) {
+        const double center = centers[static_cast<std::size_t>(i)];
+        const std::ptrdiff_t low = i + first;
+        const bool over = low < 0 || faces[static_cast<std::size_t>(low)] < center;
+        const bool under = low + 1 >= count || center < faces[static_cast<std::size_t>(low + 1)];
+        if (!over || !under) return false;
+      }
+      return true;
+    };
+    if (faces.size() < 2 || centers.size() < 2) return std::nullopt;
+    const bool above = faces.front() < centers.front();
+    const std::ptrdiff_t first = above ? 0 : -1;
+    const auto difference =
+        static_cast<std::ptrdiff_t>(faces.size()) - static_cast<std::ptrdiff_t>(centers.size());
+    const bool fits =
+        above ? difference == 0 || difference == 1 : difference == 0 || difference == -1;
+    return fits && between(first) ? std::optional(first) : std::nullopt;
+  }
+
+  struct Line {
+    int dimension = -1;
+    Role role = Role::unknown;
+    AxisKind kind = AxisKind::cartesian;
+    std::ptrdiff_t uses = 0;
+    bool falls = false;
+    std::vector<double> values;  // ascending: with the opposite sign if the coordinate falls
+  };
+
+  // Dimensions with coordinates that no name has explained, those of most variables first.
+  Result<std::vector<Line>> lines() const {
+    std::vector<Line> out;
+    const std::vector<DimensionRole> roles = classify_dimensions(contents_);
+    for (std::size_t d = 0; d < roles.size(); ++d) {
+      const DimensionRole& role = roles[d];
+      const bool in_space = role.role == Role::x || role.role == Role::y || role.role == Role::z;
+      Line line{static_cast<int>(d), role.role, role.kind, uses(static_cast<int>(d)), false, {}};
+      if (!in_space || role.coordinate < 0 || line.uses == 0 || found_[d].centers >= 0 ||
+          contents_.dimensions[d].length > compared_length_max) {
+        continue;
+      }
+      auto values = unpacked_values(file_, role.coordinate);
+      if (!values) return values.error();
+      line.values = std::move(*values);
+      line.falls = line.values.size() > 1 && line.values[1] < line.values[0];
+      for (double& value : line.values) value = line.falls ? -value : value;
+      out.push_back(std::move(line));
+    }
+    std::stable_sort(out.begin(), out.end(),
+                     [](const Line& a, const Line& b) { return a.uses > b.uses; });
+    return out;
+  }
+
+  // MITgcm (X, Xp1, Zl), MOM (xh, xq, zl, zi; xt_ocean, xu_ocean), ...
+  Result<void> by_coordinates() {
+    auto found = lines();
+    if (!found) return found.error();
+    for (std::size_t c = 0; c < found->size(); ++c) {
+      const Line& centers = (*found)[c];
+      if (found_[at(centers.dimension)].centers >= 0) continue;
+      for (std::size_t f = c + 1; f < found->size(); ++f) {
+        const Line& faces = (*found)[f];
+        if (faces.role != centers.role || faces.kind != centers.kind ||
+            faces.falls != centers.falls) {
+          continue;
+        }
+        const auto first = interleaved(faces.values, centers.values);
+        if (first) add(faces.dimension, centers.dimension, false, *first);
+      }
+    }
+    return {};
+  }
+
+  const ArrayFile& file_;
+  const FileContents& contents_;
+  std::vector<Stagger> found_;
+};
+
+}  // namespace
+
+Result<std::vector<Stagger>> find_staggering(const ArrayFile& file) {
+  return StaggerFinder(file).find();
+}
+
+}  // namespace windsplat::data::cf

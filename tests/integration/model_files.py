@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+"""Writes small files with the headers of models on staggered or unstructured grids, and compares
+the program's reports with values computed by numpy from the same numbers.
+
+    python3 tests/integration/model_files.py --program=build/release/windsplat [NAME...]
+
+Variables, dimensions and attributes follow the models' public documentation. Compared are the axes,
+and units, ranges, masks and single values of every field (see real_files.py). Files that cannot be
+drawn must be refused with the reason. Exits 1 if anything differs."""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import joined_models as joined
+import staggered_models as staggered
+import unstructured_models as unstructured
+from real_files import check_file
+
+READ = {"wrfout_d01.nc": staggered.write_wrf,
+        "wrfout_d02_*.nc": staggered.write_wrf_series,
+        "roms_his.nc": staggered.write_roms,
+        "roms_old.nc": staggered.roms_without_terms,
+        "roms_g1.nc": staggered.roms_transform_1,
+        "mitgcm.nc": staggered.write_mitgcm,
+        "mom6.nc": staggered.write_mom6,
+        "sgrid.nc": staggered.write_sgrid,
+        "{ua,va,wap,hus}_*.nc": joined.write_cmip,
+        "ORCA_{grid_T,grid_U,grid_V,grid_W}.nc": joined.write_nemo}
+REFUSED = {"ugrid.nc": unstructured.write_ugrid,
+           "fvcom.nc": unstructured.write_fvcom,
+           "mpas.nc": unstructured.write_mpas,
+           "icon.nc": unstructured.write_icon}
+
+
+def check_refusal(program, path):
+    done = subprocess.run([program, "inspect", path], capture_output=True, text=True, check=False)
+    if done.returncode == 3 and "unstructured grid" in done.stderr:
+        return []
+    return [f"exit code {done.returncode}, {done.stdout[:200]} {done.stderr[:200]}"]
+
+
+def main():
+    root = Path(__file__).resolve().parents[2]
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--program", default=root / "build/release/windsplat")
+    parser.add_argument("--keep", type=Path, help="write the files to this folder and keep them")
+    options = parser.parse_args()
+    failed = 0
+    with tempfile.TemporaryDirectory() as folder:
+        folder = options.keep or Path(folder)
+        for name, write in (READ | REFUSED).items():
+            if options.names and name not in options.names:
+                continue
+            expected = write(folder / name)
+            if name in REFUSED:
+                compared, faults = 1, check_refusal(options.program, folder / name)
+            else:
+                check = check_file(options.program, folder / name, lambda *_, e=expected: e)
+                compared, faults = check.compared, check.faults
+            failed += bool(faults)
+            print(f"{name}: {compared} comparisons, {len(faults)} differ")
+            for fault in faults[:20]:
+                print(f"  {fault}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
