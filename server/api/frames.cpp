@@ -277,6 +277,7 @@ Result<Picture> read_query(const http::Request& request, frame::Format format) {
   Picture picture;
   picture.encoding.format = format;
   picture.encoding.quality = jpeg_quality_default;
+  picture.encoding.describe = true;
   const auto step = query.integer("step");
   const auto width = query.integer("width");
   const auto height = query.integer("height");
@@ -301,6 +302,7 @@ Result<Picture> read_view(const http::Request& request, frame::Format format) {
   picture.view = document->view();
   picture.encoding.format = format;
   picture.encoding.quality = jpeg_quality_default;
+  picture.encoding.describe = true;
   if (picture.view.dataset.empty()) {
     return make_error_at(ErrorKind::invalid, "/dataset", "must name a dataset");
   }

@@ -219,8 +219,8 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());
   const Clock::time_point measured_from = Clock::now();
   // Content is that of the view, not of coarser data.
-  if (prepared.encoding.measure && prepared.setting.coarser == 0 &&
-      scene.method != scene::Method::reference) {
+  const bool described = prepared.encoding.measure || prepared.encoding.describe;
+  if (described && prepared.setting.coarser == 0 && scene.method != scene::Method::reference) {
     drawn.content = content_of(scene);
   }
   if (is_measured(prepared)) {

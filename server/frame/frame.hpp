@@ -34,6 +34,9 @@ struct Encoding {
   // Whether the error of the picture is measured by a second, finer rendering, and that of a JPEG
   // by decoding it.
   bool measure = false;
+  // Whether what the view shows is described, which its estimated errors follow from. Frames with a
+  // measured error always have their content.
+  bool describe = false;
 };
 
 struct Frame {
@@ -42,7 +45,7 @@ struct Frame {
   int width = 0;        // rendered width
   int height = 0;
   double detail = 0;                        // at the size of the view (scene::detail_shown)
-  std::optional<quality::Content> content;  // if the encoding asks for measurements
+  std::optional<quality::Content> content;  // if the encoding asks for it
   engine::WorkReport work;
   std::int64_t render_us = 0;  // time of scene and engine, including the tone mapping of JPEG tiles
   std::int64_t measure_us = 0;

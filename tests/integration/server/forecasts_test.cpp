@@ -1,6 +1,7 @@
 // Forecasts over REST: before any measurement and after a calibration run.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <string>
@@ -78,6 +79,30 @@ TEST_F(Forecasts, ChosenPointIsTheRenderedSetting) {
     const Json info = Json::parse(drawn.header("windsplat-frame"));
     for (const char* key : {"method", "width", "height", "slabThickness"}) {
       EXPECT_EQ(info[key], chosen[key]) << key << " at " << budget_ms;
+    }
+  }
+}
+
+// What a view shows determines both: neither is that of a typical view.
+TEST_F(Forecasts, AreTheErrorsThatPicturesReport) {
+  Json view = view_of(320, 240);
+  draw(view);
+  for (const char* const method : {"kernel", "slab"}) {
+    view["method"]["name"] = method;
+    for (const double opacity : {0.05, 1.0}) {
+      view["vector"]["opacity"] = opacity;
+      const Json points = json_of(post(view))["points"];
+      const auto own = std::find_if(points.begin(), points.end(), [&](const Json& point) {
+        return point["method"] == method && point["width"] == 320 && point["coarser"] == 0 &&
+               (point["slabThickness"].is_null() || point["slabThickness"] == 1);
+      });
+      ASSERT_NE(own, points.end()) << points;
+      const double forecast = (*own)["error"].get<double>();
+      const Answer drawn = post_view(port(), view.dump());
+      const Json error = Json::parse(drawn.header("windsplat-frame"))["error"];
+      EXPECT_EQ(error["kind"], "estimated");
+      EXPECT_NEAR(error["value"].get<double>(), forecast, 1e-6 * forecast)
+          << method << ' ' << opacity;
     }
   }
 }
