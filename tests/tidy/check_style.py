@@ -140,6 +140,28 @@ def empty_test_folders(root, files):
                 yield f"{inside}: an empty folder"
 
 
+def tests_left_out(root, files):
+    """Test sources in no listed folder, and those of which sanitized builds omit a part but which
+    run in no other build."""
+    listing = root / "tests" / "CMakeLists.txt"
+    if not listing.exists():
+        return
+    call = r"^windsplat_test\((\w+) (\"[^\"]*\"|\S+)([^)]*)\)"
+    tests = re.findall(call, listing.read_text(), re.M)
+    listed = []
+    for name, named, options in tests:
+        folders = tuple(f"tests/{folder}/" for folder in named.strip('"').split(";"))
+        listed += folders
+        if not re.search(r"ASAN \*", options) or "RELEASE" in options:
+            continue
+        for path, file in files:
+            if path.startswith(folders) and "WINDSPLAT_SANITIZED" in (tree.text(file) or ""):
+                yield f"{path}: {name} runs under sanitizers only, which omit a part of it"
+    for path, _ in files:
+        if re.fullmatch(r"tests/unit/.+_test\.cpp", path) and not path.startswith(tuple(listed)):
+            yield f"{path}: not in a folder of tests/CMakeLists.txt"
+
+
 def full_folders(files):
     """Reports source folders with too many files."""
     count = collections.Counter(path.rpartition("/")[0] for path, _ in files if path.endswith(CODE))
@@ -150,7 +172,8 @@ def full_folders(files):
 
 def check(root):
     files = tree.files(root)
-    complaints = [*empty_test_folders(root, files), *full_folders(files)]
+    complaints = [*empty_test_folders(root, files), *tests_left_out(root, files),
+                  *full_folders(files)]
     if (root / "server" / "main.cpp").exists():
         complaints += stale_exceptions(root)
     for path, file in files:

@@ -53,6 +53,16 @@ class Planted(unittest.TestCase):
         for complaint, part in zip(complaints, said):
             self.assertIn(part, complaint)
 
+    def test_tests_that_run_nowhere(self):
+        self.plant("tests/unit/net/a_test.cpp", "TEST(A, IsTrue) {\n}\n")
+        self.expect(check_style, "tests/unit/net/a_test.cpp: not in a folder")
+        self.plant("tests/CMakeLists.txt", "windsplat_test(unit_base unit/base LABEL unit)\n"
+                   "windsplat_test(unit_net unit/net LABEL unit ASAN *\n  LINK a)\n")
+        self.expect(check_style)
+        self.plant("tests/unit/net/a_test.cpp",
+                   "TEST(A, IsTrue) {\n#ifndef WINDSPLAT_SANITIZED\n#endif\n}\n")
+        self.expect(check_style, "unit_net runs under sanitizers only")
+
     def test_clean_tree_passes(self):
         self.expect(check_includes)
         self.expect(check_style)
