@@ -126,24 +126,42 @@ bool is_chosen(const protocol::View& view) {
 // At the setting that its limits need. What the view shows decides, so its data become resident
 // first; a picture at the view's own setting is drawn from that scene. Errors: not_resident if
 // nothing may be loaded.
-Result<tasks::PreparedPtr> prepare_limited(quality::Tables& tables,
+Result<tasks::PreparedPtr> prepare_limited(tasks::Backend& backend,
                                            const scene::CompletedView& completed,
                                            const frame::Encoding& encoding, data::Dataset& dataset,
                                            tasks::Loading loading) {
   const protocol::View& view = completed.view();
-  auto own = frame::prepare(completed, frame::own_setting(completed), dataset, encoding);
-  if (!own && own.error().kind == ErrorKind::not_resident && loading == tasks::Loading::none) {
-    return own.error();
+  std::optional<frame::Prepared> own;
+  {
+    auto prepared = frame::prepare(completed, frame::own_setting(completed), dataset, encoding);
+    // Where memory does not suffice for this scene, it may for that of a coarser setting.
+    if (prepared) {
+      own = std::move(*prepared);
+    } else if (prepared.error().kind == ErrorKind::not_resident &&
+               loading == tasks::Loading::none) {
+      return prepared.error();
+    }
   }
-  // Where memory does not suffice for this scene, it may for that of a coarser setting.
-  const auto known = tables.forecasts(quality::signature_of(view),
-                                      frame::viewpoint_of(completed, own ? &own->scene : nullptr));
+  const quality::Viewpoint viewpoint = frame::viewpoint_of(completed, own ? &own->scene : nullptr);
+  auto known = backend.quality.forecasts(quality::signature_of(view), viewpoint);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const double pixels = quality::pixels_at(view, quality::settings[i]);
+    known[i].ms += backend.request_times.encoding_ms(encoding.format, pixels);
+  }
   const quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
   const quality::Setting& setting = quality::settings[quality::pick(view, known, aim).setting];
   if (own && setting == own->setting) {
+    own->content = viewpoint.content;
     return tasks::with_memory(std::move(*own), dataset, loading);
   }
-  return tasks::prepare_picture(completed, setting, encoding, dataset, loading);
+  const std::int64_t sampling_us = own ? own->scene.sampling_us : 0;
+  own.reset();  // its data may have to make room
+  auto picture = tasks::prepare_picture(completed, setting, encoding, dataset, loading);
+  if (picture) {
+    (*picture)->frame.content = viewpoint.content;
+    (*picture)->frame.scene.sampling_us += sampling_us;
+  }
+  return picture;
 }
 
 http::Response unchanged_response(const std::string& etag) {
@@ -152,7 +170,7 @@ http::Response unchanged_response(const std::string& etag) {
 
 // Null if the client has the picture already: `reply` is called with 304. Its tag identifies the
 // completed view, which may require reading data, so it is not known earlier.
-Result<tasks::PreparedPtr> prepare(quality::Tables& tables, const Picture& picture,
+Result<tasks::PreparedPtr> prepare(tasks::Backend& backend, const Picture& picture,
                                    tasks::ViewCompletion& completion, data::Dataset& dataset,
                                    tasks::Loading loading, const http::Reply& reply) {
   const auto completed = complete(picture, completion, dataset);
@@ -169,7 +187,7 @@ Result<tasks::PreparedPtr> prepare(quality::Tables& tables, const Picture& pictu
     }
   }
   if (is_chosen(view) && view.method.name != protocol::MethodName::reference) {
-    return prepare_limited(tables, *completed, picture.encoding, dataset, loading);
+    return prepare_limited(backend, *completed, picture.encoding, dataset, loading);
   }
   return tasks::prepare_picture(*completed, frame::own_setting(*completed), picture.encoding,
                                 dataset, loading);
@@ -187,6 +205,8 @@ Result<http::Response> draw(tasks::Backend& backend, const Picture& picture,
   backend.metrics.stage_took(metrics::Metrics::Stage::queue, queue_us);
   backend.metrics.stage_took(metrics::Metrics::Stage::render, drawn->render_us);
   backend.metrics.stage_took(metrics::Metrics::Stage::encode, drawn->encode_us);
+  backend.request_times.learn_encoding(
+      picture.encoding.format, static_cast<double>(drawn->width) * drawn->height, drawn->encode_us);
   http::Response response;
   if (is_chosen(drawn->view)) {
     response.headers = {{"Cache-Control", "no-store"}};
@@ -235,12 +255,12 @@ void submit_picture(tasks::Backend& backend, access::Admission& admission, Pictu
       request.address.empty() ? request.peer : std::hash<std::string>{}(request.address);
   tasks::Drawing drawing{
       tasks::RenderService::Kind::request, owner, cancel, std::move(dataset), {}, {}, {}, 0, {}};
-  drawing.prepare = [&tables = backend.quality, picture, answer, cancel,
+  drawing.prepare = [&backend, picture, answer, cancel,
                      completion = std::make_shared<tasks::ViewCompletion>(),
                      id = request.id](data::Dataset& available, tasks::Loading loading) {
     return tasks::run_guarded<tasks::PreparedPtr>(
         "preparing a picture", cancel,
-        [&] { return prepare(tables, *picture, *completion, available, loading, *answer); }, id);
+        [&] { return prepare(backend, *picture, *completion, available, loading, *answer); }, id);
   };
   drawing.draw = [&backend, picture, answer, cancel, id = request.id](
                      const tasks::PreparedPicture& prepared, data::Dataset& resident,

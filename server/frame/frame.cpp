@@ -194,8 +194,13 @@ Result<Prepared> prepare(const scene::CompletedView& completed, const quality::S
   if (!drawn) return drawn.error();
   auto scene = scene::build_scene(*drawn, dataset);
   if (!scene) return with_need(scene.error(), completed.view(), dataset);
-  return Prepared{std::move(*drawn), completed.view().image,           std::move(*scene), setting,
-                  encoding,          microseconds(start, Clock::now())};
+  return Prepared{std::move(*drawn),
+                  completed.view().image,
+                  std::move(*scene),
+                  setting,
+                  encoding,
+                  microseconds(start, Clock::now()),
+                  {}};
 }
 
 Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
@@ -220,7 +225,10 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   const Clock::time_point measured_from = Clock::now();
   // Content is that of the view, not of coarser data.
   const bool described = prepared.encoding.measure || prepared.encoding.describe;
-  if (described && prepared.setting.coarser == 0 && scene.method != scene::Method::reference) {
+  if (prepared.content) {
+    drawn.content = prepared.content;
+  } else if (described && prepared.setting.coarser == 0 &&
+             scene.method != scene::Method::reference) {
     drawn.content = content_of(scene);
   }
   if (is_measured(prepared)) {

@@ -92,6 +92,7 @@ struct Prepared {
   quality::Setting setting;
   Encoding encoding;
   std::int64_t prepare_us = 0;  // time of completing and preparing, counted in render_us
+  std::optional<quality::Content> content;  // of the view, if it is known already
 };
 // Errors: those of the scene.
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,

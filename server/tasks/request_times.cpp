@@ -38,4 +38,17 @@ double RequestTimes::estimate_ms(const std::string& dataset, protocol::MethodNam
   return us_a_kernel * kernels / 1000;
 }
 
+void RequestTimes::learn_encoding(frame::Format format, double pixels, std::int64_t took_us) {
+  if (pixels <= 0) return;
+  const std::lock_guard lock(mutex_);
+  double& known = encoding_us_a_pixel_.at(static_cast<std::size_t>(format));
+  const double seen = static_cast<double>(took_us) / pixels;
+  known += (seen > known ? weight_above : weight_below) * (seen - known);
+}
+
+double RequestTimes::encoding_ms(frame::Format format, double pixels) const {
+  const std::lock_guard lock(mutex_);
+  return encoding_us_a_pixel_.at(static_cast<std::size_t>(format)) * pixels / 1000;
+}
+
 }  // namespace windsplat::tasks

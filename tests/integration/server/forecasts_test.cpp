@@ -107,6 +107,22 @@ TEST_F(Forecasts, AreTheErrorsThatPicturesReport) {
   }
 }
 
+// The data of the view and those of the coarser setting do not fit into memory together.
+TEST(LimitedPicture, MakesRoomForTheDataOfItsSetting) {
+  constexpr std::uint64_t samples = 64 * 64 * 64;
+  constexpr std::uint64_t full = samples * 4 * sizeof(float);  // a vector and a scalar
+  const TestServer server({}, {}, full + samples / 4);  // an eighth of the samples: samples * 2
+  ASSERT_TRUE(server.store().add("tornado:64"));
+  const Json view{{"dataset", "tornado:64"},
+                  {"step", 1},
+                  {"image", {{"width", 320}, {"height", 180}}},
+                  {"quality", {{"budgetMs", 1}}}};
+  const Answer drawn = post_view(server.port(), view.dump());
+  ASSERT_EQ(drawn.status, 200) << drawn.body.substr(0, 300);
+  const Json info = Json::parse(drawn.header("windsplat-frame"), nullptr, false);
+  EXPECT_THAT(info["work"]["variant"].get<std::string>(), HasSubstr("level=1,1,1")) << info;
+}
+
 // Opaque lines have larger errors than those of a typical view. The first step determines the
 // defaults of the view; the second one is not resident.
 TEST_F(Forecasts, DecideForDataThatAreNotYetResidentAsForThoseThatAre) {

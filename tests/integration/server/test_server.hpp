@@ -80,6 +80,7 @@ class TestServer {
 
   [[nodiscard]] std::uint16_t port() const { return server_->port(); }
   windsplat::transport::Server& server() { return *server_; }
+  [[nodiscard]] windsplat::data::Store& store() const { return *store_; }
   [[nodiscard]] std::uint64_t loads() const { return store_->find("small").value()->loads(); }
 
  private:

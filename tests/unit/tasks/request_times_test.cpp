@@ -42,6 +42,15 @@ TEST(RequestTimes, AreAboveMostMeasuredCosts) {
   EXPECT_LT(above, 950);
 }
 
+TEST(RequestTimes, OfEncodingFollowPixelsAndFormat) {
+  RequestTimes times(2);
+  const double jpeg = times.encoding_ms(frame::Format::jpeg, 1e6);
+  EXPECT_GT(times.encoding_ms(frame::Format::png, 1e6), jpeg);
+  for (int i = 0; i < 100; ++i) times.learn_encoding(frame::Format::png, 2e6, 160'000);
+  EXPECT_NEAR(times.encoding_ms(frame::Format::png, 1e6), 80, 0.1);
+  EXPECT_DOUBLE_EQ(times.encoding_ms(frame::Format::jpeg, 1e6), jpeg);
+}
+
 // A suspension of the machine during a picture must not cause pictures to be refused permanently.
 TEST(RequestTimes, IgnoreOutliers) {
   RequestTimes times(2);
