@@ -18,6 +18,7 @@ struct FileDimension {
   // first center (cf/staggered).
   int centers = -1;
   int first_face = 0;
+  bool other = false;  // neither space nor time
 };
 
 struct FileVariable {

@@ -5,11 +5,14 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <type_traits>
 #include <utility>
 
 #include "server/base/ascii.hpp"
 #include "server/data/formats/zarr/codec.hpp"
+#include "server/data/formats/zarr/half.hpp"
+#include "server/data/formats/zarr/shard.hpp"
 #include "server/data/formats/zarr/store.hpp"
 
 namespace windsplat::data::zarr {
@@ -19,32 +22,14 @@ namespace {
 // Cache limits: the first one in general, the second one for the chunks of a single block.
 constexpr std::size_t kept_bytes_least = std::size_t{64} << 20;
 constexpr std::size_t kept_bytes_most = std::size_t{512} << 20;
+// Indices of shards; an open file counts as 2 MiB, so that at most 32 are open.
+constexpr std::size_t kept_shards_bytes = std::size_t{64} << 20;
+constexpr std::size_t open_file_bytes = std::size_t{2} << 20;
 
-std::uint64_t chunks_along(const ArrayMetadata& array, std::size_t d) {
-  return array.shape[d] / array.chunks[d] + (array.shape[d] % array.chunks[d] != 0 ? 1 : 0);
+std::uint64_t files_along(const ArrayMetadata& array, std::size_t d) {
+  const std::size_t length = array.file_shape()[d];
+  return array.shape[d] / length + (array.shape[d] % length != 0 ? 1 : 0);
 }
-
-// IEEE 754 binary16.
-float widen(std::uint16_t half) {
-  const int exponent = (half >> 10U) & 0x1f;
-  const auto fraction = static_cast<float>(half & 0x3ffU);
-  float value = 0;
-  if (exponent == 31) {
-    value = fraction != 0 ? std::numeric_limits<float>::quiet_NaN()
-                          : std::numeric_limits<float>::infinity();
-  } else if (exponent == 0) {
-    value = std::ldexp(fraction, -24);
-  } else {
-    value = std::ldexp(fraction + 1024, exponent - 25);
-  }
-  return (half & 0x8000U) != 0 ? -value : value;
-}
-
-struct Half {
-  std::uint16_t bits;
-  explicit operator float() const { return widen(bits); }
-  explicit operator double() const { return static_cast<double>(widen(bits)); }
-};
 
 template <class T, class Out>
 void copy_row(const unsigned char* from, std::size_t stride_bytes, std::size_t count, Out* out) {
@@ -116,16 +101,22 @@ Overlap overlap_of(const ArrayMetadata& array, const std::vector<std::size_t>& p
   return out;
 }
 
-// Items between neighbours along each dimension.
-std::vector<std::size_t> strides_of(const std::vector<std::size_t>& lengths, bool column_major) {
-  const std::size_t rank = lengths.size();
-  std::vector<std::size_t> out(rank, 1);
+// Items between neighbours along each dimension; order: dimensions, slowest first.
+std::vector<std::size_t> strides_of(const std::vector<std::size_t>& lengths,
+                                    const std::vector<std::size_t>& order) {
+  std::vector<std::size_t> out(lengths.size(), 1);
   std::size_t stride = 1;
-  for (std::size_t i = 0; i < rank; ++i) {
-    const std::size_t d = column_major ? i : rank - 1 - i;
+  for (std::size_t i = order.size(); i-- > 0;) {
+    const std::size_t d = order[i];
     out[d] = stride;
     stride *= lengths[d];
   }
+  return out;
+}
+
+std::vector<std::size_t> in_order(std::size_t rank) {
+  std::vector<std::size_t> out(rank);
+  std::iota(out.begin(), out.end(), std::size_t{0});
   return out;
 }
 
@@ -143,8 +134,8 @@ void copy_overlap(const ArrayMetadata& array, const std::vector<unsigned char>& 
                   const Overlap& part, const std::vector<std::size_t>& block, Out* out) {
   const std::size_t rank = block.size();
   const std::size_t item = array.dtype.bytes;
-  const auto from = strides_of(array.chunks, array.column_major);
-  const auto to = strides_of(block, false);
+  const auto from = strides_of(array.chunks, array.order);
+  const auto to = strides_of(block, in_order(rank));
   const CopyRow<Out> copy = copier<Out>(array.dtype);
   const auto absent = static_cast<Out>(absent_value(array, std::is_same_v<Out, float>));
   const std::size_t row = rank == 0 ? 1 : part.count.back();
@@ -170,26 +161,25 @@ void copy_overlap(const ArrayMetadata& array, const std::vector<unsigned char>& 
 
 }  // namespace
 
-std::uint64_t chunk_count(const ArrayMetadata& array) {
+std::uint64_t file_count(const ArrayMetadata& array) {
   std::uint64_t count = 1;
-  for (std::size_t d = 0; d < array.shape.size(); ++d) count *= chunks_along(array, d);
+  for (std::size_t d = 0; d < array.shape.size(); ++d) count *= files_along(array, d);
   return count;
 }
 
-std::string chunk_key(const ArrayMetadata& array, std::uint64_t number) {
+std::string file_key(const ArrayMetadata& array, std::uint64_t number) {
   const std::size_t rank = array.shape.size();
-  if (rank == 0) return "0";
   std::vector<std::uint64_t> place(rank);
   for (std::size_t d = rank; d-- > 0;) {
-    place[d] = number % chunks_along(array, d);
-    number /= chunks_along(array, d);
+    place[d] = number % files_along(array, d);
+    number /= files_along(array, d);
   }
-  std::string key;
+  std::string key = array.prefixed_keys ? "c" : "";
   for (const std::uint64_t index : place) {
     if (!key.empty()) key += array.separator;
     key += std::to_string(index);
   }
-  return key;
+  return key.empty() ? "0" : key;
 }
 
 std::vector<std::size_t> Store::chunk(int variable) const {
@@ -199,62 +189,143 @@ std::vector<std::size_t> Store::chunk(int variable) const {
 void Store::forget_chunks(int variable) const {
   const std::lock_guard lock(mutex_);
   kept_.forget(variable);
+  shards_.forget(variable);
 }
 
-Result<ChunkBytes> Store::load(const Array& array, const std::string& path) const {
-  const auto fault = [&](const std::string& what) {
-    return make_error(ErrorKind::bad_data,
-                      in_quotes(contents_.name) + ": the chunk " + in_quotes(path) + " " + what);
-  };
+Result<Store::File> Store::open_file(const Array& array, std::uint64_t number) const {
+  const std::string path = array.path + file_key(array.metadata, number);
   auto input = files_->open(path);
-  if (!input && input.error().kind == ErrorKind::not_found) return ChunkBytes();
-  if (!input) return input.error();
-  if ((*input)->size() > stored_bytes_max(array.metadata)) {
-    return fault("has more bytes than its array can need");
+  if (!input && input.error().kind != ErrorKind::not_found) return input.error();
+  File out;
+  out.path = path;
+  if (input) out.input = std::move(*input);
+  return out;
+}
+
+Error Store::fault(const std::string& path, const std::string& what) const {
+  return make_error(ErrorKind::bad_data,
+                    in_quotes(contents_.name) + ": the chunk " + in_quotes(path) + " " + what);
+}
+
+Result<const Store::OpenShard*> Store::shard_at(const Array& array, std::uint64_t number) const {
+  if (const OpenShard* const kept = shards_.find(number)) return kept;
+  auto file = open_file(array, number);
+  if (!file) return file.error();
+  OpenShard shard;
+  shard.file = std::move(*file);
+  if (shard.file.input) {
+    auto index = read_index(array.metadata, *shard.file.input);
+    if (!index) return fault(shard.file.path, index.error().message);
+    shard.index = std::move(*index);
   }
-  std::vector<unsigned char> stored((*input)->size());
-  if (auto done = (*input)->read(0, stored.data(), stored.size()); !done) return done.error();
+  const std::size_t bytes = shard.index.size() * sizeof(Span) + open_file_bytes;
+  shards_.evict_for(bytes, kept_shards_bytes);
+  return shards_.add(number, std::move(shard), bytes);
+}
+
+Result<ChunkBytes> Store::load(const Array& array, std::uint64_t file_number,
+                               std::size_t in_file) const {
+  File file;
+  Span span;
+  std::string place;
+  if (array.metadata.shard) {
+    const auto shard = shard_at(array, file_number);
+    if (!shard) return shard.error();
+    file = (*shard)->file;
+    if (!file.input || (*shard)->index.at(in_file).bytes == absent_span) return ChunkBytes();
+    if (auto same = file.input->check_unchanged(); !same) return same.error();
+    span = (*shard)->index.at(in_file);
+    place = "is damaged: its part " + std::to_string(in_file) + " ";
+  } else {
+    auto opened = open_file(array, file_number);
+    if (!opened) return opened.error();
+    file = std::move(*opened);
+    if (!file.input) return ChunkBytes();
+    span.bytes = file.input->size();
+  }
+  if (span.bytes > stored_bytes_max(array.metadata)) {
+    return fault(file.path, place + "has more bytes than its array can need");
+  }
+  std::vector<unsigned char> stored(span.bytes);
+  if (auto done = file.input->read(span.offset, stored.data(), stored.size()); !done) {
+    return done.error();
+  }
   auto bytes = decode_chunk(array.metadata, std::move(stored));
-  if (!bytes) return fault(bytes.error().message);
+  if (!bytes) return fault(file.path, place + bytes.error().message);
   return bytes;
 }
 
 Result<const ChunkBytes*> Store::chunk_at(int variable, const std::vector<std::size_t>& place,
                                           std::size_t kept_bytes_max) const {
   const Array& array = array_of(variable);
-  kept_.select(variable);
-  std::uint64_t number = 0;
+  const ArrayMetadata& metadata = array.metadata;
+  const std::vector<std::size_t>& shape = metadata.file_shape();
+  std::uint64_t file_number = 0;
+  std::vector<std::size_t> along;    // chunks of a file
+  std::vector<std::size_t> in_file;  // place of this one
   for (std::size_t d = 0; d < place.size(); ++d) {
-    number = number * chunks_along(array.metadata, d) + place[d];
+    along.push_back(shape[d] / metadata.chunks[d]);
+    in_file.push_back(place[d] % along[d]);
+    file_number = file_number * files_along(metadata, d) + place[d] / along[d];
   }
-  if (const ChunkBytes* const kept = kept_.find(number)) return kept;
-  kept_.evict_for(array.metadata.chunk_items() * array.metadata.dtype.bytes, kept_bytes_max);
-  auto loaded = load(array, array.path + chunk_key(array.metadata, number));
+  std::size_t number = 0;
+  std::size_t count = 1;
+  const auto strides =
+      strides_of(along, metadata.shard ? metadata.shard->order : in_order(place.size()));
+  for (std::size_t d = 0; d < place.size(); ++d) {
+    number += in_file[d] * strides[d];
+    count *= along[d];
+  }
+  kept_.select(variable);
+  shards_.select(variable);
+  if (const ChunkBytes* const kept = kept_.find(file_number * count + number)) return kept;
+  const std::size_t bytes = metadata.chunk_items() * metadata.dtype.bytes;
+  kept_.evict_for(bytes, kept_bytes_max);
+  auto loaded = load(array, file_number, number);
   if (!loaded) return loaded.error();
-  return kept_.add(number, std::move(*loaded));
+  const std::size_t loaded_bytes = loaded->size();
+  return kept_.add(file_number * count + number, std::move(*loaded), loaded_bytes);
 }
 
 template <class Out>
 Result<void> Store::read_block(int variable, const std::vector<std::size_t>& start,
                                const std::vector<std::size_t>& count, Out* out) const {
-  const ArrayMetadata& array = array_of(variable).metadata;
-  std::vector<std::size_t> first;
-  std::vector<std::size_t> last;
-  std::size_t needed = array.chunk_items() * array.dtype.bytes + ChunkCache::bookkeeping_bytes;
-  for (std::size_t d = 0; d < start.size(); ++d) {
+  const Array& of = array_of(variable);
+  if (of.line) {
+    for (std::size_t i = 0; i < count[0]; ++i) out[i] = static_cast<Out>(of.line->at(start[0] + i));
+    return {};
+  }
+  const ArrayMetadata& array = of.metadata;
+  const std::vector<std::size_t>& shape = array.file_shape();
+  const std::size_t rank = start.size();
+  std::vector<std::size_t> first_file;
+  std::vector<std::size_t> last_file;
+  std::size_t needed = array.chunk_items() * array.dtype.bytes + kept_.bookkeeping_bytes;
+  for (std::size_t d = 0; d < rank; ++d) {
     if (count[d] == 0) return {};
-    first.push_back(start[d] / array.chunks[d]);
-    last.push_back((start[d] + count[d] - 1) / array.chunks[d]);
-    const std::size_t along = last[d] - first[d] + 1;
+    const std::size_t end = start[d] + count[d] - 1;
+    first_file.push_back(start[d] / shape[d]);
+    last_file.push_back(end / shape[d]);
+    const std::size_t along = end / array.chunks[d] - start[d] / array.chunks[d] + 1;
     needed = needed > kept_bytes_most / along ? kept_bytes_most : needed * along;
   }
   const std::lock_guard lock(mutex_);
-  std::vector<std::size_t> place = first;
-  do {
-    const auto chunk = chunk_at(variable, place, std::max(needed, kept_bytes_least));
-    if (!chunk) return chunk.error();
-    copy_overlap(array, **chunk, overlap_of(array, place, start, count), count, out);
-  } while (advance(place, first, last, place.size()));
+  std::vector<std::size_t> file = first_file;
+  do {  // one file after the other
+    std::vector<std::size_t> first(rank);
+    std::vector<std::size_t> last(rank);
+    for (std::size_t d = 0; d < rank; ++d) {
+      const std::size_t along = shape[d] / array.chunks[d];
+      first[d] = std::max(start[d] / array.chunks[d], file[d] * along);
+      last[d] = std::min((start[d] + count[d] - 1) / array.chunks[d], file[d] * along + along - 1);
+    }
+    std::vector<std::size_t> place = first;
+    do {
+      const auto chunk = chunk_at(variable, place, std::max(needed, kept_bytes_least));
+      if (!chunk) return chunk.error();
+      copy_overlap(array, **chunk, overlap_of(array, place, start, count), count, out);
+    } while (advance(place, first, last, rank));
+  } while (advance(file, first_file, last_file, rank));
   return {};
 }
 

@@ -1,4 +1,4 @@
-// Numbering of the chunks of an array and their keys in the store.
+// Numbering of the files of an array (chunks, or shards of chunks) and their keys in the store.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 
 namespace windsplat::data::zarr {
 
-// Number of chunks of an array; at least one unless a dimension is empty.
-std::uint64_t chunk_count(const ArrayMetadata& array);
+// Number of files of an array; at least one unless a dimension is empty.
+std::uint64_t file_count(const ArrayMetadata& array);
 
-// The file of a chunk within its array's folder; `number` counts with the last dimension fastest.
-std::string chunk_key(const ArrayMetadata& array, std::uint64_t number);
+// A file within its array's folder; `number` counts with the last dimension fastest.
+std::string file_key(const ArrayMetadata& array, std::uint64_t number);
 
 }  // namespace windsplat::data::zarr

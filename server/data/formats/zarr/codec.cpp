@@ -1,4 +1,5 @@
-// Decompression by C libraries into a buffer of known size, then the filters in reverse order.
+// Decodes a chunk by its codecs in reverse order. Compressors are C libraries that write into a
+// buffer of known size.
 #include "server/data/formats/zarr/codec.hpp"
 
 #include <blosc.h>
@@ -14,6 +15,8 @@
 #include <utility>
 
 #include "server/data/bytes/decode_limits.hpp"
+#include "server/data/formats/zarr/crc32c.hpp"
+#include "server/data/formats/zarr/metadata_parts.hpp"
 
 namespace windsplat::data::zarr {
 
@@ -75,17 +78,13 @@ bool decompress_zstd(const Bytes& stored, std::size_t bytes, Bytes& out) {
   return ZSTD_decompress(out.data(), out.size(), stored.data(), stored.size()) == out.size();
 }
 
-Result<Bytes> decompress(Compressor compressor, Bytes stored, std::size_t bytes) {
-  if (compressor == Compressor::none) {
-    return stored.size() == bytes ? Result<Bytes>(std::move(stored))
-                                  : wrong_size(stored.size(), bytes);
-  }
+Result<Bytes> decompress(Codec::Kind kind, const Bytes& stored, std::size_t bytes) {
   Bytes out;
-  const bool done = compressor == Compressor::blosc  ? decompress_blosc(stored, bytes, out)
-                    : compressor == Compressor::zstd ? decompress_zstd(stored, bytes, out)
-                    : compressor == Compressor::lz4
+  const bool done = kind == Codec::Kind::blosc  ? decompress_blosc(stored, bytes, out)
+                    : kind == Codec::Kind::zstd ? decompress_zstd(stored, bytes, out)
+                    : kind == Codec::Kind::lz4
                         ? decompress_lz4(stored, bytes, out)
-                        : inflate_all(stored, compressor == Compressor::gzip, bytes, out);
+                        : inflate_all(stored, kind == Codec::Kind::gzip, bytes, out);
   if (!done) {
     return broken_chunk("does not decompress to the " + std::to_string(bytes) +
                         " bytes of its array");
@@ -151,7 +150,7 @@ void sum_up(Bytes& bytes) {
   }
 }
 
-Bytes unscale(const Bytes& in, const Filter& filter) {
+Bytes unscale(const Bytes& in, const Codec& filter) {
   const std::size_t count = in.size() / filter.encoded.bytes;
   Bytes out(count * filter.decoded.bytes);
   with_type(filter.encoded, [&](auto encoded) {
@@ -177,42 +176,82 @@ void turn_bytes(Bytes& bytes, std::size_t item) {
   }
 }
 
-// Bytes of an item before compression.
-std::size_t encoded_item_bytes(const ArrayMetadata& array) {
-  std::size_t bytes = array.dtype.bytes;
-  for (const Filter& filter : array.filters) {
-    if (filter.kind != Filter::Kind::shuffle) bytes = filter.encoded.bytes;
-  }
+// Removes and checks the sum that follows the bytes.
+Result<Bytes> check_sum(Bytes bytes) {
+  if (bytes.size() < crc32c_bytes) return broken_chunk("is shorter than its CRC-32C");
+  const std::size_t count = bytes.size() - crc32c_bytes;
+  if (!ends_in_crc32c(bytes)) return broken_chunk("does not match its CRC-32C");
+  bytes.resize(count);
   return bytes;
+}
+
+// Bytes before each codec, and after the last, as if no compressor changed them.
+std::vector<std::size_t> encoded_sizes(const ArrayMetadata& array) {
+  const std::size_t items = array.chunk_items();
+  std::vector<std::size_t> out{items * array.dtype.bytes};
+  for (const Codec& codec : array.codecs) {
+    const std::size_t bytes = out.back();
+    out.push_back(codec.kind == Codec::Kind::fixed_scale_offset ? items * codec.encoded.bytes
+                  : codec.kind == Codec::Kind::crc32c           ? bytes + crc32c_bytes
+                                                                : bytes);
+  }
+  return out;
+}
+
+Result<Bytes> decode(const Codec& codec, Bytes bytes, std::size_t decoded_bytes) {
+  switch (codec.kind) {
+    case Codec::Kind::swap_bytes:
+      turn_bytes(bytes, codec.element_bytes);
+      return bytes;
+    case Codec::Kind::shuffle:
+      if (bytes.size() % codec.element_bytes != 0) {
+        return broken_chunk("is not a whole number of shuffled elements");
+      }
+      return unshuffle(bytes, codec.element_bytes);
+    case Codec::Kind::delta:
+      with_type(codec.decoded, [&](auto item) { sum_up<decltype(item)>(bytes); });
+      return bytes;
+    case Codec::Kind::fixed_scale_offset:
+      return unscale(bytes, codec);
+    case Codec::Kind::crc32c:
+      return check_sum(std::move(bytes));
+    default:
+      return decompress(codec.kind, bytes, decoded_bytes);
+  }
 }
 
 }  // namespace
 
+bool ends_in_crc32c(const std::vector<unsigned char>& bytes) {
+  if (bytes.size() < crc32c_bytes) return false;
+  const unsigned char* const sum = bytes.data() + bytes.size() - crc32c_bytes;
+  const std::uint32_t stored = std::uint32_t{sum[0]} | std::uint32_t{sum[1]} << 8U |
+                               std::uint32_t{sum[2]} << 16U | std::uint32_t{sum[3]} << 24U;
+  return crc32c(bytes.data(), bytes.size() - crc32c_bytes) == stored;
+}
+
 std::size_t stored_bytes_max(const ArrayMetadata& array) {
-  return stored_chunk_bytes_max(array.chunk_items() * encoded_item_bytes(array));
+  return stored_chunk_bytes_max(encoded_sizes(array).back());
 }
 
 Result<Bytes> decode_chunk(const ArrayMetadata& array, Bytes stored) {
+  const auto sizes = encoded_sizes(array);
   if (stored.size() > stored_bytes_max(array)) {
     return wrong_size(stored.size(), stored_bytes_max(array));
   }
-  const std::size_t encoded_bytes = array.chunk_items() * encoded_item_bytes(array);
-  auto bytes = decompress(array.compressor, std::move(stored), encoded_bytes);
-  if (!bytes) return bytes.error();
-  for (auto filter = array.filters.rbegin(); filter != array.filters.rend(); ++filter) {
-    if (filter->kind == Filter::Kind::shuffle) {
-      if (bytes->size() % filter->element_bytes != 0) {
-        return broken_chunk("is not a whole number of shuffled elements");
-      }
-      *bytes = unshuffle(*bytes, filter->element_bytes);
-    } else if (filter->kind == Filter::Kind::delta) {
-      with_type(filter->decoded, [&](auto item) { sum_up<decltype(item)>(*bytes); });
-    } else {
-      *bytes = unscale(*bytes, *filter);
-    }
+  const auto compressor =
+      std::find_if(array.codecs.begin(), array.codecs.end(),
+                   [](const Codec& codec) { return is_compressor(codec.kind); });
+  // Sizes are known up to the compressor.
+  const auto known = static_cast<std::size_t>(compressor - array.codecs.begin());
+  for (std::size_t i = array.codecs.size(); i-- > 0;) {
+    if (i < known && stored.size() != sizes[i + 1]) return wrong_size(stored.size(), sizes[i + 1]);
+    auto bytes = decode(array.codecs[i], std::move(stored), sizes[i]);
+    if (!bytes) return bytes;
+    stored = std::move(*bytes);
   }
-  if (array.dtype.big_endian && array.dtype.bytes > 1) turn_bytes(*bytes, array.dtype.bytes);
-  return bytes;
+  if (stored.size() != sizes.front()) return wrong_size(stored.size(), sizes.front());
+  return stored;
 }
 
 }  // namespace windsplat::data::zarr

@@ -145,6 +145,11 @@ const Json* Json::find(std::string_view key) const {
   return at == object.end() ? nullptr : &at->second;
 }
 
+std::string Json::text_at(std::string_view key) const {
+  const Json* found = find(key);
+  return found == nullptr ? "" : found->text;
+}
+
 Result<Json> parse_json(std::string_view text) {
   // The parser would treat a NUL as the end of its input.
   if (text.find('\0') != std::string_view::npos) {

@@ -3,33 +3,21 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "server/base/ascii.hpp"
 #include "server/data/formats/zarr/chunks.hpp"
+#include "server/data/formats/zarr/nodes.hpp"
 
 namespace windsplat::data::zarr {
 
 namespace {
 
-constexpr std::uint64_t json_bytes_max = std::uint64_t{8} << 20;
-constexpr std::size_t arrays_max = 8192;
 constexpr std::size_t text_max = 4096;
 constexpr const char* group_reason = "group: to see it, open its folder";
-constexpr std::uint64_t stamped_chunks_max = 4096;
-
-Error broken_store(const std::string& place, const std::string& what) {
-  std::string message = in_quotes(place);
-  message += ": ";
-  message += what;
-  return make_error(ErrorKind::bad_data, std::move(message));
-}
-
-bool is_plain_name(std::string_view name) {
-  return !name.empty() && name != "." && name != ".." && name.size() <= 255 &&
-         name.find('/') == std::string_view::npos && name.find('\0') == std::string_view::npos;
-}
+constexpr std::uint64_t stamped_files_max = 4096;
 
 std::string type_name(const Dtype& type) {
   const char* const base = type.kind == 'f' ? "float" : type.kind == 'i' ? "int" : "uint";
@@ -38,26 +26,44 @@ std::string type_name(const Dtype& type) {
   return base + std::to_string(bytes * 8);
 }
 
+std::string nameless(const std::vector<std::size_t>& shape, std::size_t d) {
+  return "dim" + std::to_string(shape.size() - d) + "_" + std::to_string(shape[d]);
+}
+
+// The names that the file gives to the dimensions, empty where there is none; nullopt if no names
+// are given at all.
+std::optional<std::vector<std::string>> given_names(const Node& node) {
+  const Json* names = node.metadata.find("dimension_names");
+  const bool may_be_null = names != nullptr && names->kind == Json::Kind::list;
+  if (!may_be_null) names = node.attributes.find("_ARRAY_DIMENSIONS");
+  if (names == nullptr) return {};
+  std::vector<std::string> out;
+  for (const Json& entry : names->list) {
+    const bool named = entry.kind == Json::Kind::text && is_plain_name(entry.text);
+    const bool absent = may_be_null && (entry.kind == Json::Kind::null || entry.text.empty());
+    if (named || absent) out.push_back(named ? entry.text : "");
+  }
+  if (out.size() != names->list.size()) out.clear();
+  return out;
+}
+
 // Without names, arrays share dimensions of equal length at equal positions.
-void name_dimensions(Array& array) {
+void name_dimensions(const std::optional<std::vector<std::string>>& given, Array& array) {
   const auto& shape = array.metadata.shape;
-  const Json* names = array.attributes.find("_ARRAY_DIMENSIONS");
-  if (names != nullptr) {
-    for (const Json& entry : names->list) {
-      if (entry.kind == Json::Kind::text && is_plain_name(entry.text)) {
-        array.dimensions.push_back(entry.text);
-      }
+  if (given) {
+    std::set<std::string> distinct;
+    for (std::size_t d = 0; d < given->size() && d < shape.size(); ++d) {
+      const std::string& name = (*given)[d];
+      array.dimensions.push_back(name.empty() ? nameless(shape, d) : name);
+      distinct.insert(array.dimensions.back());
+      array.named_dimensions = array.named_dimensions || !name.empty();
     }
-    const std::set<std::string> distinct(array.dimensions.begin(), array.dimensions.end());
-    array.named_dimensions = names->list.size() == shape.size() && distinct.size() == shape.size();
-    if (array.named_dimensions) return;
-    array.metadata.problem = "its _ARRAY_DIMENSIONS are not names, one for each dimension";
+    if (given->size() == shape.size() && distinct.size() == shape.size()) return;
+    array.named_dimensions = false;
+    array.metadata.problem = "its dimension names are not names, one for each dimension";
   }
   array.dimensions.clear();
-  for (std::size_t d = 0; d < shape.size(); ++d) {
-    array.dimensions.push_back("dim" + std::to_string(shape.size() - d) + "_" +
-                               std::to_string(shape[d]));
-  }
+  for (std::size_t d = 0; d < shape.size(); ++d) array.dimensions.push_back(nameless(shape, d));
 }
 
 // If no field can be read, returns the reason instead of a missing field.
@@ -88,119 +94,80 @@ class StoreScan {
   }
 
  private:
-  Result<Json> read_json(const std::string& path) {
-    auto input = files_.open(path);
-    if (!input) return input.error();
-    const std::uint64_t size = (*input)->size();
-    if (size > json_bytes_max) {
-      return broken_store(path, "it has more than " + std::to_string(json_bytes_max) + " bytes");
-    }
-    std::string text(size, ' ');
-    if (auto done = (*input)->read(0, text.data(), text.size()); !done) return done.error();
-    out_.identity += path + ' ' + (*input)->identity() + '\n';
-    auto json = parse_json(text);
-    if (!json) return broken_store(path, json.error().message);
-    if (json->kind != Json::Kind::object) return broken_store(path, "it is not a JSON object");
-    return json;
-  }
-
-  Result<Json> read_attributes(const std::string& path) {
-    return files_.exists(path + ".zattrs") ? read_json(path + ".zattrs") : Result<Json>(Json{});
-  }
-
   Result<void> find_arrays() {
-    out_.identity = out_.name + '\n';
-    if (files_.exists(".zmetadata")) return find_consolidated();
-    if (files_.exists(".zarray")) {
-      const auto json = read_json(".zarray");
-      if (!json) return json.error();
-      auto attributes = read_attributes("");
-      if (!attributes) return attributes.error();
-      return add_array(files_.location().stem, "", *json, std::move(*attributes));
+    auto nodes = find_nodes(files_);
+    if (!nodes) return nodes.error();
+    out_.version = nodes->version;
+    out_.identity = out_.name + '\n' + nodes->identity;
+    out_.file.title = text_in(nodes->attributes, "title");
+    for (const std::string& group : nodes->groups) {
+      out_.file.left_out.push_back({group, group_reason});
     }
-    if (!files_.exists(".zgroup")) {
-      return make_error(ErrorKind::bad_data,
-                        "is a Zarr store of version 3; only version 2 is supported");
+    for (Node& node : nodes->arrays) {
+      auto metadata = nodes->version == 2 ? parse_v2(node.metadata) : parse_v3(node.metadata);
+      if (!metadata) return broken_store(node.name, metadata.error().message);
+      Array array;
+      array.path = node.path;
+      array.name = node.name;
+      array.metadata = std::move(*metadata);
+      if (array.metadata.problem.empty() && !node.path.empty() && !files_.exists(node.path)) {
+        array.metadata.problem = "its folder is missing in the store";
+      }
+      const bool is_image = nodes->multiscale && node.path == nodes->multiscale->finest + '/';
+      if (is_image && nodes->multiscale->axes.size() == array.metadata.shape.size()) {
+        place_image(*nodes->multiscale, array);
+      } else {
+        name_dimensions(given_names(node), array);
+      }
+      array.attributes = std::move(node.attributes);
+      out_.arrays.push_back(std::move(array));
     }
-    return find_below_root();
+    if (nodes->multiscale) tell_level(*nodes->multiscale);
+    return {};
   }
 
-  Result<void> find_consolidated() {
-    const auto json = read_json(".zmetadata");
-    if (!json) return json.error();
-    const Json* metadata = json->find("metadata");
-    if (metadata == nullptr || metadata->kind != Json::Kind::object) {
-      return broken_store(".zmetadata", "it has no 'metadata'");
+  void tell_level(const Multiscale& multiscale) {
+    const std::size_t levels = multiscale.levels.size();
+    std::string note = "of the " + std::to_string(levels) + " levels of detail ('multiscales') " +
+                       in_quotes(multiscale.finest) + ", the finest, is read";
+    if (levels == 1) note = "'multiscales' names one level, " + in_quotes(multiscale.finest);
+    out_.file.notes.push_back(std::move(note));
+  }
+
+  // Names the dimensions of an image, and adds their positions as coordinates.
+  void place_image(const Multiscale& multiscale, Array& image) {
+    std::vector<std::string> names;
+    for (const ImageAxis& axis : multiscale.axes) {
+      names.push_back(is_plain_name(axis.name) ? axis.name : "");
     }
-    std::set<std::string> groups;
-    for (const auto& [key, value] : metadata->object) {
-      const std::size_t slash = key.find('/');
-      if (slash == std::string::npos) {
-        if (key == ".zattrs") attributes_ = value;
+    name_dimensions(names, image);
+    image.named_dimensions = false;  // these names say nothing about missing values
+    for (std::size_t d = 0; d < multiscale.axes.size(); ++d) {
+      const ImageAxis& axis = multiscale.axes[d];
+      const std::size_t length = image.metadata.shape[d];
+      if (!axis.is_space && !axis.is_time) {
+        out_.file.dimensions.push_back({image.dimensions[d], length, false, false, true});
         continue;
       }
-      const std::string name = key.substr(0, slash);
-      const std::string rest = key.substr(slash + 1);
-      if (rest == ".zarray") {
-        const Json* attributes = metadata->find(name + "/.zattrs");
-        auto added =
-            add_array(name, name + "/", value, attributes == nullptr ? Json{} : *attributes);
-        if (!added) return added;
-      } else if (rest != ".zattrs") {
-        groups.insert(name);
-      }
+      if (!multiscale.placed) continue;
+      Array coordinate;
+      coordinate.name = image.dimensions[d];
+      coordinate.dimensions = {coordinate.name};
+      coordinate.metadata.shape = {length};
+      coordinate.metadata.chunks = {1};
+      coordinate.metadata.order = {0};
+      coordinate.metadata.dtype = {'f', 8};
+      coordinate.line = Line{axis.first, axis.spacing};
+      Json& attributes = coordinate.attributes;
+      attributes.kind = Json::Kind::object;
+      attributes.object["units"] = {.kind = Json::Kind::text, .text = axis.unit};
+      if (axis.is_time) attributes.object["axis"] = {.kind = Json::Kind::text, .text = "T"};
+      out_.arrays.push_back(std::move(coordinate));
     }
-    for (const std::string& name : groups) out_.file.left_out.push_back({name, group_reason});
-    return {};
-  }
-
-  Result<void> find_below_root() {
-    auto attributes = read_attributes("");
-    if (!attributes) return attributes.error();
-    attributes_ = std::move(*attributes);
-    const auto names = files_.list("");
-    if (!names) return names.error();
-    for (const std::string& entry : *names) {
-      if (entry.back() != '/') continue;
-      if (files_.exists(entry + ".zarray")) {
-        const auto json = read_json(entry + ".zarray");
-        if (!json) return json.error();
-        auto own = read_attributes(entry);
-        if (!own) return own.error();
-        auto added = add_array(entry.substr(0, entry.size() - 1), entry, *json, std::move(*own));
-        if (!added) return added;
-      } else if (files_.exists(entry + ".zgroup")) {
-        out_.file.left_out.push_back({entry.substr(0, entry.size() - 1), group_reason});
-      }
-    }
-    return {};
-  }
-
-  Result<void> add_array(const std::string& name, const std::string& path, const Json& json,
-                         Json attributes) {
-    if (!is_plain_name(name)) return broken_store(name, "is not a valid array name");
-    if (out_.arrays.size() >= arrays_max) {
-      return make_error(ErrorKind::bad_data,
-                        "it has more than " + std::to_string(arrays_max) + " arrays");
-    }
-    auto metadata = parse_array(json);
-    if (!metadata) return broken_store(name, metadata.error().message);
-    Array array;
-    array.path = path;
-    array.name = name;
-    array.attributes = std::move(attributes);
-    array.metadata = std::move(*metadata);
-    if (array.metadata.problem.empty() && !path.empty() && !files_.exists(path)) {
-      array.metadata.problem = "its folder is missing in the store";
-    }
-    name_dimensions(array);
-    out_.arrays.push_back(std::move(array));
-    return {};
   }
 
   // Coordinates first: their lengths have precedence over those of other arrays.
   void describe_all() {
-    out_.file.title = text_in(attributes_, "title");
     std::stable_partition(out_.arrays.begin(), out_.arrays.end(),
                           std::mem_fn(&Array::is_coordinate));
     for (const Array& array : out_.arrays) describe(array);
@@ -245,27 +212,35 @@ class StoreScan {
     variable.packed =
         attributes.find("scale_factor") != nullptr || attributes.find("add_offset") != nullptr;
     out_.file.variables.push_back(std::move(variable));
-    if (!array.is_coordinate() && array.metadata.problem.empty() && array.is_fill_a_number()) {
+    if (out_.version == 2 && !array.is_coordinate() && array.metadata.problem.empty() &&
+        array.is_fill_a_number()) {
       out_.file.notes.push_back(in_quotes(array.name) +
                                 " has fill_value 0 and no dimension names: zeros are shown as "
                                 "values, even in absent chunks");
     }
   }
 
+  // Looks at the files of chunks, and counts the absent ones.
   void identify() {
-    std::uint64_t chunks = 0;
+    const auto is_stored = [](const Array& array) {
+      return array.metadata.problem.empty() && !array.line;
+    };
+    std::uint64_t files = 0;
     for (const Array& array : out_.arrays) {
-      if (array.metadata.problem.empty()) chunks += chunk_count(array.metadata);
+      if (is_stored(array)) files += file_count(array.metadata);
     }
-    const std::uint64_t step = std::max<std::uint64_t>(1, chunks / stamped_chunks_max);
+    const std::uint64_t step = std::max<std::uint64_t>(1, files / stamped_files_max);
     std::uint64_t next = 0;  // numbered from the current array
-    for (const Array& array : out_.arrays) {
-      if (!array.metadata.problem.empty()) continue;
-      const std::uint64_t here = chunk_count(array.metadata);
+    for (Array& array : out_.arrays) {
+      if (!is_stored(array)) continue;
+      const std::uint64_t here = file_count(array.metadata);
       for (; next < here; next += step) {
-        const std::string path = array.path + chunk_key(array.metadata, next);
+        const std::string path = array.path + file_key(array.metadata, next);
         const auto input = files_.open(path);
         out_.identity += path + ' ' + (input ? (*input)->identity() : std::string("-")) + '\n';
+        if (step == 1 && !input && input.error().kind == ErrorKind::not_found) {
+          ++array.absent_files;
+        }
       }
       next -= here;
     }
@@ -273,7 +248,6 @@ class StoreScan {
 
   Files& files_;
   StoreContents out_;
-  Json attributes_;
 };
 
 }  // namespace

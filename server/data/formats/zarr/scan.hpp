@@ -1,6 +1,8 @@
-// The metadata of a Zarr v2 store: files -> arrays, dimensions, attributes.
+// The metadata of a store: files -> arrays, dimensions, attributes.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,13 +14,24 @@
 
 namespace windsplat::data::zarr {
 
+// Evenly spaced positions, of an axis of an image.
+struct Line {
+  double first = 0;
+  double spacing = 1;
+  [[nodiscard]] double at(std::size_t index) const {
+    return first + spacing * static_cast<double>(index);
+  }
+};
+
 struct Array {
   std::string path;  // below the store, empty or ending in '/'
   std::string name;
   Json attributes;
   ArrayMetadata metadata;
   std::vector<std::string> dimensions;
-  bool named_dimensions = false;  // whether _ARRAY_DIMENSIONS is present
+  bool named_dimensions = false;   // whether the array itself names them
+  std::optional<Line> line;        // instead of stored values
+  std::uint64_t absent_files = 0;  // absent chunks or shards, if all were looked at
 
   [[nodiscard]] bool is_coordinate() const {
     return dimensions.size() == 1 && dimensions[0] == name;
@@ -30,14 +43,16 @@ struct Array {
 };
 
 struct StoreContents {
+  int version = 2;
   std::string name;
-  // Derived from the metadata and all chunks, or 4096 evenly distributed ones if there are more.
+  // Derived from the metadata and the files of all chunks, or 4096 evenly
+  // distributed ones if there are more.
   std::string identity;
   std::vector<Array> arrays;  // parallel to the variables
   FileContents file;
 };
 
-// Errors: bad_data, including version 3.
+// Errors: bad_data.
 Result<StoreContents> scan_store(Files& files);
 
 // An attribute, trimmed; empty if absent or not a string.

@@ -1,8 +1,15 @@
 #include "server/data/formats/zarr/store.hpp"
 
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <utility>
+
+#include "server/data/formats/zarr/chunks.hpp"
 
 namespace windsplat::data::zarr {
 
@@ -18,6 +25,32 @@ Result<std::unique_ptr<Store>> Store::open(std::shared_ptr<Files> files) {
   return std::unique_ptr<Store>(new Store(std::move(files), std::move(*contents)));
 }
 
+namespace {
+
+// A _FillValue as xarray writes it to version 3: base64 of the 8 little-endian bytes of a double.
+std::optional<double> float_in_base64(std::string_view text) {
+  constexpr std::string_view digits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  if (text.size() != 12 || text.back() != '=') return {};
+  std::array<unsigned char, 9> bytes{};
+  for (std::size_t i = 0; i < 12; i += 4) {
+    std::uint32_t three = 0;
+    for (const char c : text.substr(i, 4)) {
+      const std::size_t digit = c == '=' && i == 8 ? 0 : digits.find(c);
+      if (digit == std::string_view::npos) return {};
+      three = three << 6U | static_cast<std::uint32_t>(digit);
+    }
+    for (std::size_t b = 0; b < 3; ++b) {
+      bytes.at(i / 4 * 3 + b) = static_cast<unsigned char>(three >> (16 - 8 * b));
+    }
+  }
+  double out = 0;
+  std::memcpy(&out, bytes.data(), sizeof out);
+  return out;
+}
+
+}  // namespace
+
 const Array& Store::array_of(int variable) const {
   return contents_.arrays.at(static_cast<std::size_t>(variable));
 }
@@ -26,7 +59,8 @@ cf::Numbers Store::numbers(int variable, const char* attribute) const {
   const Array& array = array_of(variable);
   cf::Numbers out;
   const auto add = [&](const Json& json) {
-    if (const auto value = as_number(json)) {
+    const auto encoded = contents_.version == 3 ? float_in_base64(json.text) : std::nullopt;
+    if (const auto value = encoded ? encoded : as_number(json)) {
       out.values.push_back(*value);
       out.floating = out.floating || !json.is_integer;
     }
@@ -37,8 +71,10 @@ cf::Numbers Store::numbers(int variable, const char* attribute) const {
   }
   const auto& fill = array.metadata.fill_value;
   const std::string_view name = attribute;
-  // Coordinates have no missing values; their fill_value is a default of the writer.
-  const bool masks = fill && !array.is_coordinate() && !array.is_fill_a_number();
+  // Coordinates have no missing values; their fill_value is a default of the writer. In version 3
+  // it is that of every array.
+  const bool masks =
+      contents_.version == 2 && fill && !array.is_coordinate() && !array.is_fill_a_number();
   if (name == "_FillValue" && out.values.empty()) {
     // A NaN fill value matches no number, which disables the default fill values of netCDF.
     out.values.push_back(masks ? *fill : std::numeric_limits<double>::quiet_NaN());
@@ -47,6 +83,14 @@ cf::Numbers Store::numbers(int variable, const char* attribute) const {
     out.values.push_back(*fill);
   }
   return out;
+}
+
+cf::Unwritten Store::unwritten(int variable, std::size_t most) const {
+  const Array& array = array_of(variable);
+  const std::uint64_t files = file_count(array.metadata);
+  const bool masked = std::isnan(array.metadata.fill_value.value_or(std::nan("")));
+  if (!masked || files > most) return {};
+  return {.chunks = array.absent_files, .looked_at = files};
 }
 
 std::string Store::text_of(int variable, const char* attribute) const {

@@ -1,4 +1,4 @@
-// A folder that is a Zarr v2 store. Chunks -> blocks of numbers.
+// A folder that is a Zarr store of version 2 or 3. Chunks -> blocks of numbers.
 #pragma once
 
 #include <memory>
@@ -11,24 +11,29 @@
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/cf/array_file.hpp"
 #include "server/data/files/files.hpp"
-#include "server/data/formats/zarr/chunk_cache.hpp"
+#include "server/data/formats/zarr/recent.hpp"
 #include "server/data/formats/zarr/scan.hpp"
+#include "server/data/formats/zarr/shard.hpp"
 
 namespace windsplat::data::zarr {
 
-// Whether a folder is a Zarr store of any version.
+using ChunkBytes = std::vector<unsigned char>;  // empty if the chunk is absent
+
+// Whether a folder is a Zarr store.
 bool is_store(Files& files);
 
-// Conventions of xarray: `_ARRAY_DIMENSIONS` names the dimensions, and fill_value is _FillValue.
-// https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html
+// Conventions of xarray: `_ARRAY_DIMENSIONS` names the dimensions, and in version 2 fill_value is
+// _FillValue.
 class Store final : public cf::ArrayFile {
  public:
-  // Errors: bad_data, including version 3.
+  // Errors: bad_data.
   static Result<std::unique_ptr<Store>> open(std::shared_ptr<Files> files);
 
   [[nodiscard]] const FileContents& contents() const override { return contents_.file; }
   [[nodiscard]] const std::string& name() const override { return contents_.name; }
-  [[nodiscard]] std::string format() const override { return "Zarr v2"; }
+  [[nodiscard]] std::string format() const override {
+    return "Zarr v" + std::to_string(contents_.version);
+  }
   [[nodiscard]] std::string identity() const override { return contents_.identity; }
 
   [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override;
@@ -38,6 +43,7 @@ class Store final : public cf::ArrayFile {
     return zarr_chunk_cost_bytes;
   }
   void forget_chunks(int variable) const override;
+  [[nodiscard]] cf::Unwritten unwritten(int variable, std::size_t most) const override;
 
   Result<void> read(int variable, const std::vector<std::size_t>& start,
                     const std::vector<std::size_t>& count, double* out) const override;
@@ -45,6 +51,15 @@ class Store final : public cf::ArrayFile {
                     const std::vector<std::size_t>& count, float* out) const override;
 
  private:
+  struct File {
+    std::string path;                        // in the store
+    std::shared_ptr<const InputFile> input;  // null if absent
+  };
+  struct OpenShard {
+    File file;
+    std::vector<Span> index;  // empty if the file is absent
+  };
+
   Store(std::shared_ptr<Files> files, StoreContents contents)
       : files_(std::move(files)), contents_(std::move(contents)) {}
 
@@ -54,12 +69,17 @@ class Store final : public cf::ArrayFile {
                           const std::vector<std::size_t>& count, Out* out) const;
   Result<const ChunkBytes*> chunk_at(int variable, const std::vector<std::size_t>& place,
                                      std::size_t kept_bytes_max) const;
-  Result<ChunkBytes> load(const Array& array, const std::string& path) const;
+  // A chunk of a file, which is a shard if it has more than one.
+  Result<ChunkBytes> load(const Array& array, std::uint64_t file_number, std::size_t in_file) const;
+  Result<const OpenShard*> shard_at(const Array& array, std::uint64_t number) const;
+  Result<File> open_file(const Array& array, std::uint64_t number) const;
+  [[nodiscard]] Error fault(const std::string& path, const std::string& what) const;
 
   std::shared_ptr<Files> files_;
   StoreContents contents_;
-  mutable std::mutex mutex_;  // guards the cached chunks
-  mutable ChunkCache kept_;
+  mutable std::mutex mutex_;  // guards what is cached
+  mutable Recent<ChunkBytes> kept_;
+  mutable Recent<OpenShard> shards_;
 };
 
 }  // namespace windsplat::data::zarr

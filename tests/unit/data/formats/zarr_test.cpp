@@ -1,43 +1,13 @@
-// Zarr stores written here byte by byte, compressed by the C libraries: values, masks, orientation,
-// omissions, refusals.
-#include <blosc.h>
+// Zarr 2: values, masks, orientation, omissions, refusals.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <lz4.h>
-#include <zlib.h>
-#include <zstd.h>
 
-#include <cmath>
-#include <cstring>
-#include <filesystem>
-#include <limits>
-#include <memory>
-#include <string>
-#include <vector>
-
-#include "server/data/model/dataset_info.hpp"
-#include "server/data/open/open.hpp"
-#include "tests/unit/data/netcdf_maker.hpp"
+#include "tests/unit/data/formats/zarr_maker.hpp"
 
 namespace windsplat::data::test {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-constexpr float kMasked = std::numeric_limits<float>::quiet_NaN();
-
-void write(const std::string& path, const std::string& bytes) {
-  std::filesystem::create_directories(std::filesystem::path(path).parent_path());
-  write_bytes(path, bytes);
-}
-
-template <class T>
-std::string bytes_of_items(const std::vector<T>& items) {
-  std::string out(items.size() * sizeof(T), ' ');
-  std::memcpy(out.data(), items.data(), out.size());
-  return out;
-}
 
 std::string array_json(const std::string& shape, const std::string& chunks,
                        const std::string& dtype, const std::string& fill = "null",
@@ -47,110 +17,15 @@ std::string array_json(const std::string& shape, const std::string& chunks,
          compressor + more + "}";
 }
 
-// A store with one array f[y=2, x=3] without named axes, and the additions of a test.
-class Store {
- public:
-  explicit Store(const std::string& name = "s.zarr") : root_(folder_ / name) {
-    write(root_ + "/.zgroup", R"({"zarr_format":2})");
-  }
-  [[nodiscard]] const std::string& path() const { return root_; }
-  void put(const std::string& name, const std::string& bytes) const {
-    write(root_ + "/" + name, bytes);
-  }
-  void axis(const std::string& name, const std::vector<double>& values,
-            const std::string& units) const {
-    std::string length = "[";
-    length += std::to_string(values.size());
-    length += "]";
-    put(name + "/.zarray", array_json(length, length, "<f8", "\"NaN\""));
-    put(name + "/.zattrs", R"({"_ARRAY_DIMENSIONS":[")" + name + R"("],"units":")" + units + "\"}");
-    put(name + "/0", bytes_of_items(values));
-  }
-
-  [[nodiscard]] std::vector<float> values(const std::string& field = "f") const {
-    auto source = open_file(path());
-    EXPECT_TRUE(source) << source.error().message;
-    if (!source) return {};
-    const FieldInfo* info = (*source)->info().find(field);
-    EXPECT_NE(info, nullptr);
-    if (info == nullptr) return {};
-    auto volume =
-        (*source)->read(static_cast<std::size_t>(info - (*source)->info().fields.data()), 0);
-    EXPECT_TRUE(volume) << volume.error().message;
-    if (!volume) return {};
-    return {volume->values.begin(), volume->values.end()};
-  }
-
-  // The error of opening, or of reading the first field.
-  [[nodiscard]] std::string fault() const {
-    auto source = open_file(path());
-    if (!source) return source.error().message;
-    auto volume = (*source)->read(0, 0);
-    return volume ? "" : volume.error().message;
-  }
-
- private:
-  Folder folder_;
-  std::string root_;
-};
-
-void expect_same(const std::vector<float>& found, const std::vector<float>& expected) {
-  ASSERT_EQ(found.size(), expected.size());
-  for (std::size_t i = 0; i < expected.size(); ++i) {
-    if (std::isnan(expected[i])) {
-      EXPECT_TRUE(std::isnan(found[i])) << i << ": " << found[i];
-    } else {
-      EXPECT_EQ(found[i], expected[i]) << i;
-    }
-  }
-}
-
-std::string zlib_stream(const std::string& plain, int window_bits) {
-  z_stream stream{};
-  deflateInit2(&stream, 6, Z_DEFLATED, window_bits, 8, Z_DEFAULT_STRATEGY);
-  std::string out(plain.size() + 128, ' ');
-  std::string in = plain;
-  stream.next_in = reinterpret_cast<unsigned char*>(in.data());
-  stream.avail_in = static_cast<uInt>(in.size());
-  stream.next_out = reinterpret_cast<unsigned char*>(out.data());
-  stream.avail_out = static_cast<uInt>(out.size());
-  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-  out.resize(stream.total_out);
-  deflateEnd(&stream);
-  return out;
-}
-
-std::string zstd_frame(const std::string& plain) {
-  std::string out(ZSTD_compressBound(plain.size()), ' ');
-  out.resize(ZSTD_compress(out.data(), out.size(), plain.data(), plain.size(), 3));
-  return out;
-}
-
-// Format of numcodecs: the length in four bytes, then the block.
-std::string lz4_block(const std::string& plain) {
-  const auto size = static_cast<int>(plain.size());
-  std::string out(4 + static_cast<std::size_t>(LZ4_compressBound(size)), '\0');
-  out[0] = static_cast<char>(size & 0xff);
-  out[1] = static_cast<char>(size >> 8);
-  out.resize(4 + static_cast<std::size_t>(LZ4_compress_default(plain.data(), out.data() + 4, size,
-                                                               static_cast<int>(out.size() - 4))));
-  return out;
-}
-
-std::string blosc_buffer(const std::string& plain, const char* codec, int shuffle) {
-  std::string out(plain.size() + BLOSC_MAX_OVERHEAD, ' ');
-  const int bytes = blosc_compress_ctx(5, shuffle, 4, plain.size(), plain.data(), out.data(),
-                                       out.size(), codec, 0, 1);
-  EXPECT_GT(bytes, 0) << codec;
-  out.resize(static_cast<std::size_t>(bytes));
-  return out;
-}
-
-// 24 x 40 compressible floats, in one chunk.
-std::vector<float> ramp() {
-  std::vector<float> out(24 * 40);
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<float>(i % 40) * 0.25F;
-  return out;
+void add_axis(const ZarrStore& store, const std::string& name, const std::vector<double>& values,
+              const std::string& units) {
+  std::string length = "[";
+  length += std::to_string(values.size());
+  length += "]";
+  store.put(name + "/.zarray", array_json(length, length, "<f8", "\"NaN\""));
+  store.put(name + "/.zattrs",
+            R"({"_ARRAY_DIMENSIONS":[")" + name + R"("],"units":")" + units + "\"}");
+  store.put(name + "/0", bytes_of_items(values));
 }
 
 std::string compressor_json(const std::string& id) {
@@ -161,7 +36,7 @@ std::string compressor_json(const std::string& id) {
 }
 
 void expect_decoded(const std::string& compressor, const std::string& stored) {
-  const Store store;
+  const ZarrStore store;
   store.put("f/.zarray",
             array_json("[24,40]", "[24,40]", "<f4", "null", compressor_json(compressor)));
   store.put("f/0.0", stored);
@@ -192,7 +67,7 @@ TEST(Zarr, EdgeChunksAreCroppedAndBothSeparatorsAndOrdersRead) {
   // f[2, 3] in chunks of 2 x 2: the second one has a column beyond the edge.
   for (const char* separator : {".", "/"}) {
     for (const bool columns_first : {false, true}) {
-      const Store store;
+      const ZarrStore store;
       std::string json = array_json("[2,3]", "[2,2]", ">i2", "null", "null",
                                     std::string(R"(,"dimension_separator":")") + separator + "\"");
       if (columns_first) json.replace(json.find("\"C\""), 3, "\"F\"");
@@ -210,7 +85,7 @@ TEST(Zarr, EdgeChunksAreCroppedAndBothSeparatorsAndOrdersRead) {
 
 TEST(Zarr, TypesOfEveryWidth) {
   const auto row = [](const std::string& dtype, const std::string& bytes) {
-    const Store store;
+    const ZarrStore store;
     store.put("f/.zarray", array_json("[1,2]", "[1,2]", dtype));
     store.put("f/0.0", bytes);
     return store.values();
@@ -229,7 +104,7 @@ TEST(Zarr, TypesOfEveryWidth) {
 TEST(Zarr, MissingChunkIsTheFillValueAndNeverZeroByChance) {
   const auto without_second = [](const std::string& dtype, const std::string& fill,
                                  const std::string& attributes) {
-    const Store store;
+    const ZarrStore store;
     store.put("f/.zarray", array_json("[1,4]", "[1,2]", dtype, fill));
     store.put("f/.zattrs", attributes);
     store.put("f/0.0", bytes_of_items<std::int16_t>({7, 0}));
@@ -243,7 +118,7 @@ TEST(Zarr, MissingChunkIsTheFillValueAndNeverZeroByChance) {
   expect_same(without_second("<i2", "0", named), {7, kMasked, kMasked, kMasked});
   expect_same(without_second("<i2", "0", "{}"), {7, 0, 0, 0});
   // Default fill values of netCDF do not apply here: -32767 is the default of a short.
-  const Store store;
+  const ZarrStore store;
   store.put("f/.zarray", array_json("[1,2]", "[1,2]", "<i2"));
   store.put("f/0.0", bytes_of_items<std::int16_t>({-32767, 1}));
   expect_same(store.values(), {-32767, 1});
@@ -251,7 +126,7 @@ TEST(Zarr, MissingChunkIsTheFillValueAndNeverZeroByChance) {
 
 TEST(Zarr, DanglingChunkLinkIsAnErrorNotAMissingChunk) {
   namespace fs = std::filesystem;
-  const Store store;
+  const ZarrStore store;
   store.put("f/.zarray", array_json("[1,4]", "[1,2]", "<i2", "-9"));
   store.put("f/0.0", bytes_of_items<std::int16_t>({7, 0}));
   fs::create_symlink("moved", store.path() + "/f/0.1");
@@ -259,7 +134,7 @@ TEST(Zarr, DanglingChunkLinkIsAnErrorNotAMissingChunk) {
   store.put("f/moved", bytes_of_items<std::int16_t>({1, 2}));
   expect_same(store.values(), {7, 0, 1, 2});
 
-  const Store nested("n.zarr");
+  const ZarrStore nested("n.zarr");
   nested.put("f/.zarray",
              array_json("[2,2]", "[1,2]", "<i2", "-9", "null", R"(,"dimension_separator":"/")"));
   nested.put("f/0/0", bytes_of_items<std::int16_t>({7, 0}));
@@ -271,9 +146,9 @@ TEST(Zarr, DanglingChunkLinkIsAnErrorNotAMissingChunk) {
 
 TEST(Zarr, AttributesOfXarrayPackMaskAndOrient) {
   for (const bool consolidated : {false, true}) {
-    const Store store("named.zarr");
-    store.axis("lat", {10, 0}, "degrees_north");
-    store.axis("lon", {0, 20, 40}, "degrees_east");
+    const ZarrStore store("named.zarr");
+    add_axis(store, "lat", {10, 0}, "degrees_north");
+    add_axis(store, "lon", {0, 20, 40}, "degrees_east");
     const std::string array = array_json("[2,3]", "[2,3]", "<i2", "-1");
     // Python writes a bare NaN.
     const std::string attributes =
@@ -310,7 +185,7 @@ TEST(Zarr, AttributesOfXarrayPackMaskAndOrient) {
 }
 
 TEST(Zarr, FiltersAreReversedLastFirst) {
-  const Store store;
+  const ZarrStore store;
   std::string json = array_json("[1,4]", "[1,4]", "<f8");
   json.replace(json.find("\"filters\":null"), 14,
                R"("filters":[{"id":"fixedscaleoffset","dtype":"<f8","astype":"<i2","scale":4,)"
@@ -322,7 +197,7 @@ TEST(Zarr, FiltersAreReversedLastFirst) {
 }
 
 TEST(Zarr, UnsupportedArraysAreReportedWithReason) {
-  const Store store;
+  const ZarrStore store;
   store.put("f/.zarray", array_json("[1,2]", "[1,2]", "|u1"));
   store.put("f/0.0", "ab");
   const auto reason_of = [&](const std::string& name, const std::string& json) -> std::string {
@@ -349,7 +224,7 @@ TEST(Zarr, UnsupportedArraysAreReportedWithReason) {
 
 TEST(Zarr, BrokenMetadataIsRefused) {
   const auto fault_of = [](const std::string& json) {
-    const Store store;
+    const ZarrStore store;
     store.put("f/.zarray", json);
     return store.fault();
   };
@@ -371,16 +246,8 @@ TEST(Zarr, BrokenMetadataIsRefused) {
   EXPECT_THAT(fault_of(std::string(100000, '[')), HasSubstr("32 levels"));
 }
 
-TEST(Zarr, VersionThreeIsRefusedByName) {
-  const Folder folder;
-  write(folder / "v3/zarr.json", R"({"zarr_format":3,"node_type":"group"})");
-  auto source = open_file(folder / "v3");
-  ASSERT_FALSE(source);
-  EXPECT_THAT(source.error().message, HasSubstr("version 3"));
-}
-
 TEST(Zarr, TheDigestChangesWithAChunk) {
-  const Store store;
+  const ZarrStore store;
   store.put("f/.zarray", array_json("[1,2]", "[1,2]", "|u1"));
   const auto digest = [&] { return open_file(store.path()).value()->info().digest; };
   const std::string absent = digest();

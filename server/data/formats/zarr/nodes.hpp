@@ -1,0 +1,39 @@
+// The arrays of a store and their metadata, of either version, consolidated or not.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/files/files.hpp"
+#include "server/data/formats/zarr/json.hpp"
+#include "server/data/formats/zarr/multiscale.hpp"
+
+namespace windsplat::data::zarr {
+
+struct Node {
+  std::string path;  // below the store, empty or ending in '/'
+  std::string name;
+  Json metadata;  // .zarray or zarr.json
+  Json attributes;
+};
+
+struct Nodes {
+  int version = 2;
+  std::vector<Node> arrays;         // of the root or of the finest level
+  std::vector<std::string> groups;  // not searched
+  Json attributes;                  // of the root
+  std::optional<Multiscale> multiscale;
+  std::string identity;  // of the files read
+};
+
+// Errors: bad_data.
+Result<Nodes> find_nodes(Files& files);
+
+Error broken_store(const std::string& place, const std::string& what);
+
+// Whether a name of a store may be the name of a file.
+bool is_plain_name(std::string_view name);
+
+}  // namespace windsplat::data::zarr
