@@ -33,7 +33,10 @@ RULES = {"raw+json": "listed", "grads": "near undef"}
 
 def model_of(kind, dice):
     if kind in values.CF:
-        return models.cf_model(kind, dice)
+        out = models.cf_model(kind, dice)
+        if kind == "zarr":
+            out.options |= layout.zarr_version(dice)
+        return out
     if kind in values.GRIB:
         return model_grib.grib_model(kind, dice)
     steps = int(dice.integers(*STEPS.get(kind, (1, 2))))

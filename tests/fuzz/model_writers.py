@@ -1,5 +1,6 @@
 """Model -> the files of a dataset: netCDF through the C library, other formats byte by byte."""
 
+import base64
 import gzip
 import json
 import struct
@@ -11,6 +12,7 @@ import model as models
 import model_grib
 import seeds
 import seeds_vtk
+import zarr3_bytes
 
 ORDERS = {"little": "<", "big": ">"}
 
@@ -102,44 +104,79 @@ def with_tables(data, layers, tables):
 # --- Zarr ----------------------------------------------------------------------------------------
 
 def zarr(model):
-    files = {".zgroup": b'{"zarr_format": 2}', ".zattrs": b'{"title": "A storm"}'}
+    options = model.options
+    version = options.get("version", 2)
+    title = {"title": "A storm"}
+    files = {"zarr.json": zarr3_bytes.group(title)} if version == 3 else {
+        ".zgroup": b'{"zarr_format": 2}', ".zattrs": json.dumps(title).encode()}
+    write = zarr3_array if version == 3 else zarr_array
     for a in "tzyx":
         axis = model.axes[a]
-        files |= zarr_array(axis.name, axis.values, axis.values.shape, [axis.name],
-                            dict(axis.attributes), {})
+        files |= write(axis.name, chunked(axis.values, axis.values.shape), [axis.name],
+                       dict(axis.attributes), {})
     dims = [model.axes[a].name for a in "tzyx"]
     for field in model.fields:
-        made = zarr_array(field.name, field.written(), model.options.get("chunks", model.shape),
-                          dims, dict(field.attributes), model.options)
-        if "tables" in model.options:
-            keys = {at: f"{field.name}/{at[0]}.{at[1]}.0.0" for at in np.ndindex(model.shape[:2])}
-            table = {at: made.pop(key) for at, key in keys.items()}
-            for change in model.options["tables"]:
+        parts = chunked(field.written(), options.get("chunks", model.shape))
+        if "tables" in options:
+            table = {at[:2]: part for at, part in parts.items.items()}
+            for change in options["tables"]:
                 change(table)
-            made |= {keys[at]: part for at, part in table.items()}
-        files |= made
+            parts.items = {(*at, 0, 0): part for at, part in table.items()}
+        files |= write(field.name, parts, dims, dict(field.attributes), options)
     return {f"s.zarr/{name}": data for name, data in files.items()}, "s.zarr"
 
 
-def zarr_array(name, values, chunks, dims, attributes, options):
+class Chunks:
+    """An array of a shape and type, as chunks by place; those at an edge are filled with zeros."""
+
+    def __init__(self, values, chunks):
+        self.shape = [int(n) for n in values.shape]
+        self.chunks = [int(n) for n in chunks]
+        self.dtype = values.dtype
+        self.items = {}
+
+
+def chunked(values, chunks):
+    out = Chunks(values, chunks)
+    for at in np.ndindex(*(-(-n // c) for n, c in zip(values.shape, chunks))):
+        part = values[tuple(slice(i * c, (i + 1) * c) for i, c in zip(at, chunks))]
+        out.items[at] = np.zeros(chunks, values.dtype)
+        out.items[at][tuple(slice(0, n) for n in part.shape)] = part
+    return out
+
+
+def zarr_array(name, parts, dims, attributes, options):
     order = ">" if options.get("endian") == "big" else "<"
     memory = options.get("memory", "C")
     compressor = options.get("compressor", "none")
     fill = attributes.pop("_FillValue", None)
-    dtype = values.dtype.newbyteorder(order) if values.dtype.itemsize > 1 else values.dtype
-    meta = {"zarr_format": 2, "shape": list(values.shape), "chunks": [int(n) for n in chunks],
+    dtype = parts.dtype.newbyteorder(order) if parts.dtype.itemsize > 1 else parts.dtype
+    meta = {"zarr_format": 2, "shape": parts.shape, "chunks": parts.chunks,
             "dtype": dtype.str, "order": memory, "filters": None,
             "fill_value": json_number(fill), "compressor": seeds.coded(b"0", compressor)[0]}
     plain = {key: json_number(value) for key, value in attributes.items()}
     files = {f"{name}/.zarray": json.dumps(meta).encode(),
              f"{name}/.zattrs": json.dumps({"_ARRAY_DIMENSIONS": dims} | plain).encode()}
-    for at in np.ndindex(*(-(-n // c) for n, c in zip(values.shape, chunks))):
-        part = values[tuple(slice(i * c, (i + 1) * c) for i, c in zip(at, chunks))]
-        whole = np.zeros(chunks, dtype)
-        whole[tuple(slice(0, n) for n in part.shape)] = part
-        files[f"{name}/{'.'.join(map(str, at))}"] = seeds.coded(whole.tobytes(memory),
-                                                                compressor)[1]
+    for at, part in parts.items.items():
+        files[f"{name}/{'.'.join(map(str, at))}"] = seeds.coded(
+            part.astype(dtype).tobytes(memory), compressor)[1]
     return files
+
+
+def zarr3_array(name, parts, dims, attributes, options):
+    """As xarray writes it: _FillValue is an attribute, of floats in base64."""
+    endian = options.get("endian", "little")
+    memory = options.get("memory", "C")
+    dtype = parts.dtype.newbyteorder(ORDERS[endian])
+    fill = attributes.get("_FillValue", 0)
+    plain = {key: json_number(value) for key, value in attributes.items()}
+    if "_FillValue" in plain and parts.dtype.kind == "f":
+        plain["_FillValue"] = base64.b64encode(struct.pack("<d", fill)).decode()
+    stored = {at: part.astype(dtype).tobytes(memory) for at, part in parts.items.items()}
+    return zarr3_bytes.array(name, parts.shape, parts.chunks, parts.dtype.name, stored, dims, plain,
+                             fill=json_number(fill), endian=endian, memory=memory,
+                             compressor=options.get("compressor", "none"),
+                             **options.get("shards", {}))
 
 
 def json_number(value):

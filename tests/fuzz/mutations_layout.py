@@ -177,6 +177,15 @@ def odd_times(model, dice):
 
 # --- storage -------------------------------------------------------------------------------------
 
+def zarr_version(dice):
+    """Version 2 or 3, with shards or without."""
+    options = {"version": 2 + int(dice.integers(2))}
+    if options["version"] == 3 and dice.random() < 0.6:
+        options["shards"] = {"shards": [int(n) for n in dice.integers(1, 4, 4)],
+                             "at_start": bool(dice.integers(2)), "summed": bool(dice.integers(2))}
+    return options
+
+
 def stored_otherwise(model, dice):
     """The same numbers in another coding, byte order, layout or order of dimensions."""
     options = model.options

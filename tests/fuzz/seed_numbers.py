@@ -1,7 +1,9 @@
 """Common to the small files of all formats: the type Seed, its grid and its numbers."""
 
+import gzip
 import math
 import struct
+import zlib
 
 DIMS = (8, 6, 4)  # x, y, z
 COUNT = math.prod(DIMS)
@@ -50,3 +52,20 @@ def lz4_block(data):
         return bytes([len(data) << 4]) + data
     rest = len(data) - 15
     return b"\xf0" + b"\xff" * (rest // 255) + bytes([rest % 255]) + data
+
+
+def coded(data, compressor):
+    if compressor == "zlib":
+        return {"id": "zlib", "level": 1}, zlib.compress(data)
+    if compressor == "gzip":
+        return {"id": "gzip", "level": 1}, gzip.compress(data, mtime=0)
+    if compressor == "lz4":
+        return {"id": "lz4", "acceleration": 1}, struct.pack("<I", len(data)) + lz4_block(data)
+    if compressor == "zstd":
+        frame = struct.pack("<IBI", 0xFD2FB528, 0xA0, len(data))
+        return {"id": "zstd", "level": 1}, frame + struct.pack("<I", 1 | len(data) << 3)[:3] + data
+    if compressor == "blosc":
+        head = struct.pack("<BBBBIII", 2, 1, 2, 4, len(data), len(data), len(data) + 16)
+        return {"id": "blosc", "cname": "lz4", "clevel": 5, "shuffle": 1, "blocksize": 0}, \
+            head + data
+    return None, data

@@ -9,11 +9,11 @@ import re
 import shutil
 import struct
 import subprocess
-import zlib
 
 import hdf5_bytes
 import seeds_vtk
-from seed_numbers import DIMS, Seed, as_text, floats, interleaved, lz4_block, numbers, winds
+import zarr3_bytes
+from seed_numbers import DIMS, Seed, as_text, coded, floats, interleaved, numbers, winds
 
 REAL_BYTES_MAX = 300_000
 
@@ -116,23 +116,6 @@ def dx_seeds():
 
 # --- Zarr ----------------------------------------------------------------------------------------
 
-def coded(data, compressor):
-    if compressor == "zlib":
-        return {"id": "zlib", "level": 1}, zlib.compress(data)
-    if compressor == "gzip":
-        return {"id": "gzip", "level": 1}, gzip.compress(data, mtime=0)
-    if compressor == "lz4":
-        return {"id": "lz4", "acceleration": 1}, struct.pack("<I", len(data)) + lz4_block(data)
-    if compressor == "zstd":
-        frame = struct.pack("<IBI", 0xFD2FB528, 0xA0, len(data))
-        return {"id": "zstd", "level": 1}, frame + struct.pack("<I", 1 | len(data) << 3)[:3] + data
-    if compressor == "blosc":
-        head = struct.pack("<BBBBIII", 2, 1, 2, 4, len(data), len(data), len(data) + 16)
-        return {"id": "blosc", "cname": "lz4", "clevel": 5, "shuffle": 1, "blocksize": 0}, \
-            head + data
-    return None, data
-
-
 def zarr_array(name, shape, chunks, dtype, compressor, parts, dims, attributes):
     how = coded(b"0" * 16, compressor)[0]
     meta = {"zarr_format": 2, "shape": shape, "chunks": chunks, "dtype": dtype, "order": "C",
@@ -144,20 +127,26 @@ def zarr_array(name, shape, chunks, dtype, compressor, parts, dims, attributes):
     return files
 
 
+WINDS = (("u", "eastward_wind"), ("v", "northward_wind"), ("w", "upward_air_velocity"))
+AXES = (("time", [0.0], "hours since 2001-01-01"), ("lev", [1000.0, 850.0, 500.0, 200.0], "hPa"),
+        ("lat", [30.0 * i - 75 for i in range(DIMS[1])], "degrees_north"),
+        ("lon", [45.0 * i for i in range(DIMS[0])], "degrees_east"))
+
+
+def layer_pairs(component):
+    return [floats(numbers(component)[k * 96:(k + 1) * 96]) for k in range(2)]
+
+
 def zarr_files(compressor, consolidated=False):
     nx, ny, nz = DIMS
     files = {".zgroup": b'{"zarr_format": 2}', ".zattrs": b'{"title": "A storm"}'}
-    for c, (name, long_name) in enumerate((("u", "eastward_wind"), ("v", "northward_wind"),
-                                           ("w", "upward_air_velocity"))):
-        layers = [floats(numbers(c)[k * 96:(k + 1) * 96]) for k in range(2)]
+    for c, (name, long_name) in enumerate(WINDS):
+        layers = layer_pairs(c)
         files |= zarr_array(name, [1, nz, ny, nx], [1, 2, ny, nx], "<f4", compressor,
                             {f"0.{k}.0.0": layer for k, layer in enumerate(layers)},
                             ["time", "lev", "lat", "lon"],
                             {"units": "m s-1", "standard_name": long_name})
-    for name, values, units in (("time", [0.0], "hours since 2001-01-01"),
-                                ("lev", [1000.0, 850.0, 500.0, 200.0], "hPa"),
-                                ("lat", [30.0 * i - 75 for i in range(ny)], "degrees_north"),
-                                ("lon", [45.0 * i for i in range(nx)], "degrees_east")):
+    for name, values, units in AXES:
         data = struct.pack(f"<{len(values)}d", *values)
         files |= zarr_array(name, [len(values)], [len(values)], "<f8", compressor, {"0": data},
                             [name], {"units": units})
@@ -169,9 +158,50 @@ def zarr_files(compressor, consolidated=False):
     return {f"s.zarr/{name}": data for name, data in files.items()}
 
 
+def zarr3_files(consolidated=False, **storage):
+    nx, ny, nz = DIMS
+    files = {}
+    for c, (name, long_name) in enumerate(WINDS):
+        parts = {(0, k, 0, 0): layers for k, layers in enumerate(layer_pairs(c))}
+        files |= zarr3_bytes.array(name, [1, nz, ny, nx], [1, 2, ny, nx], "float32", parts,
+                                   ["time", "lev", "lat", "lon"],
+                                   {"units": "m s-1", "standard_name": long_name}, **storage)
+    for name, values, units in AXES:
+        files |= zarr3_bytes.array(name, [len(values)], [len(values)], "float64",
+                                   {(0,): struct.pack(f"<{len(values)}d", *values)}, [name],
+                                   {"units": units})
+    members = {key.removesuffix("/zarr.json"): json.loads(text) for key, text in files.items()
+               if key.endswith("zarr.json")}
+    root = zarr3_bytes.group({"title": "A storm"}, members if consolidated else None)
+    return {f"s.zarr/{name}": data for name, data in ({"zarr.json": root} | files).items()}
+
+
+def image_files():
+    """OME-Zarr 0.5, two levels."""
+    nx, ny, nz = DIMS
+    axes = [{"name": "c", "type": "channel"}] + [
+        {"name": name, "type": "space", "unit": "micrometer"} for name in "zyx"]
+    levels = [{"path": str(level), "coordinateTransformations": [
+        {"type": "scale", "scale": [1, 0.5, scale, scale]}]} for level, scale in ((0, 1), (1, 2))]
+    files = {"zarr.json": zarr3_bytes.group({"ome": {"version": "0.5", "multiscales": [
+        {"axes": axes, "datasets": levels}]}})}
+    for level, scale in (("0", 1), ("1", 2)):
+        shape = [1, nz, ny // scale, nx // scale]
+        parts = {(0, k, 0, 0): bytes(range(shape[2] * shape[3])) for k in range(nz - 1)}
+        files |= zarr3_bytes.array(level, shape, [1, 1, *shape[2:]], "uint8", parts,
+                                   ["c", "z", "y", "x"], {}, shards=[1, nz, 1, 1])
+    return {f"s.zarr/{name}": data for name, data in files.items()}
+
+
 def zarr_seeds():
     for compressor in ("none", "zlib", "gzip", "lz4", "zstd", "blosc"):
         yield Seed("zarr", compressor, zarr_files(compressor, compressor == "zlib"), path="s.zarr")
+    for name, storage in (("plain", {}), ("blosc", {"compressor": "blosc", "summed": True}),
+                          ("sharded", {"shards": [1, 2, 1, 1], "compressor": "zstd"}),
+                          ("index first", {"shards": [1, 2, 1, 1], "at_start": True}),
+                          ("consolidated", {"consolidated": True, "compressor": "gzip"})):
+        yield Seed("zarr", f"3 {name}", zarr3_files(**storage), path="s.zarr")
+    yield Seed("zarr", "3 image", image_files(), path="s.zarr")
 
 
 # --- HDF5, netCDF, GRIB, real files --------------------------------------------------------------
