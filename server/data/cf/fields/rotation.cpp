@@ -18,13 +18,26 @@ class Tangents {
  public:
   explicit Tangents(const Columns& columns) : columns_(columns) {}
 
-  // Direction from one column to another, in the tangent plane at a third.
-  [[nodiscard]] Plane between(std::size_t from, std::size_t to, std::size_t seen_from) const {
-    const auto a = place(from);
-    const auto b = place(to);
-    const double longitude = columns_.longitude[seen_from] * degree;
-    const double latitude = columns_.latitude[seen_from] * degree;
-    const std::array<double, 3> way{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+  // Direction of a line of `count` columns, `stride` apart, at column n, the index-th of them: in
+  // the tangent plane. At an end that of the parabola through three columns.
+  [[nodiscard]] Plane along(std::size_t n, std::size_t index, std::size_t count,
+                            std::size_t stride) const {
+    const bool at_start = index == 0;
+    const bool at_end = index + 1 >= count;
+    const double longitude = columns_.longitude[n] * degree;
+    const double latitude = columns_.latitude[n] * degree;
+    Way way = from_to(at_start ? n : n - stride, at_end ? n : n + stride);
+    if (at_start != at_end && count > 2) {
+      const std::size_t far = at_start ? n + 2 * stride : n - 2 * stride;
+      const Way beyond = at_start ? from_to(n + stride, far) : from_to(far, n - stride);
+      const double near_length = length_of(way);
+      const double far_length = length_of(beyond);
+      // Derivative at 0 of the parabola through 0, near and near + far, times a positive factor.
+      const double turn = far_length > 0 ? near_length / far_length : 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        way[c] += turn * (way[c] - turn * beyond[c]) / (1 + turn);
+      }
+    }
     const double outward = std::cos(longitude) * way[0] + std::sin(longitude) * way[1];
     Plane plane{-std::sin(longitude) * way[0] + std::cos(longitude) * way[1],
                 -std::sin(latitude) * outward + std::cos(latitude) * way[2]};
@@ -37,7 +50,14 @@ class Tangents {
   }
 
  private:
+  using Way = std::array<double, 3>;
   static constexpr double degree = std::numbers::pi / 180.0;
+  static double length_of(const Way& way) { return std::hypot(way[0], way[1], way[2]); }
+  [[nodiscard]] Way from_to(std::size_t from, std::size_t to) const {
+    const auto a = place(from);
+    const auto b = place(to);
+    return {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+  }
   [[nodiscard]] std::array<double, 3> place(std::size_t n) const {
     const double longitude = columns_.longitude[n] * degree;
     const double latitude = columns_.latitude[n] * degree;
@@ -59,8 +79,8 @@ GridBearing bearing_of(const Columns& columns, std::size_t width) {
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t i = n % width;
     const std::size_t j = n / width;
-    x[n] = tangents.between(n - (i > 0 ? 1 : 0), n + (i + 1 < width ? 1 : 0), n);
-    y[n] = tangents.between(n - (j > 0 ? width : 0), n + (j + 1 < height ? width : 0), n);
+    x[n] = tangents.along(n, i, width, 1);
+    y[n] = tangents.along(n, j, height, width);
     turning += x[n].east * y[n].north - x[n].north * y[n].east;
   }
   GridBearing bearing;
