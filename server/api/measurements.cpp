@@ -219,8 +219,11 @@ http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& datase
     if (cancel.cancelled()) {
       return http::problem_response(make_error(ErrorKind::cancelled, "request cancelled"));
     }
-    const auto volume =
-        load(catalogue, dataset, field.name, static_cast<std::size_t>(step), cancel);
+    const auto at_step = static_cast<std::size_t>(step);
+    // Derived fields only if a picture has needed them: computing all would take seconds.
+    const auto volume = field.derived ? dataset.resident_only().volume(field.name, at_step)
+                                      : load(catalogue, dataset, field.name, at_step, cancel);
+    if (!volume && field.derived) continue;
     if (!volume) return http::problem_response(volume.error());
     out.fields.push_back(describe(field));
     out.values.push_back(data::value_at(**volume, place->index));

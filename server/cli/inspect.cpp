@@ -101,7 +101,7 @@ std::string largest_field(const data::DatasetInfo& info) {
   std::string name;
   std::size_t components = 0;
   for (const data::FieldInfo& field : info.fields) {
-    if (field.components.size() <= components) continue;
+    if (field.derived || field.components.size() <= components) continue;
     components = field.components.size();
     name = field.name;
   }

@@ -40,7 +40,7 @@ const std::vector<Kind>& kinds() {
        {},
        {"sunset", 0.05, 12, false}},
       {{"rain", "snow", "precip", "hail", "graupel"}, {"qr", "qs", "qg"}, {"ice", 0.05, 12, false}},
-      {{"vortic", "helicity"}, {}, {"plasma", 0.10, 10, false}},
+      {{"vortic", "helicity", "q_criterion"}, {}, {"plasma", 0.10, 10, false}},
       {{"humidity", "water", "vapor", "vapour", "moist"},
        {"q", "qv", "hus", "hur", "rh", "r", "shum", "rhum"},
        {"ice", 0.45, 8, false}},
@@ -290,7 +290,7 @@ std::vector<std::string> default_scalars(const data::DatasetInfo& info) {
   std::size_t best_kind = kinds().size();
   const data::FieldInfo* body = nullptr;
   for (const data::FieldInfo& field : info.fields) {
-    if (field.kind != data::FieldKind::scalar) continue;
+    if (field.kind != data::FieldKind::scalar || field.derived) continue;
     if (is_body(field)) {
       if (body == nullptr) body = &field;
       continue;

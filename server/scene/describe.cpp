@@ -140,7 +140,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
       description.range_of = ranges == RangesOf::all_steps ? "all" : "step";
       if (auto ok = add_range(dataset, steps, description); !ok) return ok.error();
     }
-    components += field.components.size();
+    if (!field.derived) components += field.components.size();
     out.fields.push_back(std::move(description));
   }
   for (const data::LeftOut& left : info.left_out) out.left_out.emplace_back(left.name, left.reason);

@@ -126,7 +126,7 @@ def empty_test_folders(root, files):
     """CMake silently accepts a test folder without sources."""
     listing = root / "tests" / "CMakeLists.txt"
     if listing.exists():
-        for name, named in re.findall(r"^windsplat_test\((\w+) (\S+)", listing.read_text(), re.M):
+        for name, named in re.findall(r"^windsplat_test\((\w+)\s+(\S+)", listing.read_text(), re.M):
             for folder in named.strip('"').split(";"):
                 here = [file for path, file in files
                         if re.fullmatch(rf"tests/{folder}/.+\.cpp", path)]
@@ -146,7 +146,7 @@ def tests_left_out(root, files):
     listing = root / "tests" / "CMakeLists.txt"
     if not listing.exists():
         return
-    call = r"^windsplat_test\((\w+) (\"[^\"]*\"|\S+)([^)]*)\)"
+    call = r"^windsplat_test\((\w+)\s+(\"[^\"]*\"|\S+)([^)]*)\)"
     tests = re.findall(call, listing.read_text(), re.M)
     listed = []
     for name, named, options in tests:

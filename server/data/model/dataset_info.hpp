@@ -52,7 +52,8 @@ struct FieldInfo {
   bool derived = false;  // computed on request from other fields, not stored in the file
   // Bytes decoded to read one step, including whole chunks; 0 if equal to the size of the volume.
   std::uint64_t decoded_bytes = 0;
-  std::uint64_t chunk_bytes = 0;  // the largest chunk, decoded
+  std::uint64_t chunk_bytes = 0;  // the largest chunk, decoded; at least the fields that a derived
+                                  // one is computed from, while it is
 };
 
 // A variable of the file that is not shown, with the reason.

@@ -14,6 +14,7 @@
 #include "server/data/cf/series.hpp"
 #include "server/data/cf/source.hpp"
 #include "server/data/cf/staggered/collocated_file.hpp"
+#include "server/data/derived/source.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/files/pattern.hpp"
 #include "server/data/formats/dx/file.hpp"
@@ -172,7 +173,7 @@ SourceResult open_dataset(const std::shared_ptr<Files>& files) {
       return make_error(ErrorKind::bad_data, shown + ": " + ok.error().message);
     }
     files->stop_counting();  // a series or store may open any number of files later
-    return source;
+    return derived::with_derived_fields(std::move(*source));
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "not enough memory to open " + shown);
   } catch (const std::exception& fault) {

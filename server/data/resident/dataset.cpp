@@ -165,7 +165,11 @@ struct Dataset::State {
       counts.prefetched += urgency == Urgency::prefetch ? 1 : 0;
       loading = Loading{info.fields[field].name, step, 0};
     }
-    auto volume = guarded(info.fields[field], [&] { return source->read(field, step); });
+    Reservation inputs(budget);  // of a derived field of a sample; a loader counts its own memory
+    const auto held =
+        inputs.resize(info.stored_bytes == 0 ? info.fields[field].chunk_bytes : 0, urgency);
+    auto volume = held ? guarded(info.fields[field], [&] { return source->read(field, step); })
+                       : Result<Resident>(held.error());
     {
       const std::lock_guard lock(mutex);
       loading.reset();
@@ -269,9 +273,7 @@ Result<Resident> Dataset::get(const ResidentKey& key, std::uint64_t bytes,
 
 Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
   const Result<std::size_t> index = state_->find(field, step);
-  if (!index) {
-    return index.error();
-  }
+  if (!index) return index.error();
   const ResidentKey key{state_->owner, *index, step, ""};
   if (manner_ == Manner::resident_only) {
     const Resident there = state_->budget->find_now(key);

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "server/base/log.hpp"
+#include "server/data/derived/source.hpp"
 #include "server/data/files/locate_parts.hpp"
 #include "server/data/open/open.hpp"
 #include "server/data/resident/prefetch_thread.hpp"
@@ -30,6 +31,12 @@ Result<std::unique_ptr<Source>> open_here(const Location& location) {
   auto source = open_dataset(direct_files(location));
   if (!source) return source.error();
   return std::unique_ptr<Source>(std::move(*source));
+}
+
+Result<std::unique_ptr<Source>> sample_source(const SizedSample& sample) {
+  auto source = open_sample(sample.name, sample.dims);
+  if (!source) return source.error();
+  return std::unique_ptr<Source>(derived::with_derived_fields(std::move(*source)));
 }
 
 double now_s() {
@@ -269,7 +276,7 @@ Store::~Store() = default;
 Result<DatasetPtr> Store::add(const std::string& sample_or_path) {
   if (const auto sample = sized_sample(sample_or_path)) {
     auto added = state_->add("sample:" + sample_or_path, printable(sample_or_path), std::nullopt,
-                             [&] { return open_sample(sample->name, sample->dims); });
+                             [&] { return sample_source(*sample); });
     if (!added) return added.error();
     return std::move(added->dataset);
   }

@@ -70,8 +70,9 @@ TEST_F(Measures, ProbeReturnsEveryFieldAtTheNearestSample) {
   const Json probe = ask("probe" + near(5, 3, 2) + "&step=1");
   EXPECT_EQ(probe["step"], 1);
   EXPECT_EQ(probe["position"]["index"], Json({{"x", 5}, {"y", 3}, {"z", 2}}));
-  EXPECT_EQ(probe["values"].size(), dataset_->info().fields.size());
   for (const auto& info : dataset_->info().fields) {
+    EXPECT_EQ(probe["values"].contains(info.name), !info.derived) << info.name;
+    if (info.derived) continue;
     const Json& told = probe["values"][info.name];
     const auto there = volume(info.name, 1);
     EXPECT_EQ(told["units"], info.units);

@@ -304,6 +304,22 @@ TEST(Presets, ChangeTheNamedProperties) {
   EXPECT_EQ(refused.error().at.at(0).pointer, "/preset");
 }
 
+TEST(Describe, DerivedFieldsAreListedButNeitherReadNorShownNorCounted) {
+  auto reads = std::make_shared<FakeSource::Reads>();
+  auto vorticity = scalar_info("wind_vertical_vorticity", "s-1");
+  vorticity.derived = true;
+  auto dataset = dataset_of(std::make_unique<FakeSource>(
+      atmosphere_grid(),
+      std::vector<data::FieldInfo>{wind_info(), scalar_info("temperature", "K"), vorticity}, 1,
+      reads));
+  const auto told = *describe(*dataset, RangesOf::all_steps);
+  ASSERT_EQ(told.fields.size(), 3U);
+  EXPECT_FALSE(told.fields[2].range);
+  EXPECT_EQ(reads->count("wind_vertical_vorticity@0"), 0U);
+  EXPECT_EQ(told.default_view.scalars->size(), 0U);
+  EXPECT_EQ(told.bytes_when_resident, 4U * 36U * 4U);
+}
+
 TEST(Describe, LoadsNothingUnlessRangesAreRequested) {
   auto dataset = weather();
   const auto brief = *describe(*dataset, RangesOf::none);

@@ -158,9 +158,11 @@ TEST(NetcdfFields, VectorInfoReplacesThatOfItsComponents) {
   auto source = open_file(folder / "w.nc");
   ASSERT_TRUE(source) << source.error().message;
   const DatasetInfo& info = (*source)->info();
-  ASSERT_EQ(info.fields.size(), 6U);  // wind, its three components, and derived fields
+  ASSERT_EQ(info.fields.size(), 14U);  // wind, its three components, and derived fields
   EXPECT_EQ(info.fields[4].name, "standard_height");
   EXPECT_EQ(info.fields[5].name, "wind_m");
+  EXPECT_EQ(info.fields[6].name, "wind_horizontal_speed");
+  EXPECT_EQ(info.fields[13].name, "wind_m_helicity");
   const FieldInfo& wind = info.fields[0];
   EXPECT_EQ(wind.name, "wind");
   EXPECT_EQ(wind.kind, FieldKind::vector);
