@@ -16,7 +16,8 @@ const [width, height] = [320, 200]; // size of a card's picture in pixels
 const many = (count: number, what: string): string => `${count} ${what}${count === 1 ? "" : "s"}`;
 
 export function cardText({ fields, steps }: DatasetSummary, dims = ""): string {
-  const names = fields.map(({ name }) => name).join(", ");
+  const stored = fields.filter(({ dtype }) => dtype !== "derived");
+  const names = stored.map(({ name }) => name).join(", ");
   return [...(dims === "" ? [] : [dims]), many(steps, "step"), names].join(" · ");
 }
 
