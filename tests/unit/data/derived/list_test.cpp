@@ -78,6 +78,14 @@ TEST(DerivedFields, OneLayerHasThoseOfTheLevelsOnly) {
             (Names{"v_speed", "v_horizontal_speed", "v_vertical_vorticity", "v_divergence"}));
 }
 
+TEST(DerivedFields, ASectionHasSpeedsOnly) {
+  for (const std::size_t normal : {0U, 1U}) {
+    Grid grid = box();
+    grid.axes.at(normal).coordinates = {0};
+    EXPECT_EQ(names_of(grid, velocity), (Names{"v_speed", "v_horizontal_speed"})) << normal;
+  }
+}
+
 TEST(DerivedFields, ANameOfTheFileIsLeftToIt) {
   auto source = std::make_unique<FormulaSource>(box());
   source->add("v", velocity, zero);

@@ -206,32 +206,51 @@ TEST(DerivedOnASphere, AMirroredGridHasTheSameVorticity) {
   EXPECT_LT(greatest_error(curl, expected, 2), 1e-8);  // of about 1e-5
 }
 
-// What differs between neighbours along x differs less than this if differences go around.
-void expect_no_seam(const Grid& grid) {
-  const auto flow = [&](std::size_t, std::size_t j, std::size_t) {
-    const double c = std::cos(grid.axes[1].coordinates[j] * degree);
-    return Vec{20 * c * c, 0, 0};
+// The divergence of a zonal wave that is `shift` samples further east, at sample i of row 4; twelve
+// samples go around the globe.
+double divergence_at(const Grid& grid, std::size_t i, std::size_t shift) {
+  const auto wave = [&](std::size_t at, std::size_t, std::size_t) {
+    const std::size_t phase = (at + 12 - shift) % 12;
+    return Vec{static_cast<double>(phase * phase), 0, 0};
   };
-  const Volume curl = derived_of(grid, horizontal, flow, "v_vertical_vorticity");
-  const auto width = static_cast<std::size_t>(curl.dims[0]);
-  for (std::size_t j = 0; j < static_cast<std::size_t>(curl.dims[1]); ++j) {
-    const float* row = curl.values.data() + j * width;
-    for (const std::size_t i : {std::size_t{0}, width - 1}) {
-      EXPECT_NEAR(static_cast<double>(row[i]), static_cast<double>(row[width / 2]), 1e-12);
-    }
-  }
+  const Volume divergence = derived_of(grid, horizontal, wave, "v_divergence");
+  return static_cast<double>(
+      divergence.values.data()[4 * static_cast<std::size_t>(divergence.dims[0]) + i]);
 }
 
 TEST(DerivedOnASphere, LongitudesThatCloseACircleHaveNoSeam) {
   Grid grid = globe(12, 9, -60, 60);
-  expect_no_seam(grid);
-  grid.axes[0].coordinates.push_back(360);  // the first meridian again
-  expect_no_seam(grid);
+  Grid closed = grid;
+  closed.axes[0].coordinates.push_back(360);  // the first meridian again
+  for (const std::size_t shift : {0U, 3U}) {
+    const double inside = divergence_at(grid, 5, 5 + shift);
+    EXPECT_NE(inside, 0);
+    for (const Grid& one : {grid, closed}) {
+      EXPECT_NEAR(divergence_at(one, 0, shift) / inside, 1, 1e-6);
+      EXPECT_NEAR(divergence_at(one, 11, (11 + shift) % 12) / inside, 1, 1e-6);
+    }
+    EXPECT_NEAR(divergence_at(closed, 12, shift) / inside, 1, 1e-6);
+  }
+}
+
+TEST(DerivedOnASphere, ColumnsThatCloseACircleHaveNoSeam) {
+  Grid grid = globe(12, 9, -60, 60);
+  Columns columns;
+  for (const double latitude : grid.axes[1].coordinates) {
+    for (const double longitude : grid.axes[0].coordinates) {
+      columns.longitude.push_back(longitude);
+      columns.latitude.push_back(latitude);
+    }
+  }
+  grid.columns = std::make_shared<const Columns>(std::move(columns));
+  const double inside = divergence_at(grid, 5, 7);
+  // The directions of columns are one-sided there: 30 degrees are 0.27 squared radians.
+  EXPECT_NEAR(divergence_at(grid, 0, 2) / inside, 1, 0.1);
 }
 
 TEST(DerivedOnASphere, APartOfACircleHasEnds) {
-  Grid grid = globe(12, 9, -60, 60);
-  grid.axes[0].coordinates.resize(8);
+  Grid grid = globe(36, 9, -60, 60);
+  grid.axes[0].coordinates.resize(24);
   // Growing with longitude: around the globe the ends would differ by all of it.
   const Volume divergence = derived_of(
       grid, horizontal,
@@ -239,8 +258,10 @@ TEST(DerivedOnASphere, APartOfACircleHasEnds) {
         return Vec{static_cast<double>(i), 0, 0};
       },
       "v_divergence");
-  for (std::size_t i = 0; i < 8; ++i) {
-    EXPECT_GT(divergence.values.data()[8 * 4 + i], 0.0F) << i;
+  const double expected = 1 / (earth_radius_m * 10 * degree);  // at the equator, row 4
+  for (std::size_t i = 0; i < 24; ++i) {
+    const double is = static_cast<double>(divergence.values.data()[24 * 4 + i]);
+    EXPECT_NEAR(is / expected, 1, 0.1) << i;
   }
 }
 
