@@ -26,9 +26,12 @@ constexpr std::size_t kept_bytes_most = std::size_t{512} << 20;
 constexpr std::size_t kept_shards_bytes = std::size_t{64} << 20;
 constexpr std::size_t open_file_bytes = std::size_t{2} << 20;
 
+std::size_t count_along(std::size_t length, std::size_t part) {
+  return length / part + (length % part != 0 ? 1 : 0);
+}
+
 std::uint64_t files_along(const ArrayMetadata& array, std::size_t d) {
-  const std::size_t length = array.file_shape()[d];
-  return array.shape[d] / length + (array.shape[d] % length != 0 ? 1 : 0);
+  return count_along(array.shape[d], array.file_shape()[d]);
 }
 
 template <class T, class Out>
@@ -117,6 +120,31 @@ std::vector<std::size_t> strides_of(const std::vector<std::size_t>& lengths,
 std::vector<std::size_t> in_order(std::size_t rank) {
   std::vector<std::size_t> out(rank);
   std::iota(out.begin(), out.end(), std::size_t{0});
+  return out;
+}
+
+// A chunk of an array: its file, and its place in that file's index.
+struct ChunkPlace {
+  std::uint64_t file = 0;
+  std::size_t in_file = 0;
+  std::size_t per_file = 1;
+  [[nodiscard]] std::uint64_t number() const { return file * per_file + in_file; }
+};
+
+// place: indices of the chunk in the grid of all chunks.
+ChunkPlace place_of(const ArrayMetadata& array, const std::vector<std::size_t>& place) {
+  ChunkPlace out;
+  const std::vector<std::size_t>& shape = array.file_shape();
+  std::vector<std::size_t> along;  // chunks of a file
+  for (std::size_t d = 0; d < place.size(); ++d) {
+    along.push_back(shape[d] / array.chunks[d]);
+    out.file = out.file * files_along(array, d) + place[d] / along[d];
+    out.per_file *= along[d];
+  }
+  const auto strides = strides_of(along, array.shard ? array.shard->order : in_order(place.size()));
+  for (std::size_t d = 0; d < place.size(); ++d) {
+    out.in_file += place[d] % along[d] * strides[d];
+  }
   return out;
 }
 
@@ -232,7 +260,7 @@ Result<ChunkBytes> Store::load(const Array& array, std::uint64_t file_number,
     const auto shard = shard_at(array, file_number);
     if (!shard) return shard.error();
     file = (*shard)->file;
-    if (!file.input || (*shard)->index.at(in_file).bytes == absent_span) return ChunkBytes();
+    if ((*shard)->is_absent(in_file)) return ChunkBytes();
     if (auto same = file.input->check_unchanged(); !same) return same.error();
     span = (*shard)->index.at(in_file);
     place = "is damaged: its part " + std::to_string(in_file) + " ";
@@ -258,33 +286,48 @@ Result<ChunkBytes> Store::load(const Array& array, std::uint64_t file_number,
 Result<const ChunkBytes*> Store::chunk_at(int variable, const std::vector<std::size_t>& place,
                                           std::size_t kept_bytes_max) const {
   const Array& array = array_of(variable);
-  const ArrayMetadata& metadata = array.metadata;
-  const std::vector<std::size_t>& shape = metadata.file_shape();
-  std::uint64_t file_number = 0;
-  std::vector<std::size_t> along;    // chunks of a file
-  std::vector<std::size_t> in_file;  // place of this one
-  for (std::size_t d = 0; d < place.size(); ++d) {
-    along.push_back(shape[d] / metadata.chunks[d]);
-    in_file.push_back(place[d] % along[d]);
-    file_number = file_number * files_along(metadata, d) + place[d] / along[d];
-  }
-  std::size_t number = 0;
-  std::size_t count = 1;
-  const auto strides =
-      strides_of(along, metadata.shard ? metadata.shard->order : in_order(place.size()));
-  for (std::size_t d = 0; d < place.size(); ++d) {
-    number += in_file[d] * strides[d];
-    count *= along[d];
-  }
+  const ChunkPlace at = place_of(array.metadata, place);
   kept_.select(variable);
   shards_.select(variable);
-  if (const ChunkBytes* const kept = kept_.find(file_number * count + number)) return kept;
-  const std::size_t bytes = metadata.chunk_items() * metadata.dtype.bytes;
-  kept_.evict_for(bytes, kept_bytes_max);
-  auto loaded = load(array, file_number, number);
+  if (const ChunkBytes* const kept = kept_.find(at.number())) return kept;
+  kept_.evict_for(array.metadata.chunk_items() * array.metadata.dtype.bytes, kept_bytes_max);
+  auto loaded = load(array, at.file, at.in_file);
   if (!loaded) return loaded.error();
-  const std::size_t loaded_bytes = loaded->size();
-  return kept_.add(file_number * count + number, std::move(*loaded), loaded_bytes);
+  const std::size_t bytes = loaded->size();
+  return kept_.add(at.number(), std::move(*loaded), bytes);
+}
+
+cf::Unwritten Store::unwritten(int variable, std::size_t most) const {
+  const Array& array = array_of(variable);
+  const ArrayMetadata& metadata = array.metadata;
+  if (!std::isnan(absent_value(metadata, false))) return {};
+  std::size_t chunks = 1;
+  std::vector<std::size_t> last;
+  for (std::size_t d = 0; d < metadata.shape.size(); ++d) {
+    const std::size_t along = count_along(metadata.shape[d], metadata.chunks[d]);
+    if (along == 0) return {};
+    chunks *= along;
+    last.push_back(along - 1);
+  }
+  cf::Unwritten out;
+  out.looked_at = std::min(chunks, most);
+  out.is_all = out.looked_at == chunks;
+  if (!metadata.shard) {
+    // Files were looked at when the store was opened.
+    return out.is_all ? cf::Unwritten{array.absent_files, chunks, true} : cf::Unwritten{};
+  }
+  const std::lock_guard lock(mutex_);
+  shards_.select(variable);
+  const std::vector<std::size_t> first(last.size(), 0);
+  std::vector<std::size_t> place = first;
+  for (std::size_t i = 0; i < out.looked_at; ++i) {
+    const ChunkPlace at = place_of(metadata, place);
+    const auto shard = shard_at(array, at.file);
+    if (!shard) return {};  // the error is that of reading it
+    out.chunks += (*shard)->is_absent(at.in_file) ? 1 : 0;
+    advance(place, first, last, place.size());
+  }
+  return out;
 }
 
 template <class Out>

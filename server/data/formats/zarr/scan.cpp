@@ -1,6 +1,7 @@
 #include "server/data/formats/zarr/scan.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -243,7 +244,17 @@ class StoreScan {
         }
       }
       next -= here;
+      tell_absent(array, here);
     }
+  }
+
+  // zarr-python 3 leaves out chunks of which all values are the fill value.
+  void tell_absent(const Array& array, std::uint64_t files) {
+    if (out_.version == 2 || array.is_coordinate() || array.absent_files == 0) return;
+    if (!std::isfinite(array.metadata.fill_value.value_or(std::nan("")))) return;
+    out_.file.notes.push_back(in_quotes(array.name) + ": " + std::to_string(array.absent_files) +
+                              " of " + std::to_string(files) +
+                              " files are absent; their values are fill_value");
   }
 
   Files& files_;

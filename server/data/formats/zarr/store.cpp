@@ -1,15 +1,12 @@
 #include "server/data/formats/zarr/store.hpp"
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <optional>
 #include <string_view>
 #include <utility>
-
-#include "server/data/formats/zarr/chunks.hpp"
 
 namespace windsplat::data::zarr {
 
@@ -83,14 +80,6 @@ cf::Numbers Store::numbers(int variable, const char* attribute) const {
     out.values.push_back(*fill);
   }
   return out;
-}
-
-cf::Unwritten Store::unwritten(int variable, std::size_t most) const {
-  const Array& array = array_of(variable);
-  const std::uint64_t files = file_count(array.metadata);
-  const bool masked = std::isnan(array.metadata.fill_value.value_or(std::nan("")));
-  if (!masked || files > most) return {};
-  return {.chunks = array.absent_files, .looked_at = files};
 }
 
 std::string Store::text_of(int variable, const char* attribute) const {

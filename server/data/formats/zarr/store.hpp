@@ -58,6 +58,9 @@ class Store final : public cf::ArrayFile {
   struct OpenShard {
     File file;
     std::vector<Span> index;  // empty if the file is absent
+    [[nodiscard]] bool is_absent(std::size_t chunk) const {
+      return index.empty() || index[chunk].bytes == absent_span;
+    }
   };
 
   Store(std::shared_ptr<Files> files, StoreContents contents)

@@ -224,6 +224,19 @@ TEST(Zarr3, ShardsWithTheIndexAtEitherEndAndAbsentChunks) {
   }
 }
 
+TEST(Zarr3, AbsentChunksOfShardsAreCountedWithoutThoseBeyondTheEdge) {
+  // f[2, 3] in shards of [2, 2] with chunks of [1, 1]; the second shard reaches beyond the edge.
+  const Zarr3 store;
+  store.put("f/zarr.json", array3("[2,3]", "[2,2]", "float32", sharded("[1,1]")));
+  store.put("f/c/0/0", shard_of({float_bytes({1}), "", "", float_bytes({5})}));
+  store.put("f/c/0/1", shard_of({float_bytes({3}), "", "", ""}));
+  expect_same(store.values(), {1, kMasked, 3, kMasked, 5, kMasked});
+  auto source = open_file(store.path());
+  ASSERT_TRUE(source);
+  EXPECT_THAT((*source)->info().notes,
+              testing::Contains(HasSubstr("never written are masked: 'f' (3 of 6 chunks)")));
+}
+
 TEST(Zarr3, ShardsOfTransposedAndCompressedChunks) {
   // f[2, 4] is transposed to shards of [4, 2] with chunks of [2, 2], which are transposed again.
   const Zarr3 store;

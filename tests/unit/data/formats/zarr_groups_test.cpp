@@ -91,6 +91,14 @@ TEST(ZarrGroups, AbsentChunksAreCountedWhereTheyAreMasked) {
   EXPECT_TRUE(says(info_of(store), "never written are masked: 'f' (2 of 3 chunks)"));
 }
 
+TEST(ZarrGroups, AbsentFilesThatHaveTheFillValueAreCounted) {
+  const ZarrStore store("s.zarr", "zarr.json", group3("{}"));
+  store.put("f/zarr.json", v3_array("[1,3]", "[1,1]", "float32", R"(["y","x"])"));
+  store.put("f/c/0/1", bytes_of_items<float>({7}));
+  expect_same(store.values(), {0, 7, 0});
+  EXPECT_TRUE(says(info_of(store), "'f': 2 of 3 files are absent; their values are fill_value"));
+}
+
 TEST(ZarrGroups, DimensionNamesMayBeAbsentOrNull) {
   const ZarrStore store("s.zarr", "zarr.json", group3("{}"));
   store.put("f/zarr.json", v3_array("[1,2,3]", "[1,2,3]", "uint8", R"(["time",null,"lon"])"));
