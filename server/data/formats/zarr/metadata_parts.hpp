@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/base/error.hpp"
@@ -31,7 +32,7 @@ bool add_numcodec(const std::string& id, const Json& configuration, Dtype& now,
 
 bool is_compressor(Codec::Kind kind);
 
-// A codec, or the name of an unsupported one in `problem`.
+// The compressor of numcodecs with this id; nullopt if there is none.
 std::optional<Codec::Kind> compressor_named(std::string_view name);
 
 }  // namespace windsplat::data::zarr
