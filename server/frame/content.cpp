@@ -7,14 +7,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
-#include <glm/vec4.hpp>
 #include <optional>
 #include <vector>
 
 #include "server/base/pcg3d.hpp"
-#include "server/data/model/volume.hpp"
 #include "server/engine/reference/kernels.hpp"
-#include "server/frame/medium_sample.hpp"
+#include "server/frame/drawn_samples.hpp"
+#include "server/frame/light_changes.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -24,8 +23,7 @@ namespace reference = engine::reference;
 constexpr std::int64_t samples_max = 4096;
 constexpr int columns = 10;
 constexpr int rows = 8;
-
-using Index = std::array<int, 3>;
+constexpr int pieces = 4;  // of a line, at different depths
 
 struct Line {
   bool drawn = false;
@@ -34,13 +32,15 @@ struct Line {
 };
 
 // What a sample adds to the picture.
-struct Projected {
+struct Seen {
   Index index{};
-  int bin = 0;
   double depth = 0;
-  double tau = 0;    // optical depth, mean over its bin
-  double cover = 0;  // area of lines times their opacity, per area of the bin
-  double cell_depth = 0;
+  double x = 0, y = 0;        // bins
+  double wide = 0, high = 0;  // of its cell, bins
+  double tau = 0;             // of the medium of its cell along the view
+  double cell_depth = 0;      // of that of a cell at full detail
+  double cover = 0;           // area of its lines times their opacity, per area of a bin
+  double line_depth = 0;      // extent of the line in depth
   double length = 0;
   double cell = 0;
   double finest = 0;
@@ -49,166 +49,195 @@ struct Projected {
   double gaps = 0;
 };
 
-struct Mean {
-  double sum = 0, weight = 0;
-  void add(double value, double its_weight) {
-    sum += its_weight * value;
-    weight += its_weight;
-  }
-  [[nodiscard]] double value() const { return weight > 0 ? sum / weight : 0; }
+// A cell's medium or a piece of a line in a bin.
+struct Part {
+  int bin = 0;
+  double depth = 0;
+  double tau = 0;  // mean over the bin
+  double cover = 0;
+  double hidden = 0;  // optical depth of the bin that counts: cells do not hide what is beside them
+  const Seen* of = nullptr;
 };
 
 class Sampling {
  public:
   explicit Sampling(const scene::Scene& scene)
-      : scene_(scene), view_(reference::make_view(scene.camera)), high_(scene.lattice.dims) {
-    if (scene.slice) {
-      const auto axis = static_cast<std::size_t>(scene.slice->axis);
-      low_[axis] = scene.slice->sample;
-      high_[axis] = scene.slice->sample + 1;
-    }
+      : scene_(scene), view_(reference::make_view(scene.camera)), samples_(scene) {
     for (std::size_t a = 0; a < 3; ++a) {
-      count_ *= high_[a] - low_[a];
       merged_ *= std::exp2(scene.level[a]);
       finer_[a] = std::exp2(-scene.level[a]);
     }
+    for (const scene::ScalarLayer& layer : scene.scalars) stride_ = std::max(stride_, layer.stride);
+    if (scene.scalars.empty() && scene.vector) stride_ = scene.vector->stride;
   }
 
-  [[nodiscard]] std::vector<Projected> project() const {
-    std::vector<Projected> out;
-    const std::int64_t taken = std::min(count_, samples_max);
-    const double each = static_cast<double>(count_) / static_cast<double>(taken);
+  // Row by row of the picture and by depth.
+  [[nodiscard]] std::vector<Seen> seen() const {
+    std::vector<Seen> out;
+    const std::int64_t taken = std::min(samples_.count(), samples_max);
     out.reserve(static_cast<std::size_t>(taken));
     for (std::int64_t n = 0; n < taken; ++n) {
       std::int64_t at = n;
-      if (taken < count_) {
+      if (taken < samples_.count()) {
         const double within = pcg3d({static_cast<std::uint32_t>(n), 17, 29})[0] / 4294967296.0;
-        at = std::min(count_ - 1, static_cast<std::int64_t>((n + within) * each));
+        at = std::min(samples_.count() - 1, static_cast<std::int64_t>((n + within) * each()));
       }
       Index i{};
       for (std::size_t a = 0; a < 3; ++a) {
-        const std::int64_t wide = high_[a] - low_[a];
-        i[a] = low_[a] + static_cast<int>(at % wide);
+        const std::int64_t wide = samples_.high()[a] - samples_.low()[a];
+        i[a] = samples_.low()[a] + static_cast<int>(at % wide);
         at /= wide;
       }
-      if (auto seen = project(i, each)) out.push_back(*seen);
+      if (auto one = project(i)) out.push_back(*one);
     }
+    std::sort(out.begin(), out.end(), [](const Seen& a, const Seen& b) {
+      const auto place = [](const Seen& one) {
+        return std::array<double, 3>{std::floor(one.y), std::floor(one.x), one.depth};
+      };
+      return place(a) < place(b);
+    });
     return out;
+  }
+
+  // Samples that each one taken stands for.
+  [[nodiscard]] double each() const {
+    const double count = static_cast<double>(samples_.count());
+    return count / std::min(count, static_cast<double>(samples_max));
+  }
+
+  // Sorted by bin, then by depth.
+  [[nodiscard]] std::vector<Part> parts(const std::vector<Seen>& seen) const {
+    std::vector<Part> out;
+    out.reserve(seen.size() * (1 + pieces));
+    for (const Seen& one : seen) {
+      each_bin(one, [&](int bin, double area) { add_parts(one, bin, area, out); });
+    }
+    std::sort(out.begin(), out.end(), [](const Part& a, const Part& b) {
+      return a.bin != b.bin ? a.bin < b.bin : a.depth < b.depth;
+    });
+    return out;
+  }
+
+  [[nodiscard]] LightChanges light_changes(const std::vector<Seen>& seen) const {
+    if (scene_.scalars.empty()) return {};
+    std::vector<RayThrough> rays;
+    rays.reserve(seen.size());
+    for (const Seen& one : seen) {
+      double area = 0;
+      each_bin(one, [&](int, double within) { area += within; });
+      rays.push_back({one.index, each() * std::min(1.0, area / (one.wide * one.high))});
+    }
+    return frame::light_changes(samples_, rays);
   }
 
  private:
-  [[nodiscard]] std::size_t number(const Index& i) const {
-    const Index& dims = scene_.lattice.dims;
-    return static_cast<std::size_t>(i[0]) +
-           static_cast<std::size_t>(dims[0]) *
-               (static_cast<std::size_t>(i[1]) +
-                static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(i[2]));
-  }
-
-  [[nodiscard]] glm::dvec3 place(const Index& i) const {
-    const scene::Lattice& lattice = scene_.lattice;
-    if (lattice.places) {
-      const auto& p = (*lattice.places)[number(i)];
-      return {p[0], p[1], p[2]};
-    }
-    return {lattice.positions[0][static_cast<std::size_t>(i[0])],
-            lattice.positions[1][static_cast<std::size_t>(i[1])],
-            lattice.positions[2][static_cast<std::size_t>(i[2])]};
-  }
-
-  [[nodiscard]] std::optional<Index> neighbour(const Index& i, std::size_t a, int step) const {
-    Index next = i;
-    next[a] += step;
-    if (next[a] < low_[a] || next[a] >= high_[a]) return std::nullopt;
-    return next;
-  }
-
-  [[nodiscard]] double edge(const Index& i, std::size_t a) const {
-    auto next = neighbour(i, a, 1);
-    if (!next) next = neighbour(i, a, -1);
-    if (!scene_.lattice.places || !next) {
-      return scene_.lattice.spacing[a][static_cast<std::size_t>(i[a])];
-    }
-    return glm::length(place(*next) - place(i));
-  }
-
-  [[nodiscard]] Medium medium(const Index& i) const {
-    using Two = data::TwoValues;
-    Medium out;
-    const std::size_t n = number(i);
-    for (const scene::ScalarLayer& layer : scene_.scalars) {
-      const data::Volume& field = *layer.field;
-      if (field.components == 1) {
-        out.add(layer, field.values[n], 1);
-        continue;
-      }
-      const double low = field.component(Two::low_share)[n];
-      const double high = field.component(Two::high_share)[n];
-      if (low > 0) out.add(layer, field.component(Two::low)[n], low);
-      if (high > 0) out.add(layer, field.component(Two::high)[n], high);
-    }
-    return out;
-  }
-
   [[nodiscard]] Line line(const Index& i) const {
     Line out;
     if (!scene_.vector) return out;
     const scene::VectorLayer& layer = *scene_.vector;
     std::array<double, 3> v{};
     for (int c = 0; c < layer.field->components; ++c) {
-      v[static_cast<std::size_t>(c)] = layer.field->component(c)[number(i)];
+      v[static_cast<std::size_t>(c)] = layer.field->component(c)[samples_.number(i)];
     }
     const double magnitude = std::hypot(v[0], v[1], v[2]);
     out.drawn = magnitude > 0 && magnitude >= layer.min_magnitude;
     if (!out.drawn) return out;
     out.magnitude = std::min(1.0, magnitude / layer.magnitude_range[1]);
     using scene::LineColor;
-    double value = place(i).z;
+    double value = samples_.place(i).z;
     if (layer.color_by == LineColor::magnitude) value = magnitude;
     if (layer.color_by == LineColor::direction) {
       value = std::atan2(v[0], v[1]) / 0.017453292519943295;
       if (value < 0) value += 360;
     }
-    if (layer.color_by == LineColor::scalar) value = layer.color_field->values[number(i)];
+    if (layer.color_by == LineColor::scalar) value = layer.color_field->values[samples_.number(i)];
     const double k = layer.magnitude_intensity;
     out.color = (1 - k + k * out.magnitude) * color_at(layer.color, value);
     return out;
   }
 
-  [[nodiscard]] std::optional<Projected> project(const Index& i, double each) const {
+  [[nodiscard]] std::optional<Seen> project(const Index& i) const {
     const scene::Camera& camera = scene_.camera;
-    const glm::dvec3 way = place(i) - camera.eye;
-    Projected out;
+    const glm::dvec3 way = samples_.place(i) - camera.eye;
+    Seen out;
     out.index = i;
     out.depth = glm::dot(way, camera.forward);
     if (camera.perspective && !(out.depth > camera.near)) return std::nullopt;
     const double scale =  // heights of the picture per world unit
         0.5 / (camera.half_height * (camera.perspective ? out.depth : 1));
     const double aspect = static_cast<double>(camera.width) / camera.height;
-    const double x = glm::dot(way, camera.right) * scale / aspect + 0.5;
-    const double y = 0.5 - glm::dot(way, camera.up) * scale;
-    if (!(x >= 0 && x < 1 && y >= 0 && y < 1)) return std::nullopt;
-    out.bin = static_cast<int>(y * rows) * columns + static_cast<int>(x * columns);
-    const double bin_area = aspect / (columns * rows);
-
+    std::array<double, 3> edges{};
     double volume = 1;
     out.finest = 1e30;
-    std::array<double, 3> edges{};
+    double cells2 = 0;  // passed for each unit of length along the view, squared
     for (std::size_t a = 0; a < 3; ++a) {
-      edges[a] = edge(i, a);
+      edges[a] = samples_.edge(i, a);
       volume *= edges[a];
       out.finest = std::min(out.finest, edges[a] * finer_[a] * scale);
+      const auto along = static_cast<glm::length_t>(a);
+      cells2 += std::pow(camera.forward[along] / edges[a], 2);
     }
-    const double fine_edge = std::cbrt(volume / merged_);
-    out.cell = fine_edge * scale;
-    const Medium here = medium(i);
-    const double rho = here.extinction;
-    out.tau = each * rho * volume * scale * scale / bin_area;
-    out.cell_depth = rho * fine_edge;
+    const double cell = std::cbrt(volume);
+    const double chord = scene_.lattice.places ? cell : std::min(1 / std::sqrt(cells2), 1e3 * cell);
+    // Layers of terrain that coincide have cells without a volume.
+    const double side = std::max(1e-9, chord > 0 ? std::sqrt(volume / chord) * scale : 0);
+    out.x = columns * (glm::dot(way, camera.right) * scale / aspect + 0.5);
+    out.y = rows * (0.5 - glm::dot(way, camera.up) * scale);
+    out.wide = columns * side / aspect;
+    out.high = rows * side;
+    bool within = false;
+    each_bin(out, [&](int, double) { within = true; });
+    if (!within) return std::nullopt;
+
+    const Medium here = samples_.medium(i);
+    const double finer = std::cbrt(1 / merged_);
+    out.cell = cell * finer * scale;
+    out.tau = here.extinction * chord;
+    out.cell_depth = out.tau * finer * stride_;
     const Line own = line(i);
-    add_line(i, own, each, scale, bin_area, *std::max_element(edges.begin(), edges.end()), out);
+    add_line(i, own, scale, *std::max_element(edges.begin(), edges.end()), out);
+    out.line_depth += chord;  // lines are moved within their cells
     compare(i, here, own, out);
     return out;
+  }
+
+  // Calls visit(bin, area of the cell in it) for a sample; cells below the size of a bin are in
+  // that of their centre.
+  template <class Visit>
+  void each_bin(const Seen& one, const Visit& visit) const {
+    const auto extent = [](double at, double size, int count) {
+      const double half = size > 1 ? size / 2 : 0;
+      return std::array<int, 2>{
+          static_cast<int>(std::floor(std::clamp(at - half, -1.0, 1.0 * count))),
+          static_cast<int>(std::floor(std::clamp(at + half, -1.0, 1.0 * count)))};
+    };
+    const auto overlap = [](double at, double size, int bin) {
+      if (size <= 1) return size;
+      return std::min(at + size / 2, bin + 1.0) - std::max(at - size / 2, 1.0 * bin);
+    };
+    const auto [left, right] = extent(one.x, one.wide, columns);
+    const auto [top, bottom] = extent(one.y, one.high, rows);
+    for (int row = std::max(top, 0); row <= std::min(bottom, rows - 1); ++row) {
+      for (int column = std::max(left, 0); column <= std::min(right, columns - 1); ++column) {
+        visit(row * columns + column,
+              overlap(one.x, one.wide, column) * overlap(one.y, one.high, row));
+      }
+    }
+  }
+
+  // Cells hide what is behind them, not what is beside them.
+  void add_parts(const Seen& one, int bin, double area, std::vector<Part>& out) const {
+    const double share = each() * area;
+    const double opaque = -std::expm1(-one.tau);
+    const double hidden = share < 1 ? -std::log1p(-share * opaque) : share * one.tau;
+    if (one.tau > 0) out.push_back({bin, one.depth, share * one.tau, 0, hidden, &one});
+    if (one.cover <= 0) return;
+    const double cover = one.cover * area / (one.wide * one.high);
+    const int count = scene_.scalars.empty() ? 1 : pieces;
+    for (int n = 0; n < count; ++n) {
+      const double q = (n + 0.5) / count - 0.5;
+      out.push_back({bin, one.depth + q * one.line_depth, 0, cover / count, 0, &one});
+    }
   }
 
   // The line of a sample from tail to head as it is drawn, world units. At a coarser level, rates
@@ -225,34 +254,36 @@ class Sampling {
     return reference::read_vector(scene_, layer, position);
   }
 
-  void add_line(const Index& i, const Line& own, double each, double scale, double bin_area,
-                double widest, Projected& out) const {
+  void add_line(const Index& i, const Line& own, double scale, double widest, Seen& out) const {
     if (!own.drawn) return;
     const auto drawn = drawn_vector(i);
     if (!drawn) return;
     const scene::VectorLayer& layer = *scene_.vector;
     const double whole = reference::length(drawn->extent);
+    const double most = layer.span * layer.stride * widest;
+    const double kept = whole > most ? most / whole : 1;
     const double across = std::hypot(reference::dot(drawn->extent, view_.right),
                                      reference::dot(drawn->extent, view_.down));
-    const double most = layer.span * layer.stride * widest;
-    out.length = scale * across * (whole > most ? most / whole : 1);
+    out.length = scale * across * kept;
+    out.line_depth = std::abs(reference::dot(drawn->extent, view_.forward)) * kept;
     const double wide = width();
-    const double lines = each * merged_ / std::pow(layer.stride, 3);
-    out.cover = lines * layer_opacity() * wide * (out.length + wide) / bin_area;
+    const double lines = each() * merged_ / std::pow(layer.stride, 3);
+    const double aspect = static_cast<double>(scene_.camera.width) / scene_.camera.height;
+    out.cover = lines * layer_opacity() * wide * (out.length + wide) * columns * rows / aspect;
   }
 
   // Differences from the next sample along each axis, of media along the view.
-  void compare(const Index& i, const Medium& here, const Line& own, Projected& out) const {
+  void compare(const Index& i, const Medium& here, const Line& own, Seen& out) const {
     double tint = 0;
     int count = 0;
     int beside = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      auto next = neighbour(i, a, 1);
-      if (!next) next = neighbour(i, a, -1);
+      auto next = samples_.neighbour(i, a, 1);
+      if (!next) next = samples_.neighbour(i, a, -1);
       if (!next) continue;
       ++count;
-      const Medium other = medium(*next);
-      const glm::dvec3 step = place(*next) - place(i);
+      const Medium other = samples_.medium(*next);
+      const glm::dvec3 step = samples_.place(*next) - samples_.place(i);
       const double length2 = glm::dot(step, step);  // 0 where layers of terrain coincide
       if (here.extinction > 0 && other.extinction > 0 && length2 > 0) {
         const double along = std::pow(glm::dot(step, scene_.camera.forward), 2) / length2;
@@ -269,207 +300,53 @@ class Sampling {
     if (own.drawn && count > 0) out.gaps = static_cast<double>(count - beside) / count;
   }
 
- public:
-  // The light of the medium along rays through some of the samples, and its change from one cell to
-  // the next across them. A ray follows the axis along which it passes most cells.
-  struct Texture {
-    Mean step, bend, wide_bend, order;  // squares
-    Mean cell;                          // its width
-  };
-  [[nodiscard]] Texture texture(const std::vector<Projected>& seen) const {
-    constexpr std::size_t rays = 128;
-    const std::size_t taken = std::min(rays, seen.size());
-    const double each =
-        static_cast<double>(count_) / static_cast<double>(std::min(count_, samples_max)) *
-        static_cast<double>(seen.size()) / static_cast<double>(std::max<std::size_t>(taken, 1));
-    Texture out;
-    if (scene_.scalars.empty()) return out;
-    for (std::size_t n = 0; n < taken; ++n) {
-      add_ray(seen[n * seen.size() / taken].index, each, out);
-    }
-    return out;
-  }
-
- private:
-  // A ray through a sample, followed in steps of `stride` cells of `axis`.
-  struct Ray {
-    Index through{};
-    std::array<double, 3> rate{};  // cells passed along each axis for each unit of length
-    std::size_t axis = 0;
-    int stride = 1;
-    double length = 0;  // of a step
-    double depth = 0;   // of the sample
-    double pace = 1;    // depth for each unit of length
-  };
-  [[nodiscard]] std::optional<Ray> ray_through(const Index& through) const {
-    const scene::Camera& camera = scene_.camera;
-    const glm::dvec3 at = place(through);
-    const glm::dvec3 way =
-        camera.perspective ? glm::normalize(at - camera.eye) : glm::dvec3(camera.forward);
-    Ray out;
-    out.through = through;
-    out.depth = glm::dot(at - camera.eye, camera.forward);
-    out.pace = glm::dot(way, camera.forward);
-    for (std::size_t a = 0; a < 3; ++a) {
-      const auto next = neighbour(through, a, 1);
-      const auto last = neighbour(through, a, -1);
-      if (!next && !last) continue;
-      const glm::dvec3 edge = next ? place(*next) - at : at - place(*last);
-      const double length2 = glm::dot(edge, edge);
-      if (length2 == 0) continue;
-      out.rate[a] = glm::dot(way, edge) / length2;
-      if (std::abs(out.rate[a]) > std::abs(out.rate[out.axis])) out.axis = a;
-    }
-    if (out.rate[out.axis] == 0) return std::nullopt;
-    constexpr int steps_most = 64;
-    const int cells = high_[out.axis] - low_[out.axis];
-    out.stride = (cells + steps_most - 1) / steps_most;
-    out.length = out.stride / std::abs(out.rate[out.axis]);
-    return out;
-  }
-
-  // The light of a ray, then of those one cell and those two cells beside it, on both sides along
-  // the two other axes.
-  struct Lights {
-    std::array<glm::dvec4, 9> light{};
-    std::array<double, 9> transmitted{1, 1, 1, 1, 1, 1, 1, 1, 1};
-    glm::dvec3 order{0, 0, 0};
-    int inside = 0;  // steps of the ray within the lattice, each of `stride` cells
-    glm::dvec3 last_color{0, 0, 0};
-    double last_absorbed = 0;
-
-    void pass(std::size_t ray, const Medium& here, double length, int stride) {
-      const double own = -std::expm1(-here.extinction * length / stride);
-      if (ray == 0) {
-        if (last_absorbed > 0) {
-          const glm::dvec3 change =
-              transmitted[0] * own * last_absorbed * (here.color() - last_color);
-          order += static_cast<double>(stride) * change;
-        }
-        last_color = here.color();
-        last_absorbed = own;
-      }
-      const double absorbed = -transmitted[ray] * std::expm1(-here.extinction * length);
-      light[ray] += absorbed * glm::dvec4(here.color(), 1);
-      transmitted[ray] -= absorbed;
-    }
-  };
-  [[nodiscard]] Lights lights_of(const Ray& ray) const {
-    const scene::Camera& camera = scene_.camera;
-    const std::size_t first = (ray.axis + 1) % 3;
-    const std::size_t second = (ray.axis + 2) % 3;
-    const int cells = high_[ray.axis] - low_[ray.axis];
-    const bool ascends = ray.rate[ray.axis] > 0;
-    Lights out;
-    for (int n = 0; n < cells; n += ray.stride) {
-      Index i = ray.through;
-      i[ray.axis] = ascends ? low_[ray.axis] + n : high_[ray.axis] - 1 - n;
-      const double gone = (i[ray.axis] - ray.through[ray.axis]) / ray.rate[ray.axis];
-      if (camera.perspective && ray.depth + gone * ray.pace < camera.near) continue;
-      i[first] += static_cast<int>(std::lround(gone * ray.rate[first]));
-      i[second] += static_cast<int>(std::lround(gone * ray.rate[second]));
-      for (std::size_t beside = 0; beside < out.light.size(); ++beside) {
-        Index shifted = i;
-        if (beside > 0) {
-          const int far = beside < 5 ? 1 : 2;
-          shifted[(beside - 1) % 4 < 2 ? first : second] += beside % 2 == 0 ? far : -far;
-        }
-        if (!contains(shifted)) continue;
-        out.inside += beside == 0 ? 1 : 0;
-        const Medium here = medium(shifted);
-        if (here.extinction > 0) out.pass(beside, here, ray.length, ray.stride);
-      }
-    }
-    return out;
-  }
-
-  void add_ray(const Index& through, double each, Texture& out) const {
-    const auto ray = ray_through(through);
-    if (!ray) return;
-    const Lights lights = lights_of(*ray);
-    if (lights.inside == 0) return;
-    const auto& light = lights.light;
-    const scene::Camera& camera = scene_.camera;
-    const double scale = 0.5 / (camera.half_height * (camera.perspective ? ray->depth : 1));
-    const double face = edge(through, 0) * edge(through, 1) * edge(through, 2) / ray->length *
-                        ray->stride;  // area of a cell across the ray
-    const double cells = static_cast<double>(lights.inside) * ray->stride;
-    const double area = each * face * scale * scale / cells;
-    const auto square = [](const glm::dvec4& v) { return glm::dot(v, v) / 4; };
-    double step = 0;
-    double bend = 0;
-    double wide_bend = 0;
-    for (const std::size_t side : {std::size_t{1}, std::size_t{3}}) {
-      step += 0.25 * (square(light[side] - light[0]) + square(light[side + 1] - light[0]));
-      bend += 0.5 * square(light[side] + light[side + 1] - 2.0 * light[0]);
-      wide_bend += 0.5 * square(light[side + 4] + light[side + 5] - 2.0 * light[0]);
-    }
-    out.step.add(step, area);
-    out.bend.add(bend, area);
-    out.wide_bend.add(wide_bend, area);
-    out.order.add(glm::dot(lights.order, lights.order), area);
-    out.cell.add(std::sqrt(face) * scale, area * step);
-  }
-
-  [[nodiscard]] bool contains(const Index& i) const {
-    for (std::size_t a = 0; a < 3; ++a) {
-      if (i[a] < low_[a] || i[a] >= high_[a]) return false;
-    }
-    return true;
-  }
-
- public:
   // Of merged lines: what the merged ones would have (scene/detail, merge_lines).
   [[nodiscard]] double width() const {
     return (scene_.vector->r1 + scene_.vector->r2) / scene_.camera.height;
   }
   [[nodiscard]] double layer_opacity() const { return scene_.vector->opacity / merged_; }
 
- private:
   const scene::Scene& scene_;
   const reference::View view_;
-  Index low_{0, 0, 0};
-  Index high_;
-  std::int64_t count_ = 1;
+  const DrawnSamples samples_;
   double merged_ = 1;
   std::array<double, 3> finer_{1, 1, 1};
+  int stride_ = 1;
 };
 
 }  // namespace
 
 quality::Content content_of(const scene::Scene& scene) {
   const Sampling sampling(scene);
-  std::vector<Projected> seen = sampling.project();
-  std::sort(seen.begin(), seen.end(), [](const Projected& a, const Projected& b) {
-    return a.bin != b.bin ? a.bin < b.bin : a.depth < b.depth;
-  });
+  const std::vector<Seen> seen = sampling.seen();
+  const std::vector<Part> parts = sampling.parts(seen);
   double line_squares = 0;
   Mean layers, length, line_depth, shade, gaps;
   Mean depth, cell_depth, tint, cell, finest;
-  for (auto first = seen.begin(); first != seen.end();) {
+  for (auto first = parts.begin(); first != parts.end();) {
     const auto end =
-        std::find_if(first, seen.end(), [&](const Projected& p) { return p.bin != first->bin; });
+        std::find_if(first, parts.end(), [&](const Part& p) { return p.bin != first->bin; });
     double transmitted = 1;
     double lines = 0;
     double medium = 0;
     double whole_tau = 0;
     double whole_cover = 0;
     for (auto p = first; p != end; ++p) {
-      const double of_medium = transmitted * -std::expm1(-p->tau);
-      const double of_line = transmitted * -std::expm1(-p->cover) * std::exp(-0.5 * p->tau);
-      transmitted *= std::exp(-p->tau - p->cover);
+      const double of_medium = transmitted * -std::expm1(-p->hidden);
+      const double of_line = transmitted * -std::expm1(-p->cover);
+      transmitted *= std::exp(-p->hidden - p->cover);
       medium += of_medium;
       lines += of_line;
       whole_tau += p->tau;
       whole_cover += p->cover;
-      cell_depth.add(p->cell_depth, of_medium);
-      tint.add(p->tint, of_medium);
-      line_depth.add(p->cell_depth, of_line);
-      length.add(p->length, of_line);
-      shade.add(p->shade, of_line);
-      gaps.add(p->gaps, of_line);
-      cell.add(p->cell, of_line + of_medium);
-      finest.add(p->finest, of_line + of_medium);
+      cell_depth.add(p->of->cell_depth, of_medium);
+      tint.add(p->of->tint, of_medium);
+      line_depth.add(p->of->cell_depth, of_line);
+      length.add(p->of->length, of_line);
+      shade.add(p->of->shade, of_line);
+      gaps.add(p->of->gaps, of_line);
+      cell.add(p->of->cell, of_line + of_medium);
+      finest.add(p->of->finest, of_line + of_medium);
     }
     line_squares += lines * lines;
     layers.add(whole_cover, lines);
@@ -488,12 +365,12 @@ quality::Content content_of(const scene::Scene& scene) {
   out.tint = tint.value();
   out.cell = cell.value();
   out.finest_cell = finest.value();
-  const Sampling::Texture texture = sampling.texture(seen);
-  out.step = std::sqrt(texture.step.sum);
-  out.bend = std::sqrt(texture.bend.sum);
-  out.wide_bend = std::sqrt(texture.wide_bend.sum);
-  out.order = std::sqrt(texture.order.sum);
-  out.step_cell = texture.cell.value();
+  const LightChanges light = sampling.light_changes(seen);
+  out.step = std::sqrt(light.step.sum);
+  for (std::size_t k = 0; k < out.bends.size(); ++k) out.bends[k] = std::sqrt(light.bends[k].sum);
+  out.incline = std::sqrt(light.incline.sum);
+  out.order = std::sqrt(light.order.sum);
+  out.step_cell = light.cell.value();
   return out;
 }
 

@@ -1,7 +1,14 @@
 // What a view shows, as far as it determines the errors of its pictures.
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 namespace windsplat::quality {
+
+// Distances across a ray at which the light of the medium is compared, in cells.
+inline constexpr std::size_t bends_count = 4;
+inline constexpr std::array<double, bends_count> bend_distances{0.125, 0.35, 1, 2};
 
 // Lengths are in heights of the picture. Means are over what is visible, weighted by its light. The
 // defaults are those of a typical view.
@@ -18,9 +25,10 @@ struct Content {
   double cell = 0.03;         // cube root of the volume of a cell
   double finest_cell = 0.03;  // the narrowest edge of a cell
   // The light of the medium alone: root of the integral of squares over the picture.
-  double step = 0.06;       // its difference from one cell to the next
-  double bend = 0.08;       // its second difference
-  double wide_bend = 0.1;   // the same over two cells on either side
+  double step = 0.06;  // its difference from one cell to the next
+  // Its second difference at each of the distances.
+  std::array<double, bends_count> bends{3e-3, 0.02, 0.08, 0.1};
+  double incline = 0.1;     // its difference for each cell, over short distances
   double order = 4e-3;      // its change if neighbouring cells changed places along the ray
   double step_cell = 0.03;  // width of the cells where it differs
 };

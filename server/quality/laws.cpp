@@ -31,6 +31,34 @@ Cause cause_of(const Setting& setting, const Viewpoint& viewpoint) {
   return setting.method == protocol::MethodName::slab ? Cause::slab : Cause::kernel;
 }
 
+namespace {
+
+// The light of the medium that a picture of fewer pixels has lost when it is shown at the full
+// size: what is between its pixels, and, since its size is whole pixels, what its proportions move.
+double lost_between_pixels(const Content& content, const Setting& setting,
+                           const Viewpoint& viewpoint) {
+  const double cell = std::max(content.step_cell, 1e-30);
+  const auto width = static_cast<double>(viewpoint.width);
+  const double high = viewpoint.pixels_high;
+  const double few = edge_at(viewpoint.pixels_high, setting.half_level);
+  const double merged = setting.coarser > 0 ? std::exp2(setting.coarser - 1) : 0;
+  const double half_pixel = std::hypot(0.5 / (few * cell), merged);
+  std::size_t k = 1;
+  while (k + 1 < bends_count && bend_distances[k] < half_pixel) ++k;
+  const auto log_bend = [&](std::size_t i) { return logarithm(content.bends[i], 1e-6); };
+  const double from = std::log(bend_distances[k - 1]);
+  const double to = std::log(bend_distances[k]);
+  const double at = std::log(std::min(half_pixel, bend_distances.back()));
+  const double slope =
+      at < from ? 2 : (log_bend(k) - log_bend(k - 1)) / (to - from);  // smooth below
+  const double bend = std::exp(log_bend(k - 1) + slope * (at - from));
+  const double other = edge_at(viewpoint.width, setting.half_level) / few / (width / high) - 1;
+  const double aside = std::abs(other) * width / high / std::sqrt(12.0);  // RMS over the picture
+  return std::hypot(0.5 * bend, content.incline * aside / cell);
+}
+
+}  // namespace
+
 Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   constexpr double radius_height = 720;  // height of the picture for which the radius is given
   const Content content = viewpoint.content.value_or(Content());
@@ -60,12 +88,13 @@ Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& 
     out[n + 1] = logarithm(content.cell_depth, 1e-5, 1e2);
     out[n + 2] = std::log(content.tint + 0.003);
     out[n + 3] = logarithm(content.step, 1e-5);
-    out[n + 4] = logarithm(content.bend, 1e-5);
-    out[n + 5] = logarithm(content.wide_bend, 1e-5);
+    out[n + 4] = logarithm(content.bends[2], 1e-5);
+    out[n + 5] = logarithm(content.bends[3], 1e-5);
     out[n + 6] = logarithm(content.order, 1e-7);
     out[n + 7] = logarithm(content.step_cell * pixels, 0.1);
+    out[n + 8] = logarithm(lost_between_pixels(content, setting, viewpoint), 1e-6);
   }
-  n += 8;
+  n += 9;
   if (kind.lines && kind.medium) out[n] = logarithm(content.line_depth, 1e-5, 1e2);
   return out;
 }
@@ -73,15 +102,20 @@ Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& 
 namespace {
 
 // Few lines and a thin medium add little light, and many layers of lines and an opaque medium vary
-// little: errors are greatest in between. Lines of cells below a pixel blend.
+// little: errors are greatest in between. Lines and cells below a pixel blend.
 Terms terms_of(const Features& features) {
   Terms out{};
   std::copy(features.begin(), features.end(), out.begin());
   const double cell = features[5];
   const double lines = features[7];
   const double layers = features[8];
+  const double length = features[9];
+  const double width = features[10];
   const double depth = features[13];
-  const std::array<double, 4> products{cell * cell, layers * layers, lines * cell, depth * depth};
+  const double cell_depth = features[14];
+  const std::array<double, terms_count - features_count> products{
+      cell * cell,     layers * layers, lines * cell,           depth * depth,
+      length * length, width * width,   cell_depth * cell_depth};
   std::copy(products.begin(), products.end(), out.begin() + features_count);
   return out;
 }
@@ -102,14 +136,28 @@ double error_of_cause(const Kind& kind, const Setting& setting, const Viewpoint&
   return std::exp(std::min(log_error, 0.0));
 }
 
+// Of a picture of full size and every sample. Lines in a thin medium have the error of lines alone.
+double error_of_method(const Kind& kind, const Setting& whole, const Viewpoint& viewpoint) {
+  const double error = error_of_cause(kind, whole, viewpoint);
+  if (!kind.lines || !kind.medium || cause_of(whole, viewpoint) != Cause::kernel) return error;
+  Kind lines = kind;
+  lines.medium = false;
+  const double depth = viewpoint.content.value_or(Content()).depth;
+  return std::max(error, std::exp(-depth) * error_of_cause(lines, whole, viewpoint));
+}
+
 }  // namespace
 
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
-  // A smaller picture and merged samples have the error of the method too.
+  // A smaller picture and merged samples have the error of the method too. It is independent of
+  // theirs for a medium; the laws of lines are fitted to the whole error.
   const Setting whole{setting.method, 0, 0, setting.thinner};
-  const bool is_whole = setting == whole;
-  const double of_method = is_whole ? 0 : error_of_cause(kind, whole, viewpoint);
-  const double error = std::hypot(error_of_cause(kind, setting, viewpoint), of_method);
+  double error = error_of_method(kind, whole, viewpoint);
+  if (setting != whole) {
+    const double power = kind.lines ? 4 : 2;
+    const double other = error_of_cause(kind, setting, viewpoint);
+    error = std::pow(std::pow(other, power) + std::pow(error, power), 1 / power);
+  }
   return {std::clamp(std::hypot(error, kind.rule / setting.thinner, kind.stop), error_least, 1.0),
           law_of(kind, cause_of(setting, viewpoint)).scatter};
 }

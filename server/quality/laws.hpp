@@ -19,11 +19,11 @@ struct Scatter {
 };
 
 // Quantities on which errors depend (laws.cpp), as logarithms unless they are shares or counts.
-inline constexpr std::size_t features_count = 22;
+inline constexpr std::size_t features_count = 23;
 using Features = std::array<double, features_count>;
 
 // The features, then squares and products of some (laws.cpp).
-inline constexpr std::size_t terms_count = features_count + 4;
+inline constexpr std::size_t terms_count = features_count + 7;
 using Terms = std::array<double, terms_count>;
 
 // error = exp(base + sum of slopes times terms). The features are clamped to the range that was

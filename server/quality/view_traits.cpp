@@ -15,19 +15,6 @@ constexpr double height_scale = 0.5;     // change of the logarithm of heights
 constexpr double pixels_scale = 1;       // change of the logarithm of pixels
 constexpr double direction_scale = 1.2;  // radians
 
-// Optical depth of the densest medium along the length of a line; 0 if unknown.
-double depth_of(const protocol::View& view) {
-  if (!view.scalars || !view.vector.length) return 0;
-  double extinction = 0;
-  for (const protocol::ScalarView& layer : *view.scalars) {
-    double most = 0;
-    if (!layer.extinction) continue;
-    for (const auto& point : *layer.extinction) most = std::max(most, point[1]);
-    extinction += most;
-  }
-  return extinction * *view.vector.length;
-}
-
 }  // namespace
 
 Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise) {
@@ -86,14 +73,12 @@ SceneSignature signature_of(const protocol::View& completed) {
   SceneSignature signature;
   signature.kind.lines = completed.vector.field.kind != protocol::FieldChoice::Kind::none;
   signature.kind.medium = !completed.scalars || !completed.scalars->empty();
-  signature.kind.length = completed.vector.length.value_or(0);
   signature.kind.radius = completed.vector.r2;
   signature.kind.thickness = completed.method.slab_thickness;
   if (signature.kind.medium) {
     signature.kind.rule = error_of_rule(completed.method.compositing);
     signature.kind.stop = error_of_stop(completed.method.stop_transmittance);
   }
-  if (const double depth = depth_of(completed); depth > 0) signature.kind.depth = depth;
   protocol::View view = completed;
   view.step = 0;
   view.camera = {};

@@ -32,9 +32,7 @@ inline constexpr double stop_of_the_truth = 1.5e-4;
 struct Kind {
   bool lines = true;
   bool medium = true;
-  double length = 0;     // length of the lines, world units; by default 5 cells; 0: unknown
   double radius = 1.4;   // radius of the lines, pixels at a picture height of 720
-  double depth = 1;      // optical depth of the densest medium along the length of a line
   double thickness = 1;  // thickness of slabs, cells
   double rule = 0;       // error of approximate compositing, at the slab thickness of the view
   double stop = 0;       // error of early termination

@@ -16,7 +16,7 @@ FLOOR = 5e-6
 FITTED_ABOVE = 2e-5  # smaller errors are partly those of single precision
 JUDGED_ABOVE = 1e-4
 RIDGE = 30.0  # in units of one measurement of standardised features
-SAFETY = 0.1  # added to logarithms: estimates rather exceed errors
+SAFETY = 0.05  # added to logarithms: estimates rather exceed errors
 CAUSES = ["kernel", "smaller", "merged", "slab"]
 CONTENTS = ["lines", "medium", "both"]
 THINNER = {24: 2, 25: 4}  # settings with thinner slabs
@@ -25,7 +25,9 @@ THINNER = {24: 2, 25: 4}  # settings with thinner slabs
 # after a calibration run at another viewpoint.
 WIDER = 1.8
 FEWEST = 30  # measurements of a group; with fewer its errors are those of single precision
-HALF_LEVEL, HALF_LEVEL_MOST = 0, 8  # a feature: those of large pictures are extrapolated
+HALF_LEVEL, COARSER, SLAB = 0, 1, 2  # features
+HALF_LEVEL_MOST = 8  # those of large pictures are extrapolated
+LEAST_EXCESS = 0.3  # of the square of an error, with less it is that of the method
 
 # Columns of the list.
 MEMBER, SCENE, VIEW, SETTING, ERROR, PRIOR, AFTER_FINAL, CALIBRATED = range(8)
@@ -34,8 +36,11 @@ BOUND, CALIBRATED_BOUND, CAUSE, CONTENT, FEATURES = range(8, 13)
 
 def terms(features):
     """terms_of of server/quality/laws.cpp."""
-    cell, lines, layers, depth = features[:, [5, 7, 8, 13]].T
-    return numpy.column_stack([features, cell * cell, layers * layers, lines * cell, depth * depth])
+    cell, lines, layers, length, width, depth, cell_depth = (
+        features[:, [5, 7, 8, 9, 10, 13, 14]].T)
+    return numpy.column_stack([features, cell * cell, layers * layers, lines * cell,
+                               depth * depth, length * length, width * width,
+                               cell_depth * cell_depth])
 
 
 class Fit:
@@ -82,17 +87,41 @@ def fitted(table, features, rows, family):
     return Fit(features[rows], logs)
 
 
+def methods(table, features):
+    """The row of the same view and method with every pixel and sample, for each row."""
+    at_full = (features[:, HALF_LEVEL] == 0) & (features[:, COARSER] == 0)
+    at_full &= ~numpy.isin(table[:, SETTING], list(THINNER))
+    row_of = {(*table[i, :3], features[i, SLAB]): i for i in numpy.flatnonzero(at_full)}
+    return numpy.array([row_of[(*table[i, :3], features[i, SLAB])] for i in range(len(table))])
+
+
+def to_fit(table, features):
+    """With the errors that laws are fitted to: of a medium without those of the method."""
+    out = table.copy()
+    method = methods(table, features)
+    worse = (table[:, CONTENT] == 1) & (features[:, HALF_LEVEL] + features[:, COARSER] > 0)
+    excess = table[:, ERROR] ** 2 - table[method, ERROR] ** 2
+    told = excess > LEAST_EXCESS * table[:, ERROR] ** 2
+    out[worse, ERROR] = numpy.where(told, numpy.sqrt(numpy.maximum(excess, 0)), 0)[worse]
+    return out
+
+
 def left_out(table, features):
     """Estimates of each member by laws fitted to the others."""
-    estimates = numpy.full(len(table), FLOOR)
+    known = to_fit(table, features)
+    laws = numpy.full(len(table), FLOOR)
     for _, _, rows in groups(table):
         for member in numpy.unique(table[rows, MEMBER]):
             own = rows & (table[:, MEMBER] == member)
             others = (table[:, MEMBER] < FAMILY) & (table[:, MEMBER] != member)
-            fit = fitted(table, features, rows, others)
+            fit = fitted(known, features, rows, others)
             if fit:
-                estimates[own] = numpy.exp(fit(features[own]) + order_of_slabs(table[own]))
-    return numpy.clip(estimates, FLOOR, 1)
+                laws[own] = numpy.exp(fit(features[own]) + order_of_slabs(table[own]))
+    # expected_error of server/quality/laws.cpp
+    power = numpy.where(table[:, CONTENT] == 1, 2, 4)
+    together = (laws ** power + laws[methods(table, features)] ** power) ** (1 / power)
+    worse = features[:, HALF_LEVEL] + features[:, COARSER] > 0
+    return numpy.clip(numpy.where(worse, together, laws), FLOOR, 1)
 
 
 def agreement(estimates, errors):
@@ -177,13 +206,14 @@ def numbers(values):
 
 def write(path, table, features, residual):
     family = table[:, MEMBER] < FAMILY
+    known = to_fit(table, features)
     lines = ["// Made by tests/bench/fit_estimates.py (docs/benchmarks/error.md); do not edit.",
              "#pragma once", "", "#include <array>", "", '#include "server/quality/laws.hpp"', "",
              "namespace windsplat::quality {", "",
              "// By cause, then lines, a medium, both.",
              "inline constexpr std::array<Law, 12> laws{{"]
     for cause, content, rows in groups(table):
-        fit = fitted(table, features, rows, family)
+        fit = fitted(known, features, rows, family)
         base, slope = (fit.base, fit.slope) if fit else (numpy.log(FLOOR), [0])
         least, most = fit.bounds if fit else ([0], [0])
         signature, viewpoint = scatter(table, residual, rows)

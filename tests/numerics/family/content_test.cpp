@@ -63,9 +63,10 @@ TEST(Content, IsFiniteWhereLayersCoincide) {
   const quality::Content content = frame::content_of(scene);
   for (const double value : {content.lines, content.shade, content.line_depth, content.depth,
                              content.cell_depth, content.tint, content.cell, content.step,
-                             content.bend, content.wide_bend, content.order, content.step_cell}) {
+                             content.incline, content.order, content.step_cell}) {
     EXPECT_TRUE(std::isfinite(value)) << value;
   }
+  for (const double bend : content.bends) EXPECT_TRUE(std::isfinite(bend)) << bend;
   EXPECT_GT(content.step, 0);
 }
 
@@ -105,6 +106,24 @@ TEST(Content, TheLightOfAMediumIsThatOfAnyNumberOfCellsAlongARay) {
   }
 }
 
+// Behind the rim of an opaque medium the light falls from 1 to 0 within less than a cell, which is
+// seen at distances below it as well.
+TEST(Content, TheRimOfAnOpaqueMediumIsSharperThanACell) {
+  scene::Scene scene;
+  scene.lattice = even_lattice({24, 24, 8}, {1, 1, 1});
+  scene.camera = look({0, 0, 0}, {0, 0, -1}, 100, 120, 90, false, 16);
+  const auto field = make_volume(scene.lattice, 1, [&](int, double x, double y, double) {
+    return std::abs(x) < 6 && std::abs(y) < 6 ? 1.0F : 0.0F;
+  });
+  scene.scalars.push_back(medium(field, {1, 1, 1}));
+  const auto sharpness = [&](double extinction) {
+    scene.scalars.front().extinction = {{0, 0}, {1, extinction}};
+    const quality::Content content = frame::content_of(scene);
+    return content.bends[0] / content.bends[2];
+  };
+  EXPECT_GT(sharpness(100), 5 * sharpness(1e-3));
+}
+
 // Lines along x and z in equal parts, as the components of the data are.
 scene::Scene scene_of_lines(const glm::dvec3& forward) {
   scene::Scene scene;
@@ -133,6 +152,20 @@ TEST(Content, LinesAreSeenInTheDirectionInWhichTheyAreDrawn) {
     scene.vector->rate_z.assign(6, 1);
     EXPECT_NEAR(frame::content_of(scene).length, forward.x != 0 ? whole : 0, 1e-6) << "by rates";
   }
+}
+
+// The opaque front of a medium does not hide the part of a line that lies before it, so lines stay
+// visible however dense the medium is.
+TEST(Content, LinesInTheFirstLayerOfAnOpaqueMediumAreSeen) {
+  scene::Scene scene = scene_of_lines({0, 0, -1});
+  const auto field =
+      make_volume(scene.lattice, 1, [](int, double, double, double) { return 1.0F; });
+  scene.scalars.push_back(medium(field, {1, 1, 1}));
+  scene.scalars.front().extinction = {{0, 1e3}, {2, 1e3}};
+  const double dense = frame::content_of(scene).lines;
+  scene.scalars.front().extinction = {{0, 1e12}, {2, 1e12}};
+  EXPECT_GT(dense, 0.01);
+  EXPECT_NEAR(frame::content_of(scene).lines / dense, 1, 0.05);
 }
 
 // Cells turned by 45 degrees about y, so that x of the data is along x + z.

@@ -15,7 +15,7 @@ using protocol::MethodName;
 
 constexpr std::size_t kernel = 0;
 constexpr std::size_t half = 2;  // half the width
-const Kind kind{true, true, 0.16, 1.4, 1, 1};
+const Kind kind{true, true, 1.4, 1};
 
 // A viewpoint at that distance from all others: only the height differs.
 Viewpoint sight_at(double steps) {

@@ -84,8 +84,6 @@ TEST(SceneSignature, DependsOnTheContent) {
 TEST(SceneSignature, DistinguishesLinesAndMedium) {
   const Kind kind = signature_of(completed()).kind;
   EXPECT_TRUE(kind.lines && kind.medium);
-  EXPECT_EQ(kind.length, 0.5);
-  EXPECT_NEAR(kind.depth, 0.5 * (3 + 3), 1e-12) << "the densest of each layer, along a line";
   protocol::View view = completed();
   view.scalars->clear();
   EXPECT_FALSE(signature_of(view).kind.medium);
@@ -98,8 +96,6 @@ TEST(SceneSignature, DistinguishesLinesAndMedium) {
 TEST(SceneSignature, IncompleteViewHasLinesInAMedium) {
   const Kind kind = signature_of(protocol::View()).kind;
   EXPECT_TRUE(kind.lines && kind.medium);
-  EXPECT_EQ(kind.length, 0);
-  EXPECT_GT(kind.depth, 0);
 }
 
 TEST(Distance, IsZeroToItselfAndSymmetric) {

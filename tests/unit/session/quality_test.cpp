@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "driver.hpp"
 
@@ -138,7 +139,8 @@ TEST(Setting, RecoversWhenTheSceneBecomesCheap) {
 TEST(Setting, RequestedErrorReplacesTheBudget) {
   Driver driver;
   driver.calibrated = calibrated(120);
-  driver.patch(1, R"({"dataset":"wind","quality":{"maxError":0.005}})");
+  const double of_kernel = (*driver.calibrated)[0].error;
+  driver.patch(1, R"({"dataset":"wind","quality":{"maxError":)" + std::to_string(of_kernel) + "}}");
   std::uint32_t rev = 1;
   driver.finish_render(costs(*driver.calibrated)(driver.render->setting));
   driver.ack(1);

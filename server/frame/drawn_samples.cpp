@@ -1,0 +1,79 @@
+// Lattice and fields of a scene -> its samples.
+#include "server/frame/drawn_samples.hpp"
+
+#include <glm/geometric.hpp>
+
+#include "server/data/model/volume.hpp"
+
+namespace windsplat::frame {
+
+DrawnSamples::DrawnSamples(const scene::Scene& scene) : scene_(scene), high_(scene.lattice.dims) {
+  if (scene.slice) {
+    const auto axis = static_cast<std::size_t>(scene.slice->axis);
+    low_[axis] = scene.slice->sample;
+    high_[axis] = scene.slice->sample + 1;
+  }
+  for (std::size_t a = 0; a < 3; ++a) count_ *= high_[a] - low_[a];
+}
+
+std::size_t DrawnSamples::number(const Index& i) const {
+  const Index& dims = scene_.lattice.dims;
+  return static_cast<std::size_t>(i[0]) +
+         static_cast<std::size_t>(dims[0]) *
+             (static_cast<std::size_t>(i[1]) +
+              static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(i[2]));
+}
+
+glm::dvec3 DrawnSamples::place(const Index& i) const {
+  const scene::Lattice& lattice = scene_.lattice;
+  if (lattice.places) {
+    const auto& p = (*lattice.places)[number(i)];
+    return {p[0], p[1], p[2]};
+  }
+  return {lattice.positions[0][static_cast<std::size_t>(i[0])],
+          lattice.positions[1][static_cast<std::size_t>(i[1])],
+          lattice.positions[2][static_cast<std::size_t>(i[2])]};
+}
+
+std::optional<Index> DrawnSamples::neighbour(const Index& i, std::size_t a, int step) const {
+  Index next = i;
+  next[a] += step;
+  if (next[a] < low_[a] || next[a] >= high_[a]) return std::nullopt;
+  return next;
+}
+
+double DrawnSamples::edge(const Index& i, std::size_t a) const {
+  auto next = neighbour(i, a, 1);
+  if (!next) next = neighbour(i, a, -1);
+  if (!scene_.lattice.places || !next) {
+    return scene_.lattice.spacing[a][static_cast<std::size_t>(i[a])];
+  }
+  return glm::length(place(*next) - place(i));
+}
+
+Medium DrawnSamples::medium(const Index& i) const {
+  using Two = data::TwoValues;
+  Medium out;
+  const std::size_t n = number(i);
+  for (const scene::ScalarLayer& layer : scene_.scalars) {
+    const data::Volume& field = *layer.field;
+    if (field.components == 1) {
+      out.add(layer, field.values[n], 1);
+      continue;
+    }
+    const double low = field.component(Two::low_share)[n];
+    const double high = field.component(Two::high_share)[n];
+    if (low > 0) out.add(layer, field.component(Two::low)[n], low);
+    if (high > 0) out.add(layer, field.component(Two::high)[n], high);
+  }
+  return out;
+}
+
+bool DrawnSamples::contains(const Index& i) const {
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (i[a] < low_[a] || i[a] >= high_[a]) return false;
+  }
+  return true;
+}
+
+}  // namespace windsplat::frame
