@@ -11,26 +11,26 @@ inline constexpr std::size_t bends_count = 4;
 inline constexpr std::array<double, bends_count> bend_distances{0.125, 0.35, 1, 2};
 
 // Lengths are in heights of the picture. Means are over what is visible, weighted by its light. The
-// defaults are those of a typical view.
+// defaults are medians over the generated family (docs/benchmarks/error.md).
 struct Content {
-  double lines = 0.2;         // RMS over the picture of the opacity of its lines
-  double layers = 0.5;        // lines over one another where there are any, times their opacity
-  double length = 0.08;       // length of a line as projected
-  double shade = 0.03;        // |difference| of the colours of neighbouring lines
-  double gaps = 0.02;         // share of the neighbours of a line that have none
-  double line_depth = 0.02;   // optical depth of the medium of one cell at a line
-  double depth = 1;           // optical depth of the medium along a ray
-  double cell_depth = 0.06;   // optical depth of the medium of one cell
-  double tint = 0.1;          // |difference| of the colours of the medium of neighbours along a ray
-  double cell = 0.03;         // cube root of the volume of a cell
-  double finest_cell = 0.03;  // the narrowest edge of a cell
+  double lines = 0.5;        // RMS over the picture of the opacity of its lines
+  double layers = 4;         // lines over one another where there are any, times their opacity
+  double length = 0.084;     // length of a line as projected
+  double shade = 0.07;       // |difference| of the colours of neighbouring lines
+  double gaps = 0.01;        // share of the neighbours of a line that have none
+  double line_depth = 0.09;  // optical depth of the medium of one cell at a line
+  double depth = 2.7;        // optical depth of the medium along a ray
+  double cell_depth = 0.4;   // optical depth of the medium of one cell
+  double tint = 0.08;        // |difference| of the colours of the medium of neighbours along a ray
+  double cell = 0.027;       // cube root of the volume of a cell
+  double finest_cell = 0.025;  // the narrowest edge of a cell
   // The light of the medium alone: root of the integral of squares over the picture.
-  double step = 0.06;  // its difference from one cell to the next
+  double step = 0.063;  // its difference from one cell to the next
   // Its second difference at each of the distances.
-  std::array<double, bends_count> bends{3e-3, 0.02, 0.08, 0.1};
-  double incline = 0.1;     // its difference for each cell, over short distances
-  double order = 4e-3;      // its change if neighbouring cells changed places along the ray
-  double step_cell = 0.03;  // width of the cells where it differs
+  std::array<double, bends_count> bends{2e-3, 0.013, 0.062, 0.14};
+  double incline = 0.07;     // its difference for each cell, over short distances
+  double order = 3.7e-3;     // its change if neighbouring cells changed places along the ray
+  double step_cell = 0.025;  // width of the cells where it differs
 };
 
 // The same content `times` as large in the picture.

@@ -16,6 +16,7 @@ struct Scatter {
   double signature = 0;  // standard deviation between scene signatures, the same at every viewpoint
   double viewpoint = 0;  // standard deviation between viewpoints of one signature
   double noise = 0;      // standard deviation of one measurement
+  double content = 0;    // added where the content of a view is unknown
 };
 
 // Quantities on which errors depend (laws.cpp), as logarithms unless they are shares or counts.

@@ -229,7 +229,7 @@ Forecast prior(const Kind& kind, const Setting& setting, const Viewpoint& viewpo
   const Expected error = expected_error(kind, setting, viewpoint);
   Forecast out;
   out.error = error.value;
-  out.spread = spread_of(error.scatter);
+  out.spread = std::hypot(spread_of(error.scatter), viewpoint.content ? 0 : error.scatter.content);
   out.ms = expected_ms(kind, setting, viewpoint).value;
   return out;
 }
@@ -240,7 +240,7 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   };
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
-  const Viewpoint viewpoint = filled(seen);
+  const Viewpoint viewpoint = filled(seen).viewpoint;
   Entry entry{viewpoint, {}, {}, cause_of(how, viewpoint), 1};
   entry.spread = spread_of(error_scatter(kind_, entry.cause));
   if (measured.error) {
@@ -261,35 +261,39 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   entries.erase(oldest == entries.end() - 1 ? entries.begin() : oldest);
 }
 
-Viewpoint Table::filled(Viewpoint viewpoint) const {
-  if (viewpoint.content) return viewpoint;
+Table::Sight Table::filled(const Viewpoint& viewpoint) const {
+  if (viewpoint.content) return {viewpoint, 0};
   const Viewpoint* nearest = nullptr;
+  double apart = 0;
   for (const std::deque<Entry>& entries : entries_) {
     for (const Entry& entry : entries) {
       if (!entry.viewpoint.content) continue;
-      if (nearest == nullptr ||
-          distance(entry.viewpoint, viewpoint) < distance(*nearest, viewpoint)) {
-        nearest = &entry.viewpoint;
-      }
+      const double its = distance(entry.viewpoint, viewpoint);
+      if (nearest != nullptr && its >= apart) continue;
+      nearest = &entry.viewpoint;
+      apart = its;
     }
   }
-  if (nearest != nullptr) {
-    viewpoint.content = scaled(*nearest->content, nearest->height / viewpoint.height);
-  }
-  return viewpoint;
+  if (nearest == nullptr) return {viewpoint, 1};
+  Sight out{viewpoint, -std::expm1(-apart)};
+  out.viewpoint.content = scaled(*nearest->content, nearest->height / viewpoint.height);
+  return out;
 }
 
-Forecast Table::forecast_at(std::size_t setting, const Viewpoint& viewpoint,
-                            NearErrors& errors) const {
+Forecast Table::forecast_at(std::size_t setting, const Sight& sight, NearErrors& errors) const {
   const Setting& how = settings[setting];
+  const Viewpoint& viewpoint = sight.viewpoint;
   Forecast out = prior(kind_, how, viewpoint);
+  const Cause cause = cause_of(how, viewpoint);
+  const Scatter& of_error = error_scatter(kind_, cause);
+  double spread = spread_of(of_error);
   if (!errors.empty()) {
-    const Cause cause = cause_of(how, viewpoint);
     out.measured = errors.is_measured(setting, cause);
-    const Kriged kriged = errors.krige_at(setting, cause, error_scatter(kind_, cause));
+    const Kriged kriged = errors.krige_at(setting, cause, of_error);
     out.error = std::clamp(out.error * std::exp(kriged.log_ratio), error_least, 1.0);
-    out.spread = std::sqrt(kriged.variance);
+    spread = std::sqrt(kriged.variance);
   }
+  out.spread = std::hypot(spread, std::sqrt(sight.guessed) * of_error.content);
   std::vector<TimeObservation> times;
   for (const Entry& entry : entries_[setting]) {
     if (!entry.log_ms) continue;
@@ -304,21 +308,21 @@ Forecast Table::forecast_at(std::size_t setting, const Viewpoint& viewpoint,
 }
 
 Forecast Table::forecast(std::size_t setting, const Viewpoint& seen) const {
-  const Viewpoint viewpoint = filled(seen);
-  NearErrors errors(*this, viewpoint);
-  return forecast_at(setting, viewpoint, errors);
+  const Sight sight = filled(seen);
+  NearErrors errors(*this, sight.viewpoint);
+  return forecast_at(setting, sight, errors);
 }
 
 Forecasts Table::forecasts(const Viewpoint& seen) const {
-  const Viewpoint viewpoint = filled(seen);
-  NearErrors errors(*this, viewpoint);
+  const Sight sight = filled(seen);
+  NearErrors errors(*this, sight.viewpoint);
   Forecasts out;
   double log_ratio = 0;
   int timed = 0;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i] = forecast_at(i, viewpoint, errors);
+    out[i] = forecast_at(i, sight, errors);
     if (!out[i].timed) continue;
-    log_ratio += std::log(out[i].ms / expected_ms(kind_, settings[i], viewpoint).value);
+    log_ratio += std::log(out[i].ms / expected_ms(kind_, settings[i], sight.viewpoint).value);
     ++timed;
   }
   if (timed == 0) return out;

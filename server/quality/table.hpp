@@ -50,7 +50,7 @@ class Table {
   // values. Errors correlate with those of other settings too, most if they have the same cause,
   // and more so the nearer the viewpoints are; a constant part belongs to the signature. The spread
   // is the kriging standard deviation. A viewpoint of unknown content has that of the nearest
-  // measured one.
+  // measured one, or a typical one, and a wider spread.
   [[nodiscard]] Forecast forecast(std::size_t setting, const Viewpoint& viewpoint) const;
 
   // Whether a calibration run at this viewpoint would add information; begin and end of one.
@@ -75,8 +75,12 @@ class Table {
     double spread = 1;  // standard deviation of log_error without measurements
   };
   // The viewpoint with the content of the nearest measured one, if its own is unknown.
-  [[nodiscard]] Viewpoint filled(Viewpoint viewpoint) const;
-  [[nodiscard]] Forecast forecast_at(std::size_t setting, const Viewpoint& viewpoint,
+  struct Sight {
+    Viewpoint viewpoint;
+    double guessed = 0;  // share of the variance of unknown content
+  };
+  [[nodiscard]] Sight filled(const Viewpoint& viewpoint) const;
+  [[nodiscard]] Forecast forecast_at(std::size_t setting, const Sight& sight,
                                      NearErrors& errors) const;
 
   Kind kind_;

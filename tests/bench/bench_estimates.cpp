@@ -101,8 +101,9 @@ Measurements read(const std::string& path) {
 
 // One line for each measurement: member, scene, viewpoint, setting, error; the estimates without
 // measurements, after that of a final frame and after a calibration run, both at the first
-// viewpoint of the scene; the 95 % bounds of the first and the last estimate; cause, content,
-// features.
+// viewpoint of the scene; the 95 % bounds of the first and the last estimate; estimates and bounds
+// of a view whose content is unknown, without measurements and after that final frame; cause,
+// content, features.
 void list(const Measurements& measurements) {
   const auto members = all_members();
   std::unique_ptr<data::Dataset> dataset;
@@ -120,6 +121,8 @@ void list(const Measurements& measurements) {
     value_or_give_up(scene::build_scene(completed, *dataset));  // merged data become resident
     const quality::Viewpoint viewpoint = frame::viewpoint_of(completed, *dataset);
     if (!viewpoint.content) give_up("the content of a view is unknown");
+    quality::Viewpoint unknown = viewpoint;
+    unknown.content.reset();
     const bool first = at[0] != last[0] || at[1] != last[1];
     last = at;
     if (first) {
@@ -131,10 +134,13 @@ void list(const Measurements& measurements) {
       const quality::Setting& setting = quality::settings[row.setting];
       const quality::Forecast before = untaught->forecast(row.setting, viewpoint);
       const quality::Forecast after = calibrated->forecast(row.setting, viewpoint);
-      std::printf("%d,%d,%d,%zu,%.4g,%.4g,%.4g,%.4g,%.4g,%.4g,%d,%d", at[0], at[1], at[2],
-                  row.setting, row.error, before.error,
+      const quality::Forecast typical = untaught->forecast(row.setting, unknown);
+      const quality::Forecast moved = after_final->forecast(row.setting, unknown);
+      std::printf("%d,%d,%d,%zu,%.4g,%.4g,%.4g,%.4g,%.4g,%.4g,%.4g,%.4g,%.4g,%.4g,%d,%d", at[0],
+                  at[1], at[2], row.setting, row.error, before.error,
                   after_final->forecast(row.setting, viewpoint).error, after.error,
-                  quality::error_bound(before), quality::error_bound(after),
+                  quality::error_bound(before), quality::error_bound(after), typical.error,
+                  quality::error_bound(typical), moved.error, quality::error_bound(moved),
                   static_cast<int>(quality::cause_of(setting, viewpoint)), at[1] % 3);
       for (const double feature : quality::features_of(kind, setting, viewpoint)) {
         std::printf(",%.5g", feature);

@@ -31,7 +31,8 @@ LEAST_EXCESS = 0.3  # of the square of an error, with less it is that of the met
 
 # Columns of the list.
 MEMBER, SCENE, VIEW, SETTING, ERROR, PRIOR, AFTER_FINAL, CALIBRATED = range(8)
-BOUND, CALIBRATED_BOUND, CAUSE, CONTENT, FEATURES = range(8, 13)
+BOUND, CALIBRATED_BOUND, TYPICAL, TYPICAL_BOUND, MOVED, MOVED_BOUND = range(8, 14)
+CAUSE, CONTENT, FEATURES = range(14, 17)
 
 
 def terms(features):
@@ -150,8 +151,11 @@ def show(title, table, estimates, chosen):
 
 
 def show_bounds(table, chosen):
-    within = table[:, ERROR] <= 1.0005 * table[:, BOUND]  # the list has four digits
-    later = table[:, ERROR] <= 1.0005 * table[:, CALIBRATED_BOUND]
+    def kept_by(bound):
+        return table[:, ERROR] <= 1.0005 * table[:, bound]  # the list has four digits
+
+    within = kept_by(BOUND)
+    later = kept_by(CALIBRATED_BOUND)
     taught = chosen & (table[:, VIEW] > 0)
     scenes = numpy.unique(table[taught][:, [MEMBER, SCENE]], axis=0)
     kept = [later[taught & (table[:, [MEMBER, SCENE]] == scene).all(axis=1)].mean() >= 0.95
@@ -159,14 +163,17 @@ def show_bounds(table, chosen):
     print("errors within the 95 % bound: "
           f"{100 * within[chosen].mean():.1f} % without measurements, "
           f"{100 * later[taught].mean():.1f} % after a calibration run at another viewpoint; "
-          f"at least 95 % in {100 * numpy.mean(kept):.1f} % of {len(scenes)} scenes")
+          f"at least 95 % in {100 * numpy.mean(kept):.1f} % of {len(scenes)} scenes; "
+          f"of unknown content {100 * kept_by(TYPICAL_BOUND)[chosen].mean():.1f} % without "
+          f"measurements, {100 * kept_by(MOVED_BOUND)[taught].mean():.1f} % after a final frame")
 
 
 def scatter(table, residual, rows):
-    """Standard deviations between signatures and between viewpoints of one."""
+    """Standard deviations between signatures, viewpoints of one, and what typical instead of
+    known content adds."""
     rows = rows & (table[:, MEMBER] < FAMILY) & (table[:, ERROR] > FITTED_ABOVE)
     if not rows.any():
-        return 0.5, 0.3
+        return 0.5, 0.3, 1
     centred = residual[rows] - residual[rows].mean()
     views = {}
     for (member, scene, view), value in zip(table[rows, :3], centred):
@@ -177,7 +184,9 @@ def scatter(table, residual, rows):
         shared += [a * b for n, a in enumerate(means) for b in means[:n]]
     between = max(0.01, numpy.mean(shared)) if shared else 0.01
     within = max(0.01, centred.var() - between)
-    return numpy.sqrt(between), WIDER * numpy.sqrt(within)
+    known, typical = (numpy.mean(numpy.log(table[rows, ERROR] / table[rows, estimate]) ** 2)
+                      for estimate in (PRIOR, TYPICAL))
+    return numpy.sqrt([between, WIDER ** 2 * within, max(0, typical - known)])
 
 
 def correlations(table, residual):
@@ -216,11 +225,11 @@ def write(path, table, features, residual):
         fit = fitted(known, features, rows, family)
         base, slope = (fit.base, fit.slope) if fit else (numpy.log(FLOOR), [0])
         least, most = fit.bounds if fit else ([0], [0])
-        signature, viewpoint = scatter(table, residual, rows)
+        signature, viewpoint, guessed = scatter(table, residual, rows)
         lines += [f"    // {CAUSES[cause]}, {CONTENTS[content]}",
                   f"    {{{base:.4g}, {{{numbers(slope)}}}, {{{numbers(least)}}}, "
                   f"{{{numbers(most)}}}, {{{signature:.2f}, {viewpoint:.2f}, "
-                  "0.06}},"]
+                  f"0.06, {guessed:.2f}}}}},"]
     lines += ["}};", "", "}  // namespace windsplat::quality", ""]
     with open(path, "w", encoding="utf-8") as file:
         file.write("\n".join(lines))
@@ -242,6 +251,10 @@ def main():
          family & other_views)
     show("After a calibration run, kinds of data outside the family", table, table[:, CALIBRATED],
          ~family & other_views)
+    for kind, rows in ("the family", family), ("other kinds of data", ~family):
+        show(f"Unknown content, {kind}", table, table[:, TYPICAL], rows)
+        show(f"Unknown content, after a final frame from another viewpoint, {kind}", table,
+             table[:, MOVED], rows & other_views)
     print("\nFamily and other kinds of data:")
     show_bounds(table, family)
     show_bounds(table, ~family)

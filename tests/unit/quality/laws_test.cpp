@@ -165,7 +165,8 @@ TEST(Laws, FewerPixelsTakeLessTime) {
 }
 
 TEST(Prior, EqualsTheLawsWithTheCombinedUncertainty) {
-  const Viewpoint viewpoint{2, {}, 640, 480};
+  Viewpoint viewpoint{2, {}, 640, 480};
+  viewpoint.content.emplace();
   for (const Setting& setting : settings) {
     const Forecast told = prior(both, setting, viewpoint);
     const Expected error = expected_error(both, setting, viewpoint);

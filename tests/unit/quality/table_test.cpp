@@ -20,6 +20,7 @@ const Kind kind{true, true, 1.4, 1};
 // A viewpoint at that distance from all others: only the height differs.
 Viewpoint sight_at(double steps) {
   Viewpoint viewpoint{std::exp(0.5 * steps), {0, 1, 0}, 640, 480};
+  viewpoint.content.emplace();
   return viewpoint;
 }
 
@@ -90,9 +91,34 @@ TEST(Table, UnknownContentIsThatOfTheNearestMeasurement) {
   seen.content->cell *= 3;
   table.add(half, seen, {prior_of(half, seen), {}});
   Viewpoint nearer = sight_at(-1);
+  nearer.content.reset();
   const double told = table.forecast(half, nearer).error;
   nearer.content = scaled(*seen.content, seen.height / nearer.height);
   EXPECT_NEAR(told / prior_of(half, nearer), 1, 1e-9);
+}
+
+// A typical content is least certain, and that of another viewpoint the less the farther it is.
+TEST(Table, GuessedContentWidensTheSpread) {
+  const auto unknown_at = [](double steps) {
+    Viewpoint viewpoint = sight_at(steps);
+    viewpoint.content.reset();
+    return viewpoint;
+  };
+  Table table(kind);
+  const double typical = table.forecast(half, unknown_at(0)).spread;
+  EXPECT_GT(typical, 1.05 * table.forecast(half, sight_at(0)).spread);
+  EXPECT_EQ(typical, prior(kind, settings[half], unknown_at(0)).spread);
+  table.add(half, sight_at(0), {1e-3, {}});
+  EXPECT_NEAR(table.forecast(half, unknown_at(0)).spread, table.forecast(half, sight_at(0)).spread,
+              1e-12)
+      << "the content of this very viewpoint";
+  double last = 0;
+  for (const double steps : {0.5, 1.0, 2.0}) {
+    const double known = table.forecast(half, sight_at(steps)).spread;
+    const double guessed = table.forecast(half, unknown_at(steps)).spread;
+    EXPECT_GT(guessed - known, last) << steps;
+    last = guessed - known;
+  }
 }
 
 TEST(Table, ErrorMeasurementsNeverReplaceTimes) {
