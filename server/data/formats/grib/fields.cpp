@@ -9,16 +9,20 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <numeric>
+#include <string_view>
 #include <utility>
 
 #include "server/data/cf/time.hpp"
 #include "server/data/formats/grib/open.hpp"
+#include "server/data/formats/grib/rows.hpp"
 
 namespace windsplat::data::grib {
 
 namespace {
 
 constexpr long points_max = 1L << 28;
+constexpr long rows_max = 40000;  // of a Gaussian grid
 
 Error broken(const std::string& what) { return make_error(ErrorKind::bad_data, what); }
 
@@ -67,7 +71,7 @@ class Message {
                ? value
                : std::numeric_limits<double>::quiet_NaN();
   }
-  // The expected count of numbers; nullopt otherwise.
+  // The expected count of numbers; none otherwise.
   [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t expected) const {
     std::size_t count = 0;
     if (codes_get_size(handle_, key, &count) != CODES_SUCCESS || count != expected) return {};
@@ -75,6 +79,17 @@ class Message {
     if (codes_get_double_array(handle_, key, out.data(), &count) != CODES_SUCCESS) return {};
     out.resize(count == expected ? count : 0);
     return out;
+  }
+  // The expected count of positive whole numbers; none otherwise.
+  [[nodiscard]] std::vector<std::size_t> counts(const char* key, std::size_t expected) const {
+    std::size_t count = 0;
+    if (codes_get_size(handle_, key, &count) != CODES_SUCCESS || count != expected) return {};
+    std::vector<long> read(count);
+    if (codes_get_long_array(handle_, key, read.data(), &count) != CODES_SUCCESS ||
+        count != expected || *std::min_element(read.begin(), read.end()) < 1) {
+      return {};
+    }
+    return {read.begin(), read.end()};
   }
 
  private:
@@ -96,6 +111,14 @@ std::vector<double> longitudes(const Message& message, std::size_t count) {
   return out;
 }
 
+std::vector<double> longitudes_around(std::size_t count) {
+  std::vector<double> out(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    out[i] = 360 * static_cast<double>(i) / static_cast<double>(count);
+  }
+  return out;
+}
+
 std::vector<double> even_latitudes(const Message& message, std::size_t count) {
   const double first = message.number("latitudeOfFirstGridPointInDegrees");
   const double last = message.number("latitudeOfLastGridPointInDegrees");
@@ -109,7 +132,8 @@ std::vector<double> even_latitudes(const Message& message, std::size_t count) {
 // A contiguous range of Gaussian latitudes, whose ends are stored to a thousandth of a degree.
 std::vector<double> gaussian_latitudes(const Message& message, std::size_t count) {
   const long number = message.whole("N", 0);
-  if (number < 1 || number > 20000 || count > static_cast<std::size_t>(2 * number)) return {};
+  if (number < 1 || number > rows_max / 2 || count > static_cast<std::size_t>(2 * number))
+    return {};
   std::vector<double> all(static_cast<std::size_t>(2 * number));
   if (codes_get_gaussian_latitudes(number, all.data()) != CODES_SUCCESS) return {};
   const double first = message.number("latitudeOfFirstGridPointInDegrees");
@@ -124,15 +148,24 @@ std::vector<double> gaussian_latitudes(const Message& message, std::size_t count
   return {};
 }
 
+bool has_axes(const Grid& grid) { return grid.type.ends_with("_ll") || grid.type.ends_with("_gg"); }
+
+bool is_reduced(const Grid& grid) { return grid.type.starts_with("reduced_"); }
+
+std::size_t points_of(const std::vector<std::size_t>& row_lengths) {
+  return std::accumulate(row_lengths.begin(), row_lengths.end(), std::size_t{0});
+}
+
 void find_coordinates(const Message& message, Grid& grid) {
   const bool odd = message.whole("jPointsAreConsecutive", 0) != 0 ||
                    message.whole("alternativeRowScanning", 0) != 0;
-  if (grid.type == "regular_ll" || grid.type == "regular_gg") {
-    grid.longitude = longitudes(message, grid.columns);
-    grid.latitude = grid.type == "regular_ll" ? even_latitudes(message, grid.rows)
-                                              : gaussian_latitudes(message, grid.rows);
+  if (has_axes(grid)) {
+    grid.longitude =
+        is_reduced(grid) ? longitudes_around(grid.columns) : longitudes(message, grid.columns);
+    grid.latitude = grid.type.ends_with("_ll") ? even_latitudes(message, grid.rows)
+                                               : gaussian_latitudes(message, grid.rows);
   } else if (odd) {
-    grid.problem = "its projected grid is not scanned row by row";
+    grid.problem = "on a projected grid that is not scanned row by row";
     return;
   } else {
     grid.projected = true;
@@ -147,8 +180,52 @@ void find_coordinates(const Message& message, Grid& grid) {
            std::all_of(list.begin(), list.end(), [](double v) { return std::isfinite(v); });
   };
   if (!finite(grid.longitude) || !finite(grid.latitude)) {
-    grid.problem = "ecCodes provides no coordinates for its grid " + in_quotes(grid.type);
+    grid.problem = "on a grid for which ecCodes has no coordinates: " + in_quotes(grid.type);
   }
+}
+
+// Why grids of a type cannot be read; empty if they can.
+std::string why_unsupported(const std::string& type) {
+  constexpr auto supported = std::to_array<std::string_view>(
+      {"regular_ll", "regular_gg", "rotated_ll", "rotated_gg", "reduced_gg", "reduced_rotated_gg",
+       "lambert", "lambert_azimuthal_equal_area", "polar_stereographic", "mercator"});
+  if (std::find(supported.begin(), supported.end(), type) != supported.end()) return {};
+  std::string_view what;
+  std::string_view advice = "interpolate it to longitudes and latitudes first";
+  if (type == "sh") {
+    what = " (spherical harmonics)";
+    advice = "transform it first, for example with cdo sp2gp";
+  } else if (type == "unstructured_grid") {
+    what = " (cells in a list, whose positions are not in the file)";
+    advice =
+        "interpolate it to longitudes and latitudes first, for example with cdo remapcon and the "
+        "file of its grid";
+  } else if (type == "space_view") {
+    what = " (as seen from a satellite)";
+  }
+  return "on a grid of the type " + in_quotes(type) + std::string(what) +
+         ", which is not supported: " + std::string(advice);
+}
+
+// Why the rows of a reduced Gaussian grid cannot be interpolated; empty if they can. The amount of
+// memory is bounded: octahedral grids need twice as many samples as points.
+std::string problem_of_rows(const Message& message, const Grid& grid) {
+  if (message.whole("iScansNegatively", 0) != 0 || message.whole("jPointsAreConsecutive", 0) != 0 ||
+      message.whole("alternativeRowScanning", 0) != 0) {
+    return "on a reduced grid that is not scanned row by row to the east";
+  }
+  constexpr std::size_t samples_per_point_max = 8;
+  if (grid.rows * grid.columns > samples_per_point_max * points_of(grid.row_lengths)) {
+    return "on a reduced grid whose rows have too different numbers of points";
+  }
+  const double first = message.number("longitudeOfFirstGridPointInDegrees");
+  const double last = message.number("longitudeOfLastGridPointInDegrees");
+  const double spacing = 360.0 / static_cast<double>(grid.columns);
+  if (grid.rows == static_cast<std::size_t>(2 * message.whole("N", 0)) && std::abs(first) < 1e-3 &&
+      last > 360 - 1.5 * spacing) {
+    return {};
+  }
+  return "on a part of a reduced Gaussian grid, which is not supported (the whole globe is)";
 }
 
 // ecCodes divides by the length of the time unit, which it defines for these units only.
@@ -221,23 +298,40 @@ Result<Grid> read_grid(const std::vector<unsigned char>& bytes) {
   if (message.handle() == nullptr) return broken("is not understood by ecCodes");
   Grid grid;
   grid.type = message.text("gridType");
-  constexpr auto known_types = std::to_array<const char*>(
-      {"regular_ll", "regular_gg", "lambert", "polar_stereographic", "mercator"});
-  if (std::find(known_types.begin(), known_types.end(), grid.type) == known_types.end()) {
-    grid.problem = "on a grid of the type " + in_quotes(grid.type) + ", which is not supported";
-    return grid;
+  grid.problem = why_unsupported(grid.type);
+  if (!grid.problem.empty()) return grid;
+  const long rows = message.whole(has_axes(grid) ? "Nj" : "Ny", -1);
+  long columns = -1;
+  long points = -1;
+  if (!is_reduced(grid)) {
+    columns = message.whole(has_axes(grid) ? "Ni" : "Nx", -1);
+    points = rows < 1 || columns > points_max / rows ? -1 : columns * rows;
+  } else if (rows >= 1 && rows <= rows_max) {
+    const auto& lengths = grid.row_lengths = message.counts("pl", static_cast<std::size_t>(rows));
+    for (const std::size_t length : lengths) columns = std::max(columns, static_cast<long>(length));
+    points = static_cast<long>(points_of(lengths));
   }
-  const bool latitudes = grid.type == "regular_ll" || grid.type == "regular_gg";
-  const long columns = message.whole(latitudes ? "Ni" : "Nx", -1);
-  const long rows = message.whole(latitudes ? "Nj" : "Ny", -1);
-  if (columns < 1 || rows < 1 || columns > points_max / rows ||
-      message.whole("numberOfDataPoints", -1) != columns * rows) {
-    grid.problem = "its grid's numbers of rows, columns and points are inconsistent";
+  const std::string inconsistent =
+      "on a grid with inconsistent numbers of rows, columns and points";
+  if (columns < 1 || rows < 1 || columns > points_max / rows) {
+    grid.problem = inconsistent;
     return grid;
   }
   grid.columns = static_cast<std::size_t>(columns);
   grid.rows = static_cast<std::size_t>(rows);
-  find_coordinates(message, grid);
+  if (is_reduced(grid)) grid.problem = problem_of_rows(message, grid);
+  if (grid.problem.empty() && message.whole("numberOfDataPoints", -1) != points) {
+    grid.problem = inconsistent;
+  }
+  grid.rotated = grid.type.find("rotated") != std::string::npos;
+  if (grid.rotated) {
+    grid.south_pole_latitude = message.number("latitudeOfSouthernPoleInDegrees");
+    grid.south_pole_longitude = message.number("longitudeOfSouthernPoleInDegrees");
+    if (message.number("angleOfRotationInDegrees") != 0) {
+      grid.problem = "on a rotated grid that is also turned about its pole, which is not supported";
+    }
+  }
+  if (grid.problem.empty()) find_coordinates(message, grid);
   return grid;
 }
 
@@ -246,14 +340,16 @@ Result<std::vector<float>> read_values(const std::vector<unsigned char>& bytes, 
   const Message message(bytes);
   if (message.handle() == nullptr) return broken("is not understood by ecCodes");
   constexpr double missing = -1e300;
-  if (message.whole("numberOfDataPoints", -1) != static_cast<long>(grid.rows * grid.columns) ||
+  const bool reduced = is_reduced(grid);
+  const std::size_t points = reduced ? points_of(grid.row_lengths) : grid.rows * grid.columns;
+  if (message.whole("numberOfDataPoints", -1) != static_cast<long>(points) ||
       codes_set_double(message.handle(), "missingValue", missing) != CODES_SUCCESS) {
     return broken("has a number of values different from its grid");
   }
-  const std::vector<double> values = message.numbers("values", grid.rows * grid.columns);
+  const std::vector<double> values = message.numbers("values", points);
   if (values.empty()) return broken("has no values that ecCodes can decode");
-  const bool by_columns = message.whole("jPointsAreConsecutive", 0) != 0;
-  const bool alternating = message.whole("alternativeRowScanning", 0) != 0;
+  const bool by_columns = !reduced && message.whole("jPointsAreConsecutive", 0) != 0;
+  const bool alternating = !reduced && message.whole("alternativeRowScanning", 0) != 0;
   const std::size_t run = by_columns ? grid.rows : grid.columns;
   std::vector<float> out(values.size());
   for (std::size_t k = 0; k < values.size(); ++k) {
@@ -263,7 +359,7 @@ Result<std::vector<float>> read_values(const std::vector<unsigned char>& bytes, 
     out[by_columns ? fast * grid.columns + slow : slow * grid.columns + fast] =
         fits ? static_cast<float>(values[k]) : std::numeric_limits<float>::quiet_NaN();
   }
-  return out;
+  return reduced ? equal_rows(out, grid.row_lengths, grid.columns) : out;
 }
 
 }  // namespace windsplat::data::grib

@@ -21,6 +21,11 @@ struct Grid {
   bool rows_fall = false;     // toward smaller j
   std::vector<double> longitude;
   std::vector<double> latitude;
+  std::vector<std::size_t> row_lengths;  // points of each row of a reduced grid, the longest having
+                                         // `columns`; empty for other grids
+  bool rotated = false;  // longitudes and latitudes relate to the pole, given in degrees:
+  double south_pole_latitude = -90;
+  double south_pole_longitude = 0;
 };
 
 struct Header {
@@ -39,7 +44,7 @@ struct Header {
 Result<Header> read_header(const std::vector<unsigned char>& message);
 Result<Grid> read_grid(const std::vector<unsigned char>& message);
 // values of rows x columns, columns fastest, in the order of the coordinates of the grid; NaN if
-// missing
+// missing; of a reduced grid, interpolated along its rows
 Result<std::vector<float>> read_values(const std::vector<unsigned char>& message, const Grid& grid);
 
 }  // namespace windsplat::data::grib

@@ -23,7 +23,9 @@ bool is_same(const Grid& a, const Grid& b) {
                       [](double l, double r) { return std::abs(l - r) < 1e-3; });
   };
   return a.type == b.type && a.problem == b.problem && a.columns == b.columns && a.rows == b.rows &&
-         close(a.longitude, b.longitude) && close(a.latitude, b.latitude);
+         a.row_lengths == b.row_lengths && a.south_pole_latitude == b.south_pole_latitude &&
+         a.south_pole_longitude == b.south_pole_longitude && close(a.longitude, b.longitude) &&
+         close(a.latitude, b.latitude);
 }
 
 FileVariable level_axis(const std::string& type) {
@@ -44,6 +46,24 @@ FileVariable level_axis(const std::string& type) {
     out.positive = type.starts_with("hybrid") || type == "sigma" ? "down" : "";
   }
   return out;
+}
+
+FileVariable latitude_axis(const char* standard_name) {
+  FileVariable out;
+  out.standard_name = standard_name;
+  out.units = out.standard_name == "latitude" ? "degrees_north" : "degrees";
+  return out;
+}
+
+FileVariable longitude_axis(const char* standard_name) {
+  FileVariable out;
+  out.standard_name = standard_name;
+  out.units = out.standard_name == "longitude" ? "degrees_east" : "degrees";
+  return out;
+}
+
+std::string name_on_grid(const char* name, std::size_t grid) {
+  return grid == 0 ? name : name + ("_" + std::to_string(grid + 1));
 }
 
 // The library names winds eastward and northward regardless of the flag of the message. Winds along
@@ -176,35 +196,48 @@ int File::axis(const std::string& name, const std::vector<double>& values,
 // Latitude and longitude, or rows and columns with 2-D latitudes and longitudes.
 std::vector<int> File::grid_dimensions(std::size_t g) {
   if (const auto known = grid_dims_.find(g); known != grid_dims_.end()) return known->second;
+  return grid_dims_[g] = grids_[g].projected ? add_positions(g) : add_axes(g);
+}
+
+std::vector<int> File::add_axes(std::size_t g) {
   const Grid& grid = grids_[g];
-  FileVariable latitude;
-  latitude.standard_name = "latitude";
-  latitude.units = "degrees_north";
-  FileVariable longitude;
-  longitude.standard_name = "longitude";
-  longitude.units = "degrees_east";
-  std::vector<int> dims;
-  if (!grid.projected) {
-    dims = {axis("latitude", grid.latitude, latitude),
-            axis("longitude", grid.longitude, longitude)};
-  } else {
-    const std::string number = g == 0 ? "" : "_" + std::to_string(g + 1);
-    contents_.dimensions.push_back({"y" + number, grid.rows, false, grid.rows_fall});
-    contents_.dimensions.push_back({"x" + number, grid.columns, false, grid.columns_fall});
-    const int x = static_cast<int>(contents_.dimensions.size()) - 1;
-    dims = {x - 1, x};
-    for (const bool north : {true, false}) {
-      FileVariable position = north ? latitude : longitude;
-      position.name = (north ? "latitude_of_points" : "longitude_of_points") + number;
-      position.type = "float64";
-      position.numeric = true;
-      position.dims = dims;
-      contents_.variables.push_back(std::move(position));
-      held_.push_back({north ? grid.latitude : grid.longitude, -1, {}, {}});
-    }
+  const std::vector<std::size_t>& lengths = grid.row_lengths;
+  if (!lengths.empty()) {
+    contents_.notes.push_back("the rows of the reduced Gaussian grid have " +
+                              std::to_string(*std::min_element(lengths.begin(), lengths.end())) +
+                              " to " + std::to_string(grid.columns) +
+                              " points: interpolated linearly along each row to " +
+                              std::to_string(grid.columns) + " samples, vectors by components");
   }
-  grid_dims_[g] = dims;
-  return dims;
+  if (!grid.rotated) {
+    return {axis("latitude", grid.latitude, latitude_axis("latitude")),
+            axis("longitude", grid.longitude, longitude_axis("longitude"))};
+  }
+  FileVariable mapping;
+  mapping.name = name_on_grid("rotated_pole", g);
+  mapping.unread = "description of the map projection";
+  contents_.variables.push_back(std::move(mapping));
+  held_.push_back({});
+  held_.back().rotated_grid = static_cast<int>(g);
+  return {axis(name_on_grid("rlat", g), grid.latitude, latitude_axis("grid_latitude")),
+          axis(name_on_grid("rlon", g), grid.longitude, longitude_axis("grid_longitude"))};
+}
+
+std::vector<int> File::add_positions(std::size_t g) {
+  const Grid& grid = grids_[g];
+  contents_.dimensions.push_back({name_on_grid("y", g), grid.rows, false, grid.rows_fall});
+  contents_.dimensions.push_back({name_on_grid("x", g), grid.columns, false, grid.columns_fall});
+  const int x = static_cast<int>(contents_.dimensions.size()) - 1;
+  for (const bool north : {true, false}) {
+    FileVariable position = north ? latitude_axis("latitude") : longitude_axis("longitude");
+    position.name = name_on_grid(north ? "latitude_of_points" : "longitude_of_points", g);
+    position.type = "float64";
+    position.numeric = true;
+    position.dims = {x - 1, x};
+    contents_.variables.push_back(std::move(position));
+    held_.push_back({north ? grid.latitude : grid.longitude, -1, {}, {}});
+  }
+  return {x - 1, x};
 }
 
 void File::add_field(std::size_t g) {
@@ -247,13 +280,18 @@ void File::add_field(std::size_t g) {
     }
     const auto grid = grid_dimensions(group.grid);
     variable.dims.insert(variable.dims.end(), grid.begin(), grid.end());
+    if (grids_[group.grid].rotated) {
+      variable.grid_mapping = name_on_grid("rotated_pole", group.grid);
+    }
   }
   if (group.repeated > 0) {
     contents_.notes.push_back(in_quotes(variable.name) + ": " + std::to_string(group.repeated) +
                               " more messages of the same times and levels (ensemble members or "
                               "the like) are omitted; the first ones are used");
   }
-  if (header.relative_to_grid && grids_[group.grid].projected && tell_by_grid(variable)) {
+  const Grid& on_grid = grids_[group.grid];
+  const bool is_turned = on_grid.projected || on_grid.rotated;
+  if (header.relative_to_grid && is_turned && tell_by_grid(variable)) {
     contents_.notes.push_back(in_quotes(variable.name) +
                               " is along the rows or columns of its grid, not to east or north");
   }
@@ -261,9 +299,21 @@ void File::add_field(std::size_t g) {
   held_.push_back(std::move(held));
 }
 
-cf::Numbers File::numbers(int /*variable*/, const char* /*attribute*/) const { return {}; }
+cf::Numbers File::numbers(int variable, const char* attribute) const {
+  const int at = held_.at(static_cast<std::size_t>(variable)).rotated_grid;
+  if (at < 0) return {};
+  const Grid& grid = grids_[static_cast<std::size_t>(at)];
+  const std::string_view name = attribute;
+  if (name == "grid_north_pole_latitude") return {{-grid.south_pole_latitude}, true};
+  if (name == "grid_north_pole_longitude") return {{grid.south_pole_longitude + 180}, true};
+  return {};
+}
 
-std::string File::text_of(int /*variable*/, const char* /*attribute*/) const { return {}; }
+std::string File::text_of(int variable, const char* attribute) const {
+  const bool is_name = std::string_view(attribute) == "grid_mapping_name";
+  const Content& held = held_.at(static_cast<std::size_t>(variable));
+  return is_name && held.rotated_grid >= 0 ? "rotated_latitude_longitude" : "";
+}
 
 std::vector<std::size_t> File::chunk(int variable) const {
   const auto& dims = contents_.variables.at(static_cast<std::size_t>(variable)).dims;

@@ -40,12 +40,13 @@ class File final : public cf::ArrayFile {
     std::map<std::pair<double, double>, std::size_t> fields;
     std::size_t repeated = 0;
   };
-  // Content of a variable: numbers, or the fields of a group.
+  // Content of a variable: numbers, the fields of a group, or the pole of a rotated grid.
   struct Content {
     std::vector<double> numbers;
     int group = -1;
     std::vector<double> times;
     std::vector<double> levels;
+    int rotated_grid = -1;
   };
 
   explicit File(std::shared_ptr<const InputFile> input) : input_(std::move(input)) {}
@@ -54,6 +55,8 @@ class File final : public cf::ArrayFile {
   void add_variables();
   [[nodiscard]] Result<void> check_any_field() const;
   std::vector<int> grid_dimensions(std::size_t grid);
+  std::vector<int> add_axes(std::size_t grid);
+  std::vector<int> add_positions(std::size_t grid);
   int axis(const std::string& name, const std::vector<double>& values, const FileVariable& like);
   void add_field(std::size_t group);
   template <class Out>

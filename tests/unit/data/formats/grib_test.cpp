@@ -13,7 +13,7 @@
 #include "tests/unit/data/netcdf_maker.hpp"
 
 #ifdef WINDSPLAT_GRIB
-#include <eccodes.h>
+#include "tests/unit/data/formats/grib_maker.hpp"
 #endif
 
 namespace windsplat::data::test {
@@ -48,41 +48,6 @@ constexpr long rows = 3;
 double value_at(double lon, double lat, double level, double hour) {
   return lon + 100 * lat + level + 10000 * hour;
 }
-
-class Maker {
- public:
-  explicit Maker(const std::string& sample)
-      : handle_(codes_grib_handle_new_from_samples(nullptr, sample.c_str())) {
-    EXPECT_NE(handle_, nullptr) << sample;
-  }
-  Maker(const Maker&) = delete;
-  Maker& operator=(const Maker&) = delete;
-  ~Maker() { codes_handle_delete(handle_); }
-
-  void set(const char* key, long value) {
-    EXPECT_EQ(codes_set_long(handle_, key, value), CODES_SUCCESS) << key;
-  }
-  void set(const char* key, double value) {
-    EXPECT_EQ(codes_set_double(handle_, key, value), CODES_SUCCESS) << key;
-  }
-  void set(const char* key, const std::string& value) {
-    std::size_t length = value.size();
-    EXPECT_EQ(codes_set_string(handle_, key, value.c_str(), &length), CODES_SUCCESS) << key;
-  }
-  void values(const std::vector<double>& list) {
-    EXPECT_EQ(codes_set_double_array(handle_, "values", list.data(), list.size()), CODES_SUCCESS);
-  }
-  [[nodiscard]] std::string bytes() const {
-    const void* data = nullptr;
-    std::size_t size = 0;
-    EXPECT_EQ(codes_get_message(handle_, &data, &size), CODES_SUCCESS);
-    return {static_cast<const char*>(data), size};
-  }
-  [[nodiscard]] codes_handle* handle() { return handle_; }
-
- private:
-  codes_handle* handle_;
-};
 
 void fill_grid(Maker& maker, const Scan& scan, long level, long hour, double missing_lon = -1) {
   maker.set("Ni", columns);
@@ -131,24 +96,7 @@ std::string message(int edition, const std::string& quantity, long level, long h
   return maker.bytes();
 }
 
-class Grib : public testing::Test {
- protected:
-  std::unique_ptr<Source> open(const std::string& bytes) {
-    write_bytes(folder_ / "a.grib", bytes);
-    auto source = open_file(folder_ / "a.grib");
-    EXPECT_TRUE(source) << source.error().message;
-    return source ? std::move(*source) : nullptr;
-  }
-  std::string fault(const std::string& bytes) {
-    write_bytes(folder_ / "a.grib", bytes);
-    auto source = open_file(folder_ / "a.grib");
-    if (!source) return source.error().message;
-    auto volume = (*source)->read(0, 0);
-    return volume ? "" : volume.error().message;
-  }
-
-  Folder folder_;
-};
+class Grib : public GribFiles {};
 
 // Every sample of a field equals the closed form, within a few packing steps.
 void expect_form(Source& source, const std::string& field, std::size_t step, double hour) {
@@ -382,11 +330,6 @@ TEST_F(Grib, FurtherMembersAreReportedAndOmitted) {
 
 TEST_F(Grib, HeadingBeforeTheMessageIsSkipped) {
   EXPECT_EQ(fault("\x01\r\r\n001\r\r\nHTXX50 EGRR 291200\r\r\n" + message(1, "t", 500, 0)), "");
-}
-
-TEST_F(Grib, ReducedGridsAreRefusedByName) {
-  const Maker maker("reduced_gg_pl_32_grib2");
-  EXPECT_THAT(fault(maker.bytes()), HasSubstr("'reduced_gg'"));
 }
 
 TEST_F(Grib, BrokenMessagesAreErrors) {
