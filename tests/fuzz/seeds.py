@@ -3,6 +3,7 @@ installed by nccopy and grib_filter or copied from build/test-data. VTK is in se
 that try to lead a reader out of the data root are in seeds_escaping.py."""
 
 import gzip
+import itertools
 import json
 import pathlib
 import re
@@ -239,10 +240,46 @@ write;
 """
 
 
+# An octahedral grid of 208 points, and a grid about a rotated pole.
+GRIB_GRIDS = {"reduced_gg_pl_32": (208, """set N = 4; set Nj = 8;
+set pl = {20,24,28,32,32,28,24,20};
+set latitudeOfFirstGridPointInDegrees = 73.799; set latitudeOfLastGridPointInDegrees = -73.799;
+set longitudeOfLastGridPointInDegrees = 348.75;
+"""), "rotated_ll_pl": (48, """set Ni = 8; set Nj = 6;
+set latitudeOfFirstGridPointInDegrees = 5; set latitudeOfLastGridPointInDegrees = -5;
+set longitudeOfFirstGridPointInDegrees = 0; set longitudeOfLastGridPointInDegrees = 14;
+set iDirectionIncrementInDegrees = 2; set jDirectionIncrementInDegrees = 2;
+set latitudeOfSouthernPoleInDegrees = -40; set longitudeOfSouthernPoleInDegrees = 10;
+""")}
+
+
+def grid_seeds(folder, tool, samples, edition):
+    for grid, (points, rules) in GRIB_GRIDS.items():
+        data = b""
+        for c, name in enumerate("uv"):
+            values = ",".join(f"{v:.4f}" for v in itertools.islice(itertools.cycle(numbers(c)),
+                                                                   points))
+            count = f"set numberOfDataPoints = {points};" if edition == 2 else ""
+            (folder / "rules").write_text(f"""{rules}{count}
+set shortName = "{name}"; set level = 500; set bitsPerValue = 12;
+set values = {{{values}}};
+write;
+""")
+            made = folder / "made.grib"
+            made.unlink(missing_ok=True)
+            subprocess.run([tool, "-o", made, folder / "rules",
+                            samples / f"{grid}_grib{edition}.tmpl"], check=True,
+                           capture_output=True)
+            data += made.read_bytes()
+        yield Seed(f"grib {edition}", grid, {"g.grib": data})
+
+
 def grib_seeds(folder):
     samples = pathlib.Path("/usr/share/eccodes/samples")
     tool = shutil.which("grib_filter")
     for edition in (1, 2):
+        if tool and samples.exists():
+            yield from grid_seeds(folder, tool, samples, edition)
         sample = samples / f"regular_ll_pl_grib{edition}.tmpl"
         packings = ["grid_simple"] + (["grid_ccsds", "grid_jpeg", "grid_ieee"] if edition == 2
                                       else ["grid_second_order"])
