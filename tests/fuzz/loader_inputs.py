@@ -39,11 +39,14 @@ def field(name, components, derived=0):
 
 
 def info(axes=((0.0, 1.0), (0.0, 1.0), (1.0, 0.0)), fields=((b"wind", (b"u", b"v")),),
-         columns=None, steps=(0.0,), count_of_steps=None):
+         columns=None, steps=(0.0,), count_of_steps=None, choices=((b"number", 2, (b"0", b"1")),)):
     out = b"".join(map(text, (b"told", b"", b"told.nc", b"x", b"0", b"", b"")))
     out += b"".join(axis(name, values) for name, values in zip((b"x", b"y", b"z"), axes))
     out += struct.pack("<Q", len(fields)) + b"".join(field(*f) for f in fields)
     out += struct.pack("<Q", 1) + text(b"left") + text(b"out") + texts([b"a note"])
+    out += struct.pack("<Q", len(choices))
+    out += b"".join(text(name) + struct.pack("<Q", length) + texts(values) + text(b"1")
+                    for name, length, values in choices)
     out += struct.pack("<Q", len(steps) if count_of_steps is None else count_of_steps)
     out += b"".join(struct.pack("<d", step) + text(b"0") for step in steps)
     out += bytes([columns is not None])
@@ -68,11 +71,12 @@ def loader_seeds():
     square = ([0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0])
     infos = [info(), info(fields=((b"T", (b"T",)), (b"w", (b"u", b"v", b"w"), 1))),
              info(columns=square), info(steps=(0.0, 6.0, 12.0)),
-             info(axes=((0.0,), (0.0,), (5.0,))),
+             info(axes=((0.0,), (0.0,), (5.0,))), info(choices=()),
+             info(choices=((b"bin", 1, (b"0", b"1")),)),
              info(fields=()), info(steps=()), info(axes=((1.0, 0.0), (0.0,), (0.0,))),
              info(axes=((float("nan"),), (0.0,), (0.0,)))]
     task = struct.pack("<Q", 1 << 30) + texts([b"/usr/share"]) + b"\0\1" + text(b"a") + text(
-        b"") + text(b"") + texts([b"a.nc"])
+        b"") + text(b"") + struct.pack("<Q", 1) + text(b"number") + text(b"3") + texts([b"a.nc"])
     payloads = [*infos, error(), error(200), texts([b"a", b"b/"]), task, struct.pack("<d", 0.5)]
     for i, payload in enumerate(payloads):
         yield "loader", f"payload-{i}", PAYLOAD + payload

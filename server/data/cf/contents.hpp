@@ -13,7 +13,8 @@ struct FileDimension {
   std::string name;
   std::size_t length = 0;
   bool unlimited = false;
-  bool falls = false;  // indices run opposite to the direction of vector components
+  bool is_time = false;  // time whatever its name: lead or reference times of forecasts
+  bool falls = false;    // indices run opposite to the direction of vector components
   // Of faces of cells, if the reader knows: the dimension of their centers, and the face before the
   // first center (cf/staggered).
   int centers = -1;
@@ -48,11 +49,12 @@ struct FileVariable {
 struct FileContents {
   std::string title;
   std::vector<FileDimension> dimensions;
-  std::vector<FileVariable> variables;  // variables of the root group; readers address a variable
-                                        // by its index
-  std::vector<std::string> groups;      // names of groups below the root, which are not searched
-  std::vector<LeftOut> left_out;        // variables that cannot be read
-  std::vector<std::string> notes;       // assumptions and conversions of the reader, for users
+  std::vector<FileVariable> variables;   // variables of the root group; readers address a variable
+                                         // by its index
+  std::vector<std::string> groups;       // names of groups below the root, which are not searched
+  std::vector<LeftOut> left_out;         // variables that cannot be read
+  std::vector<DimensionChoice> choices;  // dimensions of which one entry was chosen
+  std::vector<std::string> notes;        // assumptions and conversions of the reader, for users
 };
 
 }  // namespace windsplat::data

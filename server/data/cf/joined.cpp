@@ -159,6 +159,12 @@ Result<void> JoinedFile::add(const ArrayFile& part) {
     add_variable(part, static_cast<int>(v), dimensions);
   }
   contents_.left_out.insert(contents_.left_out.end(), added.left_out.begin(), added.left_out.end());
+  for (const DimensionChoice& choice : added.choices) {
+    const bool known =
+        std::any_of(contents_.choices.begin(), contents_.choices.end(),
+                    [&](const DimensionChoice& one) { return one.name == choice.name; });
+    if (!known && contents_.choices.size() < choices_max) contents_.choices.push_back(choice);
+  }
   for (const std::string& note : added.notes) {
     if (std::count(contents_.notes.begin(), contents_.notes.end(), note) == 0) {
       contents_.notes.push_back(note);

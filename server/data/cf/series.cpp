@@ -309,6 +309,7 @@ void SeriesFile::finish() {
   contents_.title = own.title;
   contents_.dimensions = own.dimensions;
   contents_.groups = own.groups;
+  contents_.choices = own.choices;
   contents_.notes.insert(contents_.notes.begin(), own.notes.begin(), own.notes.end());
   contents_.left_out.insert(contents_.left_out.begin(), own.left_out.begin(), own.left_out.end());
   for (std::size_t v = 0; v < own.variables.size(); ++v) {

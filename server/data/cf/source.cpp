@@ -53,6 +53,7 @@ class ArraySource final : public FileSource {
     }
     info_.left_out = std::move(choice_.left_out);
     info_.notes = file_->contents().notes;
+    info_.choices = file_->contents().choices;
     if (auto done = find_axes(); !done) {
       return named(done.error());
     }

@@ -9,6 +9,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/files/input_file.hpp"
+#include "server/data/files/selection.hpp"
 #include "server/data/files/stamp.hpp"
 
 namespace windsplat::data {
@@ -32,11 +33,21 @@ struct Location {
   std::string stem;             // name of the dataset: without folder and extension
   std::string pattern;          // for a series: absolute, or below `root` if that is not empty
   std::string root;
+  Selection selection;  // entries of dimensions that were chosen
+
+  // The dataset's id as wanted: "gcm", with a selection "gcm,number=3", which is cut where views
+  // could not name it.
+  [[nodiscard]] std::string wanted_id() const {
+    constexpr std::size_t bytes_max = 240;
+    return selection.empty() ? stem : (stem + ',' + selection_text(selection)).substr(0, bytes_max);
+  }
 };
 
 // Locates a path of a file or folder, or a pattern whose last part has * ? or [...]; for files with
-// groups also "path#/group". The ending of a file name determines whether the file may have
-// companions. Errors: not_found; bad_data for URLs and special files.
+// groups also "path#/group". Either may be followed by a selection, "path?number=3", unless a file
+// has this name. The ending of a file name determines whether the file may have
+// companions. Errors: not_found; bad_data for URLs and special files;
+// invalid for a malformed selection.
 Result<Location> locate(const std::string& path_or_pattern);
 
 // The same for an untrusted path below the folder `root`: "..", absolute paths and links cannot

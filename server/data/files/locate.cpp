@@ -117,6 +117,19 @@ Result<Location> locate_series(const std::string& pattern) {
   return out;
 }
 
+// "path?name=value", unless a file has this name. Errors as locate().
+Result<Location> locate_selected(const std::string& path, std::size_t mark) {
+  auto selection = parse_selection(std::string_view(path).substr(mark + 1));
+  if (!selection) return selection.error();
+  auto out = locate(path.substr(0, mark));
+  if (!out) return out;
+  if (!out->selection.empty()) {
+    return make_error(ErrorKind::invalid, in_quotes(path) + " has two selections");
+  }
+  out->selection = std::move(*selection);
+  return out;
+}
+
 // "path#/group", unless a file has this name. Errors as locate().
 Result<Location> locate_inside(const std::string& path, std::size_t mark) {
   const std::string file = path.substr(0, mark);
@@ -148,6 +161,9 @@ Result<Location> locate(const std::string& path_or_pattern) {
   std::error_code fault;
   const fs::path plain = fs::canonical(path, fault);
   if (fault) {
+    if (const auto mark = selection_mark(path); mark != std::string::npos) {
+      return locate_selected(path, mark);
+    }
     if (const auto mark = path.rfind("#/"); mark != std::string::npos && mark > 0) {
       return locate_inside(path, mark);
     }
@@ -196,7 +212,9 @@ std::string links_left_out(const Location& series) {
 Result<Location> locate_again(const Location& series) {
   auto out = series.root.empty() ? locate_series(series.pattern)
                                  : locate_beneath(series.root, series.pattern);
-  if (out) out->inside = series.inside;
+  if (!out) return out;
+  out->inside = series.inside;
+  out->selection = series.selection;
   return out;
 }
 

@@ -13,6 +13,7 @@
 #include <climits>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -175,7 +176,7 @@ Result<Location> find_plain(int top, const std::string& root, const std::string&
 }
 
 // "path#/group" denotes a group unless a file has this name.
-Result<Location> find(int top, const std::string& root, const std::string& path) {
+Result<Location> find_inside(int top, const std::string& root, const std::string& path) {
   const auto mark = path.rfind("#/");
   if (mark == std::string::npos || mark == 0 || Descriptor(open_beneath(top, path, O_PATH))) {
     return find_plain(top, root, path);
@@ -186,6 +187,21 @@ Result<Location> find(int top, const std::string& root, const std::string& path)
     return refused(path, "names a group, which a folder does not have");
   }
   out->inside = path.substr(mark + 2);
+  return out;
+}
+
+// "path?name=value" has a selection unless a file has this name.
+Result<Location> find(int top, const std::string& root, const std::string& path) {
+  const std::size_t mark = selection_mark(path);
+  if (mark == std::string::npos || Descriptor(open_beneath(top, path, O_PATH))) {
+    return find_inside(top, root, path);
+  }
+  auto selection = parse_selection(std::string_view(path).substr(mark + 1));
+  if (!selection) return selection.error();
+  auto out = find(top, root, path.substr(0, mark));
+  if (!out) return out;
+  if (!out->selection.empty()) return refused(path, "has two selections");
+  out->selection = std::move(*selection);
   return out;
 }
 

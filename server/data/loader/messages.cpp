@@ -104,6 +104,28 @@ FieldInfo field_of(Reader& in, std::uint64_t samples) {
   return field;
 }
 
+DimensionChoice choice_of(Reader& in) {
+  DimensionChoice choice;
+  choice.name = text_of(in);
+  choice.length = in.number<std::uint64_t>();
+  choice.values.resize(in.count(choice_values_max, text_bytes_min));
+  for (std::string& value : choice.values) value = text_of(in);
+  choice.chosen = text_of(in);
+  // A length is a number in JSON.
+  if (choice.length > std::size_t{1} << 53 || choice.values.empty() ||
+      choice.values.size() > choice.length) {
+    in.fail();
+  }
+  return choice;
+}
+
+void put_choice(Writer& out, const DimensionChoice& choice) {
+  out.text(choice.name);
+  out.number(static_cast<std::uint64_t>(choice.length));
+  put_texts(out, choice.values);
+  out.text(choice.chosen);
+}
+
 void put_axis(Writer& out, const Axis& axis) {
   out.text(axis.name);
   out.text(axis.standard_name);
@@ -141,6 +163,11 @@ std::string encode_task(const Task& task) {
   out.text(task.location.stem);
   out.text(task.location.inside);
   out.text(task.location.pattern);
+  out.count(task.location.selection.size());
+  for (const SelectedEntry& one : task.location.selection) {
+    out.text(one.dimension);
+    out.text(one.value);
+  }
   out.count(task.location.members.size());
   for (const Location::Member& member : task.location.members) out.text(member.name);
   return out.bytes();
@@ -159,6 +186,11 @@ Result<Task> decode_task(std::string_view bytes) {
   out.location.stem = in.text(text_max);
   out.location.inside = in.text(text_max);
   out.location.pattern = in.text(text_max);
+  out.location.selection.resize(in.count(selection_max, 2 * text_bytes_min));
+  for (SelectedEntry& one : out.location.selection) {
+    one.dimension = in.text(text_max);
+    one.value = in.text(text_max);
+  }
   out.location.members.resize(in.count(things_max, text_bytes_min));
   for (Location::Member& member : out.location.members) member.name = in.text(text_max);
   if (!in.complete()) return make_error(ErrorKind::internal, "the task of the loader is malformed");
@@ -200,6 +232,8 @@ std::string encode_info(const DatasetInfo& info) {
     out.text(left.reason);
   }
   put_texts(out, info.notes);
+  out.count(info.choices.size());
+  for (const DimensionChoice& choice : info.choices) put_choice(out, choice);
   out.count(info.steps.size());
   for (const TimeStep& step : info.steps) {
     out.number(step.value);
@@ -236,6 +270,8 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
     left.reason = text_of(in);
   }
   info.notes = texts_of(in);
+  info.choices.resize(in.count(choices_max, 3 * text_bytes_min));
+  for (DimensionChoice& choice : info.choices) choice = choice_of(in);
   info.steps.resize(in.count(steps_max, sizeof(double) + text_bytes_min));
   for (TimeStep& step : info.steps) {
     step.value = in.number<double>();

@@ -62,6 +62,17 @@ struct LeftOut {
   std::string reason;
 };
 
+// A dimension besides space and time, of which one entry is shown: a member of an ensemble, a
+// reference time, a spectral band.
+struct DimensionChoice {
+  std::string name;
+  std::size_t length = 0;
+  std::vector<std::string> values;  // of the first choice_values_max entries
+  std::string chosen;
+};
+inline constexpr std::size_t choices_max = 32;
+inline constexpr std::size_t choice_values_max = 100;
+
 struct TimeStep {
   double value = 0;  // in the unit of the file
   std::string
@@ -79,7 +90,8 @@ struct DatasetInfo {
   std::vector<FieldInfo> fields;
   std::vector<LeftOut> left_out;
   std::vector<std::string> notes;  // how the data were converted: "resampled from 4096 cells ..."
-  std::vector<TimeStep> steps;     // at least one
+  std::vector<DimensionChoice> choices;  // at most choices_max
+  std::vector<TimeStep> steps;           // at least one
   std::string time_units;
   std::string time_calendar;       // as in CF; empty means standard
   std::uint64_t stored_bytes = 0;  // total size of the files opened by a loader; 0 for samples

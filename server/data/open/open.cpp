@@ -11,6 +11,7 @@
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/joined.hpp"
+#include "server/data/cf/selected/selected_file.hpp"
 #include "server/data/cf/series.hpp"
 #include "server/data/cf/source.hpp"
 #include "server/data/cf/staggered/collocated_file.hpp"
@@ -57,16 +58,33 @@ Result<std::string> first_bytes(Files& files) {
 
 SourceResult source_of(const Files& files, Result<std::unique_ptr<cf::ArrayFile>> file) {
   if (!file) return file.error();
+  if (auto known = cf::check_selection((*file)->contents(), files.location().selection); !known) {
+    return make_error(known.error().kind,
+                      in_quotes((*file)->name()) + ": " + known.error().message);
+  }
   (*file)->set_stored_bytes(files.opened_bytes());
   return cf::make_source(std::move(*file));
+}
+
+// The chosen entries of dimensions besides space and time.
+template <class File>
+Result<std::unique_ptr<cf::ArrayFile>> chosen_of(const Files& files,
+                                                 Result<std::unique_ptr<File>> file) {
+  if (!file) return file.error();
+  (*file)->set_stored_bytes(files.opened_bytes());  // limits the reading of coordinates
+  const std::string name = (*file)->name();
+  auto chosen = cf::selected(std::move(*file), files.location().selection);
+  if (!chosen)
+    return make_error(chosen.error().kind, in_quotes(name) + ": " + chosen.error().message);
+  return chosen;
 }
 
 template <class File>
 Result<std::unique_ptr<cf::ArrayFile>> as_arrays(const Files& files,
                                                  Result<std::unique_ptr<File>> file) {
-  if (!file) return file.error();
-  (*file)->set_stored_bytes(files.opened_bytes());  // limits the reading of coordinates
-  return cf::collocated(std::move(*file));
+  auto chosen = chosen_of(files, std::move(file));
+  if (!chosen) return chosen.error();
+  return cf::collocated(std::move(*chosen));
 }
 
 // Only netCDF and HDF5 have groups; for other formats a group after '#/' must not be ignored.
@@ -87,7 +105,7 @@ Result<std::unique_ptr<cf::ArrayFile>> open_arrays(const std::shared_ptr<Files>&
   for (const ArrayFormat& format : array_formats) {
     if (!format.looks_like(*head)) continue;
     if (auto plain = without_group(*files, name); !plain) return plain.error();
-    return format.open(files, std::move(*input));
+    return chosen_of(*files, format.open(files, std::move(*input)));
   }
   if (grib::is_grib(**input)) {
     if (auto plain = without_group(*files, name); !plain) return plain.error();
@@ -141,14 +159,22 @@ ArraysResult open_series(const std::shared_ptr<Files>& files) {
     parts.push_back(std::move(*part));
   }
   if (parts.size() == 1) return std::move(parts.front());
-  return as_arrays(*files, cf::JoinedFile::open(location.stem, pattern, std::move(parts)));
+  auto joined = cf::JoinedFile::open(location.stem, pattern, std::move(parts));
+  if (!joined) return joined.error();
+  (*joined)->set_stored_bytes(files->opened_bytes());
+  return cf::collocated(std::move(*joined));
 }
 
 SourceResult open_by_content(const std::shared_ptr<Files>& files) {
   const auto head = first_bytes(*files);
   if (!head) return head.error();
   if (vtk::is_vtk(*head)) {
-    const auto plain = without_group(*files, files->location().members.front().name);
+    const std::string& name = files->location().members.front().name;
+    if (!files->location().selection.empty()) {
+      return make_error(ErrorKind::not_found,
+                        in_quotes(name) + " has a format without dimensions to choose from");
+    }
+    const auto plain = without_group(*files, name);
     return plain ? vtk::open(files) : SourceResult(plain.error());
   }
   if (zarr::is_store(*files)) return source_of(*files, as_arrays(*files, zarr::Store::open(files)));

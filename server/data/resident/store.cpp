@@ -302,7 +302,7 @@ Result<Store::Added> Store::add_or_find(const Location& location) {
   // Ends idle loaders, so that their number is limited when many files are opened in sequence.
   constexpr double hardly_idle_s = 0.5;
   release_idle(hardly_idle_s);
-  return state_->add(key_of(location), printable(location.stem), location,
+  return state_->add(key_of(location), printable(location.wanted_id()), location,
                      [&] { return state_->options.open(location); });
 }
 
@@ -339,7 +339,7 @@ void Store::list_failed(const std::string& sample_or_path, const Error& why) {
   if (location) entry.key = key_of(*location);
   entry.listed.problem = why.message;
   std::string wanted =
-      location ? location->stem : std::filesystem::path(sample_or_path).stem().native();
+      location ? location->wanted_id() : std::filesystem::path(sample_or_path).stem().native();
   const std::lock_guard lock(state_->mutex);
   entry.listed.id = state_->unique_id(printable(wanted.empty() ? "dataset" : wanted), "");
   state_->failed.push_back(std::move(entry));

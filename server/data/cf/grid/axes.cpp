@@ -327,7 +327,7 @@ DimensionRole classify(const FileContents& contents, int dimension) {
   if (out.coordinate >= 0) {
     heed_positive(contents.variables[static_cast<std::size_t>(out.coordinate)], found);
   }
-  out.role = self.other ? Role::other : found.role;
+  out.role = self.other ? Role::other : self.is_time ? Role::time : found.role;
   out.kind = found.kind;
   out.kind_is_sure = found.kind_is_sure;
   out.positive_down = found.positive_down;

@@ -198,14 +198,25 @@ Result<void> check_size(const FileContents& contents, const GridChoice& choice) 
 
 }  // namespace
 
+std::vector<std::string> reasons_of_no_field(const FileContents& contents,
+                                             const std::vector<DimensionRole>& roles) {
+  const Named named(contents);
+  std::vector<std::string> out;
+  out.reserve(contents.variables.size());
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    out.push_back(not_a_field(contents, roles, named, v));
+  }
+  return out;
+}
+
 Result<GridChoice> choose_grid(const FileContents& contents,
                                const std::vector<DimensionRole>& roles) {
   GridChoice choice;
   std::vector<Group> groups;
-  const Named named(contents);
+  std::vector<std::string> reasons = reasons_of_no_field(contents, roles);
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
     const FileVariable& variable = contents.variables[v];
-    std::string reason = not_a_field(contents, roles, named, v);
+    std::string& reason = reasons[v];
     if (reason.empty()) {
       Candidate candidate{static_cast<int>(v), lay_out(contents, roles, variable)};
       reason = misplaced(contents, variable, candidate.layout);

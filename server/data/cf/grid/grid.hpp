@@ -23,6 +23,10 @@ struct GridChoice {
   std::vector<LeftOut> left_out;
 };
 
+// For each variable why it cannot be a field on any grid; empty if it can.
+std::vector<std::string> reasons_of_no_field(const FileContents& contents,
+                                             const std::vector<DimensionRole>& roles);
+
 // Prefers grids with three spatial dimensions, then the one with the most samples over all its
 // variables. Errors: bad_data if there is none, or if it exceeds samples_max.
 Result<GridChoice> choose_grid(const FileContents& contents,

@@ -60,6 +60,7 @@ DatasetInfo good() {
   info.fields = {wind, heat};
   info.left_out = {{"x", "not a number"}, {"y", "on another grid"}};
   info.notes = {"resampled"};
+  info.choices = {{"number", 3, {"0", "1", "2"}, "2"}};
   info.steps = {{0.5, "2000-01-01T12:00:00Z"}, {1.5, "2000-01-02T12:00:00Z"}};
   return info;
 }
@@ -139,6 +140,11 @@ TEST(LoaderMessages, InfoSurvivesARoundTrip) {
   EXPECT_EQ(out->left_out[1].name, "y");
   EXPECT_EQ(out->left_out[1].reason, "on another grid");
   EXPECT_EQ(out->notes, info.notes);
+  ASSERT_EQ(out->choices.size(), 1U);
+  EXPECT_EQ(out->choices[0].name, "number");
+  EXPECT_EQ(out->choices[0].length, 3U);
+  EXPECT_EQ(out->choices[0].values, info.choices[0].values);
+  EXPECT_EQ(out->choices[0].chosen, "2");
   ASSERT_EQ(out->steps.size(), 2U);
   EXPECT_EQ(out->steps[1].value, 1.5);
   EXPECT_EQ(out->steps[1].text, "2000-01-02T12:00:00Z");
@@ -147,6 +153,11 @@ TEST(LoaderMessages, InfoSurvivesARoundTrip) {
 TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
   const std::vector<std::pair<const char*, void (*)(DatasetInfo&)>> lies{
       {"no steps", [](DatasetInfo& i) { i.steps.clear(); }},
+      {"a choice without values", [](DatasetInfo& i) { i.choices[0].values.clear(); }},
+      {"a choice with more values than entries", [](DatasetInfo& i) { i.choices[0].length = 2; }},
+      {"a choice beyond the numbers of JSON",
+       [](DatasetInfo& i) { i.choices[0].length = std::size_t{1} << 60; }},
+      {"too many choices", [](DatasetInfo& i) { i.choices.resize(choices_max + 1, i.choices[0]); }},
       {"no fields", [](DatasetInfo& i) { i.fields.clear(); }},
       {"a step without a time", [](DatasetInfo& i) { i.steps[1].value = std::nan(""); }},
       {"an axis without coordinates", [](DatasetInfo& i) { i.grid.axes[2].coordinates.clear(); }},
@@ -282,6 +293,7 @@ TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   task.location.stem = "stem";
   task.location.inside = "a/b";
   task.location.pattern = "*.nc";
+  task.location.selection = {{"number", "3"}, {"band", "2"}};
   task.location.members = {{"a.nc", "/secret/a.nc"}, {"b.nc", "/secret/b.nc"}};
   const std::string bytes = encode_task(task);
   EXPECT_EQ(bytes.find("secret"), std::string::npos);
@@ -294,6 +306,7 @@ TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   EXPECT_EQ(out->location.stem, "stem");
   EXPECT_EQ(out->location.inside, "a/b");
   EXPECT_EQ(out->location.pattern, "*.nc");
+  EXPECT_EQ(selection_text(out->location.selection), "number=3,band=2");
   ASSERT_EQ(out->location.members.size(), 2U);
   EXPECT_EQ(out->location.members[1].name, "b.nc");
 }

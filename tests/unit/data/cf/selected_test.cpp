@@ -1,0 +1,345 @@
+// Members of ensembles, forecasts and bands: one entry of a dimension besides space and time.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/data/files/files.hpp"
+#include "tests/unit/data/dataset_probe.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+namespace windsplat::data::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// Values whose decimal digits are the sample's indices, the first dimension's first.
+std::vector<double> tagged(const std::vector<std::size_t>& lengths) {
+  std::vector<double> out{0};
+  for (const std::size_t length : lengths) {
+    std::vector<double> next;
+    next.reserve(out.size() * length);
+    for (const double tag : out) {
+      for (std::size_t i = 0; i < length; ++i) next.push_back(10 * tag + static_cast<double>(i));
+    }
+    out = std::move(next);
+  }
+  return out;
+}
+
+float last_of(const Volume& volume) { return volume.values[volume.values.size() - 1]; }
+
+struct Space {
+  int z, y, x;
+};
+
+Space space_of(NetcdfMaker& file) {
+  return {file.axis("lev", {1000, 500}, "hPa", "air_pressure"),
+          file.axis("lat", {0, 10, 20}, "degrees_north", "latitude"),
+          file.axis("lon", {0, 10, 20, 30}, "degrees_east", "longitude")};
+}
+
+// Members 3, 5 and 9; t(number, time, lev, lat, lon), oro(lat, lon).
+void write_ensemble(const std::string& path, double hour = 0) {
+  NetcdfMaker file(path);
+  const int n = file.axis("number", {3, 5, 9}, "1", "realization");
+  const int t = file.axis("time", {hour, hour + 6}, "hours since 2001-01-01", "time");
+  const auto [z, y, x] = space_of(file);
+  file.variable("t", NC_FLOAT, {n, t, z, y, x}, tagged({3, 2, 2, 3, 4}));
+  file.variable("steady", NC_FLOAT, {z, y, x}, tagged({2, 3, 4}));
+}
+
+std::string why_not(const std::string& path) {
+  const auto source = open_file(path);
+  EXPECT_FALSE(source) << path << " was opened";
+  return source ? "" : source.error().message;
+}
+
+TEST(SelectedEntries, EveryMemberIsShownByItsValue) {
+  const Folder folder;
+  write_ensemble(folder / "e.nc");
+  const std::vector<std::string> numbers{"3", "5", "9"};
+  for (std::size_t m = 0; m < numbers.size(); ++m) {
+    const auto source = opened((folder / "e.nc?number=") + numbers[m]);
+    ASSERT_NE(source, nullptr);
+    ASSERT_EQ(source->info().steps.size(), 2U);
+    const double tag = static_cast<double>(m) * 10000;
+    for (std::size_t step = 0; step < 2; ++step) {
+      const Volume volume = volume_of(*source, "t", step);
+      ASSERT_EQ(volume.dims, (std::array<int, 3>{4, 3, 2}));
+      EXPECT_EQ(volume.values[0], tag + static_cast<double>(step) * 1000);
+      EXPECT_EQ(last_of(volume), tag + static_cast<double>(step) * 1000 + 123);
+    }
+    EXPECT_EQ(last_of(volume_of(*source, "steady", 1)), 123);
+    ASSERT_EQ(source->info().choices.size(), 1U);
+    EXPECT_EQ(source->info().choices[0].chosen, numbers[m]);
+    EXPECT_EQ(source->info().title, "e (number=" + numbers[m] + ")");
+    EXPECT_FALSE(has_note(source->info(), "the first is shown"));
+  }
+}
+
+TEST(SelectedEntries, WithoutAChoiceTheFirstIsShownAndNoted) {
+  const Folder folder;
+  write_ensemble(folder / "e.nc");
+  const auto source = opened(folder / "e.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(last_of(volume_of(*source, "t")), 123);
+  EXPECT_TRUE(has_note(source->info(),
+                       "'number' has 3 entries (3 .. 9): the first is shown; choose another by "
+                       "appending ?number=VALUE to the file's name"));
+  ASSERT_EQ(source->info().choices.size(), 1U);
+  EXPECT_EQ(source->info().choices[0].name, "number");
+  EXPECT_EQ(source->info().choices[0].length, 3U);
+  EXPECT_THAT(source->info().choices[0].values, ElementsAre("3", "5", "9"));
+  EXPECT_EQ(source->info().title, "e");
+  const auto other = opened(folder / "e.nc?number=5");
+  ASSERT_NE(other, nullptr);
+  EXPECT_NE(source->info().digest, other->info().digest);
+}
+
+TEST(SelectedEntries, WhatDoesNotExistIsRefusedWithWhatDoes) {
+  const Folder folder;
+  write_ensemble(folder / "e.nc");
+  EXPECT_EQ(why_not(folder / "e.nc?number=4"),
+            "'e.nc': the dimension 'number' has no entry '4': it has 3 entries (3 .. 9)");
+  EXPECT_EQ(why_not(folder / "e.nc?member=3"),
+            "'e.nc': there is no dimension 'member': there are 'number' (3), 'time' (2), 'lev' "
+            "(2), 'lat' (3), 'lon' (4)");
+  EXPECT_THAT(why_not(folder / "e.nc?=3"), HasSubstr("has a choice without a name"));
+  EXPECT_THAT(why_not(folder / "e.nc?number="), HasSubstr("has a choice without a value"));
+  EXPECT_THAT(why_not(folder / "e.nc?number=3&number=5"), HasSubstr("chooses 'number' twice"));
+  EXPECT_THAT(why_not(folder / "e.nc?number=3?time=0"), HasSubstr("has two selections"));
+  EXPECT_THAT(why_not(folder / "none.nc?number=3"), HasSubstr("none.nc': no such file"));
+  EXPECT_THAT(why_not(folder / "e?number=3"), HasSubstr("no such file"));
+  std::string many = folder / "e.nc?d0=0";
+  for (int n = 1; n <= 16; ++n) many += "&d" + std::to_string(n) + "=0";
+  EXPECT_THAT(why_not(many), HasSubstr("has more than 16 choices"));
+}
+
+TEST(SelectedEntries, AFileWhoseNameLooksLikeASelectionWins) {
+  const Folder folder;
+  write_ensemble(folder / "e.nc");
+  std::filesystem::rename(folder / "e.nc", folder / "e.nc?number=5");
+  const auto source = opened(folder / "e.nc?number=5");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().choices[0].chosen, "3");
+}
+
+TEST(SelectedEntries, SpaceAndTimeMayBeChosenToo) {
+  const Folder folder;
+  write_ensemble(folder / "e.nc");
+  const auto source = opened(folder / "e.nc?number=9&lev=500&time=2001-01-01T06:00:00Z");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().steps.size(), 1U);
+  const Volume volume = volume_of(*source, "t");
+  ASSERT_EQ(volume.dims, (std::array<int, 3>{4, 3, 1}));
+  EXPECT_EQ(volume.values[0], 21100);
+  EXPECT_EQ(last_of(volume), 21123);
+}
+
+TEST(SelectedEntries, BandsWithoutACoordinateAreNumberedFromZero) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "bins.nc");
+    const int b = file.dimension("bin", 3);
+    const int t = file.axis("time", {0, 1}, "hours since 2001-01-01");
+    const auto [z, y, x] = space_of(file);
+    file.variable("mass", NC_FLOAT, {b, t, z, y, x}, tagged({3, 2, 2, 3, 4}));
+  }
+  const auto first = opened(folder / "bins.nc");
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(last_of(volume_of(*first, "mass", 1)), 1123);
+  EXPECT_THAT(first->info().choices[0].values, ElementsAre("0", "1", "2"));
+  const auto third = opened(folder / "bins.nc?bin=2");
+  ASSERT_NE(third, nullptr);
+  EXPECT_EQ(last_of(volume_of(*third, "mass", 1)), 21123);
+  EXPECT_THAT(why_not(folder / "bins.nc?bin=3"),
+              HasSubstr("has no entry '3': it has 3 entries (0 .. 2)"));
+  EXPECT_THAT(why_not(folder / "bins.nc?bin=0.5"), HasSubstr("has no entry '0.5'"));
+  EXPECT_THAT(why_not(folder / "bins.nc?bin=-1"), HasSubstr("has no entry '-1'"));
+}
+
+TEST(SelectedEntries, SinglePrecisionValuesAreNamedAsTheyWereWritten) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "waves.nc");
+    const int b = file.dimension("wavelength", 2);
+    file.variable("wavelength", NC_FLOAT, {b}, {0.1, 0.55});
+    const auto [z, y, x] = space_of(file);
+    file.variable("aerosol", NC_FLOAT, {b, z, y, x}, tagged({2, 2, 3, 4}));
+  }
+  const auto source = opened(folder / "waves.nc?wavelength=0.55");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(last_of(volume_of(*source, "aerosol")), 1123);
+  EXPECT_THAT(source->info().choices[0].values, ElementsAre("0.1", "0.55"));
+}
+
+TEST(SelectedEntries, AnAxisOfAnotherVariableIsNotChosen) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "both.nc");
+    const int b = file.dimension("layer_of_soil", 2);
+    const auto [z, y, x] = space_of(file);
+    file.variable("soil", NC_FLOAT, {b, y, x}, tagged({2, 3, 4}));
+    file.variable("odd", NC_FLOAT, {b, z, y, x}, tagged({2, 2, 3, 4}));
+  }
+  const auto source = opened(folder / "both.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_TRUE(source->info().choices.empty());
+  EXPECT_EQ(reason_of(source->info(), "odd"), "it has more than three spatial dimensions");
+  const auto chosen = opened(folder / "both.nc?layer_of_soil=1");
+  ASSERT_NE(chosen, nullptr);
+  EXPECT_EQ(last_of(volume_of(*chosen, "odd")), 1123);
+}
+
+TEST(SelectedEntries, CornersOfCellsAreNotMembers) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "corners.nc");
+    const int corners = file.dimension("nv", 4);
+    const auto [z, y, x] = space_of(file);
+    file.variable("t", NC_FLOAT, {z, y, x}, tagged({2, 3, 4}));
+    file.variable("area", NC_FLOAT, {y, x, corners}, tagged({3, 4, 4}));
+  }
+  const auto source = opened(folder / "corners.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_TRUE(source->info().choices.empty());
+  EXPECT_EQ(reason_of(source->info(), "area"), "its dimension 'nv' is neither space nor time");
+}
+
+// t(reference, lead, lev, lat, lon), with valid times or without.
+void write_forecast(const std::string& path, bool valid_times) {
+  NetcdfMaker file(path);
+  const int r = file.axis("reftime", {0, 24}, "hours since 2001-01-01", "forecast_reference_time");
+  const int l = file.axis("leadtime", {0, 6, 12}, "hours", "forecast_period");
+  const auto [z, y, x] = space_of(file);
+  if (valid_times) {
+    const int valid = file.variable("valid_time", NC_DOUBLE, {r, l}, {0, 6, 12, 24, 30, 36});
+    file.text(valid, "units", "hours since 2001-01-01");
+    file.text(valid, "standard_name", "time");
+  }
+  file.variable("t", NC_FLOAT, {r, l, z, y, x}, tagged({2, 3, 2, 3, 4}));
+}
+
+TEST(SelectedEntries, LeadTimesAreStepsWithTheirValidTimes) {
+  const Folder folder;
+  write_forecast(folder / "f.nc", true);
+  const auto source = opened(folder / "f.nc?reftime=2001-01-02T00:00:00Z");
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().steps.size(), 3U);
+  EXPECT_EQ(source->info().steps[0].text, "2001-01-02T00:00:00Z");
+  EXPECT_EQ(source->info().steps[2].text, "2001-01-02T12:00:00Z");
+  EXPECT_EQ(source->info().time_units, "hours since 2001-01-01");
+  EXPECT_EQ(last_of(volume_of(*source, "t", 2)), 12123);
+  EXPECT_TRUE(has_note(source->info(), "valid times 'valid_time' of the lead times 'leadtime'"));
+  const auto first = opened(folder / "f.nc");
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(first->info().steps[2].text, "2001-01-01T12:00:00Z");
+  EXPECT_EQ(last_of(volume_of(*first, "t", 2)), 2123);
+  EXPECT_TRUE(has_note(first->info(),
+                       "'reftime' has 2 entries (2001-01-01T00:00:00Z .. "
+                       "2001-01-02T00:00:00Z): the first is shown"));
+}
+
+TEST(SelectedEntries, LeadTimesAreStepsWithoutValidTimesToo) {
+  const Folder folder;
+  write_forecast(folder / "f.nc", false);
+  const auto source = opened(folder / "f.nc?reftime=24");
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().steps.size(), 3U);
+  EXPECT_EQ(source->info().steps[1].value, 6);
+  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 11123);
+  EXPECT_TRUE(has_note(source->info(), "time steps are the lead times 'leadtime'"));
+}
+
+TEST(SelectedEntries, ReferenceTimesAreStepsIfALeadTimeIsChosen) {
+  const Folder folder;
+  write_forecast(folder / "f.nc", false);
+  const auto source = opened(folder / "f.nc?leadtime=12");
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  EXPECT_EQ(source->info().steps[1].text, "2001-01-02T00:00:00Z");
+  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 12123);
+}
+
+TEST(SelectedEntries, ASeriesShowsOneMemberOfEveryFile) {
+  const Folder folder;
+  write_ensemble(folder / "e_1.nc", 0);
+  write_ensemble(folder / "e_2.nc", 12);
+  for (const char* pattern : {"e_*.nc?number=9", "e_?.nc?number=9"}) {
+    const auto source = opened(folder / pattern);
+    ASSERT_NE(source, nullptr) << pattern;
+    EXPECT_EQ(last_of(volume_of(*source, "steady")), 123) << pattern;
+    EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 21123) << pattern;
+    EXPECT_EQ(source->info().choices.at(0).chosen, "9") << pattern;
+  }
+  const auto series = opened(folder / "e_*.nc?number=9");
+  ASSERT_NE(series, nullptr);
+  EXPECT_EQ(series->info().steps.size(), 4U);
+  EXPECT_EQ(last_of(volume_of(*series, "t", 3)), 21123);
+  EXPECT_THAT(why_not(folder / "e_*.nc?member=9"), HasSubstr("there is no dimension 'member'"));
+}
+
+TEST(SelectedEntries, PartsOfADatasetMayLackTheDimension) {
+  const Folder folder;
+  write_ensemble(folder / "m_t.nc");
+  {
+    NetcdfMaker file(folder / "m_oro.nc");
+    const auto [z, y, x] = space_of(file);
+    file.variable("oro", NC_FLOAT, {z, y, x}, tagged({2, 3, 4}));
+  }
+  const auto source = opened(folder / "m_{oro,t}.nc?number=5");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 11123);
+  EXPECT_EQ(last_of(volume_of(*source, "oro")), 123);
+}
+
+TEST(SelectedEntries, AMemberOfAGroup) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "g.nc");
+    int group = 0;
+    std::array<int, 4> dims{};
+    ASSERT_EQ(nc_def_grp(file.id(), "runs", &group), NC_NOERR);
+    const std::array<std::size_t, 4> lengths{2, 2, 3, 4};
+    const std::array<const char*, 4> names{"member", "z", "y", "x"};
+    for (std::size_t d = 0; d < 4; ++d) {
+      ASSERT_EQ(nc_def_dim(group, names.at(d), lengths.at(d), &dims.at(d)), NC_NOERR);
+    }
+    int variable = 0;
+    ASSERT_EQ(nc_def_var(group, "t", NC_FLOAT, 4, dims.data(), &variable), NC_NOERR);
+    const std::vector<double> values = tagged({2, 2, 3, 4});
+    ASSERT_EQ(nc_put_var_double(group, variable, values.data()), NC_NOERR);
+  }
+  const auto source = opened(folder / "g.nc#/runs?member=1");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(last_of(volume_of(*source, "t")), 1123);
+}
+
+TEST(SelectedEntries, APathBelowTheDataRootHasThemToo) {
+  const Folder folder;
+  write_ensemble(folder / "e.nc");
+  const auto one = locate_beneath(folder / "", "e.nc?number=5&time=6");
+  ASSERT_TRUE(one) << one.error().message;
+  ASSERT_EQ(one->selection.size(), 2U);
+  EXPECT_EQ(one->selection[0].dimension, "number");
+  EXPECT_EQ(one->selection[0].value, "5");
+  EXPECT_EQ(one->wanted_id(), "e,number=5,time=6");
+  const auto series = locate_beneath(folder / "", "e*?number=5");
+  ASSERT_TRUE(series) << series.error().message;
+  const auto again = locate_again(*series);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->wanted_id(), series->wanted_id());
+  EXPECT_EQ(locate_beneath(folder / "", "e.nc?=5").error().kind, ErrorKind::invalid);
+  EXPECT_EQ(locate_beneath(folder / "", "e.nc?a=1?b=2").error().kind, ErrorKind::invalid);
+  EXPECT_EQ(locate_beneath(folder / "", "f.nc?number=5").error().kind, ErrorKind::not_found);
+}
+
+}  // namespace
+}  // namespace windsplat::data::test
