@@ -233,6 +233,13 @@ Json dataset_json(const DatasetDescription& dataset) {
   for (const auto& [name, reason] : dataset.left_out) {
     left_out.push_back(Json{{"name", name}, {"reason", reason}});
   }
+  Json choices = Json::array();
+  for (const ChoiceDescription& choice : dataset.choices) {
+    choices.push_back(Json{{"name", choice.name},
+                           {"length", choice.length},
+                           {"values", choice.values},
+                           {"chosen", choice.chosen}});
+  }
   Json times = Json::array();
   for (const StepDescription& step : dataset.steps) {
     times.push_back(Json{{"value", canonical_number(step.value)}, {"text", step.text}});
@@ -247,6 +254,7 @@ Json dataset_json(const DatasetDescription& dataset) {
   out["world"] = {{"min", vec3_json(dataset.world_min)}, {"max", vec3_json(dataset.world_max)}};
   out["mappings"] = dataset.mappings;
   out["leftOut"] = std::move(left_out);
+  out["choices"] = std::move(choices);
   out["steps"] = {{"count", dataset.steps.size()}, {"times", std::move(times)}};
   out["timeUnits"] = dataset.time_units;
   out["bytesWhenResident"] = dataset.bytes_when_resident;

@@ -82,6 +82,13 @@ struct StepDescription {
   double value = 0;
   std::string text;
 };
+// A dimension besides space and time, of which one entry is shown.
+struct ChoiceDescription {
+  std::string name;
+  std::uint64_t length = 0;
+  std::vector<std::string> values;  // of the first entries
+  std::string chosen;
+};
 struct DatasetDescription {
   std::string id;
   std::string title;
@@ -96,6 +103,7 @@ struct DatasetDescription {
   std::vector<FieldDescription> fields;
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason
   std::vector<std::string> notes;  // conversions of the data, problems found
+  std::vector<ChoiceDescription> choices;
   std::vector<StepDescription> steps;
   std::size_t step_count = 0;  // number of steps, even if `steps` is omitted
   std::string time_units;

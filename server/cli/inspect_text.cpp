@@ -180,6 +180,22 @@ std::string steps_text(const protocol::DatasetDescription& dataset) {
   return out + table(rows);
 }
 
+// For each dimension that is chosen from: its entry and the others.
+std::string choices_text(const protocol::DatasetDescription& dataset) {
+  constexpr std::size_t listed_max = 12;
+  if (dataset.choices.empty()) return "";
+  std::vector<Row> rows;
+  for (const protocol::ChoiceDescription& choice : dataset.choices) {
+    std::string values = "of " + std::to_string(choice.length) + ':';
+    for (std::size_t i = 0; i < std::min(choice.values.size(), listed_max); ++i) {
+      values += ' ' + word(choice.values[i]);
+    }
+    if (choice.length > listed_max) values += " ...";
+    rows.push_back({word(choice.name), word(choice.chosen), values});
+  }
+  return "\nchosen\n" + table(rows);
+}
+
 }  // namespace
 
 std::string inspect_text(const protocol::DatasetDescription& dataset) {
@@ -190,6 +206,7 @@ std::string inspect_text(const protocol::DatasetDescription& dataset) {
   out += "memory " + byte_count(dataset.bytes_when_resident) +
          " with every field resident at every step\n\n";
   out += grid_text(dataset) + '\n' + fields_text(dataset) + '\n' + steps_text(dataset);
+  out += choices_text(dataset);
   if (!dataset.left_out.empty()) {
     std::size_t width = 0;
     for (const auto& left : dataset.left_out) width = std::max(width, word(left.first).size());

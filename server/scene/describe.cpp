@@ -144,6 +144,9 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
     out.fields.push_back(std::move(description));
   }
   for (const data::LeftOut& left : info.left_out) out.left_out.emplace_back(left.name, left.reason);
+  for (const data::DimensionChoice& choice : info.choices) {
+    out.choices.push_back({choice.name, choice.length, choice.values, choice.chosen});
+  }
   out.notes = info.notes;
   for (const data::TimeStep& step : info.steps) out.steps.push_back({step.value, step.text});
   out.time_units = info.time_units;

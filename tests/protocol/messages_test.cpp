@@ -58,6 +58,7 @@ DatasetDescription climate() {
   dataset.fields = {wind_field()};
   dataset.left_out = {{"ps", "two-dimensional"}};
   dataset.notes = {"winds were turned from the grid's axes to east and north"};
+  dataset.choices = {{"number", 3, {"0", "1", "2"}, "1"}};
   dataset.steps = {{0, "2001-01-01T00:00:00Z"}, {1.5, "2001-01-01T01:30:00Z"}};
   dataset.time_units = "hours since 2001-01-01";
   dataset.resident_bytes = 48;
@@ -237,6 +238,8 @@ TEST(Shapes, DatasetInFull) {
   EXPECT_EQ(dataset["steps"], Json::parse(R"({"count":2,"times":[
       {"value":0,"text":"2001-01-01T00:00:00Z"},{"value":1.5,"text":"2001-01-01T01:30:00Z"}]})"));
   EXPECT_EQ(dataset["leftOut"], Json::parse(R"([{"name":"ps","reason":"two-dimensional"}])"));
+  EXPECT_EQ(dataset["choices"],
+            Json::parse(R"([{"name":"number","length":3,"values":["0","1","2"],"chosen":"1"}])"));
   EXPECT_EQ(dataset["timeUnits"], "hours since 2001-01-01");
   EXPECT_EQ(dataset["residentBytes"], 48);
   EXPECT_EQ(dataset["bytesWhenResident"], 5'000'000'000);

@@ -162,6 +162,7 @@ export function described(
     fields: fields.map(fieldOf),
     leftOut: [],
     notes: [],
+    choices: [],
     steps: {
       count: steps,
       times: Array.from({ length: steps }, (_, n) => ({

@@ -63,6 +63,33 @@ TEST(CliFiles, SynthInspectRender) {
   EXPECT_EQ(png_size(read_file(picture)), (std::pair<std::uint32_t, std::uint32_t>(64, 48)));
 }
 
+TEST(CliFiles, AnEntryOfADimensionIsChosenBehindTheName) {
+  const Folder folder;
+  const std::string path = synth(folder, "tornado", "12x10x8");
+  const json whole = json::parse(run({"inspect", "--json", path}).out);
+  EXPECT_EQ(whole["choices"], json::array());
+  const std::string time = whole["steps"]["times"][1]["text"];
+  const Outcome told = run({"inspect", "--json", path + "?time=" + time});
+  ASSERT_EQ(told.code, 0) << told.err;
+  const json one = json::parse(told.out);
+  EXPECT_EQ(one["id"], "tornado-small,time=" + time);
+  EXPECT_EQ(one["steps"]["count"], 1);
+  ASSERT_EQ(one["choices"].size(), 1U);
+  EXPECT_EQ(one["choices"][0]["name"], "time");
+  EXPECT_EQ(one["choices"][0]["length"], 2);
+  EXPECT_EQ(one["choices"][0]["chosen"], time);
+  EXPECT_EQ(one["choices"][0]["values"],
+            json({whole["steps"]["times"][0]["text"], whole["steps"]["times"][1]["text"]}));
+  const Outcome text = run({"inspect", path + "?time=" + time});
+  EXPECT_THAT(text.out, HasSubstr("chosen\n"));
+  const Outcome absent = run({"inspect", path + "?number=3"});
+  EXPECT_EQ(absent.code, 1);
+  EXPECT_THAT(absent.err, HasSubstr("there is no dimension 'number': there are 'time' (2)"));
+  const Outcome nameless = run({"inspect", path + "?=3"});
+  EXPECT_EQ(nameless.code, 2);
+  EXPECT_THAT(nameless.err, HasSubstr("has a choice without a name"));
+}
+
 TEST(CliFiles, InspectTextNamesAxesFieldsStepsAndSize) {
   const Folder folder;
   const std::string path = synth(folder, "climate", "16x8x5");

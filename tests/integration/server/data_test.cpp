@@ -69,6 +69,36 @@ TEST(OpenedDatasets, DatasetsOfTheCommandLineAreKeptWhenPostedAgain) {
   EXPECT_EQ(get(server.port(), "/v1/datasets/small").status, 200);
 }
 
+TEST(OpenedDatasets, EntriesOfADimensionAreDatasetsOfTheirOwn) {
+  TestServer server(with_root(folder_of_small()));
+  const auto probed = [&](const std::string& id, int step) {
+    return json_of(get(server.port(), "/v1/datasets/" + id + "/probe?x=0&y=0&z=500&step=" +
+                                          std::to_string(step)))["values"];
+  };
+  const Json whole = json_of(get(server.port(), "/v1/datasets/small"));
+  EXPECT_EQ(whole["choices"], Json::array());
+  for (int step = 0; step < small_steps; ++step) {
+    const std::string time = whole["steps"]["times"][static_cast<std::size_t>(step)]["text"];
+    const Json job = finished_job(server.port(), post_file(server.port(), "small.nc?time=" + time));
+    ASSERT_EQ(job["state"], "done") << job;
+    ASSERT_EQ(job["result"], "small,time=" + time);
+    const Json one = json_of(get(server.port(), "/v1/datasets/small,time=" + time));
+    EXPECT_EQ(one["steps"]["count"], 1);
+    EXPECT_EQ(one["choices"][0]["chosen"], time);
+    const Json values = probed("small,time=" + time, 0);
+    ASSERT_FALSE(values.empty());
+    EXPECT_EQ(values, probed("small", step));
+  }
+  EXPECT_NE(probed("small", 0), probed("small", 1));
+  const Json wrong = finished_job(server.port(), post_file(server.port(), "small.nc?number=3"));
+  EXPECT_EQ(wrong["state"], "failed");
+  EXPECT_NE(wrong.dump().find("there is no dimension 'number'"), std::string::npos) << wrong;
+  const Answer nameless =
+      request(server.port(), "POST", "/v1/datasets", {{"Content-Type", "application/json"}},
+              R"({"path": "small.nc?=3"})");
+  EXPECT_EQ(nameless.status, 422);
+}
+
 // Files are opened once the gate is open.
 class SharedDataset : public testing::Test {
  protected:
