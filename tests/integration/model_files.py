@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Writes small files with the headers of models on staggered or unstructured grids, and compares
+"""Writes small files with the headers of models on staggered or unstructured grids and of
+ensembles and forecasts, and compares
 the program's reports with values computed by numpy from the same numbers.
 
     python3 tests/integration/model_files.py --program=build/release/windsplat [NAME...]
@@ -14,6 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import ensemble_models as ensemble
 import joined_models as joined
 import staggered_models as staggered
 import unstructured_models as unstructured
@@ -28,7 +30,13 @@ READ = {"wrfout_d01.nc": staggered.write_wrf,
         "mom6.nc": staggered.write_mom6,
         "sgrid.nc": staggered.write_sgrid,
         "{ua,va,wap,hus}_*.nc": joined.write_cmip,
-        "ORCA_{grid_T,grid_U,grid_V,grid_W}.nc": joined.write_nemo}
+        "ORCA_{grid_T,grid_U,grid_V,grid_W}.nc": joined.write_nemo,
+        "ensemble.nc": ensemble.write_members,
+        "members.nc?number=7": ensemble.write_members,
+        "ens_{ta,ua}_*.nc?realization=2": ensemble.write_members_of_variables,
+        "seasonal.nc?forecast_reference_time=30&number=2": ensemble.write_seasonal,
+        "cfgrib.nc?time=2020-01-02T00:00:00Z": ensemble.write_cfgrib,
+        "spectrum.nc?wavelength=0.55": ensemble.write_spectrum}
 REFUSED = {"ugrid.nc": unstructured.write_ugrid,
            "fvcom.nc": unstructured.write_fvcom,
            "mpas.nc": unstructured.write_mpas,
