@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 #include "server/base/check.hpp"
 #include "server/engine/body.hpp"
@@ -89,9 +90,10 @@ void add_kernels(const Scene& scene, int a, int stride, AxisArrays& axis) {
     add_kernel(scene, a, {sample, 1, spacing[sample]}, axis);
     return;
   }
-  const int samples = static_cast<int>(spacing.size());
+  const int samples = scene.lattice.drawn(a);
+  const auto drawn = std::span(spacing).first(static_cast<std::size_t>(samples));
   for (int first = 0; first < samples; first += stride) {
-    add_kernel(scene, a, axis_kernel(spacing, stride, first), axis);
+    add_kernel(scene, a, axis_kernel(drawn, stride, first), axis);
   }
 }
 
@@ -206,15 +208,20 @@ void measure_ways(const Lattice& lattice, SampleWays& ways) {
     std::array<float, 3> way{};
     double farthest2 = 0;
     const std::size_t row = step * dims[a];
-    for (std::size_t i = 0; i + step < places.size(); ++i) {
-      if (i % row >= row - step) continue;
+    const auto add = [&](const std::array<float, 3>& from, const std::array<float, 3>& to) {
       double square = 0;
       for (int c = 0; c < 3; ++c) {
-        const float apart = std::abs(places[i + step][c] - places[i][c]);
+        const float apart = std::abs(to[c] - from[c]);
         way[c] = std::max(way[c], apart);
         square += static_cast<double>(apart) * static_cast<double>(apart);
       }
       farthest2 = std::max(farthest2, square);
+    };
+    for (std::size_t i = 0; i + step < places.size(); ++i) {
+      if (i % row < row - step) add(places[i], places[i + step]);
+    }
+    for (std::size_t i = 0; a == 0 && lattice.around > 0 && i < places.size(); i += row) {
+      add(places[i + static_cast<std::size_t>(lattice.around) - 1], places[i]);
     }
     ways.distance[a] = std::sqrt(farthest2);
     ways.longest[a] = way;
@@ -312,6 +319,7 @@ void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan
     to.cell_max[a] = *std::max_element(axis.cell.begin(), axis.cell.end());
     to.dims[a] = dims[a];
   }
+  to.around = scene.lattice.around;
   to.compositing = pass.vector != nullptr && pass.vector->combine_or
                        ? kernels::compositing_or
                        : static_cast<int>(scene.compositing);
@@ -397,7 +405,7 @@ int major_axis(const Camera& camera, const Lattice& lattice) {
   return major;
 }
 
-AxisKernel axis_kernel(const std::vector<double>& spacing, int stride, int first) {
+AxisKernel axis_kernel(std::span<const double> spacing, int stride, int first) {
   const int last = std::min(first + stride, static_cast<int>(spacing.size())) - 1;
   const double cell = std::accumulate(spacing.begin() + first, spacing.begin() + last + 1, 0.0);
   return {first + (last - first) / 2, last - first + 1, cell};

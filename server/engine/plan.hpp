@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "server/engine/kernels/frame_data.hpp"
@@ -24,7 +25,7 @@ struct AxisKernel {
   int group = 1;    // number of samples represented
   double cell = 0;  // their extent in world units
 };
-AxisKernel axis_kernel(const std::vector<double>& spacing, int stride, int first);
+AxisKernel axis_kernel(std::span<const double> spacing, int stride, int first);
 
 // Index of the kernel position whose cell (bounded midway between positions) contains the eye; in
 // orthographic views the end of the axis nearest to the viewer. Outward from it is front to back.

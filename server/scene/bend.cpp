@@ -118,6 +118,12 @@ class Cells {
   }
   // index: index of sample n along axis a, which must have more than one sample.
   [[nodiscard]] glm::dvec3 edge(std::size_t n, std::size_t a, int index) const {
+    if (a == 0 && lattice_.around > 0) {
+      const auto around = static_cast<std::size_t>(lattice_.around);
+      const auto at = static_cast<std::size_t>(index);
+      const std::size_t row = n - at;
+      return 0.5 * (place(row + (at + 1) % around) - place(row + (at + around - 1) % around));
+    }
     const bool first = index == 0;
     const bool last = index + 1 == lattice_.dims[a];
     const glm::dvec3 across = place(last ? n : n + stride_[a]) - place(first ? n : n - stride_[a]);
@@ -240,10 +246,8 @@ Shell shell_of(const Lattice& straight, const data::Grid& even, double vertical_
 
 using Places = std::vector<std::array<float, 3>>;
 
-Places on_sphere(const Lattice& straight, const data::Columns& columns,
-                 const Elevations& elevations, const Shell& shell) {
-  const double bottom = straight.box_min.z;
-  const double height = straight.box_max.z - bottom;
+// Unit vectors from the centre of the globe to the columns.
+std::vector<glm::dvec3> directions_of(const data::Columns& columns) {
   std::vector<glm::dvec3> up;
   up.reserve(columns.longitude.size());
   for (std::size_t c = 0; c < columns.longitude.size(); ++c) {
@@ -252,6 +256,50 @@ Places on_sphere(const Lattice& straight, const data::Columns& columns,
     up.emplace_back(std::cos(latitude) * std::sin(longitude),
                     -std::cos(latitude) * std::cos(longitude), std::sin(latitude));
   }
+  return up;
+}
+
+// Whether in each row of `width` columns the first and column `last` are at most `steps` times as
+// far apart as the farthest neighbours between them.
+bool meet(const std::vector<glm::dvec3>& up, std::size_t width, std::size_t last, double steps) {
+  const auto angle = [&up](std::size_t a, std::size_t b) {
+    return std::asin(std::min(0.5 * glm::distance(up[a], up[b]), 1.0));
+  };
+  for (std::size_t row = 0; row < up.size(); row += width) {
+    double farthest = 0;
+    for (std::size_t i = row; i < row + last; ++i) farthest = std::max(farthest, angle(i, i + 1));
+    if (angle(row, row + last) > steps * farthest) return false;
+  }
+  return true;
+}
+
+// Whether the columns of a row reach around more than half the globe.
+bool turn(const data::Columns& columns, std::size_t width) {
+  const std::vector<double>& at = columns.longitude;
+  for (std::size_t row = 0; row < at.size(); row += width) {
+    if (std::abs(at[row + width - 1] - at[row]) > 180) return true;
+  }
+  return false;
+}
+
+// Lattice::around. Up to two columns may repeat the first ones, as in some ocean models.
+int columns_around(const data::Columns& columns, const std::vector<glm::dvec3>& up,
+                   std::size_t width) {
+  if (!turn(columns, width)) return 0;
+  constexpr double same = 0.01;  // steps
+  constexpr double next = 1.5;
+  constexpr std::size_t fewest = 3;
+  for (const std::size_t repeated : {2, 1}) {
+    if (width < fewest + repeated || !meet(up, width, width - repeated, same)) continue;
+    return static_cast<int>(width - repeated);
+  }
+  return width >= fewest && meet(up, width, width - 1, next) ? static_cast<int>(width) : 0;
+}
+
+Places on_sphere(const Lattice& straight, const std::vector<glm::dvec3>& up,
+                 const Elevations& elevations, const Shell& shell) {
+  const double bottom = straight.box_min.z;
+  const double height = straight.box_max.z - bottom;
   Places places;
   places.reserve(up.size() * straight.positions[2].size());
   for (std::size_t k = 0; k < straight.positions[2].size(); ++k) {
@@ -378,10 +426,15 @@ Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryVie
   const Elevations elevations(*straight, heights, extent);
   const bool one_height = !extent;
   const Shell shell = shell_of(*straight, even, geometry.scale[2], one_height);
-  auto places = std::make_shared<Places>(
-      sphere ? on_sphere(*straight, *columns, elevations, shell)
-             : on_map(*straight, even, columns ? &*columns : nullptr, elevations));
   Lattice lattice = *straight;
+  auto places = std::make_shared<Places>();
+  if (sphere) {
+    const std::vector<glm::dvec3> up = directions_of(*columns);
+    *places = on_sphere(*straight, up, elevations, shell);
+    lattice.around = columns_around(*columns, up, static_cast<std::size_t>(lattice.dims[0]));
+  } else {
+    *places = on_map(*straight, even, columns ? &*columns : nullptr, elevations);
+  }
   lattice.places = places;
   const auto measure_columns = [&lattice] {
     for (std::size_t a = 0; a < 2; ++a) {

@@ -36,8 +36,8 @@ struct Camera {
 // Curved (a globe, terrain): `places` holds the position of each sample. The edge of a cell along
 // axis a is half the vector from the previous sample to the next (at an end the vector to the only
 // neighbour; along an axis of one sample `spacing`, perpendicular to the other two), times the
-// stride. positions and spacing remain those of the uncurved lattice; colours by height use
-// positions[2].
+// stride. Along x the first and the last of `around` samples are neighbours. positions and spacing
+// remain those of the uncurved lattice; colours by height use positions[2].
 struct Lattice {
   std::array<int, 3> dims{1, 1, 1};
   std::array<std::vector<double>, 3> positions;
@@ -46,6 +46,11 @@ struct Lattice {
   glm::dvec3 box_min{-1, -1, -1};
   glm::dvec3 box_max{1, 1, 1};
   double inner_radius = 0;  // of the shell of a globe: the lowest edge of its cells; otherwise 0
+  // Number of samples along x that close a circle around the globe; 0: x does not close. Those
+  // beyond repeat the first ones, and only a slice of such a column draws them.
+  int around = 0;
+  // Number of samples along an axis that are drawn, unless it is that of a slice.
+  [[nodiscard]] int drawn(int axis) const { return axis == 0 && around > 0 ? around : dims[axis]; }
 };
 
 // World heights of the edges of the lowest and the highest cell.

@@ -404,6 +404,7 @@ Result<Lattice> lattice_of(const Section& section, data::Dataset& dataset) {
   const Lattice& whole = *section.whole;
   Lattice out = whole;
   out.dims = section.dims;
+  if (out.dims[0] == 1) out.around = 0;
   for (int a = 0; a < 3; ++a) {
     out.positions[a] = along_section(section, a, whole.positions[a]);
     out.spacing[a] = along_section(section, a, whole.spacing[a]);

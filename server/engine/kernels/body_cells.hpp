@@ -26,18 +26,24 @@ inline float dot3(const float a[3], const float b[3]) {
 }
 
 // The edge of a curved cell along axis a: half the vector from the previous sample to the next (at
-// an end, the vector to the only neighbour), times the number of samples that the position
-// represents. Returns false for an axis of one sample.
+// an end of an axis that does not close, the vector to the only neighbour), times the number of
+// samples that the position represents. Returns false for an axis of one sample.
 inline bool edge_between(const Pass& pass, const Rows& rows, int a, int i, float edge[3]) {
   const int dim = pass.dims[a];
   if (dim == 1) return false;
   const int at = rows.sample[a][i];
-  const int before = at > 0 ? 1 : 0;
-  const int after = at + 1 < dim ? 1 : 0;
+  int before = at > 0 ? at - 1 : at;
+  int after = at + 1 < dim ? at + 1 : at;
+  int steps = after - before;
+  if (a == 0 && pass.around > 0) {
+    before = (at + pass.around - 1) % pass.around;
+    after = (at + 1) % pass.around;
+    steps = 2;
+  }
   const std::int64_t offset = offset_of(rows, i);
-  const float* p = pass.places + 3 * (offset - before * pass.step[a]);
-  const float* q = pass.places + 3 * (offset + after * pass.step[a]);
-  const float scale = static_cast<float>(rows.group[a][i]) / static_cast<float>(before + after);
+  const float* p = pass.places + 3 * (offset + (before - at) * pass.step[a]);
+  const float* q = pass.places + 3 * (offset + (after - at) * pass.step[a]);
+  const float scale = static_cast<float>(rows.group[a][i]) / static_cast<float>(steps);
   for (int c = 0; c < 3; ++c) edge[c] = (q[c] - p[c]) * scale;
   return true;
 }

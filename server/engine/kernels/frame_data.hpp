@@ -144,6 +144,7 @@ struct Pass {
   Medium medium;
   float cell_max[3];            // widest cell along each axis; curved: largest extent of a cell
   int dims[3];                  // dimensions of the fields
+  int around;                   // scene::Lattice::around
   const float* places;          // curved lattices: 3 per sample, world units; otherwise null
   int compositing;              // scene::Compositing or compositing_or
   int by_depth;                 // depths of kernel positions are required

@@ -50,8 +50,14 @@ std::array<Vec, 3> curved_edges(const scene::Lattice& lattice,
     std::array<int, 3> after = sample;
     before[a] = std::max(sample[a] - 1, 0);
     after[a] = std::min(sample[a] + 1, lattice.dims[a] - 1);
+    int steps = after[a] - before[a];
+    if (a == 0 && lattice.around > 0) {
+      before[a] = (sample[a] + lattice.around - 1) % lattice.around;
+      after[a] = (sample[a] + 1) % lattice.around;
+      steps = 2;
+    }
     const Vec across = plus(position_of(lattice, after), -1, position_of(lattice, before));
-    edge[a] = scaled(across, static_cast<double>(s[a].samples) / (after[a] - before[a]));
+    edge[a] = scaled(across, static_cast<double>(s[a].samples) / steps);
     known[a] = true;
   }
   for (int a = 0; a < 3; ++a) {
@@ -111,7 +117,7 @@ std::vector<AxisPosition> axis_positions(const Scene& scene, int axis, int strid
     const int sample = scene.slice->sample;
     return {{sample, 1, spacing[sample]}};
   }
-  const int dim = scene.lattice.dims[axis];
+  const int dim = scene.lattice.drawn(axis);
   std::vector<AxisPosition> positions;
   for (int done = 0; done < dim;) {
     const int samples = std::min(stride, dim - done);

@@ -50,7 +50,7 @@ std::vector<Position> positions(const Scene& scene, int axis, int stride) {
     return {{scene.slice->sample, 1, spacing[scene.slice->sample]}};
   }
   std::vector<Position> out;
-  const int count = static_cast<int>(spacing.size());
+  const int count = scene.lattice.drawn(axis);
   for (int first = 0; first < count; first += stride) {
     const int samples = std::min(stride, count - first);
     Position position{first + (samples - 1) / 2, samples, 0};
@@ -84,7 +84,12 @@ Vec edge_of(const scene::Lattice& lattice, const std::array<int, 3>& sample, int
   std::array<int, 3> after = sample;
   before[a] = std::max(sample[a] - 1, 0);
   after[a] = std::min(sample[a] + 1, lattice.dims[a] - 1);
-  const Real steps = after[a] - before[a];
+  Real steps = after[a] - before[a];
+  if (a == 0 && lattice.around > 0) {
+    before[a] = (sample[a] + lattice.around - 1) % lattice.around;
+    after[a] = (sample[a] + 1) % lattice.around;
+    steps = 2;
+  }
   return (along.samples / steps) * (place(lattice, after) - place(lattice, before));
 }
 

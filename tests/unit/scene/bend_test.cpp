@@ -99,6 +99,36 @@ TEST(Sphere, RectilinearLatticeHasTheMeanCellsOfTheCurvedOne) {
               0.5 * (lattice->spacing[1][3] + lattice->spacing[1][4]), 1e-12);
 }
 
+TEST(Sphere, LongitudesCloseIfTheFirstAndTheLastAreNeighbours) {
+  const auto around = [](double step, int count) {
+    data::Grid grid = globe();
+    grid.axes[0].coordinates = steps(-170, step, count);
+    const auto lattice = place_lattice(grid, mapped(GeometryMapping::sphere));
+    return lattice ? lattice->around : -1;
+  };
+  EXPECT_EQ(around(30, 12), 12);
+  EXPECT_EQ(around(30, 11), 0);
+  EXPECT_EQ(around(30, 13), 12);
+  EXPECT_EQ(around(30, 14), 12);
+  EXPECT_EQ(around(120, 3), 3);
+  EXPECT_EQ(around(120, 4), 3);
+  EXPECT_EQ(around(1, 40), 0);
+  EXPECT_EQ(around(180, 2), 0);
+  data::Grid stretched = globe();
+  stretched.axes[0].coordinates = {0, 1, 40};
+  const auto lattice = place_lattice(stretched, mapped(GeometryMapping::sphere));
+  ASSERT_TRUE(lattice);
+  EXPECT_EQ(lattice->around, 0);
+}
+
+TEST(Sphere, CellsAtTheSeamAreThoseOfEveryLongitude) {
+  const auto lattice = place_lattice(globe(), mapped(GeometryMapping::sphere));
+  ASSERT_TRUE(lattice);
+  for (const double width : lattice->spacing[0]) {
+    EXPECT_NEAR(width, lattice->spacing[0][5], tolerance);
+  }
+}
+
 TEST(Sphere, HeightScalesTheShellOnly) {
   GeometryView geometry = mapped(GeometryMapping::sphere);
   geometry.scale = {5, 7, 2};
