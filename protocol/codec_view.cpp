@@ -165,17 +165,23 @@ void read_field_choice(ObjectReader& reader, FieldChoice& field) {
   if (reader.faults().count() == before) field.kind = FieldChoice::Kind::named;
 }
 
-void check_vector(const VectorView& vector, ObjectReader& reader) {
-  if (vector.r1 > vector.r2) {
+// Radii are compared only if both are valid: in place of a refused one there is the default.
+void read_radii(ObjectReader& reader, VectorView& vector) {
+  const std::size_t before = reader.faults().count();
+  reader.number("r1", vector.r1, {0, limits::radius_max});
+  reader.number("r2", vector.r2, {0, limits::radius_max});
+  if (reader.faults().count() == before && vector.r1 > vector.r2) {
     reader.faults().add(reader.at("r1"), "must be at most r2: " + number_text(vector.r1) +
                                              " is more than " + number_text(vector.r2));
   }
-  if (vector.magnitude_range) {
-    const auto& [low, high] = *vector.magnitude_range;
-    if (!(high - low >= limits::range_width_min)) {
-      reader.faults().add(reader.at("magnitudeRange"),
-                          "must ascend by at least " + number_text(limits::range_width_min));
-    }
+}
+
+void check_magnitudes(const VectorView& vector, ObjectReader& reader) {
+  if (!vector.magnitude_range) return;
+  const auto& [low, high] = *vector.magnitude_range;
+  if (!(high - low >= limits::range_width_min)) {
+    reader.faults().add(reader.at("magnitudeRange"),
+                        "must ascend by at least " + number_text(limits::range_width_min));
   }
 }
 
@@ -189,8 +195,7 @@ VectorView read_vector(const Json& json, const std::string& pointer, Faults& fau
   reader.number("length", vector.length, {0, limits::line_length_max});
   reader.number("span", vector.span, {limits::span_min, limits::span_max});
   reader.integer("stride", vector.stride, stride_range);
-  reader.number("r1", vector.r1, {0, limits::radius_max});
-  reader.number("r2", vector.r2, {0, limits::radius_max});
+  read_radii(reader, vector);
   reader.number("opacity", vector.opacity, fraction);
   reader.choice("combine", vector.combine, combination_names);
   reader.number("headDesaturation", vector.head_desaturation, fraction);
@@ -207,7 +212,7 @@ VectorView read_vector(const Json& json, const std::string& pointer, Faults& fau
     vector.jitter = read_jitter(*jitter, reader.at("jitter"), faults);
   }
   reader.finish();
-  check_vector(vector, reader);
+  check_magnitudes(vector, reader);
   return vector;
 }
 
@@ -286,10 +291,12 @@ DepthCueView read_depth_cue(const Json& json, const std::string& pointer, Faults
   DepthCueView cue;
   ObjectReader reader(json, pointer, faults);
   reader.number("strength", cue.strength, fraction);
+  const std::size_t before = faults.count();
   reader.number("near", cue.near, depth);
   reader.number("far", cue.far, depth);
+  const bool both = faults.count() == before;
   reader.finish();
-  if (!(cue.near < cue.far)) {
+  if (both && !(cue.near < cue.far)) {
     faults.add(reader.at("near"), "must be less than far: " + number_text(cue.near) +
                                       " is not less than " + number_text(cue.far));
   }

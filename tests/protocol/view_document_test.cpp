@@ -11,6 +11,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
 
 ViewDocument document_of(const std::string& json) {
   const auto document = ViewDocument::parse(json);
@@ -129,6 +130,23 @@ TEST(ViewDocument, ReportsTheLimitAndTheValue) {
   const auto method = ViewDocument::parse(R"({"method": {"name": "splat"}})");
   EXPECT_EQ(method.error().at[0].detail,
             R"(must be one of "kernel", "slab", "reference", not "splat")");
+}
+
+TEST(ViewDocument, RefusedValuesAreNotComparedWithOthers) {
+  const auto pointers = [](const char* text) {
+    std::vector<std::string> out;
+    const auto refused = ViewDocument::parse(text);
+    if (!refused) {
+      for (const FieldError& fault : refused.error().at) out.push_back(fault.pointer);
+    }
+    return out;
+  };
+  EXPECT_THAT(pointers(R"({"vector": {"r1": 20, "r2": 90}})"), ElementsAre("/vector/r2"));
+  EXPECT_THAT(pointers(R"({"vector": {"r1": -1, "r2": 0}})"), ElementsAre("/vector/r1"));
+  EXPECT_THAT(pointers(R"({"vector": {"r1": 20, "r2": 2, "length": -1}})"),
+              UnorderedElementsAre("/vector/r1", "/vector/length"));
+  EXPECT_THAT(pointers(R"({"depthCue": {"near": 3, "far": "x"}})"), ElementsAre("/depthCue/far"));
+  EXPECT_THAT(pointers(R"({"depthCue": {"near": 2, "far": 1}})"), ElementsAre("/depthCue/near"));
 }
 
 TEST(ViewDocument, ErrorsDoNotRepeatOversizeOrHostileKeys) {
