@@ -86,6 +86,7 @@ const dataset: Dataset = {
   ],
   leftOut: [],
   notes: [],
+  choices: [],
   steps: { count: 1, times: [{ value: 0, text: "" }] },
   timeUnits: "",
   residentBytes: 0,

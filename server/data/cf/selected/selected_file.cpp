@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
@@ -45,7 +46,7 @@ class Entries {
   [[nodiscard]] std::string text(std::size_t index) const {
     if (variable_ == nullptr) return std::to_string(index);
     const double value = values_.at(index);
-    if (counts_from_a_time(*variable_)) {
+    if (counts_from_a_time(*variable_) && std::isfinite(value)) {
       return decode_time({value}, variable_->units, variable_->calendar).steps.front().text;
     }
     const auto narrow = static_cast<float>(value);

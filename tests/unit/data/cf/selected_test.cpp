@@ -268,6 +268,23 @@ TEST(SelectedEntries, ReferenceTimesAreStepsIfALeadTimeIsChosen) {
   EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 12123);
 }
 
+TEST(SelectedEntries, AReferenceTimeThatIsMissingIsNoDate) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "f.nc");
+    const int r =
+        file.axis("reftime", {-999, 24}, "hours since 2001-01-01", "forecast_reference_time");
+    file.number(file.variable_id("reftime"), "missing_value", NC_DOUBLE, {-999});
+    const int l = file.axis("leadtime", {0, 6}, "hours", "forecast_period");
+    const auto [z, y, x] = space_of(file);
+    file.variable("t", NC_FLOAT, {r, l, z, y, x}, tagged({2, 2, 2, 3, 4}));
+  }
+  const auto source = opened(folder / "f.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_THAT(source->info().choices.at(0).values, ElementsAre("nan", "2001-01-02T00:00:00Z"));
+  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 1123);
+}
+
 TEST(SelectedEntries, ASeriesShowsOneMemberOfEveryFile) {
   const Folder folder;
   write_ensemble(folder / "e_1.nc", 0);
