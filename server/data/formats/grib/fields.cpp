@@ -285,6 +285,7 @@ Result<Header> read_header(const std::vector<unsigned char>& bytes) {
   out.level_type = known(message.text("typeOfLevel"));
   out.level = message.number("level");
   out.hours = hours_of_validity(message);
+  out.member = static_cast<double>(message.whole("perturbationNumber", 0));
   out.relative_to_grid = is_along_grid(message);
   out.grid_key = message.text("md5GridSection");
   if (!std::isfinite(out.level)) return broken("has no level");

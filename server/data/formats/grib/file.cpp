@@ -141,7 +141,8 @@ Result<void> File::scan() {
       groups_.push_back({*header, *grid, {}, 0});
       at = groups_.end() - 1;
     }
-    if (!at->fields.emplace(std::pair(header->hours, header->level), f).second) ++at->repeated;
+    if (!at->fields.emplace(Place{header->member, header->hours, header->level}, f).second)
+      ++at->repeated;
   }
   for (const auto& [reason, count] : unread) {
     contents_.notes.push_back(std::to_string(count) + " messages left out: each " + reason);
@@ -189,7 +190,7 @@ int File::axis(const std::string& name, const std::vector<double>& values,
   variable.numeric = true;
   variable.dims = {static_cast<int>(contents_.dimensions.size()) - 1};
   contents_.variables.push_back(std::move(variable));
-  held_.push_back({values, -1, {}, {}});
+  held_.push_back({values, -1, {}, {}, {}});
   return static_cast<int>(contents_.dimensions.size()) - 1;
 }
 
@@ -235,12 +236,32 @@ std::vector<int> File::add_positions(std::size_t g) {
     position.numeric = true;
     position.dims = {x - 1, x};
     contents_.variables.push_back(std::move(position));
-    held_.push_back({north ? grid.latitude : grid.longitude, -1, {}, {}});
+    held_.push_back({north ? grid.latitude : grid.longitude, -1, {}, {}, {}});
   }
   return {x - 1, x};
 }
 
+// Keeps the members of an ensemble that have as many messages as the one with the most.
+void File::omit_incomplete_members(Group& group) {
+  std::map<double, std::size_t> counts;
+  for (const auto& [place, field] : group.fields) ++counts[place[0]];
+  std::size_t most = 0;
+  for (const auto& [member, count] : counts) most = std::max(most, count);
+  std::string omitted;
+  for (const auto& [member, count] : counts) {
+    if (count == most) continue;
+    omitted += (omitted.empty() ? "" : ", ") + std::to_string(static_cast<long>(member));
+    std::erase_if(group.fields, [at = member](const auto& one) { return one.first[0] == at; });
+  }
+  if (omitted.empty()) return;
+  contents_.notes.push_back(in_quotes(group.header.short_name) +
+                            ": members of the ensemble with fewer messages than others are "
+                            "omitted: " +
+                            omitted);
+}
+
 void File::add_field(std::size_t g) {
+  omit_incomplete_members(groups_[g]);
   const Group& group = groups_[g];
   const Header& header = group.header;
   FileVariable variable;
@@ -260,15 +281,24 @@ void File::add_field(std::size_t g) {
   variable.numeric = variable.unread.empty();
   Content held;
   held.group = static_cast<int>(g);
+  std::set<double> members;
   std::set<double> times;
   std::set<double> levels;
   for (const auto& [place, field] : group.fields) {
-    times.insert(place.first);
-    levels.insert(place.second);
+    members.insert(place[0]);
+    times.insert(place[1]);
+    levels.insert(place[2]);
   }
+  held.members.assign(members.begin(), members.end());
   held.times.assign(times.begin(), times.end());
   held.levels.assign(levels.begin(), levels.end());
   if (variable.numeric) {
+    if (members.size() > 1) {
+      FileVariable number;
+      number.standard_name = "realization";
+      number.units = "1";
+      variable.dims.push_back(axis("number", held.members, number));
+    }
     FileVariable time;
     time.standard_name = "time";
     time.units = "hours since 1970-01-01 00:00:00";
@@ -286,8 +316,8 @@ void File::add_field(std::size_t g) {
   }
   if (group.repeated > 0) {
     contents_.notes.push_back(in_quotes(variable.name) + ": " + std::to_string(group.repeated) +
-                              " more messages of the same times and levels (ensemble members or "
-                              "the like) are omitted; the first ones are used");
+                              " more messages of the same members, times and levels are omitted; "
+                              "the first ones are used");
   }
   const Grid& on_grid = grids_[group.grid];
   const bool is_turned = on_grid.projected || on_grid.rotated;
@@ -366,19 +396,24 @@ Result<void> File::read_block(int variable, const std::vector<std::size_t>& star
   const std::lock_guard lock(mutex_);
   if (auto same = input_->check_unchanged(); !same) return same;
   const Group& group = groups_[static_cast<std::size_t>(held.group)];
-  const bool has_levels = rank == 4;
-  for (std::size_t t = 0; t < count[0]; ++t) {
-    for (std::size_t l = 0; l < (has_levels ? count[1] : 1); ++l) {
-      const double level = held.levels[has_levels ? start[1] + l : 0];
-      const auto at = group.fields.find({held.times[start[0] + t], level});
-      if (at == group.fields.end()) {
-        out = std::fill_n(out, rows * count.back(), std::numeric_limits<Out>::quiet_NaN());
-        continue;
-      }
-      const auto values = values_of(at->second, grids_[group.grid]);
-      if (!values) return values.error();
-      copy_rows((*values)->data());
+  const std::size_t time = held.members.size() > 1 ? 1 : 0;
+  const bool has_levels = held.levels.size() > 1;
+  const std::size_t members = time == 0 ? 1 : count[0];
+  const std::size_t levels = has_levels ? count[time + 1] : 1;
+  for (std::size_t n = 0; n < members * count[time] * levels; ++n) {
+    const std::size_t m = n / levels / count[time];
+    const std::size_t t = n / levels % count[time];
+    const std::size_t l = n % levels;
+    const Place place{held.members[time == 0 ? 0 : start[0] + m], held.times[start[time] + t],
+                      held.levels[has_levels ? start[time + 1] + l : 0]};
+    const auto at = group.fields.find(place);
+    if (at == group.fields.end()) {
+      out = std::fill_n(out, rows * count.back(), std::numeric_limits<Out>::quiet_NaN());
+      continue;
     }
+    const auto values = values_of(at->second, grids_[group.grid]);
+    if (!values) return values.error();
+    copy_rows((*values)->data());
   }
   return {};
 }

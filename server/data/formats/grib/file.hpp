@@ -1,6 +1,7 @@
-// The fields of a GRIB file combined into arrays over time, level, row and column.
+// The fields of a GRIB file combined into arrays over member, time, level, row and column.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -33,17 +34,19 @@ class File final : public cf::ArrayFile {
   void forget_chunks(int variable) const override;
 
  private:
-  // The fields of one quantity, kind of level and grid, by time and level.
+  using Place = std::array<double, 3>;  // member of an ensemble, time, level
+  // The fields of one quantity, kind of level and grid.
   struct Group {
     Header header;  // header of its first field
     std::size_t grid = 0;
-    std::map<std::pair<double, double>, std::size_t> fields;
+    std::map<Place, std::size_t> fields;
     std::size_t repeated = 0;
   };
   // Content of a variable: numbers, the fields of a group, or the pole of a rotated grid.
   struct Content {
     std::vector<double> numbers;
     int group = -1;
+    std::vector<double> members;
     std::vector<double> times;
     std::vector<double> levels;
     int rotated_grid = -1;
@@ -59,6 +62,7 @@ class File final : public cf::ArrayFile {
   std::vector<int> add_positions(std::size_t grid);
   int axis(const std::string& name, const std::vector<double>& values, const FileVariable& like);
   void add_field(std::size_t group);
+  void omit_incomplete_members(Group& group);
   template <class Out>
   Result<void> read_block(int variable, const std::vector<std::size_t>& start,
                           const std::vector<std::size_t>& count, Out* out) const;

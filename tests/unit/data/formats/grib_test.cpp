@@ -1,5 +1,6 @@
 // GRIB files made from the samples of ecCodes, whose values are a function of position, level and
 // time written in the order of WMO flag table 3.4; and broken files.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "server/data/cf/array_file.hpp"
+#include "server/data/files/input_file.hpp"
+#include "server/data/formats/grib/open.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/source.hpp"
 #include "server/data/open/open.hpp"
@@ -321,11 +325,73 @@ TEST_F(Grib, WindsOnPolarStereographicGridsFollowTheFlagOfTheirEdition) {
   }
 }
 
-TEST_F(Grib, FurtherMembersAreReportedAndOmitted) {
+TEST_F(Grib, RepeatedMessagesAreReportedAndOmitted) {
   const auto source = open(message(1, "t", 500, 0) + message(1, "t", 500, 0, {}, 20));
   ASSERT_NE(source, nullptr);
   EXPECT_THAT(source->info().notes, ElementsAre(HasSubstr("1 more messages")));
   EXPECT_EQ(source->read(0, 0)->masked, 0);
+}
+
+// A member whose values are those of the control and 1e5 times its number.
+std::string member(int edition, long number, long level, long hour) {
+  Maker maker(edition == 1 ? "regular_ll_pl_grib1" : "regular_ll_pl_grib2");
+  if (edition == 1) {
+    maker.set("setLocalDefinition", 1L);
+    maker.set("stream", std::string("enfo"));
+    maker.set("type", std::string("pf"));
+  } else {
+    maker.set("productDefinitionTemplateNumber", 1L);
+  }
+  maker.set("number", number);
+  maker.set("stepRange", std::to_string(hour));
+  maker.set("typeOfLevel", std::string("isobaricInhPa"));
+  maker.set("level", level);
+  maker.set("shortName", std::string("t"));
+  fill_grid(maker, {}, level, hour + 10 * number);
+  return maker.bytes();
+}
+
+TEST_F(Grib, MembersOfAnEnsembleAreADimension) {
+  for (const int edition : {1, 2}) {
+    std::string bytes = member(edition, 7, 500, 0);  // has fewer messages than the others
+    for (const long hour : {0, 6}) {
+      for (const long number : {3, 0, 4}) {
+        for (const long level : {500, 850}) bytes += member(edition, number, level, hour);
+      }
+    }
+    write_bytes(folder_ / "a.grib", bytes);
+    auto input = InputFile::adopt(::open((folder_ / "a.grib").c_str(), O_RDONLY), "a.grib");
+    ASSERT_TRUE(input);
+    const auto file = grib::open(*input);
+    ASSERT_TRUE(file) << file.error().message;
+    const FileContents& contents = (*file)->contents();
+    EXPECT_THAT(contents.notes, ElementsAre(testing::EndsWith("omitted: 7")));
+    const int t = cf::variable_named(contents, "t");
+    ASSERT_GE(t, 0);
+    std::vector<std::size_t> lengths;
+    for (const int d : contents.variables[cf::at(t)].dims) {
+      lengths.push_back(contents.dimensions[cf::at(d)].length);
+    }
+    EXPECT_THAT(lengths, ElementsAre(3, 2, 2, rows, columns));
+    const int number = cf::variable_named(contents, "number");
+    ASSERT_GE(number, 0);
+    EXPECT_EQ(contents.variables[cf::at(number)].standard_name, "realization");
+    std::vector<double> numbers(3);
+    ASSERT_TRUE((*file)->read(number, {0}, {3}, numbers.data()));
+    EXPECT_THAT(numbers, ElementsAre(0, 3, 4));
+    // The second row, 40 N, from the second column, 20 E.
+    std::vector<double> read(3 * 2 * 2 * 2);
+    ASSERT_TRUE((*file)->read(t, {0, 0, 0, 1, 1}, {3, 2, 2, 1, 2}, read.data()));
+    std::size_t n = 0;
+    for (const double one : {0, 3, 4}) {
+      for (const double hour : {0, 6}) {
+        for (const double level : {500, 850}) {
+          EXPECT_NEAR(read[n++], value_at(20, 40, level, hour + 10 * one), 0.05);
+          EXPECT_NEAR(read[n++], value_at(30, 40, level, hour + 10 * one), 0.05);
+        }
+      }
+    }
+  }
 }
 
 TEST_F(Grib, HeadingBeforeTheMessageIsSkipped) {
