@@ -193,11 +193,15 @@ TEST(ZarrGroups, TheFinestLevelOfAnImageOfOmeZarr4) {
   expect_image(store);
 }
 
-TEST(ZarrGroups, ChannelsAreNeitherSpaceNorTime) {
+TEST(ZarrGroups, ChannelsAreChosenFrom) {
   const ZarrStore store("cell.zarr", "zarr.json",
                         group3(R"({"ome":{"multiscales":[)" + kImage + "]}}"));
   store.put("0/zarr.json", v3_array("[2,2,2,3]", "[2,2,2,3]", "uint8", R"(["c","z","y","x"])"));
-  EXPECT_THAT(store.fault(), HasSubstr("its dimension 'c' is neither space nor time"));
+  store.put("0/c/0/0/0/0", "abcdefghijklABCDEFGHIJKL");
+  expect_same(store.values("cell"), {97, 98, 99, 100, 101, 102, 103, 104, 105, 106, 107, 108});
+  const DatasetInfo info = info_of(store);
+  ASSERT_EQ(info.choices.size(), 1U);
+  EXPECT_EQ(info.choices[0].name, "c");
 }
 
 TEST(ZarrGroups, LevelsMayBeGroupsOfArrays) {
