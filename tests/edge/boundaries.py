@@ -20,7 +20,9 @@ from suite import KIB, Watched, Wrong
 from wire_client import request
 
 EVERY = 100
-# Rendered pictures leave steps of the sample in memory, 4 MiB each.
+# Factors of the permitted growth. A thread that computed a forecast keeps its scratch memory, some
+# 640 KiB; rendered pictures leave steps of the sample in memory, 4 MiB each.
+REFUSED_SHARE = 2
 DRAWN_SHARE = 64
 
 
@@ -79,11 +81,13 @@ def main():
     kinds = Kinds(daemon.target, limits, chance)
     gunner = Gunner(daemon)
     begun = time.monotonic()
-    for name, every in (("refused", kinds.refused()), ("drawn", kinds.numbers())):
+    permitted = daemon.growth_max
+    for name, every, share in (("refused", kinds.refused(), REFUSED_SHARE),
+                               ("drawn", kinds.numbers(), DRAWN_SHARE)):
+        daemon.growth_max = share * permitted
         shots = [shot for shot in every if options.kind in shot.kind]
         chance.shuffle(shots)
         gunner.all(name, shots[:options.count // 2 if options.count else None])
-        daemon.growth_max *= DRAWN_SHARE
     code = daemon.stop()
     if code != 0:
         gunner.failures.append(f"the daemon exited with {code}")
