@@ -20,9 +20,9 @@ from suite import KIB, Watched, Wrong
 from wire_client import request
 
 EVERY = 100
-# Factors of the permitted growth. A thread that computed a forecast keeps its scratch memory, some
-# 640 KiB; rendered pictures leave steps of the sample in memory, 4 MiB each.
-REFUSED_SHARE = 2
+# Factors of the permitted growth. Each of up to six threads that computed a forecast keeps its
+# scratch memory, some 640 KiB; rendered pictures leave steps of the sample in memory, 4 MiB each.
+REFUSED_SHARE = 4
 DRAWN_SHARE = 64
 
 
