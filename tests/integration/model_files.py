@@ -17,6 +17,7 @@ from pathlib import Path
 
 import ensemble_models as ensemble
 import joined_models as joined
+import lattice_models as lattice
 import staggered_models as staggered
 import unstructured_models as unstructured
 from real_files import check_file
@@ -29,6 +30,8 @@ READ = {"wrfout_d01.nc": staggered.write_wrf,
         "mitgcm.nc": staggered.write_mitgcm,
         "mom6.nc": staggered.write_mom6,
         "sgrid.nc": staggered.write_sgrid,
+        "instruments.nc": lattice.write_instruments,
+        "auxiliary.nc": lattice.write_auxiliary,
         "{ua,va,wap,hus}_*.nc": joined.write_cmip,
         "ORCA_{grid_T,grid_U,grid_V,grid_W}.nc": joined.write_nemo,
         "ensemble.nc": ensemble.write_members,

@@ -13,10 +13,10 @@ namespace windsplat::data::cf {
 
 namespace {
 
-// MPAS, ICON, CAM-SE, FESOM, FVCOM, SCHISM.
-constexpr auto usual_names = std::to_array<std::string_view>(
-    {"ncells", "nedges", "nvertices", "ncol", "nod2", "nod2d", "nodes_2d", "nod_n", "elem", "nele",
-     "nschism_hgrid_node", "nschism_hgrid_face"});
+// MPAS, ICON, FESOM, FVCOM, SCHISM.
+constexpr auto usual_names =
+    std::to_array<std::string_view>({"ncells", "nedges", "nvertices", "nod2", "nod2d", "nodes_2d",
+                                     "nod_n", "nele", "nschism_hgrid_node", "nschism_hgrid_face"});
 
 // Longitudes (-1) or latitudes (1) by attributes, or in radians by name (lonCell); 0: neither.
 int side_of(const FileVariable& variable) {
@@ -40,8 +40,13 @@ std::vector<bool> find_cell_lists(const FileContents& contents) {
   const std::size_t count = contents.dimensions.size();
   std::vector<bool> found(count, false);
   std::vector<std::array<bool, 2>> placed(count, {false, false});  // by longitude, by latitude
+  // Beside the coordinate of an axis, others on it are auxiliary.
+  const auto is_own_axis = [&](int dimension) {
+    const int axis = variable_named(contents, contents.dimensions.at(at(dimension)).name);
+    return axis >= 0 && side_of(contents.variables[at(axis)]) != 0;
+  };
   for (const FileVariable& variable : contents.variables) {
-    if (variable.dims.size() == 1 && variable.numeric) {
+    if (variable.dims.size() == 1 && variable.numeric && !is_own_axis(variable.dims[0])) {
       const int side = side_of(variable);
       if (side != 0) placed.at(at(variable.dims[0])).at(side < 0 ? 0 : 1) = true;
     }

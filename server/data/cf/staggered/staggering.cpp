@@ -147,7 +147,14 @@ class StaggerFinder {
                          });
   }
 
-  // The first face of the first center, if every center lies between two faces. Both ascending.
+  // Whether a center is near the middle of two faces. A mean of values elsewhere would be that of
+  // another place: levels of two instruments also interleave.
+  [[nodiscard]] static bool is_middle(double center, double below, double above) {
+    constexpr double tolerance = 0.2;  // of the cell, for stretched grids
+    return above > below && std::abs(center - (below + above) / 2) <= tolerance * (above - below);
+  }
+
+  // The first face of the first center, if every center lies amid two faces. Both ascending.
   [[nodiscard]] static std::optional<std::ptrdiff_t> interleaved(
       const std::vector<double>& faces, const std::vector<double>& centers) {
     const auto between = [&](std::ptrdiff_t first) {
@@ -155,9 +162,11 @@ class StaggerFinder {
       for (std::ptrdiff_t i = 0; i < static_cast<std::ptrdiff_t>(centers.size()); ++i) {
         const double center = centers[static_cast<std::size_t>(i)];
         const std::ptrdiff_t low = i + first;
-        const bool over = low < 0 || faces[static_cast<std::size_t>(low)] < center;
-        const bool under = low + 1 >= count || center < faces[static_cast<std::size_t>(low + 1)];
-        if (!over || !under) return false;
+        const bool has_both = low >= 0 && low + 1 < count;
+        if (has_both && !is_middle(center, faces[static_cast<std::size_t>(low)],
+                                   faces[static_cast<std::size_t>(low + 1)])) {
+          return false;
+        }
       }
       return true;
     };

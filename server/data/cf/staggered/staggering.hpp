@@ -20,7 +20,7 @@ struct Stagger {
 // One entry per dimension of the file. Evidence in this order: what the reader
 // knows (FileDimension::centers), SGRID metadata (sgrid.github.io,
 // version 0.3: cf_role = grid_topology), names of dimensions of WRF and ROMS, 1-D coordinates of
-// which each lies between two of another dimension. Errors: bad_data if coordinates cannot be read.
+// which each lies amid two of another dimension. Errors: bad_data if coordinates cannot be read.
 Result<std::vector<Stagger>> find_staggering(const ArrayFile& file);
 
 }  // namespace windsplat::data::cf
