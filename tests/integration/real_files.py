@@ -264,13 +264,19 @@ def compare_values(check, inspected, other, url):
                 check.same(what, np.atleast_1d(here), there.data, np.abs(values).max())
 
 
-def check_file(program, path, read):
+def check_file(program, path, read, only=False):
+    """only: whether fields of the file that `read` does not know are a fault."""
     check = Check(path.name)
     inspected = json.loads(subprocess.run([program, "inspect", path, "--json"], check=True,
                                           capture_output=True).stdout)
     other = read(path, inspected)
     compare_axes(check, inspected, other)
     compare_fields(check, inspected, other)
+    # "w(wap)" is converted from the variable wap.
+    stored = {c for f in inspected["fields"] if f["dtype"] != "derived" for c in f["components"]
+              if "(" not in c}
+    if only and stored - set(other.scalars):
+        check.faults.append(f"not expected: {sorted(stored - set(other.scalars))}")
     unseen = set(other.scalars) - {c for f in inspected["fields"] for c in f["components"]}
     if unseen:
         check.faults.append(f"not offered: {sorted(unseen)}")
