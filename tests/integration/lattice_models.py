@@ -16,6 +16,11 @@ def write_instruments(path):
     axis(file, "lat_2", np.arange(5.0) + 1e-6, units="degrees_north")
     z = axis(file, "h", [2.0, 50, 100, 200], units="m", positive="up", axis="Z")
     axis(file, "h_2", [49.0, 99, 190, 1000], units="m", positive="up", axis="Z")
+    axis(file, "h_3", [26.0, 75, 150, 230], units="m", positive="up", axis="Z")
+    put(file, "r", ("h_3", "lat", "lon"), noise(4, 5, 6), units="1")
+    file.createDimension("x", 1)
+    file.createDimension("x_stag", None)  # no entries yet
+    file.createVariable("empty", "f4", ("h", "lat", "x_stag"))
     t = put(file, "t", ("h", "lat", "lon"), noise(4, 5, 6), units="K")
     q = put(file, "q", ("h", "lat", "lon"), noise(4, 5, 6), units="1")
     put(file, "w", ("h_2", "lat", "lon"), noise(4, 5, 6), units="m s-1")

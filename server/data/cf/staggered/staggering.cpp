@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/fields/fields.hpp"
 #include "server/data/cf/grid/axes.hpp"
 
 namespace windsplat::data::cf {
@@ -42,6 +43,7 @@ class StaggerFinder {
   // Ignores dimensions that are absent, known already or of a length that does not fit.
   void add(int faces, int centers, bool aligned, std::ptrdiff_t first) {
     if (faces < 0 || centers < 0 || faces == centers || found_.at(at(faces)).centers >= 0) return;
+    if (length(faces) == 0 || length(centers) == 0) return;
     const auto difference =
         static_cast<std::ptrdiff_t>(length(faces)) - static_cast<std::ptrdiff_t>(length(centers));
     if (aligned ? difference != 0 : std::abs(difference) > 1) return;
@@ -154,6 +156,16 @@ class StaggerFinder {
     return above > below && std::abs(center - (below + above) / 2) <= tolerance * (above - below);
   }
 
+  // Whether a center with one face lies beyond it by at most one and a half cells.
+  [[nodiscard]] static bool is_near_end(double center, const std::vector<double>& faces,
+                                        bool is_first) {
+    constexpr double cells_max = 1.5;
+    const std::size_t last = faces.size() - 1;
+    const double cell = is_first ? faces[1] - faces[0] : faces[last] - faces[last - 1];
+    const double beyond = is_first ? faces[0] - center : center - faces[last];
+    return beyond > 0 && beyond <= cells_max * cell;
+  }
+
   // The first face of the first center, if every center lies amid two faces. Both ascending.
   [[nodiscard]] static std::optional<std::ptrdiff_t> interleaved(
       const std::vector<double>& faces, const std::vector<double>& centers) {
@@ -163,14 +175,14 @@ class StaggerFinder {
         const double center = centers[static_cast<std::size_t>(i)];
         const std::ptrdiff_t low = i + first;
         const bool has_both = low >= 0 && low + 1 < count;
-        if (has_both && !is_middle(center, faces[static_cast<std::size_t>(low)],
-                                   faces[static_cast<std::size_t>(low + 1)])) {
-          return false;
-        }
+        const bool fits = has_both ? is_middle(center, faces[static_cast<std::size_t>(low)],
+                                               faces[static_cast<std::size_t>(low + 1)])
+                                   : is_near_end(center, faces, low < 0);
+        if (!fits) return false;
       }
       return true;
     };
-    if (faces.size() < 2 || centers.size() < 2) return std::nullopt;
+    if (faces.size() < 3 || centers.size() < 3) return std::nullopt;
     const bool above = faces.front() < centers.front();
     const std::ptrdiff_t first = above ? 0 : -1;
     const auto difference =
@@ -178,6 +190,15 @@ class StaggerFinder {
     const bool fits =
         above ? difference == 0 || difference == 1 : difference == 0 || difference == -1;
     return fits && between(first) ? std::optional(first) : std::nullopt;
+  }
+
+  [[nodiscard]] bool has_velocity(int dimension) const {
+    return std::any_of(contents_.variables.begin(), contents_.variables.end(),
+                       [dimension](const FileVariable& variable) {
+                         return is_velocity_component(variable) &&
+                                std::count(variable.dims.begin(), variable.dims.end(), dimension) >
+                                    0;
+                       });
   }
 
   struct Line {
@@ -226,6 +247,11 @@ class StaggerFinder {
             faces.falls != centers.falls) {
           continue;
         }
+        // As many levels between others are faces only if a velocity lies on them.
+        const bool is_sure = faces.role != Role::z ||
+                             faces.values.size() != centers.values.size() ||
+                             has_velocity(faces.dimension);
+        if (!is_sure) continue;
         const auto first = interleaved(faces.values, centers.values);
         if (first) add(faces.dimension, centers.dimension, false, *first);
       }
