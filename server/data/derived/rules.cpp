@@ -324,9 +324,9 @@ class Finder {
     if (!rule.humidity) rule.humidity = scalar("humidity_mixing_ratio", mixing, mass_fraction);
     if (!rule.humidity) return;
     rule.quantity = Quantity::relative_humidity;
-    add(std::move(rule), "relative_humidity", "%",
-        "relative humidity over water (Bolton 1980), from " +
-            info_.fields[rule.humidity->field].name);
+    std::string source = "relative humidity over water (Bolton 1980), from " +
+                         info_.fields[rule.humidity->field].name;
+    add(std::move(rule), "relative_humidity", "%", std::move(source));
   }
 
   const DatasetInfo& info_;
