@@ -3,7 +3,7 @@
 import netCDF4
 import numpy as np
 
-from model_values import as_masked, axis, noise, put
+from model_values import as_masked, axis, between, noise, put
 from real_files import Independent
 
 
@@ -40,3 +40,36 @@ def write_auxiliary(path):
     file.close()
     return Independent({"x": x, "y": y, "z": None}, as_masked({"t": t[None, None]}), {},
                        {"x": "degrees_east", "y": "degrees_north", "t": "K"})
+
+
+def write_section(path):
+    """A vertical section along a line: longitudes and latitudes of the samples in order."""
+    file = netCDF4.Dataset(path, "w")
+    file.createDimension("x", 8)
+    x = put(file, "lon", ("x",), np.arange(10.0, 18.0), units="degrees_east")
+    put(file, "lat", ("x",), np.arange(50.0, 42.0, -1.0), units="degrees_north")
+    z = axis(file, "z", np.arange(5.0) * 100, units="m", positive="up")
+    t = put(file, "t", ("z", "x"), noise(5, 8), units="K")
+    file.close()
+    return Independent({"x": x, "y": None, "z": z}, as_masked({"t": t[None, :, None]}), {},
+                       {"x": "degrees_east", "z": "m", "t": "K"})
+
+
+def write_chain(path):
+    """Names of faces of faces, and positions of steps of which there are none yet."""
+    file = netCDF4.Dataset(path, "w")
+    x = axis(file, "x", np.arange(6.0), units="m")
+    y = axis(file, "y", np.arange(5.0), units="m")
+    file.createDimension("x_stag", 7)
+    file.createDimension("x_stag_stag", 8)
+    file.createDimension("time", None)
+    for name, units in (("XLONG", "degree_east"), ("XLAT", "degree_north")):
+        file.createVariable(name, "f4", ("time", "y", "x")).units = units
+    t = put(file, "t", ("y", "x"), noise(5, 6), units="K")
+    faces = put(file, "u", ("y", "x_stag"), noise(5, 7), units="K")
+    put(file, "c", ("y", "x_stag_stag"), noise(5, 8), units="K")
+    file.close()
+    u = between(faces, 1)
+    return Independent({"x": x, "y": y, "z": None},
+                       as_masked({"t": t[None, None], "u": u[None, None]}), {},
+                       {"x": "m", "y": "m", "t": "K", "u": "K"})

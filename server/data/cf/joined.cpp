@@ -101,17 +101,15 @@ int add_dimension(FileContents& contents, FileDimension dimension) {
   return static_cast<int>(contents.dimensions.size()) - 1;
 }
 
-// Whether two dimensions with coordinates have the same ones.
+// Whether two coordinates, `own` of the first file and `other` of the part, have the same values.
 Result<bool> same_coordinates(const ArrayFile& first, int own, const ArrayFile& part, int other,
                               bool is_time) {
-  const int own_coordinate = classify_dimensions(first.contents()).at(at(own)).coordinate;
-  const int second = classify_dimensions(part.contents()).at(at(other)).coordinate;
-  auto a = unpacked_values(first, own_coordinate);
+  auto a = unpacked_values(first, own);
   if (!a) return a.error();
-  auto b = unpacked_values(part, second);
+  auto b = unpacked_values(part, other);
   if (!b) return b.error();
-  const FileVariable& to = first.contents().variables.at(at(own_coordinate));
-  const FileVariable& from = part.contents().variables.at(at(second));
+  const FileVariable& to = first.contents().variables.at(at(own));
+  const FileVariable& from = part.contents().variables.at(at(other));
   if (is_time) {
     const auto times = convert_times(*b, {from.units, from.calendar}, {to.units, to.calendar});
     if (!times) return false;
@@ -146,9 +144,11 @@ std::string JoinedFile::identity() const {
 
 Result<void> JoinedFile::add(const ArrayFile& part) {
   const FileContents& added = part.contents();
+  const std::vector<DimensionRole> known = classify_dimensions(contents_);
+  const std::vector<DimensionRole> roles = classify_dimensions(added);
   std::vector<int> dimensions;  // of the joined file, by dimension of the part
   for (std::size_t d = 0; d < added.dimensions.size(); ++d) {
-    auto own = dimension_of(part, static_cast<int>(d));
+    auto own = dimension_of(part, static_cast<int>(d), roles[d], known);
     if (!own) return own.error();
     dimensions.push_back(*own);
   }
@@ -173,25 +173,27 @@ Result<void> JoinedFile::add(const ArrayFile& part) {
   return {};
 }
 
-// The common dimension of a part's dimension, added if there is none.
-Result<int> JoinedFile::dimension_of(const ArrayFile& part, int dimension) {
-  const std::vector<DimensionRole> own_roles = classify_dimensions(contents_);
+// The common dimension of a part's dimension, added if there is none. known: roles of the
+// dimensions of the parts before.
+Result<int> JoinedFile::dimension_of(const ArrayFile& part, int dimension,
+                                     const DimensionRole& role,
+                                     const std::vector<DimensionRole>& known) {
   const FileDimension& wanted = part.contents().dimensions.at(at(dimension));
-  const DimensionRole role = classify_dimensions(part.contents()).at(at(dimension));
-  for (std::size_t d = 0; d < contents_.dimensions.size(); ++d) {
+  for (std::size_t d = 0; d < known.size(); ++d) {
     const int own = static_cast<int>(d);
     const FileDimension& found = contents_.dimensions[d];
     const bool named = found.name == wanted.name;
-    const bool both = own_roles[d].coordinate >= 0 && role.coordinate >= 0;
-    const bool is_time = role.role == Role::time && own_roles[d].role == Role::time;
-    const bool alike = role.role != Role::unknown && role.role == own_roles[d].role;
+    const bool both = known[d].coordinate >= 0 && role.coordinate >= 0;
+    const bool is_time = role.role == Role::time && known[d].role == Role::time;
+    const bool alike = role.role != Role::unknown && role.role == known[d].role;
     if (!named && !(both && alike)) continue;
     if (found.length == wanted.length) {
       if (!both) {
         if (named) return own;
         continue;
       }
-      const auto same = same_coordinates(*this, own, part, dimension, is_time);
+      const auto same =
+          same_coordinates(*this, known[d].coordinate, part, role.coordinate, is_time);
       if (!same) return same.error();
       if (*same) return own;
     }

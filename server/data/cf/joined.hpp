@@ -8,6 +8,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
+#include "server/data/cf/grid/axes.hpp"
 
 namespace windsplat::data::cf {
 
@@ -48,7 +49,8 @@ class JoinedFile final : public ArrayFile {
   JoinedFile(std::string name, std::string origin)
       : name_(std::move(name)), origin_(std::move(origin)) {}
   Result<void> add(const ArrayFile& part);
-  Result<int> dimension_of(const ArrayFile& part, int dimension);
+  Result<int> dimension_of(const ArrayFile& part, int dimension, const DimensionRole& role,
+                           const std::vector<DimensionRole>& known);
   Result<void> place_faces(const ArrayFile& part, std::vector<int>& dimensions);
   void add_variable(const ArrayFile& part, int variable, const std::vector<int>& dimensions);
   [[nodiscard]] const Place& place_of(int variable) const { return places_.at(at(variable)); }

@@ -252,9 +252,7 @@ int coordinate_of(const FileContents& contents, int dimension) {
   int marked = -1;
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
     const FileVariable& variable = contents.variables[v];
-    if (variable.dims != std::vector<int>{dimension} || !variable.numeric) {
-      continue;
-    }
+    if (variable.dims.size() != 1 || variable.dims[0] != dimension || !variable.numeric) continue;
     if (variable.name == name) {
       return static_cast<int>(v);
     }

@@ -40,10 +40,12 @@ std::vector<bool> find_cell_lists(const FileContents& contents) {
   const std::size_t count = contents.dimensions.size();
   std::vector<bool> found(count, false);
   std::vector<std::array<bool, 2>> placed(count, {false, false});  // by longitude, by latitude
-  // Beside the coordinate of an axis, others on it are auxiliary.
+  // Beside the coordinate of an axis, others on it are auxiliary; samples along `x` lie in order.
   const auto is_own_axis = [&](int dimension) {
-    const int axis = variable_named(contents, contents.dimensions.at(at(dimension)).name);
-    return axis >= 0 && side_of(contents.variables[at(axis)]) != 0;
+    const std::string& name = contents.dimensions.at(at(dimension)).name;
+    const int axis = variable_named(contents, name);
+    return is_one_of(lower(name), std::to_array<std::string_view>({"x", "y"})) ||
+           (axis >= 0 && side_of(contents.variables[at(axis)]) != 0);
   };
   for (const FileVariable& variable : contents.variables) {
     if (variable.dims.size() == 1 && variable.numeric && !is_own_axis(variable.dims[0])) {

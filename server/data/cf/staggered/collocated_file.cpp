@@ -73,6 +73,14 @@ std::vector<double> averaged(const std::vector<double>& block, const Span& span,
   return out;
 }
 
+// Longitudes or latitudes that are repeated for every step.
+bool is_position_of_each_step(const FileContents& contents, const std::vector<DimensionRole>& roles,
+                              const FileVariable& variable) {
+  if (!variable.numeric || variable.dims.size() != 3 || !is_position(variable)) return false;
+  const int first = variable.dims[0];
+  return roles.at(at(first)).role == Role::time && contents.dimensions.at(at(first)).length > 0;
+}
+
 class CollocatedFile final : public ArrayFile {
  public:
   CollocatedFile(std::unique_ptr<ArrayFile> base, const std::vector<Stagger>& staggers)
@@ -80,7 +88,8 @@ class CollocatedFile final : public ArrayFile {
     const std::vector<DimensionRole> roles = classify_dimensions(contents_);
     std::string names;
     for (FileVariable& variable : contents_.variables) {
-      ways_.push_back(way_of(variable, staggers, roles));
+      ways_.push_back(way_of(variable, staggers));
+      ways_.back().first_step = is_position_of_each_step(contents_, roles, variable);
       const Way& way = ways_.back();
       if (!way.is_changed()) continue;
       if (!way.first_step) {
@@ -167,15 +176,10 @@ class CollocatedFile final : public ArrayFile {
     [[nodiscard]] bool is_changed() const { return first_step || !staggers.empty(); }
   };
 
-  static Way way_of(const FileVariable& variable, const std::vector<Stagger>& staggers,
-                    const std::vector<DimensionRole>& roles) {
+  static Way way_of(const FileVariable& variable, const std::vector<Stagger>& staggers) {
     Way way;
     const std::vector<int>& dims = variable.dims;
-    if (!variable.numeric || dims.size() < 2) return way;
-    if (is_position(variable)) {
-      way.first_step = dims.size() == 3 && roles.at(at(dims[0])).role == Role::time;
-      return way;
-    }
+    if (!variable.numeric || dims.size() < 2 || is_position(variable)) return way;
     const bool staggered = std::any_of(dims.begin(), dims.end(), [&](int dimension) {
       return staggers.at(at(dimension)).centers >= 0;
     });
@@ -264,11 +268,10 @@ class CollocatedFile final : public ArrayFile {
 
 bool has_positions_of_each_step(const FileContents& contents) {
   const std::vector<DimensionRole> roles = classify_dimensions(contents);
-  return std::any_of(
-      contents.variables.begin(), contents.variables.end(), [&](const FileVariable& variable) {
-        return variable.numeric && variable.dims.size() == 3 && is_position(variable) &&
-               roles.at(at(variable.dims[0])).role == Role::time;
-      });
+  return std::any_of(contents.variables.begin(), contents.variables.end(),
+                     [&](const FileVariable& variable) {
+                       return is_position_of_each_step(contents, roles, variable);
+                     });
 }
 
 }  // namespace

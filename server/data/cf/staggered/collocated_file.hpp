@@ -13,8 +13,8 @@ namespace windsplat::data::cf {
 // order, in which those on faces or corners are averages over their neighbors around each center:
 //  - a sample is the mean of the two neighbors along each staggered dimension; at the end of the
 //    grid, where there is one neighbor only, its value;
-//  - a masked neighbor of a velocity is a wall and counts as 0, unless all neighbors are masked; of
-//    other variables it is left out;
+//  - a masked neighbor of a variable in units of speed is a wall and counts as 0, unless all
+//    neighbors are masked; of other variables it is left out;
 //  - longitudes and latitudes on faces keep their dimensions, and those of each step become those
 //    of the first.
 // WRF's pressure, temperature and height are added (wrf.hpp). Errors: bad_data.

@@ -32,6 +32,7 @@ class StaggerFinder {
     by_suffix("_stag");
     by_roms_names();
     if (auto done = by_coordinates(); !done) return done.error();
+    forget_chains();
     return std::move(found_);
   }
 
@@ -257,6 +258,14 @@ class StaggerFinder {
       }
     }
     return {};
+  }
+
+  // A dimension between samples that lie between others themselves is not understood.
+  void forget_chains() {
+    const std::vector<Stagger> all = found_;
+    for (Stagger& one : found_) {
+      if (one.centers >= 0 && all.at(at(one.centers)).centers >= 0) one = {};
+    }
   }
 
   const ArrayFile& file_;
