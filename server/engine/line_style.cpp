@@ -55,11 +55,11 @@ void flatten(const scene::ColorTable& table, std::vector<float>& rgb) {
 }
 
 kernels::ColorTable make_table(const scene::ColorTable& table, const std::vector<float>& rgb,
-                               double scale) {
+                               double scale, double origin) {
   kernels::ColorTable to{};
   to.rgb = rgb.data();
   to.entries = static_cast<int>(table.entries.size());
-  to.low = bounded(scale * table.range[0]);
+  to.low = bounded(scale * table.range[0] - origin);
   const double last = to.entries - 1;
   to.scale =
       bounded(std::min(last * ramp_scale(scale * table.range[0], scale * table.range[1]), 1e30));
@@ -84,7 +84,8 @@ void set_rates(const scene::VectorLayer& from, std::vector<float>& rate_x,
   to.rate_z = rate_z.empty() ? nullptr : rate_z.data();
 }
 
-void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::LineStyle& to) {
+void style_lines(const Scene& scene, const scene::VectorLayer& from, double depth_origin,
+                 kernels::LineStyle& to) {
   to.length = static_cast<float>(from.length);
   const double scale = magnitude_scale(from);
   const double full = scale * from.magnitude_range[1];
@@ -105,7 +106,7 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, kernels::Li
   to.intensity_low = bounded(scale * from.magnitude_range[0]);
   to.intensity_scale = ramp_scale(scale * from.magnitude_range[0], scale * from.magnitude_range[1]);
   to.intensity = static_cast<float>(from.magnitude_intensity);
-  to.cue_near = bounded(scene.depth_cue.near);
+  to.cue_near = bounded(scene.depth_cue.near - depth_origin);
   to.cue_scale = ramp_scale(scene.depth_cue.near, scene.depth_cue.far);
   to.cue_strength = static_cast<float>(scene.depth_cue.strength);
   to.color_by = static_cast<int>(from.color_by);

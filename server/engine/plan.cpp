@@ -117,7 +117,7 @@ void check_volume(const data::Volume& volume, const Lattice& lattice) {
                   volume.samples() * static_cast<std::size_t>(volume.components));
 }
 
-void add_lines(const Scene& scene, PassPlan& pass) {
+void add_lines(const Scene& scene, double depth_origin, PassPlan& pass) {
   const scene::VectorLayer& from = *pass.vector;
   check_volume(*from.field, scene.lattice);
   kernels::LineStyle& to = pass.kernel.line;
@@ -125,7 +125,7 @@ void add_lines(const Scene& scene, PassPlan& pass) {
     to.velocity[c] = c < from.field->components ? from.field->component(c) : nullptr;
   }
   set_rates(from, pass.rate_x, pass.rate_z, to);
-  style_lines(scene, from, to);
+  style_lines(scene, from, depth_origin, to);
   if (from.color_by == scene::LineColor::scalar) {
     WINDSPLAT_CHECK(from.color_field != nullptr);
     check_volume(*from.color_field, scene.lattice);
@@ -133,9 +133,12 @@ void add_lines(const Scene& scene, PassPlan& pass) {
   }
   flatten(from.color, pass.line_rgb);
   const bool by_magnitude = from.color_by == scene::LineColor::magnitude;
-  to.color = make_table(from.color, pass.line_rgb, by_magnitude ? to.magnitude_scale : 1);
+  const bool by_depth = from.color_by == scene::LineColor::screen_z;
+  to.color = make_table(from.color, pass.line_rgb, by_magnitude ? to.magnitude_scale : 1,
+                        by_depth ? depth_origin : 0);
   if (from.color_by == scene::LineColor::rise) color_by_rise(scene, from, to);
   pass.kernel.has_lines = 1;
+  pass.kernel.by_depth = 1;
 }
 
 void flatten_layer(const scene::ScalarLayer& from, LayerArrays& arrays) {
@@ -295,7 +298,8 @@ void plan_slabs(const Scene& scene, RenderPlan& plan) {
   }
 }
 
-void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan& pass) {
+void finish_pass(const Scene& scene, double depth_origin, int major, const SampleWays& ways,
+                 PassPlan& pass) {
   const auto& dims = scene.lattice.dims;
   kernels::Pass& to = pass.kernel;
   to.major = major;
@@ -324,7 +328,7 @@ void finish_pass(const Scene& scene, int major, const SampleWays& ways, PassPlan
                        ? kernels::compositing_or
                        : static_cast<int>(scene.compositing);
   if (scene.lattice.places) bend_pass(scene, ways, pass);
-  if (pass.vector != nullptr) add_lines(scene, pass);
+  if (pass.vector != nullptr) add_lines(scene, depth_origin, pass);
   add_medium(scene, pass);
 }
 
@@ -458,7 +462,9 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   plan.eye_inside = is_inside(scene.camera, scene.lattice);
   plan.eye_sample = eye_index(scene.camera, major, scene.lattice.positions[major]);
   if (plan.curved) measure_ways(scene.lattice, plan.ways);
-  for (PassPlan& pass : plan.passes) finish_pass(scene, major, plan.ways, pass);
+  for (PassPlan& pass : plan.passes) {
+    finish_pass(scene, plan.camera.depth_origin, major, plan.ways, pass);
+  }
   plan.slab_depth = 1;
   if (plan.slabs || plan.curved) plan_slabs(scene, plan);
   if (scene.body) {

@@ -105,6 +105,17 @@ TEST(Line, DimsByMagnitudeAndDistance) {
   EXPECT_NEAR(pixel(image, 40, 40)[3], 0.75, 1e-6);
 }
 
+// Ranges of depth far below the rounding of the distance from the eye.
+TEST(Line, DimsWithDepthInAVolumeThatIsThinAlongTheView) {
+  scene::Scene scene = one_line(5, 0, 0);
+  scene.depth_cue = {0.4, 5 - 1e-9, 5 + 3e-9};  // the line is 5 units away
+  EXPECT_NEAR(pixel(render(scene).image, 40, 40)[2], 0.75 * 0.8 * (1 - 0.4 * 0.25), 1e-6);
+  scene.depth_cue.strength = 0;
+  scene.vector->color = ramp_color(5 - 1e-9, 5 + 3e-9, {0.0F, 0.0F, 0.0F}, {1.0F, 1.0F, 1.0F});
+  scene.vector->color_by = scene::LineColor::screen_z;
+  EXPECT_NEAR(pixel(render(scene).image, 40, 40)[0], 0.75 * 0.25, 1e-5);
+}
+
 TEST(Line, ColorFollowsTheConfiguredSource) {
   scene::Scene scene = one_line(6, 0, 8);
   scene.vector->color = ramp_color(0, 10, {0.0F, 0.0F, 0.0F}, {1.0F, 1.0F, 1.0F});

@@ -237,14 +237,14 @@ KERNEL_INLINE Kernel bearing(Kernel x, Kernel y) {
 // The quantity that determines the colour. On a curved lattice, heights are those of the uncurved
 // one.
 KERNEL_INLINE Kernel color_value(const LineStyle& line, const Rows& rows, const Vectors& vectors,
-                                 const Segments& s, Kernel view_distance, int i) {
+                                 const Segments& s, Kernel depth, int i) {
   const Kernel z =
       hn::MulAdd(s.lift, load<Kernel>(rows.cell[2] + i), load<Kernel>(rows.height + i));
   switch (line.color_by) {
     case 0:
       return z;
     case 1:
-      return view_distance;
+      return depth;
     case 2: {
       // The vector itself, even if a slice draws only its part in the plane.
       const Kernel part =
@@ -301,20 +301,20 @@ struct Shades {
   std::uint64_t unknown;  // bit l set: the field that determines the colour is masked
 };
 
-// Table position and dimming by magnitude and view distance.
+// Table position and dimming by magnitude and depth.
 KERNEL_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, const Rows& rows,
                                  const KernelPositions& positions, const Vectors& vectors,
                                  const Segments& s, int i, int l, Shades& shades) {
-  const Kernel distance = load<Kernel>(positions.z + l) + dot3(camera.forward, s.offset);
+  const Kernel depth = load<Kernel>(positions.depth + l) + dot3(camera.forward, s.offset);
   const Kernel one = all<Kernel>(1.0F);
   const Kernel strong = clamped(
       (vectors.magnitude - all<Kernel>(line.intensity_low)) * all<Kernel>(line.intensity_scale),
       0.0F, 1.0F);
   const Kernel far =
-      clamped((distance - all<Kernel>(line.cue_near)) * all<Kernel>(line.cue_scale), 0.0F, 1.0F);
+      clamped((depth - all<Kernel>(line.cue_near)) * all<Kernel>(line.cue_scale), 0.0F, 1.0F);
   const Kernel dim = hn::NegMulAdd(all<Kernel>(line.intensity), one - strong, one) *
                      hn::NegMulAdd(all<Kernel>(line.cue_strength), far, one);
-  const Kernel value = color_value(line, rows, vectors, s, distance, i);
+  const Kernel value = color_value(line, rows, vectors, s, depth, i);
   const auto masked = is_masked(value);
   const ColorTable& table = line.color;
   const Kernel known = hn::IfThenElse(masked, all<Kernel>(table.low), value);

@@ -68,8 +68,8 @@ struct LineStyle {
   float reach, steep;  // opacity of a pixel: clamp(reach - steep distance, 0, opacity)
   float head_desaturation;
   float intensity_low, intensity_scale, intensity;
-  float cue_near, cue_scale, cue_strength;
-  int color_by;  // scene::LineColor
+  float cue_near, cue_scale, cue_strength;  // from the camera's depth origin
+  int color_by;                             // scene::LineColor
   ColorTable color;
   const float* color_values;  // values of the field that determines the colour, or null
   // Colour by rise: position on the map = rise_scale * part of the length that rises + height_scale
