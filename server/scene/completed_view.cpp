@@ -257,7 +257,9 @@ Result<void> complete_scalar(protocol::ScalarView& scalar, const Lattice& lattic
   const auto range = first_scalar_range(field, dataset);
   if (!range) return range.error();
   if (!scalar.color.range) scalar.color.range = *range;
-  if (!scalar.extinction) scalar.extinction = default_extinction(field, *range, lattice, slice);
+  if (!scalar.extinction) {
+    scalar.extinction = default_extinction(field, *range, lattice, slice, is_map(dataset.info()));
+  }
   return {};
 }
 

@@ -64,13 +64,17 @@ bool is_body(const data::FieldInfo& field) {
   return std::find(names.begin(), names.end(), lower(field.name)) != names.end();
 }
 
-// Index of the kind of a field; kinds().size() if none matches. Other quantities of clouds, such as
-// temperature, height or wind, are excluded.
+// Index of the kind of a field; kinds().size() if none matches. Other quantities of clouds and of
+// sea water, such as temperature, height or velocity, are excluded.
 std::size_t kind_of(const data::FieldInfo& field) {
   const std::string name = lower(field.name);
-  const std::string text = name + " " + lower(field.standard_name) + " " + lower(field.long_name);
-  for (const char* other : {"temperature", "pressure", "altitude", "height", "flux", "speed"}) {
+  std::string text = name + " " + lower(field.standard_name) + " " + lower(field.long_name);
+  for (const char* other :
+       {"temperature", "pressure", "altitude", "height", "flux", "speed", "velocity"}) {
     if (text.find(other) != std::string::npos) return kinds().size();
+  }
+  for (const std::string_view sea : {"sea_water", "sea water"}) {
+    if (const auto at = text.find(sea); at != std::string::npos) text.erase(at, sea.size());
   }
   for (std::size_t n = 0; n < kinds().size(); ++n) {
     for (const std::string_view word : kinds()[n].words) {
@@ -285,7 +289,18 @@ ScalarStyle scalar_style(const data::FieldInfo& field) {
   return kind < kinds().size() ? kinds()[kind].signature : other_style;
 }
 
+bool is_map(const data::DatasetInfo& info) {
+  return info.grid.dims()[2] == 1 && info.first(data::FieldKind::vector) == nullptr;
+}
+
 std::vector<std::string> default_scalars(const data::DatasetInfo& info) {
+  if (is_map(info)) {
+    const auto shown =
+        std::find_if(info.fields.begin(), info.fields.end(), [](const data::FieldInfo& field) {
+          return field.kind == data::FieldKind::scalar && field.standard_name != "time";
+        });
+    if (shown != info.fields.end()) return {shown->name};
+  }
   const data::FieldInfo* best = nullptr;
   std::size_t best_kind = kinds().size();
   const data::FieldInfo* body = nullptr;
@@ -333,12 +348,17 @@ protocol::Range default_scalar_range(const data::FieldInfo& field, const data::V
 std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& field,
                                                       const protocol::Range& range,
                                                       const Lattice& lattice,
-                                                      const std::optional<Slice>& slice) {
+                                                      const std::optional<Slice>& slice, bool map) {
   const ScalarStyle signature = scalar_style(field);
   double shortest = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < 3; ++a) {
     const bool across = slice && slice->axis == static_cast<int>(a);
     shortest = std::min(shortest, cell_size(lattice, a) * (across ? 1 : lattice.dims[a]));
+  }
+  constexpr double opaque = 12;
+  if (map) {
+    const double everywhere = nice_above(opaque / shortest);
+    return {{range[0], everywhere}, {range[1], everywhere}};
   }
   const double top = nice_above(signature.opacity / shortest);
   const double clear = range[0] + signature.clear_below * (range[1] - range[0]);

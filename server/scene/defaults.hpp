@@ -57,17 +57,21 @@ struct ScalarStyle {
 };
 ScalarStyle scalar_style(const data::FieldInfo& field);
 
+// Whether a dataset is a map: one layer of scalars, without a vector field.
+bool is_map(const data::DatasetInfo& info);
+
 // Names of the scalars shown by default: the best match of a cloud or density, and solid bodies in
-// the flow; in a dataset without a vector field at least the first scalar.
+// the flow; in a dataset without a vector field at least the first scalar; of a map the first.
 std::vector<std::string> default_scalars(const data::DatasetInfo& info);
 
 protocol::Range default_scalar_range(const data::FieldInfo& field, const data::Volume& volume);
 
 // Dense parts are nearly opaque through the shortest edge of the box; in a slice through its layer.
+// A map is opaque everywhere, so that only masked samples are dark.
 std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& field,
                                                       const protocol::Range& range,
                                                       const Lattice& lattice,
-                                                      const std::optional<Slice>& slice);
+                                                      const std::optional<Slice>& slice, bool map);
 
 // The default length of lines at full magnitude: about five grid spacings per stride, for a slice
 // those of the axes in its plane.

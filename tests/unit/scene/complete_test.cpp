@@ -372,5 +372,39 @@ TEST(Defaults, QuantilesAreThoseOfUnmaskedMagnitudes) {
   EXPECT_EQ(quantiles(volume, 0.34, 0.67), (protocol::Range{5, 10}));
 }
 
+TEST(Defaults, AnOceanHasNoMediumOfCurrentsOrSalinity) {
+  data::FieldInfo current = scalar_info("water_u", "m/s");
+  current.standard_name = "eastward_sea_water_velocity";
+  data::FieldInfo salinity = scalar_info("so", "1e-3");
+  salinity.standard_name = "sea_water_salinity";
+  data::DatasetInfo info;
+  info.grid = atmosphere_grid();
+  info.fields = {wind_info(), current, salinity};
+  EXPECT_TRUE(default_scalars(info).empty());
+  info.fields.push_back(scalar_info("q", "kg kg-1"));
+  EXPECT_EQ(default_scalars(info), std::vector<std::string>{"q"});
+}
+
+TEST(Defaults, AMapShowsItsFirstFieldAndIsOpaqueEverywhere) {
+  data::Grid grid = atmosphere_grid();
+  grid.axes[2].coordinates = {0};
+  data::FieldInfo time = scalar_info("time_of_pass", "s");
+  time.standard_name = "time";
+  const auto map = dataset_of(std::make_unique<FakeSource>(
+      grid,
+      std::vector<data::FieldInfo>{time, scalar_info("sst", "K"), scalar_info("ice_fraction", "1")},
+      1));
+  const View view = completed(View{}, *map);
+  ASSERT_EQ(view.scalars->size(), 1U);
+  const protocol::ScalarView& shown = view.scalars->front();
+  EXPECT_EQ(shown.field, "sst");
+  // exp(-12) of the light from behind passes one layer.
+  const Scene scene = built(View{}, *map);
+  const double thickness = scene.lattice.spacing[2][0];
+  for (const auto& [value, extinction] : *shown.extinction) {
+    EXPECT_GE(extinction * thickness, 12) << value;
+  }
+}
+
 }  // namespace
 }  // namespace windsplat::scene
