@@ -138,7 +138,14 @@ class Finder {
   // Heights of the samples, where the vertical axis does not state those of all columns.
   [[nodiscard]] std::optional<Input> find_heights() const {
     const Axis& z = info_.grid.axes[2];
-    if (z.coordinates.size() < 2 || metres_in(z.units)) return std::nullopt;
+    if (z.coordinates.size() < 2) return std::nullopt;
+    // Levels at their mean heights, which vary along them.
+    const FieldInfo* own = info_.find("height");
+    if (own != nullptr && own->derived && own->kind == FieldKind::scalar) {
+      const auto found = metres(*own, static_cast<std::size_t>(own - info_.fields.data()));
+      if (found) return found;
+    }
+    if (metres_in(z.units)) return std::nullopt;
     constexpr auto usual = std::to_array<std::string_view>({"height"});
     if (const auto found = scalar("geopotential_height", usual, metres)) return found;
     // Levels whose pressure varies along them.

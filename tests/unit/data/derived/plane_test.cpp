@@ -174,34 +174,41 @@ TEST(DerivedOnAPlane, DepthIsDownward) {
             1e-8);
 }
 
+// Levels without lengths beside the field of their heights, and levels placed at their mean
+// heights.
 TEST(DerivedOnAPlane, SlopingLevelsOfAHeightFieldAreTakenIntoAccount) {
-  Grid grid;
-  grid.axes = {axis_of(AxisKind::cartesian, "m", evenly(0, 100, 5)),
-               axis_of(AxisKind::cartesian, "m", evenly(0, 100, 4)),
-               axis_of(AxisKind::level, "", evenly(1, 1, 4))};
   const auto height = [](std::size_t i, std::size_t j, std::size_t k) {
     const auto [x, y, z] = std::array{100.0 * static_cast<double>(i),
                                       100.0 * static_cast<double>(j), static_cast<double>(k)};
     return 200 * z + 0.3 * x - 0.2 * y + 1e-4 * x * y;
   };
-  const Vec omega{0.01, -0.02, 0.03};
-  auto source = std::make_unique<FormulaSource>(grid);
-  source->add("v", metres_per_second, [&](std::size_t i, std::size_t j, std::size_t k) {
-    return cross(omega,
-                 {100.0 * static_cast<double>(i), 100.0 * static_cast<double>(j), height(i, j, k)});
-  });
-  source->add(
-      "z", {"km"},
-      [&](std::size_t i, std::size_t j, std::size_t k) {
-        return Vec{height(i, j, k) / 1000, 0, 0};
-      },
-      "geopotential_height");
-  const Volume vorticity = volume_of(*derive(std::move(source)), "v_vorticity");
-  EXPECT_LT(greatest_error(vorticity,
-                           [](auto, auto, auto) {
-                             return Vec{0.02, -0.04, 0.06};
-                           }),
-            1e-6);
+  for (const bool placed : {false, true}) {
+    Grid grid;
+    grid.axes = {axis_of(AxisKind::cartesian, "m", evenly(0, 100, 5)),
+                 axis_of(AxisKind::cartesian, "m", evenly(0, 100, 4)),
+                 placed ? axis_of(AxisKind::height, "m", evenly(30, 200, 4))
+                        : axis_of(AxisKind::level, "", evenly(1, 1, 4))};
+    const Vec omega{0.01, -0.02, 0.03};
+    auto source = std::make_unique<FormulaSource>(grid);
+    source->add("v", metres_per_second, [&](std::size_t i, std::size_t j, std::size_t k) {
+      return cross(
+          omega, {100.0 * static_cast<double>(i), 100.0 * static_cast<double>(j), height(i, j, k)});
+    });
+    source->add(
+        placed ? "height" : "z", {"km"},
+        [&](std::size_t i, std::size_t j, std::size_t k) {
+          return Vec{height(i, j, k) / 1000, 0, 0};
+        },
+        placed ? "" : "geopotential_height");
+    source->change().fields.back().derived = placed;
+    const Volume vorticity = volume_of(*derive(std::move(source)), "v_vorticity");
+    EXPECT_LT(greatest_error(vorticity,
+                             [](auto, auto, auto) {
+                               return Vec{0.02, -0.04, 0.06};
+                             }),
+              1e-6)
+        << placed;
+  }
 }
 
 TEST(DerivedOnAPlane, SpeedsAreLengthsOfTheVectorAndOfItsHorizontalPart) {
