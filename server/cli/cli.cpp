@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <csignal>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <new>
 #include <sstream>
@@ -54,7 +55,10 @@ std::string unknown_argument(const CLI::App& app) {
   const CLI::App& command = chosen.empty() ? app : *chosen.front();
   if (first == extras.end()) {
     const std::string& word = extras.empty() ? app.get_name() : extras.front();
-    return "'" + printable(word) + "' is an unexpected argument of '" + command.get_name() + "'";
+    std::error_code ignored;
+    const bool is_file = std::filesystem::exists(word, ignored);
+    return "'" + printable(word) + "' is an unexpected argument of '" + command.get_name() + "'" +
+           (is_file ? "; a pattern of files must be in quotes" : "");
   }
   const std::string word = first->substr(0, std::min<std::size_t>(first->find('='), 64));
   std::string nearest;

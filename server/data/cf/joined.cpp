@@ -12,6 +12,7 @@
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/grid/curvilinear.hpp"
+#include "server/data/cf/selected/selected_file.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/model/digest.hpp"
 
@@ -144,6 +145,8 @@ std::string JoinedFile::identity() const {
 
 Result<void> JoinedFile::add(const ArrayFile& part) {
   const FileContents& added = part.contents();
+  const std::string differs = differing_entry(contents_, added);
+  if (!differs.empty()) return cannot_join(part, *parts_.front(), differs);
   const std::vector<DimensionRole> known = classify_dimensions(contents_);
   const std::vector<DimensionRole> roles = classify_dimensions(added);
   std::vector<int> dimensions;  // of the joined file, by dimension of the part

@@ -12,6 +12,7 @@
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/packing.hpp"
+#include "server/data/cf/selected/selected_file.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/model/digest.hpp"
 
@@ -132,11 +133,18 @@ Result<void> SeriesFile::add(std::size_t member) {
 }
 
 Result<void> SeriesFile::check_space(const ArrayFile& file) const {
+  const std::string differs = differing_entry(first_->contents(), file.contents());
+  if (!differs.empty()) return misfit(file, *first_, differs);
   for (const int d : space_) {
     if (d < 0) continue;
     const FileDimension& own = first_->contents().dimensions.at(at(d));
     const int other = dimension_named(file.contents(), own.name);
-    if (other < 0) return misfit(file, *first_, "it has no dimension " + in_quotes(own.name));
+    if (other < 0) {
+      return misfit(file, *first_,
+                    "it has no dimension " + in_quotes(own.name) +
+                        "; files with different variables are joined by a list in braces, "
+                        "'{a,b}_*.nc'");
+    }
     const std::size_t length = file.contents().dimensions.at(at(other)).length;
     if (length != own.length) {
       return misfit(file, *first_,

@@ -138,7 +138,9 @@ TEST(CliUsage, UnknownWordIsReportedWithASuggestion) {
   EXPECT_THAT(run({"serve", "--banana"}).err,
               StartsWith("windsplat: '--banana' is not an option of 'serve'\n"));
   EXPECT_THAT(run({"inspect", "tornado", "extra"}).err,
-              HasSubstr("'extra' is an unexpected argument"));
+              HasSubstr("'extra' is an unexpected argument of 'inspect'\n"));
+  EXPECT_THAT(run({"inspect", WINDSPLAT_PROGRAM, WINDSPLAT_PROGRAM}).err,
+              HasSubstr("a pattern of files must be in quotes"));
 }
 
 // Text from arguments must not imitate lines or colours of the program's messages.

@@ -22,4 +22,8 @@ Result<std::unique_ptr<ArrayFile>> selected(std::unique_ptr<ArrayFile> file,
 // dimension of a name in the selection.
 Result<void> check_selection(const FileContents& contents, const Selection& selection);
 
+// How two files that become one dataset differ if they show different entries of a dimension;
+// empty if they do not. Reference times of forecasts may differ.
+std::string differing_entry(const FileContents& first, const FileContents& other);
+
 }  // namespace windsplat::data::cf

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -82,6 +83,26 @@ TEST(SelectedEntries, EveryMemberIsShownByItsValue) {
     EXPECT_EQ(source->info().title, "e (number=" + numbers[m] + ")");
     EXPECT_FALSE(has_note(source->info(), "the first is shown"));
   }
+}
+
+// Files that begin with members 3 and 5: as a series along time, and with different variables.
+TEST(SelectedEntries, FilesThatBeginWithDifferentMembersAreNotMixed) {
+  const Folder folder;
+  write_ensemble(folder / "e_1.nc");
+  for (const auto& [name, variable] : {std::pair("e_2.nc", "t"), std::pair("q.nc", "q")}) {
+    NetcdfMaker file(folder / name);
+    const int n = file.axis("number", {5, 9}, "1", "realization");
+    const double hour = std::string_view(variable) == "t" ? 12 : 0;
+    const int t = file.axis("time", {hour, hour + 6}, "hours since 2001-01-01", "time");
+    const auto [z, y, x] = space_of(file);
+    file.variable(variable, NC_FLOAT, {n, t, z, y, x}, tagged({2, 2, 2, 3, 4}));
+  }
+  EXPECT_THAT(why_not(folder / "e_*.nc"), HasSubstr("its first 'number' is 5, not 3; choose one"));
+  EXPECT_THAT(why_not(folder / "{e_1,q}.nc"), HasSubstr("its first 'number' is 5, not 3"));
+  const auto series = opened(folder / "e_*.nc?number=5");
+  ASSERT_NE(series, nullptr);
+  EXPECT_EQ(last_of(volume_of(*series, "t", 0)), 10123);
+  EXPECT_EQ(last_of(volume_of(*series, "t", 2)), 123);
 }
 
 TEST(SelectedEntries, WithoutAChoiceTheFirstIsShownAndNoted) {

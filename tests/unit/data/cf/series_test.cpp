@@ -167,6 +167,23 @@ TEST(Series, IncompatibleMembersAreReportedWithTheDifference) {
   EXPECT_NE(source.error().message.find("'s2.nc'"), std::string::npos) << source.error().message;
 }
 
+TEST(Series, FilesWithOtherDimensionsAreReferredToAListInBraces) {
+  const Folder folder;
+  write_part(folder / "s1.nc", {{0}, "hours since 2001-01-01"});
+  {
+    NetcdfMaker file(folder / "s2.nc");
+    const int y = file.axis("latitude", {-10, 0, 10}, "degrees_north");
+    const int x = file.axis("lon", {0, 10, 20, 30}, "degrees_east");
+    file.variable("g", NC_FLOAT, {y, x}, counting(12, 0));
+  }
+  const auto source = open_file(folder / "s*.nc");
+  ASSERT_FALSE(source);
+  EXPECT_NE(
+      source.error().message.find("it has no dimension 'lat'; files with different variables"),
+      std::string::npos)
+      << source.error().message;
+}
+
 TEST(Series, CoordinatesMayDifferBySinglePrecisionRounding) {
   const Folder folder;
   write_part(folder / "s1.nc", {{0}, "hours since 2001-01-01", "", 1, {-10, 0, 10.1}});
