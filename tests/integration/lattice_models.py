@@ -55,6 +55,50 @@ def write_section(path):
                        {"x": "degrees_east", "z": "m", "t": "K"})
 
 
+def write_icon(path):
+    """ICON on a latitude-longitude grid: numbered levels from the top, W between them."""
+    file = netCDF4.Dataset(path, "w")
+    x = axis(file, "lon", np.arange(6.0), units="degrees_east")
+    y = axis(file, "lat", np.arange(5.0), units="degrees_north")
+    of_levels = {"standard_name": "height", "long_name": "generalized_height", "axis": "Z"}
+    z = axis(file, "height", np.arange(1.0, 5), **of_levels)
+    axis(file, "height_2", np.arange(1.0, 6), **of_levels)
+    u, v = (put(file, name, ("height", "lat", "lon"), noise(4, 5, 6), units="m s-1",
+                standard_name=standard)
+            for name, standard in (("u", "eastward_wind"), ("v", "northward_wind")))
+    faces = put(file, "w", ("height_2", "lat", "lon"), noise(5, 5, 6), units="m s-1",
+                standard_name="upward_air_velocity")
+    file.close()
+    fields = {"u": u[::-1], "v": v[::-1], "w": between(faces, 0)[::-1]}
+    return Independent({"x": x, "y": y, "z": z[::-1]},
+                       as_masked({name: values[None] for name, values in fields.items()}),
+                       {"wind": ("u", "v", "w")},
+                       {"x": "degrees_east", "y": "degrees_north", "z": "",
+                        "u": "m s-1", "v": "m s-1", "w": "m s-1"}, falls=("z",))
+
+
+def write_cm1(path):
+    """CM1 and MicroHH: centres and faces by coordinates, without attributes of axes."""
+    file = netCDF4.Dataset(path, "w")
+    x = axis(file, "xh", np.arange(6.0) + 0.5, units="km")
+    axis(file, "xf", np.arange(7.0), units="km")
+    y = axis(file, "yh", np.arange(5.0) + 0.5, units="km")
+    axis(file, "yf", np.arange(6.0), units="km")
+    z = axis(file, "zh", np.arange(4.0) + 0.5, units="km")
+    axis(file, "zf", np.arange(5.0), units="km")
+    q = put(file, "qc", ("zh", "yh", "xh"), noise(4, 5, 6), units="kg/kg")
+    u = put(file, "u", ("zh", "yh", "xf"), noise(4, 5, 7), units="m/s")
+    v = put(file, "v", ("zh", "yf", "xh"), noise(4, 6, 6), units="m/s")
+    w = put(file, "w", ("zf", "yh", "xh"), noise(5, 5, 6), units="m/s")
+    file.close()
+    fields = {"qc": q, "u": between(u, 2), "v": between(v, 1), "w": between(w, 0)}
+    return Independent({"x": x, "y": y, "z": z},
+                       as_masked({name: values[None] for name, values in fields.items()}),
+                       {"wind": ("u", "v", "w")},
+                       {"x": "km", "y": "km", "z": "km", "qc": "kg/kg", "u": "m/s", "v": "m/s",
+                        "w": "m/s", "wind": "m/s"})
+
+
 def write_chain(path):
     """Names of faces of faces, and positions of steps of which there are none yet."""
     file = netCDF4.Dataset(path, "w")

@@ -32,12 +32,14 @@ class Independent:
     """The values of another reader. axes: x, y, z -> coordinates as in the file, or None where
     a grid has no such axis. scalars: name -> masked array (step, z, y, x). vectors: name -> names
     of its components. units: name of a scalar or an axis -> text, if the file contains it. columns:
-    arrays (y, x) of longitudes and of latitudes, by which the program finds a column, or None."""
+    arrays (y, x) of longitudes and of latitudes, by which the program finds a column, or None.
+    falls: axes of levels that are counted from the top."""
 
-    def __init__(self, axes, scalars, vectors, units=None, columns=None):
+    def __init__(self, axes, scalars, vectors, units=None, columns=None, falls=()):
         self.axes, self.scalars, self.vectors = axes, scalars, vectors
         self.units = units or {}
         self.columns = columns
+        self.falls = falls
 
 
 def read_netcdf(path, inspected):
@@ -198,7 +200,7 @@ def compare_axes(check, inspected, other):
             there = there + 360 * np.round((np.asarray(axis["coordinates"]) - there) / 360)
         check.same(f"axis {a}", axis["coordinates"], there, np.ptp(there))
         check.same(f"axis {a} uses each sample once", sorted(orders[a]), np.arange(len(there)))
-        upward = -1 if axis["kind"] in ("pressure", "depth") else 1
+        upward = -1 if axis["kind"] in ("pressure", "depth") or a in other.falls else 1
         check.same_text(f"axis {a} units", axis["units"], other.units.get(a, ""))
         check.same(f"axis {a} ascends", np.all(upward * np.diff(axis["coordinates"]) > 0), True)
     other.scalars = {

@@ -85,9 +85,7 @@ Evidence by_standard_name(std::string_view name) {
        {"time", Role::time, AxisKind::cartesian, false}});
   const auto* at = std::find_if(known_names.begin(), known_names.end(),
                                 [name](const Known& known) { return known.text == name; });
-  if (at != known_names.end()) {
-    return evidence_of(*at);
-  }
+  if (at != known_names.end()) return evidence_of(*at);
   if (name.starts_with("height_above_")) {
     return {role_z, AxisKind::height, true, false};
   }
@@ -134,35 +132,30 @@ std::string_view without_number(std::string_view name) {
 
 Role role_of_name(std::string_view name) {
   constexpr auto x_names = std::to_array<std::string_view>(
-      {"lon", "longitude", "long", "rlon", "x", "xc", "xt", "xu", "xi", "nlon", "i", "ni", "nx",
-       "east", "easting", "west_east", "longitudes", "xdim"});
+      {"lon",     "longitude", "long",       "rlon", "x",  "xc", "xt",
+       "xu",      "xi",        "nlon",       "i",    "ni", "nx", "east",
+       "easting", "west_east", "longitudes", "xdim", "xh", "xf"});
   constexpr auto y_names = std::to_array<std::string_view>(
-      {"lat", "latitude", "rlat", "y", "yc", "yt", "yu", "eta_rho", "nlat", "j", "nj", "ny",
-       "north", "northing", "south_north", "latitudes", "yv", "ydim"});
+      {"lat",         "latitude",  "rlat", "y",    "yc", "yt",    "yu",
+       "eta_rho",     "nlat",      "j",    "nj",   "ny", "north", "northing",
+       "south_north", "latitudes", "yv",   "ydim", "yh", "yf"});
   constexpr auto z_names = std::to_array<std::string_view>(
       {"z",        "lev",      "level",      "levels", "plev",     "height",  "heights", "alt",
        "altitude", "depth",    "depths",     "k",      "nk",       "nz",      "zc",      "zt",
        "zlev",     "pressure", "pres",       "press",  "isobaric", "layer",   "layers",  "lay",
        "sigma",    "hybrid",   "bottom_top", "deptht", "depthu",   "depthv",  "depthw",  "st_ocean",
-       "vertical", "nlev",     "levelist",   "mlev",   "ilev",     "lv_isbl", "zdim"});
+       "vertical", "nlev",     "levelist",   "mlev",   "ilev",     "lv_isbl", "zdim",    "zh",
+       "zf",       "zu_3d",    "zw_3d"});
   constexpr auto time_names = std::to_array<std::string_view>(
       {"time", "t", "times", "nt", "timestep", "time_step", "step", "steps", "date", "frtime",
        "frame", "frames", "ntime", "time_counter", "month", "record"});
   constexpr auto other_names = std::to_array<std::string_view>(
       {"bnds", "bounds", "nv", "nbnd", "nbnds", "vertices", "corners", "nvertex", "member",
-       "ensemble", "realization", "number", "strlen", "ncells", "ncol", "bnd"});
-  if (is_one_of(name, x_names)) {
-    return Role::x;
-  }
-  if (is_one_of(name, y_names)) {
-    return Role::y;
-  }
-  if (is_one_of(name, z_names)) {
-    return Role::z;
-  }
-  if (is_one_of(name, time_names)) {
-    return Role::time;
-  }
+       "ensemble", "realization", "number", "strlen", "ncells", "ncol", "bnd", "expver"});
+  if (is_one_of(name, x_names)) return Role::x;
+  if (is_one_of(name, y_names)) return Role::y;
+  if (is_one_of(name, z_names)) return Role::z;
+  if (is_one_of(name, time_names)) return Role::time;
   return is_one_of(name, other_names) ? Role::other : Role::unknown;
 }
 
@@ -198,15 +191,9 @@ Evidence by_name(std::string_view full_name, std::string_view units, bool has_co
 }
 
 Role role_of_axis_attribute(std::string_view axis) {
-  if (axis == "x") {
-    return Role::x;
-  }
-  if (axis == "y") {
-    return Role::y;
-  }
-  if (axis == "z") {
-    return Role::z;
-  }
+  if (axis == "x") return Role::x;
+  if (axis == "y") return Role::y;
+  if (axis == "z") return Role::z;
   return axis == "t" ? Role::time : Role::unknown;
 }
 
@@ -270,9 +257,14 @@ int coordinate_of(const FileContents& contents, int dimension) {
   return marked;
 }
 
-// An explicit `positive` overrides the name; pressure always increases downward.
+// An explicit `positive` overrides the name; pressure always increases downward. ICON numbers its
+// levels from the top.
 void heed_positive(const FileVariable& variable, Evidence& found) {
   const std::string positive = lower(variable.positive);
+  if (found.role == Role::z && variable.units.empty() &&
+      lower(variable.long_name).starts_with("generalized")) {
+    found = {Role::z, AxisKind::level, true, true};
+  }
   if (found.role != Role::z || found.kind == AxisKind::pressure ||
       is_ocean_pressure(lower(variable.units)) || (positive != "up" && positive != "down")) {
     return;
@@ -291,9 +283,9 @@ bool is_bare_sigma(const FileVariable& variable) {
           lower(variable.units) == "sigma_level");
 }
 
-// Direction of a vertical axis by its values if `positive` is absent.
+// Direction of a vertical axis by its values if `positive` is absent, and its unit if it has none.
 void heed_values(const FileVariable& variable, const std::vector<double>& coordinates,
-                 AxisKind& kind, bool& positive_down, std::string& note) {
+                 AxisKind& kind, bool& positive_down, std::string& units, std::string& note) {
   const auto [low, high] = std::minmax_element(coordinates.begin(), coordinates.end());
   if (!variable.positive.empty() || low == coordinates.end()) return;
   const bool below_zero = *low < 0 && *high <= 0;
@@ -305,6 +297,14 @@ void heed_values(const FileVariable& variable, const std::vector<double>& coordi
     const bool is_named = without_number(lower(variable.name)) == "sigma";
     constexpr double ground = 1.1;  // some models exceed 1 by half a layer
     positive_down = !below_zero && (is_named || (*low >= 0 && *high <= ground));
+  } else if (kind == AxisKind::level && units.empty() && variable.standard_name.empty() &&
+             coordinates.front() == *high && *low > 0 && *high >= 500 && *high <= 1100 &&
+             *high - *low > static_cast<double>(coordinates.size())) {
+    kind = AxisKind::pressure;
+    positive_down = true;
+    units = "hPa";
+    note = in_quotes(variable.name) +
+           " descends from 1100 or less and has no units: interpreted as pressures in hPa";
   }
 }
 
@@ -467,7 +467,9 @@ Result<OrientedAxis> orient_axis(const FileContents& contents, const DimensionRo
   const bool is_angle = role.kind == AxisKind::longitude || role.kind == AxisKind::latitude;
   if (is_angle && is_radian(variable.units)) out.axis.units = "degrees";
   bool positive_down = role.positive_down;
-  if (which == 2) heed_values(variable, coordinates, out.axis.kind, positive_down, out.note);
+  if (which == 2) {
+    heed_values(variable, coordinates, out.axis.kind, positive_down, out.axis.units, out.note);
+  }
   if (which == 2 && !role.kind_is_sure && horizontal == AxisKind::longitude) {
     out.axis.kind = is_length(lower(variable.units)) ? AxisKind::height : AxisKind::level;
   }

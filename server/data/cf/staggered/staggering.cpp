@@ -31,6 +31,7 @@ class StaggerFinder {
     by_sgrid();
     by_suffix("_stag");
     by_roms_names();
+    by_numbered_levels();
     if (auto done = by_coordinates(); !done) return done.error();
     forget_chains();
     return std::move(found_);
@@ -138,6 +139,29 @@ class StaggerFinder {
       }
     }
     add_between(dimension_named(contents_, "s_w"), dimension_named(contents_, "s_rho"));
+  }
+
+  // Whether a dimension has no coordinates in a unit: its levels are counted.
+  [[nodiscard]] bool is_numbered(int dimension) const {
+    const int coordinate = variable_named(contents_, contents_.dimensions.at(at(dimension)).name);
+    if (coordinate < 0) return true;
+    const std::string& units = contents_.variables[at(coordinate)].units;
+    return units.empty() || units == "1";
+  }
+
+  // Levels without heights, one more of which a velocity has: level1 of COSMO beside level,
+  // height_2 of ICON beside height.
+  void by_numbered_levels() {
+    constexpr auto names = std::to_array<std::pair<const char*, const char*>>(
+        {{"level1", "level"}, {"height_2", "height"}});
+    for (const auto& [faces_name, centers_name] : names) {
+      const int faces = dimension_named(contents_, faces_name);
+      const int centers = dimension_named(contents_, centers_name);
+      if (faces < 0 || centers < 0 || length(faces) != length(centers) + 1) continue;
+      if (is_numbered(faces) && is_numbered(centers) && has_velocity(faces)) {
+        add(faces, centers, false, 0);
+      }
+    }
   }
 
   // How many variables of two or more dimensions run along a dimension.

@@ -43,7 +43,10 @@ FileVariable level_axis(const std::string& type) {
     out.positive = "down";
   } else {
     out.standard_name = "model_level_number";
-    out.positive = type.starts_with("hybrid") || type == "sigma" ? "down" : "";
+    // Numbered from the top, or 1 at the ground.
+    const bool falls =
+        type.starts_with("hybrid") || type.starts_with("generalVertical") || type == "sigma";
+    out.positive = falls ? "down" : "";
   }
   return out;
 }
@@ -183,7 +186,7 @@ int File::axis(const std::string& name, const std::vector<double>& values,
     }
     free = name + "_" + std::to_string(n);
   }
-  contents_.dimensions.push_back({free, values.size(), false});
+  contents_.dimensions.push_back({.name = free, .length = values.size()});
   FileVariable variable = like;
   variable.name = free;
   variable.type = "float64";
@@ -226,8 +229,10 @@ std::vector<int> File::add_axes(std::size_t g) {
 
 std::vector<int> File::add_positions(std::size_t g) {
   const Grid& grid = grids_[g];
-  contents_.dimensions.push_back({name_on_grid("y", g), grid.rows, false, grid.rows_fall});
-  contents_.dimensions.push_back({name_on_grid("x", g), grid.columns, false, grid.columns_fall});
+  contents_.dimensions.push_back(
+      {.name = name_on_grid("y", g), .length = grid.rows, .falls = grid.rows_fall});
+  contents_.dimensions.push_back(
+      {.name = name_on_grid("x", g), .length = grid.columns, .falls = grid.columns_fall});
   const int x = static_cast<int>(contents_.dimensions.size()) - 1;
   for (const bool north : {true, false}) {
     FileVariable position = north ? latitude_axis("latitude") : longitude_axis("longitude");

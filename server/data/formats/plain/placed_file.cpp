@@ -19,7 +19,7 @@ constexpr std::uint64_t span_max = std::uint64_t{1} << 20;  // bytes read at a t
 }  // namespace
 
 int PlacedFile::add_dimension(std::string name, std::size_t length) {
-  contents_.dimensions.push_back({std::move(name), length, false});
+  contents_.dimensions.push_back({.name = std::move(name), .length = length});
   return static_cast<int>(contents_.dimensions.size()) - 1;
 }
 

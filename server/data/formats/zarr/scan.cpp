@@ -147,7 +147,8 @@ class StoreScan {
       const ImageAxis& axis = multiscale.axes[d];
       const std::size_t length = image.metadata.shape[d];
       if (!axis.is_space && !axis.is_time) {
-        out_.file.dimensions.push_back({image.dimensions[d], length, false, false, true});
+        out_.file.dimensions.push_back(
+            {.name = image.dimensions[d], .length = length, .other = true});
         continue;
       }
       if (!multiscale.placed) continue;
@@ -185,7 +186,7 @@ class StoreScan {
       auto at = std::find_if(out_.file.dimensions.begin(), out_.file.dimensions.end(),
                              [&](const FileDimension& known) { return known.name == name; });
       if (at == out_.file.dimensions.end()) {
-        out_.file.dimensions.push_back({name, length, false});
+        out_.file.dimensions.push_back({.name = name, .length = length});
         at = out_.file.dimensions.end() - 1;
       }
       if (at->length != length && variable.unread.empty()) {
