@@ -11,6 +11,7 @@
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/grid/grid.hpp"
+#include "server/data/cf/mesh/topology.hpp"
 #include "server/data/cf/packing.hpp"
 #include "server/data/cf/selected/selected_file.hpp"
 #include "server/data/cf/time.hpp"
@@ -81,11 +82,16 @@ std::string SeriesFile::identity() const {
 Result<void> SeriesFile::begin() {
   const FileContents& contents = first_->contents();
   const std::vector<DimensionRole> roles = classify_dimensions(contents);
-  auto choice = choose_grid(contents, roles);
+  // Files of a mesh, or of data on a mesh in another file, are joined before they have a lattice.
+  const auto topology = find_topology(*first_);
+  const auto lists = grid_of_lists(*first_);
+  auto choice = topology && lists ? Result<GridChoice>(*lists) : choose_grid(contents, roles);
+  if (!choice && lists) choice = *lists;
   if (!choice) {
     return make_error(choice.error().kind,
                       in_quotes(first_->name()) + ": " + choice.error().message);
   }
+  if (topology) parts_of_mesh_ = variables_of(*topology);
   space_ = choice->space;
   time_ = choice->time;
   dropped_.resize(contents.variables.size());
@@ -111,7 +117,9 @@ bool SeriesFile::is_static(std::size_t in_first) const {
   if (time_ >= 0) {
     return std::find(variable.dims.begin(), variable.dims.end(), time_) == variable.dims.end();
   }
-  return variable.dims.size() < 2 || !variable.numeric || is_position(variable);
+  const auto is_part =
+      std::count(parts_of_mesh_.begin(), parts_of_mesh_.end(), static_cast<int>(in_first)) > 0;
+  return variable.dims.size() < 2 || !variable.numeric || is_position(variable) || is_part;
 }
 
 Result<void> SeriesFile::add(std::size_t member) {

@@ -95,6 +95,7 @@ class SeriesFile final : public ArrayFile {
   OpenMember open_member_;
   std::unique_ptr<ArrayFile> first_;
   std::array<int, 3> space_{-1, -1, -1};  // the first member's dimensions
+  std::vector<int> parts_of_mesh_;        // variables of the first member that describe its mesh
   int time_ = -1;                         // time dimension; -1: members are single steps
   int time_coordinate_ = -1;              // variable of the first member; -1: steps are numbered
   std::vector<std::string> dropped_;      // per variable: why it is omitted, or empty

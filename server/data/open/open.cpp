@@ -11,6 +11,7 @@
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/joined.hpp"
+#include "server/data/cf/mesh/meshed_file.hpp"
 #include "server/data/cf/selected/selected_file.hpp"
 #include "server/data/cf/series.hpp"
 #include "server/data/cf/source.hpp"
@@ -63,7 +64,10 @@ SourceResult source_of(const Files& files, Result<std::unique_ptr<cf::ArrayFile>
                       in_quotes((*file)->name()) + ": " + known.error().message);
   }
   (*file)->set_stored_bytes(files.opened_bytes());
-  return cf::make_source(std::move(*file));
+  auto lattice = cf::meshed(std::move(*file));
+  if (!lattice) return lattice.error();
+  (*lattice)->set_stored_bytes(files.opened_bytes());
+  return cf::make_source(std::move(*lattice));
 }
 
 // The chosen entries of dimensions besides space and time.

@@ -404,8 +404,8 @@ Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& r
       if (length != 1) {
         const bool is_list = roles.at(static_cast<std::size_t>(dimension)).is_list;
         layout.problem = "its dimension '" + printable(dimension_name(contents, dimension)) +
-                         (is_list ? "' lists the cells, edges, nodes or stations of an "
-                                    "unstructured grid, which is not supported"
+                         (is_list ? "' lists stations, or cells, edges or nodes of an "
+                                    "unstructured grid whose outlines are not in the file"
                                   : "' is neither space nor time");
         return layout;
       }

@@ -18,7 +18,12 @@ constexpr auto usual_names =
     std::to_array<std::string_view>({"ncells", "nedges", "nvertices", "nod2", "nod2d", "nodes_2d",
                                      "nod_n", "nele", "nschism_hgrid_node", "nschism_hgrid_face"});
 
-// Longitudes (-1) or latitudes (1) by attributes, or in radians by name (lonCell); 0: neither.
+bool is_connectivity(const FileVariable& variable) {
+  return lower(variable.cf_role).ends_with("_connectivity");
+}
+
+}  // namespace
+
 int side_of(const FileVariable& variable) {
   const std::string units = lower(variable.units);
   const std::string standard_name = lower(variable.standard_name);
@@ -29,12 +34,6 @@ int side_of(const FileVariable& variable) {
   if (name.find("lon") != std::string::npos) return -1;
   return name.find("lat") != std::string::npos ? 1 : 0;
 }
-
-bool is_connectivity(const FileVariable& variable) {
-  return lower(variable.cf_role).ends_with("_connectivity");
-}
-
-}  // namespace
 
 std::vector<bool> find_cell_lists(const FileContents& contents) {
   const std::size_t count = contents.dimensions.size();

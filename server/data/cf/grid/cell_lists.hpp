@@ -11,4 +11,7 @@ namespace windsplat::data::cf {
 // (version 1.0: cf_role, mesh); the usual names of models without either.
 std::vector<bool> find_cell_lists(const FileContents& contents);
 
+// Longitudes (-1) or latitudes (1) by attributes, or in radians by name (lonCell); 0: neither.
+int side_of(const FileVariable& variable);
+
 }  // namespace windsplat::data::cf

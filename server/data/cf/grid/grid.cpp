@@ -109,8 +109,8 @@ std::string misplaced(const FileContents& contents, const FileVariable& variable
 // Error text for a file without fields, explained by the variable with the most dimensions.
 std::string nothing_to_show(const FileContents& contents, const std::vector<LeftOut>& left_out) {
   std::string text =
-      "there is no numeric variable with two or three spatial dimensions; cells and stations in a "
-      "list are not supported";
+      "there is no numeric variable with two or three spatial dimensions; stations in a list, and "
+      "cells without their outlines, are not supported";
   const FileVariable* most = nullptr;
   for (const FileVariable& variable : contents.variables) {
     if (!variable.unread.empty() && variable.dims.size() >= 2) {

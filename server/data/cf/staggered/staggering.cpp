@@ -30,6 +30,7 @@ class StaggerFinder {
     by_reader();
     by_sgrid();
     by_suffix("_stag");
+    by_suffix("P1");
     by_roms_names();
     by_numbered_levels();
     if (auto done = by_coordinates(); !done) return done.error();
@@ -121,7 +122,7 @@ class StaggerFinder {
     }
   }
 
-  // WRF: west_east_stag beside west_east.
+  // WRF: west_east_stag beside west_east. MPAS: nVertLevelsP1 beside nVertLevels.
   void by_suffix(std::string_view suffix) {
     for (std::size_t d = 0; d < found_.size(); ++d) {
       const std::string& name = contents_.dimensions[d].name;

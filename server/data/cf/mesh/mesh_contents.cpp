@@ -1,0 +1,252 @@
+// Goes through the variables of a file with a mesh.
+#include "server/data/cf/mesh/mesh_contents.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "server/base/ascii.hpp"
+#include "server/data/cf/grid/cell_lists.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+// The dimensions of a file that list what a mesh consists of.
+struct MeshDimensions {
+  std::vector<int> cells;
+  std::vector<int> nodes;
+  std::vector<int> edges;
+  [[nodiscard]] static bool has(const std::vector<int>& all, int d) {
+    return std::find(all.begin(), all.end(), d) != all.end();
+  }
+};
+
+// Dimensions of other names but the same length are those of data joined with a grid file.
+MeshDimensions dimensions_of(const FileContents& contents, const Topology& topology,
+                             const Mesh& mesh) {
+  MeshDimensions out;
+  const std::vector<bool> lists = find_cell_lists(contents);
+  const bool has_nodes = topology.nodes >= 0;
+  for (std::size_t d = 0; d < contents.dimensions.size(); ++d) {
+    const int id = static_cast<int>(d);
+    const FileDimension& own = contents.dimensions[d];
+    constexpr auto usual =
+        std::to_array<std::string_view>({"ncells", "ncol", "cell", "cells", "ncol_d"});
+    const bool is_list = lists[d] || is_one_of(lower(own.name), usual);
+    const bool is_other = id != topology.cells && id != topology.nodes && id != topology.edges;
+    const bool counts_cells = own.length == mesh.cells();
+    const bool counts_nodes = has_nodes && own.length == mesh.nodes();
+    const bool is_alias = is_other && is_list && counts_cells != counts_nodes;
+    if (id == topology.cells || (is_alias && counts_cells)) out.cells.push_back(id);
+    if (id == topology.nodes || (is_alias && counts_nodes)) out.nodes.push_back(id);
+    if (id == topology.edges) out.edges.push_back(id);
+  }
+  return out;
+}
+
+class ContentsMaker {
+ public:
+  ContentsMaker(const ArrayFile& file, const Topology& topology, const Mesh& mesh,
+                const MeshLattice& lattice)
+      : file_(file),
+        topology_(topology),
+        on_sphere_(mesh.on_sphere),
+        lattice_(lattice),
+        contents_(out_.contents),
+        dimensions_(dimensions_of(file.contents(), topology, mesh)),
+        parts_of_mesh_(variables_of(topology)) {
+    contents_ = file.contents();
+    contents_.variables.clear();
+  }
+
+  Result<MeshContents> make() {
+    add_lattice();
+    if (auto done = add_levels(); !done) return done.error();
+    add_variables();
+    add_heights();
+    name_mesh_variables(contents_, topology_.convention);
+    return std::move(out_);
+  }
+
+ private:
+  // A name that no dimension of the file has, nor a variable that is kept.
+  [[nodiscard]] std::string free_name(std::string name) const {
+    const FileContents& all = file_.contents();
+    const auto is_taken = [&] {
+      const int v = variable_named(all, name);
+      return dimension_named(all, name) >= 0 ||
+             (v >= 0 && !describes_mesh(v, all.variables[at(v)]));
+    };
+    while (is_taken()) name += "_lattice";
+    return name;
+  }
+
+  void add_lattice() {
+    const FileContents& all = file_.contents();
+    const int position = topology_.plane_positions[0];
+    const std::string plane_units =
+        position < 0 ? std::string() : all.variables[at(position)].units;
+    for (const bool is_x : {false, true}) {
+      const LatticeAxis& axis = is_x ? lattice_.x : lattice_.y;
+      FileVariable variable;
+      variable.name = free_name(on_sphere_ ? (is_x ? "lon" : "lat") : (is_x ? "x" : "y"));
+      variable.type = "float64";
+      variable.numeric = true;
+      variable.standard_name = on_sphere_
+                                   ? (is_x ? "longitude" : "latitude")
+                                   : (is_x ? "projection_x_coordinate" : "projection_y_coordinate");
+      variable.units = on_sphere_ ? (is_x ? "degrees_east" : "degrees_north") : plane_units;
+      variable.axis = is_x ? "X" : "Y";
+      MeshPart own;
+      for (std::size_t i = 0; i < axis.count; ++i) own.values.push_back(axis.at(i));
+      FileDimension dimension;
+      dimension.name = variable.name;
+      dimension.length = axis.count;
+      add_coordinate(std::move(dimension), std::move(variable), std::move(own));
+    }
+  }
+
+  void add_coordinate(FileDimension dimension, FileVariable variable, MeshPart own) {
+    variable.dims = {static_cast<int>(contents_.dimensions.size())};
+    contents_.dimensions.push_back(std::move(dimension));
+    contents_.variables.push_back(std::move(variable));
+    out_.parts.push_back(std::move(own));
+  }
+
+  [[nodiscard]] std::vector<int> lattice_dims() const {
+    const int first = static_cast<int>(file_.contents().dimensions.size());
+    return {first, first + 1};
+  }
+
+  Result<void> add_levels() {
+    auto levels = levels_of_mesh(file_, topology_);
+    if (!levels) return levels.error();
+    if (!*levels) return {};
+    MeshLevels& found = **levels;
+    FileVariable& variable = found.variable;
+    variable.name = contents_.dimensions.at(at(found.dimension)).name;
+    variable.type = "float64";
+    variable.numeric = true;
+    variable.dims = {found.dimension};
+    variable.axis = "Z";
+    replaced_ = variable.name;
+    contents_.variables.push_back(std::move(variable));
+    MeshPart own;
+    own.values = std::move(found.values);
+    out_.parts.push_back(std::move(own));
+    return {};
+  }
+
+  // Tables with a dimension that counts the parts of a cell or node describe the mesh.
+  [[nodiscard]] bool describes_mesh(int v, const FileVariable& variable) const {
+    if (std::find(parts_of_mesh_.begin(), parts_of_mesh_.end(), v) != parts_of_mesh_.end()) {
+      return true;
+    }
+    constexpr auto counts = std::to_array<std::string_view>(
+        {"three", "four", "two", "maxnode", "maxelem", "maxedges", "maxedges2", "vertexdegree",
+         "nv", "vertices", "ne", "no", "nc", "grid_corners", "bnds"});
+    const bool is_table = std::any_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
+      return is_one_of(lower(contents_.dimensions.at(at(d)).name), counts);
+    });
+    const bool is_place = variable.dims.size() == 1 && side_of(variable) != 0;
+    const bool listed = std::any_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
+      return MeshDimensions::has(dimensions_.cells, d) ||
+             MeshDimensions::has(dimensions_.nodes, d) || MeshDimensions::has(dimensions_.edges, d);
+    });
+    return listed && (is_table || is_place || lower(variable.cf_role).ends_with("_connectivity"));
+  }
+
+  void add_variables() {
+    const std::vector<FileVariable>& all = file_.contents().variables;
+    for (std::size_t v = 0; v < all.size(); ++v) {
+      const int id = static_cast<int>(v);
+      FileVariable variable = all[v];
+      if (variable.name == replaced_ || describes_mesh(id, variable)) {
+        if (variable.dims.size() > 1 && variable.numeric) {
+          contents_.left_out.push_back({variable.name, "describes the mesh"});
+        }
+        continue;
+      }
+      MeshPart own;
+      own.base = id;
+      place(variable, own);
+      contents_.variables.push_back(std::move(variable));
+      out_.parts.push_back(std::move(own));
+    }
+  }
+
+  void place(FileVariable& variable, MeshPart& own) const {
+    const auto count = [&](const std::vector<int>& lists) {
+      return std::count_if(variable.dims.begin(), variable.dims.end(),
+                           [&](int d) { return MeshDimensions::has(lists, d); });
+    };
+    if (count(dimensions_.edges) > 0) {
+      variable.numeric = false;
+      variable.unread = "on the edges of the mesh: values at cells and nodes only are drawn";
+      return;
+    }
+    const bool at_cells = count(dimensions_.cells) == 1;
+    if (!variable.numeric || count(dimensions_.cells) + count(dimensions_.nodes) != 1) return;
+    own.location = at_cells ? MeshLocation::face : MeshLocation::node;
+    const std::vector<int>& lists = at_cells ? dimensions_.cells : dimensions_.nodes;
+    const auto list = std::find_if(variable.dims.begin(), variable.dims.end(),
+                                   [&](int d) { return MeshDimensions::has(lists, d); });
+    own.list = static_cast<std::size_t>(list - variable.dims.begin());
+    variable.dims.erase(list);
+    for (const int d : lattice_dims()) variable.dims.push_back(d);
+    variable.type = "float32";
+    variable.packed = false;
+    variable.is_unsigned = false;
+    variable.mesh.clear();
+    variable.coordinates.clear();
+  }
+
+  void add_heights() {
+    out_.heights = sigma_heights_of(file_.contents(), topology_);
+    if (out_.heights.sigma < 0 || variable_named(contents_, "height") >= 0) return;
+    const std::vector<FileVariable>& all = file_.contents().variables;
+    FileVariable variable;
+    variable.name = "height";
+    variable.type = "float32";
+    variable.numeric = true;
+    variable.dims = {all[at(out_.heights.surface)].dims[0], all[at(out_.heights.sigma)].dims[0]};
+    for (const int d : lattice_dims()) variable.dims.push_back(d);
+    variable.standard_name = "altitude";
+    variable.long_name = "height of the layer, zeta + siglay (h + zeta)";
+    variable.units = "m";
+    contents_.variables.push_back(std::move(variable));
+    MeshPart own;
+    own.location = MeshLocation::node;
+    out_.parts.push_back(std::move(own));
+  }
+
+  const ArrayFile& file_;
+  const Topology& topology_;
+  bool on_sphere_;
+  const MeshLattice& lattice_;
+  MeshContents out_;
+  FileContents& contents_;
+  MeshDimensions dimensions_;
+  std::vector<int> parts_of_mesh_;  // variables of the file
+  std::string replaced_;            // a variable in whose place there is another coordinate
+};
+
+}  // namespace
+
+MeshLocation MeshContents::most() const {
+  std::ptrdiff_t surplus = 0;
+  for (const MeshPart& one : parts) {
+    if (one.location) surplus += *one.location == MeshLocation::face ? 1 : -1;
+  }
+  return surplus < 0 ? MeshLocation::node : MeshLocation::face;
+}
+
+Result<MeshContents> contents_on_lattice(const ArrayFile& file, const Topology& topology,
+                                         const Mesh& mesh, const MeshLattice& lattice) {
+  return ContentsMaker(file, topology, mesh, lattice).make();
+}
+
+}  // namespace windsplat::data::cf
