@@ -1,4 +1,5 @@
-"""Small files with the headers of models on unstructured grids, which must be refused."""
+"""Small files with the headers of models on unstructured grids that must be refused: cells without
+three corners, numbers of nodes beyond the last, and cells without outlines."""
 
 import netCDF4
 import numpy as np
@@ -34,7 +35,7 @@ def write_fvcom(path):
             standard_name="longitude")
         put(file, "lat" + points, (dim,), noise(count), units="degrees_north",
             standard_name="latitude")
-    put(file, "nv", ("three", "nele"), np.ones((3, 50), np.int32))
+    put(file, "nv", ("three", "nele"), np.tile(np.array([[1], [2], [43]], np.int32), (1, 50)))
     put(file, "u", ("time", "siglay", "nele"), noise(1, 5, 50), units="meters s-1")
     put(file, "v", ("time", "siglay", "nele"), noise(1, 5, 50), units="meters s-1")
     put(file, "temp", ("time", "siglay", "node"), noise(1, 5, 42), units="degrees_C")
