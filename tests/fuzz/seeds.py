@@ -12,6 +12,7 @@ import struct
 import subprocess
 
 import hdf5_bytes
+import seeds_mesh
 import seeds_vtk
 import zarr3_bytes
 from seed_numbers import DIMS, Seed, as_text, coded, floats, interleaved, numbers, winds
@@ -315,7 +316,12 @@ def real_seeds(folder):
             yield Seed(REAL_KINDS[path.suffix], path.name, {path.name: path.read_bytes()})
 
 
+def mesh_seeds():
+    for name, data in seeds_mesh.mesh_files().items():
+        yield Seed("netcdf classic", f"mesh {name}", {"x.nc": data})
+
+
 def plain_seeds(program, folder, real):
     return [*nrrd_seeds(), *raw_seeds(), *grads_seeds(), *dx_seeds(), *zarr_seeds(),
             *seeds_vtk.vtk_seeds(), *hdf5_seeds(), *netcdf_seeds(program, folder),
-            *grib_seeds(folder), *real_seeds(real)]
+            *mesh_seeds(), *grib_seeds(folder), *real_seeds(real)]
