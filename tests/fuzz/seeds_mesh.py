@@ -67,7 +67,8 @@ def fvcom():
         ("lon", ["node"], DOUBLE, X, EAST), ("lat", ["node"], DOUBLE, Y, NORTH),
         ("nv", ["three", "nele"], INT, sum(map(list, zip(*cells)), []), {}),
         ("siglay", ["siglay", "node"], DOUBLE, [-0.25] * 9 + [-0.75] * 9, {}),
-        ("h", ["node"], DOUBLE, range(10, 19), {}), ("zeta", ["time", "node"], DOUBLE, [1.0] * 9, {}),
+        ("h", ["node"], DOUBLE, range(10, 19), {}),
+        ("zeta", ["time", "node"], DOUBLE, [1.0] * 9, {}),
         ("u", ["time", "siglay", "nele"], DOUBLE, range(8), {"units": "m s-1"}),
         ("v", ["time", "siglay", "nele"], DOUBLE, range(8), {"units": "m s-1"})])
 

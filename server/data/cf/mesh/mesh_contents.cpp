@@ -68,6 +68,7 @@ class ContentsMaker {
     add_variables();
     add_heights();
     name_mesh_variables(contents_, topology_.convention);
+    out_.cell_dimensions = dimensions_.cells;
     return std::move(out_);
   }
 
@@ -124,19 +125,19 @@ class ContentsMaker {
   Result<void> add_levels() {
     auto levels = levels_of_mesh(file_, topology_);
     if (!levels) return levels.error();
-    if (!*levels) return {};
-    MeshLevels& found = **levels;
-    FileVariable& variable = found.variable;
-    variable.name = contents_.dimensions.at(at(found.dimension)).name;
-    variable.type = "float64";
-    variable.numeric = true;
-    variable.dims = {found.dimension};
-    variable.axis = "Z";
-    replaced_ = variable.name;
-    contents_.variables.push_back(std::move(variable));
-    MeshPart own;
-    own.values = std::move(found.values);
-    out_.parts.push_back(std::move(own));
+    for (MeshLevels& found : *levels) {
+      FileVariable& variable = found.variable;
+      variable.name = contents_.dimensions.at(at(found.dimension)).name;
+      variable.type = "float64";
+      variable.numeric = true;
+      variable.dims = {found.dimension};
+      variable.axis = "Z";
+      replaced_.push_back(variable.name);
+      contents_.variables.push_back(std::move(variable));
+      MeshPart own;
+      own.values = std::move(found.values);
+      out_.parts.push_back(std::move(own));
+    }
     return {};
   }
 
@@ -164,7 +165,8 @@ class ContentsMaker {
     for (std::size_t v = 0; v < all.size(); ++v) {
       const int id = static_cast<int>(v);
       FileVariable variable = all[v];
-      if (variable.name == replaced_ || describes_mesh(id, variable)) {
+      if (std::count(replaced_.begin(), replaced_.end(), variable.name) > 0 ||
+          describes_mesh(id, variable)) {
         if (variable.dims.size() > 1 && variable.numeric) {
           contents_.left_out.push_back({variable.name, "describes the mesh"});
         }
@@ -230,8 +232,8 @@ class ContentsMaker {
   MeshContents out_;
   FileContents& contents_;
   MeshDimensions dimensions_;
-  std::vector<int> parts_of_mesh_;  // variables of the file
-  std::string replaced_;            // a variable in whose place there is another coordinate
+  std::vector<int> parts_of_mesh_;     // variables of the file
+  std::vector<std::string> replaced_;  // variables in whose place there are other coordinates
 };
 
 }  // namespace

@@ -25,8 +25,9 @@ struct MeshPart {
 
 struct MeshContents {
   FileContents contents;
-  std::vector<MeshPart> parts;  // parallel to contents.variables
-  SigmaHeights heights;         // of the part at nodes without a base
+  std::vector<MeshPart> parts;       // parallel to contents.variables
+  SigmaHeights heights;              // of the part at nodes without a base
+  std::vector<int> cell_dimensions;  // dimensions of the file that list the cells
 
   // Where most variables lie.
   [[nodiscard]] MeshLocation most() const;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/data/cf/mesh/centers.hpp"
 #include "server/data/cf/mesh/mesh_contents.hpp"
 #include "server/data/cf/mesh/mesh_grid.hpp"
 #include "server/data/cf/mesh/source_layers.hpp"
@@ -175,6 +176,8 @@ Result<std::unique_ptr<ArrayFile>> meshed(std::unique_ptr<ArrayFile> file) {
   if (!grid) return named(grid.error());
   auto shown = contents_on_lattice(*file, *topology, grid->mesh(), grid->lattice());
   if (!shown) return named(shown.error());
+  const auto fits = check_centers(*file, shown->cell_dimensions, grid->mesh());
+  if (!fits) return named(fits.error());
   for (std::string& note : grid->notes(topology->convention, shown->most())) {
     shown->contents.notes.push_back(std::move(note));
   }

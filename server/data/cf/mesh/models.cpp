@@ -55,7 +55,7 @@ std::vector<double> row_means(const std::vector<double>& values, std::size_t row
   return out;
 }
 
-using FoundLevels = Result<std::optional<MeshLevels>>;
+using FoundLevels = Result<std::vector<MeshLevels>>;
 
 FoundLevels fvcom_levels(const ArrayFile& file, const SigmaHeights& heights) {
   const FileVariable& sigma = file.contents().variables.at(at(heights.sigma));
@@ -68,7 +68,7 @@ FoundLevels fvcom_levels(const ArrayFile& file, const SigmaHeights& heights) {
   out.variable.positive = "up";
   out.variable.units = "1";
   out.values = row_means(*values, file.contents().dimensions.at(at(out.dimension)).length);
-  return std::optional(std::move(out));
+  return std::vector{std::move(out)};
 }
 
 FoundLevels mpas_levels(const ArrayFile& file) {
@@ -77,7 +77,7 @@ FoundLevels mpas_levels(const ArrayFile& file) {
   const bool in_water = variable_named(contents, "layerThickness") >= 0 ||
                         variable_named(contents, "velocityZonal") >= 0 ||
                         variable_named(contents, "refBottomDepth") >= 0;
-  if (levels < 0 || !in_water) return std::optional<MeshLevels>();
+  if (levels < 0 || !in_water) return std::vector<MeshLevels>();
   MeshLevels out;
   out.dimension = levels;
   out.variable.positive = "down";
@@ -94,10 +94,33 @@ FoundLevels mpas_levels(const ArrayFile& file) {
       out.values.push_back((above + bottom) / 2);
       above = bottom;
     }
-    return std::optional(std::move(out));
+    return std::vector{std::move(out)};
   }
   for (std::size_t k = 0; k < count; ++k) out.values.push_back(static_cast<double>(k));
-  return std::optional(std::move(out));
+  return std::vector{std::move(out)};
+}
+
+FoundLevels icon_levels(const ArrayFile& file) {
+  const FileContents& contents = file.contents();
+  std::vector<MeshLevels> out;
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    const FileVariable& variable = contents.variables[v];
+    const bool is_own = variable.numeric && variable.dims.size() == 1 &&
+                        contents.dimensions.at(at(variable.dims[0])).name == variable.name;
+    if (!is_own || variable.long_name != "generalized_height" || !variable.positive.empty()) {
+      continue;
+    }
+    auto values = unpacked_values(file, static_cast<int>(v));
+    if (!values) return values.error();
+    MeshLevels levels;
+    levels.dimension = variable.dims[0];
+    levels.variable.long_name = variable.long_name;
+    levels.variable.positive = "down";
+    levels.variable.units = "level";
+    levels.values = std::move(*values);
+    out.push_back(std::move(levels));
+  }
+  return out;
 }
 
 }  // namespace
@@ -128,11 +151,12 @@ SigmaHeights sigma_heights_of(const FileContents& contents, const Topology& topo
   return out;
 }
 
-Result<std::optional<MeshLevels>> levels_of_mesh(const ArrayFile& file, const Topology& topology) {
+FoundLevels levels_of_mesh(const ArrayFile& file, const Topology& topology) {
   const SigmaHeights heights = sigma_heights_of(file.contents(), topology);
   if (heights.sigma >= 0) return fvcom_levels(file, heights);
   if (topology.convention == "MPAS") return mpas_levels(file);
-  return std::optional<MeshLevels>();
+  if (topology.convention == "CF bounds") return icon_levels(file);
+  return std::vector<MeshLevels>();
 }
 
 }  // namespace windsplat::data::cf

@@ -1,7 +1,6 @@
 // What models on unstructured meshes leave to their documentation: names of velocities and levels.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +21,9 @@ struct MeshLevels {
 };
 
 // FVCOM: the mean of siglay(siglay, node). MPAS-Ocean, whose levels are numbered downward: their
-// depths by refBottomDepth, or their numbers. Errors: bad_data.
-Result<std::optional<MeshLevels>> levels_of_mesh(const ArrayFile& file, const Topology& topology);
+// depths by refBottomDepth, or their numbers. ICON: levels of generalized_height, which are
+// numbered downward but do not say so. Errors: bad_data.
+Result<std::vector<MeshLevels>> levels_of_mesh(const ArrayFile& file, const Topology& topology);
 
 // height = zeta + siglay (h + zeta), in metres above the datum of zeta (FVCOM user manual).
 // Variables of the file; all are absent (-1) unless siglay(siglay, node), h(node) and zeta are

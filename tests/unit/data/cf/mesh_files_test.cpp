@@ -306,6 +306,31 @@ TEST(UgridFiles, NodesWithoutAPositionAreRefused) {
   EXPECT_THAT(refusal(folder / "u.nc"), HasSubstr("node 24 of the mesh has the position 12, 91"));
 }
 
+TEST(UgridFiles, CellsThatDoNotLieAtTheirCentersAreRefused) {
+  const Folder folder;
+  // One cell aside, as with numbers of nodes that start at another index than the file says.
+  for (const double aside : {0.0, 1.0}) {
+    const std::string path = folder / (aside > 0 ? "aside.nc" : "fits.nc");
+    {
+      UgridMaker maker(path);
+      maker.plain_corners();
+      const int x =
+          maker.file.variable("fx", NC_DOUBLE, {maker.face},
+                              at_cells([&](double a, double) { return a + aside - 360; }));
+      const int y = maker.file.variable("fy", NC_DOUBLE, {maker.face},
+                                        at_cells([](double, double b) { return b; }));
+      maker.file.text(x, "units", "degrees_east");
+      maker.file.text(y, "units", "degrees_north");
+      maker.file.variable("t", NC_FLOAT, {maker.face}, at_cells(sum_of));
+    }
+    if (aside > 0) {
+      EXPECT_THAT(refusal(path), HasSubstr("do not lie where 'fx' and 'fy' place them: 24 of 24"));
+    } else {
+      EXPECT_NE(opened(path), nullptr);
+    }
+  }
+}
+
 TEST(UgridFiles, StepsInSeveralFilesShareTheMesh) {
   const Folder folder;
   for (int file = 0; file < 2; ++file) {
@@ -407,7 +432,7 @@ TEST(MeshModels, LevelsOfMpasOceanGoDownward) {
   EXPECT_EQ(source->info().grid.axes[2].coordinates, (Table{55, 20, 5}));
 }
 
-TEST(MeshModels, AGridFileMayNameTheDimensionOfTheCellsOtherwise) {
+TEST(MeshModels, AGridFileMayNameTheCellsOtherwiseAndIconNumbersLevelsFromTheTop) {
   const Folder folder;
   {
     NetcdfMaker file(folder / "grid.nc");
@@ -433,16 +458,21 @@ TEST(MeshModels, AGridFileMayNameTheDimensionOfTheCellsOtherwise) {
   {
     NetcdfMaker file(folder / "data.nc");
     const int cell = file.dimension("ncells", cells);
-    const int level = file.axis("plev", {100000, 50000}, "Pa", "air_pressure");
-    Table values = at_cells(sum_of);
-    const Table again = values;
-    values.insert(values.end(), again.begin(), again.end());
+    // ICON numbers levels from the top.
+    const int level = file.axis("height", {1, 2}, "", "height");
+    file.text(file.variable_id("height"), "long_name", "generalized_height");
+    Table values = at_cells([](double x, double y) { return 100 + sum_of(x, y); });
+    const Table lower = at_cells(sum_of);
+    values.insert(values.end(), lower.begin(), lower.end());
     file.variable("t", NC_FLOAT, {level, cell}, values);
   }
   EXPECT_THAT(refusal(folder / "data.nc"), HasSubstr("unstructured grid"));
   const auto source = opened(folder / "{grid,data}.nc");
   ASSERT_NE(source, nullptr);
-  expect_function(*source, "t", sum_of, 1);
+  EXPECT_EQ(source->info().grid.axes[2].coordinates, (Table{2, 1}));
+  expect_function(*source, "t", sum_of, 1, 0);
+  const auto upper = [](double x, double y) { return 100 + sum_of(x, y); };
+  expect_function(*source, "t", upper, 1, 1);
 }
 
 }  // namespace

@@ -1,0 +1,87 @@
+#include "server/data/cf/mesh/centers.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+
+#include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/grid/cell_lists.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+constexpr std::size_t cells_compared = 10'000;
+
+// Longitudes and latitudes of the entries of a dimension; -1: none.
+std::array<int, 2> centers_on(const FileContents& contents, int dimension) {
+  std::array<int, 2> out{-1, -1};
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    const FileVariable& variable = contents.variables[v];
+    const int side = side_of(variable);
+    if (!variable.numeric || variable.dims != std::vector{dimension} || side == 0) continue;
+    int& own = out.at(side < 0 ? 0 : 1);
+    if (own < 0) own = static_cast<int>(v);
+  }
+  return out;
+}
+
+// Whether a position lies in the box around a cell, enlarged by a quarter on each side. True for
+// cells at a pole, which have no box.
+bool is_near_cell(const Mesh& mesh, std::size_t cell, double longitude, double latitude,
+                  Outline& outline) {
+  if (!outline_of(mesh, cell, outline) || outline.polar) return true;
+  std::array<double, 2> low{std::numeric_limits<double>::infinity(),
+                            std::numeric_limits<double>::infinity()};
+  std::array<double, 2> high{-low[0], -low[1]};
+  for (const PlanePoint& point : outline.points) {
+    for (std::size_t a = 0; a < 2; ++a) {
+      low.at(a) = std::min(low.at(a), point.at(a));
+      high.at(a) = std::max(high.at(a), point.at(a));
+    }
+  }
+  constexpr double sizes_max = 0.75;  // from the middle of the box
+  const double aside = std::remainder(longitude - (low[0] + high[0]) / 2, 360.0);
+  return std::abs(aside) <= sizes_max * (high[0] - low[0]) &&
+         std::abs(latitude - (low[1] + high[1]) / 2) <= sizes_max * (high[1] - low[1]);
+}
+
+}  // namespace
+
+Result<void> check_centers(const ArrayFile& file, const std::vector<int>& dimensions,
+                           const Mesh& mesh) {
+  if (!mesh.on_sphere) return {};
+  const std::size_t stride = std::max<std::size_t>(1, mesh.cells() / cells_compared);
+  Outline outline;
+  for (const int dimension : dimensions) {
+    const auto [x, y] = centers_on(file.contents(), dimension);
+    if (x < 0 || y < 0) continue;
+    const auto longitudes = unpacked_degrees(file, x);
+    if (!longitudes) return longitudes.error();
+    const auto latitudes = unpacked_degrees(file, y);
+    if (!latitudes) return latitudes.error();
+    std::size_t compared = 0;
+    std::size_t apart = 0;
+    std::size_t first = 0;
+    for (std::size_t c = 0; c < mesh.cells(); c += stride) {
+      ++compared;
+      if (is_near_cell(mesh, c, (*longitudes)[c], (*latitudes)[c], outline)) continue;
+      if (apart++ == 0) first = c;
+    }
+    if (apart * 100 <= compared) continue;
+    return make_error(ErrorKind::bad_data,
+                      "the cells of the mesh do not lie where " +
+                          in_quotes(file.contents().variables[at(x)].name) + " and " +
+                          in_quotes(file.contents().variables[at(y)].name) + " place them: " +
+                          std::to_string(apart) + " of " + std::to_string(compared) +
+                          " compared, first cell " + std::to_string(first + 1) +
+                          "; the mesh belongs to other data, or the numbers of its nodes start at "
+                          "another index than the file says");
+  }
+  return {};
+}
+
+}  // namespace windsplat::data::cf
