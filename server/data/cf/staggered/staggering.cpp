@@ -32,7 +32,8 @@ class StaggerFinder {
     by_suffix("_stag");
     by_suffix("P1");
     by_roms_names();
-    by_numbered_levels();
+    by_generalized_heights();
+    by_counted_levels();
     if (auto done = by_coordinates(); !done) return done.error();
     forget_chains();
     return std::move(found_);
@@ -142,25 +143,28 @@ class StaggerFinder {
     add_between(dimension_named(contents_, "s_w"), dimension_named(contents_, "s_rho"));
   }
 
-  // Whether a dimension has no coordinates in a unit: its levels are counted.
-  [[nodiscard]] bool is_numbered(int dimension) const {
-    const int coordinate = variable_named(contents_, contents_.dimensions.at(at(dimension)).name);
-    if (coordinate < 0) return true;
-    const std::string& units = contents_.variables[at(coordinate)].units;
-    return units.empty() || units == "1";
-  }
+  // ICON: full levels 1 to n, and half levels 1 to n + 1, which surround them.
+  void by_generalized_heights() {
+    std::vector<int> levels;
+    for (std::size_t d = 0; d < found_.size(); ++d) {
+      const int v = variable_named(contents_, contents_.dimensions[d].name);
+      if (v >= 0 && contents_.variables[at(v)].long_name == "generalized_height") {
+        levels.push_back(static_cast<int>(d));
+      }
+    }
+    for (const int faces : levels) {
+      for (const int centers : levels) {
+        if (length(faces) == length(centers) + 1) add(faces, centers, false, 0);
 
-  // Levels without heights, one more of which a velocity has: level1 of COSMO beside level,
-  // height_2 of ICON beside height.
-  void by_numbered_levels() {
-    constexpr auto names = std::to_array<std::pair<const char*, const char*>>(
-        {{"level1", "level"}, {"height_2", "height"}});
-    for (const auto& [faces_name, centers_name] : names) {
-      const int faces = dimension_named(contents_, faces_name);
-      const int centers = dimension_named(contents_, centers_name);
-      if (faces < 0 || centers < 0 || length(faces) != length(centers) + 1) continue;
-      if (is_numbered(faces) && is_numbered(centers) && has_velocity(faces)) {
-        add(faces, centers, false, 0);
+  // COSMO: level, and level1 with one more, both without coordinates.
+  void by_counted_levels() {
+    const int faces = dimension_named(contents_, "level1");
+    const int centers = dimension_named(contents_, "level");
+    const bool counted =
+        variable_named(contents_, "level1") < 0 && variable_named(contents_, "level") < 0;
+    if (faces < 0 || centers < 0 || !counted || !has_velocity(faces)) return;
+    if (length(faces) == length(centers) + 1) add(faces, centers, false, 0);
+  }
       }
     }
   }

@@ -465,6 +465,11 @@ TEST(MeshModels, AGridFileMayNameTheCellsOtherwiseAndIconNumbersLevelsFromTheTop
     const Table lower = at_cells(sum_of);
     values.insert(values.end(), lower.begin(), lower.end());
     file.variable("t", NC_FLOAT, {level, cell}, values);
+    const int half = file.axis("height_2", {1, 2, 3}, "", "height");
+    file.text(file.variable_id("height_2"), "long_name", "generalized_height");
+    Table w;
+    for (const double value : {1.0, 3.0, 7.0}) w.insert(w.end(), cells, value);
+    file.variable("w", NC_FLOAT, {half, cell}, w);
   }
   EXPECT_THAT(refusal(folder / "data.nc"), HasSubstr("unstructured grid"));
   const auto source = opened(folder / "{grid,data}.nc");
@@ -473,6 +478,10 @@ TEST(MeshModels, AGridFileMayNameTheCellsOtherwiseAndIconNumbersLevelsFromTheTop
   expect_function(*source, "t", sum_of, 1, 0);
   const auto upper = [](double x, double y) { return 100 + sum_of(x, y); };
   expect_function(*source, "t", upper, 1, 1);
+  expect_function(
+      *source, "w", [](double, double) { return 5; }, 0, 0);
+  expect_function(
+      *source, "w", [](double, double) { return 2; }, 0, 1);
 }
 
 }  // namespace
