@@ -172,15 +172,12 @@ void turn_longitudes(Mesh& mesh, double base) {
   }
 }
 
-void set_spacing(const Survey& survey, std::size_t cells, double shrink, MeshLattice& out) {
+void set_spacing(const Survey& survey, std::size_t samples_max, double shrink, MeshLattice& out) {
   const double within = survey.area * shrink;  // in squares of units of y
   double spacing = out.median_size / std::numbers::sqrt2;
   spacing = std::min(spacing, std::sqrt(within / samples_within_min));
   const double whole = (survey.x.high - survey.x.low) * shrink * (survey.y.high - survey.y.low);
-  const double most =
-      std::max(static_cast<double>(samples_per_cell_max) * static_cast<double>(cells),
-               static_cast<double>(samples_of_small_mesh));
-  const double least_spacing = std::sqrt(whole / most);
+  const double least_spacing = std::sqrt(whole / static_cast<double>(samples_max));
   out.is_coarse = spacing < least_spacing;
   spacing = std::max(spacing, least_spacing);
   out.x = axis_over(survey.x.low, survey.x.high, spacing / shrink);
@@ -189,7 +186,7 @@ void set_spacing(const Survey& survey, std::size_t cells, double shrink, MeshLat
 
 }  // namespace
 
-Result<MeshLattice> lattice_of(Mesh& mesh) {
+Result<MeshLattice> lattice_of(Mesh& mesh, std::size_t samples_max) {
   Survey survey = survey_of(mesh);
   MeshLattice out;
   out.no_area = survey.no_area;
@@ -220,7 +217,9 @@ Result<MeshLattice> lattice_of(Mesh& mesh) {
   const auto middle = survey.sizes.begin() + static_cast<std::ptrdiff_t>(survey.sizes.size() / 2);
   std::nth_element(survey.sizes.begin(), middle, survey.sizes.end());
   out.median_size = static_cast<double>(*middle);
-  set_spacing(survey, survey.sizes.size(), shrink, out);
+  const std::size_t most =
+      std::max(samples_per_cell_max * survey.sizes.size(), samples_of_small_mesh);
+  set_spacing(survey, std::min(most, samples_max), shrink, out);
   return out;
 }
 

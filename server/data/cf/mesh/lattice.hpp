@@ -41,10 +41,11 @@ inline constexpr std::size_t samples_of_small_mesh = 65536;
 // The lattice covers the mesh with a spacing of the median cell size divided by the square root of
 // two, so that cells of that size contain two samples; in degrees of longitude divided by the
 // cosine of the latitude nearest to the equator. Smaller for meshes of few cells, so that 1024
-// samples lie within, and larger if there were more than samples_per_cell_max for a cell. On the
+// samples lie within, and larger if there were more than samples_per_cell_max for a cell, or than
+// samples_max. On the
 // sphere the lattice closes a circle unless a meridian crosses no cell, and the longitudes of the
 // mesh are turned to lie on it. Errors: bad_data if no cell has an area.
-Result<MeshLattice> lattice_of(Mesh& mesh);
+Result<MeshLattice> lattice_of(Mesh& mesh, std::size_t samples_max);
 
 struct CellsOfSamples {
   std::vector<std::uint32_t> cells;  // x fastest; no_mesh_cell: outside of all

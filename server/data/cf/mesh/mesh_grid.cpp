@@ -21,10 +21,10 @@ std::string percent(double part) { return three_digits(100 * part) + " %"; }
 
 }  // namespace
 
-Result<MeshGrid> MeshGrid::of(Mesh mesh) {
+Result<MeshGrid> MeshGrid::of(Mesh mesh, std::size_t samples_max) {
   MeshGrid out;
   out.mesh_ = std::make_unique<Mesh>(std::move(mesh));
-  auto lattice = lattice_of(*out.mesh_);
+  auto lattice = lattice_of(*out.mesh_, samples_max);
   if (!lattice) return lattice.error();
   out.lattice_ = *lattice;
   auto cells = find_cells(*out.mesh_, out.lattice_);
@@ -58,8 +58,9 @@ std::vector<std::string> MeshGrid::notes(const std::string& convention, MeshLoca
   }
   out.push_back(std::move(text));
   if (lattice_.is_coarse) {
-    out.push_back("the lattice is coarser than half of the cells: more than " +
-                  std::to_string(samples_per_cell_max) + " samples for a cell would be needed");
+    out.push_back("the lattice is coarser than half of the cells: it may not have more than " +
+                  std::to_string(samples_per_cell_max) +
+                  " samples for a cell, nor more than suit the size of the file");
   }
   if (lattice_.no_area > 0) {
     out.push_back("cells of the mesh without area are left out: " +

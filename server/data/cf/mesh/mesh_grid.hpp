@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,8 +18,11 @@ namespace windsplat::data::cf {
 
 class MeshGrid {
  public:
-  // Errors: bad_data, from lattice_of() and find_cells().
-  static Result<MeshGrid> of(Mesh mesh);
+  // Memory for a sample: its cell, its place and weights, and values of two layers.
+  static constexpr std::size_t bytes_of_sample = sizeof(std::uint32_t) + sizeof(SamplePlace) + 8;
+
+  // samples_max: of the lattice. Errors: bad_data, from lattice_of() and find_cells().
+  static Result<MeshGrid> of(Mesh mesh, std::size_t samples_max);
 
   [[nodiscard]] const Mesh& mesh() const { return *mesh_; }
   [[nodiscard]] const MeshLattice& lattice() const { return lattice_; }

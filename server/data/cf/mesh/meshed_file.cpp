@@ -3,12 +3,16 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "server/data/bytes/decode_limits.hpp"
+#include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/mesh/centers.hpp"
 #include "server/data/cf/mesh/mesh_contents.hpp"
 #include "server/data/cf/mesh/mesh_grid.hpp"
@@ -162,6 +166,14 @@ class MeshedFile final : public ArrayFile {
   mutable std::vector<float> computed_;
 };
 
+// Samples of a lattice that take a quarter of the memory for opening files of so many bytes.
+std::size_t samples_for(const std::optional<std::uint64_t>& stored_bytes) {
+  if (!stored_bytes) return samples_max;
+  return std::max(samples_of_small_mesh,
+                  static_cast<std::size_t>(opening_memory_bytes(*stored_bytes) / 4 /
+                                           MeshGrid::bytes_of_sample));
+}
+
 }  // namespace
 
 Result<std::unique_ptr<ArrayFile>> meshed(std::unique_ptr<ArrayFile> file) {
@@ -172,7 +184,7 @@ Result<std::unique_ptr<ArrayFile>> meshed(std::unique_ptr<ArrayFile> file) {
   };
   auto mesh = read_mesh(*file, *topology);
   if (!mesh) return named(mesh.error());
-  auto grid = MeshGrid::of(std::move(*mesh));
+  auto grid = MeshGrid::of(std::move(*mesh), samples_for(file->stored_bytes()));
   if (!grid) return named(grid.error());
   auto shown = contents_on_lattice(*file, *topology, grid->mesh(), grid->lattice());
   if (!shown) return named(shown.error());

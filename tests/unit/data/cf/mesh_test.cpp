@@ -22,6 +22,8 @@
 namespace windsplat::data::cf {
 namespace {
 
+constexpr std::size_t many = std::size_t{1} << 31;  // samples
+
 using Function = std::function<double(double, double)>;
 
 void add_polygon(Mesh& mesh, const std::vector<std::uint32_t>& nodes) {
@@ -112,7 +114,7 @@ struct Resampled {
 
 Resampled located(Mesh mesh) {
   Resampled out{std::move(mesh), {}, {}, {}};
-  auto lattice = lattice_of(out.mesh);
+  auto lattice = lattice_of(out.mesh, many);
   EXPECT_TRUE(lattice);
   out.lattice = *lattice;
   auto cells = find_cells(out.mesh, out.lattice);
@@ -196,6 +198,15 @@ TEST(MeshLattice, SmallCellsAreLimitedToSixteenSamplesForACell) {
   EXPECT_LT(on.cells.hit, on.mesh.cells() / 10);
 }
 
+TEST(MeshLattice, ItHasNoMoreSamplesThanAllowed) {
+  Mesh mesh = mixed_square(60, 0.2);
+  const auto lattice = lattice_of(mesh, 2000);
+  ASSERT_TRUE(lattice);
+  EXPECT_TRUE(lattice->is_coarse);
+  EXPECT_GT(lattice->samples(), 1900U);
+  EXPECT_LT(lattice->samples(), 2100U);  // whole rows and columns
+}
+
 TEST(MeshLattice, SamplesOnEdgesAndNodesBelongToOneCell) {
   // Rows and columns of the lattice lie on the edges.
   const Mesh mesh = mixed_square(8, 0);
@@ -254,7 +265,7 @@ TEST(MeshLattice, CellsThatOverlapWithoutBoundAreRefused) {
   mesh.y = {0, 0, 1, 1, 0, 0.001};
   for (int n = 0; n < 10000; ++n) add_polygon(mesh, {0, 4, 5});
   for (int n = 0; n < 9000; ++n) add_polygon(mesh, {0, 1, 2, 3});
-  auto lattice = lattice_of(mesh);
+  auto lattice = lattice_of(mesh, many);
   ASSERT_TRUE(lattice);
   const auto cells = find_cells(mesh, *lattice);
   ASSERT_FALSE(cells);
