@@ -121,7 +121,7 @@ def files(program):
         (folder / "made").mkdir()
         every = [*seeds.nrrd_seeds(), *seeds.raw_seeds(), *seeds.grads_seeds(), *seeds.dx_seeds(),
                  *seeds.zarr_seeds(), *seeds_vtk.vtk_seeds(), *seeds.hdf5_seeds(),
-                 *seeds.grib_seeds(folder / "made")]
+                 *seeds.mesh_seeds(), *seeds.grib_seeds(folder / "made")]
         if program:
             every += seeds.netcdf_seeds(program, folder)
     for i, seed in enumerate(every):
