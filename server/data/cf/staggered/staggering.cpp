@@ -155,6 +155,9 @@ class StaggerFinder {
     for (const int faces : levels) {
       for (const int centers : levels) {
         if (length(faces) == length(centers) + 1) add(faces, centers, false, 0);
+      }
+    }
+  }
 
   // COSMO: level, and level1 with one more, both without coordinates.
   void by_counted_levels() {
@@ -164,9 +167,6 @@ class StaggerFinder {
         variable_named(contents_, "level1") < 0 && variable_named(contents_, "level") < 0;
     if (faces < 0 || centers < 0 || !counted || !has_velocity(faces)) return;
     if (length(faces) == length(centers) + 1) add(faces, centers, false, 0);
-  }
-      }
-    }
   }
 
   // How many variables of two or more dimensions run along a dimension.
