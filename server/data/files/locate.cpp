@@ -20,8 +20,11 @@ namespace {
 namespace fs = std::filesystem;
 
 // Extensions of formats whose headers name companion files.
-constexpr auto with_companions = std::to_array<std::string_view>(
-    {".pvd", ".pvti", ".pvtr", ".pvts", ".pvtu", ".ctl", ".json", ".nhdr", ".dx"});
+constexpr auto with_companions =
+    std::to_array<std::string_view>({".pvd", ".ctl", ".json", ".nhdr", ".dx", ".pvti", ".pvtr",
+                                     ".pvts", ".pvtu", ".vtm", ".vtmb", ".vtpd", ".vtpc"});
+// Of these, those of a single step, of which a pattern makes a series.
+constexpr std::size_t first_of_a_step = 5;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -74,6 +77,12 @@ bool may_have_companions(const std::string& name) {
   return std::find(with_companions.begin(), with_companions.end(), ending) != with_companions.end();
 }
 
+bool steps_may_have_companions(const std::string& pattern) {
+  const std::string ending = lower(fs::path(pattern).extension().native());
+  return std::find(with_companions.begin() + first_of_a_step, with_companions.end(), ending) !=
+         with_companions.end();
+}
+
 namespace {
 
 Error not_reached(const std::string& path, const std::error_code& fault) {
@@ -95,6 +104,7 @@ Result<Location> locate_series(const std::string& pattern) {
   out.folder = folder.native();
   out.stem = stem_of_pattern(name);
   out.pattern = (folder / name).native();
+  out.companions = steps_may_have_companions(name);
   const std::vector<std::string> alternatives = alternatives_of(name);
   for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault)) {
     const std::string found = at->path().filename().native();

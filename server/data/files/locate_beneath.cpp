@@ -138,6 +138,7 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
   out.stem = stem_of_pattern(pattern);
   out.pattern = path;
   out.root = root_path;
+  out.companions = steps_may_have_companions(pattern);
   std::size_t left_out = 0;
   for (const std::string& name : *names) {
     const std::string below = (fs::path(folder) / name).native();

@@ -18,6 +18,8 @@ bool comes_before(std::string_view a, std::string_view b);
 std::string stem_of_pattern(const std::string& pattern);
 // Whether the file name belongs to a format whose header names companion files.
 bool may_have_companions(const std::string& name);
+// The same for the files of a series, each of which is a step: those of VTK.
+bool steps_may_have_companions(const std::string& pattern);
 // A note on the links that match the pattern of a series but are omitted: how many and why. Empty
 // if there are none.
 std::string links_left_out(const Location& series);

@@ -1,6 +1,7 @@
 // Detects formats by content, whatever the file name, and calls the reader of the format.
 #include "server/data/open/open.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <exception>
@@ -169,17 +170,43 @@ ArraysResult open_series(const std::shared_ptr<Files>& files) {
   return cf::collocated(std::move(*joined));
 }
 
+// Cases of OpenFOAM and EnSight are refused with advice: the errors of other formats would not say
+// what they are.
+Result<void> not_a_case(Files& files, const Result<std::string>& head) {
+  const Location& location = files.location();
+  const std::string name = location.members.empty() ? location.stem : location.members.front().name;
+  const bool is_folder = location.kind == Location::Kind::folder;
+  const std::string ending = lower(name.substr(std::min(name.size(), name.find_last_of('.'))));
+  const bool foam =
+      (is_folder && files.exists("system/controlDict")) || ending == ".foam" ||
+      ending == ".openfoam" ||
+      (head && head->find("FoamFile") != std::string::npos && head->find('{') != std::string::npos);
+  if (foam) {
+    return make_error(ErrorKind::bad_data,
+                      in_quotes(name) +
+                          " belongs to an OpenFOAM case, which is not read; convert the case with "
+                          "foamToVTK and open its .vtm or .vtk files");
+  }
+  if (head && head->starts_with("FORMAT") && lower(*head).find("ensight") != std::string::npos) {
+    return make_error(ErrorKind::bad_data,
+                      in_quotes(name) +
+                          " is an EnSight case, which is not read; convert it to VTK files, for "
+                          "example .pvd or .vtm with ParaView");
+  }
+  return {};
+}
+
 SourceResult open_by_content(const std::shared_ptr<Files>& files) {
   const auto head = first_bytes(*files);
+  if (auto fine = not_a_case(*files, head); !fine) return fine.error();
   if (!head) return head.error();
-  if (vtk::is_vtk(*head)) {
+  if (vtk::is_vtk(*head) || (head->starts_with("\x89HDF") && vtk::is_vtkhdf(*files))) {
     const std::string& name = files->location().members.front().name;
     if (!files->location().selection.empty()) {
       return make_error(ErrorKind::not_found,
                         in_quotes(name) + " has a format without dimensions to choose from");
     }
-    const auto plain = without_group(*files, name);
-    return plain ? vtk::open(files) : SourceResult(plain.error());
+    return vtk::open(files);  // a block may follow '#/'
   }
   if (zarr::is_store(*files)) return source_of(*files, as_arrays(*files, zarr::Store::open(files)));
   if (files->location().kind == Location::Kind::folder) {

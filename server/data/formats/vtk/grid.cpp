@@ -45,15 +45,15 @@ Result<RegularGrid> image_grid(const InputFile& file, const Snapshot& snapshot) 
   for (std::size_t a = 0; a < 3; ++a) {
     std::size_t world = 0;
     for (std::size_t w = 1; w < 3; ++w) {
-      if (std::abs(snapshot.direction.at(3 * w + a)) >
-          std::abs(snapshot.direction.at(3 * world + a))) {
+      if (std::abs(snapshot.place.direction.at(3 * w + a)) >
+          std::abs(snapshot.place.direction.at(3 * world + a))) {
         world = w;
       }
     }
-    const double along = snapshot.direction.at(3 * world + a);
+    const double along = snapshot.place.direction.at(3 * world + a);
     for (std::size_t w = 0; w < 3; ++w) {
       const double wanted = w == world ? 1.0 : 0.0;
-      if (!(std::abs(std::abs(snapshot.direction.at(3 * w + a)) - wanted) < 1e-6) ||
+      if (!(std::abs(std::abs(snapshot.place.direction.at(3 * w + a)) - wanted) < 1e-6) ||
           taken.at(world)) {
         return file.fault(
             "has a Direction whose axes are not those of x, y and z, which is not "
@@ -62,10 +62,10 @@ Result<RegularGrid> image_grid(const InputFile& file, const Snapshot& snapshot) 
     }
     taken.at(world) = true;
     grid.world[a] = world;
-    const double step = snapshot.spacing[a] * (along < 0 ? -1.0 : 1.0);
+    const double step = snapshot.place.spacing[a] * (along < 0 ? -1.0 : 1.0);
     // Index 0 is at the origin even if the extent begins at another index; axes are independent.
     for (std::int64_t i = 0; i < counts[a]; ++i) {
-      by_index[a].push_back(snapshot.origin.at(world) +
+      by_index[a].push_back(snapshot.place.origin.at(world) +
                             step * static_cast<double>(snapshot.whole.first[a] + i));
     }
   }
@@ -75,8 +75,20 @@ Result<RegularGrid> image_grid(const InputFile& file, const Snapshot& snapshot) 
   return grid;
 }
 
-Result<RegularGrid> rectilinear_grid(const std::shared_ptr<const InputFile>& file,
-                                     const Snapshot& snapshot) {
+// Writes the coordinates of a piece; false if they differ from those of another piece.
+bool place_coordinates(const std::vector<double>& values, std::size_t first,
+                       std::vector<double>& out) {
+  const double extent = values.size() > 1 ? values.back() - values.front() : values.front();
+  const double tolerance = 1e-6 * std::abs(extent);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    double& at = out[first + i];
+    if (std::isfinite(at) && std::abs(at - values[i]) > tolerance) return false;
+    if (!std::isfinite(at)) at = values[i];
+  }
+  return true;
+}
+
+Result<RegularGrid> rectilinear_grid(Files& files, const Snapshot& snapshot) {
   RegularGrid grid;
   Coordinates by_index;
   const auto counts = snapshot.whole.points();
@@ -84,24 +96,28 @@ Result<RegularGrid> rectilinear_grid(const std::shared_ptr<const InputFile>& fil
     auto& out = by_index[a];
     out.assign(static_cast<std::size_t>(counts[a]), std::numeric_limits<double>::quiet_NaN());
     for (const Piece& piece : snapshot.pieces) {
-      const auto values = read_all(file, piece.coordinates.at(a));
+      const auto file = piece.file.open(files);
+      if (!file) return file.error();
+      const auto values = read_all(*file, piece.coordinates.at(a));
       if (!values) return values.error();
-      std::copy(values->begin(), values->end(),
-                out.begin() + (piece.extent.first[a] - snapshot.whole.first[a]));
+      const auto first = static_cast<std::size_t>(piece.extent.first[a] - snapshot.whole.first[a]);
+      if (!place_coordinates(*values, first, out)) {
+        return (*file)->fault("has coordinates that differ from those of another piece");
+      }
     }
   }
   if (!orient(std::move(by_index), grid)) {
-    return file->fault("has coordinates that are missing, not finite or not strictly monotonic");
+    return snapshot.file->fault(
+        "has coordinates that are missing, not finite or not strictly monotonic");
   }
   return grid;
 }
 
 }  // namespace
 
-Result<RegularGrid> regular_grid(const std::shared_ptr<const InputFile>& file,
-                                 const Snapshot& snapshot) {
-  return snapshot.kind == Kind::image ? image_grid(*file, snapshot)
-                                      : rectilinear_grid(file, snapshot);
+Result<RegularGrid> regular_grid(Files& files, const Snapshot& snapshot) {
+  return snapshot.kind == Kind::image ? image_grid(*snapshot.file, snapshot)
+                                      : rectilinear_grid(files, snapshot);
 }
 
 std::optional<RegularGrid> separable_grid(const std::vector<double>& points,

@@ -23,9 +23,8 @@ struct RegularGrid {
 };
 
 // The grid of an image or a rectilinear grid. Errors: bad_data, including an image whose axes are
-// not parallel to those of the world.
-Result<RegularGrid> regular_grid(const std::shared_ptr<const InputFile>& file,
-                                 const Snapshot& snapshot);
+// not parallel to those of the world, and pieces whose coordinates differ.
+Result<RegularGrid> regular_grid(Files& files, const Snapshot& snapshot);
 
 // The grid of a structured grid (points: x y z of each, i fastest) whose x, y and z depend on one
 // index each; nullopt if it is curved or sheared. counts: points along i, j, k.

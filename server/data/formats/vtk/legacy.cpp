@@ -32,7 +32,7 @@ class Reader {
     }
     if (!has_dataset_) return file_->fault("has no DATASET");
     out_.pieces.push_back(std::move(piece_));
-    if (auto done = check_snapshot(file_, out_); !done) return done.error();
+    if (auto done = check_snapshot(file_, out_, Part::whole); !done) return done.error();
     return std::move(out_);
   }
 
@@ -133,8 +133,8 @@ class Reader {
       piece_.extent = out_.whole;
       return {};
     }
-    if (key == "origin") return numbers(out_.origin);
-    if (key == "spacing" || key == "aspect_ratio") return numbers(out_.spacing);
+    if (key == "origin") return numbers(out_.place.origin);
+    if (key == "spacing" || key == "aspect_ratio") return numbers(out_.place.spacing);
     if (key == "points") return read_points();
     if (key == "x_coordinates") return read_coordinates(0);
     if (key == "y_coordinates") return read_coordinates(1);

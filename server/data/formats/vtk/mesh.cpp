@@ -92,16 +92,46 @@ class Counts {
   std::size_t used_ = 0;
 };
 
-const StoredArray* ghosts_of(const std::vector<StoredArray>& arrays) {
-  const auto at = std::find_if(arrays.begin(), arrays.end(), [](const StoredArray& a) {
-    return a.name == ghost_name && a.components == 1;
-  });
-  return at == arrays.end() ? nullptr : &*at;
+// The points of an image or a rectilinear grid: x y z of each, i fastest.
+Result<std::vector<double>> lattice_points(const FilePtr& file, const Piece& piece) {
+  const auto counts = piece.extent.points();
+  std::array<std::vector<double>, 3> axes;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (piece.kind == Kind::rectilinear) {
+      auto values = read_all(file, piece.coordinates.at(a));
+      if (!values) return values.error();
+      axes[a] = std::move(*values);
+      continue;
+    }
+    for (std::int64_t i = 0; i < counts[a]; ++i) {
+      axes[a].push_back(piece.place.spacing[a] * static_cast<double>(piece.extent.first[a] + i));
+    }
+  }
+  const bool is_image = piece.kind == Kind::image;
+  std::vector<double> points;
+  points.reserve(static_cast<std::size_t>(piece.points) * 3);
+  for (const double z : axes[2]) {
+    for (const double y : axes[1]) {
+      for (const double x : axes[0]) {
+        if (!is_image) {
+          points.insert(points.end(), {x, y, z});
+          continue;
+        }
+        const auto& d = piece.place.direction;
+        for (std::size_t w = 0; w < 3; ++w) {
+          points.push_back(piece.place.origin[w] + d.at(3 * w) * x + d.at(3 * w + 1) * y +
+                           d.at(3 * w + 2) * z);
+        }
+      }
+    }
+  }
+  return points;
 }
 
 // The points of a piece; hidden ones are NaN.
 Result<std::vector<double>> read_points(const FilePtr& file, const Piece& piece) {
-  auto points = read_all(file, piece.coordinates.front());
+  const bool listed = piece.kind == Kind::structured || piece.kind == Kind::unstructured;
+  auto points = listed ? read_all(file, piece.coordinates.front()) : lattice_points(file, piece);
   if (!points) return points.error();
   const auto ghosts = read_ghosts(file, piece.point_data);
   if (!ghosts) return ghosts.error();
@@ -111,8 +141,11 @@ Result<std::vector<double>> read_points(const FilePtr& file, const Piece& piece)
   return points;
 }
 
-Result<void> read_structured_piece(const FilePtr& file, const Snapshot& snapshot,
-                                   const Piece& piece, Mesh& mesh) {
+Result<void> read_structured_piece(Files& files, const Snapshot& snapshot, const Piece& piece,
+                                   Mesh& mesh) {
+  const auto opened = piece.file.open(files);
+  if (!opened) return opened.error();
+  const FilePtr& file = *opened;
   const auto points = read_points(file, piece);
   if (!points) return points.error();
   const auto all = snapshot.whole.points();
@@ -142,10 +175,12 @@ Result<void> read_structured_piece(const FilePtr& file, const Snapshot& snapshot
 // The cells of one piece, whose points begin at `base`.
 class PieceCells {
  public:
-  PieceCells(FilePtr file, const Piece& piece, std::uint64_t base, Mesh& mesh)
+  // masked: the bits of ghosts that hide a cell.
+  PieceCells(FilePtr file, const Piece& piece, std::uint64_t base, unsigned masked, Mesh& mesh)
       : file_(std::move(file)),
         piece_(piece),
         base_(base),
+        masked_(masked),
         mesh_(mesh),
         connectivity_(*piece.connectivity) {}
 
@@ -170,7 +205,7 @@ class PieceCells {
         if (*size < end) return file_->fault("is malformed: the offsets of its cells decrease");
         *size -= std::exchange(end, *size);
       }
-      const bool hidden = c < ghosts->size() && has_bit((*ghosts)[c], hidden_cell | refined_cell);
+      const bool hidden = c < ghosts->size() && has_bit((*ghosts)[c], masked_);
       if (auto done =
               add(static_cast<int>(std::min<std::uint64_t>(*type, 255)), *size, hidden, indices);
           !done) {
@@ -186,7 +221,12 @@ class PieceCells {
     StoredArray array = *piece_.offsets;
     offsets.emplace(file_, array);
     if (auto done = offsets->open(); !done) return done;
-    if (piece_.offsets_from_zero) return offsets->skip(1);
+    if (piece_.offsets_from_zero) {
+      const auto begin = offsets->next();
+      if (!begin) return begin.error();
+      if (*begin == 0) return {};
+      return file_->fault("is malformed: the offsets of its cells do not begin with 0");
+    }
     std::uint64_t last = 0;
     for (std::uint64_t c = 0; c < piece_.cells; ++c) {
       const auto value = offsets->next();
@@ -234,17 +274,49 @@ class PieceCells {
   FilePtr file_;
   const Piece& piece_;
   std::uint64_t base_;
+  unsigned masked_;
   Mesh& mesh_;
   StoredArray connectivity_;
 };
 
+// Appends the cells of a structured piece, whose points begin at `base`.
+Result<void> add_structured_cells(const FilePtr& file, const Piece& piece, std::uint64_t base,
+                                  unsigned masked, Mesh& mesh) {
+  const auto ghosts = read_ghosts(file, piece.cell_data);
+  if (!ghosts) return ghosts.error();
+  Mesh own;
+  own.counts = piece.extent.points();
+  std::array<std::uint32_t, 8> corners{};
+  for (std::uint64_t c = 0; c < piece.cells; ++c) {
+    const bool hidden = c < ghosts->size() && has_bit((*ghosts)[c], masked);
+    const Shape shape = hidden ? Shape::none : own.cell(c, corners);
+    const auto size = static_cast<std::size_t>(corners_of(shape));
+    mesh.first.push_back(static_cast<std::uint32_t>(mesh.corners.size()));
+    mesh.shapes.push_back(shape);
+    if (mesh.corners.size() + size > std::numeric_limits<std::uint32_t>::max()) {
+      return file->fault("has cells with more than 2^32 corners");
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      mesh.corners.push_back(static_cast<std::uint32_t>(base + corners.at(i)));
+    }
+  }
+  return {};
+}
+
 }  // namespace
+
+Shape shape_of_type(int type) { return cell_type(type).shape; }
 
 Result<std::vector<double>> read_ghosts(const FilePtr& file,
                                         const std::vector<StoredArray>& arrays) {
-  const StoredArray* array = ghosts_of(arrays);
-  return array == nullptr ? Result<std::vector<double>>(std::vector<double>())
-                          : read_all(file, *array);
+  const StoredArray* array = find_array(arrays, ghost_name);
+  const bool levels = array == nullptr;
+  if (levels) array = find_array(arrays, ghost_levels_name);
+  if (array == nullptr || array->components != 1) return std::vector<double>();
+  auto values = read_all(file, *array);
+  if (!values || !levels) return values;
+  for (double& value : *values) value = value > 0 ? duplicate : 0;
+  return values;
 }
 
 bool has_bit(double ghost, unsigned bits) {
@@ -293,7 +365,7 @@ void Mesh::forget_points() {
   points.shrink_to_fit();
 }
 
-Result<Mesh> read_mesh(const FilePtr& file, const Snapshot& snapshot) {
+Result<Mesh> read_mesh(Files& files, const Snapshot& snapshot) {
   Mesh mesh;
   if (snapshot.kind == Kind::structured) {
     mesh.counts = snapshot.whole.points();
@@ -301,23 +373,31 @@ Result<Mesh> read_mesh(const FilePtr& file, const Snapshot& snapshot) {
     for (const std::int64_t n : mesh.counts) mesh.points_read *= static_cast<std::uint64_t>(n);
     mesh.points.assign(static_cast<std::size_t>(mesh.points_read) * 3, missing);
     for (const Piece& piece : snapshot.pieces) {
-      if (auto done = read_structured_piece(file, snapshot, piece, mesh); !done) {
+      if (auto done = read_structured_piece(files, snapshot, piece, mesh); !done) {
         return done.error();
       }
     }
     return mesh;
   }
+  // A file of one piece shows the cells that it repeats from others, which are not here.
+  const unsigned masked =
+      hidden_cell | refined_cell | (snapshot.pieces.size() > 1 ? duplicate : 0U);
   for (const Piece& piece : snapshot.pieces) {
+    const auto file = piece.file.open(files);
+    if (!file) return file.error();
     const std::uint64_t base = mesh.points_read;
-    const auto points = read_points(file, piece);
+    const auto points = read_points(*file, piece);
     if (!points) return points.error();
     mesh.points.insert(mesh.points.end(), points->begin(), points->end());
     mesh.points_read += piece.points;
     if (mesh.points_read > cf::samples_max) {
-      return file->fault("has more than " + std::to_string(cf::samples_max) + " points");
+      return (*file)->fault("has more than " + std::to_string(cf::samples_max) + " points");
     }
     if (piece.cells == 0) continue;
-    if (auto done = PieceCells(file, piece, base, mesh).read(); !done) return done.error();
+    auto done = piece.kind == Kind::unstructured
+                    ? PieceCells(*file, piece, base, masked, mesh).read()
+                    : add_structured_cells(*file, piece, base, masked, mesh);
+    if (!done) return done.error();
   }
   return mesh;
 }

@@ -1,4 +1,4 @@
-// Points and cells of structured and unstructured grids, in memory. Snapshot -> checked indices.
+// Points and cells of grids of any kind, in memory. Snapshot -> checked indices.
 #pragma once
 
 #include <algorithm>
@@ -36,13 +36,16 @@ struct Mesh {
   std::uint64_t points_read = 0;
 };
 
+// The shape of a cell type of VTK; Shape::none if it is not supported.
+Shape shape_of_type(int type);
+
 // Errors: bad_data.
-Result<Mesh> read_mesh(const std::shared_ptr<const InputFile>& file, const Snapshot& snapshot);
+Result<Mesh> read_mesh(Files& files, const Snapshot& snapshot);
 
 // A digest of points and cells; call it before forget_points().
 std::string digest_of_mesh(const Mesh& mesh);
 
-// The ghost array of the point or cell data of a piece; empty if absent.
+// The ghost array of the point or cell data of a piece, as values of vtkGhostType; empty if absent.
 Result<std::vector<double>> read_ghosts(const std::shared_ptr<const InputFile>& file,
                                         const std::vector<StoredArray>& arrays);
 // Whether a value of the ghost array has any of these bits.

@@ -15,13 +15,31 @@ struct Target {
   std::ptrdiff_t origin = 0;
   std::array<std::ptrdiff_t, 3> along{};
   std::array<std::int64_t, 3> counts{};
+};
 
-  [[nodiscard]] std::size_t at(std::uint64_t tuple) const {
-    const auto t = static_cast<std::int64_t>(tuple);
-    return static_cast<std::size_t>(origin + t % counts[0] * along[0] +
-                                    t / counts[0] % counts[1] * along[1] +
-                                    t / (counts[0] * counts[1]) * along[2]);
+// The sample indices of the tuples one after the other.
+class TargetWalk {
+ public:
+  explicit TargetWalk(const Target& target) : target_(target), at_(target.origin) {}
+
+  std::size_t next() {
+    const std::ptrdiff_t at = at_;
+    at_ += target_.along[0];
+    if (++index_[0] == target_.counts[0]) {
+      index_[0] = 0;
+      if (++index_[1] == target_.counts[1]) {
+        index_[1] = 0;
+        ++index_[2];
+      }
+      at_ = target_.origin + index_[1] * target_.along[1] + index_[2] * target_.along[2];
+    }
+    return static_cast<std::size_t>(at);
   }
+
+ private:
+  Target target_;
+  std::ptrdiff_t at_;
+  std::array<std::int64_t, 3> index_{};
 };
 
 // The target of a piece of `whole`. world: for each index axis the axis of the volume; turned:

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "server/data/cf/time.hpp"
+
 namespace windsplat::data::vtk {
 
 namespace {
@@ -331,6 +333,41 @@ class Resampler {
 }  // namespace
 
 Result<Resampling> resample(const Mesh& mesh) { return Resampler(mesh).run(); }
+
+std::vector<std::string> notes_on(const Mesh& mesh, const Resampling& where, bool of_cells) {
+  constexpr std::array<const char*, 3> axes{"x", "y", "z"};
+  std::vector<std::string> notes;
+  std::array<std::size_t, 3> dims{};
+  for (std::size_t d = 0; d < 3; ++d) dims[d] = where.coordinates.at(d).size();
+  const auto samples = static_cast<double>(where.cells.size());
+  const double outside = 100 * (1 - static_cast<double>(where.inside) / samples);
+  std::string note = "resampled from " + std::to_string(mesh.point_count());
+  note += " points and " + std::to_string(where.shown) + " cells onto ";
+  note += std::to_string(dims[0]) + " x " + std::to_string(dims[1]) + " x ";
+  note += std::to_string(dims[2]) + " samples; ";
+  note += std::to_string(std::lround(outside)) + " % lie outside all cells and are masked";
+  if (of_cells) note += "; values are those of the cells, not interpolated";
+  notes.push_back(std::move(note));
+  for (std::size_t d = 0; d < 3; ++d) {
+    const double layers = std::round(where.layers.at(d));
+    if (dims.at(d) < 2 || dims.at(d) >= layers) continue;
+    notes.push_back("along " + std::string(axes.at(d)) +
+                    " fewer samples than cells: " + std::to_string(dims.at(d)) + " for about " +
+                    cf::number_text(layers) + "; thin cells may be missed");
+  }
+  for (const auto& [type, count] : mesh.unread) {
+    notes.push_back(std::to_string(count) + " cells of type " + std::to_string(type) + " omitted");
+  }
+  if (where.other_rank > 0) {
+    notes.push_back(std::to_string(where.other_rank) +
+                    " flat cells omitted, because there are solid ones");
+  }
+  if (where.broken > 0) {
+    notes.push_back(std::to_string(where.broken) +
+                    " cells without volume, or with hidden or non-finite points, omitted");
+  }
+  return notes;
+}
 
 void gather_points(const Mesh& mesh, const Resampling& where, const float* values, float* out) {
   std::array<std::uint32_t, 8> index{};

@@ -37,6 +37,9 @@ inline constexpr std::uint32_t no_cell = 0xffffffffU;
 // the same spacing. Errors: bad_data, without the file name in the message.
 Result<Resampling> resample(const Mesh& mesh);
 
+// What a user should know of a resampling: sizes, and cells that are not shown.
+std::vector<std::string> notes_on(const Mesh& mesh, const Resampling& where, bool of_cells);
+
 // Computes one component on the lattice; samples outside all cells are NaN. values: one per point,
 // which are interpolated, or one per cell.
 void gather_points(const Mesh& mesh, const Resampling& where, const float* values, float* out);

@@ -2,9 +2,11 @@
 #include "server/data/formats/vtk/snapshot.hpp"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "server/base/ascii.hpp"
+#include "server/data/bytes/byte_store.hpp"
 #include "server/data/cf/grid/grid.hpp"
 
 namespace windsplat::data::vtk {
@@ -26,17 +28,13 @@ std::optional<std::uint64_t> product(const std::array<std::int64_t, 3>& counts) 
   return all;
 }
 
-std::string text_of(const Extent& extent) {
-  std::string out;
-  for (std::size_t a = 0; a < 3; ++a) {
-    if (a > 0) out += ' ';
-    out += std::to_string(extent.first[a]) + ' ' + std::to_string(extent.last[a]);
-  }
-  return out;
+Error too_large(const InputFile& file) {
+  return file.fault("has an extent that is empty or beyond the limit of " +
+                    std::to_string(cf::samples_max) + " samples");
 }
 
 // Memory is allocated for the whole extent, so the pieces must cover it, without excessive overlap.
-Result<void> check_cover(const InputFile& file, const Snapshot& snapshot) {
+Result<void> check_amount(const InputFile& file, const Snapshot& snapshot) {
   const std::uint64_t whole = *product(snapshot.whole.points());
   std::uint64_t sum = 0;
   for (const Piece& piece : snapshot.pieces) {
@@ -54,21 +52,14 @@ Result<void> check_cover(const InputFile& file, const Snapshot& snapshot) {
   return file.fault(what);
 }
 
-Result<void> check_extents(const InputFile& file, Snapshot& snapshot) {
-  const auto too_large = [&] {
-    return file.fault("has an extent that is empty or beyond the limit of " +
-                      std::to_string(cf::samples_max) + " samples");
-  };
-  if (!product(snapshot.whole.points())) return too_large();
+Result<void> check_extents(const InputFile& file, Snapshot& snapshot, Part part) {
+  if (!product(snapshot.whole.points())) return too_large(file);
   for (Piece& piece : snapshot.pieces) {
-    if (!product(piece.extent.points())) return too_large();
-    if (!snapshot.whole.holds(piece.extent)) {
-      return file.fault("has a piece that is not within the whole extent");
-    }
+    if (!product(piece.extent.points())) return too_large(file);
     piece.points = *product(piece.extent.points());
     piece.cells = *product(piece.extent.cells());
   }
-  return check_cover(file, snapshot);
+  return part == Part::whole ? check_cover(file, snapshot) : Result<void>();
 }
 
 // Keeps the valid arrays and omits the others with a reason. Errors: truncated files.
@@ -142,10 +133,45 @@ bool Extent::holds(const Extent& other) const {
   return true;
 }
 
-Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapshot& snapshot) {
-  if (snapshot.pieces.empty()) return file->fault("has no piece and so no data");
+std::string text_of(const Extent& extent) {
+  std::string out;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (a > 0) out += ' ';
+    out += std::to_string(extent.first[a]) + ' ' + std::to_string(extent.last[a]);
+  }
+  return out;
+}
+
+Result<std::shared_ptr<const InputFile>> PieceFile::open(Files& files) const {
+  if (kept) return kept;
+  return bytes::open_again(files, name, identity);
+}
+
+void Snapshot::leave_out(const std::string& name, const std::string& reason) {
+  const bool known = std::any_of(left_out.begin(), left_out.end(),
+                                 [&](const LeftOut& left) { return left.name == name; });
+  if (!known) left_out.push_back({name, reason});
+}
+
+Result<void> check_cover(const InputFile& file, const Snapshot& snapshot) {
+  if (!product(snapshot.whole.points())) return too_large(file);
+  for (const Piece& piece : snapshot.pieces) {
+    if (!snapshot.whole.holds(piece.extent)) {
+      return file.fault("has a piece with the extent " + text_of(piece.extent) +
+                        ", which is not within the whole extent " + text_of(snapshot.whole));
+    }
+  }
+  return check_amount(file, snapshot);
+}
+
+Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapshot& snapshot,
+                            Part part) {
+  if (snapshot.pieces.empty()) {
+    return part == Part::of_step ? Result<void>()
+                                 : Result<void>(file->fault("has no piece and so no data"));
+  }
   if (snapshot.kind != Kind::unstructured) {
-    if (auto done = check_extents(*file, snapshot); !done) return done;
+    if (auto done = check_extents(*file, snapshot, part); !done) return done;
   }
   for (Piece& piece : snapshot.pieces) {
     if (piece.points > cf::samples_max || piece.cells > cf::samples_max) {
@@ -160,6 +186,51 @@ Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapsh
     }
   }
   return {};
+}
+
+const StoredArray* find_array(const std::vector<StoredArray>& arrays, const std::string& name) {
+  const auto at = std::find_if(arrays.begin(), arrays.end(),
+                               [&](const StoredArray& array) { return array.name == name; });
+  return at == arrays.end() ? nullptr : &*at;
+}
+
+bool is_ghost(const StoredArray& array) {
+  return array.name == ghost_name || array.name == ghost_levels_name;
+}
+
+void erase_array(Snapshot& snapshot, PieceData data, const std::string& name) {
+  for (Piece& piece : snapshot.pieces) {
+    std::erase_if(piece.*data, [&](const StoredArray& array) { return array.name == name; });
+  }
+}
+
+std::vector<std::string> array_names(const Snapshot& snapshot, PieceData data) {
+  std::set<std::string> known;
+  std::vector<std::string> out;
+  for (const Piece& piece : snapshot.pieces) {
+    for (const StoredArray& array : piece.*data) {
+      if (!is_ghost(array) && known.insert(array.name).second) out.push_back(array.name);
+    }
+  }
+  return out;
+}
+
+void keep_common_arrays(const InputFile& file, Snapshot& snapshot) {
+  if (snapshot.pieces.size() < 2) return;
+  for (const PieceData data : {&Piece::point_data, &Piece::cell_data}) {
+    for (const std::string& name : array_names(snapshot, data)) {
+      const StoredArray* first = find_array(snapshot.pieces.front().*data, name);
+      const bool common =
+          std::all_of(snapshot.pieces.begin(), snapshot.pieces.end(), [&](const Piece& piece) {
+            const StoredArray* array = find_array(piece.*data, name);
+            return first != nullptr && array != nullptr && array->components == first->components;
+          });
+      if (common) continue;
+      snapshot.leave_out(
+          name, "is missing, or has a different type, in a piece of " + in_quotes(file.name()));
+      erase_array(snapshot, data, name);
+    }
+  }
 }
 
 }  // namespace windsplat::data::vtk

@@ -19,6 +19,7 @@
 #include "server/data/formats/vtk/piece_target.hpp"
 #include "server/data/formats/vtk/resample.hpp"
 #include "server/data/formats/vtk/snapshot.hpp"
+#include "server/data/formats/vtk/step_reader.hpp"
 #include "server/data/model/digest.hpp"
 
 namespace windsplat::data::vtk {
@@ -28,43 +29,39 @@ namespace {
 using FilePtr = std::shared_ptr<const InputFile>;
 
 constexpr std::size_t steps_max = 100'000;
+constexpr std::size_t files_max = 200'000;  // of all steps
 constexpr std::size_t block_tuples = std::size_t{1} << 15;
 constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
 
-struct StepFile {
-  std::string name;
-  std::optional<double> time;
-  std::string identity;
-};
-
-Result<Snapshot> read_snapshot(const FilePtr& file) {
-  const auto head = file->head(head_bytes);
-  if (!head) return head.error();
-  if (is_legacy(*head)) return read_legacy(file);
-  if (is_xml(*head)) return read_xml(file);
-  return file->fault("is not a VTK file");
+const StoredArray* first_of(const Snapshot& snapshot, PieceData data, const std::string& name) {
+  for (const Piece& piece : snapshot.pieces) {
+    if (const StoredArray* array = find_array(piece.*data, name)) return array;
+  }
+  return nullptr;
 }
 
-const StoredArray* find_array(const std::vector<StoredArray>& arrays, const std::string& name) {
-  const auto at = std::find_if(arrays.begin(), arrays.end(),
-                               [&](const StoredArray& array) { return array.name == name; });
-  return at == arrays.end() ? nullptr : &*at;
-}
-
-bool is_field(const StoredArray& array) {
-  return array.name != ghost_name && array.components <= 3;
-}
+bool is_field(const StoredArray& array) { return !is_ghost(array) && array.components <= 3; }
 
 class VtkSource final : public FileSource {
  public:
-  explicit VtkSource(std::shared_ptr<Files> files) : files_(std::move(files)) {}
+  explicit VtkSource(std::shared_ptr<Files> files)
+      : files_(std::move(files)), reader_(*files_, files_->location().inside) {}
 
   Result<void> prepare() {
-    if (auto done = find_steps(); !done) return done;
+    auto steps = steps_of(*files_);
+    if (!steps) return steps.error();
+    steps_ = std::move(*steps);
+    if (steps_.size() > steps_max) {
+      return make_error(ErrorKind::bad_data, "more than " + std::to_string(steps_max) + " steps");
+    }
     std::string identity;
     for (std::size_t s = 0; s < steps_.size(); ++s) {
       auto snapshot = open_step(s);
       if (!snapshot) return snapshot.error();
+      if (files_read_ > files_max) {
+        return step_fault(s, "refers, with the steps before, to more than " +
+                                 std::to_string(files_max) + " files");
+      }
       auto done = s == 0 ? take_first(*snapshot) : compare(s, *snapshot);
       if (!done) return done;
       identity += steps_[s].identity + '\n';
@@ -93,46 +90,21 @@ class VtkSource final : public FileSource {
     if (steps_[step].identity != identity) {
       return file_->fault("has changed since it was opened; open it again");
     }
+    count_tuples(*snapshot);
     auto done =
         mesh_ ? fill_resampled(*snapshot, field, step, out) : fill_regular(*snapshot, field, out);
     return done ? file_->check_unchanged() : done;
   }
 
  private:
-  // Finds the files of the steps, and their times in a collection.
-  Result<void> find_steps() {
-    for (const auto& member : files_->location().members) {
-      steps_.push_back({member.name, {}, {}});
-    }
-    if (files_->location().kind == Location::Kind::file) {
-      auto file = files_->open(steps_.front().name);
-      if (!file) return file.error();
-      const auto head = (*file)->head(head_bytes);
-      if (!head) return head.error();
-      if (is_xml(*head) && head->find("\"Collection\"") != std::string::npos) {
-        auto collection = read_collection(*file);
-        if (!collection) return collection.error();
-        if (*collection) {
-          steps_.clear();
-          for (auto& member : (*collection)->members) {
-            steps_.push_back({std::move(member.file), member.time, {}});
-          }
-        }
-      }
-    }
-    if (steps_.size() > steps_max) {
-      return make_error(ErrorKind::bad_data, "more than " + std::to_string(steps_max) + " steps");
-    }
-    return {};
-  }
-
-  // Opens the file of a step as file_ and records its identity.
+  // Reads the headers of a step, sets file_ to its main file and records its identity.
   Result<Snapshot> open_step(std::size_t step) {
-    auto file = files_->open(steps_[step].name);
-    if (!file) return file.error();
-    file_ = std::move(*file);
-    steps_[step].identity = file_->identity();
-    return read_snapshot(file_);
+    auto out = reader_.read(steps_[step]);
+    if (!out) return out;
+    file_ = out->file;
+    files_read_ += reader_.file_count();
+    steps_[step].identity = out->identity;
+    return out;
   }
 
   [[nodiscard]] Error step_fault(std::size_t step, const std::string& what) const {
@@ -143,6 +115,7 @@ class VtkSource final : public FileSource {
     info_.title = snapshot.title;
     info_.format = snapshot.format;
     info_.left_out = std::move(snapshot.left_out);
+    info_.notes = std::move(snapshot.notes);
     kind_ = snapshot.kind;
     whole_ = snapshot.whole;
     time_ = snapshot.time;
@@ -165,33 +138,35 @@ class VtkSource final : public FileSource {
                           " of the whole extent are in no piece: masked");
   }
 
-  [[nodiscard]] const std::vector<StoredArray>& data_of(const Piece& piece) const {
-    return of_cells_ ? piece.cell_data : piece.point_data;
+  [[nodiscard]] PieceData data() const {
+    return of_cells_ ? &Piece::cell_data : &Piece::point_data;
   }
 
   // Chooses point or cell data, whichever has more fields, points if equal; omits the other.
   void choose_data(const Snapshot& snapshot) {
-    const Piece& piece = snapshot.pieces.front();
-    const auto fields = [](const std::vector<StoredArray>& arrays) {
-      return std::count_if(arrays.begin(), arrays.end(), is_field);
+    const auto fields = [&](PieceData data) {
+      const auto names = array_names(snapshot, data);
+      return std::count_if(names.begin(), names.end(), [&](const std::string& name) {
+        return is_field(*first_of(snapshot, data, name));
+      });
     };
-    of_cells_ = fields(piece.cell_data) > fields(piece.point_data);
-    for (const StoredArray& array : of_cells_ ? piece.point_data : piece.cell_data) {
-      if (array.name == ghost_name) continue;
-      info_.left_out.push_back(
-          {array.name, of_cells_ ? "is at points, while more fields are at cells"
-                                 : "is at cells, while no fewer fields are at points"});
+    of_cells_ = fields(&Piece::cell_data) > fields(&Piece::point_data);
+    const PieceData omitted = of_cells_ ? &Piece::point_data : &Piece::cell_data;
+    for (const std::string& name : array_names(snapshot, omitted)) {
+      info_.left_out.push_back({name, of_cells_
+                                          ? "is at points, while more fields are at cells"
+                                          : "is at cells, while no fewer fields are at points"});
     }
   }
 
   Result<void> find_grid(const Snapshot& snapshot) {
     if (kind_ == Kind::image || kind_ == Kind::rectilinear) {
-      auto grid = vtk::regular_grid(file_, snapshot);
+      auto grid = vtk::regular_grid(*files_, snapshot);
       if (!grid) return grid.error();
       points_grid_ = *grid;
       return set_grid(std::move(*grid));
     }
-    auto mesh = read_mesh(file_, snapshot);
+    auto mesh = read_mesh(*files_, snapshot);
     if (!mesh) return mesh.error();
     mesh_digest_ = digest_of_mesh(*mesh);
     if (kind_ == Kind::structured) {
@@ -232,41 +207,15 @@ class VtkSource final : public FileSource {
     mesh_ = std::move(mesh);
     resampling_ = std::move(*resampling);
     if (auto done = set_axes(resampling_.coordinates); !done) return done;
-    const auto dims = info_.grid.dims();
-    const auto samples = static_cast<double>(info_.grid.samples());
-    const double outside = 100 * (1 - static_cast<double>(resampling_.inside) / samples);
-    std::string note = "resampled from " + std::to_string(mesh_->point_count());
-    note += " points and " + std::to_string(resampling_.shown) + " cells onto ";
-    note += std::to_string(dims[0]) + " x " + std::to_string(dims[1]) + " x ";
-    note += std::to_string(dims[2]) + " samples; ";
-    note += std::to_string(std::lround(outside)) + " % lie outside all cells and are masked";
-    if (of_cells_) note += "; values are those of the cells, not interpolated";
-    info_.notes.push_back(std::move(note));
-    for (std::size_t d = 0; d < 3; ++d) {
-      const double layers = std::round(resampling_.layers.at(d));
-      if (dims.at(d) < 2 || dims.at(d) >= layers) continue;
-      info_.notes.push_back("along " + std::string(axis_names.at(d)) +
-                            " fewer samples than cells: " + std::to_string(dims.at(d)) +
-                            " for about " + cf::number_text(layers) + "; thin cells may be missed");
-    }
-    for (const auto& [type, count] : mesh_->unread) {
-      info_.notes.push_back(std::to_string(count) + " cells of type " + std::to_string(type) +
-                            " omitted");
-    }
-    if (resampling_.other_rank > 0) {
-      info_.notes.push_back(std::to_string(resampling_.other_rank) +
-                            " flat cells omitted, because there are solid ones");
-    }
-    if (resampling_.broken > 0) {
-      info_.notes.push_back(std::to_string(resampling_.broken) +
-                            " cells without volume, or with hidden or non-finite points, omitted");
+    for (std::string& note : notes_on(*mesh_, resampling_, of_cells_)) {
+      info_.notes.push_back(std::move(note));
     }
     return {};
   }
 
   Result<void> find_fields(const Snapshot& snapshot) {
-    for (const StoredArray& array : data_of(snapshot.pieces.front())) {
-      if (array.name == ghost_name) continue;
+    for (const std::string& name : array_names(snapshot, data())) {
+      const StoredArray& array = *first_of(snapshot, data(), name);
       if (!is_field(array)) {
         info_.left_out.push_back({array.name, "has " + std::to_string(array.components) +
                                                   " components; 1, 2 or 3 are supported"});
@@ -290,32 +239,51 @@ class VtkSource final : public FileSource {
       info_.fields.push_back(std::move(field));
     }
     keep_common_fields(snapshot);
+    note_missing(snapshot);
     return {};
   }
 
-  // Omits fields that are missing in a piece.
+  // Omits fields that a step lacks, or that its pieces have with other numbers of components.
   void keep_common_fields(const Snapshot& snapshot) {
     std::erase_if(info_.fields, [&](const FieldInfo& field) {
-      const bool common =
-          std::all_of(snapshot.pieces.begin(), snapshot.pieces.end(), [&](const Piece& piece) {
-            const StoredArray* array = find_array(data_of(piece), field.name);
-            return array != nullptr &&
-                   static_cast<std::size_t>(array->components) == field.components.size();
-          });
-      if (!common) {
-        info_.left_out.push_back(
-            {field.name,
-             "is missing, or has a different type, in a piece of " + in_quotes(file_->name())});
+      bool found = false;
+      bool fits = true;
+      for (const Piece& piece : snapshot.pieces) {
+        const StoredArray* array = find_array(piece.*data(), field.name);
+        found = found || array != nullptr;
+        fits = fits && (array == nullptr ||
+                        static_cast<std::size_t>(array->components) == field.components.size());
       }
-      return !common;
+      if (found && fits) return false;
+      info_.left_out.push_back(
+          {field.name, "is missing, or has a different type, in " + in_quotes(file_->name())});
+      return true;
     });
+  }
+
+  // Of blocks: fields that only some have.
+  void note_missing(const Snapshot& snapshot) {
+    if (snapshot.blocks.size() < 2) return;
+    for (const FieldInfo& field : info_.fields) {
+      std::vector<bool> has(snapshot.blocks.size());
+      for (const Piece& piece : snapshot.pieces) {
+        if (find_array(piece.*data(), field.name) != nullptr) has[piece.block] = true;
+      }
+      const auto lacking = std::count(has.begin(), has.end(), false);
+      if (lacking == 0) continue;
+      const auto first =
+          static_cast<std::size_t>(std::find(has.begin(), has.end(), false) - has.begin());
+      info_.notes.push_back(in_quotes(field.name) + " is missing in " + std::to_string(lacking) +
+                            " of " + std::to_string(has.size()) + " blocks, where it is masked: " +
+                            in_quotes(snapshot.blocks[first]) + (lacking > 1 ? " and others" : ""));
+    }
   }
 
   // A later step must have the same grid. Meshes are compared when their step is read.
   Result<void> compare(std::size_t step, const Snapshot& snapshot) {
     bool same = snapshot.kind == kind_ && snapshot.whole == whole_;
     if (same && (kind_ == Kind::image || kind_ == Kind::rectilinear)) {
-      const auto grid = vtk::regular_grid(file_, snapshot);
+      const auto grid = vtk::regular_grid(*files_, snapshot);
       if (!grid) return grid.error();
       same = *grid == points_grid_;
     }
@@ -341,10 +309,10 @@ class VtkSource final : public FileSource {
     }
   }
 
-  // Calls take(tuples, count) for blocks of an array of a piece, in order.
+  // Calls take(number, values) for each tuple of an array, in order.
   template <class Take>
-  Result<void> read_tuples(const StoredArray& array, const Take& take) {
-    auto reader = ArrayReader::open(file_, array);
+  Result<void> read_tuples(const FilePtr& file, const StoredArray& array, const Take& take) {
+    auto reader = ArrayReader::open(file, array);
     if (!reader) return reader.error();
     const auto components = static_cast<std::size_t>(array.components);
     std::vector<double> block(std::min<std::uint64_t>(array.tuples, block_tuples) * components);
@@ -352,16 +320,20 @@ class VtkSource final : public FileSource {
       const auto count =
           static_cast<std::size_t>(std::min<std::uint64_t>(array.tuples - done, block_tuples));
       if (auto read = reader->read(block.data(), count * components); !read) return read;
-      take(block.data(), count);
+      for (std::size_t i = 0; i < count; ++i) take(done + i, block.data() + i * components);
       done += count;
-      report_progress(static_cast<double>(done) / static_cast<double>(array.tuples));
+      tuples_done_ += count;
+      report_progress(static_cast<double>(tuples_done_) / static_cast<double>(tuples_all_));
     }
-    return {};
+    return file->check_unchanged();
   }
 
-  Result<const StoredArray*> array_of(const Piece& piece, std::size_t field) const {
+  // The array of a field in a piece; null where a block lacks it.
+  Result<const StoredArray*> array_of(const Snapshot& snapshot, const Piece& piece,
+                                      std::size_t field) const {
     const FieldInfo& wanted = info_.fields[field];
-    const StoredArray* array = find_array(data_of(piece), wanted.name);
+    const StoredArray* array = find_array(piece.*data(), wanted.name);
+    if (array == nullptr && snapshot.blocks.size() > 1) return array;
     if (array == nullptr ||
         static_cast<std::size_t>(array->components) != wanted.components.size()) {
       return file_->fault("has changed since it was opened; open it again");
@@ -369,72 +341,102 @@ class VtkSource final : public FileSource {
     return array;
   }
 
+  // Reads a piece of a grid with indices into `out`, whose components have `samples` values. Tuples
+  // that `mask` hides are left out; copies of those of other pieces yield to them.
+  Result<void> fill_piece(const Snapshot& snapshot, const Piece& piece, std::size_t field,
+                          const Target& target, unsigned mask, std::size_t samples, float* out) {
+    const auto array = array_of(snapshot, piece, field);
+    if (!array || *array == nullptr) return array ? Result<void>() : array.error();
+    const auto file = piece.file.open(*files_);
+    if (!file) return file.error();
+    const auto ghosts = read_ghosts(*file, piece.*data());
+    if (!ghosts) return ghosts.error();
+    const auto components = static_cast<std::size_t>((*array)->components);
+    TargetWalk walk(target);
+    return read_tuples(*file, **array, [&](std::uint64_t tuple, const double* values) {
+      const std::size_t at = walk.next();
+      if (!ghosts->empty()) {
+        const double ghost = (*ghosts)[tuple];
+        if (has_bit(ghost, mask) || (has_bit(ghost, duplicate) && !std::isnan(out[at]))) return;
+      }
+      for (std::size_t c = 0; c < components; ++c) {
+        out[at + c * samples] = static_cast<float>(values[c]);
+      }
+    });
+  }
+
+  void count_tuples(const Snapshot& snapshot) {
+    tuples_done_ = 0;
+    tuples_all_ = 1;
+    for (const Piece& piece : snapshot.pieces)
+      tuples_all_ += of_cells_ ? piece.cells : piece.points;
+  }
+
   Result<void> fill_regular(const Snapshot& snapshot, std::size_t field, float* out) {
     const std::size_t samples = info_.grid.samples();
-    const std::size_t components = info_.fields[field].components.size();
     if (!(snapshot.whole == whole_))
       return file_->fault("has a grid that changed since it was opened");
-    std::fill_n(out, samples * components, std::numeric_limits<float>::quiet_NaN());
+    std::fill_n(out, samples * info_.fields[field].components.size(),
+                std::numeric_limits<float>::quiet_NaN());
+    const unsigned mask = of_cells_ ? hidden_cell | refined_cell : hidden_point;
     for (const Piece& piece : snapshot.pieces) {
-      const auto array = array_of(piece, field);
-      if (!array) return array.error();
-      const auto ghosts = read_ghosts(file_, data_of(piece));
-      if (!ghosts) return ghosts.error();
-      const unsigned mask = of_cells_ ? hidden_cell | refined_cell : hidden_point;
       const Target target = target_of(whole_, piece.extent, of_cells_, grid_.world, grid_.turned);
-      std::uint64_t tuple = 0;
-      auto done = read_tuples(**array, [&](const double* block, std::size_t count) {
-        for (std::size_t i = 0; i < count; ++i, ++tuple, block += components) {
-          if (!ghosts->empty() && has_bit((*ghosts)[tuple], mask)) continue;
-          const std::size_t at = target.at(tuple);
-          for (std::size_t c = 0; c < components; ++c) {
-            out[at + c * samples] = static_cast<float>(block[c]);
-          }
-        }
-      });
+      auto done = fill_piece(snapshot, piece, field, target, mask, samples, out);
       if (!done) return done;
     }
     return {};
   }
 
-  Result<void> fill_resampled(const Snapshot& snapshot, std::size_t field, std::size_t step,
-                              float* out) {
-    if (step > 0) {
-      const auto mesh = read_mesh(file_, snapshot);
-      if (!mesh) return mesh.error();
-      if (digest_of_mesh(*mesh) != mesh_digest_) {
-        return step_fault(step, "has a mesh that differs from that of the first step");
-      }
-    }
-    const std::size_t samples = info_.grid.samples();
+  // Reads the values of the points or cells of the mesh.
+  Result<std::vector<float>> mesh_values(const Snapshot& snapshot, std::size_t field) {
     const std::size_t components = info_.fields[field].components.size();
     const std::uint64_t count = of_cells_ ? mesh_->cell_count() : mesh_->point_count();
     std::vector<float> values(count * components, std::numeric_limits<float>::quiet_NaN());
     std::uint64_t base = 0;
     for (const Piece& piece : snapshot.pieces) {
-      const auto array = array_of(piece, field);
-      if (!array) return array.error();
-      if (kind_ == Kind::unstructured && (*array)->tuples > count - base) {
+      if (kind_ == Kind::structured) {
+        const Target target = target_of(whole_, piece.extent, of_cells_, {0, 1, 2}, {});
+        auto done = fill_piece(snapshot, piece, field, target, 0, count, values.data());
+        if (!done) return done.error();
+        continue;
+      }
+      const std::uint64_t tuples = of_cells_ ? piece.cells : piece.points;
+      if (tuples > count - base) {
         return file_->fault("has a mesh that changed since it was opened");
       }
-      const Target target = kind_ == Kind::structured
-                                ? target_of(whole_, piece.extent, of_cells_, {0, 1, 2}, {})
-                                : Target{};
-      std::uint64_t tuple = 0;
-      auto done = read_tuples(**array, [&](const double* block, std::size_t n) {
-        for (std::size_t i = 0; i < n; ++i, ++tuple, block += components) {
-          const std::size_t at =
-              kind_ == Kind::structured ? target.at(tuple) : static_cast<std::size_t>(base + tuple);
+      const auto array = array_of(snapshot, piece, field);
+      if (!array) return array.error();
+      if (*array != nullptr) {
+        const auto file = piece.file.open(*files_);
+        if (!file) return file.error();
+        auto done = read_tuples(*file, **array, [&](std::uint64_t tuple, const double* from) {
           for (std::size_t c = 0; c < components; ++c) {
-            values[at + c * count] = static_cast<float>(block[c]);
+            values[base + tuple + c * count] = static_cast<float>(from[c]);
           }
-        }
-      });
-      if (!done) return done;
-      base += (*array)->tuples;
+        });
+        if (!done) return done.error();
+      }
+      base += tuples;
     }
+    return values;
+  }
+
+  Result<void> fill_resampled(const Snapshot& snapshot, std::size_t field, std::size_t step,
+                              float* out) {
+    if (step > 0) {
+      const auto mesh = read_mesh(*files_, snapshot);
+      if (!mesh) return mesh.error();
+      if (digest_of_mesh(*mesh) != mesh_digest_) {
+        return step_fault(step, "has a mesh that differs from that of the first step");
+      }
+    }
+    const auto values = mesh_values(snapshot, field);
+    if (!values) return values.error();
+    const std::size_t samples = info_.grid.samples();
+    const std::size_t components = info_.fields[field].components.size();
+    const std::size_t count = values->size() / components;
     for (std::size_t c = 0; c < components; ++c) {
-      const float* from = values.data() + c * count;
+      const float* from = values->data() + c * count;
       if (of_cells_) {
         gather_cells(resampling_, from, out + c * samples);
       } else {
@@ -445,9 +447,13 @@ class VtkSource final : public FileSource {
   }
 
   std::shared_ptr<Files> files_;
+  StepReader reader_;
   FilePtr file_;  // file of the last step read
-  std::vector<StepFile> steps_;
+  std::vector<Step> steps_;
+  std::size_t files_read_ = 0;
   DatasetInfo info_;
+  std::uint64_t tuples_done_ = 0;  // of the read in progress
+  std::uint64_t tuples_all_ = 1;
   Kind kind_ = Kind::image;
   Extent whole_;
   std::optional<double> time_;
@@ -462,6 +468,12 @@ class VtkSource final : public FileSource {
 }  // namespace
 
 bool is_vtk(std::string_view head) { return is_legacy(head) || is_xml(head); }
+
+bool is_vtkhdf(Files& files) {
+  if (files.location().members.empty()) return false;
+  const auto file = files.open(files.location().members.front().name);
+  return file && HdfFile::is_vtkhdf(**file);
+}
 
 Result<std::unique_ptr<FileSource>> open(const std::shared_ptr<Files>& files) {
   auto source = std::make_unique<VtkSource>(files);

@@ -87,11 +87,9 @@ class FileBytes {
   std::size_t used_ = 0;
 };
 
-}  // namespace
-
-class ArrayReader::Stream {
+class FileStream final : public ArrayStream {
  public:
-  Stream(std::shared_ptr<const InputFile> file, const StoredArray& array)
+  FileStream(std::shared_ptr<const InputFile> file, const StoredArray& array)
       : file_(std::move(file)),
         array_(array),
         value_bytes_(bytes::size_of(array.type)),
@@ -116,7 +114,7 @@ class ArrayReader::Stream {
                                                         : begin_blocks(wanted);
   }
 
-  Result<void> read(double* out, std::size_t count) {
+  Result<void> read(double* out, std::size_t count) override {
     WINDSPLAT_CHECK(count <= left_);
     left_ -= count;
     if (array_.encoding == Encoding::text) return read_text(out, count);
@@ -322,19 +320,15 @@ class ArrayReader::Stream {
   std::vector<unsigned char> scratch_;
 };
 
-ArrayReader::ArrayReader(std::unique_ptr<Stream> stream) : stream_(std::move(stream)) {}
-ArrayReader::ArrayReader(ArrayReader&&) noexcept = default;
-ArrayReader& ArrayReader::operator=(ArrayReader&&) noexcept = default;
-ArrayReader::~ArrayReader() = default;
+}  // namespace
 
 Result<ArrayReader> ArrayReader::open(std::shared_ptr<const InputFile> file,
                                       const StoredArray& array) {
-  auto stream = std::make_unique<Stream>(std::move(file), array);
+  if (array.encoding == Encoding::hdf5) return ArrayReader(hdf_stream(array));
+  auto stream = std::make_unique<FileStream>(std::move(file), array);
   if (auto done = stream->begin(); !done) return done.error();
   return ArrayReader(std::move(stream));
 }
-
-Result<void> ArrayReader::read(double* out, std::size_t count) { return stream_->read(out, count); }
 
 Result<std::vector<double>> read_all(const std::shared_ptr<const InputFile>& file,
                                      const StoredArray& array) {

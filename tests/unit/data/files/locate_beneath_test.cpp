@@ -28,7 +28,8 @@ class LocateBeneath : public testing::Test {
     above_ = fs::canonical(name);
     root_ = above_ / "root";
     fs::create_directories(root_ / "runs/may");
-    for (const char* file : {"a.nc", "odd[1].nc", "runs/f10.nc", "runs/f2.nc", "runs/x.pvd"}) {
+    for (const char* file :
+         {"a.nc", "odd[1].nc", "runs/f10.nc", "runs/f2.nc", "runs/x.pvd", "runs/p1.pvtu"}) {
       std::ofstream(root_ / file) << "data";
     }
     std::ofstream(above_ / "secret.nc") << "secret";
@@ -104,6 +105,9 @@ TEST_F(LocateBeneath, PatternInTheLastPartIsASeriesInNaturalOrder) {
   EXPECT_EQ(refusal("runs/g*.nc"), ErrorKind::not_found);
   EXPECT_EQ(refusal("r*/f2.nc"), ErrorKind::not_found) << "a pattern before the last part";
   EXPECT_EQ(located("[a].nc").members.size(), 1U);
+  EXPECT_FALSE(found.companions);
+  EXPECT_TRUE(located("runs/p*.pvtu").companions) << "headers of VTK name their pieces";
+  EXPECT_FALSE(located("runs/x*.pvd").companions) << "a collection is a series itself";
 }
 
 TEST_F(LocateBeneath, GroupIsNamedAfterTheFile) {

@@ -77,6 +77,40 @@ TEST_F(Loader, UnwrittenSamplesHoldNothingOfAnEarlierVolume) {
   EXPECT_EQ(b->masked, 6);
 }
 
+// A loader may have 256 files open besides the members of a series; each step has 320 pieces, which
+// the daemon opens.
+TEST_F(Loader, MorePiecesThanDescriptorsReadAsInThisProcess) {
+  constexpr int pieces = 320;
+  for (const int step : {1, 2}) {
+    std::filesystem::create_directories(folder_ / "parts");
+    std::string listed;
+    for (int n = 0; n < pieces; ++n) {
+      const std::string extent = std::to_string(n) + ' ' + std::to_string(n + 1) + " 0 1 0 1";
+      const std::string name = "parts/" + std::to_string(step) + '_' + std::to_string(n) + ".vti";
+      std::ofstream(folder_ / name)
+          << "<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"" << extent
+          << "\"><Piece Extent=\"" << extent
+          << "\"><PointData><DataArray type=\"Float32\" Name=\"a\" format=\"ascii\">" << n << ' '
+          << n + 1 << " 0 0 0 0 0 " << step
+          << "</DataArray></PointData></Piece></ImageData></VTKFile>";
+      listed += "<Piece Source=\"" + name + "\" Extent=\"" + extent + "\"/>";
+    }
+    std::ofstream(folder_ / ("s" + std::to_string(step) + ".pvti"))
+        << "<VTKFile type=\"PImageData\"><PImageData WholeExtent=\"0 " << pieces
+        << " 0 1 0 1\"><PPointData><PDataArray type=\"Float32\" Name=\"a\"/></PPointData>" << listed
+        << "</PImageData></VTKFile>";
+  }
+  expect_same_as_here(folder_ / "s*.pvti");
+  auto source = opened(folder_ / "s*.pvti");
+  ASSERT_TRUE(source);
+  const auto volume = source->read(0, 1);
+  ASSERT_TRUE(volume) << volume.error().message;
+  for (const std::size_t n : {0U, 100U, 319U, 320U}) {
+    EXPECT_EQ(volume->values[n], static_cast<float>(n));
+  }
+  EXPECT_EQ(volume->values[volume->samples() - 1], 2);
+}
+
 // Number of descriptors of this process that refer to the memory of volumes.
 std::size_t transfers_kept() {
   std::size_t count = 0;
