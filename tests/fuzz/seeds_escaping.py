@@ -67,6 +67,11 @@ def escape_seeds(outside):
             ).encode()}, "mark.dx")
         members = seeds_vtk.pvd(["m0.vti", to("mark.vti")])
         yield seed("pvd", "member", {"s.pvd": members, "m0.vti": vti}, "mark.vti")
+        header = seeds_vtk.parallel("ImageData", 'WholeExtent="0 7 0 5 0 3" Spacing="1 1 2"',
+                                    [(to("mark.vti"), "0 7 0 5 0 3")])
+        yield seed("pvti", "piece", {"s.pvti": header}, "mark.vti")
+        block = seeds_vtk.multi_block(f'<DataSet index="0" name="a" file="{to("mark.vti")}"/>')
+        yield seed("vtm", "block", {"s.vtm": block}, "mark.vti")
         yield from hdf5_escapes(seed, to)
     entity = f'<!DOCTYPE VTKFile [<!ENTITY x SYSTEM "file://{outside}/mark.txt">]>\n<VTKFile'
     text = vti.replace(b"<VTKFile", entity.encode(), 1).replace(b'"heat"', b'"&x;"')

@@ -99,6 +99,32 @@ def pvd(names):
             f"{sets}</Collection>\n</VTKFile>\n").encode()
 
 
+def image_part(low, high, ghost=False):
+    """A piece of an image: the indices from `low` to `high` along x."""
+    xml = VtkXml("appended", "ZLib")
+    extent = f"{low} {high} 0 5 0 3"
+    count = (high - low + 1) * 24
+    data = "<PointData>" + xml.array("heat", [float(i % 7) for i in range(count)])
+    if ghost:
+        data += xml.array("vtkGhostType", [i % 5 == 0 for i in range(count)], 1, "UInt8")
+    return xml.file("ImageData", f'WholeExtent="{extent}" Spacing="1 1 2"',
+                    f'<Piece Extent="{extent}">\n{data}</PointData></Piece>\n')
+
+
+def parallel(kind, attributes, pieces):
+    """The header of a parallel file; pieces: (name, extent or "")."""
+    inner = "".join(f'<Piece Source="{name}"' + (f' Extent="{extent}"' if extent else "") + "/>\n"
+                    for name, extent in pieces)
+    declared = ('<PDataArray type="Float32" Name="heat" NumberOfComponents="1"/>'
+                '<PDataArray type="Float32" Name="wind" NumberOfComponents="3"/>')
+    return VtkXml("ascii").file("P" + kind, attributes,
+                                f"<PPointData>{declared}</PPointData>\n{inner}")
+
+
+def multi_block(inner):
+    return VtkXml("ascii").file("vtkMultiBlockDataSet", "", inner)
+
+
 LEGACY = "# vtk DataFile Version 3.0\nA storm\n{coding}\nDATASET {kind}\n"
 
 
@@ -139,7 +165,59 @@ def vtk_seeds():
     for ending in ("vti", "vtu"):
         members = {f"m{i}.{ending}": vtk_xml(ending, "appended", "ZLib") for i in range(2)}
         yield Seed("pvd", ending, {"s.pvd": pvd(members)} | members)
+    halves = {"m0.vti": image_part(0, 4), "m1.vti": image_part(3, 7, True)}
+    header = parallel("ImageData", 'WholeExtent="0 7 0 5 0 3" GhostLevel="1" Spacing="1 1 2"',
+                      [("m0.vti", "0 4 0 5 0 3"), ("m1.vti", "3 7 0 5 0 3")])
+    yield Seed("pvti", "two pieces", {"s.pvti": header} | halves)
+    meshes = {f"m{i}.vtu": vtk_xml("vtu", coding) for i, coding in enumerate(("ascii", "appended"))}
+    header = parallel("UnstructuredGrid", 'GhostLevel="0"', [(name, "") for name in meshes])
+    yield Seed("pvtu", "two pieces", {"s.pvtu": header} | meshes)
+    inner = ('<Block index="0" name="fluid"><DataSet index="0" name="a" file="m0.vti"/></Block>'
+             '<DataSet index="1" file="m1.vti"/><DataSet index="2" name="b" file="m0.vtu"/>')
+    yield Seed("vtm", "image and mesh", {"s.vtm": multi_block(inner)} | halves | meshes)
     for kind in ("STRUCTURED_POINTS", "RECTILINEAR_GRID", "STRUCTURED_GRID", "UNSTRUCTURED_GRID"):
         for binary in (False, True):
             yield Seed("vtk binary" if binary else "vtk ascii", kind.lower(),
                        {"f.vtk": vtk_legacy(kind, binary)})
+
+
+def vtkhdf_seeds(folder):
+    """Images with steps, and a mesh of two parts, written by netCDF4, whose groups and attributes
+    are those of HDF5."""
+    import netCDF4
+    import numpy
+    for name in ("image", "mesh"):
+        path = folder / f"{name}.vtkhdf"
+        with netCDF4.Dataset(path, "w") as file:
+            group = file.createGroup("VTKHDF")
+            group.Version = [2, 0]
+
+            def put(path, kind, values, shape, file=file):
+                dims = [f"d{n}" for n in shape]
+                for dim, n in zip(dims, shape):
+                    if dim not in file.dimensions:
+                        file.createDimension(dim, n)
+                file.createVariable("/VTKHDF/" + path, kind, dims)[:] = numpy.reshape(values, shape)
+            if name == "image":
+                group.Type = "ImageData"
+                group.WholeExtent = [0, 7, 0, 5, 0, 3]
+                group.Origin = [0.0, 0.0, 0.0]
+                group.Spacing = [1.0, 1.0, 2.0]
+                group.Direction = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+                put("PointData/heat", "f4", numbers(3) + numbers(3, 1), (2, *DIMS[::-1]))
+                put("Steps/Values", "f8", [0.0, 0.5], (2,))
+                group["Steps"].NSteps = 2
+                put("Steps/PointDataOffsets/heat", "i8", [1, 0], (2,))
+            else:
+                group.Type = "UnstructuredGrid"
+                cells = [p for cell in hexahedra() for p in cell]
+                many = len(cells) // 8
+                put("NumberOfPoints", "i8", [COUNT] * 2, (2,))
+                put("NumberOfCells", "i8", [many] * 2, (2,))
+                put("NumberOfConnectivityIds", "i8", [8 * many] * 2, (2,))
+                put("Points", "f4", points_of_grid() * 2, (2 * COUNT, 3))
+                put("Connectivity", "i8", cells * 2, (16 * many,))
+                put("Offsets", "i8", list(range(0, 8 * many + 1, 8)) * 2, (2 * many + 2,))
+                put("Types", "u1", [12] * (2 * many), (2 * many,))
+                put("PointData/heat", "f4", numbers(3) * 2, (2 * COUNT,))
+        yield Seed("hdf5", f"vtkhdf {name}", {"h.h5": path.read_bytes()})

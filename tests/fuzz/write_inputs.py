@@ -31,6 +31,7 @@ INPUT_BYTES_MAX = 300_000
 MUTANTS = 340  # number of mutated datasets, over all formats
 READERS = {"nrrd": "nrrd", "raw+json": "raw", "grads": "grads", "opendx": "opendx", "zarr": "zarr",
            "vti": "vtk_xml", "vtr": "vtk_xml", "vts": "vtk_xml", "vtu": "vtk_xml", "pvd": "vtk_xml",
+           "pvti": "vtk_xml", "pvtu": "vtk_xml", "vtm": "vtk_xml",
            "vtk ascii": "vtk_legacy", "vtk binary": "vtk_legacy", "hdf5": "hdf5",
            "netcdf-4": "hdf5", "netcdf classic": "netcdf", "netcdf 64-bit": "netcdf",
            "netcdf cdf5": "netcdf", "grib 1": "grib", "grib 2": "grib"}
@@ -121,7 +122,8 @@ def files(program):
         (folder / "made").mkdir()
         every = [*seeds.nrrd_seeds(), *seeds.raw_seeds(), *seeds.grads_seeds(), *seeds.dx_seeds(),
                  *seeds.zarr_seeds(), *seeds_vtk.vtk_seeds(), *seeds.hdf5_seeds(),
-                 *seeds.mesh_seeds(), *seeds.grib_seeds(folder / "made")]
+                 *seeds.mesh_seeds(), *seeds_vtk.vtkhdf_seeds(folder / "made"),
+                 *seeds.grib_seeds(folder / "made")]
         if program:
             every += seeds.netcdf_seeds(program, folder)
     for i, seed in enumerate(every):

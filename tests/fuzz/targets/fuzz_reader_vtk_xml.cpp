@@ -1,4 +1,5 @@
-// XML files of VTK: image data, rectilinear and structured grids, unstructured meshes, collections.
+// XML files of VTK: image data, rectilinear and structured grids, unstructured meshes, their
+// parallel headers, blocks, collections.
 #include <cstdint>
 #include <string_view>
 
