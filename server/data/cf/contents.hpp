@@ -44,6 +44,7 @@ struct FileVariable {
   std::string unread;        // why a variable cannot be read; `numeric` is then false
   bool packed = false;       // has scale_factor or add_offset
   bool is_unsigned = false;  // _Unsigned = "true" on a signed integer type
+  bool in_use = false;       // a coordinate that named an entry or gave the times: not omitted
 };
 
 struct FileContents {

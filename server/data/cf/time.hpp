@@ -54,6 +54,11 @@ struct TimeUnits {
 std::optional<std::vector<double>> convert_times(const std::vector<double>& values,
                                                  const TimeUnits& from, const TimeUnits& to);
 
+// Whether units count from a time: "hours since 2001-01-01".
+inline bool counts_from_a_time(std::string_view units) {
+  return units.find(" since ") != std::string_view::npos;
+}
+
 // The shortest decimal text that reads back as the same double.
 std::string number_text(double value);
 

@@ -70,7 +70,7 @@ std::string not_a_field(const FileContents& contents, const std::vector<Dimensio
   const bool is_coordinate = std::any_of(
       roles.begin(), roles.end(),
       [v](const DimensionRole& role) { return role.coordinate == static_cast<int>(v); });
-  if (is_coordinate) {
+  if (is_coordinate || variable.in_use) {
     return coordinate_variable;
   }
   if (named.bounds.count(variable.name) > 0) {

@@ -16,6 +16,7 @@
 
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/selected/extra_dimensions.hpp"
+#include "server/data/cf/selected/lead_times.hpp"
 #include "server/data/cf/time.hpp"
 
 namespace windsplat::data::cf {
@@ -23,10 +24,6 @@ namespace windsplat::data::cf {
 namespace {
 
 using Counts = std::vector<std::size_t>;
-
-bool counts_from_a_time(const FileVariable& variable) {
-  return variable.units.find(" since ") != std::string::npos;
-}
 
 // The entries of a dimension as users name them: values of its coordinate, or indices.
 class Entries {
@@ -46,7 +43,7 @@ class Entries {
   [[nodiscard]] std::string text(std::size_t index) const {
     if (variable_ == nullptr) return std::to_string(index);
     const double value = values_.at(index);
-    if (counts_from_a_time(*variable_) && std::isfinite(value)) {
+    if (counts_from_a_time(variable_->units) && std::isfinite(value)) {
       return decode_time({value}, variable_->units, variable_->calendar).steps.front().text;
     }
     const auto narrow = static_cast<float>(value);
@@ -62,7 +59,8 @@ class Entries {
     const char* end = wanted.data() + wanted.size();
     const auto [stop, fault] = std::from_chars(wanted.data(), end, number);
     const bool numeric = fault == std::errc() && stop == end;
-    const bool by_text = !numeric || (variable_ != nullptr && !counts_from_a_time(*variable_));
+    const bool by_text =
+        !numeric || (variable_ != nullptr && !counts_from_a_time(variable_->units));
     for (std::size_t i = 0; i < values_.size(); ++i) {
       if ((numeric && values_[i] == number) || (by_text && text(i) == wanted)) return i;
     }
@@ -218,6 +216,9 @@ class SelectedFile final : public ArrayFile {
                                                   ": it has " + entries->range());
     }
     entry_[at(d)] = *index;
+    if (const int named = roles_[at(d)].coordinate; named >= 0) {
+      contents_.variables[at(named)].in_use = true;
+    }
     contents_.choices.push_back(entries->choice(name, *index));
     if (value == nullptr) {
       contents_.notes.push_back(in_quotes(name) + " has " + entries->range() +
@@ -233,19 +234,21 @@ class SelectedFile final : public ArrayFile {
     dimension.is_time = true;
     if (!is_lead_time(contents_, roles_, d)) return;
     const int own = roles_[at(d)].coordinate;
-    if (own >= 0 && counts_from_a_time(contents_.variables[at(own)])) return;
+    if (own >= 0 && counts_from_a_time(contents_.variables[at(own)].units)) return;
     const auto valid = std::find_if(
         contents_.variables.begin(), contents_.variables.end(), [&](const FileVariable& variable) {
           return variable.numeric && variable.dims == std::vector<int>{d} &&
                  (variable.standard_name.empty() || variable.standard_name == "time") &&
-                 counts_from_a_time(variable) && dimension_named(contents_, variable.name) < 0;
+                 counts_from_a_time(variable.units) &&
+                 dimension_named(contents_, variable.name) < 0;
         });
     if (valid == contents_.variables.end()) {
-      contents_.notes.push_back("time steps are the lead times " + in_quotes(dimension.name));
+      contents_.notes.push_back(lead_time_note(dimension.name));
       return;
     }
     contents_.notes.push_back("time steps are the valid times " + in_quotes(valid->name) +
                               " of the lead times " + in_quotes(dimension.name));
+    if (own >= 0) contents_.variables[at(own)].in_use = true;
     dimension.name = valid->name;  // which makes them its coordinate
   }
 
@@ -261,8 +264,8 @@ Result<std::unique_ptr<ArrayFile>> selected(std::unique_ptr<ArrayFile> file,
                                             const Selection& selection) {
   auto out = std::make_unique<SelectedFile>(std::move(file));
   if (auto done = out->choose(selection); !done) return done.error();
-  if (!out->is_changed()) return out->give_base();
-  return std::unique_ptr<ArrayFile>(std::move(out));
+  if (!out->is_changed()) return with_valid_times(out->give_base());
+  return with_valid_times(std::move(out));
 }
 
 Result<void> check_selection(const FileContents& contents, const Selection& selection) {

@@ -14,7 +14,8 @@ namespace windsplat::data::cf {
 // order, without the dimensions that `selection` names and without those of
 // find_extra_dimensions(), of which the first entry is taken and noted. A dimension that it does
 // not have is left to check_selection(). Lead times become the time axis, with the valid times if
-// the file has them. Errors: not_found if a dimension has no such entry, bad_data.
+// the file has them or they follow from a reference time (with_valid_times()). Errors: not_found if
+// a dimension has no such entry, bad_data.
 Result<std::unique_ptr<ArrayFile>> selected(std::unique_ptr<ArrayFile> file,
                                             const Selection& selection);
 

@@ -268,15 +268,82 @@ TEST(SelectedEntries, LeadTimesAreStepsWithTheirValidTimes) {
                        "2001-01-02T00:00:00Z): the first is shown"));
 }
 
-TEST(SelectedEntries, LeadTimesAreStepsWithoutValidTimesToo) {
+TEST(SelectedEntries, LeadTimesFollowTheChosenReferenceTime) {
   const Folder folder;
   write_forecast(folder / "f.nc", false);
   const auto source = opened(folder / "f.nc?reftime=24");
   ASSERT_NE(source, nullptr);
   ASSERT_EQ(source->info().steps.size(), 3U);
-  EXPECT_EQ(source->info().steps[1].value, 6);
+  EXPECT_EQ(source->info().steps[1].value, 30);
+  EXPECT_EQ(source->info().steps[1].text, "2001-01-02T06:00:00Z");
+  EXPECT_EQ(source->info().time_units, "hours since 2001-01-01");
   EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 11123);
-  EXPECT_TRUE(has_note(source->info(), "time steps are the lead times 'leadtime'"));
+  EXPECT_TRUE(has_note(source->info(),
+                       "time steps are the lead times 'leadtime' after the reference time "
+                       "2001-01-02T00:00:00Z"));
+  EXPECT_TRUE(source->info().left_out.empty());
+}
+
+// A forecast of two steps, with a single reference time in days. Times in half days.
+void write_one_forecast(const std::string& path, const std::string& lead_units, double day,
+                        const char* axis = "") {
+  NetcdfMaker file(path);
+  const int l = file.axis("step", {0.5, 1}, lead_units, "forecast_period");
+  if (*axis != '\0') file.text(file.variable_id("step"), "axis", axis);
+  const auto [z, y, x] = space_of(file);
+  const int reference = file.variable("start", NC_DOUBLE, {}, {day});
+  file.text(reference, "units", "days since 2000-02-28");
+  file.text(reference, "calendar", "noleap");
+  file.text(reference, "standard_name", "forecast_reference_time");
+  file.variable("t", NC_FLOAT, {l, z, y, x}, tagged({2, 2, 3, 4}));
+}
+
+TEST(SelectedEntries, LeadTimesFollowTheOnlyReferenceTime) {
+  const Folder folder;
+  write_one_forecast(folder / "f_1.nc", "days", 0.5);
+  write_one_forecast(folder / "f_2.nc", "days", 1.5);
+  const auto source = opened(folder / "f_1.nc");
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  EXPECT_EQ(source->info().steps[0].text, "2000-03-01T00:00:00Z") << "no leap day";
+  EXPECT_EQ(source->info().steps[1].value, 1.5);
+  EXPECT_TRUE(source->info().left_out.empty());
+  const auto series = opened(folder / "f_*.nc");
+  ASSERT_NE(series, nullptr);
+  ASSERT_EQ(series->info().steps.size(), 4U);
+  EXPECT_EQ(series->info().steps[3].text, "2000-03-02T12:00:00Z");
+  EXPECT_EQ(last_of(volume_of(*series, "t", 3)), 1123);
+}
+
+TEST(SelectedEntries, LeadTimesOnADeclaredTimeAxisFollowItToo) {
+  const Folder folder;
+  write_one_forecast(folder / "f.nc", "hours", 0.5, "T");
+  const auto source = opened(folder / "f.nc");
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  EXPECT_EQ(source->info().steps[1].text, "2000-02-28T13:00:00Z");
+  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 1123);
+}
+
+TEST(SelectedEntries, LeadTimesOfUnknownUnitsAreSteps) {
+  const Folder folder;
+  write_one_forecast(folder / "f.nc", "fortnights", 0.5);
+  const auto source = opened(folder / "f.nc");
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  EXPECT_EQ(source->info().steps[0].value, 0.5);
+  EXPECT_TRUE(has_note(source->info(), "time steps are the lead times 'step'"));
+  EXPECT_FALSE(has_note(source->info(), "after the reference time"));
+}
+
+TEST(SelectedEntries, TheCoordinateOfAChoiceIsNotOmitted) {
+  const Folder folder;
+  write_ensemble(folder / "e.nc");
+  for (const char* name : {"e.nc", "e.nc?number=5", "e.nc?number=5&time=6"}) {
+    const auto source = opened(folder / name);
+    ASSERT_NE(source, nullptr) << name;
+    EXPECT_TRUE(source->info().left_out.empty()) << name;
+  }
 }
 
 TEST(SelectedEntries, ReferenceTimesAreStepsIfALeadTimeIsChosen) {

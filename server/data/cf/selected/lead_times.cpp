@@ -1,0 +1,149 @@
+#include "server/data/cf/selected/lead_times.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/selected/extra_dimensions.hpp"
+#include "server/data/cf/time.hpp"
+
+namespace windsplat::data::cf {
+
+namespace {
+
+struct ForecastTimes {
+  int dimension = -1;
+  int lead = -1;  // variables
+  int reference = -1;
+};
+
+// The lead times and the only reference time of a file, as far as it has them.
+std::optional<ForecastTimes> times_of(const FileContents& contents) {
+  const std::vector<DimensionRole> roles = classify_dimensions(contents);
+  ForecastTimes out;
+  for (std::size_t d = 0; d < roles.size(); ++d) {
+    const int own = roles[d].coordinate;
+    const bool is_time = contents.dimensions[d].is_time || roles[d].role == Role::time;
+    if (!is_time || own < 0 || counts_from_a_time(contents.variables[at(own)].units) ||
+        !is_lead_time(contents, roles, static_cast<int>(d))) {
+      continue;
+    }
+    out.dimension = static_cast<int>(d);
+    out.lead = own;
+  }
+  for (std::size_t v = 0; v < contents.variables.size() && out.reference < 0; ++v) {
+    const FileVariable& variable = contents.variables[v];
+    const bool is_single = std::all_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
+      return contents.dimensions.at(at(d)).length == 1;
+    });
+    if (variable.numeric && is_single && variable.standard_name == "forecast_reference_time" &&
+        counts_from_a_time(variable.units)) {
+      out.reference = static_cast<int>(v);
+    }
+  }
+  return out.lead < 0 || out.reference < 0 ? std::nullopt : std::optional(out);
+}
+
+// A file and a variable of known values, the last one.
+class TimedFile final : public ArrayFile {
+ public:
+  TimedFile(std::unique_ptr<ArrayFile> base, FileContents contents, std::vector<double> times)
+      : base_(std::move(base)), contents_(std::move(contents)), times_(std::move(times)) {
+    if (const auto bytes = base_->stored_bytes()) set_stored_bytes(*bytes);
+  }
+
+  [[nodiscard]] const FileContents& contents() const override { return contents_; }
+  [[nodiscard]] const std::string& name() const override { return base_->name(); }
+  [[nodiscard]] std::string origin() const override { return base_->origin(); }
+  [[nodiscard]] std::string format() const override { return base_->format(); }
+  [[nodiscard]] std::string identity() const override { return base_->identity(); }
+  [[nodiscard]] Numbers numbers(int variable, const char* attribute) const override {
+    return is_own(variable) ? Numbers() : base_->numbers(variable, attribute);
+  }
+  [[nodiscard]] std::string text_of(int variable, const char* attribute) const override {
+    return is_own(variable) ? std::string() : base_->text_of(variable, attribute);
+  }
+  [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override {
+    return is_own(variable) ? std::vector{times_.size()} : base_->chunk(variable);
+  }
+  [[nodiscard]] std::size_t chunk_cost_bytes(int variable) const override {
+    return is_own(variable) ? 0 : base_->chunk_cost_bytes(variable);
+  }
+  [[nodiscard]] Unwritten unwritten(int variable, std::size_t most) const override {
+    return is_own(variable) ? Unwritten() : base_->unwritten(variable, most);
+  }
+  void forget_chunks(int variable) const override {
+    if (!is_own(variable)) base_->forget_chunks(variable);
+  }
+  Result<void> read(int variable, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count, double* out) const override {
+    if (!is_own(variable)) return base_->read(variable, start, count, out);
+    const auto from = times_.begin() + static_cast<std::ptrdiff_t>(start.at(0));
+    std::copy_n(from, count.at(0), out);
+    return {};
+  }
+  Result<void> read(int variable, const std::vector<std::size_t>& start,
+                    const std::vector<std::size_t>& count, float* out) const override {
+    return base_->read(variable, start, count, out);  // the own variable is float64
+  }
+
+ private:
+  [[nodiscard]] bool is_own(int variable) const {
+    return at(variable) + 1 == contents_.variables.size();
+  }
+
+  std::unique_ptr<ArrayFile> base_;
+  FileContents contents_;
+  std::vector<double> times_;
+};
+
+}  // namespace
+
+std::string lead_time_note(const std::string& dimension) {
+  return "time steps are the lead times " + in_quotes(dimension);
+}
+
+Result<std::unique_ptr<ArrayFile>> with_valid_times(std::unique_ptr<ArrayFile> file) {
+  const auto found = times_of(file->contents());
+  if (!found) return file;
+  FileContents contents = file->contents();
+  FileVariable& lead = contents.variables[at(found->lead)];
+  FileVariable& reference = contents.variables[at(found->reference)];
+  const auto leads = unpacked_values(*file, found->lead);
+  if (!leads) return leads.error();
+  const auto since = unpacked_values(*file, found->reference);
+  if (!since) return since.error();
+  const auto decoded = decode_time(*since, reference.units, reference.calendar);
+  if (!decoded.reason.empty()) return file;
+  const std::string date = decoded.steps.front().text;
+  auto times = convert_times(*leads, {lead.units + " since " + date, reference.calendar},
+                             {reference.units, reference.calendar});
+  if (!times) return file;
+  FileDimension& dimension = contents.dimensions[at(found->dimension)];
+  const std::string note = lead_time_note(dimension.name);
+  std::erase(contents.notes, note);
+  contents.notes.push_back(note + " after the reference time " + date);
+  FileVariable valid;
+  valid.name = "valid_time";
+  while (variable_named(contents, valid.name) >= 0 || dimension_named(contents, valid.name) >= 0) {
+    valid.name += '_';
+  }
+  valid.type = "float64";
+  valid.numeric = true;
+  valid.dims = {found->dimension};
+  valid.standard_name = "time";
+  valid.units = reference.units;
+  valid.calendar = reference.calendar;
+  lead.in_use = true;
+  reference.in_use = true;
+  dimension.name = valid.name;  // which makes them its coordinate
+  contents.variables.push_back(std::move(valid));
+  return std::unique_ptr<ArrayFile>(
+      std::make_unique<TimedFile>(std::move(file), std::move(contents), std::move(*times)));
+}
+
+}  // namespace windsplat::data::cf
