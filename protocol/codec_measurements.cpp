@@ -54,6 +54,30 @@ Json result_json(const JobResult& result) {
                 {"psnr", differs ? canonical_number(reference.psnr) : Json(nullptr)}}}};
 }
 
+// Names of dimensions -> entries: a text, or a number as its shortest decimal text.
+void read_selection(const Json& value, const std::string& pointer, Faults& faults,
+                    std::vector<std::pair<std::string, std::string>>& out) {
+  if (!value.is_object()) return faults.add(pointer, "must be an object");
+  if (value.empty() || value.size() > limits::selection_entries_max) {
+    return faults.add(
+        pointer, "must name 1 to " + std::to_string(limits::selection_entries_max) + " dimensions");
+  }
+  for (const auto& [name, entry] : value.items()) {
+    const std::string at = join_pointer(pointer, name);
+    if (name.empty() || (!entry.is_number() && !entry.is_string())) {
+      faults.add(at, "must be the value of an entry: a number or a text");
+      continue;
+    }
+    const std::string text =
+        entry.is_string() ? entry.get<std::string>() : canonical_number(entry.get<double>()).dump();
+    if (text.empty() || text.size() > limits::name_chars_max) {
+      faults.add(at, "must have 1 to " + std::to_string(limits::name_chars_max) + " characters");
+    } else {
+      out.emplace_back(name, text);
+    }
+  }
+}
+
 Json point_json(const ForecastPoint& point) {
   return Json{{"method", point.method},
               {"slabThickness", number_or_null(point.slab_thickness)},
@@ -143,16 +167,25 @@ std::string encode_jobs(const std::vector<JobDescription>& jobs) {
   return dump(Json{{"jobs", std::move(list)}});
 }
 
-Result<std::string> parse_dataset_request(std::string_view json) {
+Result<DatasetRequest> parse_dataset_request(std::string_view json) {
   const auto tree = parse_json(json);
   if (!tree) return tree.error();
   Faults faults;
+  DatasetRequest out;
   ObjectReader reader(*tree, "", faults);
-  std::string path;
-  reader.text("path", path, 1, Presence::required, limits::path_chars_max);
+  const bool by_entry =
+      tree->is_object() && (tree->contains("from") || tree->contains("selection"));
+  if (by_entry) {
+    reader.text("from", out.from, 1, Presence::required);
+    if (const Json* value = reader.child("selection", Presence::required)) {
+      read_selection(*value, reader.at("selection"), faults, out.selection);
+    }
+  } else {
+    reader.text("path", out.path, 1, Presence::required, limits::path_chars_max);
+  }
   reader.finish();
   if (!faults.empty()) return faults.error();
-  return path;
+  return out;
 }
 
 }  // namespace windsplat::protocol

@@ -168,6 +168,7 @@ Json limits_json(std::int64_t image_pixels_max) {
               {"decodeMsMax", canonical_number(limits::decode_ms_max)},
               {"problemErrorsMax", limits::problem_errors_max},
               {"pathCharsMax", limits::path_chars_max},
+              {"selectionEntriesMax", limits::selection_entries_max},
               {"histogramBinsMax", limits::histogram_bins_max},
               {"histogramClipMax", canonical_number(limits::histogram_clip_max)},
               {"coordinateMax", canonical_number(limits::coordinate_max)},

@@ -58,6 +58,7 @@ inline constexpr double decode_ms_max = 1e9;
 inline constexpr std::size_t problem_errors_max = 16;  // invalid values listed in one response
 
 inline constexpr std::size_t path_chars_max = 4096;  // code points of a path below the data root
+inline constexpr std::size_t selection_entries_max = 16;  // entries chosen by one request
 inline constexpr int histogram_bins_max = 4096;
 inline constexpr double histogram_clip_max = 0.49;  // maximum fraction of the values at either end
 inline constexpr double coordinate_max = 1e30;      // largest coordinate of a probe, in the units

@@ -124,7 +124,14 @@ std::string encode_forecast(const ForecastDescription& forecast);
 std::string encode_job(const JobDescription& job);
 std::string encode_jobs(const std::vector<JobDescription>& jobs);
 
-// Returns the path in the body of POST /v1/datasets. Errors of parsers: see codec.hpp.
-Result<std::string> parse_dataset_request(std::string_view json);
+// The body of POST /v1/datasets: a path below the data root, or a listed dataset and other entries
+// of its choices.
+struct DatasetRequest {
+  std::string path;
+  std::string from;
+  std::vector<std::pair<std::string, std::string>> selection;  // dimension, entry
+};
+// Errors of parsers: see codec.hpp.
+Result<DatasetRequest> parse_dataset_request(std::string_view json);
 
 }  // namespace windsplat::protocol

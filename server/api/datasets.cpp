@@ -15,13 +15,14 @@ namespace {
 
 http::Response no_content() { return {204, "", {{"Cache-Control", "no-store"}}, {}}; }
 
-http::Response open_in_job(tasks::Backend& backend, const std::string& base_path,
-                           data::Location location) {
+// `open`: takes a CancelToken and returns the id of the dataset.
+template <class Open>
+http::Response open_in_job(tasks::Backend& backend, const std::string& base_path, Open open) {
   const auto job =
       backend.jobs.submit("dataset",
-                          [&backend, location = std::move(location)](
+                          [&backend, open = std::move(open)](
                               const tasks::Jobs::Handle& handle) -> Result<protocol::JobResult> {
-                            auto opened = backend.catalogue.open(location, handle.cancel);
+                            Result<std::string> opened = open(handle.cancel);
                             backend.metrics.dataset_opened(opened.has_value());
                             if (!opened) return opened.error();
                             return std::move(*opened);
@@ -33,9 +34,32 @@ http::Response open_in_job(tasks::Backend& backend, const std::string& base_path
 http::Response locate_and_open(const ServerOptions& options, tasks::Backend& backend,
                                const std::string& path) {
   const auto located = data::locate_beneath(options.data_root, path);
-  if (located) return open_in_job(backend, options.base_path, *located);
+  if (located) {
+    return open_in_job(backend, options.base_path,
+                       [&backend, location = *located](const CancelToken& cancel) {
+                         return backend.catalogue.open(location, cancel);
+                       });
+  }
   return http::problem_response(
       make_error_at(located.error().kind, "/path", located.error().message));
+}
+
+// No file is named: other entries of the files of a listed dataset.
+http::Response open_entries(const ServerOptions& options, tasks::Backend& backend,
+                            const protocol::DatasetRequest& request) {
+  if (options.fixed_entries) {
+    return http::problem_response(
+        403, "Forbidden",
+        "choosing other entries is disabled: the server runs with --fixed-entries");
+  }
+  data::Selection chosen;
+  for (const auto& [dimension, value] : request.selection) chosen.push_back({dimension, value});
+  const auto entries = backend.catalogue.entries_of(request.from, chosen);
+  if (!entries) return http::problem_response(entries.error());
+  return open_in_job(backend, options.base_path,
+                     [&backend, entries = *entries](const CancelToken& cancel) {
+                       return backend.catalogue.open_entries(entries, cancel);
+                     });
 }
 
 }  // namespace
@@ -54,24 +78,28 @@ http::Response job_response(metrics::Metrics& metrics, const std::string& base_p
 
 void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
                   tasks::Backend& backend, const http::Request& request, http::Reply reply) {
+  if (!is_json(request.header("Content-Type"))) {
+    reply(http::problem_response(415, "Unsupported Media Type",
+                                 "Content-Type must be application/json: {\"path\": ...}"));
+    return;
+  }
+  auto wanted = protocol::parse_dataset_request(request.body);
+  if (!wanted) {
+    reply(http::problem_response(wanted.error()));
+    return;
+  }
+  if (!wanted->from.empty()) {
+    reply(open_entries(options, backend, *wanted));
+    return;
+  }
   if (options.data_root.empty()) {
     reply(http::problem_response(403, "Forbidden",
                                  "opening files is disabled: start the server with "
                                  "--data-root"));
     return;
   }
-  if (!is_json(request.header("Content-Type"))) {
-    reply(http::problem_response(415, "Unsupported Media Type",
-                                 "Content-Type must be application/json: {\"path\": ...}"));
-    return;
-  }
-  auto path = protocol::parse_dataset_request(request.body);
-  if (!path) {
-    reply(http::problem_response(path.error()));
-    return;
-  }
   run_later(look_ups, request, std::move(reply), "a look-up", nullptr,
-            [&options, &backend, path = std::move(*path)] {
+            [&options, &backend, path = std::move(wanted->path)] {
               return locate_and_open(options, backend, path);
             });
 }

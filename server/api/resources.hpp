@@ -36,7 +36,7 @@ http::Response get_datasets(const tasks::Catalogue& catalogue);
 void get_dataset(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                  const http::Request& request, http::Reply reply);
 
-// Opens a file below a root given by --data-root, in a job.
+// Opens a file below a root given by --data-root, or other entries of a listed dataset, in a job.
 void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
                   tasks::Backend& backend, const http::Request& request, http::Reply reply);
 http::Response delete_dataset(tasks::Catalogue& catalogue, const std::string& id,

@@ -29,6 +29,7 @@ struct ServerOptions {
   std::vector<std::string> allow_hosts;  // additional names for both, without a port
   // The folder below which POST /v1/datasets opens files, absolute; empty: none.
   std::string data_root;
+  bool fixed_entries = false;  // clients may not open other entries of listed datasets
   std::shared_ptr<views::SavedViews> views;  // null: in memory only
   int sessions_max = 64;
   access::Limits limits;

@@ -89,7 +89,7 @@ http::Response get_metrics(const metrics::Metrics& metrics, const tasks::Catalog
   http::Response response;
   response.content_type = "text/plain; version=0.0.4; charset=utf-8";
   response.headers = {{"Cache-Control", "no-store"}};
-  response.body = http::Body::of(metrics.text(catalogue.counts()));
+  response.body = http::Body::of(metrics.text(catalogue.store().counts()));
   return response;
 }
 

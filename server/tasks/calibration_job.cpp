@@ -43,7 +43,7 @@ class Study {
     complete_ =
         static_cast<bool>(run_guarded<void>("a calibration run", stop, [&]() -> Result<void> {
           const auto room =
-              backend_.catalogue.reserve(frame::calibration_bytes(completed_.view().image));
+              backend_.catalogue.store().reserve(frame::calibration_bytes(completed_.view().image));
           if (!room) return room.error();  // other users occupy the memory
           return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
         }));

@@ -11,6 +11,7 @@ namespace windsplat::tasks {
 Result<std::shared_ptr<data::Dataset>> Catalogue::find(const std::string& id) const {
   auto dataset = store_->find(id);
   if (!dataset) return make_error_at(ErrorKind::not_found, "/dataset", dataset.error().message);
+  chosen_.touch(id, data::ChosenDatasets::Clock::now());
   return dataset;
 }
 
@@ -80,20 +81,28 @@ Result<protocol::DatasetDescription> Catalogue::describe(const std::string& id,
 }
 
 Result<std::string> Catalogue::open(const data::Location& location, const CancelToken& cancel) {
+  auto opened = open_listed(location, cancel);
+  if (!opened) return opened.error();
+  chosen_.remove(opened->first);  // named by a client, so it stays
+  return std::move(opened->first);
+}
+
+Result<std::pair<std::string, bool>> Catalogue::open_listed(const data::Location& location,
+                                                            const CancelToken& cancel) {
   const auto opened = open_and_want(location);
   if (!opened) return opened.error();
-  const auto& [dataset, openers] = *opened;
+  const auto& [dataset, openers, is_new] = *opened;
   std::string id = dataset->info().id;
   // A dataset that cannot be described must not invalidate the whole list.
   const auto description = scene::describe(*dataset, scene::RangesOf::none);
-  if (description && !cancel.cancelled()) return id;
+  if (description && !cancel.cancelled()) return std::pair(std::move(id), is_new);
   no_longer_want(id, openers);
   if (!description) return description.error();
   return make_error(ErrorKind::cancelled, "request cancelled");
 }
 
-Result<std::pair<std::shared_ptr<data::Dataset>, Catalogue::OpenersPtr>> Catalogue::open_and_want(
-    const data::Location& location) {
+Result<std::tuple<std::shared_ptr<data::Dataset>, std::shared_ptr<Catalogue::Openers>, bool>>
+Catalogue::open_and_want(const data::Location& location) {
   for (;;) {
     auto added = store_->add_or_find(location);
     if (!added) return added.error();
@@ -101,15 +110,46 @@ Result<std::pair<std::shared_ptr<data::Dataset>, Catalogue::OpenersPtr>> Catalog
     const std::lock_guard lock(mutex_);
     // The dataset may have been removed before this opener was registered.
     if (const auto listed = store_->find(id); !listed || *listed != added->dataset) continue;
-    OpenersPtr& openers = openers_[id];
+    std::shared_ptr<Openers>& openers = openers_[id];
     if (!openers) openers = std::make_shared<Openers>();
     ++openers->count;
     openers->brought = openers->brought || added->is_new;
-    return std::pair(std::move(added->dataset), openers);
+    return std::tuple(std::move(added->dataset), openers, added->is_new);
   }
 }
 
-void Catalogue::no_longer_want(const std::string& id, const OpenersPtr& openers) {
+Result<data::ChosenEntries> Catalogue::entries_of(const std::string& id,
+                                                  const data::Selection& chosen) const {
+  const auto dataset = find(id);
+  if (!dataset) return make_error_at(ErrorKind::not_found, "/from", dataset.error().message);
+  return data::choose_entries((*dataset)->info(), store_->location(id), chosen);
+}
+
+Result<std::string> Catalogue::open_entries(const data::ChosenEntries& entries,
+                                            const CancelToken& cancel) {
+  for (const auto& dataset : store_->all()) {
+    const std::string& id = dataset->info().id;
+    if (!data::shows(dataset->info(), store_->location(id), entries)) continue;
+    chosen_.touch(id, data::ChosenDatasets::Clock::now());
+    return id;
+  }
+  const auto surplus = chosen_.make_room();
+  if (!surplus) return surplus.error();
+  if (*surplus) forget(**surplus);
+  auto opened = open_listed(entries.location, cancel);
+  if (!opened) return opened.error();
+  auto& [id, is_new] = *opened;
+  if (is_new) chosen_.add(id, data::ChosenDatasets::Clock::now());
+  return std::move(id);
+}
+
+std::vector<std::string> Catalogue::look_after() {
+  for (const std::string& id : chosen_.take_unused(data::ChosenDatasets::Clock::now())) forget(id);
+  store_->release_idle();
+  return store_->look_for_changes();
+}
+
+void Catalogue::no_longer_want(const std::string& id, const std::shared_ptr<Openers>& openers) {
   const std::lock_guard lock(mutex_);
   if (--openers->count > 0) return;
   const auto known = openers_.find(id);
@@ -134,6 +174,7 @@ void Catalogue::forget(const std::string& id) {
 
 void Catalogue::remove(const std::string& id) {
   described_.erase(id);
+  chosen_.remove(id);
   (void)store_->remove(id);  // not_found: already removed
 }
 

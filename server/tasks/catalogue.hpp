@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/resident/chosen_datasets.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/frame/cost.hpp"
 
@@ -25,6 +27,8 @@ class Catalogue {
   explicit Catalogue(std::shared_ptr<data::Store> store) : store_(std::move(store)) {}
 
   [[nodiscard]] Result<std::shared_ptr<data::Dataset>> find(const std::string& id) const;
+  // Keeps a dataset that open_entries() opened from being closed while the result exists.
+  [[nodiscard]] data::ChosenDatasets::Use use(const std::string& id) { return chosen_.use(id); }
 
   // All datasets, with ranges where they are known. Loads nothing.
   [[nodiscard]] Result<std::vector<protocol::DatasetDescription>> list() const;
@@ -37,17 +41,21 @@ class Catalogue {
   // callers that open a dataset share it. Errors: those of opening; cancelled, in which case the
   // dataset is listed only if another caller still holds it. May block for a long time.
   Result<std::string> open(const data::Location& location, const CancelToken& cancel);
-  // Replaces the prefetch requests of a session; see data::Store::request_prefetch.
-  void request_prefetch(std::uint64_t owner, std::vector<data::PrefetchRequest> requests) {
-    store_->request_prefetch(owner, std::move(requests));
-  }
-  // Reopens datasets that changed on disk and closes files that are not being read; returns the ids
-  // of the changed ones. Do not call it on the io thread.
-  std::vector<std::string> look_after() {
-    store_->release_idle();
-    return store_->look_for_changes();
-  }
-  [[nodiscard]] data::BudgetCounts counts() const { return store_->counts(); }
+
+  // The files of a listed dataset at `chosen`, which replaces entries that it shows. Reads nothing.
+  // Errors: not_found at /from; invalid for a dimension that is not one of its choices.
+  [[nodiscard]] Result<data::ChosenEntries> entries_of(const std::string& id,
+                                                       const data::Selection& chosen) const;
+  // Opens them like open(), unless a listed dataset already shows these entries of these files.
+  // The dataset is closed once it is not used any more (data::ChosenDatasets). Errors: those of
+  // open(); busy.
+  Result<std::string> open_entries(const data::ChosenEntries& entries, const CancelToken& cancel);
+  // For memory, prefetching and the end of all reads.
+  [[nodiscard]] data::Store& store() const { return *store_; }
+  // Reopens datasets that changed on disk, closes files that are not being read, and datasets that
+  // open_entries() opened and nobody uses; returns the ids of the changed ones. Do not call it on
+  // the io thread.
+  std::vector<std::string> look_after();
   // Calls load(data::Dataset&). If memory does not suffice, waits for its turn until others release
   // memory (data::Dataset::in_turn()) and calls it once more. `cancel` ends the wait with the error
   // cancelled.
@@ -64,13 +72,6 @@ class Catalogue {
     handle = dataset.in_turn(cancel);
     return load(handle);
   }
-  // See data::Store::reserve().
-  Result<std::shared_ptr<const void>> reserve(std::uint64_t bytes) {
-    return store_->reserve(bytes);
-  }
-  [[nodiscard]] std::uint64_t room() const { return store_->room(); }
-  // See data::Store::end().
-  void end() { store_->end(); }
   // Whether open() added it after the start of the server.
   [[nodiscard]] bool is_opened_later(const std::string& id) const;
   void forget(const std::string& id);
@@ -91,16 +92,19 @@ class Catalogue {
     protocol::DatasetDescription description;
     protocol::DatasetDescription brief;  // without steps and axes, of which there may be millions
   };
-  // Number of requests that opened a dataset by open() and still hold it.
+  // Number of requests that opened a dataset by open() and still hold it. Guarded by the mutex.
   struct Openers {
     int count = 0;
     bool brought = false;  // added by one of them; removed with the last one
   };
-  using OpenersPtr = std::shared_ptr<Openers>;  // guarded by the mutex
-  [[nodiscard]] Result<std::pair<std::shared_ptr<data::Dataset>, OpenersPtr>> open_and_want(
-      const data::Location& location);
+  // The last value: whether this call opened it.
+  [[nodiscard]] Result<std::tuple<std::shared_ptr<data::Dataset>, std::shared_ptr<Openers>, bool>>
+  open_and_want(const data::Location& location);
+  // The id, and whether this call opened it.
+  [[nodiscard]] Result<std::pair<std::string, bool>> open_listed(const data::Location& location,
+                                                                 const CancelToken& cancel);
   void remove(const std::string& id);  // requires the mutex
-  void no_longer_want(const std::string& id, const OpenersPtr& openers);
+  void no_longer_want(const std::string& id, const std::shared_ptr<Openers>& openers);
   // The cached description of a dataset; `brief`: for a list.
   [[nodiscard]] std::optional<protocol::DatasetDescription> known(const data::Dataset& dataset,
                                                                   bool brief) const;
@@ -110,7 +114,8 @@ class Catalogue {
   std::shared_ptr<data::Store> store_;
   mutable std::mutex mutex_;
   std::map<std::string, Described> described_;
-  std::map<std::string, OpenersPtr> openers_;  // keyed by dataset
+  std::map<std::string, std::shared_ptr<Openers>> openers_;  // keyed by dataset
+  mutable data::ChosenDatasets chosen_;                      // find() notes the time of use
 };
 
 // An out-of-memory error extended by the name of what was being loaded; other errors are unchanged.

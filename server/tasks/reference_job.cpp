@@ -90,8 +90,8 @@ Result<protocol::JobResult> draw_reference(Backend& backend, const protocol::Vie
   description.id = id_of(completed->view(), dataset);
   if (const auto kept = backend.references.find(description.id)) return kept->description;
   const frame::WorkMemory memory{
-      [&](std::uint64_t bytes) { return backend.catalogue.reserve(bytes); },
-      [&] { return backend.catalogue.room(); }};
+      [&](std::uint64_t bytes) { return backend.catalogue.store().reserve(bytes); },
+      [&] { return backend.catalogue.store().room(); }};
   auto begun = frame::ReferenceDrawing::begin(*completed, dataset, backend.pool->size(),
                                               handle.cancel, memory);
   if (!begun) return begun.error();

@@ -113,6 +113,7 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   running_.emplace(effect.ticket, cancel);
   auto dataset = backend_.catalogue.find(effect.view.dataset);
   if (!dataset) return reply(effect.ticket, dataset.error());
+  shown_ = backend_.catalogue.use(effect.view.dataset);
   // A final frame may be larger than the view that was checked before.
   if (const auto fits = backend_.check(effect.view); !fits) {
     return reply(effect.ticket, fits.error());
@@ -202,7 +203,7 @@ void Viewer::resolve_prefetch(Backend& backend, std::uint64_t owner, PrefetchSta
   });
   const std::lock_guard lock(requests.mutex);
   if (found && requests.epoch == epoch)
-    backend.catalogue.request_prefetch(owner, std::move(*found));
+    backend.catalogue.store().request_prefetch(owner, std::move(*found));
 }
 
 void Viewer::cancel_prefetch() {
@@ -210,7 +211,7 @@ void Viewer::cancel_prefetch() {
   requests_->newest.reset();
   requests_->of = nullptr;
   ++requests_->epoch;
-  backend_.catalogue.request_prefetch(owner_, {});
+  backend_.catalogue.store().request_prefetch(owner_, {});
 }
 
 void Viewer::start(const session::Calibrate& effect) {

@@ -46,6 +46,7 @@ class Viewer {
   Backend& backend_;
   const std::uint64_t owner_;
   const std::string payer_;
+  data::ChosenDatasets::Use shown_;               // of the dataset of the newest picture
   std::map<std::uint64_t, CancelToken> running_;  // keyed by ticket
   std::shared_ptr<PrefetchState> requests_;       // shared with the jobs that evaluate them
   // Shared with jobs.

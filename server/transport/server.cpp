@@ -51,8 +51,8 @@ struct Server::State {
     parts.connections.each([](Connection& connection) { connection.abort(); });
     parts.backend.renderer.cancel_all();
     if (ending.joinable()) ending.join();
-    parts.backend.catalogue.end();  // ends reads, so that no executor blocks in one
-    parts.end();                    // ends the threads of the executors
+    parts.backend.catalogue.store().end();  // ends reads, so that no executor blocks in one
+    parts.end();                            // ends the threads of the executors
     if (handshakes) handshakes->stop();
     // Releases handlers that were pending when the loop stopped.
     io.restart();
@@ -167,7 +167,7 @@ struct Server::State {
       parts.backend.renderer.cancel_all();
       ending = std::thread([this] {
         try {
-          parts.backend.catalogue.end();
+          parts.backend.catalogue.store().end();
         } catch (const std::exception& failure) {
           tasks::log_fault("pending reads could not be ended", failure);
         }

@@ -125,8 +125,15 @@ TEST(Measurements, JobsHaveTheirShape) {
   expect_shape("jobs", encode_jobs({}));
 }
 
-TEST(Measurements, DatasetRequestIsAPathOnly) {
-  EXPECT_EQ(*parse_dataset_request(R"({"path":"a/b.nc"})"), "a/b.nc");
+TEST(Measurements, DatasetRequestIsAPathOrEntries) {
+  using ::testing::Pair;
+  EXPECT_EQ(parse_dataset_request(R"({"path":"a/b.nc"})")->path, "a/b.nc");
+  const auto entries =
+      parse_dataset_request(R"({"from":"gcm","selection":{"number":3,"bin":0.5,"run":"a b"}})");
+  ASSERT_TRUE(entries);
+  EXPECT_EQ(entries->from, "gcm");
+  EXPECT_THAT(entries->selection, ::testing::UnorderedElementsAre(
+                                      Pair("number", "3"), Pair("bin", "0.5"), Pair("run", "a b")));
   const std::string longest(limits::path_chars_max, 'p');
   EXPECT_TRUE(parse_dataset_request(R"({"path":")" + longest + "\"}"));
   for (const auto& [json, pointer] : std::vector<std::pair<std::string, std::string>>{
@@ -137,6 +144,14 @@ TEST(Measurements, DatasetRequestIsAPathOnly) {
            {R"({"path":"a\u0000b"})", "/path"},
            {R"({})", "/path"},
            {R"({"path":"a","mode":1})", "/mode"},
+           {R"({"path":"a","from":"b","selection":{"n":1}})", "/path"},
+           {R"({"from":"b"})", "/selection"},
+           {R"({"selection":{"n":1}})", "/from"},
+           {R"({"from":"b","selection":{}})", "/selection"},
+           {R"({"from":"b","selection":3})", "/selection"},
+           {R"({"from":"b","selection":{"n":[1]}})", "/selection/n"},
+           {R"({"from":"b","selection":{"n":""}})", "/selection/n"},
+           {R"({"from":"b","selection":{"":1}})", "/selection/"},
            {R"([])", ""}}) {
     const auto refused = parse_dataset_request(json);
     ASSERT_FALSE(refused) << json;

@@ -86,6 +86,11 @@ void add_data_options(CLI::App& command, ServeArguments& arguments) {
       ->envname("WINDSPLAT_DATA_ROOT")
       ->type_name("DIR");
   command
+      .add_flag("--fixed-entries", arguments.fixed_entries,
+                "Serve only the members, reference times or bands named here; without it, clients "
+                "may choose others of the same files")
+      ->envname("WINDSPLAT_FIXED_ENTRIES");
+  command
       .add_option("--state-dir", arguments.state_dir,
                   "Store saved views in this folder; default: in memory only")
       ->envname("WINDSPLAT_STATE_DIR")

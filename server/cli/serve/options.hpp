@@ -21,6 +21,7 @@ struct ServeArguments {
   std::string tls_key;
   std::string base_path = "/";
   std::string data_root;
+  bool fixed_entries = false;
   std::string state_dir;
   std::string memory_limit = "8G";
   std::string storage = "float32";

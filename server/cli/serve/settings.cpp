@@ -136,6 +136,7 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   options.token = std::move(*token);
   options.tls = std::move(*tls);
   options.data_root = std::move(*data_root);
+  options.fixed_entries = arguments.fixed_entries;
   options.address = listen->address;
   options.port = listen->port;
   options.local_hosts_only = listen->loopback;

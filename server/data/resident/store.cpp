@@ -372,6 +372,12 @@ std::vector<DatasetPtr> Store::all() const {
   return out;
 }
 
+std::optional<Location> Store::location(const std::string& id) const {
+  const std::lock_guard lock(state_->mutex);
+  const State::Entry* found = state_->find(id);
+  return found == nullptr ? std::nullopt : found->location;
+}
+
 void Store::request_prefetch(std::uint64_t owner, std::vector<PrefetchRequest> requests) {
   state_->prefetcher.request_prefetch(owner, std::move(requests));
 }

@@ -67,6 +67,8 @@ class Store {
   Result<void> remove(const std::string& id);
   [[nodiscard]] Result<std::shared_ptr<Dataset>> find(const std::string& id) const;
   [[nodiscard]] std::vector<std::shared_ptr<Dataset>> all() const;
+  // The location of its files; nullopt: unknown, or a sample.
+  [[nodiscard]] std::optional<Location> location(const std::string& id) const;
 
   // Lists a configured dataset that cannot be opened, under an id like that of a dataset, so that
   // find() of the id reports the reason. Replaced by add() of the same files, and by

@@ -14,6 +14,7 @@
 #include "server/tasks/drawing.hpp"
 #include "server/tasks/viewer.hpp"
 #include "server/transport/server_parts.hpp"
+#include "tests/integration/server/opening.hpp"
 #include "tests/integration/server/slow_source.hpp"
 #include "tests/integration/server/test_server.hpp"
 
@@ -23,41 +24,7 @@ namespace {
 using namespace windsplat;  // NOLINT(google-build-using-namespace)
 namespace fs = std::filesystem;
 
-api::ServerOptions with_root(const fs::path& root) {
-  api::ServerOptions options;
-  options.data_root = root.native();
-  return options;
-}
-
 fs::path folder_of_small() { return fs::path(small_file()).parent_path(); }
-
-// Returns the id of the job.
-std::string post_file(std::uint16_t port, const std::string& path) {
-  const Answer answer =
-      request(port, "POST", "/v1/datasets", {{"Content-Type", "application/json"}},
-              Json{{"path", path}}.dump());
-  EXPECT_EQ(answer.status, 202) << answer.body;
-  return answer.status == 202 ? json_of(answer)["id"].get<std::string>() : "";
-}
-
-Json finished_job(std::uint16_t port, const std::string& id) {
-  for (int i = 0; i < 6000; ++i) {
-    Json job = json_of(get(port, "/v1/jobs/" + id));
-    const auto state = job.value("state", "");
-    if (state != "queued" && state != "running") return job;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  ADD_FAILURE() << "job " << id << " does not end";
-  return {};
-}
-
-bool is_running(std::uint16_t port, const std::string& id) {
-  for (int i = 0; i < 6000; ++i) {
-    if (json_of(get(port, "/v1/jobs/" + id)).value("state", "") == "running") return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
-}
 
 TEST(OpenedDatasets, DatasetsOfTheCommandLineAreKeptWhenPostedAgain) {
   TestServer server(with_root(folder_of_small()));
