@@ -1,6 +1,7 @@
 // The app in a simulated document with parts that record their calls: the messages it sends and the
 // state it shows, for the server messages of a test. No browser, no server.
-import { App, type AppParts } from "../src/app/app";
+import { App } from "../src/app/app";
+import type { AppParts } from "../src/app/app_parts";
 import { DatasetList } from "../src/app/dataset_list";
 import type {
   ClientMessage,
@@ -216,6 +217,8 @@ export class Page {
   readonly app: App;
   built = 0; // number of times the panels were built
   cardsShown = 0; // number of times the cards were shown
+  entriesShown: string[] = []; // what the entry picker shows
+  entriesRefused = "";
   private seq = 0;
   private socket: Socket;
 
@@ -292,6 +295,12 @@ export class Page {
       picker: this.element("dataset"),
       list: new DatasetList(this.element("dataset") as unknown as HTMLSelectElement),
       cards: { show: () => (this.cardsShown += 1) },
+      entries: {
+        show: (choices: Dataset["choices"]) => {
+          this.entriesShown = choices.map(({ name, chosen }) => `${name}=${chosen}`);
+        },
+        refuse: (reason: string) => (this.entriesRefused = reason),
+      },
       facts: this.element("facts"),
     } as unknown as AppParts;
   }

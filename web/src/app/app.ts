@@ -2,11 +2,11 @@
 // frames -> picture, legend, panels, time bar and status text. The parts depend only on this class,
 // not on each other.
 import { Address } from "./address";
+import type { AppParts } from "./app_parts";
 import { PatchAnswers } from "./patch_answers";
 import { Api } from "../wire/api";
 import { anglesOf, distanceOf, rollOf } from "../view/camera";
 import { CameraControl } from "../view/camera_control";
-import type { Cards } from "./dataset_cards";
 import { ColorMaps } from "../wire/color_maps";
 import {
   Connection,
@@ -15,17 +15,12 @@ import {
   type ConnectionState,
   type SocketLike,
 } from "../wire/connection";
-import type { DatasetList } from "./dataset_list";
 import { Flow } from "../view/flow";
 import { scaleText, type FrameState } from "../viewport/frame_text";
 import { loadHelpTexts } from "../panels/help_texts";
-import type { Gizmo } from "../viewport/gizmo";
-import type { HoverView } from "../viewport/hover_view";
-import type { Hud } from "../viewport/hud";
-import type { Legend } from "../viewport/legend";
 import { legendEntries } from "../view/legend_entries";
 import { DatasetOpener } from "./dataset_opener";
-import type { Panels } from "../panels/panels";
+import { openEntry } from "./entries";
 import { Playback } from "./playback";
 import {
   type Dataset,
@@ -34,30 +29,11 @@ import {
   type ServerMessage,
   type View,
 } from "../wire/protocol";
-import type { Probe } from "../viewport/probe";
 import { problemText } from "../wire/requests";
-import type { Status } from "./status";
-import type { TimeBar } from "./time_bar";
 import { UndoControl } from "./undo_control";
 import { ViewModel } from "../view/view_model";
 import type { Outgoing, Patch } from "../view/view_state";
-import type { DrawnFrame, Viewport } from "../viewport/viewport";
-
-export interface AppParts {
-  viewport: Viewport;
-  hud: Hud;
-  legend: Legend;
-  gizmo: Gizmo;
-  panels: Panels;
-  timeBar: TimeBar;
-  status: Status;
-  picker: HTMLSelectElement;
-  probe: Probe;
-  hover: HoverView;
-  list: DatasetList;
-  cards: Pick<Cards, "show">;
-  facts: HTMLElement; // dimensions and number of steps of the dataset
-}
+import type { DrawnFrame } from "../viewport/viewport";
 
 const presenceMs = 60_000;
 
@@ -76,7 +52,7 @@ export class App {
   private address!: Address;
 
   constructor(
-    clock: Clock,
+    private readonly clock: Clock,
     private readonly baseUri: string,
   ) {
     this.api = new Api(baseUri, (url, init) => fetch(url, init));
@@ -163,7 +139,7 @@ export class App {
     }, presenceMs);
   }
 
-  private makeOpener({ status, list, cards }: AppParts): DatasetOpener {
+  private makeOpener({ status, list, cards, entries }: AppParts): DatasetOpener {
     return new DatasetOpener(
       {
         sendMessage: (message) => void this.connection.send(message),
@@ -178,6 +154,18 @@ export class App {
         refresh: () => this.refresh(),
         mark: () => this.showMark(),
         empty: () => cards.show(),
+        openEntry: (entry, wanted) =>
+          openEntry(
+            this.api,
+            entry,
+            wanted,
+            (ms) => new Promise((done) => this.clock.setTimeout(done, ms)),
+          ),
+        later: () => this.undoControl.later(),
+        showEntries: (refusal) => {
+          if (refusal !== undefined) entries.refuse(refusal);
+          entries.show(this.model.open?.choices ?? []);
+        },
       },
       this.model,
       status,
@@ -214,6 +202,10 @@ export class App {
 
   open(id: string): void {
     this.undoControl.edit(() => this.opener.choose(id));
+  }
+
+  chooseEntry(dimension: string, value: string): void {
+    this.opener.chooseEntry(dimension, value);
   }
 
   // Returns to the view that was drawn last and cancels the one that is still loading.
@@ -306,6 +298,7 @@ export class App {
   }
 
   private onHello(hello: HelloMessage): void {
+    this.parts.entries.refuse(""); // another server may allow it
     this.parts.viewport.newSession(hello.limits.imagePixelsMax);
     this.answers.newSession();
     if (!this.maps.loaded) this.loadMaps();
@@ -411,8 +404,9 @@ export class App {
 
   // --- display -------------------------------------------------------------------------
 
-  private describe({ title, source, format, dims, steps, axes }: Dataset): void {
-    const { timeBar, gizmo, facts } = this.parts;
+  private describe({ title, source, format, dims, steps, axes, choices }: Dataset): void {
+    const { timeBar, gizmo, facts, entries } = this.parts;
+    entries.show(choices);
     timeBar.setDataset(this.dataset());
     gizmo.setGeographic(axes.x.kind === "longitude");
     const { count } = steps;

@@ -53,6 +53,7 @@ export function withState(
 
 export class DatasetList {
   private datasets: DatasetSummary[] = [];
+  private added: string | null = null; // the entry of another dataset that was opened last
 
   constructor(private readonly picker: HTMLSelectElement) {}
 
@@ -82,6 +83,16 @@ export class DatasetList {
     const before = this.datasets;
     this.datasets = withState(before, dataset);
     if (this.datasets !== before) this.write();
+  }
+
+  // A dataset that this page opened. It replaces the one before, so that stepping through the
+  // members of an ensemble does not fill the list.
+  add({ id, title, state, fields, steps, residentBytes, notes }: Dataset): void {
+    if (this.has(id)) return;
+    const summary = { id, title, state, fields, steps: steps.count, residentBytes, notes };
+    this.datasets = [...this.datasets.filter((known) => known.id !== this.added), summary];
+    this.added = id;
+    this.write();
   }
 
   failed(id: string, note: string): void {

@@ -1,6 +1,7 @@
 // Selects the displayed dataset: the user's choice, a link or the server's list -> an `open`
 // message and the matching view; `opened` and refusals -> the open dataset or its replacement.
 import { failureNote, type DatasetList } from "./dataset_list";
+import { entryOf, entryText, type Entry } from "./entries";
 import { fitView, shapeOf } from "../view/fit_view";
 import type {
   ClientMessage,
@@ -10,6 +11,7 @@ import type {
   OpenedMessage,
   View,
 } from "../wire/protocol";
+import { failureText, Refusal } from "../wire/api";
 import type { Status } from "./status";
 import type { ViewModel } from "../view/view_model";
 import type { Outgoing, Patch } from "../view/view_state";
@@ -26,8 +28,15 @@ export interface DatasetOpenerHost {
   refresh(): void;
   mark(): void; // another view was requested
   empty(): void; // nothing to show: the user must choose or add a dataset
+  // null: no longer wanted
+  openEntry(entry: Entry, wanted: () => boolean): Promise<Dataset | null>;
+  // how to run a change that follows the present user action later
+  later(): (run: () => void) => void;
+  // shows the entries of the open dataset; `refusal`: why no other may be chosen
+  showEntries(refusal?: string): void;
 }
 
+const forbidden = 403; // the server does not let clients open other entries
 const busyCodes = [429, 503]; // the server is busy; the dataset itself may be readable
 
 export class DatasetOpener {
@@ -58,7 +67,15 @@ export class DatasetOpener {
       return;
     }
     this.status.clearError();
-    this.request(id, this.model.state.replace(this.host.firstView({ dataset: id })));
+    this.turnTo(this.host.firstView({ dataset: id }), id);
+  }
+
+  // Shows the present view at another entry of a dimension.
+  chooseEntry(dimension: string, value: string): void {
+    const { open, state } = this.model;
+    if (open === null) return;
+    this.status.clearError();
+    this.openEntry({ from: open.id, selection: { [dimension]: value } }, () => state.document);
   }
 
   // Applies a whole view, which may name another dataset. Returns true if that dataset is
@@ -70,8 +87,15 @@ export class DatasetOpener {
       if (this.awaitsOther()) this.abandon();
       return false;
     }
-    this.request(id, this.model.state.replace({ ...view, dataset: id }));
+    this.turnTo({ ...view, dataset: id }, id);
     return true;
+  }
+
+  // A dataset that shows an entry of another one's files may have been closed: it is opened first.
+  private turnTo(view: View, id: string): void {
+    const entry = entryOf(id, this.list.all);
+    if (entry === null) this.request(id, this.model.state.replace(view));
+    else this.openEntry(entry, () => view);
   }
 
   // Cancels the last request and restores the previous view. `settled` is the newest view that was
@@ -106,8 +130,13 @@ export class DatasetOpener {
     this.waits = false;
     this.abandonedId = this.openId;
     this.abandonedRev = model.state.rev;
-    this.list.show(model.open?.id ?? "");
+    this.showOpen();
     status.announce("live");
+  }
+
+  private showOpen(): void {
+    this.list.show(this.model.open?.id ?? "");
+    this.host.showEntries();
   }
 
   // The view of the displayed dataset at the time when another one was requested.
@@ -133,6 +162,11 @@ export class DatasetOpener {
       this.status.announce("live, without a dataset");
       this.host.empty();
       return false;
+    }
+    const entry = list.has(id) ? null : entryOf(id, datasets);
+    if (entry !== null) {
+      this.openEntry(entry, () => model.state.document, true);
+      return true;
     }
     // The limits of the server and the size of the window may have changed.
     model.state.change(this.host.firstView({ dataset: id }) as Patch);
@@ -207,17 +241,65 @@ export class DatasetOpener {
   // The view is sent before `open`, so that the first picture already shows it; `open` then only
   // requests the dataset's description.
   private request(id: string, outgoing: Outgoing[]): void {
+    this.startWaiting(id);
+    this.host.halt();
+    this.host.send(outgoing);
+    this.host.sendMessage({ type: "open", id: this.openId, dataset: id });
+    this.host.mark();
+  }
+
+  private startWaiting(what: string): void {
     const { settled, document } = this.model.state;
     const shown = this.model.open?.id;
     this.before = [settled, document, this.before].find((view) => view?.dataset === shown);
     this.openId += 1;
-    this.openingId = id;
+    this.openingId = what;
     this.waits = true;
-    this.host.halt();
-    this.status.startLoading(`opening ${id}…`);
-    this.host.send(outgoing);
-    this.host.sendMessage({ type: "open", id: this.openId, dataset: id });
-    this.host.mark();
+    this.status.startLoading(`opening ${what}…`);
+  }
+
+  // Opens a dataset of other entries, then requests it in the view as it is then. `afresh`: the
+  // session has no view yet.
+  private openEntry(entry: Entry, view: () => View, afresh = false): void {
+    const { model, host, list } = this;
+    const run = host.later();
+    this.startWaiting(entryText(entry));
+    const openId = this.openId;
+    const wanted = (): boolean => this.waits && this.openId === openId;
+    host.openEntry(entry, wanted).then(
+      (dataset) => {
+        if (dataset === null || !wanted()) return;
+        const { id } = dataset;
+        list.add(dataset);
+        const next = host.firstView(fitView({ ...view(), dataset: id }, dataset));
+        run(() => {
+          const outgoing = model.state.replace(next);
+          this.request(id, afresh ? [model.state.restate()] : outgoing);
+        });
+      },
+      (failure) => {
+        if (wanted()) this.notOpened(failure, view());
+      },
+    );
+  }
+
+  private notOpened(failure: unknown, view: View): void {
+    const { model, status, list } = this;
+    const { open } = model;
+    const id = view.dataset ?? "";
+    const code = failure instanceof Refusal ? failure.status : 0;
+    if (id !== open?.id && list.has(id)) {
+      this.request(id, model.state.replace(view)); // it is listed under this very name
+    } else if (open === null) {
+      this.failed(failureText(failure), code);
+    } else {
+      this.waits = false;
+      status.loaded();
+      status.error("dataset", failureText(failure));
+      status.announce("live");
+      list.show(open.id);
+      this.host.showEntries(code === forbidden ? failureText(failure) : undefined);
+    }
   }
 
   // Applies the present view to the new files, as far as they support it.

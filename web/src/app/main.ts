@@ -3,6 +3,7 @@ import { drag, pan, roll, zoom, type Angles } from "../view/camera";
 import { App } from "./app";
 import { Cards } from "./dataset_cards";
 import { DatasetList } from "./dataset_list";
+import { EntryPicker } from "./entry_picker";
 import { byId, make } from "../base/dom";
 import { toggleErrorMetric } from "../base/error_text";
 import { Gizmo, looks } from "../viewport/gizmo";
@@ -257,5 +258,8 @@ app.start({
   cards,
   status,
   picker: byId("dataset", HTMLSelectElement),
+  entries: new EntryPicker(byId("entries", HTMLElement), (dimension, value) =>
+    app.chooseEntry(dimension, value),
+  ),
   facts: byId("facts", HTMLElement),
 });

@@ -38,6 +38,12 @@ export class UndoControl {
     }
   }
 
+  // For a change that follows later: runs it as it would be run now, as an edit or quietly.
+  later(): (run: () => void) => void {
+    const quiet = this.quiet;
+    return (run) => (quiet ? this.quietly(run) : this.edit(run));
+  }
+
   undo(): void {
     this.turn("undo", "undone", "nothing to undo");
   }
@@ -73,7 +79,7 @@ export class UndoControl {
     if (this.host.busy()) return;
     const found = this.history[way](this.host.document());
     if (found !== null) {
-      this.host.show(found.view);
+      this.quietly(() => this.host.show(found.view));
       this.host.edited();
     }
     this.host.announce(found === null ? nothing : `${done}: ${found.what}`);

@@ -66,11 +66,29 @@ export interface Forecast {
   chosen: number | null;
 }
 
+// The opening of a dataset, as a job of the server.
+export interface OpeningJob {
+  id: string;
+  state: "queued" | "running" | "done" | "failed" | "cancelled";
+  result: string | null; // id of the dataset
+  problem: { detail: string; status: number } | null;
+}
+
 export interface Answer {
   ok: boolean;
   status: number;
   json(): Promise<unknown>;
   blob(): Promise<Blob>;
+}
+
+// The server's refusal of a request, with its HTTP status.
+export class Refusal extends Error {
+  constructor(
+    text: string,
+    readonly status: number,
+  ) {
+    super(text);
+  }
 }
 
 export type Fetch = (url: string, init?: RequestInit) => Promise<Answer>;
@@ -124,6 +142,19 @@ export class Api {
     return this.get<Dataset>(this.dataset(id), (a) => isObject(a.dims));
   }
 
+  // Opens the files of a listed dataset at other entries of its choices.
+  async openEntry(entry: { from: string; selection: Record<string, string> }): Promise<OpeningJob> {
+    return this.get<OpeningJob>("v1/datasets", isJob, posted(entry));
+  }
+
+  async job(id: string): Promise<OpeningJob> {
+    return this.get<OpeningJob>(`v1/jobs/${encodeURIComponent(id)}`, isJob);
+  }
+
+  async cancelJob(id: string): Promise<void> {
+    await this.answer(`v1/jobs/${encodeURIComponent(id)}`, { method: "DELETE" });
+  }
+
   // A small picture of the dataset in its default view.
   async preview(id: string, width: number, height: number): Promise<Blob> {
     const path = `${this.dataset(id)}/frame.jpg?width=${width}&height=${height}`;
@@ -153,9 +184,12 @@ export class Api {
   private async answer(path: string, init?: RequestInit): Promise<Answer> {
     const response = await this.fetch(new URL(path, this.baseUri).href, init);
     if (response.ok) return response;
-    throw new Error(await refusalText(response));
+    throw new Refusal(await refusalText(response), response.status);
   }
 }
+
+const isJob = (a: Record<string, unknown>): boolean =>
+  typeof a.id === "string" && typeof a.state === "string";
 
 const place = ([x, y, z]: Vec3): string => `x=${x}&y=${y}&z=${z}`;
 

@@ -1,4 +1,4 @@
-// Requests that post a view, and the text of error answers.
+// Requests that post a document, and the text of error answers.
 import type { Problem, View } from "./protocol";
 
 export function problemText(problem: Problem): string {
@@ -10,10 +10,10 @@ export function problemText(problem: Problem): string {
   return problem.detail === "" ? problem.title : problem.detail;
 }
 
-export const posted = (view: View, headers = {}): RequestInit => ({
+export const posted = (body: View | object, headers = {}): RequestInit => ({
   method: "POST",
   headers: { "Content-Type": "application/json", ...headers },
-  body: JSON.stringify(view),
+  body: JSON.stringify(body),
 });
 
 // The server's own text of an error answer.

@@ -1,0 +1,30 @@
+// The parts of the page that the application controller drives.
+import type { Cards } from "./dataset_cards";
+import type { DatasetList } from "./dataset_list";
+import type { EntryPicker } from "./entry_picker";
+import type { Gizmo } from "../viewport/gizmo";
+import type { HoverView } from "../viewport/hover_view";
+import type { Hud } from "../viewport/hud";
+import type { Legend } from "../viewport/legend";
+import type { Panels } from "../panels/panels";
+import type { Probe } from "../viewport/probe";
+import type { Status } from "./status";
+import type { TimeBar } from "./time_bar";
+import type { Viewport } from "../viewport/viewport";
+
+export interface AppParts {
+  viewport: Viewport;
+  hud: Hud;
+  legend: Legend;
+  gizmo: Gizmo;
+  panels: Panels;
+  timeBar: TimeBar;
+  status: Status;
+  picker: HTMLSelectElement;
+  entries: EntryPicker;
+  probe: Probe;
+  hover: HoverView;
+  list: DatasetList;
+  cards: Pick<Cards, "show">;
+  facts: HTMLElement; // dimensions and number of steps of the dataset
+}
