@@ -172,6 +172,16 @@ Result<DatasetRequest> parse_dataset_request(std::string_view json) {
   if (!tree) return tree.error();
   Faults faults;
   DatasetRequest out;
+  if (tree->is_object() && tree->contains("files")) {
+    const Json& files = (*tree)["files"];
+    if (!files.is_array() || files.empty() || !files.front().is_string()) {
+      faults.add("/files", "must be a list of names or patterns");
+      return faults.error();
+    }
+    out.list = dump(*tree);
+    out.first = files.front().get<std::string>();
+    return out;
+  }
   ObjectReader reader(*tree, "", faults);
   const bool by_entry =
       tree->is_object() && (tree->contains("from") || tree->contains("selection"));

@@ -124,10 +124,12 @@ std::string encode_forecast(const ForecastDescription& forecast);
 std::string encode_job(const JobDescription& job);
 std::string encode_jobs(const std::vector<JobDescription>& jobs);
 
-// The body of POST /v1/datasets: a path below the data root, or a listed dataset and other entries
-// of its choices.
+// The body of POST /v1/datasets: a path below the data root, a listed dataset and other entries of
+// its choices, or a list of files below the data root.
 struct DatasetRequest {
   std::string path;
+  std::string list;   // the text of the list, whose content is checked when it is opened
+  std::string first;  // its first name or pattern
   std::string from;
   std::vector<std::pair<std::string, std::string>> selection;  // dimension, entry
 };

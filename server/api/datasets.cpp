@@ -7,6 +7,7 @@
 #include "protocol/measurements.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/files/locate_parts.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
 
@@ -42,6 +43,19 @@ http::Response locate_and_open(const ServerOptions& options, tasks::Backend& bac
   }
   return http::problem_response(
       make_error_at(located.error().kind, "/path", located.error().message));
+}
+
+// The names in the list are resolved when it is opened, below the data root only.
+http::Response open_list(const ServerOptions& options, tasks::Backend& backend,
+                         const protocol::DatasetRequest& request) {
+  data::Location location;
+  location.folder = options.data_root;
+  location.companions = true;
+  location.stem = data::stem_of_pattern(request.first);
+  location.list = request.list;
+  return open_in_job(backend, options.base_path, [&backend, location](const CancelToken& cancel) {
+    return backend.catalogue.open(location, cancel);
+  });
 }
 
 // No file is named: other entries of the files of a listed dataset.
@@ -96,6 +110,10 @@ void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
     reply(http::problem_response(403, "Forbidden",
                                  "opening files is disabled: start the server with "
                                  "--data-root"));
+    return;
+  }
+  if (!wanted->list.empty()) {
+    reply(open_list(options, backend, *wanted));
     return;
   }
   run_later(look_ups, request, std::move(reply), "a look-up", nullptr,

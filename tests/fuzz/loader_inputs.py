@@ -76,7 +76,8 @@ def loader_seeds():
              info(fields=()), info(steps=()), info(axes=((1.0, 0.0), (0.0,), (0.0,))),
              info(axes=((float("nan"),), (0.0,), (0.0,)))]
     task = struct.pack("<Q", 1 << 30) + texts([b"/usr/share"]) + b"\0\1" + text(b"a") + text(
-        b"") + text(b"") + struct.pack("<Q", 1) + text(b"number") + text(b"3") + texts([b"a.nc"])
+        b"") + text(b"") + text(b"{}") + struct.pack("<Q", 1) + text(b"number") + text(
+        b"3") + texts([b"a.nc"])
     payloads = [*infos, error(), error(200), texts([b"a", b"b/"]), task, struct.pack("<d", 0.5)]
     for i, payload in enumerate(payloads):
         yield "loader", f"payload-{i}", PAYLOAD + payload

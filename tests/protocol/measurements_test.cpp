@@ -134,6 +134,10 @@ TEST(Measurements, DatasetRequestIsAPathOrEntries) {
   EXPECT_EQ(entries->from, "gcm");
   EXPECT_THAT(entries->selection, ::testing::UnorderedElementsAre(
                                       Pair("number", "3"), Pair("bin", "0.5"), Pair("run", "a b")));
+  const auto list = parse_dataset_request(R"({"title":"T","files":["a_*.nc","b.nc"]})");
+  ASSERT_TRUE(list);
+  EXPECT_EQ(list->first, "a_*.nc");
+  EXPECT_EQ(Json::parse(list->list), Json::parse(R"({"title":"T","files":["a_*.nc","b.nc"]})"));
   const std::string longest(limits::path_chars_max, 'p');
   EXPECT_TRUE(parse_dataset_request(R"({"path":")" + longest + "\"}"));
   for (const auto& [json, pointer] : std::vector<std::pair<std::string, std::string>>{
@@ -152,6 +156,9 @@ TEST(Measurements, DatasetRequestIsAPathOrEntries) {
            {R"({"from":"b","selection":{"n":[1]}})", "/selection/n"},
            {R"({"from":"b","selection":{"n":""}})", "/selection/n"},
            {R"({"from":"b","selection":{"":1}})", "/selection/"},
+           {R"({"files":[]})", "/files"},
+           {R"({"files":"a.nc"})", "/files"},
+           {R"({"files":[3]})", "/files"},
            {R"([])", ""}}) {
     const auto refused = parse_dataset_request(json);
     ASSERT_FALSE(refused) << json;

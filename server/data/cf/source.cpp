@@ -41,7 +41,7 @@ class ArraySource final : public FileSource {
  public:
   explicit ArraySource(std::unique_ptr<ArrayFile> file) : file_(std::move(file)) {}
 
-  Result<void> prepare() {
+  Result<void> prepare(const std::string& title) {
     roles_ = classify_dimensions(file_->contents());
     auto choice = choose_grid(file_->contents(), roles_);
     if (!choice) {
@@ -83,7 +83,8 @@ class ArraySource final : public FileSource {
     const std::filesystem::path name(file_->name());
     info_.id = name.stem().native();
     info_.source = file_->origin();
-    info_.title = file_->contents().title.empty() ? info_.id : file_->contents().title;
+    info_.title = title.empty() ? file_->contents().title : title;
+    if (info_.title.empty()) info_.title = info_.id;
     info_.format = file_->format();
     info_.digest = digest_of(file_->identity() + '\n' + WINDSPLAT_VERSION);
     return {};
@@ -429,9 +430,10 @@ class ArraySource final : public FileSource {
 
 }  // namespace
 
-Result<std::unique_ptr<FileSource>> make_source(std::unique_ptr<ArrayFile> file) {
+Result<std::unique_ptr<FileSource>> make_source(std::unique_ptr<ArrayFile> file,
+                                                const std::string& title) {
   auto source = std::make_unique<ArraySource>(std::move(file));
-  if (auto done = source->prepare(); !done) {
+  if (auto done = source->prepare(title); !done) {
     return done.error();
   }
   return std::unique_ptr<FileSource>(std::move(source));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
@@ -9,7 +10,8 @@
 
 namespace windsplat::data::cf {
 
-// The dataset of a file's arrays. Errors: bad_data.
-Result<std::unique_ptr<FileSource>> make_source(std::unique_ptr<ArrayFile> file);
+// The dataset of a file's arrays. `title`: its title; empty: that of the file. Errors: bad_data.
+Result<std::unique_ptr<FileSource>> make_source(std::unique_ptr<ArrayFile> file,
+                                                const std::string& title = "");
 
 }  // namespace windsplat::data::cf

@@ -34,6 +34,7 @@ struct Location {
   std::string pattern;          // for a series: absolute, or below `root` if that is not empty
   std::string root;
   Selection selection;  // entries of dimensions that were chosen
+  std::string list;     // JSON text that lists the files below `folder` (formats/list); no members
 
   // The dataset's id as wanted: "gcm", with a selection "gcm,number=3", which is cut where views
   // could not name it.

@@ -163,6 +163,7 @@ std::string encode_task(const Task& task) {
   out.text(task.location.stem);
   out.text(task.location.inside);
   out.text(task.location.pattern);
+  out.text(task.location.list);
   out.count(task.location.selection.size());
   for (const SelectedEntry& one : task.location.selection) {
     out.text(one.dimension);
@@ -186,6 +187,7 @@ Result<Task> decode_task(std::string_view bytes) {
   out.location.stem = in.text(text_max);
   out.location.inside = in.text(text_max);
   out.location.pattern = in.text(text_max);
+  out.location.list = in.text(text_max);
   out.location.selection.resize(in.count(selection_max, 2 * text_bytes_min));
   for (SelectedEntry& one : out.location.selection) {
     one.dimension = in.text(text_max);

@@ -95,6 +95,7 @@ Result<std::string> RunningLoader::open() {
   task.location.stem = location_.stem;
   task.location.inside = location_.inside;
   task.location.selection = location_.selection;
+  task.location.list = location_.list;
   task.location.pattern = location_.pattern.substr(location_.pattern.find_last_of('/') + 1);
   for (const Location::Member& member : location_.members) {
     task.location.members.push_back({member.name, {}});

@@ -19,10 +19,13 @@
 #include "server/data/cf/staggered/collocated_file.hpp"
 #include "server/data/derived/source.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/files/locate_parts.hpp"
 #include "server/data/files/pattern.hpp"
 #include "server/data/formats/dx/file.hpp"
 #include "server/data/formats/grads/file.hpp"
 #include "server/data/formats/grib/open.hpp"
+#include "server/data/formats/list/document.hpp"
+#include "server/data/formats/list/listed_files.hpp"
 #include "server/data/formats/netcdf/file.hpp"
 #include "server/data/formats/nrrd/file.hpp"
 #include "server/data/formats/raw/file.hpp"
@@ -58,7 +61,8 @@ Result<std::string> first_bytes(Files& files) {
   return (*input)->head(4096);
 }
 
-SourceResult source_of(const Files& files, Result<std::unique_ptr<cf::ArrayFile>> file) {
+SourceResult source_of(const Files& files, Result<std::unique_ptr<cf::ArrayFile>> file,
+                       const std::string& title = "") {
   if (!file) return file.error();
   if (auto known = cf::check_selection((*file)->contents(), files.location().selection); !known) {
     return make_error(known.error().kind,
@@ -68,7 +72,7 @@ SourceResult source_of(const Files& files, Result<std::unique_ptr<cf::ArrayFile>
   auto lattice = cf::meshed(std::move(*file));
   if (!lattice) return lattice.error();
   (*lattice)->set_stored_bytes(files.opened_bytes());
-  return cf::make_source(std::move(*lattice));
+  return cf::make_source(std::move(*lattice), title);
 }
 
 // The chosen entries of dimensions besides space and time.
@@ -112,14 +116,17 @@ Result<std::unique_ptr<cf::ArrayFile>> open_arrays(const std::shared_ptr<Files>&
     if (auto plain = without_group(*files, name); !plain) return plain.error();
     return chosen_of(*files, format.open(files, std::move(*input)));
   }
+  if (vtk::is_vtk(*head)) {
+    return (*input)->fault("is a VTK file: only files of arrays are listed or joined by variables");
+  }
   if (grib::is_grib(**input)) {
     if (auto plain = without_group(*files, name); !plain) return plain.error();
     return as_arrays(*files, grib::open(std::move(*input)));
   }
   if (raw::is_json(*head)) {
     return (*input)->fault(
-        "is JSON, but not a description of raw files, which has \"windsplat\": \"raw\" in its "
-        "first 4096 bytes");
+        "is JSON, but neither a description of raw files nor a list of files, which have "
+        "\"windsplat\": \"raw\" or \"files\" in their first 4096 bytes");
   }
   return as_arrays(*files, netcdf::File::open(std::move(*input), files->location().inside));
 }
@@ -141,30 +148,30 @@ ArraysResult open_along_time(const std::shared_ptr<Files>& files, std::vector<st
   return std::unique_ptr<cf::ArrayFile>(std::move(*series));
 }
 
-// The files that a pattern matches: along time, and for a list in braces joined by variables.
-ArraysResult open_series(const std::shared_ptr<Files>& files) {
-  const Location& location = files->location();
-  const std::string pattern = location.pattern.substr(location.pattern.find_last_of('/') + 1);
-  const std::vector<std::string> alternatives = alternatives_of(pattern);
-  std::vector<std::vector<std::string>> members(alternatives.size());
-  for (const Location::Member& member : location.members) {
-    const int part = alternative_matching(alternatives, member.name);
-    if (part >= 0) members[static_cast<std::size_t>(part)].push_back(member.name);
-  }
-  std::vector<std::unique_ptr<cf::ArrayFile>> parts;
-  for (std::size_t n = 0; n < alternatives.size(); ++n) {
-    if (members[n].empty()) {
-      return make_error(ErrorKind::not_found, in_quotes(alternatives[n]) + ": no file matches");
+// Files with the same variables: one, or several along time.
+struct Part {
+  std::string pattern;
+  std::vector<std::string> members;
+};
+
+// Parts with different variables are joined. `origin` names them in messages.
+ArraysResult open_parts(const std::shared_ptr<Files>& files, std::vector<Part> parts,
+                        const std::string& origin) {
+  std::vector<std::unique_ptr<cf::ArrayFile>> opened;
+  const bool joins = parts.size() > 1;
+  for (Part& part : parts) {
+    if (part.members.empty()) {
+      return make_error(ErrorKind::not_found, in_quotes(part.pattern) + ": no file matches");
     }
-    const bool one = alternatives.size() > 1 && members[n].size() == 1;
-    auto part = one ? open_arrays(files, members[n].front())
-                    : open_along_time(files, std::move(members[n]), alternatives[n]);
-    if (!part) return part.error();
-    (*part)->set_stored_bytes(files->opened_bytes());
-    parts.push_back(std::move(*part));
+    const bool one = part.members.size() == 1 && (joins || part.members.front() == part.pattern);
+    auto file = one ? open_arrays(files, part.members.front())
+                    : open_along_time(files, std::move(part.members), part.pattern);
+    if (!file) return file.error();
+    (*file)->set_stored_bytes(files->opened_bytes());
+    opened.push_back(std::move(*file));
   }
-  if (parts.size() == 1) return std::move(parts.front());
-  auto joined = cf::JoinedFile::open(location.stem, pattern, std::move(parts));
+  if (!joins) return std::move(opened.front());
+  auto joined = cf::JoinedFile::open(files->location().stem, origin, std::move(opened));
   if (!joined) return joined.error();
   (*joined)->set_stored_bytes(files->opened_bytes());
   return cf::collocated(std::move(*joined));
@@ -196,10 +203,86 @@ Result<void> not_a_case(Files& files, const Result<std::string>& head) {
   return {};
 }
 
+// The files that a pattern matches: along time, and for a list in braces joined by variables.
+ArraysResult open_series(const std::shared_ptr<Files>& files) {
+  const Location& location = files->location();
+  const std::string pattern = location.pattern.substr(location.pattern.find_last_of('/') + 1);
+  const std::vector<std::string> alternatives = alternatives_of(pattern);
+  std::vector<Part> parts(alternatives.size());
+  for (std::size_t n = 0; n < parts.size(); ++n) parts[n].pattern = alternatives[n];
+  for (const Location::Member& member : location.members) {
+    const int part = alternative_matching(alternatives, member.name);
+    if (part >= 0) parts[static_cast<std::size_t>(part)].members.push_back(member.name);
+  }
+  return open_parts(files, std::move(parts), pattern);
+}
+
+// The files that a name or pattern of a list stands for, in natural order.
+Result<std::vector<std::string>> files_named(Files& files, const std::string& name) {
+  const std::size_t slash = name.find_last_of('/');
+  const std::string folder = slash == std::string::npos ? "" : name.substr(0, slash + 1);
+  const std::string pattern = name.substr(slash + 1);
+  if (!has_wildcard(pattern) || files.exists(name)) return std::vector<std::string>{name};
+  const auto entries = files.list(folder.substr(0, folder.size() - (folder.empty() ? 0 : 1)));
+  if (!entries) return entries.error();
+  std::vector<std::string> out;
+  for (const std::string& entry : *entries) {
+    if (entry.ends_with('/') || alternative_matching({pattern}, entry) < 0) continue;
+    out.push_back(folder);
+    out.back() += entry;
+    if (out.size() > series_members_max) {
+      return make_error(ErrorKind::bad_data, in_quotes(name) + " matches more than " +
+                                                 std::to_string(series_members_max) + " files");
+    }
+  }
+  std::sort(out.begin(), out.end(), comes_before);
+  return out;
+}
+
+// The files of a list, whose entries are parts like the alternatives of a pattern. The entries of
+// dimensions and the group of the location take the place of those of the list.
+SourceResult open_list(const std::shared_ptr<Files>& files, Result<list::Document> document) {
+  if (!document) return document.error();
+  Location location = files->location();
+  if (location.inside.empty()) location.inside = document->group;
+  for (SelectedEntry& entry : document->selection) {
+    const bool replaced = std::any_of(
+        location.selection.begin(), location.selection.end(),
+        [&](const SelectedEntry& chosen) { return chosen.dimension == entry.dimension; });
+    if (!replaced) location.selection.push_back(std::move(entry));
+  }
+  std::string title = document->title;
+  if (!title.empty() && !location.selection.empty()) {
+    title += " (" + selection_text(location.selection) + ')';
+  }
+  const std::string origin =
+      location.members.empty() ? "list of files" : location.members.front().name;
+  const auto listed = std::make_shared<list::ListedFiles>(files, std::move(location));
+  std::vector<Part> parts;
+  for (const std::string& name : document->files) {
+    for (std::string& alternative : alternatives_of(name)) {
+      auto members = files_named(*files, alternative);
+      if (!members) return members.error();
+      parts.push_back({std::move(alternative), std::move(*members)});
+    }
+  }
+  auto source = source_of(*listed, open_parts(listed, std::move(parts), origin), title);
+  listed->stop_counting();
+  return source;
+}
+
 SourceResult open_by_content(const std::shared_ptr<Files>& files) {
+  if (const std::string& text = files->location().list; !text.empty()) {
+    return open_list(files, list::parse_document(text));
+  }
   const auto head = first_bytes(*files);
   if (auto fine = not_a_case(*files, head); !fine) return fine.error();
   if (!head) return head.error();
+  if (list::looks_like(*head) && files->location().kind == Location::Kind::file) {
+    const auto input = files->open(files->location().members.front().name);
+    if (!input) return input.error();
+    return open_list(files, list::parse_document(**input));
+  }
   if (vtk::is_vtk(*head) || (head->starts_with("\x89HDF") && vtk::is_vtkhdf(*files))) {
     const std::string& name = files->location().members.front().name;
     if (!files->location().selection.empty()) {

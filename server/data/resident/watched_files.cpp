@@ -52,7 +52,7 @@ bool match_again(std::optional<Location>& location, std::string& listed) {
 
 std::string key_of(const Location& location) {
   std::string key = std::to_string(static_cast<int>(location.kind)) + location.folder + '#' +
-                    location.inside + '?' + selection_text(location.selection);
+                    location.inside + '?' + selection_text(location.selection) + location.list;
   for (const Location::Member& member : location.members) {
     key += '\n';
     key += member.path;

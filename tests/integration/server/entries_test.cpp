@@ -5,6 +5,7 @@
 
 #include <array>
 #include <filesystem>
+#include <fstream>
 
 #include "tests/integration/server/opening.hpp"
 
@@ -101,6 +102,37 @@ TEST_F(ChosenEntries, WhatDoesNotExistIsRefused) {
   EXPECT_NE(absent.dump().find("has no entry '3': it has 20 entries (0 .. 21)"), std::string::npos)
       << absent;
   EXPECT_EQ(get(port, "/v1/datasets/e,number=3").status, 404);
+}
+
+TEST_F(ChosenEntries, APostedListOfFilesIsADatasetBelowTheDataRoot) {
+  TestServer server(with_root(root_));
+  const std::uint16_t port = server.port();
+  const auto post = [&](const Json& list) {
+    return request(port, "POST", "/v1/datasets", {{"Content-Type", "application/json"}},
+                   list.dump());
+  };
+  const auto job = [&](const Json& list) {
+    return finished_job(port, json_of(post(list))["id"].get<std::string>());
+  };
+  const Json list{{"title", "Ens"}, {"files", {"e.nc"}}, {"selection", {{"number", 2}}}};
+  EXPECT_EQ(job(list)["result"], "e");
+  EXPECT_EQ(value_in(port, "e"), 2);
+  EXPECT_EQ(json_of(get(port, "/v1/datasets/e"))["title"], "Ens (number=2)");
+  EXPECT_EQ(job(list)["result"], "e") << "the same list is the same dataset";
+  EXPECT_EQ(chosen(port, "e", {{"number", 5}})["result"], "e,number=5");
+  EXPECT_EQ(value_in(port, "e,number=5"), 5);
+  const Json outside = job({{"files", {"../e.nc"}}});
+  EXPECT_EQ(outside["state"], "failed");
+  EXPECT_NE(outside.dump().find("/files/0: leads out of the folder"), std::string::npos) << outside;
+  EXPECT_EQ(post({{"files", 3}}).status, 422);
+  std::ofstream(root_ / "l.json") << R"({"windsplat": "files", "files": ["e.nc"]})";
+  EXPECT_EQ(finished_job(port, post_file(port, "l.json?number=1"))["result"], "l,number=1");
+  EXPECT_EQ(value_in(port, "l,number=1"), 1);
+  TestServer closed(api::ServerOptions{});
+  EXPECT_EQ(request(closed.port(), "POST", "/v1/datasets", {{"Content-Type", "application/json"}},
+                    list.dump())
+                .status,
+            403);
 }
 
 TEST_F(ChosenEntries, BeyondSixteenTheOneUnusedLongestIsClosedButNoneThatASessionShows) {

@@ -5,136 +5,26 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <string_view>
 #include <utility>
+
+#include "server/data/formats/plain/json_text.hpp"
 
 namespace windsplat::data::raw {
 
 namespace {
 
-using nlohmann::json;
+using json = json_text::Json;
+using json_text::Object;
+using json_text::refuse;
 
 constexpr std::size_t document_max = std::size_t{4} << 20;
-constexpr int depth_max = 8;
 constexpr std::int64_t axis_max = std::int64_t{1} << 24;
 constexpr std::int64_t steps_max = 10'000'000;
 constexpr std::size_t fields_max = 1024;
 constexpr std::size_t files_max = 100'000;
-constexpr std::size_t text_max = 4096;
 constexpr std::array<const char*, 3> letters{"x", "y", "z"};
-
-struct Refused {
-  std::string what;
-};
-
-[[noreturn]] void refuse(const std::string& pointer, const std::string& what) {
-  throw Refused{(pointer.empty() ? std::string("the document") : pointer) + ": " + what};
-}
-
-// Checks depth and keys while the text is parsed.
-class Watch {
- public:
-  bool operator()(int depth, json::parse_event_t event, json& parsed) {
-    if (depth > depth_max) {
-      throw Refused{"the document: nested deeper than " + std::to_string(depth_max)};
-    }
-    if (event == json::parse_event_t::object_start) {
-      keys_.emplace_back();
-    } else if (event == json::parse_event_t::object_end) {
-      keys_.pop_back();
-    } else if (event == json::parse_event_t::key &&
-               !keys_.back().insert(parsed.get<std::string>()).second) {
-      throw Refused{"the document: the key " + in_quotes(parsed.get<std::string>()) +
-                    " occurs twice in one object"};
-    }
-    return true;
-  }
-
- private:
-  std::vector<std::set<std::string>> keys_;
-};
-
-// An object of the document and its JSON pointer.
-class Object {
- public:
-  Object(const json& value, std::string pointer, std::initializer_list<std::string_view> keys)
-      : value_(value), pointer_(std::move(pointer)) {
-    if (!value.is_object()) refuse(pointer_, "must be an object");
-    for (const auto& [key, member] : value.items()) {
-      if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-        refuse(below(printable(key, 40)), "unknown key");
-      }
-    }
-  }
-
-  [[nodiscard]] std::string below(const std::string& key) const { return pointer_ + '/' + key; }
-  [[nodiscard]] bool has(const char* key) const { return value_.contains(key); }
-  [[nodiscard]] const json& at(const char* key) const {
-    const auto found = value_.find(key);
-    if (found == value_.end()) refuse(below(key), "is required");
-    return *found;
-  }
-
-  [[nodiscard]] std::string text(const char* key, const std::string& otherwise) const {
-    return has(key) ? text_of(at(key), below(key)) : otherwise;
-  }
-  [[nodiscard]] std::int64_t integer(const char* key, std::int64_t least, std::int64_t most) const {
-    return integer_of(at(key), below(key), least, most);
-  }
-  [[nodiscard]] std::int64_t integer(const char* key, std::int64_t least, std::int64_t most,
-                                     std::int64_t otherwise) const {
-    return has(key) ? integer(key, least, most) : otherwise;
-  }
-  [[nodiscard]] double number(const char* key, double otherwise) const {
-    return has(key) ? number_of(at(key), below(key)) : otherwise;
-  }
-
-  static std::string text_of(const json& value, const std::string& pointer) {
-    if (!value.is_string()) refuse(pointer, "must be a string");
-    auto text = value.get<std::string>();
-    if (text.size() > text_max) {
-      refuse(pointer, "is longer than " + std::to_string(text_max) + " bytes");
-    }
-    return text;
-  }
-  static std::int64_t integer_of(const json& value, const std::string& pointer, std::int64_t least,
-                                 std::int64_t most) {
-    const bool unsigned_fits =
-        value.is_number_unsigned() &&
-        value.get<std::uint64_t>() <=
-            static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-    const bool fits = value.is_number_unsigned() ? unsigned_fits : value.is_number_integer();
-    const std::int64_t number = fits ? value.get<std::int64_t>() : 0;
-    if (!fits || number < least || number > most) {
-      refuse(pointer, "must be a whole number from " + std::to_string(least) + " to " +
-                          std::to_string(most));
-    }
-    return number;
-  }
-  static double number_of(const json& value, const std::string& pointer) {
-    if (!value.is_number() || !std::isfinite(value.get<double>())) {
-      refuse(pointer, "must be a finite number");
-    }
-    return value.get<double>();
-  }
-  static std::vector<double> numbers_of(const json& value, const std::string& pointer,
-                                        std::size_t most) {
-    if (!value.is_array() || value.size() > most) {
-      refuse(pointer, "must be a list of at most " + std::to_string(most) + " numbers");
-    }
-    std::vector<double> out;
-    for (const json& entry : value) {
-      out.push_back(number_of(entry, pointer + '/' + std::to_string(out.size())));
-    }
-    return out;
-  }
-
- private:
-  const json& value_;
-  std::string pointer_;
-};
 
 FileNames files_of(const json& value, const std::string& pointer) {
   FileNames out;
@@ -348,13 +238,10 @@ Result<Document> parse_document(const InputFile& file) {
   }
   const auto text = file.head(document_max);
   if (!text) return text.error();
-  try {
-    return read(json::parse(*text, Watch()));
-  } catch (const Refused& refused) {
-    return file.fault("is invalid: " + refused.what);
-  } catch (const json::exception& fault) {
-    return file.fault("is not valid JSON: " + printable(fault.what()));
-  }
+  Document out;
+  const auto parsed = json_text::parse(*text, [&](const json& value) { out = read(value); });
+  if (!parsed) return file.fault(parsed.error().message);
+  return out;
 }
 
 }  // namespace windsplat::data::raw

@@ -293,6 +293,7 @@ TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   task.location.stem = "stem";
   task.location.inside = "a/b";
   task.location.pattern = "*.nc";
+  task.location.list = R"({"files": ["a.nc"]})";
   task.location.selection = {{"number", "3"}, {"band", "2"}};
   task.location.members = {{"a.nc", "/secret/a.nc"}, {"b.nc", "/secret/b.nc"}};
   const std::string bytes = encode_task(task);
@@ -306,6 +307,7 @@ TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   EXPECT_EQ(out->location.stem, "stem");
   EXPECT_EQ(out->location.inside, "a/b");
   EXPECT_EQ(out->location.pattern, "*.nc");
+  EXPECT_EQ(out->location.list, task.location.list);
   EXPECT_EQ(selection_text(out->location.selection), "number=3,band=2");
   ASSERT_EQ(out->location.members.size(), 2U);
   EXPECT_EQ(out->location.members[1].name, "b.nc");
