@@ -215,6 +215,43 @@ def hdf5_seeds():
     yield Seed("hdf5", "contiguous", {"h.h5": file.bytes()})
 
 
+# Grids whose positions follow from a map projection: the attributes of `crs`, and the unit of x, y.
+PROJECTED = (("lambert", """crs:grid_mapping_name = "lambert_conformal_conic";
+crs:standard_parallel = 33., 45.; crs:latitude_of_projection_origin = 23.;
+crs:longitude_of_central_meridian = -96.; crs:earth_radius = 6371229.;""", "m", 300000),
+             ("satellite", """crs:grid_mapping_name = "geostationary";
+crs:latitude_of_projection_origin = 0.; crs:longitude_of_projection_origin = -75.;
+crs:perspective_point_height = 35786023.; crs:sweep_angle_axis = "x";
+crs:semi_major_axis = 6378137.; crs:inverse_flattening = 298.257;""", "radian", 0.05),
+             ("transverse", """crs:grid_mapping_name = "transverse_mercator";
+crs:latitude_of_projection_origin = 0.; crs:longitude_of_central_meridian = 9.;
+crs:scale_factor_at_central_meridian = 0.9996;""", "km", 300))
+
+
+def projected_seeds(folder):
+    def listed(values):
+        return ", ".join(str(value) for value in values)
+
+    for name, attributes, unit, step in PROJECTED:
+        text = ["netcdf p { dimensions: y = 6; x = 8; variables: int crs; double x(x), y(y);",
+                "float u(y, x), v(y, x);", attributes]
+        for axis in "xy":
+            text.append(f'{axis}:units = "{unit}"; '
+                        f'{axis}:standard_name = "projection_{axis}_coordinate";')
+        for c, direction in (("u", "east"), ("v", "north")):
+            text.append(f'{c}:standard_name = "{direction}ward_wind"; {c}:units = "m s-1"; '
+                        f'{c}:grid_mapping = "crs";')
+        text.append("data:")
+        for axis, count in (("x", 8), ("y", 6)):
+            text.append(f"{axis} = {listed(step * (i - count // 2) for i in range(count))};")
+        text += [f"{c} = {listed(range(48))};" for c in "uv"]
+        source = folder / "p.cdl"
+        source.write_text("\n".join(text) + "\n}\n")
+        made = folder / "p.nc"
+        subprocess.run(["ncgen", "-k", "1", "-o", made, source], check=True)
+        yield Seed("netcdf classic", name, {"x.nc": made.read_bytes()})
+
+
 def netcdf_seeds(program, folder):
     nc4 = folder / "x.nc"
     subprocess.run([program, "synth", "climate", "--dims", "8x6x4", "--steps", "2", "-o", nc4],
@@ -228,6 +265,8 @@ def netcdf_seeds(program, folder):
         copy = folder / "copy.nc"
         subprocess.run(["nccopy", "-k", code, *more, nc4, copy], check=True)
         yield Seed(kind, f"nccopy -k {code}", {"x.nc": copy.read_bytes()})
+    if shutil.which("ncgen"):
+        yield from projected_seeds(folder)
 
 
 GRIB_RULES = """set Ni = 8; set Nj = 6;

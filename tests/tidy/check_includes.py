@@ -29,6 +29,7 @@ CONFINED = [
      r"protocol/codec\w*\.[ch]pp|server/data/formats/(zarr/json|(raw|list)/document)\.cpp|"
      r"server/data/formats/plain/json_text\.[ch]pp|tests/.*"),
     ("ecCodes", r"eccodes\.h", r"server/data/formats/grib/.*|tests/.*"),
+    ("PROJ", r"proj\.h", r"server/data/cf/grid/projected_columns\.cpp|tests/.*"),
     ("a compressor", r"(blosc|lz4|zlib|zstd)\.h", r"server/data/.*|tests/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
     ("libseccomp", r"seccomp\.h", r"server/data/loader/.*|tests/.*"),

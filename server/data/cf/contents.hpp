@@ -14,7 +14,6 @@ struct FileDimension {
   std::size_t length = 0;
   bool unlimited = false;
   bool is_time = false;  // time whatever its name: lead or reference times of forecasts
-  bool falls = false;    // indices run opposite to the direction of vector components
   // Of faces of cells, if the reader knows: the dimension of their centers, and the face before the
   // first center (cf/staggered).
   int centers = -1;

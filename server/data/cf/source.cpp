@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,6 +26,7 @@
 #include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/grid/level_heights.hpp"
 #include "server/data/cf/grid/level_pressures.hpp"
+#include "server/data/cf/grid/positions.hpp"
 #include "server/data/cf/packing.hpp"
 #include "server/data/cf/read_blocks.hpp"
 #include "server/data/cf/steps.hpp"
@@ -116,6 +118,7 @@ class ArraySource final : public FileSource {
     }
     if (plan.rotated) rotate(bearing(), placement_.length[2], out, out + samples);
     if (plan.follows_rows) follow_axes(out, out + samples);
+    if (!outside_.empty()) mask_outside(out, info_.fields[field].components.size());
     return {};
   }
 
@@ -183,9 +186,7 @@ class ArraySource final : public FileSource {
     }
     if (bearing->is_curvilinear) {
       to_axes_.swapped = bearing->swapped;
-      for (std::size_t a = 0; a < 2; ++a) {
-        to_axes_.negated.at(a) = bearing->turned.at(a) != dimension(choice_.space.at(a)).falls;
-      }
+      to_axes_.negated = bearing->turned;
     }
     info_.grid.columns = std::move(bearing->columns);
     placement_.space = choice_.space;
@@ -197,32 +198,15 @@ class ArraySource final : public FileSource {
     return bearing->is_curvilinear ? Result<void>() : find_projection();
   }
 
-  // Finds the projection of axes with 1-D coordinates.
+  // The positions of axes with 1-D coordinates.
   Result<void> find_projection() {
-    const auto& [x, y, z] = info_.grid.axes;
-    const int mapping = grid_mapping_of(*file_, choice_.variables);
-    const std::string projection =
-        mapping < 0 ? std::string() : lower(file_->text_of(mapping, "grid_mapping_name"));
-    const bool about_pole =
-        x.kind == AxisKind::longitude &&
-        (x.standard_name == "grid_longitude" ||
-         (projection == "rotated_latitude_longitude" && x.standard_name.empty()));
-    if (x.kind == AxisKind::longitude && !about_pole) return {};
-    auto columns = find_columns(*file_, placement_);
-    if (!columns) return columns.error();
-    info_.grid.columns = std::move(*columns);
-    if (!info_.grid.columns && about_pole && y.kind == AxisKind::latitude && mapping >= 0) {
-      info_.grid.columns = columns_about_pole(*file_, mapping, info_.grid);
-      if (info_.grid.columns) {
-        info_.notes.push_back("longitudes and latitudes are computed from the rotated pole of " +
-                              in_quotes(variable_name(mapping)));
-      }
-    }
-    constexpr auto along_east = std::to_array<std::string_view>(
-        {"latitude_longitude", "mercator", "lambert_cylindrical_equal_area"});
-    const bool on_map = x.standard_name == "projection_x_coordinate" || !projection.empty();
-    follows_other_axes_ =
-        info_.grid.columns || about_pole || (on_map && !is_one_of(projection, along_east));
+    auto positions = find_positions(
+        *file_, choice_.variables,
+        {coordinate_of(choice_.space[0]), coordinate_of(choice_.space[1])}, placement_, info_);
+    if (!positions) return positions.error();
+    info_.grid.columns = std::move(positions->columns);
+    outside_ = std::move(positions->outside);
+    follows_other_axes_ = positions->follow_other_axes;
     return {};
   }
 
@@ -409,6 +393,17 @@ class ArraySource final : public FileSource {
     }
   }
 
+  // A part of the picture of a satellite that does not show the Earth has no position.
+  void mask_outside(float* values, std::size_t components) const {
+    const std::size_t layers = placement_.length[2] * components;
+    for (std::size_t n = 0; n < outside_.size(); ++n) {
+      if (!outside_[n]) continue;
+      for (std::size_t k = 0; k < layers; ++k) {
+        values[k * outside_.size() + n] = std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+  }
+
   const GridBearing& bearing() {
     if (!bearing_) bearing_ = bearing_of(*info_.grid.columns, placement_.length[0]);
     return *bearing_;
@@ -422,6 +417,7 @@ class ArraySource final : public FileSource {
   PressureLevels pressures_;
   LevelHeights heights_;
   bool follows_other_axes_ = false;  // rows may not run east
+  std::vector<bool> outside_;        // columns that do not lie on the Earth; empty: all do
   ToAxes to_axes_;
   std::optional<GridBearing> bearing_;
   std::vector<DerivedField> derived_;

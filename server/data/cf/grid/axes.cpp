@@ -34,7 +34,6 @@ bool is_ocean_pressure(std::string_view units) {
 }
 
 bool is_pressure(std::string_view units) { return pascals_in(units).has_value(); }
-
 bool is_length(std::string_view units) { return metres_in(units).has_value(); }
 
 bool is_level_unit(std::string_view units) {
@@ -69,9 +68,11 @@ Evidence by_standard_name(std::string_view name) {
       {{"longitude", role_x, AxisKind::longitude, false},
        {"grid_longitude", role_x, AxisKind::longitude, false},
        {"projection_x_coordinate", role_x, AxisKind::cartesian, false},
+       {"projection_x_angular_coordinate", role_x, AxisKind::cartesian, false},
        {"latitude", role_y, AxisKind::latitude, false},
        {"grid_latitude", role_y, AxisKind::latitude, false},
        {"projection_y_coordinate", role_y, AxisKind::cartesian, false},
+       {"projection_y_angular_coordinate", role_y, AxisKind::cartesian, false},
        {"air_pressure", role_z, AxisKind::pressure, true},
        {"sea_water_pressure", role_z, AxisKind::depth, true},
        {"height", role_z, AxisKind::height, false},

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
+#include <sstream>
 #include <string>
 #include <utility>
 
@@ -85,17 +85,6 @@ std::vector<double> in_order(Table table, int x, std::array<std::size_t, 2> leng
   return out;
 }
 
-// Unwraps longitudes to be continuous, along the first column and then along every row.
-void unwrap(std::vector<double>& longitude, std::size_t width) {
-  const auto follow = [&](std::size_t from, std::size_t to) {
-    longitude[to] = longitude[from] + difference(longitude[from], longitude[to], true);
-  };
-  for (std::size_t n = width; n < longitude.size(); n += width) follow(n - width, n);
-  for (std::size_t n = 0; n < longitude.size(); ++n) {
-    if (n % width != 0) follow(n - 1, n);
-  }
-}
-
 // Returns null if a longitude or latitude is missing.
 std::shared_ptr<const Columns> columns_of(std::array<Table, 2> tables, int x,
                                           std::array<std::size_t, 2> lengths,
@@ -107,11 +96,21 @@ std::shared_ptr<const Columns> columns_of(std::array<Table, 2> tables, int x,
     return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   };
   if (!finite(columns->longitude) || !finite(columns->latitude)) return nullptr;
-  unwrap(columns->longitude, lengths[0]);
+  unwrap_longitudes(columns->longitude, lengths[0]);
   return columns;
 }
 
 }  // namespace
+
+void unwrap_longitudes(std::vector<double>& longitude, std::size_t width) {
+  const auto follow = [&](std::size_t from, std::size_t to) {
+    longitude[to] = longitude[from] + difference(longitude[from], longitude[to], true);
+  };
+  for (std::size_t n = width; n < longitude.size(); n += width) follow(n - width, n);
+  for (std::size_t n = 0; n < longitude.size(); ++n) {
+    if (n % width != 0) follow(n - 1, n);
+  }
+}
 
 int position_on(const FileContents& contents, int a, int b, bool longitude) {
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
@@ -194,47 +193,26 @@ Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const
                     {grid.turned[0], grid.turned[1]});
 }
 
-int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables) {
+int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables,
+                    const std::string& coordinate) {
   for (const int v : variables) {
-    // "name", or "name: coordinate coordinate name: ..."; the first name is used.
-    std::string name = file.contents().variables.at(at(v)).grid_mapping;
-    name = name.substr(0, name.find_first_of(": \t"));
+    std::istringstream words(file.contents().variables.at(at(v)).grid_mapping);
+    std::string first;
+    std::string current;
+    std::string chosen;
+    for (std::string word; words >> word;) {
+      if (current.empty() || word.ends_with(':')) {
+        current = word.substr(0, word.find(':'));
+        if (first.empty()) first = current;
+      } else if (word == coordinate && chosen.empty()) {
+        chosen = current;
+      }
+    }
+    const std::string& name = chosen.empty() ? first : chosen;
     const int mapping = name.empty() ? -1 : variable_named(file.contents(), name);
     if (mapping >= 0) return mapping;
   }
   return -1;
-}
-
-std::shared_ptr<const Columns> columns_about_pole(const ArrayFile& file, int mapping,
-                                                  const Grid& grid) {
-  const auto number = [&](const char* name) { return file.numbers(mapping, name).values; };
-  const auto pole_latitude = number("grid_north_pole_latitude");
-  const auto pole_longitude = number("grid_north_pole_longitude");
-  const auto north = number("north_pole_grid_longitude");
-  const auto& [x, y, z] = grid.axes;
-  if (pole_latitude.size() != 1 || pole_longitude.size() != 1 || !std::isfinite(pole_latitude[0]) ||
-      !std::isfinite(pole_longitude[0]) ||
-      x.coordinates.size() > samples_read / y.coordinates.size()) {
-    return nullptr;
-  }
-  constexpr double degree = std::numbers::pi / 180;
-  const double sin_pole = std::sin(pole_latitude[0] * degree);
-  const double cos_pole = std::cos(pole_latitude[0] * degree);
-  auto columns = std::make_shared<Columns>();
-  for (const double row : y.coordinates) {
-    const double up = std::sin(row * degree);
-    for (const double column : x.coordinates) {
-      const double way = (column - (north.empty() ? 0 : north[0])) * degree;
-      const double aside = -std::cos(row * degree) * std::sin(way);
-      const double ahead = std::cos(row * degree) * std::cos(way);
-      const double sine = up * sin_pole + ahead * cos_pole;
-      columns->latitude.push_back(std::asin(std::clamp(sine, -1.0, 1.0)) / degree);
-      columns->longitude.push_back(pole_longitude[0] +
-                                   std::atan2(aside, up * cos_pole - ahead * sin_pole) / degree);
-    }
-  }
-  unwrap(columns->longitude, x.coordinates.size());
-  return columns;
 }
 
 }  // namespace windsplat::data::cf

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "server/base/error.hpp"
@@ -34,12 +36,12 @@ Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const
 // The 2-D longitude or latitude variable on exactly these two dimensions; -1 if there is none.
 int position_on(const FileContents& contents, int a, int b, bool longitude);
 
-// The grid mapping variable of one of `variables`; -1 if there is none.
-int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables);
+// The grid mapping variable of one of `variables`; -1 if there is none. coordinate: the variable of
+// the x axis, which tells several mappings of a variable apart ("crs: x y wgs84: lat lon").
+int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables,
+                    const std::string& coordinate);
 
-// Longitudes and latitudes of a rotated-pole grid (CF 1.8, appendix F). mapping: the grid mapping
-// variable. Null if it does not give the position of the pole.
-std::shared_ptr<const Columns> columns_about_pole(const ArrayFile& file, int mapping,
-                                                  const Grid& grid);
+// Makes longitudes continuous, along the first column and then along every row of `width`.
+void unwrap_longitudes(std::vector<double>& longitude, std::size_t width);
 
 }  // namespace windsplat::data::cf

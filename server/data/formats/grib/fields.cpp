@@ -14,7 +14,9 @@
 #include <utility>
 
 #include "server/data/cf/time.hpp"
+#include "server/data/formats/grib/message.hpp"
 #include "server/data/formats/grib/open.hpp"
+#include "server/data/formats/grib/projection.hpp"
 #include "server/data/formats/grib/rows.hpp"
 
 namespace windsplat::data::grib {
@@ -42,58 +44,6 @@ class LibraryLock {
     return mutex;
   }
   std::lock_guard<std::mutex> lock_;
-};
-
-class Message {
- public:
-  explicit Message(const std::vector<unsigned char>& bytes)
-      : handle_(codes_handle_new_from_message(nullptr, bytes.data(), bytes.size())) {}
-  ~Message() {
-    if (handle_ != nullptr) codes_handle_delete(handle_);
-  }
-  Message(const Message&) = delete;
-  Message& operator=(const Message&) = delete;
-
-  [[nodiscard]] codes_handle* handle() const { return handle_; }
-  [[nodiscard]] std::string text(const char* key) const {
-    std::array<char, 512> out{};
-    std::size_t length = out.size();
-    if (codes_get_string(handle_, key, out.data(), &length) != CODES_SUCCESS) return {};
-    return {out.data()};
-  }
-  [[nodiscard]] long whole(const char* key, long otherwise) const {
-    long value = 0;
-    return codes_get_long(handle_, key, &value) == CODES_SUCCESS ? value : otherwise;
-  }
-  [[nodiscard]] double number(const char* key) const {
-    double value = 0;
-    return codes_get_double(handle_, key, &value) == CODES_SUCCESS
-               ? value
-               : std::numeric_limits<double>::quiet_NaN();
-  }
-  // The expected count of numbers; none otherwise.
-  [[nodiscard]] std::vector<double> numbers(const char* key, std::size_t expected) const {
-    std::size_t count = 0;
-    if (codes_get_size(handle_, key, &count) != CODES_SUCCESS || count != expected) return {};
-    std::vector<double> out(count);
-    if (codes_get_double_array(handle_, key, out.data(), &count) != CODES_SUCCESS) return {};
-    out.resize(count == expected ? count : 0);
-    return out;
-  }
-  // The expected count of positive whole numbers; none otherwise.
-  [[nodiscard]] std::vector<std::size_t> counts(const char* key, std::size_t expected) const {
-    std::size_t count = 0;
-    if (codes_get_size(handle_, key, &count) != CODES_SUCCESS || count != expected) return {};
-    std::vector<long> read(count);
-    if (codes_get_long_array(handle_, key, read.data(), &count) != CODES_SUCCESS ||
-        count != expected || *std::min_element(read.begin(), read.end()) < 1) {
-      return {};
-    }
-    return {read.begin(), read.end()};
-  }
-
- private:
-  codes_handle* handle_;
 };
 
 // Longitudes ascend beyond 360 instead of wrapping to 0.
@@ -157,23 +107,14 @@ std::size_t points_of(const std::vector<std::size_t>& row_lengths) {
 }
 
 void find_coordinates(const Message& message, Grid& grid) {
-  const bool odd = message.whole("jPointsAreConsecutive", 0) != 0 ||
-                   message.whole("alternativeRowScanning", 0) != 0;
   if (has_axes(grid)) {
     grid.longitude =
         is_reduced(grid) ? longitudes_around(grid.columns) : longitudes(message, grid.columns);
     grid.latitude = grid.type.ends_with("_ll") ? even_latitudes(message, grid.rows)
                                                : gaussian_latitudes(message, grid.rows);
-  } else if (odd) {
-    grid.problem = "on a projected grid that is not scanned row by row";
-    return;
   } else {
-    grid.projected = true;
-    grid.columns_fall = message.whole("iScansNegatively", 0) != 0;
-    grid.rows_fall = message.whole("jScansPositively", 1) == 0;
-    const std::size_t points = grid.rows * grid.columns;
-    grid.longitude = message.numbers("longitudes", points);
-    grid.latitude = message.numbers("latitudes", points);
+    find_projection(message, grid);
+    return;
   }
   const auto finite = [](const std::vector<double>& list) {
     return !list.empty() &&
@@ -188,7 +129,8 @@ void find_coordinates(const Message& message, Grid& grid) {
 std::string why_unsupported(const std::string& type) {
   constexpr auto supported = std::to_array<std::string_view>(
       {"regular_ll", "regular_gg", "rotated_ll", "rotated_gg", "reduced_gg", "reduced_rotated_gg",
-       "lambert", "lambert_azimuthal_equal_area", "polar_stereographic", "mercator"});
+       "albers", "lambert", "lambert_azimuthal_equal_area", "mercator", "polar_stereographic",
+       "transverse_mercator"});
   if (std::find(supported.begin(), supported.end(), type) != supported.end()) return {};
   std::string_view what;
   std::string_view advice = "interpolate it to longitudes and latitudes first";
@@ -326,8 +268,11 @@ Result<Grid> read_grid(const std::vector<unsigned char>& bytes) {
   }
   grid.rotated = grid.type.find("rotated") != std::string::npos;
   if (grid.rotated) {
-    grid.south_pole_latitude = message.number("latitudeOfSouthernPoleInDegrees");
-    grid.south_pole_longitude = message.number("longitudeOfSouthernPoleInDegrees");
+    grid.mapping.texts["grid_mapping_name"] = "rotated_latitude_longitude";
+    grid.mapping.numbers["grid_north_pole_latitude"] = {
+        -message.number("latitudeOfSouthernPoleInDegrees")};
+    grid.mapping.numbers["grid_north_pole_longitude"] = {
+        message.number("longitudeOfSouthernPoleInDegrees") + 180};
     if (message.number("angleOfRotationInDegrees") != 0) {
       grid.problem = "on a rotated grid that is also turned about its pole, which is not supported";
     }

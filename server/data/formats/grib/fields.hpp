@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/base/error.hpp"
+#include "server/data/cf/grid/projection.hpp"
 
 namespace windsplat::data::grib {
 
@@ -16,16 +17,16 @@ struct Grid {
   std::string problem;  // why it cannot be read; empty if it can
   std::size_t columns = 0;
   std::size_t rows = 0;
-  bool projected = false;     // true: longitude and latitude per point; false: per axis
-  bool columns_fall = false;  // for a projected grid: scanned toward smaller i
-  bool rows_fall = false;     // toward smaller j
+  // Projected: x and y in metres are the axes; otherwise longitude and latitude.
+  bool projected = false;
+  std::vector<double> x;  // in the order of columns and rows
+  std::vector<double> y;
   std::vector<double> longitude;
   std::vector<double> latitude;
   std::vector<std::size_t> row_lengths;  // points of each row of a reduced grid, the longest having
                                          // `columns`; empty for other grids
-  bool rotated = false;  // longitudes and latitudes relate to the pole, given in degrees:
-  double south_pole_latitude = -90;
-  double south_pole_longitude = 0;
+  bool rotated = false;                  // longitudes and latitudes relate to a rotated pole
+  cf::GridMapping mapping;               // of projected and rotated grids, as in CF
 };
 
 struct Header {

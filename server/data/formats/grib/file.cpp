@@ -13,19 +13,23 @@ namespace windsplat::data::grib {
 
 namespace {
 
+constexpr const char* mapping_name = "map_projection";
 constexpr std::size_t groups_max = 8192;
 constexpr std::size_t grids_max = 256;
 
 // Tolerates rounding: edition 1 stores thousandths of a degree, edition 2 millionths.
 bool is_same(const Grid& a, const Grid& b) {
-  const auto close = [](const std::vector<double>& left, const std::vector<double>& right) {
+  using List = std::vector<double>;
+  const auto close = [](const List& left, const List& right, double tolerance = 1e-3) {
     return std::equal(left.begin(), left.end(), right.begin(), right.end(),
-                      [](double l, double r) { return std::abs(l - r) < 1e-3; });
+                      [tolerance](double l, double r) { return std::abs(l - r) < tolerance; });
   };
+  constexpr double tolerance_m = 100;  // about a thousandth of a degree
   return a.type == b.type && a.problem == b.problem && a.columns == b.columns && a.rows == b.rows &&
-         a.row_lengths == b.row_lengths && a.south_pole_latitude == b.south_pole_latitude &&
-         a.south_pole_longitude == b.south_pole_longitude && close(a.longitude, b.longitude) &&
-         close(a.latitude, b.latitude);
+         a.row_lengths == b.row_lengths && a.mapping.numbers == b.mapping.numbers &&
+         a.mapping.texts == b.mapping.texts && close(a.longitude, b.longitude) &&
+         close(a.latitude, b.latitude) && close(a.x, b.x, tolerance_m) &&
+         close(a.y, b.y, tolerance_m);
 }
 
 FileVariable level_axis(const std::string& type) {
@@ -55,6 +59,13 @@ FileVariable latitude_axis(const char* standard_name) {
   FileVariable out;
   out.standard_name = standard_name;
   out.units = out.standard_name == "latitude" ? "degrees_north" : "degrees";
+  return out;
+}
+
+FileVariable plane_axis(const char* standard_name) {
+  FileVariable out;
+  out.standard_name = standard_name;
+  out.units = "m";
   return out;
 }
 
@@ -197,10 +208,10 @@ int File::axis(const std::string& name, const std::vector<double>& values,
   return static_cast<int>(contents_.dimensions.size()) - 1;
 }
 
-// Latitude and longitude, or rows and columns with 2-D latitudes and longitudes.
+// Latitude and longitude, or y and x of a map projection.
 std::vector<int> File::grid_dimensions(std::size_t g) {
   if (const auto known = grid_dims_.find(g); known != grid_dims_.end()) return known->second;
-  return grid_dims_[g] = grids_[g].projected ? add_positions(g) : add_axes(g);
+  return grid_dims_[g] = grids_[g].projected ? add_plane(g) : add_axes(g);
 }
 
 std::vector<int> File::add_axes(std::size_t g) {
@@ -217,33 +228,24 @@ std::vector<int> File::add_axes(std::size_t g) {
     return {axis("latitude", grid.latitude, latitude_axis("latitude")),
             axis("longitude", grid.longitude, longitude_axis("longitude"))};
   }
-  FileVariable mapping;
-  mapping.name = name_on_grid("rotated_pole", g);
-  mapping.unread = "description of the map projection";
-  contents_.variables.push_back(std::move(mapping));
-  held_.push_back({});
-  held_.back().rotated_grid = static_cast<int>(g);
+  add_mapping(g);
   return {axis(name_on_grid("rlat", g), grid.latitude, latitude_axis("grid_latitude")),
           axis(name_on_grid("rlon", g), grid.longitude, longitude_axis("grid_longitude"))};
 }
 
-std::vector<int> File::add_positions(std::size_t g) {
-  const Grid& grid = grids_[g];
-  contents_.dimensions.push_back(
-      {.name = name_on_grid("y", g), .length = grid.rows, .falls = grid.rows_fall});
-  contents_.dimensions.push_back(
-      {.name = name_on_grid("x", g), .length = grid.columns, .falls = grid.columns_fall});
-  const int x = static_cast<int>(contents_.dimensions.size()) - 1;
-  for (const bool north : {true, false}) {
-    FileVariable position = north ? latitude_axis("latitude") : longitude_axis("longitude");
-    position.name = name_on_grid(north ? "latitude_of_points" : "longitude_of_points", g);
-    position.type = "float64";
-    position.numeric = true;
-    position.dims = {x - 1, x};
-    contents_.variables.push_back(std::move(position));
-    held_.push_back({north ? grid.latitude : grid.longitude, -1, {}, {}, {}});
-  }
-  return {x - 1, x};
+void File::add_mapping(std::size_t g) {
+  FileVariable mapping;
+  mapping.name = name_on_grid(mapping_name, g);
+  mapping.unread = "description of the map projection";
+  contents_.variables.push_back(std::move(mapping));
+  held_.push_back({});
+  held_.back().mapped_grid = static_cast<int>(g);
+}
+
+std::vector<int> File::add_plane(std::size_t g) {
+  add_mapping(g);
+  return {axis(name_on_grid("y", g), grids_[g].y, plane_axis("projection_y_coordinate")),
+          axis(name_on_grid("x", g), grids_[g].x, plane_axis("projection_x_coordinate"))};
 }
 
 // Keeps the members of an ensemble that have as many messages as the one with the most.
@@ -315,8 +317,8 @@ void File::add_field(std::size_t g) {
     }
     const auto grid = grid_dimensions(group.grid);
     variable.dims.insert(variable.dims.end(), grid.begin(), grid.end());
-    if (grids_[group.grid].rotated) {
-      variable.grid_mapping = name_on_grid("rotated_pole", group.grid);
+    if (grids_[group.grid].rotated || grids_[group.grid].projected) {
+      variable.grid_mapping = name_on_grid(mapping_name, group.grid);
     }
   }
   if (group.repeated > 0) {
@@ -335,19 +337,19 @@ void File::add_field(std::size_t g) {
 }
 
 cf::Numbers File::numbers(int variable, const char* attribute) const {
-  const int at = held_.at(static_cast<std::size_t>(variable)).rotated_grid;
+  const int at = held_.at(static_cast<std::size_t>(variable)).mapped_grid;
   if (at < 0) return {};
-  const Grid& grid = grids_[static_cast<std::size_t>(at)];
-  const std::string_view name = attribute;
-  if (name == "grid_north_pole_latitude") return {{-grid.south_pole_latitude}, true};
-  if (name == "grid_north_pole_longitude") return {{grid.south_pole_longitude + 180}, true};
-  return {};
+  const auto& numbers = grids_[static_cast<std::size_t>(at)].mapping.numbers;
+  const auto found = numbers.find(attribute);
+  return found == numbers.end() ? cf::Numbers() : cf::Numbers{found->second, true};
 }
 
 std::string File::text_of(int variable, const char* attribute) const {
-  const bool is_name = std::string_view(attribute) == "grid_mapping_name";
-  const Content& held = held_.at(static_cast<std::size_t>(variable));
-  return is_name && held.rotated_grid >= 0 ? "rotated_latitude_longitude" : "";
+  const int at = held_.at(static_cast<std::size_t>(variable)).mapped_grid;
+  if (at < 0) return {};
+  const auto& texts = grids_[static_cast<std::size_t>(at)].mapping.texts;
+  const auto found = texts.find(attribute);
+  return found == texts.end() ? "" : found->second;
 }
 
 std::vector<std::size_t> File::chunk(int variable) const {

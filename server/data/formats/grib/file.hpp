@@ -42,14 +42,14 @@ class File final : public cf::ArrayFile {
     std::map<Place, std::size_t> fields;
     std::size_t repeated = 0;
   };
-  // Content of a variable: numbers, the fields of a group, or the pole of a rotated grid.
+  // Content of a variable: numbers, the fields of a group, or the mapping of a grid.
   struct Content {
     std::vector<double> numbers;
     int group = -1;
     std::vector<double> members;
     std::vector<double> times;
     std::vector<double> levels;
-    int rotated_grid = -1;
+    int mapped_grid = -1;
   };
 
   explicit File(std::shared_ptr<const InputFile> input) : input_(std::move(input)) {}
@@ -59,7 +59,8 @@ class File final : public cf::ArrayFile {
   [[nodiscard]] Result<void> check_any_field() const;
   std::vector<int> grid_dimensions(std::size_t grid);
   std::vector<int> add_axes(std::size_t grid);
-  std::vector<int> add_positions(std::size_t grid);
+  std::vector<int> add_plane(std::size_t grid);
+  void add_mapping(std::size_t grid);
   int axis(const std::string& name, const std::vector<double>& values, const FileVariable& like);
   void add_field(std::size_t group);
   void omit_incomplete_members(Group& group);

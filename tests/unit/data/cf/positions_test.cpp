@@ -251,7 +251,7 @@ TEST(Positions, RotatedPoleColumnsAndWindsFollowTheirFrame) {
         ++n;
       }
     }
-    EXPECT_TRUE(has_note((*source)->info(), "computed from the rotated pole of 'rp'"));
+    EXPECT_TRUE(has_note((*source)->info(), "computed from the map projection 'rp'"));
     EXPECT_TRUE(has_note((*source)->info(), "'wind' has components along east and north: rotated"));
   }
 }

@@ -55,6 +55,28 @@ TEST_F(Loader, Netcdf4FilesReadAsInThisProcess) {
   expect_same_as_here(path);
 }
 
+// PROJ looks for files, none of which a loader can open.
+TEST_F(Loader, PositionsOfMapProjectionsAreThoseOfThisProcess) {
+  for (const bool transverse : {false, true}) {
+    const std::string path = folder_ / "map.nc";
+    {
+      NetcdfMaker file(path);
+      const int y = file.axis("y", {1e5, 2e5, 3e5}, "m", "projection_y_coordinate");
+      const int x = file.axis("x", {1e5, 2e5}, "m", "projection_x_coordinate");
+      const int crs = file.variable("crs", NC_INT, {}, {0});
+      file.text(crs, "grid_mapping_name",
+                transverse ? "transverse_mercator" : "lambert_conformal_conic");
+      file.number(crs, "standard_parallel", NC_DOUBLE, {38.5});
+      file.number(crs, "scale_factor_at_central_meridian", NC_DOUBLE, {1});
+      file.number(crs, "latitude_of_projection_origin", NC_DOUBLE, {38.5});
+      file.number(crs, "longitude_of_central_meridian", NC_DOUBLE, {-97.5});
+      file.text(file.variable("f", NC_FLOAT, {y, x}, test::counting(6)), "grid_mapping", "crs");
+    }
+    expect_same_as_here(path);
+    EXPECT_NE(opened(path)->info().grid.columns, nullptr);
+  }
+}
+
 // Chunks that were never written, in a file that disables filling: HDF5 leaves the memory
 // unchanged, which contained the numbers of another field. They must be masked.
 TEST_F(Loader, UnwrittenSamplesHoldNothingOfAnEarlierVolume) {
