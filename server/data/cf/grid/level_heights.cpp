@@ -20,31 +20,57 @@ namespace {
 
 using LevelTerms = std::array<double, 3>;
 using ColumnTerms = std::array<double, 2>;
+using Constants = ParametricLevels::Constants;
 
-// Names as in appendix D: column = {depth, eta}, level = {s or sigma, C}, constant = depth_c.
-double ocean_sigma(const LevelTerms& level, const ColumnTerms& column, double /*constant*/) {
+// Names as in appendix D: column = {depth, eta}, level = {s or sigma, C}, constants = {depth_c}.
+double ocean_sigma(const LevelTerms& level, const ColumnTerms& column,
+                   const Constants& /*constants*/) {
   return column[1] + level[0] * (column[0] + column[1]);
 }
-double ocean_s_g1(const LevelTerms& level, const ColumnTerms& column, double constant) {
-  const double s = constant * level[0] + (column[0] - constant) * level[1];
+double ocean_s_g1(const LevelTerms& level, const ColumnTerms& column, const Constants& constants) {
+  const double s = constants[0] * level[0] + (column[0] - constants[0]) * level[1];
   return s + column[1] * (1 + s / column[0]);
 }
-double ocean_s_g2(const LevelTerms& level, const ColumnTerms& column, double constant) {
-  const double s = (constant * level[0] + column[0] * level[1]) / (constant + column[0]);
+double ocean_s_g2(const LevelTerms& level, const ColumnTerms& column, const Constants& constants) {
+  const double s = (constants[0] * level[0] + column[0] * level[1]) / (constants[0] + column[0]);
   return column[1] + (column[1] + column[0]) * s;
 }
 // level = {sigma, zlev}; NaN in sigma below the sigma levels.
-double ocean_sigma_z(const LevelTerms& level, const ColumnTerms& column, double constant) {
+double ocean_sigma_z(const LevelTerms& level, const ColumnTerms& column,
+                     const Constants& constants) {
   if (std::isnan(level[0])) return level[1];
-  return column[1] + level[0] * (std::min(constant, column[0]) + column[1]);
+  return column[1] + level[0] * (std::min(constants[0], column[0]) + column[1]);
+}
+// constants = {depth_c, a, b}; level[1] is C, which set_stretching() computes.
+double ocean_s(const LevelTerms& level, const ColumnTerms& column, const Constants& constants) {
+  return column[1] * (1 + level[0]) + constants[0] * level[0] +
+         (column[0] - constants[0]) * level[1];
+}
+void set_stretching(LevelTerms& level, const Constants& constants) {
+  const double a = constants[1];
+  const double b = constants[2];
+  level[1] = (1 - b) * std::sinh(a * level[0]) / std::sinh(a) +
+             b * (std::tanh(a * (level[0] + 0.5)) / (2 * std::tanh(0.5 * a)) - 0.5);
+}
+// constants = {z1, z2, a, href}, column = {depth}. The formula gives depths below the datum: it
+// holds only if sigma grows downward, from 0 at the datum to 1 at the depth f and 2 at the floor;
+// k_c is the last level with a sigma of at most 1.
+double ocean_double_sigma(const LevelTerms& level, const ColumnTerms& column,
+                          const Constants& constants) {
+  const auto& [z1, z2, a, href] = constants;
+  const double f =
+      0.5 * (z1 + z2) + 0.5 * (z1 - z2) * std::tanh(2 * a / (z1 - z2) * (column[0] - href));
+  if (!(level[0] >= 0 && level[0] <= 2)) return std::numeric_limits<double>::quiet_NaN();
+  return level[0] <= 1 ? -level[0] * f : -(f + (level[0] - 1) * (column[0] - f));
 }
 // column = {orog}, level = {a, b}.
-double hybrid_height(const LevelTerms& level, const ColumnTerms& column, double /*constant*/) {
+double hybrid_height(const LevelTerms& level, const ColumnTerms& column,
+                     const Constants& /*constants*/) {
   return level[0] + level[1] * column[0];
 }
-// column = {zsurf1, zsurf2}, level = {a, b1, b2}, constant = ztop.
-double sleve(const LevelTerms& level, const ColumnTerms& column, double constant) {
-  return level[0] * constant + level[1] * column[0] + level[2] * column[1];
+// column = {zsurf1, zsurf2}, level = {a, b1, b2}, constants = {ztop}.
+double sleve(const LevelTerms& level, const ColumnTerms& column, const Constants& constants) {
+  return level[0] * constants[0] + level[1] * column[0] + level[2] * column[1];
 }
 
 struct KnownFormula {
@@ -52,31 +78,40 @@ struct KnownFormula {
   ParametricLevels::Formula formula;
   std::array<const char*, 3> levels;  // terms; null: none
   std::array<const char*, 2> columns;
-  const char* constant;
+  std::array<const char*, 4> constants;
   bool second_is_optional;  // absent: 0
+  void (*prepare)(LevelTerms&, const Constants&) = nullptr;
 };
 constexpr auto known_formulas = std::to_array<KnownFormula>({
-    {"ocean_sigma_coordinate",
-     ocean_sigma,
-     {"sigma", nullptr, nullptr},
+    {"ocean_sigma_coordinate", ocean_sigma, {"sigma"}, {"depth", "eta"}, {}, true},
+    {"ocean_s_coordinate",
+     ocean_s,
+     {"s"},
      {"depth", "eta"},
-     nullptr,
-     true},
-    {"ocean_s_coordinate_g1", ocean_s_g1, {"s", "c", nullptr}, {"depth", "eta"}, "depth_c", true},
-    {"ocean_s_coordinate_g2", ocean_s_g2, {"s", "c", nullptr}, {"depth", "eta"}, "depth_c", true},
+     {"depth_c", "a", "b"},
+     true,
+     set_stretching},
+    {"ocean_s_coordinate_g1", ocean_s_g1, {"s", "c"}, {"depth", "eta"}, {"depth_c"}, true},
+    {"ocean_s_coordinate_g2", ocean_s_g2, {"s", "c"}, {"depth", "eta"}, {"depth_c"}, true},
     {"ocean_sigma_z_coordinate",
      ocean_sigma_z,
-     {"sigma", "zlev", nullptr},
+     {"sigma", "zlev"},
      {"depth", "eta"},
-     "depth_c",
+     {"depth_c"},
      true},
-    {"atmosphere_hybrid_height_coordinate",
-     hybrid_height,
-     {"a", "b", nullptr},
-     {"orog", nullptr},
-     nullptr,
+    {"ocean_double_sigma_coordinate",
+     ocean_double_sigma,
+     {"sigma"},
+     {"depth"},
+     {"z1", "z2", "a", "href"},
      true},
-    {"atmosphere_sleve_coordinate", sleve, {"a", "b1", "b2"}, {"zsurf1", "zsurf2"}, "ztop", false},
+    {"atmosphere_hybrid_height_coordinate", hybrid_height, {"a", "b"}, {"orog"}, {}, true},
+    {"atmosphere_sleve_coordinate",
+     sleve,
+     {"a", "b1", "b2"},
+     {"zsurf1", "zsurf2"},
+     {"ztop"},
+     false},
 });
 
 using Terms = std::map<std::string, std::string>;
@@ -146,11 +181,12 @@ class HeightFinder {
         missing = known->columns.at(i);
       }
     }
-    if (known->constant != nullptr) {
-      const auto value = single_value(terms[known->constant]);
+    for (std::size_t i = 0; i < known->constants.size(); ++i) {
+      if (known->constants.at(i) == nullptr) continue;
+      const auto value = single_value(terms[known->constants.at(i)]);
       if (!value) return value.error();
-      if (!*value) missing = known->constant;
-      out.constant = value->value_or(0);
+      if (!*value) missing = known->constants.at(i);
+      out.constants.at(i) = value->value_or(0);
     }
     if (auto done = read_levels(*known, terms, out, missing); !done) return done.error();
     if (missing.empty()) return Found(std::move(out));
@@ -173,6 +209,9 @@ class HeightFinder {
       if (!values) return values.error();
       if (grid_.turned[2]) std::reverse(values->begin(), values->end());
       for (std::size_t k = 0; k < values->size(); ++k) out.levels[k].at(i) = (*values)[k];
+    }
+    for (LevelTerms& level : out.levels) {
+      if (known.prepare != nullptr) known.prepare(level, out.constants);
     }
     return {};
   }
@@ -302,7 +341,7 @@ Result<void> ParametricHeights::load(const ArrayFile& file, const Placement& gri
 double ParametricHeights::at(std::size_t level, std::size_t column) const {
   const ColumnTerms values{static_cast<double>(columns_[0][column]),
                            static_cast<double>(columns_[1][column])};
-  return levels_.formula(levels_.levels[level], values, levels_.constant);
+  return levels_.formula(levels_.levels[level], values, levels_.constants);
 }
 
 Result<LevelHeights> find_heights(const ArrayFile& file, int coordinate,

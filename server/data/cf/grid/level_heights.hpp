@@ -15,13 +15,14 @@ namespace windsplat::data::cf {
 
 // height(level, column) from coefficients of the level and values of the column.
 struct ParametricLevels {
-  // Of the level, of the column (0 where the file has none), and the constant term.
+  using Constants = std::array<double, 4>;
+  // Of the level, of the column (0 where the file has none), and the constant terms.
   using Formula = double (*)(const std::array<double, 3>& level,
-                             const std::array<double, 2>& column, double constant);
+                             const std::array<double, 2>& column, const Constants& constants);
   Formula formula = nullptr;
   std::vector<std::array<double, 3>> levels;  // lowest first
   std::array<int, 2> columns{-1, -1};         // variables; the second may depend on time
-  double constant = 0;                        // m
+  Constants constants{};
 };
 
 // Where the height of a sample comes from, in metres, upward.

@@ -79,6 +79,34 @@ Result<void> place_by_pressure(const ArrayFile& file, HybridLevels hybrid, Place
   return {};
 }
 
+// Whether pressures are finite, positive and descend.
+bool fall(const std::vector<double>& pressures) {
+  for (std::size_t k = 0; k < pressures.size(); ++k) {
+    const bool positive = pressures[k] > 0 && std::isfinite(pressures[k]);
+    if (!positive || (k > 0 && pressures[k] >= pressures[k - 1])) return false;
+  }
+  return true;
+}
+
+void place_by_logarithm(LogarithmicLevels logarithmic, DatasetInfo& info,
+                        PressureLevels& pressures) {
+  if (!fall(logarithmic.pressures)) {
+    info.notes.emplace_back(
+        "levels of the logarithm of pressure whose pressures do not decrease from level to level: "
+        "the coordinate of the file is used");
+    return;
+  }
+  Axis& axis = info.grid.axes[2];
+  axis.kind = AxisKind::pressure;
+  axis.standard_name = "air_pressure";
+  axis.units = "Pa";
+  axis.coordinates = logarithmic.pressures;
+  info.notes.push_back(
+      "levels of the logarithm of pressure: the vertical axis has their pressures" +
+      logarithmic.note);
+  pressures.level = std::move(logarithmic.pressures);
+}
+
 }  // namespace
 
 Result<PressureLevels> find_pressures(const ArrayFile& file, int coordinate, Placement& grid,
@@ -88,6 +116,12 @@ Result<PressureLevels> find_pressures(const ArrayFile& file, int coordinate, Pla
   const bool by_pressure = axis.kind == AxisKind::pressure;
   const auto unit = pascals_in(axis.units);
   if (!by_pressure) {
+    auto logarithmic = find_logarithmic(file, grid, coordinate);
+    if (!logarithmic) return logarithmic.error();
+    if (*logarithmic) {
+      place_by_logarithm(std::move(**logarithmic), info, pressures);
+      return pressures;
+    }
     auto hybrid = find_hybrid(file, grid, coordinate);
     if (!hybrid) return hybrid.error();
     if (*hybrid) {

@@ -243,4 +243,23 @@ Result<std::optional<HybridLevels>> find_hybrid(const ArrayFile& file, const Pla
   return Found(std::move(out));
 }
 
+Result<std::optional<LogarithmicLevels>> find_logarithmic(const ArrayFile& file,
+                                                          const Placement& grid, int coordinate) {
+  using Found = std::optional<LogarithmicLevels>;
+  if (coordinate < 0 || grid.space[2] < 0 ||
+      file.contents().variables[at(coordinate)].standard_name !=
+          "atmosphere_ln_pressure_coordinate") {
+    return Found();
+  }
+  auto terms = formula_terms(file.text_of(coordinate, "formula_terms"));
+  auto levels = on_levels(file, grid, terms["lev"]);
+  if (!levels) return levels.error();
+  if (levels->empty()) return Found();
+  LogarithmicLevels out;
+  const auto reference = reference_pressure(file, terms["p0"], out.note);
+  if (!reference) return reference.error();
+  for (const double level : *levels) out.pressures.push_back(*reference * std::exp(-level));
+  return Found(std::move(out));
+}
+
 }  // namespace windsplat::data::cf

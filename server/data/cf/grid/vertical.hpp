@@ -37,6 +37,16 @@ struct HybridLevels {
 Result<std::optional<HybridLevels>> find_hybrid(const ArrayFile& file, const Placement& grid,
                                                 int coordinate);
 
+struct LogarithmicLevels {
+  std::vector<double> pressures;  // Pa, one per level, lowest first
+  std::string note;               // assumptions made
+};
+
+// atmosphere_ln_pressure_coordinate: p = p0 exp(-lev). coordinate: as above. Empty if the levels
+// are of another kind. Errors: bad_data if a variable cannot be read.
+Result<std::optional<LogarithmicLevels>> find_logarithmic(const ArrayFile& file,
+                                                          const Placement& grid, int coordinate);
+
 // Identifies a surface pressure by standard name, otherwise by common names and units; of any
 // dimensions.
 bool is_surface_pressure(const FileVariable& variable);
