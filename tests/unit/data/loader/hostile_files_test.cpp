@@ -15,6 +15,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/unit/data/formats/netcdf/hdf5_maker.hpp"
@@ -87,9 +88,32 @@ std::uintmax_t stored_bytes(const std::string& path) {
   return bytes;
 }
 
+// A large triangle and small ones, which ask for a lattice of 16 samples for each.
+void write_cells(const std::string& path) {
+  constexpr std::size_t cells = 600'000;
+  NetcdfMaker file(path);
+  const int node = file.dimension("node", 6);
+  const int face = file.dimension("face", cells);
+  const int topology = file.variable("mesh", NC_INT, {});
+  file.text(topology, "cf_role", "mesh_topology");
+  file.number(topology, "topology_dimension", NC_INT, {2});
+  file.text(topology, "node_coordinates", "x y");
+  file.text(topology, "face_node_connectivity", "corners");
+  file.text(file.variable("x", NC_DOUBLE, {node}, {0, 100, 0, 0, 0.001, 0}), "units",
+            "degrees_east");
+  file.text(file.variable("y", NC_DOUBLE, {node}, {0, 0, 50, 0, 0, 0.001}), "units",
+            "degrees_north");
+  std::vector<double> corners{0, 1, 2};
+  while (corners.size() < 3 * cells) corners.insert(corners.end(), {3, 4, 5});
+  file.deflate(
+      file.variable("corners", NC_INT, {face, file.dimension("three", 3)}, std::move(corners)));
+  file.deflate(file.variable("t", NC_FLOAT, {face}, std::vector<double>(cells, 1)));
+}
+
 // Named by what each file amplifies.
 const std::map<std::string, std::function<void(const std::string&)>>& hostile_files() {
   static const std::map<std::string, std::function<void(const std::string&)>> all{
+      {"cells_of_a_mesh", write_cells},
       {"files_of_one_value", write_empty_store},
       {"one_chunk",
        [](const std::string& path) {
