@@ -66,6 +66,9 @@ def raw_seeds():
                                        "s_01.raw": raw_step(1)})
     yield Seed("raw+json", "one file", {"s.json": raw_document(file="s.raw").encode(),
                                         "s.raw": raw_step(0) + raw_step(1)})
+    listed = {"windsplat": "files", "title": "A storm", "files": ["a_0.nrrd", "a_[1-9].nrrd"]}
+    yield Seed("raw+json", "list of files", {"s.json": json.dumps(listed).encode()} | {
+        f"a_{i}.nrrd": nrrd_header("raw") + b"\n" + floats(interleaved(i)) for i in range(2)})
 
 
 GRADS = """dset ^{file}

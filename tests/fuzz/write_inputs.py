@@ -97,6 +97,9 @@ def requests():
     for target in (b"/v1/frames", b"/v1/forecasts", b"/v1/views", b"/v1/datasets"):
         body = b'{"path":"a.nc"}' if target.endswith(b"datasets") else view
         yield "http", "post-" + target.decode().replace("/", "-"), sizes.post(body, target=target)
+    for name, body in (("entries", b'{"from":"a","selection":{"number":3,"run":"b"}}'),
+                       ("list", b'{"files":["a_*.nc","b.nc"],"title":"A","group":"/g"}')):
+        yield "http", "post-datasets-" + name, sizes.post(body, target=b"/v1/datasets")
     stream = [b"Connection: Upgrade", b"Upgrade: websocket", b"Sec-WebSocket-Version: 13",
               b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="]
     pause = sizes.frame(0x81, b'{"type":"pause"}')
