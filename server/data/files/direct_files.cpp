@@ -23,6 +23,13 @@ constexpr std::size_t companions_max = 256;
 
 std::string last_part(const std::string& name) { return name.substr(name.find_last_of('/') + 1); }
 
+Error is_fetched(const Location& location) {
+  return make_error(
+      ErrorKind::invalid,
+      in_quotes(location.members.empty() ? location.folder : location.members.front().path) +
+          " is a URL; files are fetched only from the hosts of --data-host");
+}
+
 Error not_opened(const std::string& name, int reason) {
   const bool absent = reason == ENOENT || reason == ENOTDIR;
   const bool outside = reason == EXDEV || reason == ELOOP;
@@ -48,6 +55,7 @@ int open_in(int folder, const std::string& name, std::uint64_t flags, std::uint6
 class DirectFiles final : public Files {
  public:
   explicit DirectFiles(Location location) : location_(std::move(location)) {
+    if (location_.fetched) return;
     // Links were resolved when the dataset was located; a later link may lead elsewhere.
     folder_.reset(
         open_in(AT_FDCWD, location_.folder, O_PATH | O_DIRECTORY | O_CLOEXEC, RESOLVE_NO_SYMLINKS));
@@ -55,6 +63,7 @@ class DirectFiles final : public Files {
   [[nodiscard]] const Location& location() const override { return location_; }
 
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
+    if (location_.fetched) return is_fetched(location_);
     // O_NONBLOCK: opening a pipe must not wait for a writer; adopt() rejects pipes.
     const int descriptor = open_any(name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (descriptor < 0) {
@@ -73,6 +82,7 @@ class DirectFiles final : public Files {
   [[nodiscard]] std::vector<Companion> companions() const override { return companions_; }
 
   Result<std::vector<std::string>> list(const std::string& folder) override {
+    if (location_.fetched) return is_fetched(location_);
     const int descriptor =
         open_any(folder.empty() ? "." : folder, O_RDONLY | O_CLOEXEC | O_DIRECTORY);
     if (descriptor < 0) return not_opened(folder, errno);
@@ -104,6 +114,7 @@ class DirectFiles final : public Files {
   }
 
   bool exists(const std::string& name) override {
+    if (location_.fetched) return false;
     const int descriptor = open_any(name, O_PATH | O_CLOEXEC);
     if (descriptor >= 0) ::close(descriptor);
     return descriptor >= 0;

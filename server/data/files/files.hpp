@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -29,9 +30,11 @@ struct Location {
   std::string folder;           // absolute; for Kind::folder the dataset itself
   std::vector<Member> members;  // one for a file, none for a folder
   bool companions = false;      // other files below `folder` may be opened too
-  std::string inside;           // a group within the file or files ("a/b"), for formats with groups
-  std::string stem;             // name of the dataset: without folder and extension
-  std::string pattern;          // for a series: absolute, or below `root` if that is not empty
+  // Fetched from a host: `folder` and the paths of members are URLs without a final '/'.
+  bool fetched = false;
+  std::string inside;   // a group within the file or files ("a/b"), for formats with groups
+  std::string stem;     // name of the dataset: without folder and extension
+  std::string pattern;  // for a series: absolute, or below `root` if that is not empty
   std::string root;
   Selection selection;  // entries of dimensions that were chosen
   std::string list;     // JSON text that lists the files below `folder` (formats/list); no members
@@ -47,7 +50,7 @@ struct Location {
 // Locates a path of a file or folder, or a pattern whose last part has * ? or [...]; for files with
 // groups also "path#/group". Either may be followed by a selection, "path?number=3", unless a file
 // has this name. The ending of a file name determines whether the file may have
-// companions. Errors: not_found; bad_data for URLs and special files;
+// companions. For a URL the same as locate_url(). Errors: not_found; bad_data for special files;
 // invalid for a malformed selection.
 Result<Location> locate(const std::string& path_or_pattern);
 
@@ -71,6 +74,9 @@ class Files {
   virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;
   // Whether a file or folder with this name exists.
   virtual bool exists(const std::string& name) = 0;
+  // The first error other than not_found that exists() has met since the last call: whether the
+  // file exists is then unknown.
+  [[nodiscard]] virtual std::optional<Error> take_fault() { return {}; }
   // The companions opened so far, at most a few hundred.
   [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }
   // Total size of all files opened until stop_counting(), which also forgets their names.
@@ -91,7 +97,8 @@ class Files {
   std::uint64_t opened_bytes_ = 0;
 };
 
-// Opens files within a location; companions through openat2 with RESOLVE_BENEATH.
+// Opens files within a location; companions through openat2 with RESOLVE_BENEATH. Of a location
+// that is fetched it opens nothing: the error says so.
 std::shared_ptr<Files> direct_files(Location location);
 
 }  // namespace windsplat::data

@@ -12,6 +12,7 @@
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
 #include "server/data/files/pattern.hpp"
+#include "server/data/files/url.hpp"
 
 namespace windsplat::data {
 
@@ -164,10 +165,7 @@ Result<Location> locate(const std::string& path_or_pattern) {
   if (path.empty() || path.find('\0') != std::string::npos) {
     return make_error(ErrorKind::not_found, "no file name given");
   }
-  if (path.find("://") != std::string::npos) {
-    return make_error(ErrorKind::bad_data,
-                      in_quotes(path) + " is a URL; only local files are opened");
-  }
+  if (looks_like_url(path)) return locate_url(path);
   std::error_code fault;
   const fs::path plain = fs::canonical(path, fault);
   if (fault) {

@@ -21,6 +21,7 @@
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
 #include "server/data/files/pattern.hpp"
+#include "server/data/files/url.hpp"
 
 namespace windsplat::data {
 
@@ -52,8 +53,8 @@ Result<void> check_letters(const std::string& path) {
   if (path.empty() || path.find('\0') != std::string::npos) {
     return make_error(ErrorKind::invalid, "no path given");
   }
-  if (path.find("://") != std::string::npos) {
-    return refused(path, "is a URL; only files below the data root are opened");
+  if (looks_like_url(path)) {
+    return refused(without_secrets(path), "is a URL; only files below the data root are opened");
   }
   if (path.front() == '/') return refused(path, "is absolute; paths are below the data root");
   bool names_something = false;

@@ -15,6 +15,7 @@ constexpr std::size_t files_watched_max = 64;
 }  // namespace
 
 FileStamp stamp_of_all(const Location& location, const std::vector<Companion>& companions) {
+  if (location.fetched) return {"fetched", 0};
   std::vector<std::string> paths;
   if (location.kind == Location::Kind::folder) {
     for (const char* part : {"", "/.zmetadata", "/.zattrs", "/.zgroup"}) {

@@ -11,7 +11,8 @@
 
 namespace windsplat::data {
 
-// The combined state of the watched files of a dataset.
+// The combined state of the watched files of a dataset; always the same for one that is fetched,
+// whose files are not watched.
 FileStamp stamp_of_all(const Location& location, const std::vector<Companion>& companions);
 // States at the time of opening: members from `before`, companions as recorded by the source.
 std::string stamp_as_opened(FileStamp before, const std::vector<Companion>& companions);
