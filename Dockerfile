@@ -17,15 +17,17 @@ RUN cmake --preset release -DWINDSPLAT_TESTS=OFF -DWINDSPLAT_WERROR=OFF \
 FROM ${BASE}
 RUN apt-get -q update \
     && DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends \
-        libblosc1 libboost-url1.81.0 libeccodes0 libfmt9 libhwy1 liblz4-1 libnetcdf19 libpng16-16 \
-        libproj25 libprometheus-cpp-core1.0 libpugixml1v5 libseccomp2 libspdlog1.10 libssl3 libstdc++6 \
-        libturbojpeg0 libzstd1 zlib1g \
+        ca-certificates libblosc1 libboost-url1.81.0 libcurl4 libeccodes0 libfmt9 libhwy1 liblz4-1 \
+        libnetcdf19 libpng16-16 libproj25 libprometheus-cpp-core1.0 libpugixml1v5 libseccomp2 \
+        libspdlog1.10 libssl3 libstdc++6 libturbojpeg0 libzstd1 zlib1g \
     && rm -rf /var/lib/apt/lists/* /var/cache/apt/* /var/log/apt /var/log/dpkg.log \
     && useradd --system --uid 10001 --user-group --no-create-home --home-dir /nonexistent \
         --shell /usr/sbin/nologin windsplat \
-    && install -d -o windsplat -g windsplat -m 0700 /var/lib/windsplat
+    && install -d -o windsplat -g windsplat -m 0700 /var/lib/windsplat /var/cache/windsplat
 COPY --from=build /opt/windsplat/bin/windsplat /usr/local/bin/windsplat
-# For WINDSPLAT_STATE_DIR: a new volume mounted here belongs to the user.
+# For WINDSPLAT_STATE_DIR: a new volume mounted here belongs to the user; so does that of the cache of
+# files fetched from other hosts.
+ENV WINDSPLAT_DATA_CACHE=/var/cache/windsplat
 USER windsplat
 EXPOSE 8080
 HEALTHCHECK --interval=15s --timeout=5s --start-period=20s --retries=3 \

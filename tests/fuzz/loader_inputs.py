@@ -75,7 +75,7 @@ def loader_seeds():
              info(choices=((b"bin", 1, (b"0", b"1")),)),
              info(fields=()), info(steps=()), info(axes=((1.0, 0.0), (0.0,), (0.0,))),
              info(axes=((float("nan"),), (0.0,), (0.0,)))]
-    task = struct.pack("<Q", 1 << 30) + texts([b"/usr/share"]) + b"\0\1" + text(b"a") + text(
+    task = struct.pack("<Q", 1 << 30) + texts([b"/usr/share"]) + b"\0\1\0" + text(b"a") + text(
         b"") + text(b"") + text(b"{}") + struct.pack("<Q", 1) + text(b"number") + text(
         b"3") + texts([b"a.nc"])
     payloads = [*infos, error(), error(200), texts([b"a", b"b/"]), task, struct.pack("<d", 0.5)]

@@ -32,6 +32,7 @@ CONFINED = [
     ("PROJ", r"proj\.h", r"server/data/cf/grid/projected_columns\.cpp|tests/.*"),
     ("a compressor", r"(blosc|lz4|zlib|zstd)\.h", r"server/data/.*|tests/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
+    ("libcurl", r"curl/", r"server/data/fetch/http_client\.cpp"),
     ("libseccomp", r"seccomp\.h", r"server/data/loader/.*|tests/.*"),
     ("an image library", r"(turbojpeg|jpeglib|png)\.h", r"server/image/.*|tests/.*"),
     ("Highway", r"hwy/", r"server/engine/kernels/.*|server/image/ycc_rows\.cpp|tests/.*"),

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -38,6 +39,11 @@ struct Limits {
   // Budget for its private memory and that of the transfer; null: not counted.
   std::shared_ptr<Budget> budget = nullptr;
   std::size_t opens_max = 400'000;  // files opened in answer to one call
+  // The files of a location; they ask `cancelled` whether to give up. Empty: direct_files().
+  std::function<std::shared_ptr<Files>(const Location&, std::function<bool()> cancelled)> files{};
+  std::function<bool()> cancelled{};  // set by RemoteSource
+  // Additional time of a call for files that are fetched.
+  std::chrono::milliseconds fetch_time{0};
   // Absolute folders of library tables, whose files may also be read.
   std::vector<std::string> library_folders{"/usr/share/eccodes/definitions"};
 };

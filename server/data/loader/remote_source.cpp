@@ -14,7 +14,14 @@ namespace windsplat::data::loader {
 
 struct RemoteSource::State {
   State(Location where, Limits most)
-      : limits(std::move(most)), loader(std::move(where), limits), transfer_memory(limits.budget) {}
+      : limits(cancelled_by(*this, std::move(most))),
+        loader(std::move(where), limits),
+        transfer_memory(limits.budget) {}
+
+  static Limits cancelled_by(State& state, Limits limits) {
+    limits.cancelled = [&state] { return state.is_cancelled(); };
+    return limits;
+  }
 
   const Limits limits;
   DatasetInfo info;

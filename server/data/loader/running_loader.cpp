@@ -59,6 +59,13 @@ std::string seconds_text(std::chrono::milliseconds time) {
   return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10) + " s";
 }
 
+// The loader's answer, or the error that its files have met instead.
+Result<Message> checked(Files& files, Message heard) {
+  if (auto fault = files.take_fault()) return std::move(*fault);
+  if (heard.kind == Kind::failed) return decode_error(heard.payload);
+  return heard;
+}
+
 }  // namespace
 
 void set_program(std::string path) {
@@ -72,6 +79,16 @@ struct RunningLoader::Patience {
   Clock::time_point moved = Clock::now();  // time of the last message or progress of the loader
   Clock::time_point looked = Clock::now();
   std::chrono::nanoseconds cpu{};
+  std::chrono::nanoseconds extra{};  // by which `end` may still be postponed
+  std::chrono::nanoseconds postponed{};
+
+  // The loader waited for a file that was fetched.
+  void postpone(std::chrono::nanoseconds waited) {
+    const auto more = std::min(waited, extra);
+    extra -= more;
+    postponed += more;
+    end += std::chrono::duration_cast<Clock::duration>(more);
+  }
 };
 
 RunningLoader::RunningLoader(Location location, const Limits& limits)
@@ -86,12 +103,13 @@ Result<std::string> RunningLoader::open() {
     release();
     return started.error();
   }
-  files_ = direct_files(location_);
+  files_ = limits_.files ? limits_.files(location_, limits_.cancelled) : direct_files(location_);
   Task task;
   task.memory_bytes = limits_.memory_bytes;
   task.library_folders = limits_.library_folders;
   task.location.kind = location_.kind;
   task.location.companions = location_.companions;
+  task.location.fetched = location_.fetched;
   task.location.stem = location_.stem;
   task.location.inside = location_.inside;
   task.location.selection = location_.selection;
@@ -117,7 +135,7 @@ Result<std::string> RunningLoader::open() {
 }
 
 Result<Message> RunningLoader::call(const Call& what) {
-  Patience patience{Clock::now() + what.time};
+  Patience patience{.end = Clock::now() + what.time, .extra = limits_.fetch_time};
   process_.allow_cpu(std::chrono::ceil<std::chrono::seconds>(what.time));
   Fate fate = send_message(process_.socket(), what.kind, what.payload, what.descriptor,
                            next_deadline(patience));
@@ -135,12 +153,11 @@ Result<Message> RunningLoader::call(const Call& what) {
                              next_deadline(patience));
     }
     if (fate != Fate::done) break;
-    if (heard.kind == what.answer) return heard;
-    if (heard.kind == Kind::failed) return decode_error(heard.payload);
-    fate = heard.kind == Kind::progress ? hear_progress(heard.payload)
-           : ++questions > 2 * limits_.opens_max
-               ? Fate::broken
-               : answer(heard, what.kind, next_deadline(patience));
+    if (heard.kind == what.answer || heard.kind == Kind::failed)
+      return checked(*files_, std::move(heard));
+    fate = heard.kind == Kind::progress          ? hear_progress(heard.payload)
+           : ++questions > 2 * limits_.opens_max ? Fate::broken
+                                                 : answer(heard, what.kind, patience);
     patience.moved = Clock::now();
   }
   return ended(fate, what, patience);
@@ -192,9 +209,11 @@ Fate RunningLoader::hear_progress(const std::string& payload) const {
 }
 
 // Answers a question of the loader during a call of that kind.
-Fate RunningLoader::answer(const Message& question, Kind during, const Deadline& deadline) {
+Fate RunningLoader::answer(const Message& question, Kind during, Patience& patience) {
+  const Clock::time_point begin = Clock::now();
   const auto say = [&](Kind kind, std::string_view payload, int descriptor = -1) {
-    return send_message(process_.socket(), kind, payload, descriptor, deadline);
+    if (location_.fetched) patience.postpone(Clock::now() - begin);
+    return send_message(process_.socket(), kind, payload, descriptor, next_deadline(patience));
   };
   const std::string& name = question.payload;
   if (name.size() > question_bytes_max) return Fate::broken;
@@ -233,7 +252,9 @@ Error RunningLoader::ended(Fate fate, const Call& what, const Patience& patience
   if (fate == Fate::late && Clock::now() < patience.end) {
     how = "made no progress for " + seconds_text(limits_.stall_time) + " and was terminated";
   } else if (fate == Fate::late) {
-    how = "was terminated after " + seconds_text(what.time);
+    how = "was terminated after " +
+          seconds_text(what.time +
+                       std::chrono::duration_cast<std::chrono::milliseconds>(patience.postponed));
   } else if (fate != Fate::closed) {
     how = "violated the protocol and was terminated";
   }

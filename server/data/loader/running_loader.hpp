@@ -50,7 +50,7 @@ class RunningLoader {
   [[nodiscard]] Deadline next_deadline(const Patience& patience) const;
   Result<Fate> wait(Patience& patience);
   Fate hear_progress(const std::string& payload) const;
-  Fate answer(const Message& question, Kind during, const Deadline& deadline);
+  Fate answer(const Message& question, Kind during, Patience& patience);
   Error crowded_out(const Error& error, const Call& what);
   Error ended(Fate fate, const Call& what, const Patience& patience);
   [[nodiscard]] std::string loader_text() const;

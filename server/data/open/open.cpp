@@ -294,7 +294,9 @@ SourceResult open_by_content(const std::shared_ptr<Files>& files) {
   if (zarr::is_store(*files)) return source_of(*files, as_arrays(*files, zarr::Store::open(files)));
   if (files->location().kind == Location::Kind::folder) {
     return make_error(ErrorKind::bad_data,
-                      in_quotes(files->location().stem) + " is a directory, but not a Zarr store");
+                      in_quotes(files->location().stem) +
+                          (files->location().fetched ? " has no metadata of a Zarr store"
+                                                     : " is a directory, but not a Zarr store"));
   }
   if (files->location().kind == Location::Kind::series) {
     return source_of(*files, open_series(files));

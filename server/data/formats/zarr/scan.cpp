@@ -222,8 +222,10 @@ class StoreScan {
     }
   }
 
-  // Looks at the files of chunks, and counts the absent ones.
+  // Looks at the files of chunks, and counts the absent ones; not of a store that is fetched, whose
+  // chunks are fetched when they are read.
   void identify() {
+    if (files_.location().fetched) return;
     const auto is_stored = [](const Array& array) {
       return array.metadata.problem.empty() && !array.line;
     };

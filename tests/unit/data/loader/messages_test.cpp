@@ -290,6 +290,7 @@ TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   task.library_folders = {"/usr/share/tables"};
   task.location.kind = Location::Kind::series;
   task.location.companions = true;
+  task.location.fetched = true;
   task.location.stem = "stem";
   task.location.inside = "a/b";
   task.location.pattern = "*.nc";
@@ -304,6 +305,7 @@ TEST(LoaderMessages, TaskContainsNamesButNoPaths) {
   EXPECT_EQ(out->library_folders, task.library_folders);
   EXPECT_EQ(out->location.kind, Location::Kind::series);
   EXPECT_TRUE(out->location.companions);
+  EXPECT_TRUE(out->location.fetched);
   EXPECT_EQ(out->location.stem, "stem");
   EXPECT_EQ(out->location.inside, "a/b");
   EXPECT_EQ(out->location.pattern, "*.nc");

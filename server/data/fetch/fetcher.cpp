@@ -1,0 +1,134 @@
+#include "server/data/fetch/fetcher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace windsplat::data::fetch {
+
+namespace {
+
+constexpr std::size_t idle_clients_max = 8;
+constexpr std::size_t list_entries_max = 1'000'000;
+constexpr std::size_t list_page_bytes_max = std::size_t{4} << 20;
+
+Error no_s3(const Url& url) {
+  return make_error(ErrorKind::invalid, in_quotes(url.text()) + ": no S3 service is set");
+}
+
+}  // namespace
+
+Fetcher::Fetcher(FetchOptions options)
+    : options_(std::move(options)), rules_(std::make_shared<const HostRules>(options_.rules)) {}
+
+Result<std::unique_ptr<Fetcher>> Fetcher::open(FetchOptions options) {
+  std::unique_ptr<Fetcher> out(new Fetcher(std::move(options)));
+  auto cache = ObjectCache::open(out->options_.cache);
+  if (!cache) return cache.error();
+  out->cache_ = std::move(*cache);
+  return out;
+}
+
+Result<Request> Fetcher::request_of(const Url& url, const Cancelled& cancelled) const {
+  Request out;
+  out.url = url;
+  if (url.scheme == "s3") {
+    if (!options_.s3) return no_s3(url);
+    out.url = options_.s3->url_of(url);
+    out.key = &options_.s3->key;
+  }
+  out.limits = options_.limits;
+  out.cancelled = [this, cancelled] { return ended_ || (cancelled && cancelled()); };
+  return out;
+}
+
+Result<void> Fetcher::check(const Location& location) const {
+  const auto url = parse_url(location.folder);
+  if (!url) return url.error();
+  const auto request = request_of(*url, {});
+  if (!request) return request.error();
+  return rules_->check(request->url);
+}
+
+Result<Response> Fetcher::get(const Request& request, const HttpClient::Sink& sink) {
+  std::unique_ptr<HttpClient> client;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!idle_.empty()) {
+      client = std::move(idle_.back());
+      idle_.pop_back();
+    }
+  }
+  if (!client) client = std::make_unique<HttpClient>(rules_, options_.authorities);
+  auto response = client->get(request, sink);
+  const std::lock_guard lock(mutex_);
+  if (idle_.size() < idle_clients_max) idle_.push_back(std::move(client));
+  return response;
+}
+
+Result<Descriptor> Fetcher::fetch(const std::string& text, const Cancelled& cancelled) {
+  const auto url = parse_url(text);
+  if (!url) return url.error();
+  auto request = request_of(*url, cancelled);
+  if (!request) return request.error();
+  const std::string key = request->url.text();
+  if (auto permitted = rules_->check(request->url); !permitted) return permitted.error();
+  auto known = cache_->find(key);
+  if (known && known->is_fresh) return std::move(known->file);
+  if (known) request->known = known->validators;
+  auto part = cache_->begin();
+  if (!part) return part.error();
+  const auto response =
+      get(*request, [&part](std::string_view bytes) { return part->append(bytes); });
+  if (!response) {
+    if (response.error().kind == ErrorKind::not_found) cache_->remove(key);
+    return response.error();
+  }
+  if (!response->is_unchanged) return cache_->keep(key, std::move(*part), response->validators);
+  cache_->confirm(key);
+  return std::move(known->file);
+}
+
+Result<std::vector<std::string>> Fetcher::list(const std::string& folder_url,
+                                               const Cancelled& cancelled) {
+  const auto url = parse_url(folder_url);
+  if (!url) return url.error();
+  if (url->scheme != "s3") {
+    return make_error(ErrorKind::bad_data,
+                      in_quotes(url->text()) +
+                          " cannot be listed: over http a Zarr store needs consolidated metadata");
+  }
+  auto request = request_of(*url, cancelled);
+  if (!request) return request.error();
+  request->url = options_.s3->bucket_of(*url);
+  request->limits.bytes_max = list_page_bytes_max;
+  request->limits.bytes_name = "a page of a list";
+  std::string prefix = percent_decoded(url->path.substr(1));
+  if (!prefix.empty() && !prefix.ends_with('/')) prefix += '/';
+  std::vector<std::string> out;
+  std::string continuation;
+  do {
+    request->query = list_query(prefix, continuation);
+    std::string xml;
+    const auto response = get(*request, [&xml](std::string_view bytes) {
+      xml += bytes;
+      return true;
+    });
+    if (!response) return response.error();
+    auto page = parse_list(xml, prefix);
+    if (!page || (!continuation.empty() && page->continuation == continuation)) {
+      return make_error(ErrorKind::bad_data, in_quotes(url->text()) +
+                                                 " is listed by an answer that is not a list of "
+                                                 "objects (ListObjectsV2)");
+    }
+    out.insert(out.end(), page->names.begin(), page->names.end());
+    continuation = std::move(page->continuation);
+    if (out.size() > list_entries_max) {
+      return make_error(ErrorKind::bad_data, in_quotes(url->text()) + " has more than " +
+                                                 std::to_string(list_entries_max) + " entries");
+    }
+  } while (!continuation.empty());
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace windsplat::data::fetch

@@ -1,0 +1,70 @@
+// Files of datasets on other hosts: URL -> cache or request -> open file.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/fetch/host_rules.hpp"
+#include "server/data/fetch/http_client.hpp"
+#include "server/data/fetch/object_cache.hpp"
+#include "server/data/fetch/s3.hpp"
+#include "server/data/files/descriptor.hpp"
+#include "server/data/files/files.hpp"
+
+namespace windsplat::data::fetch {
+
+struct FetchOptions {
+  HostRules rules;
+  RequestLimits limits;
+  CacheOptions cache;
+  std::string authorities;  // file of certificates to trust; empty: those of the system
+  std::optional<S3Service> s3;
+};
+
+using Cancelled = std::function<bool()>;
+
+// Thread-safe.
+class Fetcher {
+ public:
+  // Errors: those of ObjectCache::open().
+  static Result<std::unique_ptr<Fetcher>> open(FetchOptions options);
+
+  // Whether the host of a location is permitted. Errors: invalid.
+  [[nodiscard]] Result<void> check(const Location& location) const;
+
+  // The file at a URL of https, http or s3, from the cache if its host confirms it, or did so
+  // recently. Errors: those of HttpClient::get(), out_of_memory if it cannot be stored.
+  Result<Descriptor> fetch(const std::string& url, const Cancelled& cancelled);
+  // Names directly below a folder of an S3 service, sorted; folders end in '/'. Errors: bad_data,
+  // also for other hosts, which have no lists.
+  Result<std::vector<std::string>> list(const std::string& folder_url, const Cancelled& cancelled);
+
+  // Ends all present and future requests.
+  void end() { ended_ = true; }
+
+ private:
+  explicit Fetcher(FetchOptions options);
+  // The request for a URL of a file; without a query.
+  [[nodiscard]] Result<Request> request_of(const Url& url, const Cancelled& cancelled) const;
+  Result<Response> get(const Request& request, const HttpClient::Sink& sink);
+
+  FetchOptions options_;
+  std::shared_ptr<const HostRules> rules_;
+  std::unique_ptr<ObjectCache> cache_;
+  std::atomic<bool> ended_ = false;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<HttpClient>> idle_;  // guarded by the mutex
+};
+
+// The files of a location that is fetched. `cancelled` ends a request that is under way. The
+// fetcher must outlive the result.
+std::shared_ptr<Files> fetched_files(Fetcher& fetcher, Location location, Cancelled cancelled);
+
+}  // namespace windsplat::data::fetch

@@ -1,0 +1,342 @@
+// The only use of libcurl. Each redirect is a request of its own, whose URL is checked like the
+// first; the address of each connection is checked after the name was resolved.
+#include "server/data/fetch/http_client.hpp"
+
+#include <curl/curl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <mutex>
+#include <new>
+#include <optional>
+#include <utility>
+
+#include "server/base/ascii.hpp"
+
+namespace windsplat::data::fetch {
+
+namespace {
+
+constexpr std::size_t discarded_bytes_max = std::size_t{64} << 10;  // of the body of an error
+constexpr long ok = 200;
+constexpr long not_modified = 304;
+
+struct ListDeleter {
+  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
+};
+using HeaderList = std::unique_ptr<curl_slist, ListDeleter>;
+
+void start_library() {
+  static std::once_flag once;
+  std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
+}
+
+// One request as the callbacks of libcurl see it.
+struct Exchange {
+  CURL* curl = nullptr;
+  const HostRules* rules = nullptr;
+  const Request* request = nullptr;
+  const HttpClient::Sink* sink = nullptr;
+  Response response;
+  std::string encoding;
+  std::size_t header_bytes = 0;
+  std::uint64_t body_bytes = 0;
+  bool address_refused = false;
+  bool too_large = false;
+  bool header_too_large = false;
+  bool not_stored = false;
+  bool encoded = false;
+  bool has_length = false;  // the end of the body is known
+};
+
+long status_of(CURL* curl) {
+  long status = 0;
+  curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
+  return status;
+}
+
+// Validators are sent back and stored as a line of text.
+std::string_view validator(std::string_view value) {
+  constexpr std::size_t bytes_max = 1024;
+  const bool plain =
+      value.size() <= bytes_max &&
+      std::all_of(value.begin(), value.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  return plain ? value : std::string_view();
+}
+
+// Callbacks have the types of libcurl.
+std::size_t on_header(char* data, std::size_t size, std::size_t count, void* user) {
+  auto& exchange = *static_cast<Exchange*>(user);
+  const std::string_view line(data, size * count);
+  exchange.header_bytes += line.size();
+  exchange.header_too_large = exchange.header_bytes > header_bytes_max;
+  if (exchange.header_too_large) return 0;
+  if (line.starts_with("HTTP/")) {  // a final response after an interim one
+    exchange.response.validators = {};
+    exchange.encoding.clear();
+    exchange.has_length = false;
+  }
+  const std::size_t colon = line.find(':');
+  if (colon == std::string_view::npos) return line.size();
+  const std::string name = lower(line.substr(0, colon));
+  const std::string_view value = trim(line.substr(colon + 1));
+  if (name == "etag") exchange.response.validators.etag = validator(value);
+  if (name == "last-modified") exchange.response.validators.last_modified = validator(value);
+  if (name == "content-length" || name == "transfer-encoding") exchange.has_length = true;
+  if (name == "content-encoding") exchange.encoding = lower(value);
+  return line.size();
+}
+
+std::size_t on_body(char* data, std::size_t size, std::size_t count, void* user) {
+  auto& exchange = *static_cast<Exchange*>(user);
+  const std::string_view bytes(data, size * count);
+  exchange.body_bytes += bytes.size();
+  if (status_of(exchange.curl) != ok) {
+    // Reading a short body to its end keeps the connection usable.
+    return exchange.body_bytes <= discarded_bytes_max ? bytes.size() : 0;
+  }
+  exchange.encoded = !exchange.encoding.empty() && exchange.encoding != "identity";
+  exchange.too_large = exchange.body_bytes > exchange.request->limits.bytes_max;
+  if (exchange.encoded || exchange.too_large || !exchange.has_length) return 0;
+  exchange.not_stored = !(*exchange.sink)(bytes);
+  return exchange.not_stored ? 0 : bytes.size();
+}
+
+int on_progress(void* user, curl_off_t /*expected*/, curl_off_t /*received*/,
+                curl_off_t /*to_send*/, curl_off_t /*sent*/) {
+  const auto& cancelled = static_cast<Exchange*>(user)->request->cancelled;
+  return cancelled && cancelled() ? 1 : 0;
+}
+
+curl_socket_t on_socket(void* user, curlsocktype /*purpose*/, curl_sockaddr* address) {
+  auto& exchange = *static_cast<Exchange*>(user);
+  if (!exchange.rules->permits(&address->addr)) {
+    exchange.address_refused = true;
+    return CURL_SOCKET_BAD;
+  }
+  return ::socket(address->family, address->socktype | SOCK_CLOEXEC, address->protocol);
+}
+
+Error fault(ErrorKind kind, const Url& url, const std::string& what) {
+  return make_error(kind, in_quotes(url.text()) + ' ' + what);
+}
+
+Error fault_of_status(const Url& url, long status) {
+  constexpr long gone = 410;
+  constexpr long missing = 404;
+  const std::string text = "is answered with status " + std::to_string(status);
+  if (status == missing || status == gone)
+    return fault(ErrorKind::not_found, url, text + ": no such file");
+  if (status == 401 || status == 403)
+    return fault(ErrorKind::bad_data, url, text + ": not permitted");
+  return fault(ErrorKind::bad_data, url, text);
+}
+
+Error fault_of_transfer(const Exchange& exchange, const Url& url, CURLcode code,
+                        const std::string& detail) {
+  const RequestLimits& limits = exchange.request->limits;
+  if (code == CURLE_ABORTED_BY_CALLBACK) return fault(ErrorKind::cancelled, url, "was cancelled");
+  if (exchange.address_refused) {
+    return fault(
+        ErrorKind::invalid, url,
+        "has an address in a private or reserved network; --allow-private-data-hosts permits "
+        "private ones");
+  }
+  if (exchange.too_large || code == CURLE_FILESIZE_EXCEEDED) {
+    return fault(ErrorKind::too_large, url,
+                 "has more than the " + std::to_string(limits.bytes_max) + " bytes of " +
+                     std::string(limits.bytes_name));
+  }
+  if (exchange.header_too_large) {
+    return fault(
+        ErrorKind::bad_data, url,
+        "is answered with a header of more than " + std::to_string(header_bytes_max) + " bytes");
+  }
+  if (exchange.encoded) {
+    return fault(ErrorKind::bad_data, url,
+                 "is sent with the content coding " + in_quotes(exchange.encoding) +
+                     ", which was not asked for");
+  }
+  if (exchange.body_bytes > 0 && !exchange.has_length) {
+    return fault(ErrorKind::bad_data, url,
+                 "is sent without a length, so that a part could not be told from the whole");
+  }
+  if (exchange.not_stored) {
+    return fault(ErrorKind::out_of_memory, url, "cannot be stored in the folder of --data-cache");
+  }
+  if (code == CURLE_OPERATION_TIMEDOUT) {
+    return fault(ErrorKind::bad_data, url,
+                 "was not received within " + std::to_string(limits.time.count() / 1000) +
+                     " s (--max-download-time), or at less than " +
+                     std::to_string(stall_bytes_per_second) + " bytes a second for " +
+                     std::to_string(limits.stall_time.count()) + " s");
+  }
+  if (code == CURLE_PARTIAL_FILE) {
+    return fault(ErrorKind::bad_data, url,
+                 "was received incompletely: the connection ended after " +
+                     std::to_string(exchange.body_bytes) + " bytes");
+  }
+  return fault(
+      ErrorKind::bad_data, url,
+      "cannot be fetched: " + printable(detail.empty() ? curl_easy_strerror(code) : detail));
+}
+
+void append(HeaderList& list, const std::string& line) {
+  curl_slist* const longer = curl_slist_append(list.get(), line.c_str());
+  if (longer == nullptr) throw std::bad_alloc();
+  static_cast<void>(list.release());
+  list.reset(longer);
+}
+
+HeaderList headers_of(const Request& request) {
+  HeaderList out;
+  if (!request.known.etag.empty()) append(out, "If-None-Match: " + request.known.etag);
+  if (request.known.etag.empty() && !request.known.last_modified.empty()) {
+    append(out, "If-Modified-Since: " + request.known.last_modified);
+  }
+  // S3 requires the SHA-256 of the body, which is empty.
+  if (request.key != nullptr && !request.key->id.empty()) {
+    append(out,
+           "x-amz-content-sha256: "
+           "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  }
+  if (request.key != nullptr && !request.key->session_token.empty()) {
+    append(out, "x-amz-security-token: " + request.key->session_token);
+  }
+  return out;
+}
+
+}  // namespace
+
+struct HttpClient::Handle {
+  CURL* curl = curl_easy_init();
+  std::array<char, CURL_ERROR_SIZE> detail{};
+
+  Handle() {
+    if (curl == nullptr) throw std::bad_alloc();
+  }
+  ~Handle() { curl_easy_cleanup(curl); }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+
+  template <class Value>
+  void set(CURLoption option, Value value) const {
+    curl_easy_setopt(curl, option, value);
+  }
+
+  // Keeps connections and resolved names of earlier requests.
+  void prepare(const Request& request, const std::string& authorities) {
+    curl_easy_reset(curl);
+    detail[0] = '\0';
+    set(CURLOPT_ERRORBUFFER, detail.data());
+    set(CURLOPT_NOSIGNAL, 1L);
+    set(CURLOPT_PROTOCOLS_STR, request.url.scheme.c_str());
+    set(CURLOPT_FOLLOWLOCATION, 0L);
+    set(CURLOPT_PROXY, "");
+    set(CURLOPT_NETRC, static_cast<long>(CURL_NETRC_IGNORED));
+    set(CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_1_1));
+    set(CURLOPT_SSL_VERIFYPEER, 1L);
+    set(CURLOPT_SSL_VERIFYHOST, 2L);
+    set(CURLOPT_SSLVERSION, static_cast<long>(CURL_SSLVERSION_TLSv1_2));
+    if (!authorities.empty()) set(CURLOPT_CAINFO, authorities.c_str());
+    set(CURLOPT_MAXCONNECTS, 4L);
+    set(CURLOPT_HTTP_CONTENT_DECODING, 0L);
+    set(CURLOPT_USERAGENT, "windsplat/" WINDSPLAT_VERSION);
+    const RequestLimits& limits = request.limits;
+    set(CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(limits.connect_time.count()));
+    set(CURLOPT_LOW_SPEED_LIMIT, stall_bytes_per_second);
+    set(CURLOPT_LOW_SPEED_TIME, static_cast<long>(limits.stall_time.count()));
+    set(CURLOPT_MAXFILESIZE_LARGE, static_cast<curl_off_t>(limits.bytes_max));
+  }
+
+  void sign(const S3Key& key) const {
+    const std::string user = key.id + ':' + key.secret;
+    set(CURLOPT_AWS_SIGV4, ("aws:amz:" + key.region + ":s3").c_str());
+    set(CURLOPT_USERPWD, user.c_str());
+  }
+};
+
+HttpClient::HttpClient(std::shared_ptr<const HostRules> rules, std::string authorities)
+    : rules_(std::move(rules)), authorities_(std::move(authorities)) {
+  start_library();
+  handle_ = std::make_unique<Handle>();
+}
+
+HttpClient::~HttpClient() = default;
+
+Result<Response> HttpClient::get(const Request& first, const Sink& sink) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point end = Clock::now() + first.limits.time;
+  Request request = first;
+  const HeaderList headers = headers_of(request);
+  for (int hop = 0; hop <= redirects_max; ++hop) {
+    if (auto permitted = rules_->check(request.url); !permitted) return permitted.error();
+    Exchange exchange;
+    exchange.curl = handle_->curl;
+    exchange.rules = rules_.get();
+    exchange.request = &request;
+    exchange.sink = &sink;
+    handle_->prepare(request, authorities_);
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
+    handle_->set(CURLOPT_TIMEOUT_MS, std::max<long>(1, static_cast<long>(left.count())));
+    const std::string target =
+        request.url.text() + (request.query.empty() ? "" : '?' + request.query);
+    handle_->set(CURLOPT_URL, target.c_str());
+    handle_->set(CURLOPT_PATH_AS_IS, 1L);
+    handle_->set(CURLOPT_HTTPHEADER, headers.get());
+    handle_->set(CURLOPT_HEADERFUNCTION, &on_header);
+    handle_->set(CURLOPT_HEADERDATA, &exchange);
+    handle_->set(CURLOPT_WRITEFUNCTION, &on_body);
+    handle_->set(CURLOPT_WRITEDATA, &exchange);
+    handle_->set(CURLOPT_NOPROGRESS, 0L);
+    handle_->set(CURLOPT_XFERINFOFUNCTION, &on_progress);
+    handle_->set(CURLOPT_XFERINFODATA, &exchange);
+    handle_->set(CURLOPT_OPENSOCKETFUNCTION, &on_socket);
+    handle_->set(CURLOPT_OPENSOCKETDATA, &exchange);
+    if (request.key != nullptr && !request.key->id.empty()) handle_->sign(*request.key);
+    const CURLcode code = curl_easy_perform(handle_->curl);
+    const long status = status_of(handle_->curl);
+    // The body of an error may be longer than what is discarded.
+    const bool is_error_body =
+        code == CURLE_WRITE_ERROR && status != ok && status != 0 && !exchange.header_too_large;
+    if (code != CURLE_OK && !is_error_body) {
+      return fault_of_transfer(exchange, request.url, code, handle_->detail.data());
+    }
+    if (status == ok) return std::move(exchange.response);
+    if (status == not_modified &&
+        (!request.known.etag.empty() || !request.known.last_modified.empty())) {
+      return Response{true, first.known};
+    }
+    char* location = nullptr;
+    curl_easy_getinfo(handle_->curl, CURLINFO_REDIRECT_URL, &location);
+    if (status < 301 || status > 308 || location == nullptr) {
+      return fault_of_status(request.url, status);
+    }
+    if (request.key != nullptr) {
+      return fault(ErrorKind::bad_data, request.url,
+                   "is redirected (status " + std::to_string(status) +
+                       "), which a service of s3:// URLs must not do: check region and endpoint");
+    }
+    // A query of the new URL may be a signature, so it is sent, but not shown.
+    const std::string_view next(location);
+    const std::size_t mark = next.find('?');
+    auto url = parse_url(next.substr(0, mark));
+    if (!url)
+      return fault(ErrorKind::bad_data, request.url,
+                   "is redirected to a URL that is not valid: " + url.error().message);
+    request.query = mark == std::string_view::npos ? "" : std::string(next.substr(mark + 1));
+    if (request.url.scheme == "https" && url->scheme != "https") {
+      return fault(ErrorKind::invalid, request.url, "is redirected from https to " + url->scheme);
+    }
+    if (auto permitted = rules_->check(*url); !permitted) {
+      return fault(ErrorKind::invalid, request.url,
+                   "is redirected to another host: " + permitted.error().message);
+    }
+    request.url = std::move(*url);
+  }
+  return fault(ErrorKind::bad_data, first.url,
+               "is redirected more than " + std::to_string(redirects_max) + " times");
+}
+
+}  // namespace windsplat::data::fetch

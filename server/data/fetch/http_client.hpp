@@ -1,0 +1,85 @@
+// GET requests to permitted hosts by libcurl: URL -> status, validators and bytes.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/fetch/host_rules.hpp"
+#include "server/data/files/url.hpp"
+
+namespace windsplat::data::fetch {
+
+// What identifies a state of a file on its host (RFC 9110, 8.8); empty: not given.
+struct Validators {
+  std::string etag;
+  std::string last_modified;
+};
+
+// The key of an S3 service, from the AWS_ variables of the environment.
+struct S3Key {
+  std::string id;  // empty: requests are not signed
+  std::string secret;
+  std::string session_token;
+  std::string region = "us-east-1";
+};
+
+// Limits of one request.
+struct RequestLimits {
+  std::uint64_t bytes_max = 0;  // of a body
+  std::string_view bytes_name = "--max-download";
+  std::chrono::milliseconds time{600'000};  // in total, with redirects
+  std::chrono::milliseconds connect_time{10'000};
+  std::chrono::seconds stall_time{15};  // below stall_bytes_per_second for so long
+};
+inline constexpr long stall_bytes_per_second = 1024;
+inline constexpr std::size_t header_bytes_max = std::size_t{64} << 10;
+inline constexpr int redirects_max = 5;
+
+struct Request {
+  Url url;            // https or http
+  std::string query;  // percent-encoded, sorted by name; empty: none
+  Validators known;   // the body is sent only if it differs from this state
+  RequestLimits limits;
+  const S3Key* key =
+      nullptr;  // signs the request (AWS Signature Version 4), which is not redirected
+  std::function<bool()> cancelled;  // asked at least once a second; empty: never
+};
+
+struct Response {
+  bool is_unchanged = false;  // 304: the state is that of `known`
+  Validators validators;
+};
+
+// One connection at a time, kept for the next request to the same host. Not thread-safe.
+class HttpClient {
+ public:
+  // `authorities`: file of certificates (PEM) to trust; empty: those of the system.
+  HttpClient(std::shared_ptr<const HostRules> rules, std::string authorities);
+  ~HttpClient();
+  HttpClient(const HttpClient&) = delete;
+  HttpClient& operator=(const HttpClient&) = delete;
+
+  // Takes the bytes of the body in order. False: they cannot be stored; the request ends.
+  using Sink = std::function<bool(std::string_view bytes)>;
+
+  // Redirects are followed to permitted hosts, from https only to https. Certificates are always
+  // verified; proxies, cookies, netrc files and compressed bodies are not used. Errors: not_found
+  // for 404 and 410; too_large; cancelled; invalid for a host or address that is not permitted;
+  // bad_data for everything else. Messages name the URL without query.
+  Result<Response> get(const Request& request, const Sink& sink);
+
+ private:
+  struct Handle;
+  std::shared_ptr<const HostRules> rules_;
+  std::string authorities_;
+  std::unique_ptr<Handle> handle_;
+};
+
+}  // namespace windsplat::data::fetch

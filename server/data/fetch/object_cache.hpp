@@ -1,0 +1,89 @@
+// Fetched files on disk, within a limit on bytes: URL -> open file. Processes may share a folder.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+
+#include "server/base/error.hpp"
+#include "server/data/fetch/http_client.hpp"
+#include "server/data/files/descriptor.hpp"
+
+struct evp_md_ctx_st;
+
+namespace windsplat::data::fetch {
+
+struct CacheOptions {
+  std::string folder;  // created, with mode 0700, if it does not exist
+  std::uint64_t bytes_max = 0;
+  // How long a file that was fetched or confirmed is used without asking its host.
+  std::chrono::milliseconds fresh_time{60'000};
+};
+
+// A file that is being received; removed unless it is kept.
+class PartialFile {
+ public:
+  PartialFile(PartialFile&& other) noexcept;
+  PartialFile& operator=(PartialFile&&) = delete;
+  PartialFile(const PartialFile&) = delete;
+  PartialFile& operator=(const PartialFile&) = delete;
+  ~PartialFile();
+  // False: the disk is full or faulty.
+  bool append(std::string_view bytes);
+
+ private:
+  friend class ObjectCache;
+  PartialFile(Descriptor file, std::string path);
+  Descriptor file_;
+  std::string path_;
+  std::uint64_t bytes_ = 0;
+  std::shared_ptr<evp_md_ctx_st> digest_;
+};
+
+// Thread-safe. A file is named by the digests (SHA-256) of its URL and of its bytes, and completed
+// by renaming, so that a name always has the same bytes. Its time of modification is derived from
+// its bytes: the identity of an open file (InputFile::identity()) is equal if and only if its bytes
+// are, whenever it was fetched. Beyond the limit the files used least recently are removed; open
+// descriptors remain valid.
+class ObjectCache {
+ public:
+  // Errors: invalid, if the folder cannot be used.
+  static Result<std::unique_ptr<ObjectCache>> open(CacheOptions options);
+
+  struct Entry {
+    Descriptor file;
+    Validators validators;
+    bool is_fresh = false;
+  };
+  // Empty: not in the cache. Marks the file as used.
+  std::optional<Entry> find(const std::string& url);
+  // Errors: out_of_memory.
+  Result<PartialFile> begin();
+  // Completes a file, which replaces any of the same URL. Errors: out_of_memory.
+  Result<Descriptor> keep(const std::string& url, PartialFile part, const Validators& validators);
+  // The host confirmed the state of the file.
+  void confirm(const std::string& url);
+  void remove(const std::string& url);
+
+  // Space of all files on disk.
+  [[nodiscard]] std::uint64_t bytes() const;
+
+ private:
+  explicit ObjectCache(CacheOptions options);
+  void scan();
+  void evict(std::uint64_t bytes_max);
+  [[nodiscard]] std::string path_of(const std::string& name) const;
+
+  CacheOptions options_;
+  mutable std::mutex mutex_;  // guards the members below
+  std::uint64_t bytes_ = 0;   // at the last scan, and what was added since
+  std::uint64_t parts_ = 0;
+  std::unordered_map<std::string, std::chrono::steady_clock::time_point> confirmed_;
+};
+
+}  // namespace windsplat::data::fetch
