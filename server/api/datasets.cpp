@@ -8,6 +8,7 @@
 #include "server/api/resources.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
+#include "server/data/files/url.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
 
@@ -31,18 +32,23 @@ http::Response open_in_job(tasks::Backend& backend, const std::string& base_path
   return job_response(backend.metrics, base_path, job);
 }
 
+http::Response not_located(const Error& error) {
+  return http::problem_response(make_error_at(error.kind, "/path", error.message));
+}
+
+http::Response open_location(const ServerOptions& options, tasks::Backend& backend,
+                             const data::Location& location) {
+  return open_in_job(backend, options.base_path, [&backend, location](const CancelToken& cancel) {
+    return backend.catalogue.open(location, cancel);
+  });
+}
+
 // Resolves only the name; reads nothing.
 http::Response locate_and_open(const ServerOptions& options, tasks::Backend& backend,
                                const std::string& path) {
   const auto located = data::locate_beneath(options.data_root, path);
-  if (located) {
-    return open_in_job(backend, options.base_path,
-                       [&backend, location = *located](const CancelToken& cancel) {
-                         return backend.catalogue.open(location, cancel);
-                       });
-  }
-  return http::problem_response(
-      make_error_at(located.error().kind, "/path", located.error().message));
+  if (located) return open_location(options, backend, *located);
+  return not_located(located.error());
 }
 
 // The names in the list are resolved when it is opened, below the data root only.
@@ -53,9 +59,7 @@ http::Response open_list(const ServerOptions& options, tasks::Backend& backend,
   location.companions = true;
   location.stem = data::stem_of_pattern(request.first);
   location.list = request.list;
-  return open_in_job(backend, options.base_path, [&backend, location](const CancelToken& cancel) {
-    return backend.catalogue.open(location, cancel);
-  });
+  return open_location(options, backend, location);
 }
 
 // No file is named: other entries of the files of a listed dataset.
@@ -106,10 +110,21 @@ void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
     reply(open_entries(options, backend, *wanted));
     return;
   }
-  if (options.data_root.empty()) {
+  if (options.data_root.empty() && !options.locate_url) {
     reply(http::problem_response(403, "Forbidden",
                                  "opening files is disabled: start the server with "
-                                 "--data-root"));
+                                 "--data-root, or --data-host for URLs"));
+    return;
+  }
+  if (options.locate_url && data::looks_like_url(wanted->path)) {
+    const auto located = options.locate_url(wanted->path);
+    reply(located ? open_location(options, backend, *located) : not_located(located.error()));
+    return;
+  }
+  if (options.data_root.empty()) {
+    reply(not_located(make_error(ErrorKind::invalid, in_quotes(wanted->path) +
+                                                         " is not a URL, and files are opened only "
+                                                         "with --data-root")));
     return;
   }
   if (!wanted->list.empty()) {

@@ -3,12 +3,15 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "server/access/auth.hpp"
 #include "server/access/limits.hpp"
+#include "server/base/error.hpp"
+#include "server/data/files/files.hpp"
 #include "server/views/saved_views.hpp"
 
 namespace windsplat::transport {
@@ -30,6 +33,9 @@ struct ServerOptions {
   // The folder below which POST /v1/datasets opens files, absolute; empty: none.
   std::string data_root;
   bool fixed_entries = false;  // clients may not open other entries of listed datasets
+  // Locates a URL that it opens too; empty: none. Errors: invalid, also if its host is not
+  // permitted.
+  std::function<Result<data::Location>(const std::string&)> locate_url;
   std::shared_ptr<views::SavedViews> views;  // null: in memory only
   int sessions_max = 64;
   access::Limits limits;

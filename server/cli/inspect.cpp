@@ -7,6 +7,7 @@
 
 #include "protocol/codec.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/data_hosts.hpp"
 #include "server/cli/inspect_text.hpp"
 #include "server/cli/open_store.hpp"
 #include "server/data/bytes/decode_limits.hpp"
@@ -25,6 +26,7 @@ constexpr std::uint64_t bytes_of_a_read = 65536;  // minimum cost of a read
 struct InspectArguments {
   std::string dataset;
   std::string memory = "8G";
+  DataHostArguments data_hosts;
   std::string ranges = "auto";
   bool json = false;
 };
@@ -112,7 +114,10 @@ Result<void> inspect(const InspectArguments& arguments) {
   const auto limit = memory_limit(arguments.memory);
   if (!limit) return limit.error();
   const bool asked = arguments.ranges != "auto";
-  data::Store store(asked ? store_options(*limit) : frugal_store_options(*limit));
+  auto fetcher = open_fetcher(arguments.data_hosts);
+  if (!fetcher) return fetcher.error();
+  data::Store store(asked ? store_options(*limit, std::move(*fetcher))
+                          : frugal_store_options(*limit, std::move(*fetcher)));
   const auto dataset = store.add(arguments.dataset);
   if (!dataset) return dataset.error();
   auto description = scene::describe(**dataset, scene::RangesOf::none);
@@ -148,6 +153,7 @@ void add_inspect(CLI::App& app, Action& chosen) {
       ->required()
       ->type_name("FILE");
   add_memory_option(*command, arguments->memory);
+  add_data_host_options(*command, arguments->data_hosts);
   command
       ->add_option("--ranges", arguments->ranges,
                    "Steps to read for the ranges of fields, at any cost; auto: "

@@ -2,9 +2,13 @@
 #include "server/cli/open_store.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <functional>
 #include <string_view>
+#include <utility>
 
 #include "server/base/check.hpp"
+#include "server/data/files/files.hpp"
 #include "server/data/formats/grib/open.hpp"
 #include "server/data/loader/loader.hpp"
 
@@ -45,8 +49,28 @@ data::LimitName limit_name(std::uint64_t memory_bytes) {
   return name;
 }
 
+// The time of fetching is bounded for each file; a call may fetch many.
+constexpr std::chrono::minutes fetch_time_of_a_call{30};
+
+void let_fetch(data::loader::Limits& limits, const FetcherPtr& fetcher) {
+  limits.fetch_time = fetch_time_of_a_call;
+  limits.files = [fetcher](const data::Location& location, std::function<bool()> cancelled) {
+    return location.fetched ? data::fetch::fetched_files(*fetcher, location, std::move(cancelled))
+                            : data::direct_files(location);
+  };
+}
+
+Result<void> check_host(const data::fetch::Fetcher* fetcher, const data::Location& location) {
+  if (fetcher != nullptr) return fetcher->check(location);
+  return make_error(
+      ErrorKind::invalid,
+      in_quotes(location.members.empty() ? location.folder : location.members.front().path) +
+          " is a URL: files are fetched only from the hosts of --data-host, and none is "
+          "given");
+}
+
 data::StoreOptions options_of(std::uint64_t memory_bytes, data::Storage storage,
-                              data::loader::Limits limits) {
+                              data::loader::Limits limits, FetcherPtr fetcher) {
   data::StoreOptions options;
   WINDSPLAT_CHECK(memory_bytes >= memory_bytes_min);
   options.bytes_max = data_bytes_of(memory_bytes);
@@ -56,7 +80,13 @@ data::StoreOptions options_of(std::uint64_t memory_bytes, data::Storage storage,
   limits.library_folders = folders_of(data::grib::definitions_folder());
   limits.budget = options.budget;
   options.storage = storage;
-  options.open = [limits](const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
+  if (fetcher) let_fetch(limits, fetcher);
+  options.open = [limits, fetcher = std::move(fetcher)](
+                     const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
+    if (location.fetched) {
+      if (auto permitted = check_host(fetcher.get(), location); !permitted)
+        return permitted.error();
+    }
     auto source = data::loader::open(location, limits);
     if (!source) return source.error();
     return std::unique_ptr<data::Source>(std::move(*source));
@@ -75,14 +105,15 @@ std::string bytes_text(std::uint64_t bytes) {
   return std::to_string(bytes);
 }
 
-data::StoreOptions store_options(std::uint64_t memory_bytes, data::Storage storage) {
-  return options_of(memory_bytes, storage, {});
+data::StoreOptions store_options(std::uint64_t memory_bytes, FetcherPtr fetcher,
+                                 data::Storage storage) {
+  return options_of(memory_bytes, storage, {}, std::move(fetcher));
 }
 
-data::StoreOptions frugal_store_options(std::uint64_t memory_bytes) {
+data::StoreOptions frugal_store_options(std::uint64_t memory_bytes, FetcherPtr fetcher) {
   data::loader::Limits limits;
   limits.reads_take_all = false;
-  return options_of(memory_bytes, data::Storage::float32, limits);
+  return options_of(memory_bytes, data::Storage::float32, limits, std::move(fetcher));
 }
 
 }  // namespace windsplat::cli

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
+#include "server/data/fetch/fetcher.hpp"
 #include "server/data/resident/store.hpp"
 
 namespace windsplat::cli {
@@ -24,11 +26,13 @@ constexpr std::uint64_t memory_bytes_max = std::uint64_t{1} << 47;
 std::string bytes_text(std::uint64_t bytes);
 
 // `memory_bytes`, at least memory_bytes_min, is the limit of the whole program including its
-// loaders; part of it is reserved for memory other than data.
-data::StoreOptions store_options(std::uint64_t memory_bytes,
+// loaders; part of it is reserved for memory other than data. `fetcher` fetches the datasets that
+// are given as URLs; null: they are refused.
+using FetcherPtr = std::shared_ptr<data::fetch::Fetcher>;
+data::StoreOptions store_options(std::uint64_t memory_bytes, FetcherPtr fetcher = nullptr,
                                  data::Storage storage = data::Storage::float32);
 // The same for a command that reads ranges without a request: loaders get no more memory for
 // reading than for opening.
-data::StoreOptions frugal_store_options(std::uint64_t memory_bytes);
+data::StoreOptions frugal_store_options(std::uint64_t memory_bytes, FetcherPtr fetcher = nullptr);
 
 }  // namespace windsplat::cli

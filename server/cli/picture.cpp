@@ -26,6 +26,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
       ->type_name("N")
       ->capture_default_str();
   add_memory_option(command, arguments.memory);
+  add_data_host_options(command, arguments.data_hosts);
 }
 
 Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
@@ -84,8 +85,10 @@ frame::Encoding file_encoding(frame::Format format, int quality) {
 Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments) {
   const auto limit = memory_limit(arguments.memory);
   if (!limit) return limit.error();
+  auto fetcher = open_fetcher(arguments.data_hosts);
+  if (!fetcher) return fetcher.error();
   // Datasets do not depend on the store.
-  return data::Store(store_options(*limit)).add(arguments.dataset);
+  return data::Store(store_options(*limit, std::move(*fetcher))).add(arguments.dataset);
 }
 
 }  // namespace windsplat::cli

@@ -8,6 +8,7 @@
 
 #include "protocol/codec.hpp"
 #include "server/base/error.hpp"
+#include "server/cli/data_hosts.hpp"
 #include "server/data/open/open.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/frame/frame.hpp"
@@ -21,11 +22,12 @@ struct ViewArguments {
   std::string size;
   std::vector<std::string> settings;  // "/json/pointer=value"
   std::string memory = "8G";
+  DataHostArguments data_hosts;
   int quality = 95;  // JPEG: files favour detail over size
 };
 
-// DATASET, --view, --size, --set, --quality and --memory-limit; `arguments` must outlive the
-// command.
+// DATASET, --view, --size, --set, --quality, --memory-limit and the options of data hosts;
+// `arguments` must outlive the command.
 void add_view_options(CLI::App& command, ViewArguments& arguments);
 
 // The view file, overridden by --step, --size and --set in this order.
@@ -37,7 +39,8 @@ Result<frame::Format> format_of(const std::string& output);
 // Encoding of a picture file, `quality` 1..100 for a JPEG; the reference is allowed.
 frame::Encoding file_encoding(frame::Format format, int quality);
 
-// Opens the dataset for this command. Errors: malformed for an invalid limit.
+// Opens the dataset for this command. Errors: malformed for an invalid limit; those of
+// open_fetcher().
 Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments);
 
 }  // namespace windsplat::cli

@@ -17,6 +17,7 @@
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
+#include "server/cli/data_hosts.hpp"
 #include "server/cli/open_store.hpp"
 #include "server/cli/signals.hpp"
 #include "server/data/resident/store.hpp"
@@ -46,6 +47,7 @@ struct StudyArguments {
   bool no_calibration = false;
   unsigned threads = 0;
   std::string memory = "8G";
+  DataHostArguments data_hosts;
   std::string output;
 };
 
@@ -201,9 +203,11 @@ int study_command(const StudyArguments& arguments) {
   if (arguments.extremes) return extremes_command(arguments);
   const auto limit = memory_limit(arguments.memory);
   if (!limit) return answer(limit.error());
+  auto fetcher = open_fetcher(arguments.data_hosts);
+  if (!fetcher) return answer(fetcher.error());
   const CancelToken cancel;
   const SignalWatch watch([&cancel] { cancel.cancel(); }, nullptr, {exit_interrupted});
-  data::Store store(store_options(*limit));
+  data::Store store(store_options(*limit, std::move(*fetcher)));
   const auto subjects = subjects_of(arguments, store);
   if (!subjects) return answer(subjects.error());
   ThreadPool pool(arguments.threads);
@@ -275,6 +279,7 @@ void add_study(CLI::App& app, Action& chosen) {
       ->type_name("DIR");
   add_threads_option(*command, arguments->threads);
   add_memory_option(*command, arguments->memory);
+  add_data_host_options(*command, arguments->data_hosts);
   command->callback(
       [&chosen, arguments] { chosen = [arguments] { return study_command(*arguments); }; });
 }

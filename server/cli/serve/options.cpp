@@ -122,6 +122,7 @@ void add_serve_options(CLI::App& command, ServeArguments& arguments) {
   add_access_options(command, arguments);
   add_limit_options(command, arguments.limits);
   add_data_options(command, arguments);
+  add_data_host_options(command, arguments.data_hosts);
   add_threads_option(command, arguments.threads);
   command.add_option("--log-format", arguments.log_format, "Format of the log on stderr")
       ->envname("WINDSPLAT_LOG_FORMAT")

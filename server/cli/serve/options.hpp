@@ -7,6 +7,7 @@
 
 #include "protocol/limits.hpp"
 #include "server/access/limits.hpp"
+#include "server/cli/data_hosts.hpp"
 
 namespace windsplat::cli {
 
@@ -22,6 +23,7 @@ struct ServeArguments {
   std::string base_path = "/";
   std::string data_root;
   bool fixed_entries = false;
+  DataHostArguments data_hosts;
   std::string state_dir;
   std::string memory_limit = "8G";
   std::string storage = "float32";

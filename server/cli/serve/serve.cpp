@@ -21,6 +21,7 @@
 #include "server/cli/serve/config_file.hpp"
 #include "server/cli/serve/settings.hpp"
 #include "server/cli/signals.hpp"
+#include "server/data/files/url.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
@@ -159,8 +160,9 @@ int open_datasets(const std::vector<std::string>& named, data::Store& store) {
     const auto dataset = store.add(name);
     if (!dataset) {
       const Error& error = dataset.error();
+      const std::string shown = data::looks_like_url(name) ? data::without_secrets(name) : name;
       code = code == exit_bad_data ? code : exit_code(error.kind);
-      log::warn("cannot open a dataset", {{"dataset", name}, {"fault", error.message}});
+      log::warn("cannot open a dataset", {{"dataset", shown}, {"fault", error.message}});
       store.list_failed(name, error);
       continue;
     }
@@ -184,6 +186,16 @@ int open_datasets(const std::vector<std::string>& named, data::Store& store) {
   return exit_ok;
 }
 
+// Locates the URLs of POST /v1/datasets.
+std::function<Result<data::Location>(const std::string&)> locate_on(const FetcherPtr& fetcher) {
+  return [fetcher](const std::string& url) -> Result<data::Location> {
+    auto location = data::locate_url(url);
+    if (!location) return location;
+    if (auto permitted = fetcher->check(*location); !permitted) return permitted.error();
+    return location;
+  };
+}
+
 int serve(const CLI::App& given) {
   const auto control = std::make_shared<Control>(given);
   SignalWatch signals([control] { control->drain(); }, [control] { control->reload(); });
@@ -194,8 +206,11 @@ int serve(const CLI::App& given) {
   api::ServerOptions options = (*settings)->options;
   warn_of(**settings);
 
+  auto fetcher = open_fetcher(arguments.data_hosts);
+  if (!fetcher) return answer(fetcher.error());
+  if (*fetcher) options.locate_url = locate_on(*fetcher);
   data::StoreOptions stored = store_options(
-      parse_bytes(arguments.memory_limit).value_or(0),
+      parse_bytes(arguments.memory_limit).value_or(0), *fetcher,
       arguments.storage == "packed16" ? data::Storage::packed16 : data::Storage::float32);
   stored.check = check_first_view;
   const auto store = std::make_shared<data::Store>(std::move(stored));
@@ -217,6 +232,7 @@ int serve(const CLI::App& given) {
     code = answer(ok.error());
   } else {
     server.run();
+    if (*fetcher) (*fetcher)->end();
     log::info("drained");
   }
   control->disarm();  // a further signal now ends the process

@@ -125,6 +125,9 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   if (const auto limit = memory_limit(arguments.memory_limit); !limit) return limit.error();
   auto data_root = plain_folder(arguments.data_root);
   if (!data_root) return data_root.error();
+  if (!arguments.data_hosts.hosts.empty()) {
+    if (const auto hosts = fetch_options(arguments.data_hosts); !hosts) return hosts.error();
+  }
   auto token = read_token(arguments.token_file);
   if (!token) return token.error();
   auto tls = read_tls(arguments);

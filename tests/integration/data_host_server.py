@@ -1,0 +1,219 @@
+"""A host of data files on loopback: files with validators, faults, and an S3 service."""
+
+import hashlib
+import hmac
+import http.server
+import ssl
+import threading
+import urllib.parse
+import xml.sax.saxutils
+
+KEY_ID, SECRET, TOKEN, REGION = "AKIDTEST", "secret/of+the.test", "token/of+the.test", "test-1"
+
+
+def digest(text):
+    return hashlib.sha256(text).hexdigest()
+
+
+def sign(key, text):
+    return hmac.new(key, text.encode(), hashlib.sha256).digest()
+
+
+def signature(method, path, query, headers, signed):
+    """AWS Signature Version 4 of a request to s3 without a body."""
+    date = headers["x-amz-date"]
+    lines = "".join(f"{name}:{' '.join(headers[name].split())}\n" for name in signed)
+    sorted_query = "&".join(sorted(query.split("&"))) if query else ""
+    request = "\n".join([method, path, sorted_query, lines, ";".join(signed),
+                         headers.get("x-amz-content-sha256", digest(b""))])
+    scope = f"{date[:8]}/{REGION}/s3/aws4_request"
+    text = "\n".join(["AWS4-HMAC-SHA256", date, scope, digest(request.encode())])
+    key = f"AWS4{SECRET}".encode()
+    for part in scope.split("/"):
+        key = sign(key, part)
+    return sign(key, text).hex()
+
+
+class Handler(http.server.BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
+
+    def log_message(self, *_):
+        pass
+
+    def answer(self, status, body=b"", **headers):
+        self.send_response(status)
+        headers.setdefault("Content_Length", str(len(body)))
+        for name, value in headers.items():
+            if value is not None:
+                self.send_header(name.replace("_", "-"), value)
+        self.end_headers()
+        self.wfile.write(body)
+
+    def do_GET(self):
+        host = self.server.host
+        path, _, query = self.path.partition("?")
+        with host.lock:
+            host.requests.append(self.path)
+        name = urllib.parse.unquote(path).lstrip("/")
+        if name in host.stalled:
+            self.fault_stalled(name)
+            return
+        fault = getattr(self, "fault_" + name.partition("/")[0].replace("-", "_"), None)
+        if fault:
+            fault(name.partition("/")[2])
+        elif name.partition("/")[0] in host.buckets:
+            self.object(path, name, query)
+        else:
+            self.file(host.files.get(name))
+
+    def file(self, body):
+        if body is None:
+            self.answer(404, b"no such file" * 10)
+            return
+        etag = f'"{digest(body)[:16]}"'
+        if self.headers.get("If-None-Match") == etag:
+            self.answer(304, ETag=etag, Content_Length=None)
+        else:
+            self.answer(200, body, ETag=etag)
+
+    # --- S3 -----------------------------------------------------------------------------------
+
+    def object(self, path, name, query):
+        host = self.server.host
+        if host.signed and not self.is_signed(path, query):
+            self.answer(403, b"<Error><Code>AccessDenied</Code></Error>")
+        elif "list-type=2" in query.split("&"):
+            self.listing(host.buckets[name], dict(urllib.parse.parse_qsl(query)))
+        else:
+            bucket, _, key = name.partition("/")
+            self.file(host.buckets[bucket].get(key))
+
+    def is_signed(self, path, query):
+        given = self.headers.get("Authorization", "")
+        headers = {name.lower(): value for name, value in self.headers.items()}
+        signed = given.partition("SignedHeaders=")[2].partition(",")[0].split(";")
+        if not {"host", "x-amz-date", "x-amz-security-token"} <= set(signed):
+            return False
+        expected = signature("GET", path, query, headers, signed)
+        return f"Credential={KEY_ID}/" in given and given.endswith(f"Signature={expected}") and \
+            headers["x-amz-security-token"] == TOKEN
+
+    def listing(self, bucket, query):
+        """Two entries a page, so that every list has several."""
+        prefix = query.get("prefix", "")
+        below = sorted({prefix + key[len(prefix):].partition("/")[0] +
+                        key[len(prefix):].partition("/")[1]
+                        for key in bucket if key.startswith(prefix)})
+        first = int(query.get("continuation-token", "0").strip("&/+"))
+        page = below[first:first + 2]
+        out = "<ListBucketResult>"
+        for key in page:
+            text = xml.sax.saxutils.escape(urllib.parse.quote(key))
+            out += f"<CommonPrefixes><Prefix>{text}</Prefix></CommonPrefixes>" \
+                if key.endswith("/") else f"<Contents><Key>{text}</Key></Contents>"
+        more = first + 2 < len(below)
+        out += f"<IsTruncated>{str(more).lower()}</IsTruncated>"
+        if more:
+            token = xml.sax.saxutils.escape(f"{first + 2}&/+")
+            out += f"<NextContinuationToken>{token}</NextContinuationToken>"
+        self.answer(200, (out + "</ListBucketResult>").encode())
+
+    # --- faults -------------------------------------------------------------------------------
+
+    def fault_to_other_host(self, rest):
+        self.answer(302, Location=f"http://localhost:{self.server.server_port}/{rest}")
+
+    def fault_to_same_host(self, rest):
+        self.answer(307, Location=f"/{rest}")
+
+    def fault_to_plain_http(self, rest):
+        self.answer(301, Location=f"http://127.0.0.1:{self.server.host.plain_port}/{rest}")
+
+    def fault_round(self, rest):
+        self.answer(302, Location=f"/round/{rest}")
+
+    def fault_announced(self, _):
+        self.answer(200, b"CDF\1", Content_Length="100000000000")
+
+    def fault_endless(self, _):
+        self.answer(200, Content_Length=None, Transfer_Encoding="chunked")
+        try:
+            while True:
+                self.wfile.write(b"10000\r\n" + bytes(65536) + b"\r\n")
+        except OSError:
+            pass
+
+    def fault_stalled(self, _):
+        host = self.server.host
+        self.answer(200, b"CDF\1", Content_Length="1000")
+        host.waits.set()
+        self.connection.settimeout(20)
+        try:
+            self.connection.recv(1)  # until the client leaves
+        except OSError:
+            pass
+        host.left.set()
+        self.close_connection = True
+
+    def fault_truncated(self, name):
+        body = self.server.host.files[name]
+        self.answer(200, body[:len(body) // 2], Content_Length=str(len(body)))
+        self.close_connection = True
+
+    def fault_unbounded(self, name):
+        self.answer(200, self.server.host.files[name], Content_Length=None, Connection="close")
+        self.close_connection = True
+
+    def fault_coded(self, name):
+        self.answer(200, self.server.host.files[name], Content_Encoding="gzip")
+
+    def fault_headers(self, name):
+        self.send_response(200)
+        for i in range(40):
+            self.send_header(f"X-{i}", "x" * 4000)
+        self.end_headers()
+
+    def fault_denied(self, _):
+        self.answer(403, b"denied")
+
+
+class Server(http.server.ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, request, client_address):
+        pass  # clients leave in the middle of faulty answers
+
+
+class DataHost:
+    """files: path -> bytes; buckets: name -> {key: bytes}; both may be changed while it runs."""
+
+    def __init__(self, certificate=None, plain_port=0):
+        self.files = {}
+        self.buckets = {}
+        self.signed = False
+        self.requests = []
+        self.lock = threading.Lock()
+        self.stalled = set()  # names of files that are never sent to their end
+        self.waits, self.left = threading.Event(), threading.Event()  # a client for one of these
+        self.plain_port = plain_port
+        self.server = Server(("127.0.0.1", 0), Handler)
+        self.server.host = self
+        if certificate:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(*certificate)
+            self.server.socket = context.wrap_socket(self.server.socket, server_side=True,
+                                                     do_handshake_on_connect=False)
+        self.port = self.server.server_port
+        self.origin = f"{'https' if certificate else 'http'}://127.0.0.1:{self.port}"
+        threading.Thread(target=self.server.serve_forever, args=(0.02,), daemon=True).start()
+
+    def asked(self):
+        """The paths requested since the last call."""
+        with self.lock:
+            out, self.requests = self.requests, []
+        return out
+
+    def end(self):
+        self.server.shutdown()
+        self.server.server_close()
