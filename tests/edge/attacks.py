@@ -197,7 +197,7 @@ def run_command(scene, command, path):
     more += ["-o", str(scene.folder / "out.png")] if command == "render" else []
     done = subprocess.run([scene.program, command, path, *more], capture_output=True, text=True,
                           timeout=60)
-    require(done.returncode in (1, 3), f"{command} {path}: exit code {done.returncode}")
+    require(done.returncode in (1, 2, 3), f"{command} {path}: exit code {done.returncode}")
     require(not done.stdout, f"{command} {path} said {done.stdout!r}")
     require("://" not in path or "URL" in done.stderr, f"{command} {path}: {done.stderr}")
 

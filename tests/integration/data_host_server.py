@@ -161,6 +161,26 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.answer(200, body[:len(body) // 2], Content_Length=str(len(body)))
         self.close_connection = True
 
+    def fault_flaky(self, name):
+        """Ends the connection after a third of what is left, and sends ranges."""
+        host = self.server.host
+        body = host.files[name]
+        etag = f'"{digest(body)[:16]}"'
+        begin = 0
+        if self.headers.get("If-Range") == etag:
+            begin = int(self.headers["Range"].removeprefix("bytes=").rstrip("-"))
+        ranges = {"Content_Range": f"bytes {begin}-{len(body) - 1}/{len(body)}"} if begin else {}
+        end = len(body) if begin > len(body) // 2 else begin + (len(body) - begin) // 3
+        self.answer(206 if begin else 200, body[begin:end], ETag=etag,
+                    Content_Length=str(len(body) - begin), **ranges)
+        self.close_connection = True
+
+    def fault_mutated(self, name):
+        """The same, but the file changes after each part."""
+        host = self.server.host
+        host.files[name + "-now"] = host.files.get(name + "-now", host.files[name]) + b"0"
+        self.fault_flaky(name + "-now")
+
     def fault_unbounded(self, name):
         self.answer(200, self.server.host.files[name], Content_Length=None, Connection="close")
         self.close_connection = True

@@ -228,6 +228,12 @@ class DataHosts(unittest.TestCase):
     def test_redirects_to_the_same_host_are_followed(self):
         self.same(self.tls.origin + "/to-same-host/storm.nc", self.netcdf, *self.options())
 
+    def test_the_rest_of_a_file_is_asked_for_if_its_connection_ends(self):
+        self.tls.asked()
+        self.same(self.tls.origin + "/flaky/storm.nc", self.netcdf, *self.options())
+        self.assertEqual(self.tls.asked()[:3], ["/flaky/storm.nc"] * 3)
+        self.refused(self.tls.origin + "/mutated/storm.nc", "the rest of the same file")
+
     # --- S3 -----------------------------------------------------------------------------------
 
     def s3_options(self):

@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::size_t discarded_bytes_max = std::size_t{64} << 10;  // of the body of an error
 constexpr long ok = 200;
+constexpr long partial_content = 206;
 constexpr long not_modified = 304;
 
 struct ListDeleter {
@@ -32,14 +33,22 @@ void start_library() {
   std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
 }
 
+// What was received of a file before its connection ended.
+struct Part {
+  std::uint64_t bytes = 0;
+  std::string etag;
+};
+
 // One request as the callbacks of libcurl see it.
 struct Exchange {
   CURL* curl = nullptr;
   const HostRules* rules = nullptr;
   const Request* request = nullptr;
   const HttpClient::Sink* sink = nullptr;
+  Part part;  // asks for the rest of it
   Response response;
   std::string encoding;
+  std::string range;
   std::size_t header_bytes = 0;
   std::uint64_t body_bytes = 0;
   bool address_refused = false;
@@ -48,6 +57,10 @@ struct Exchange {
   bool not_stored = false;
   bool encoded = false;
   bool has_length = false;  // the end of the body is known
+  bool not_resumed = false;
+
+  [[nodiscard]] long whole_status() const { return part.bytes == 0 ? ok : partial_content; }
+  [[nodiscard]] bool is_refused() const { return header_too_large || not_resumed; }
 };
 
 long status_of(CURL* curl) {
@@ -76,6 +89,7 @@ std::size_t on_header(char* data, std::size_t size, std::size_t count, void* use
     exchange.response.validators = {};
     exchange.encoding.clear();
     exchange.has_length = false;
+    exchange.range.clear();
   }
   const std::size_t colon = line.find(':');
   if (colon == std::string_view::npos) return line.size();
@@ -85,6 +99,7 @@ std::size_t on_header(char* data, std::size_t size, std::size_t count, void* use
   if (name == "last-modified") exchange.response.validators.last_modified = validator(value);
   if (name == "content-length" || name == "transfer-encoding") exchange.has_length = true;
   if (name == "content-encoding") exchange.encoding = lower(value);
+  if (name == "content-range") exchange.range = value;
   return line.size();
 }
 
@@ -92,12 +107,20 @@ std::size_t on_body(char* data, std::size_t size, std::size_t count, void* user)
   auto& exchange = *static_cast<Exchange*>(user);
   const std::string_view bytes(data, size * count);
   exchange.body_bytes += bytes.size();
-  if (status_of(exchange.curl) != ok) {
+  const long status = status_of(exchange.curl);
+  const Part& part = exchange.part;
+  // A host that ignores the range, or whose file has changed, answers 200 (RFC 9110, 13.1.5).
+  exchange.not_resumed =
+      part.bytes > 0 &&
+      (status == ok || (status == partial_content &&
+                        !exchange.range.starts_with("bytes " + std::to_string(part.bytes) + '-')));
+  if (exchange.not_resumed) return 0;
+  if (status != exchange.whole_status()) {
     // Reading a short body to its end keeps the connection usable.
     return exchange.body_bytes <= discarded_bytes_max ? bytes.size() : 0;
   }
   exchange.encoded = !exchange.encoding.empty() && exchange.encoding != "identity";
-  exchange.too_large = exchange.body_bytes > exchange.request->limits.bytes_max;
+  exchange.too_large = part.bytes + exchange.body_bytes > exchange.request->limits.bytes_max;
   if (exchange.encoded || exchange.too_large || !exchange.has_length) return 0;
   exchange.not_stored = !(*exchange.sink)(bytes);
   return exchange.not_stored ? 0 : bytes.size();
@@ -172,10 +195,17 @@ Error fault_of_transfer(const Exchange& exchange, const Url& url, CURLcode code,
                      std::to_string(stall_bytes_per_second) + " bytes a second for " +
                      std::to_string(limits.stall_time.count()) + " s");
   }
+  const std::uint64_t received = exchange.part.bytes + exchange.body_bytes;
+  if (exchange.not_resumed) {
+    return fault(ErrorKind::bad_data, url,
+                 "was received incompletely: the connection ended after " +
+                     std::to_string(exchange.part.bytes) +
+                     " bytes, and the host does not send the rest of the same file");
+  }
   if (code == CURLE_PARTIAL_FILE) {
     return fault(ErrorKind::bad_data, url,
                  "was received incompletely: the connection ended after " +
-                     std::to_string(exchange.body_bytes) + " bytes");
+                     std::to_string(received) + " bytes");
   }
   return fault(
       ErrorKind::bad_data, url,
@@ -189,8 +219,9 @@ void append(HeaderList& list, const std::string& line) {
   list.reset(longer);
 }
 
-HeaderList headers_of(const Request& request) {
+HeaderList headers_of(const Request& request, const Part& part) {
   HeaderList out;
+  if (part.bytes > 0) append(out, "If-Range: " + part.etag);
   if (!request.known.etag.empty()) append(out, "If-None-Match: " + request.known.etag);
   if (request.known.etag.empty() && !request.known.last_modified.empty()) {
     append(out, "If-Modified-Since: " + request.known.last_modified);
@@ -205,6 +236,14 @@ HeaderList headers_of(const Request& request) {
     append(out, "x-amz-security-token: " + request.key->session_token);
   }
   return out;
+}
+
+// Whether the rest of a file can be asked for: by a strong validator, if anything was received.
+bool may_resume(const Exchange& exchange, CURLcode code, long status) {
+  const std::string& etag = exchange.response.validators.etag;
+  return (code == CURLE_PARTIAL_FILE || code == CURLE_RECV_ERROR) && exchange.body_bytes > 0 &&
+         status == exchange.whole_status() && !exchange.is_refused() && etag.starts_with('"') &&
+         (exchange.part.bytes == 0 || etag == exchange.part.etag);
 }
 
 }  // namespace
@@ -250,6 +289,9 @@ struct HttpClient::Handle {
     set(CURLOPT_MAXFILESIZE_LARGE, static_cast<curl_off_t>(limits.bytes_max));
   }
 
+  CURLcode perform(Exchange& exchange, const std::string& authorities,
+                   std::chrono::milliseconds left);
+
   void sign(const S3Key& key) const {
     const std::string user = key.id + ':' + key.secret;
     set(CURLOPT_AWS_SIGV4, ("aws:amz:" + key.region + ":s3").c_str());
@@ -265,78 +307,105 @@ HttpClient::HttpClient(std::shared_ptr<const HostRules> rules, std::string autho
 
 HttpClient::~HttpClient() = default;
 
+// Sends one request and receives its answer.
+CURLcode HttpClient::Handle::perform(Exchange& exchange, const std::string& authorities,
+                                     std::chrono::milliseconds left) {
+  const Request& request = *exchange.request;
+  exchange.curl = curl;
+  prepare(request, authorities);
+  set(CURLOPT_TIMEOUT_MS, std::max<long>(1, static_cast<long>(left.count())));
+  const std::string target =
+      request.url.text() + (request.query.empty() ? "" : '?' + request.query);
+  set(CURLOPT_URL, target.c_str());
+  set(CURLOPT_PATH_AS_IS, 1L);
+  const HeaderList headers = headers_of(request, exchange.part);
+  set(CURLOPT_HTTPHEADER, headers.get());
+  const std::string range = std::to_string(exchange.part.bytes) + '-';
+  if (exchange.part.bytes > 0) set(CURLOPT_RANGE, range.c_str());
+  set(CURLOPT_HEADERFUNCTION, &on_header);
+  set(CURLOPT_HEADERDATA, &exchange);
+  set(CURLOPT_WRITEFUNCTION, &on_body);
+  set(CURLOPT_WRITEDATA, &exchange);
+  set(CURLOPT_NOPROGRESS, 0L);
+  set(CURLOPT_XFERINFOFUNCTION, &on_progress);
+  set(CURLOPT_XFERINFODATA, &exchange);
+  set(CURLOPT_OPENSOCKETFUNCTION, &on_socket);
+  set(CURLOPT_OPENSOCKETDATA, &exchange);
+  if (request.key != nullptr && !request.key->id.empty()) sign(*request.key);
+  const CURLcode code = curl_easy_perform(curl);
+  // The list is freed.
+  set(CURLOPT_HTTPHEADER, static_cast<curl_slist*>(nullptr));
+  return code;
+}
+
+// The URL to which a request is redirected, if it may go there. Errors: those of get().
+Result<void> HttpClient::redirect(Request& request, long status, std::string_view next) const {
+  if (request.key != nullptr) {
+    return fault(ErrorKind::bad_data, request.url,
+                 "is redirected (status " + std::to_string(status) +
+                     "), which a service of s3:// URLs must not do: check region and endpoint");
+  }
+  // A query of the new URL may be a signature, so it is sent, but not shown.
+  const std::size_t mark = next.find('?');
+  auto url = parse_url(next.substr(0, mark));
+  if (!url) {
+    return fault(ErrorKind::bad_data, request.url,
+                 "is redirected to a URL that is not valid: " + url.error().message);
+  }
+  if (request.url.scheme == "https" && url->scheme != "https") {
+    return fault(ErrorKind::invalid, request.url, "is redirected from https to " + url->scheme);
+  }
+  if (auto permitted = rules_->check(*url); !permitted) {
+    return fault(ErrorKind::invalid, request.url,
+                 "is redirected to another host: " + permitted.error().message);
+  }
+  request.query = mark == std::string_view::npos ? "" : std::string(next.substr(mark + 1));
+  request.url = std::move(*url);
+  return {};
+}
+
 Result<Response> HttpClient::get(const Request& first, const Sink& sink) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point end = Clock::now() + first.limits.time;
   Request request = first;
-  const HeaderList headers = headers_of(request);
-  for (int hop = 0; hop <= redirects_max; ++hop) {
+  Part part;
+  int hops = 0;
+  for (int resumed = 0;;) {
     if (auto permitted = rules_->check(request.url); !permitted) return permitted.error();
     Exchange exchange;
-    exchange.curl = handle_->curl;
     exchange.rules = rules_.get();
     exchange.request = &request;
     exchange.sink = &sink;
-    handle_->prepare(request, authorities_);
+    exchange.part = part;
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
-    handle_->set(CURLOPT_TIMEOUT_MS, std::max<long>(1, static_cast<long>(left.count())));
-    const std::string target =
-        request.url.text() + (request.query.empty() ? "" : '?' + request.query);
-    handle_->set(CURLOPT_URL, target.c_str());
-    handle_->set(CURLOPT_PATH_AS_IS, 1L);
-    handle_->set(CURLOPT_HTTPHEADER, headers.get());
-    handle_->set(CURLOPT_HEADERFUNCTION, &on_header);
-    handle_->set(CURLOPT_HEADERDATA, &exchange);
-    handle_->set(CURLOPT_WRITEFUNCTION, &on_body);
-    handle_->set(CURLOPT_WRITEDATA, &exchange);
-    handle_->set(CURLOPT_NOPROGRESS, 0L);
-    handle_->set(CURLOPT_XFERINFOFUNCTION, &on_progress);
-    handle_->set(CURLOPT_XFERINFODATA, &exchange);
-    handle_->set(CURLOPT_OPENSOCKETFUNCTION, &on_socket);
-    handle_->set(CURLOPT_OPENSOCKETDATA, &exchange);
-    if (request.key != nullptr && !request.key->id.empty()) handle_->sign(*request.key);
-    const CURLcode code = curl_easy_perform(handle_->curl);
+    const CURLcode code = handle_->perform(exchange, authorities_, left);
     const long status = status_of(handle_->curl);
+    if (code == CURLE_OK && status == exchange.whole_status()) return std::move(exchange.response);
+    if (may_resume(exchange, code, status) && ++resumed <= resumptions_max) {
+      part.etag = exchange.response.validators.etag;
+      part.bytes += exchange.body_bytes;
+      request.known = {};
+      continue;
+    }
     // The body of an error may be longer than what is discarded.
     const bool is_error_body =
-        code == CURLE_WRITE_ERROR && status != ok && status != 0 && !exchange.header_too_large;
+        code == CURLE_WRITE_ERROR && status != ok && status != 0 && !exchange.is_refused();
     if (code != CURLE_OK && !is_error_body) {
       return fault_of_transfer(exchange, request.url, code, handle_->detail.data());
     }
-    if (status == ok) return std::move(exchange.response);
-    if (status == not_modified &&
-        (!request.known.etag.empty() || !request.known.last_modified.empty())) {
-      return Response{true, first.known};
-    }
+    const bool asked = !request.known.etag.empty() || !request.known.last_modified.empty();
+    if (status == not_modified && asked) return Response{true, first.known};
     char* location = nullptr;
     curl_easy_getinfo(handle_->curl, CURLINFO_REDIRECT_URL, &location);
     if (status < 301 || status > 308 || location == nullptr) {
       return fault_of_status(request.url, status);
     }
-    if (request.key != nullptr) {
-      return fault(ErrorKind::bad_data, request.url,
-                   "is redirected (status " + std::to_string(status) +
-                       "), which a service of s3:// URLs must not do: check region and endpoint");
+    if (++hops > redirects_max) {
+      return fault(ErrorKind::bad_data, first.url,
+                   "is redirected more than " + std::to_string(redirects_max) + " times");
     }
-    // A query of the new URL may be a signature, so it is sent, but not shown.
-    const std::string_view next(location);
-    const std::size_t mark = next.find('?');
-    auto url = parse_url(next.substr(0, mark));
-    if (!url)
-      return fault(ErrorKind::bad_data, request.url,
-                   "is redirected to a URL that is not valid: " + url.error().message);
-    request.query = mark == std::string_view::npos ? "" : std::string(next.substr(mark + 1));
-    if (request.url.scheme == "https" && url->scheme != "https") {
-      return fault(ErrorKind::invalid, request.url, "is redirected from https to " + url->scheme);
-    }
-    if (auto permitted = rules_->check(*url); !permitted) {
-      return fault(ErrorKind::invalid, request.url,
-                   "is redirected to another host: " + permitted.error().message);
-    }
-    request.url = std::move(*url);
+    if (auto done = redirect(request, status, location); !done) return done.error();
   }
-  return fault(ErrorKind::bad_data, first.url,
-               "is redirected more than " + std::to_string(redirects_max) + " times");
 }
 
 }  // namespace windsplat::data::fetch

@@ -41,6 +41,7 @@ struct RequestLimits {
 inline constexpr long stall_bytes_per_second = 1024;
 inline constexpr std::size_t header_bytes_max = std::size_t{64} << 10;
 inline constexpr int redirects_max = 5;
+inline constexpr int resumptions_max = 3;
 
 struct Request {
   Url url;            // https or http
@@ -69,14 +70,16 @@ class HttpClient {
   // Takes the bytes of the body in order. False: they cannot be stored; the request ends.
   using Sink = std::function<bool(std::string_view bytes)>;
 
-  // Redirects are followed to permitted hosts, from https only to https. Certificates are always
-  // verified; proxies, cookies, netrc files and compressed bodies are not used. Errors: not_found
-  // for 404 and 410; too_large; cancelled; invalid for a host or address that is not permitted;
-  // bad_data for everything else. Messages name the URL without query.
+  // The rest of a file whose connection ends early is asked for by its ETag. Redirects are followed
+  // to permitted hosts, from https only to https. Certificates are always verified; proxies,
+  // cookies, netrc files and compressed bodies are not used. Errors: not_found for 404 and 410;
+  // too_large; cancelled; invalid for a host or address that is not permitted; bad_data for
+  // everything else. Messages name the URL without query.
   Result<Response> get(const Request& request, const Sink& sink);
 
  private:
   struct Handle;
+  Result<void> redirect(Request& request, long status, std::string_view next) const;
   std::shared_ptr<const HostRules> rules_;
   std::string authorities_;
   std::unique_ptr<Handle> handle_;

@@ -284,6 +284,7 @@ Result<Descriptor> ObjectCache::keep(const std::string& url, PartialFile part,
   const std::string meta_path = path_of(name + std::string(meta_suffix));
   const Meta meta{validators, hex(digest.data(), digest.size()), part.bytes_};
   const std::string path = path_of(name + '.' + meta.data);
+  const std::lock_guard lock(mutex_);  // two threads may keep the same URL
   const auto before = read_meta(meta_path);
   // The descriptor of the loader must not permit writing.
   Descriptor file(::open(part.path_.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
@@ -298,7 +299,6 @@ Result<Descriptor> ObjectCache::keep(const std::string& url, PartialFile part,
     ::unlink(path.c_str());
     return make_error(ErrorKind::out_of_memory, written.error().message);
   }
-  const std::lock_guard lock(mutex_);
   if (before && before->data != meta.data) ::unlink(path_of(name + '.' + before->data).c_str());
   bytes_ += space_of(status);
   if (confirmed_.size() >= confirmed_max) confirmed_.clear();

@@ -181,7 +181,7 @@ Result<Url> parse_url(std::string_view text) {
   if (mark == std::string_view::npos) return refused(text, "is not a URL");
   out.scheme = lower(text.substr(0, mark));
   if (out.scheme != "https" && out.scheme != "http" && out.scheme != "s3") {
-    return refused(text, "has a scheme other than https, http and s3");
+    return refused(text, "is a URL with a scheme other than https, http and s3");
   }
   const std::string_view rest = text.substr(mark + 3);
   const std::size_t slash = std::min(rest.find('/'), rest.size());
@@ -189,10 +189,12 @@ Result<Url> parse_url(std::string_view text) {
   if (authority.find('@') != std::string_view::npos) {
     return refused(text, "is given with a user or password, which a URL must not contain");
   }
-  if (!set_authority(authority, out)) return refused(text, "has no valid host and port");
+  if (!set_authority(authority, out))
+    return refused(text, "is not a URL with a valid host and port");
   auto path = plain_path(slash == rest.size() ? "/" : rest.substr(slash));
   if (!path) return refused(text, "has a character that must be percent-encoded in a URL");
-  if (has_odd_segment(*path)) return refused(text, "has an empty segment, or '.' or '..'");
+  if (has_odd_segment(*path))
+    return refused(text, "is a URL with an empty segment, or '.' or '..'");
   out.path = std::move(*path);
   return out;
 }
@@ -246,7 +248,8 @@ Result<Location> locate_url(const std::string& text) {
     out.folder = base + std::string(named);
     return out;
   }
-  if (name.find('/') != std::string::npos) return refused(text, "has '/' in the name of a file");
+  if (name.find('/') != std::string::npos)
+    return refused(text, "is a URL with '/' in the name of a file");
   out.folder = base + std::string(named.substr(0, last));
   out.members.push_back({name, base + std::string(named)});
   out.companions = may_have_companions(name);

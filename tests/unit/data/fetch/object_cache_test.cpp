@@ -117,6 +117,7 @@ TEST_F(CachedObjects, FilesUsedLeastRecentlyAreRemovedBeyondTheLimit) {
   put("5", text + "5");
   EXPECT_EQ(text_of("2"), "none");
   EXPECT_EQ(text_of("1"), text + "1");
+  ::usleep(10'000);
   EXPECT_EQ(text_of("5"), text + "5");
   EXPECT_LE(cache_->bytes(), 200'000U);
   std::uint64_t sum = 0;
