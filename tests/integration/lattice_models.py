@@ -77,6 +77,41 @@ def write_icon(path):
                         "u": "m s-1", "v": "m s-1", "w": "m s-1"}, falls=("z",))
 
 
+def write_cosmo(path):
+    """COSMO: levels without coordinates from the top, whose order and heights HHL tells."""
+    file = netCDF4.Dataset(path, "w")
+    x = axis(file, "rlon", np.arange(6.0), units="degrees", standard_name="grid_longitude")
+    y = axis(file, "rlat", np.arange(5.0), units="degrees", standard_name="grid_latitude")
+    file.createDimension("level", 4)
+    file.createDimension("level1", 5)
+    ground = noise(1, 5, 6, low=0, high=500)
+    faces = ground + np.float32(1000) * np.arange(4, -1, -1, dtype=np.float32)[:, None, None]
+    put(file, "HHL", ("level1", "rlat", "rlon"), faces, units="m", standard_name="altitude")
+    t = put(file, "T", ("level", "rlat", "rlon"), noise(4, 5, 6), units="K")
+    w = put(file, "W", ("level1", "rlat", "rlon"), noise(5, 5, 6), units="m s-1",
+            standard_name="upward_air_velocity")
+    file.close()
+    heights = between(faces, 0)[::-1]
+    fields = {"T": t[::-1], "W": between(w, 0)[::-1], "HHL": heights}
+    return Independent({"x": x, "y": y, "z": heights.mean(axis=(1, 2))},
+                       as_masked({name: values[None] for name, values in fields.items()}), {},
+                       {"x": "degrees", "y": "degrees", "z": "m", "T": "K", "W": "m s-1",
+                        "HHL": "m"})
+
+
+def write_one_place(path):
+    """An idealised case, whose longitudes and latitudes are all 0."""
+    file = netCDF4.Dataset(path, "w")
+    for name, length in (("west_east", 6), ("south_north", 5), ("bottom_top", 4)):
+        file.createDimension(name, length)
+    for name, units in (("XLONG", "degree_east"), ("XLAT", "degree_north")):
+        put(file, name, ("south_north", "west_east"), np.zeros((5, 6), np.float32), units=units)
+    t = put(file, "T", ("bottom_top", "south_north", "west_east"), noise(4, 5, 6), units="K")
+    file.close()
+    return Independent({"x": np.arange(6.0), "y": np.arange(5.0), "z": np.arange(4.0)},
+                       as_masked({"T": t[None]}), {}, {"T": "K"})
+
+
 def write_cm1(path):
     """CM1 and MicroHH: centres and faces by coordinates, without attributes of axes."""
     file = netCDF4.Dataset(path, "w")

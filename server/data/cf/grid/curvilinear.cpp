@@ -85,7 +85,13 @@ std::vector<double> in_order(Table table, int x, std::array<std::size_t, 2> leng
   return out;
 }
 
-// Returns null if a longitude or latitude is missing.
+// Idealised cases of WRF repeat one place, mostly 0, 0.
+bool is_one_place(const std::vector<double>& values) {
+  return values.size() > 1 && std::all_of(values.begin(), values.end(),
+                                          [&](double value) { return value == values.front(); });
+}
+
+// Returns null if a longitude or latitude is missing, or all are the same.
 std::shared_ptr<const Columns> columns_of(std::array<Table, 2> tables, int x,
                                           std::array<std::size_t, 2> lengths,
                                           const std::array<bool, 2>& turned) {
@@ -96,6 +102,7 @@ std::shared_ptr<const Columns> columns_of(std::array<Table, 2> tables, int x,
     return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   };
   if (!finite(columns->longitude) || !finite(columns->latitude)) return nullptr;
+  if (is_one_place(columns->longitude) || is_one_place(columns->latitude)) return nullptr;
   unwrap_longitudes(columns->longitude, lengths[0]);
   return columns;
 }
@@ -152,6 +159,7 @@ Result<Bearing> find_bearing(const ArrayFile& file, const std::vector<DimensionR
     if (!values) {
       return values.error();
     }
+    if (is_one_place(*values)) return bearing;
     Change change = change_of(*values, rows, columns, longitude);
     if (dims[0] == x) {
       std::swap(change.slow, change.fast);

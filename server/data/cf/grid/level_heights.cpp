@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <map>
 #include <string>
@@ -131,7 +132,7 @@ std::pair<std::string, Terms> terms_of_roms(const ArrayFile& file) {
 class HeightFinder {
  public:
   HeightFinder(const ArrayFile& file, int coordinate, const std::vector<int>& variables,
-               const Placement& grid, DatasetInfo& info)
+               Placement& grid, DatasetInfo& info)
       : file_(file), coordinate_(coordinate), variables_(variables), grid_(grid), info_(info) {}
 
   Result<LevelHeights> find() {
@@ -235,6 +236,7 @@ class HeightFinder {
       const auto along_levels = std::count(one.dims.begin(), one.dims.end(), grid_.space[2]);
       const bool named = one.standard_name == "geopotential_height" ||
                          one.standard_name == "altitude" ||
+                         one.standard_name.starts_with("geometric_height_at_full_level") ||
                          one.standard_name == "height_above_geopotential_datum";
       if (named && along_levels == 1 && metres_in(one.units) == 1.0) return v;
     }
@@ -290,11 +292,18 @@ class HeightFinder {
                             "): they are placed as in the file");
       return {};
     }
-    const auto mean = means(heights);
+    auto mean = means(heights);
     if (!mean) return mean.error();
-    bool rises = std::isfinite(mean->front());
-    for (std::size_t k = 1; k < mean->size(); ++k) rises = rises && (*mean)[k] > (*mean)[k - 1];
-    if (!rises) {
+    const auto rises = [&] {
+      return std::all_of(mean->begin(), mean->end(), [](double z) { return std::isfinite(z); }) &&
+             std::adjacent_find(mean->begin(), mean->end(), std::greater_equal<>()) == mean->end();
+    };
+    if (!rises() && !heights.parametric) {
+      // COSMO does not say that its levels run down.
+      std::reverse(mean->begin(), mean->end());
+      if (rises()) grid_.turned[2] = !grid_.turned[2];
+    }
+    if (!rises()) {
       info_.notes.emplace_back("levels whose mean heights do not rise: placed as in the file");
       return {};
     }
@@ -320,7 +329,7 @@ class HeightFinder {
   const ArrayFile& file_;
   int coordinate_;
   const std::vector<int>& variables_;
-  const Placement& grid_;
+  Placement& grid_;
   DatasetInfo& info_;
 };
 
@@ -345,7 +354,7 @@ double ParametricHeights::at(std::size_t level, std::size_t column) const {
 }
 
 Result<LevelHeights> find_heights(const ArrayFile& file, int coordinate,
-                                  const std::vector<int>& variables, const Placement& grid,
+                                  const std::vector<int>& variables, Placement& grid,
                                   DatasetInfo& info) {
   return HeightFinder(file, coordinate, variables, grid, info).find();
 }

@@ -46,10 +46,11 @@ class ParametricHeights {
 };
 
 // Replaces a vertical axis without physical positions by the mean heights of its levels at the
-// first step. coordinate: the vertical coordinate variable, -1 if there is none; variables: those
-// on the grid. Empty if the heights are not in the file. Errors: bad_data.
+// first step, and turns it if heights of every sample fall along it. coordinate: the vertical
+// coordinate variable, -1 if there is none; variables: those on the grid. Empty if the heights are
+// not in the file. Errors: bad_data.
 Result<LevelHeights> find_heights(const ArrayFile& file, int coordinate,
-                                  const std::vector<int>& variables, const Placement& grid,
+                                  const std::vector<int>& variables, Placement& grid,
                                   DatasetInfo& info);
 
 }  // namespace windsplat::data::cf
