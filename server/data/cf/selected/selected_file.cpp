@@ -289,7 +289,7 @@ Result<void> check_selection(const FileContents& contents, const Selection& sele
 std::string differing_entry(const FileContents& first, const FileContents& other) {
   for (const DimensionChoice& own : first.choices) {
     const int coordinate = variable_named(other, own.name);
-    if (coordinate >= 0 && counts_from_a_time(other.variables[at(coordinate)])) continue;
+    if (coordinate >= 0 && counts_from_a_time(other.variables[at(coordinate)].units)) continue;
     for (const DimensionChoice& one : other.choices) {
       if (one.name != own.name || one.chosen == own.chosen) continue;
       return "its first " + in_quotes(own.name) + " is " + printable(one.chosen) + ", not " +

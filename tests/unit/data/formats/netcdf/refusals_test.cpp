@@ -62,9 +62,9 @@ TEST(NetcdfRefusals, OtherFormats) {
 
 TEST(NetcdfRefusals, UrlsAndLibraryDirectives) {
   const Folder folder;
-  expect_refused("http://127.0.0.1:9/a.nc", ErrorKind::bad_data, "URL");
-  expect_refused("file:///etc/passwd", ErrorKind::bad_data, "URL");
-  expect_refused("[mode=bytes]https://127.0.0.1:9/a.nc", ErrorKind::bad_data, "URL");
+  expect_refused("http://127.0.0.1:9/a.nc", ErrorKind::invalid, "URL");
+  expect_refused("file:///etc/passwd", ErrorKind::invalid, "URL");
+  expect_refused("[mode=bytes]https://127.0.0.1:9/a.nc", ErrorKind::invalid, "URL");
   write_good(folder / "a.nc", 0);
   expect_refused((folder / "a.nc") + "#mode=zarr", ErrorKind::not_found, "no such file");
   // File names are never passed to the library, so a name that resembles its directives is an
