@@ -62,6 +62,11 @@ class Planted(unittest.TestCase):
         self.plant("tests/unit/net/a_test.cpp",
                    "TEST(A, IsTrue) {\n#ifndef WINDSPLAT_SANITIZED\n#endif\n}\n")
         self.expect(check_style, "unit_net runs under sanitizers only")
+        for suite, said in (("B.*:A.*", ()), ("B.*", ("unit_net runs under sanitizers only",))):
+            self.plant("tests/CMakeLists.txt",
+                       "windsplat_test(unit_base unit/base LABEL unit)\nwindsplat_test(unit_net"
+                       f" unit/net LABEL unit RELEASE {suite} ASAN -C.*\n  LINK a)\n")
+            self.expect(check_style, *said)
 
     def test_clean_tree_passes(self):
         self.expect(check_includes)
