@@ -146,15 +146,22 @@ TEST_F(CachedObjects, AnIncompleteFileIsNeverFound) {
 
 TEST_F(CachedObjects, DamagedValidatorsAreAFileThatIsNotThere) {
   put("https://h/a", "whole");
+  fs::path meta;
   for (const auto& file : fs::directory_iterator(folder_)) {
-    if (file.path().extension() == ".meta") {
-      for (const char* text :
-           {"", "x", "../../secret\n5\n\n\n", "ab\n-5\n\n\n", "ab\n5\n\n\nmore\n"}) {
-        std::ofstream(file.path(), std::ios::trunc) << text;
-        EXPECT_EQ(text_of("https://h/a"), "none") << text;
-      }
-    }
+    if (file.path().extension() == ".meta") meta = file.path();
   }
+  std::string text(4096, '\0');
+  std::ifstream in(meta);
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  for (const std::string& damaged :
+       {std::string(), std::string("x"), text.substr(0, text.size() / 2), text + "more\n",
+        std::string("../../secret\n5\n\n\n")}) {
+    std::ofstream(meta, std::ios::trunc) << damaged;
+    EXPECT_EQ(text_of("https://h/a"), "none") << damaged;
+  }
+  std::ofstream(meta, std::ios::trunc) << text;
+  EXPECT_EQ(text_of("https://h/a"), "whole");
 }
 
 TEST_F(CachedObjects, LeftoversOfOtherProcessesAreRemovedAfterADay) {
