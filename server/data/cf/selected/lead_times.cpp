@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,36 +17,58 @@ namespace windsplat::data::cf {
 namespace {
 
 struct ForecastTimes {
-  int dimension = -1;
-  int lead = -1;  // variables
+  int dimension = -1;  // of the lead times; -1: a single one without a dimension
+  int lead = -1;       // variables
   int reference = -1;
 };
+
+bool is_single(const FileContents& contents, const FileVariable& variable) {
+  return variable.numeric && std::all_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
+           return contents.dimensions.at(at(d)).length == 1;
+         });
+}
+
+// The first variable with a single value and that standard name; -1: none.
+int single_named(const FileContents& contents, std::string_view standard_name, bool counts) {
+  const auto found = std::find_if(
+      contents.variables.begin(), contents.variables.end(), [&](const FileVariable& variable) {
+        return variable.standard_name == standard_name && is_single(contents, variable) &&
+               counts_from_a_time(variable.units) == counts;
+      });
+  return found == contents.variables.end() ? -1
+                                           : static_cast<int>(found - contents.variables.begin());
+}
+
+// Whether the file gives its times itself.
+bool has_times(const FileContents& contents, const std::vector<DimensionRole>& roles) {
+  return std::any_of(roles.begin(), roles.end(),
+                     [](const DimensionRole& role) { return role.role == Role::time; }) ||
+         std::any_of(contents.variables.begin(), contents.variables.end(),
+                     [](const FileVariable& variable) {
+                       return variable.standard_name == "time" || variable.name == "time";
+                     });
+}
 
 // The lead times and the only reference time of a file, as far as it has them.
 std::optional<ForecastTimes> times_of(const FileContents& contents) {
   const std::vector<DimensionRole> roles = classify_dimensions(contents);
+  const bool timeless = !has_times(contents, roles);
   ForecastTimes out;
+  out.reference = single_named(contents, "forecast_reference_time", true);
+  if (out.reference < 0) return std::nullopt;
   for (std::size_t d = 0; d < roles.size(); ++d) {
     const int own = roles[d].coordinate;
-    const bool is_time = contents.dimensions[d].is_time || roles[d].role == Role::time;
-    if (!is_time || own < 0 || counts_from_a_time(contents.variables[at(own)].units) ||
-        !is_lead_time(contents, roles, static_cast<int>(d))) {
-      continue;
-    }
-    out.dimension = static_cast<int>(d);
-    out.lead = own;
-  }
-  for (std::size_t v = 0; v < contents.variables.size() && out.reference < 0; ++v) {
-    const FileVariable& variable = contents.variables[v];
-    const bool is_single = std::all_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
-      return contents.dimensions.at(at(d)).length == 1;
-    });
-    if (variable.numeric && is_single && variable.standard_name == "forecast_reference_time" &&
-        counts_from_a_time(variable.units)) {
-      out.reference = static_cast<int>(v);
+    const FileDimension& dimension = contents.dimensions[d];
+    const bool is_time =
+        dimension.is_time || roles[d].role == Role::time || (dimension.length == 1 && timeless);
+    if (is_time && own >= 0 && !counts_from_a_time(contents.variables[at(own)].units) &&
+        is_lead_time(contents, roles, static_cast<int>(d))) {
+      out.dimension = static_cast<int>(d);
+      out.lead = own;
     }
   }
-  return out.lead < 0 || out.reference < 0 ? std::nullopt : std::optional(out);
+  if (out.lead < 0 && timeless) out.lead = single_named(contents, "forecast_period", false);
+  return out.lead < 0 ? std::nullopt : std::optional(out);
 }
 
 // A file and a variable of known values, the last one.
@@ -68,7 +91,8 @@ class TimedFile final : public ArrayFile {
     return is_own(variable) ? std::string() : base_->text_of(variable, attribute);
   }
   [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override {
-    return is_own(variable) ? std::vector{times_.size()} : base_->chunk(variable);
+    if (!is_own(variable)) return base_->chunk(variable);
+    return std::vector<std::size_t>(contents_.variables.back().dims.size(), times_.size());
   }
   [[nodiscard]] std::size_t chunk_cost_bytes(int variable) const override {
     return is_own(variable) ? 0 : base_->chunk_cost_bytes(variable);
@@ -82,8 +106,9 @@ class TimedFile final : public ArrayFile {
   Result<void> read(int variable, const std::vector<std::size_t>& start,
                     const std::vector<std::size_t>& count, double* out) const override {
     if (!is_own(variable)) return base_->read(variable, start, count, out);
-    const auto from = times_.begin() + static_cast<std::ptrdiff_t>(start.at(0));
-    std::copy_n(from, count.at(0), out);
+    const std::size_t first = start.empty() ? 0 : start.front();
+    const std::size_t values = count.empty() ? 1 : count.front();
+    std::copy_n(times_.begin() + static_cast<std::ptrdiff_t>(first), values, out);
     return {};
   }
   Result<void> read(int variable, const std::vector<std::size_t>& start,
@@ -123,8 +148,8 @@ Result<std::unique_ptr<ArrayFile>> with_valid_times(std::unique_ptr<ArrayFile> f
   auto times = convert_times(*leads, {lead.units + " since " + date, reference.calendar},
                              {reference.units, reference.calendar});
   if (!times) return file;
-  FileDimension& dimension = contents.dimensions[at(found->dimension)];
-  const std::string note = lead_time_note(dimension.name);
+  const std::string note = lead_time_note(
+      found->dimension < 0 ? lead.name : contents.dimensions[at(found->dimension)].name);
   std::erase(contents.notes, note);
   contents.notes.push_back(note + " after the reference time " + date);
   FileVariable valid;
@@ -134,13 +159,18 @@ Result<std::unique_ptr<ArrayFile>> with_valid_times(std::unique_ptr<ArrayFile> f
   }
   valid.type = "float64";
   valid.numeric = true;
-  valid.dims = {found->dimension};
+  valid.in_use = true;
   valid.standard_name = "time";
   valid.units = reference.units;
   valid.calendar = reference.calendar;
   lead.in_use = true;
   reference.in_use = true;
-  dimension.name = valid.name;  // which makes them its coordinate
+  if (found->dimension >= 0) {
+    FileDimension& dimension = contents.dimensions[at(found->dimension)];
+    valid.dims = {found->dimension};
+    dimension.is_time = true;
+    dimension.name = valid.name;  // which makes them its coordinate
+  }
   contents.variables.push_back(std::move(valid));
   return std::unique_ptr<ArrayFile>(
       std::make_unique<TimedFile>(std::move(file), std::move(contents), std::move(*times)));

@@ -325,6 +325,45 @@ TEST(SelectedEntries, LeadTimesOnADeclaredTimeAxisFollowItToo) {
   EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 1123);
 }
 
+// One lead time, as a dimension of length 1 or without a dimension.
+void write_one_lead(const std::string& path, double hours, bool with_dimension) {
+  NetcdfMaker file(path);
+  const int reference = file.variable("start", NC_DOUBLE, {}, {31});
+  file.text(reference, "units", "days since 2000-01-01");
+  file.text(reference, "standard_name", "forecast_reference_time");
+  std::vector<int> dims;
+  if (with_dimension) {
+    dims.push_back(file.axis("lead", {hours}, "hours", "forecast_period"));
+  } else {
+    const int lead = file.variable("lead", NC_DOUBLE, {}, {hours});
+    file.text(lead, "units", "hours");
+    file.text(lead, "standard_name", "forecast_period");
+  }
+  const auto [z, y, x] = space_of(file);
+  dims.insert(dims.end(), {z, y, x});
+  file.variable("t", NC_FLOAT, dims, std::vector<double>(24, hours));
+}
+
+TEST(SelectedEntries, FilesOfOneLeadTimeEachAreASeries) {
+  for (const bool with_dimension : {true, false}) {
+    const Folder folder;
+    write_one_lead(folder / "f_a.nc", 12, with_dimension);
+    write_one_lead(folder / "f_b.nc", 6, with_dimension);
+    const auto one = opened(folder / "f_a.nc");
+    ASSERT_NE(one, nullptr);
+    ASSERT_EQ(one->info().steps.size(), 1U);
+    EXPECT_EQ(one->info().steps[0].text, "2000-02-01T12:00:00Z") << with_dimension;
+    EXPECT_TRUE(one->info().left_out.empty()) << with_dimension;
+    EXPECT_TRUE(has_note(one->info(), "'lead' after the reference time 2000-02-01T00:00:00Z"));
+    const auto series = opened(folder / "f_*.nc");
+    ASSERT_NE(series, nullptr);
+    ASSERT_EQ(series->info().steps.size(), 2U);
+    EXPECT_EQ(series->info().steps[0].text, "2000-02-01T06:00:00Z") << "by time, not by name";
+    EXPECT_EQ(last_of(volume_of(*series, "t", 0)), 6);
+    EXPECT_EQ(last_of(volume_of(*series, "t", 1)), 12);
+  }
+}
+
 TEST(SelectedEntries, LeadTimesOfUnknownUnitsAreSteps) {
   const Folder folder;
   write_one_forecast(folder / "f.nc", "fortnights", 0.5);
