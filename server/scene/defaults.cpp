@@ -74,7 +74,9 @@ std::size_t kind_of(const data::FieldInfo& field) {
     if (text.find(other) != std::string::npos) return kinds().size();
   }
   for (const std::string_view sea : {"sea_water", "sea water"}) {
-    if (const auto at = text.find(sea); at != std::string::npos) text.erase(at, sea.size());
+    for (auto at = text.find(sea); at != std::string::npos; at = text.find(sea)) {
+      text.erase(at, sea.size());
+    }
   }
   for (std::size_t n = 0; n < kinds().size(); ++n) {
     for (const std::string_view word : kinds()[n].words) {

@@ -39,11 +39,15 @@ struct Location {
   Selection selection;  // entries of dimensions that were chosen
   std::string list;     // JSON text that lists the files below `folder` (formats/list); no members
 
+  // Id of the listed dataset of which it shows other entries; empty: `stem` is its own.
+  std::string listed_id;
+
   // The dataset's id as wanted: "gcm", with a selection "gcm,number=3", which is cut where views
   // could not name it.
   [[nodiscard]] std::string wanted_id() const {
     constexpr std::size_t bytes_max = 240;
-    return selection.empty() ? stem : (stem + ',' + selection_text(selection)).substr(0, bytes_max);
+    const std::string& base = listed_id.empty() ? stem : listed_id;
+    return selection.empty() ? base : (base + ',' + selection_text(selection)).substr(0, bytes_max);
   }
 };
 

@@ -111,10 +111,16 @@ Result<std::unique_ptr<cf::ArrayFile>> open_arrays(const std::shared_ptr<Files>&
   if (!input) return input.error();
   const auto head = (*input)->head(4096);
   if (!head) return head.error();
+  if (list::looks_like(*head)) {
+    return (*input)->fault("is a list of files, which cannot be a part of a list or a pattern");
+  }
   for (const ArrayFormat& format : array_formats) {
     if (!format.looks_like(*head)) continue;
     if (auto plain = without_group(*files, name); !plain) return plain.error();
-    return chosen_of(*files, format.open(files, std::move(*input)));
+    const std::string folder = name.substr(0, name.rfind('/') + 1);
+    const std::shared_ptr<Files> beside =
+        folder.empty() ? files : std::make_shared<list::FilesBelow>(files, folder);
+    return chosen_of(*files, format.open(beside, std::move(*input)));
   }
   if (vtk::is_vtk(*head)) {
     return (*input)->fault("is a VTK file: only files of arrays are listed or joined by variables");
@@ -261,6 +267,11 @@ SourceResult open_list(const std::shared_ptr<Files>& files, Result<list::Documen
   std::vector<Part> parts;
   for (const std::string& name : document->files) {
     for (std::string& alternative : alternatives_of(name)) {
+      if (parts.size() == list::parts_max) {
+        return make_error(ErrorKind::bad_data, in_quotes(origin) + " has more than " +
+                                                   std::to_string(list::parts_max) +
+                                                   " parts, counting alternatives in braces");
+      }
       auto members = files_named(*files, alternative);
       if (!members) return members.error();
       parts.push_back({std::move(alternative), std::move(*members)});

@@ -1,11 +1,41 @@
 #include "server/data/resident/chosen_datasets.hpp"
 
 #include <algorithm>
+#include <charconv>
+#include <system_error>
 #include <utility>
 
 #include "server/data/resident/watched_files.hpp"
 
 namespace windsplat::data {
+
+namespace {
+
+std::optional<double> number_of(const std::string& text) {
+  double out = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, fault] = std::from_chars(text.data(), end, out);
+  return fault == std::errc() && stop == end ? std::optional(out) : std::nullopt;
+}
+
+// The entry as a dataset that shows it names it: "3" for "3.0" or "03".
+std::string known_name(const DimensionChoice& choice, const std::string& value) {
+  const auto& listed = choice.values;
+  if (std::find(listed.begin(), listed.end(), value) != listed.end()) return value;
+  const auto number = number_of(value);
+  if (!number) return value;
+  const auto same = std::find_if(listed.begin(), listed.end(),
+                                 [&](const std::string& one) { return number_of(one) == number; });
+  return same == listed.end() ? value : *same;
+}
+
+// "e-2" of "e-2" and of "e-2,number=3": two files named e.nc have different ids.
+std::string base_id(const std::string& id, const Selection& selection) {
+  const std::string entries = selection.empty() ? "" : ',' + selection_text(selection);
+  return id.ends_with(entries) ? id.substr(0, id.size() - entries.size()) : "";
+}
+
+}  // namespace
 
 Result<ChosenEntries> choose_entries(const DatasetInfo& info, std::optional<Location> location,
                                      const Selection& chosen) {
@@ -15,6 +45,7 @@ Result<ChosenEntries> choose_entries(const DatasetInfo& info, std::optional<Loca
         "dataset " + in_quotes(info.id) + " has no dimension of which one entry is shown");
   }
   ChosenEntries out{std::move(*location), {}};
+  out.location.listed_id = base_id(info.id, out.location.selection);
   std::string names;
   for (const DimensionChoice& choice : info.choices) {
     out.shown[choice.name] = choice.chosen;
@@ -28,9 +59,12 @@ Result<ChosenEntries> choose_entries(const DatasetInfo& info, std::optional<Loca
                            in_quotes(one.dimension) + " is not a dimension of which " +
                                in_quotes(info.id) + " shows one entry: these are " + names);
     }
-    shown->second = one.value;
+    const auto choice =
+        std::find_if(info.choices.begin(), info.choices.end(),
+                     [&](const DimensionChoice& known) { return known.name == one.dimension; });
+    shown->second = known_name(*choice, one.value);
     std::erase_if(selection, [&](const auto& known) { return known.dimension == one.dimension; });
-    selection.push_back(one);
+    selection.push_back({one.dimension, shown->second});
   }
   if (selection.size() > selection_max) {
     return make_error_at(ErrorKind::invalid, "/selection",

@@ -262,7 +262,7 @@ int coordinate_of(const FileContents& contents, int dimension) {
 // levels from the top.
 void heed_positive(const FileVariable& variable, Evidence& found) {
   const std::string positive = lower(variable.positive);
-  if (found.role == Role::z && variable.units.empty() &&
+  if (found.role == Role::z && (variable.units.empty() || variable.units == "1") &&
       lower(variable.long_name).starts_with("generalized")) {
     found = {Role::z, AxisKind::level, true, true};
   }

@@ -39,6 +39,7 @@ double ocean_s_g2(const LevelTerms& level, const ColumnTerms& column, const Cons
 // level = {sigma, zlev}; NaN in sigma below the sigma levels.
 double ocean_sigma_z(const LevelTerms& level, const ColumnTerms& column,
                      const Constants& constants) {
+  if (std::isnan(column[0])) return column[0];
   if (std::isnan(level[0])) return level[1];
   return column[1] + level[0] * (std::min(constants[0], column[0]) + column[1]);
 }

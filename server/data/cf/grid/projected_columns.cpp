@@ -72,6 +72,9 @@ class Transform {
     }
     transform(PJ_INV, x, y);
     if (projection_.verified) {
+      // An inverse may give a longitude on the other side of the date line.
+      const double centre = projection_.central_longitude * degree_in_radians;
+      for (double& v : x) v = centre + std::remainder(v - centre, 2 * std::numbers::pi);
       x_again_ = x;
       y_again_ = y;
       transform(PJ_FWD, x_again_, y_again_);

@@ -173,6 +173,7 @@ void centre(Projection& out, double longitude) {
 void albers(Attributes& from, Projection& out) {
   const auto parallels = from.parallels();
   out.definition += " +proj=aea";
+  out.verified = true;
   add(out, "lat_1", parallels[0]);
   add(out, "lat_2", parallels[1]);
   add(out, "lat_0", from.get({"latitude_of_projection_origin"}, latitudes));
@@ -185,7 +186,10 @@ void at_origin(Attributes& from, Projection& out, const char* projection) {
   centre(out, from.get({"longitude_of_projection_origin"}, longitudes));
 }
 
-void azimuthal_equidistant(Attributes& from, Projection& out) { at_origin(from, out, "aeqd"); }
+void azimuthal_equidistant(Attributes& from, Projection& out) {
+  at_origin(from, out, "aeqd");
+  out.verified = true;
+}
 void azimuthal_equal_area(Attributes& from, Projection& out) { at_origin(from, out, "laea"); }
 void orthographic(Attributes& from, Projection& out) { at_origin(from, out, "ortho"); }
 

@@ -71,31 +71,35 @@ Survey survey_of(const Mesh& mesh) {
   for (std::size_t c = 0; c < mesh.cells(); ++c) {
     const bool has_outline = outline_of(mesh, c, outline);
     const double area = has_outline ? std::abs(doubled_area(outline.points)) / 2 : 0;
-    if (!(area > 0)) {
+    double sum_y = 0;
+    for (const PlanePoint& point : outline.points) sum_y += point[1];
+    const double shrink =
+        mesh.on_sphere && has_outline
+            ? cosine_of_degrees(sum_y / static_cast<double>(outline.points.size()))
+            : 1;
+    const auto size = static_cast<float>(std::sqrt(area * shrink));
+    if (!(size > 0)) {
       ++out.no_area;
       continue;
     }
     Extent x;
-    double sum_y = 0;
     for (const PlanePoint& point : outline.points) {
       x.add(point[0]);
       out.y.add(point[1]);
-      sum_y += point[1];
     }
     out.x.add(x.low);
     out.x.add(x.high);
     if (mesh.on_sphere) out.meridians.cover(x.low, x.high);
-    const double shrink =
-        mesh.on_sphere ? cosine_of_degrees(sum_y / static_cast<double>(outline.points.size())) : 1;
     out.area += area;
-    out.sizes.push_back(static_cast<float>(std::sqrt(area * shrink)));
+    out.sizes.push_back(size);
   }
   return out;
 }
 
-LatticeAxis axis_over(double low, double high, double spacing) {
+LatticeAxis axis_over(double low, double high, double spacing, std::size_t most) {
   LatticeAxis axis;
-  const double count = std::clamp(std::ceil((high - low) / spacing - 1e-9), 1.0, 0x1p40);
+  const double wanted = std::ceil((high - low) / spacing - 1e-9);
+  const double count = std::clamp(wanted, 1.0, std::max(1.0, static_cast<double>(most)));
   axis.count = static_cast<std::size_t>(count);
   axis.spacing = (high - low) / count;
   axis.first = low + axis.spacing / 2;
@@ -180,8 +184,9 @@ void set_spacing(const Survey& survey, std::size_t samples_max, double shrink, M
   const double least_spacing = std::sqrt(whole / static_cast<double>(samples_max));
   out.is_coarse = spacing < least_spacing;
   spacing = std::max(spacing, least_spacing);
-  out.x = axis_over(survey.x.low, survey.x.high, spacing / shrink);
-  out.y = axis_over(survey.y.low, survey.y.high, spacing);
+  out.x = axis_over(survey.x.low, survey.x.high, spacing / shrink, samples_max);
+  // An axis of one sample leaves the other the rest.
+  out.y = axis_over(survey.y.low, survey.y.high, spacing, samples_max / out.x.count);
 }
 
 }  // namespace

@@ -100,29 +100,6 @@ FoundLevels mpas_levels(const ArrayFile& file) {
   return std::vector{std::move(out)};
 }
 
-FoundLevels icon_levels(const ArrayFile& file) {
-  const FileContents& contents = file.contents();
-  std::vector<MeshLevels> out;
-  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
-    const FileVariable& variable = contents.variables[v];
-    const bool is_own = variable.numeric && variable.dims.size() == 1 &&
-                        contents.dimensions.at(at(variable.dims[0])).name == variable.name;
-    if (!is_own || variable.long_name != "generalized_height" || !variable.positive.empty()) {
-      continue;
-    }
-    auto values = unpacked_values(file, static_cast<int>(v));
-    if (!values) return values.error();
-    MeshLevels levels;
-    levels.dimension = variable.dims[0];
-    levels.variable.long_name = variable.long_name;
-    levels.variable.positive = "down";
-    levels.variable.units = "level";
-    levels.values = std::move(*values);
-    out.push_back(std::move(levels));
-  }
-  return out;
-}
-
 }  // namespace
 
 void name_mesh_variables(FileContents& contents, const std::string& convention) {
@@ -155,7 +132,6 @@ FoundLevels levels_of_mesh(const ArrayFile& file, const Topology& topology) {
   const SigmaHeights heights = sigma_heights_of(file.contents(), topology);
   if (heights.sigma >= 0) return fvcom_levels(file, heights);
   if (topology.convention == "MPAS") return mpas_levels(file);
-  if (topology.convention == "CF bounds") return icon_levels(file);
   return std::vector<MeshLevels>();
 }
 

@@ -21,8 +21,7 @@ struct MeshLevels {
 };
 
 // FVCOM: the mean of siglay(siglay, node). MPAS-Ocean, whose levels are numbered downward: their
-// depths by refBottomDepth, or their numbers. ICON: levels of generalized_height, which are
-// numbered downward but do not say so. Errors: bad_data.
+// depths by refBottomDepth, or their numbers. Errors: bad_data.
 Result<std::vector<MeshLevels>> levels_of_mesh(const ArrayFile& file, const Topology& topology);
 
 // height = zeta + siglay (h + zeta), in metres above the datum of zeta (FVCOM user manual).

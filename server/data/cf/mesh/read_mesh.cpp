@@ -136,7 +136,8 @@ class MeshReader {
     const auto& x = positions[0];
     const bool all_equal = std::all_of(
         x.begin(), x.end(), [&](double value) { return std::isnan(value) || value == x.front(); });
-    if (mesh.on_sphere && all_equal && from_.plane_positions[1] >= 0) {
+    const bool has_plane = from_.plane_positions[0] >= 0 && from_.plane_positions[1] >= 0;
+    if (mesh.on_sphere && all_equal && has_plane) {
       mesh.on_sphere = false;
       for (std::size_t a = 0; a < 2; ++a) {
         auto values = unpacked_values(file_, from_.plane_positions.at(a));
@@ -175,7 +176,7 @@ class MeshReader {
       positions.at(a) = std::move(*values);
     }
     const FileVariable& longitude = variable(from_.corner_positions[0]);
-    const double tolerance = longitude.type == "float32" ? 2e-5 : 1e-7;
+    const double tolerance = longitude.type == "float32" ? 4e-5 : 1e-7;
     return mesh_of_corners(positions[0], positions[1], width, tolerance, longitude.name);
   }
 
@@ -244,6 +245,7 @@ Result<Mesh> mesh_of_corners(const std::vector<double>& longitudes,
     std::int64_t column;
     std::uint32_t index;
   };
+  const std::int64_t columns = std::llround(360 / tolerance);
   std::vector<Corner> sorted;
   sorted.reserve(longitudes.size());
   std::vector<std::uint32_t> nodes(longitudes.size(), no_node);
@@ -256,7 +258,6 @@ Result<Mesh> mesh_of_corners(const std::vector<double>& longitudes,
     }
     const bool pole = 90 - std::abs(y) <= tolerance;
     const double turned = pole ? 0 : x - 360 * std::floor(x / 360);
-    const auto columns = std::llround(360 / tolerance);
     sorted.push_back({std::llround(y / tolerance), std::llround(turned / tolerance) % columns,
                       static_cast<std::uint32_t>(i)});
   }
@@ -265,15 +266,33 @@ Result<Mesh> mesh_of_corners(const std::vector<double>& longitudes,
   });
   std::vector<double> x;
   std::vector<double> y;
+  std::vector<std::array<std::int64_t, 2>> bins;  // of the nodes, sorted
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     const Corner& own = sorted[i];
     const bool is_new =
         i == 0 || sorted[i - 1].row != own.row || sorted[i - 1].column != own.column;
     if (is_new) {
+      bins.push_back({own.row, own.column});
       x.push_back(longitudes[own.index]);
       y.push_back(std::clamp(latitudes[own.index], -90.0, 90.0));
     }
     nodes[own.index] = static_cast<std::uint32_t>(x.size() - 1);
+  }
+  // Equal corners differ by rounding, and may lie on both sides of a bin's edge.
+  std::vector<std::uint32_t> same(bins.size());
+  for (std::size_t n = 0; n < bins.size(); ++n) {
+    same[n] = static_cast<std::uint32_t>(n);
+    const auto [row, column] = bins[n];
+    for (const auto& [up, aside] : {std::pair(0, -1), {-1, -1}, {-1, 0}, {-1, 1}}) {
+      const std::array near{row + up, (column + aside + columns) % columns};
+      const auto at = std::lower_bound(bins.begin(), bins.end(), near);
+      if (at == bins.end() || *at != near) continue;
+      same[n] = same[static_cast<std::size_t>(at - bins.begin())];
+      break;
+    }
+  }
+  for (std::uint32_t& node : nodes) {
+    if (node != no_node) node = same[node];
   }
   Mesh mesh;
   mesh.on_sphere = true;

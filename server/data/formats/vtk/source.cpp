@@ -118,7 +118,6 @@ class VtkSource final : public FileSource {
     info_.notes = std::move(snapshot.notes);
     kind_ = snapshot.kind;
     whole_ = snapshot.whole;
-    time_ = snapshot.time;
     note_time(0, snapshot);
     choose_data(snapshot);
     note_gaps(snapshot);
@@ -379,9 +378,10 @@ class VtkSource final : public FileSource {
     std::fill_n(out, samples * info_.fields[field].components.size(),
                 std::numeric_limits<float>::quiet_NaN());
     const unsigned mask = of_cells_ ? hidden_cell | refined_cell : hidden_point;
-    for (const Piece& piece : snapshot.pieces) {
-      const Target target = target_of(whole_, piece.extent, of_cells_, grid_.world, grid_.turned);
-      auto done = fill_piece(snapshot, piece, field, target, mask, samples, out);
+    // The last first: where blocks overlap, the first one counts.
+    for (auto piece = snapshot.pieces.rbegin(); piece != snapshot.pieces.rend(); ++piece) {
+      const Target target = target_of(whole_, piece->extent, of_cells_, grid_.world, grid_.turned);
+      auto done = fill_piece(snapshot, *piece, field, target, mask, samples, out);
       if (!done) return done;
     }
     return {};
@@ -456,7 +456,6 @@ class VtkSource final : public FileSource {
   std::uint64_t tuples_all_ = 1;
   Kind kind_ = Kind::image;
   Extent whole_;
-  std::optional<double> time_;
   bool of_cells_ = false;
   RegularGrid points_grid_;
   RegularGrid grid_;          // grid of the shown data, unless resampled

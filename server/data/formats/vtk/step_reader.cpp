@@ -128,7 +128,7 @@ Result<std::vector<Step>> steps_in_files(Files& files) {
 Result<std::vector<Step>> steps_of(Files& files) {
   std::vector<Step> steps;
   for (const auto& member : files.location().members) {
-    steps.push_back({{{"", member.name}}, 0, {}, ""});
+    steps.push_back({{{"", member.name}}, {}, {}, ""});
   }
   const auto file = files.open(steps.front().parts.front().source);
   if (!file) return file.error();
@@ -144,7 +144,7 @@ Result<std::vector<Step>> steps_of(Files& files) {
   if (!collection) return collection.error();
   steps.clear();
   for (auto& member : collection->members) {
-    steps.push_back({std::move(member.parts), 0, member.time, ""});
+    steps.push_back({std::move(member.parts), {}, member.time, ""});
   }
   return steps;
 }
@@ -177,7 +177,8 @@ PieceFile StepReader::keep(const FilePtr& file, const std::string& name) {
   return {opened_ <= kept_open_max ? file : nullptr, name, file->identity()};
 }
 
-Result<Snapshot> StepReader::read_one(const std::string& name, std::size_t index) {
+Result<Snapshot> StepReader::read_one(const std::string& name,
+                                      std::optional<std::size_t> index) {
   const auto file = open(name, "");
   if (!file) return file.error();
   if (HdfFile::is_vtkhdf(**file)) return read_grids(*file, index);
@@ -199,14 +200,23 @@ Result<Snapshot> StepReader::read_one(const std::string& name, std::size_t index
 }
 
 // The grids of a step of a VTKHDF file. It is opened once for all steps.
-Result<Snapshot> StepReader::read_grids(const FilePtr& file, std::size_t index) {
+Result<Snapshot> StepReader::read_grids(const FilePtr& file,
+                                        std::optional<std::size_t> index) {
   if (!hdf_ || hdf_->input()->identity() != file->identity()) {
     auto opened = HdfFile::open(file);
     if (!opened) return opened.error();
     hdf_ = std::move(*opened);
   }
   if (!inside_.empty() && !has_blocks(*hdf_)) return without_blocks(file->name(), inside_);
-  auto grids = read_hdf(*hdf_, index, inside_);
+  if (!index) {
+    const auto times = times_of(*hdf_);
+    if (!times) return times.error();
+    if (times->size() > 1) {
+      return file->fault("has " + std::to_string(times->size()) +
+                         " steps; open it by itself: a collection names files of one step");
+    }
+  }
+  auto grids = read_hdf(*hdf_, index.value_or(0), inside_);
   if (!grids) return grids.error();
   for (Block& grid : *grids) {
     if (!grid.snapshot) continue;
@@ -336,7 +346,7 @@ Result<Snapshot> StepReader::read_blocks(const FilePtr& file, const std::string&
   if (!parts) return parts.error();
   std::vector<Block> blocks;
   for (const BlockFile& part : *parts) {
-    auto block = read_block({part.name, beside(name, part.source)}, name.empty() ? "" : name);
+    auto block = read_block({part.name, beside(name, part.source)}, name);
     if (!block) return block.error();
     blocks.push_back(std::move(*block));
   }

@@ -23,7 +23,7 @@ inline constexpr std::size_t step_files_max = 16'384;
 
 struct Step {
   std::vector<BlockFile> parts;
-  std::size_t index = 0;  // within a file of several steps
+  std::optional<std::size_t> index;  // within a file of several steps; none: it has one
   std::optional<double> time;
   std::string identity;
 };
@@ -45,8 +45,8 @@ class StepReader {
 
   Result<FilePtr> open(const std::string& name, const std::string& by);
   PieceFile keep(const FilePtr& file, const std::string& name);
-  Result<Snapshot> read_one(const std::string& name, std::size_t index);
-  Result<Snapshot> read_grids(const FilePtr& file, std::size_t index);
+  Result<Snapshot> read_one(const std::string& name, std::optional<std::size_t> index);
+  Result<Snapshot> read_grids(const FilePtr& file, std::optional<std::size_t> index);
   Result<Snapshot> read_xml(const FilePtr& file, const std::string& name);
   Result<Snapshot> read_parallel(const Document& document, const GridType& type,
                                  const std::string& name);

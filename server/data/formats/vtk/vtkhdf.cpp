@@ -156,6 +156,22 @@ class HdfGrid {
     return std::optional<StoredArray>();
   }
 
+  // Without NumberOfParts each step has equally many; if all steps begin with the first part, those
+  // are all of them. nullopt if they cannot be divided.
+  std::optional<std::uint64_t> parts_of_each_step(std::uint64_t all) {
+    const auto steps = file_.numbers(group_ + "/Steps", "NSteps", 1);
+    if (!steps) return all;
+    const auto count = whole_number(steps->front());
+    const std::string offsets = group_ + "/Steps/PartOffsets";
+    if (!count || *count < 1) return {};
+    if (file_.lengths(offsets).empty()) return all;
+    const auto begins = file_.values(offsets, 0, *count);
+    if (!begins) return {};
+    const auto is_first = [](double begin) { return begin == 0; };
+    if (std::all_of(begins->begin(), begins->end(), is_first)) return all;
+    return all % *count == 0 ? std::optional(all / *count) : std::nullopt;
+  }
+
   Result<void> read_mesh_parts() {
     out_.kind = Kind::unstructured;
     out_.format = "VTKHDF unstructured grid";
@@ -174,21 +190,23 @@ class HdfGrid {
     if (!part_count) return part_count.error();
     const std::uint64_t part = first_part->value_or(0);
     if (part > listed.front()) return fault("has a PartOffset beyond its parts");
-    const std::uint64_t parts = part_count->value_or(listed.front() - part);
-    if (parts > hdf_parts_max) {
+    auto parts = *part_count;
+    if (!parts) parts = parts_of_each_step(listed.front());
+    if (!parts) return fault("has no NumberOfParts of its steps");
+    if (*parts > hdf_parts_max) {
       return fault("has more than " + std::to_string(hdf_parts_max) + " parts");
     }
     std::array<std::vector<double>, 3> sizes;
     const std::array<const char*, 3> counts{"NumberOfPoints", "NumberOfCells",
                                             "NumberOfConnectivityIds"};
     for (std::size_t n = 0; n < 3; ++n) {
-      auto found = file_.values(group_ + '/' + counts.at(n), part, parts);
+      auto found = file_.values(group_ + '/' + counts.at(n), part, *parts);
       if (!found) return found.error();
       sizes.at(n) = std::move(*found);
     }
     if (auto done = find_bases(begin); !done) return done;
     std::array<std::uint64_t, 3> done{};  // of the parts before
-    for (std::size_t p = 0; p < parts; ++p) {
+    for (std::size_t p = 0; p < *parts; ++p) {
       std::array<std::uint64_t, 3> size{};
       for (std::size_t n = 0; n < 3; ++n) {
         const auto number = whole_number(sizes.at(n)[p]);
@@ -327,6 +345,10 @@ Result<std::vector<std::optional<double>>> times_of(HdfFile& file) {
 }
 
 Result<std::vector<Block>> read_hdf(HdfFile& file, std::size_t step, const std::string& inside) {
+  const auto version = file.numbers(root_group, "Version", 2);
+  if (version && !(version->front() >= 1 && version->front() < 3)) {
+    return file.input()->fault("has a version of VTKHDF other than 1 and 2");
+  }
   const std::string type = file.text(root_group, "Type").value_or("");
   std::vector<Block> out;
   const auto add = [&](const std::string& name, const std::string& group,

@@ -1,6 +1,7 @@
 // XML files of VTK that refer to others: parallel headers, multi-block files, collections.
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "server/base/ascii.hpp"
@@ -136,18 +137,16 @@ Result<Collection> read_collection(const Document& document) {
   std::stable_sort(listed.begin(), listed.end(),
                    [](const Listed& a, const Listed& b) { return a.time < b.time; });
   Collection out;
+  std::set<std::string> named;  // files of the timestep
   for (Listed& one : listed) {
     if (out.members.empty() || out.members.back().time != one.time) {
       out.members.push_back({one.time, {}});
+      named.clear();
     }
-    auto& parts = out.members.back().parts;
-    const bool twice = std::any_of(parts.begin(), parts.end(), [&](const BlockFile& part) {
-      return part.source == one.part.source;
-    });
-    if (twice) {
+    if (!named.insert(one.part.source).second) {
       return file->fault("names " + in_quotes(one.part.source) + " twice for a timestep");
     }
-    parts.push_back(std::move(one.part));
+    out.members.back().parts.push_back(std::move(one.part));
   }
   return out;
 }
