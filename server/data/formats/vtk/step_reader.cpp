@@ -177,8 +177,7 @@ PieceFile StepReader::keep(const FilePtr& file, const std::string& name) {
   return {opened_ <= kept_open_max ? file : nullptr, name, file->identity()};
 }
 
-Result<Snapshot> StepReader::read_one(const std::string& name,
-                                      std::optional<std::size_t> index) {
+Result<Snapshot> StepReader::read_one(const std::string& name, std::optional<std::size_t> index) {
   const auto file = open(name, "");
   if (!file) return file.error();
   if (HdfFile::is_vtkhdf(**file)) return read_grids(*file, index);
@@ -200,8 +199,7 @@ Result<Snapshot> StepReader::read_one(const std::string& name,
 }
 
 // The grids of a step of a VTKHDF file. It is opened once for all steps.
-Result<Snapshot> StepReader::read_grids(const FilePtr& file,
-                                        std::optional<std::size_t> index) {
+Result<Snapshot> StepReader::read_grids(const FilePtr& file, std::optional<std::size_t> index) {
   if (!hdf_ || hdf_->input()->identity() != file->identity()) {
     auto opened = HdfFile::open(file);
     if (!opened) return opened.error();
