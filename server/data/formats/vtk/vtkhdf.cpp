@@ -56,6 +56,21 @@ class HdfGrid {
     return number;
   }
 
+  // data: PointData or CellData.
+  [[nodiscard]] std::string path_of(const std::string& data, const std::string& array) const {
+    std::string path = group_ + '/' + data;
+    path += '/';
+    path += array;
+    return path;
+  }
+
+  // Where the values of this step begin in an array, if the file says so.
+  Result<std::optional<std::uint64_t>> offset_of(std::string data, const std::string& array) {
+    data += "Offsets/";
+    data += array;
+    return of_step(data);
+  }
+
   Result<void> read_image() {
     out_.kind = Kind::image;
     out_.format = "VTKHDF image data";
@@ -102,8 +117,8 @@ class HdfGrid {
       if (n > 1) flat.push_back(n);
     }
     for (const std::string& array : file_.datasets_in(group_ + '/' + name)) {
-      const std::string path = group_ + '/' + name + '/' + array;
-      auto offset = of_step(name + "Offsets/" + array);
+      const std::string path = path_of(name, array);
+      auto offset = offset_of(name, array);
       if (!offset) return offset.error();
       const std::uint64_t index = offset->value_or(step_);
       bool found = false;
@@ -227,7 +242,7 @@ class HdfGrid {
     for (const std::size_t n : {0U, 1U}) {
       const std::string group = n == 0 ? "PointData" : "CellData";
       for (const std::string& array : file_.datasets_in(group_ + '/' + group)) {
-        const auto offset = of_step(group + "Offsets/" + array);
+        const auto offset = offset_of(group, array);
         if (!offset) return offset.error();
         fields_.push_back({n == 0, array, offset->value_or(begin.at(n))});
       }
@@ -309,6 +324,7 @@ std::vector<std::string> block_groups(const HdfFile& file) {
   std::stable_sort(found.begin(), found.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<std::string> out;
+  out.reserve(found.size());
   for (auto& one : found) out.push_back(std::move(one.second));
   return out;
 }
