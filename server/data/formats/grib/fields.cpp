@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "server/data/cf/time.hpp"
+#include "server/data/formats/grib/levels.hpp"
 #include "server/data/formats/grib/message.hpp"
 #include "server/data/formats/grib/open.hpp"
 #include "server/data/formats/grib/projection.hpp"
@@ -224,8 +225,9 @@ Result<Header> read_header(const std::vector<unsigned char>& bytes) {
   out.name = known(message.text("name"));
   out.standard_name = known(message.text("cfName"));
   out.units = known(message.text("units"));
-  out.level_type = known(message.text("typeOfLevel"));
-  out.level = message.number("level");
+  const Level level = read_level(message);
+  out.level_type = level.type;
+  out.level = level.value;
   out.hours = hours_of_validity(message);
   out.member = static_cast<double>(message.whole("perturbationNumber", 0));
   out.relative_to_grid = is_along_grid(message);

@@ -35,7 +35,7 @@ struct Header {
   std::string standard_name;
   std::string units;
   std::string level_type;
-  double level = 0;
+  double level = 0;   // levels.hpp
   double hours = 0;   // time of validity, since 1970-01-01
   double member = 0;  // number in an ensemble; 0: the control, or no ensemble
   bool relative_to_grid = false;

@@ -7,6 +7,7 @@
 #include <set>
 #include <string_view>
 
+#include "server/data/formats/grib/levels.hpp"
 #include "server/data/formats/grib/open.hpp"
 
 namespace windsplat::data::grib {
@@ -30,29 +31,6 @@ bool is_same(const Grid& a, const Grid& b) {
          a.mapping.texts == b.mapping.texts && close(a.longitude, b.longitude) &&
          close(a.latitude, b.latitude) && close(a.x, b.x, tolerance_m) &&
          close(a.y, b.y, tolerance_m);
-}
-
-FileVariable level_axis(const std::string& type) {
-  FileVariable out;
-  out.axis = "Z";
-  if (type == "isobaricInhPa" || type == "isobaricInPa") {
-    out.standard_name = "air_pressure";
-    out.units = type == "isobaricInhPa" ? "hPa" : "Pa";
-  } else if (type.starts_with("heightAbove")) {
-    out.standard_name = type == "heightAboveSea" ? "altitude" : "height";
-    out.units = "m";
-  } else if (type.starts_with("depthBelow")) {
-    out.standard_name = "depth";
-    out.units = "m";
-    out.positive = "down";
-  } else {
-    out.standard_name = "model_level_number";
-    // Numbered from the top, or 1 at the ground.
-    const bool falls =
-        type.starts_with("hybrid") || type.starts_with("generalVertical") || type == "sigma";
-    out.positive = falls ? "down" : "";
-  }
-  return out;
 }
 
 FileVariable latitude_axis(const char* standard_name) {
