@@ -40,6 +40,9 @@ struct FileVariable {
   // "<name of the vector> <component index>": attribute of the netCDF writer; also set by readers
   // of formats with vectors.
   std::string vector_mark;
+  // A statistic that distinguishes the variable from others of the quantity: the components of a
+  // vector have the same.
+  std::string process;
   std::string unread;        // why a variable cannot be read; `numeric` is then false
   bool packed = false;       // has scale_factor or add_offset
   bool is_unsigned = false;  // _Unsigned = "true" on a signed integer type

@@ -58,6 +58,7 @@ class FieldFinder {
       const auto& dims = variable(v).dims;
       const auto& same = variable(like).dims;
       if (v != like && !is_used(v) && text(variable(v)) == wanted &&
+          variable(v).process == variable(like).process &&
           std::is_permutation(dims.begin(), dims.end(), same.begin(), same.end())) {
         return v;
       }
@@ -100,9 +101,9 @@ class FieldFinder {
 
   void add_vector(const std::string& name, std::vector<int> components) {
     FieldPlan plan;
-    plan.info.name = free_name(name);
-    plan.info.kind = FieldKind::vector;
     const FileVariable& first = variable(components.front());
+    plan.info.name = free_name(first.process.empty() ? name : name + "_" + first.process);
+    plan.info.kind = FieldKind::vector;
     plan.info.units = first.units;
     plan.info.dtype = dtype_of(first);
     for (const int v : components) {

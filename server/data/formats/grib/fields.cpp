@@ -180,17 +180,7 @@ bool has_known_time_unit(const Message& message) {
 
 double hours_of_validity(const Message& message) {
   if (!has_known_time_unit(message)) return std::numeric_limits<double>::quiet_NaN();
-  const long date = message.whole("validityDate", -1);
-  const long time = message.whole("validityTime", -1);
-  const cf::Date day{date / 10000, static_cast<int>(date / 100 % 100),
-                     static_cast<int>(date % 100)};
-  constexpr auto calendar = cf::Calendar::proleptic_gregorian;
-  if (date < 0 || time < 0 || time > 2400 || !cf::is_valid(day, calendar)) {
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-  const auto days = cf::day_number(day, calendar) - cf::day_number({1970, 1, 1}, calendar);
-  const auto minutes = time / 100 * 60 + time % 100;
-  return static_cast<double>(days) * 24 + static_cast<double>(minutes) / 60;
+  return hours_of(message.whole("validityDate", -1), message.whole("validityTime", -1));
 }
 
 // Flag table 3.3, bit 5 (edition 1: table 7): components along rows and columns. For some templates
@@ -204,6 +194,18 @@ bool is_along_grid(const Message& message) {
 std::string known(const std::string& text) { return text == "unknown" || text == "~" ? "" : text; }
 
 }  // namespace
+
+double hours_of(long date, long time) {
+  const cf::Date day{date / 10000, static_cast<int>(date / 100 % 100),
+                     static_cast<int>(date % 100)};
+  constexpr auto calendar = cf::Calendar::proleptic_gregorian;
+  if (date < 0 || time < 0 || time > 2400 || !cf::is_valid(day, calendar)) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const auto days = cf::day_number(day, calendar) - cf::day_number({1970, 1, 1}, calendar);
+  const auto minutes = time / 100 * 60 + time % 100;
+  return static_cast<double>(days) * 24 + static_cast<double>(minutes) / 60;
+}
 
 std::string definitions_folder() {
   const LibraryLock lock;
@@ -222,19 +224,27 @@ Result<Header> read_header(const std::vector<unsigned char>& bytes) {
     out.short_name = "param_" + message.text("discipline") + "_" +
                      message.text("parameterCategory") + "_" + message.text("parameterNumber");
   }
-  out.name = known(message.text("name"));
-  out.standard_name = known(message.text("cfName"));
-  out.units = known(message.text("units"));
   const Level level = read_level(message);
   out.level_type = level.type;
   out.level = level.value;
   out.hours = hours_of_validity(message);
+  out.reference = hours_of(message.whole("dataDate", -1), message.whole("dataTime", -1));
   out.member = static_cast<double>(message.whole("perturbationNumber", 0));
   out.relative_to_grid = is_along_grid(message);
+  out.product = read_product(message);
   out.grid_key = message.text("md5GridSection");
   if (!std::isfinite(out.level)) return broken("has no level");
-  if (!std::isfinite(out.hours)) return broken("has no date of validity");
+  if (!std::isfinite(out.hours) || !std::isfinite(out.reference))
+    return broken("has no date of validity");
   return out;
+}
+
+Result<Names> read_names(const std::vector<unsigned char>& bytes) {
+  const LibraryLock lock;
+  const Message message(bytes);
+  if (message.handle() == nullptr) return broken("is not understood by ecCodes");
+  return Names{known(message.text("name")), known(message.text("cfName")),
+               known(message.text("units"))};
 }
 
 Result<Grid> read_grid(const std::vector<unsigned char>& bytes) {

@@ -9,6 +9,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/cf/grid/projection.hpp"
+#include "server/data/formats/grib/products.hpp"
 
 namespace windsplat::data::grib {
 
@@ -31,19 +32,29 @@ struct Grid {
 
 struct Header {
   std::string short_name;
+  std::string level_type;
+  double level = 0;      // levels.hpp
+  double hours = 0;      // time of validity, since 1970-01-01
+  double reference = 0;  // reference time, likewise
+  double member = 0;     // number in an ensemble; 0: the control, or no ensemble
+  bool relative_to_grid = false;
+  Product product;
+  std::string grid_key;  // equal for fields whose grid definitions have the same bytes
+};
+
+// Hours since 1970-01-01 of YYYYMMDD and HHMM; NaN if they are not a date and a time.
+double hours_of(long date, long time);
+
+// Of a quantity, with its units. ecCodes takes longer for these than for a Header.
+struct Names {
   std::string name;
   std::string standard_name;
   std::string units;
-  std::string level_type;
-  double level = 0;   // levels.hpp
-  double hours = 0;   // time of validity, since 1970-01-01
-  double member = 0;  // number in an ensemble; 0: the control, or no ensemble
-  bool relative_to_grid = false;
-  std::string grid_key;  // equal for fields whose grid definitions have the same bytes
 };
 
 // Errors: bad_data; the message is a predicate without subject.
 Result<Header> read_header(const std::vector<unsigned char>& message);
+Result<Names> read_names(const std::vector<unsigned char>& message);
 Result<Grid> read_grid(const std::vector<unsigned char>& message);
 // values of rows x columns, columns fastest, in the order of the coordinates of the grid; NaN if
 // missing; of a reduced grid, interpolated along its rows

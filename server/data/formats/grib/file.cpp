@@ -5,10 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <set>
-#include <string_view>
 
+#include "server/data/formats/grib/header_cache.hpp"
 #include "server/data/formats/grib/levels.hpp"
 #include "server/data/formats/grib/open.hpp"
+#include "server/data/formats/grib/winds.hpp"
 
 namespace windsplat::data::grib {
 
@@ -58,22 +59,6 @@ std::string name_on_grid(const char* name, std::size_t grid) {
   return grid == 0 ? name : name + ("_" + std::to_string(grid + 1));
 }
 
-// The library names winds eastward and northward regardless of the flag of the message. Winds along
-// the rows and columns of the grid are x and y in CF, and must not be rotated.
-bool tell_by_grid(FileVariable& variable) {
-  constexpr std::string_view eastward = "eastward_";
-  constexpr std::string_view northward = "northward_";
-  std::string& name = variable.standard_name;
-  if (name.starts_with(eastward)) {
-    name.replace(0, eastward.size(), "x_");
-  } else if (name.starts_with(northward)) {
-    name.replace(0, northward.size(), "y_");
-  } else {
-    return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<cf::ArrayFile>> open(std::shared_ptr<const InputFile> input) {
@@ -104,6 +89,27 @@ Result<std::size_t> File::grid_of(const std::vector<unsigned char>& message,
   return index;
 }
 
+Result<void> File::add_message(std::size_t field, const std::vector<unsigned char>& message,
+                               const Header& header) {
+  const auto grid = grid_of(message, header.grid_key);
+  if (!grid) return grid.error();
+  const std::string key = header.short_name + '\n' + header.level_type + '\n' + header.product.key +
+                          '\n' + std::to_string(*grid);
+  const auto [known, is_new] = group_keys_.emplace(key, groups_.size());
+  if (is_new) {
+    if (groups_.size() >= groups_max) {
+      return input_->fault("has more than " + std::to_string(groups_max) + " variables");
+    }
+    auto names = read_names(message);
+    if (!names) return input_->fault("has a message that " + names.error().message);
+    groups_.push_back({header, std::move(*names), *grid, {}, 0, false, {}, {}});
+  }
+  Group& group = groups_[known->second];
+  const Place place{header.member, header.reference, header.hours, header.level};
+  if (!group.fields.emplace(place, field).second) ++group.repeated;
+  return {};
+}
+
 Result<void> File::scan() {
   auto places = find_fields(*input_);
   if (!places) return places.error();
@@ -111,8 +117,15 @@ Result<void> File::scan() {
   if (places_.empty()) return input_->fault("contains no GRIB fields");
   std::set<int> editions;
   std::map<std::string, std::size_t> unread;
+  HeaderCache headers;
   for (std::size_t f = 0; f < places_.size(); ++f) {
     editions.insert(places_[f].edition);
+    const auto head = read_head(*input_, places_[f]);
+    if (!head) return head.error();
+    if (const auto known = headers.find(places_[f].edition, *head)) {
+      if (auto done = add_message(f, {}, *known); !done) return done;
+      continue;
+    }
     const auto message = read_message(*input_, places_[f]);
     if (!message) return message.error();
     const auto header = read_header(*message);
@@ -120,21 +133,8 @@ Result<void> File::scan() {
       ++unread[header.error().message];
       continue;
     }
-    const auto grid = grid_of(*message, header->grid_key);
-    if (!grid) return grid.error();
-    auto at = std::find_if(groups_.begin(), groups_.end(), [&](const Group& group) {
-      return group.header.short_name == header->short_name &&
-             group.header.level_type == header->level_type && group.grid == *grid;
-    });
-    if (at == groups_.end()) {
-      if (groups_.size() >= groups_max) {
-        return input_->fault("has more than " + std::to_string(groups_max) + " variables");
-      }
-      groups_.push_back({*header, *grid, {}, 0});
-      at = groups_.end() - 1;
-    }
-    if (!at->fields.emplace(Place{header->member, header->hours, header->level}, f).second)
-      ++at->repeated;
+    if (auto done = add_message(f, *message, *header); !done) return done;
+    headers.remember(places_[f].edition, *head, *header);
   }
   for (const auto& [reason, count] : unread) {
     contents_.notes.push_back(std::to_string(count) + " messages left out: each " + reason);
@@ -158,6 +158,11 @@ Result<void> File::check_any_field() const {
 }
 
 void File::add_variables() {
+  merge_heights(groups_);
+  by_lead_time_ = tell_references(groups_);
+  order(groups_);
+  for (Group& group : groups_) omit_incomplete_members(group, contents_.notes);
+  find_axes(groups_, contents_.notes);
   for (std::size_t g = 0; g < groups_.size(); ++g) add_field(g);
 }
 
@@ -182,7 +187,7 @@ int File::axis(const std::string& name, const std::vector<double>& values,
   variable.numeric = true;
   variable.dims = {static_cast<int>(contents_.dimensions.size()) - 1};
   contents_.variables.push_back(std::move(variable));
-  held_.push_back({values, -1, {}, {}, {}});
+  held_.push_back({values, -1, {}, -1});
   return static_cast<int>(contents_.dimensions.size()) - 1;
 }
 
@@ -226,72 +231,81 @@ std::vector<int> File::add_plane(std::size_t g) {
           axis(name_on_grid("x", g), grids_[g].x, plane_axis("projection_x_coordinate"))};
 }
 
-// Keeps the members of an ensemble that have as many messages as the one with the most.
-void File::omit_incomplete_members(Group& group) {
-  std::map<double, std::size_t> counts;
-  for (const auto& [place, field] : group.fields) ++counts[place[0]];
-  std::size_t most = 0;
-  for (const auto& [member, count] : counts) most = std::max(most, count);
-  std::string omitted;
-  for (const auto& [member, count] : counts) {
-    if (count == most) continue;
-    omitted += (omitted.empty() ? "" : ", ") + std::to_string(static_cast<long>(member));
-    std::erase_if(group.fields, [at = member](const auto& one) { return one.first[0] == at; });
+// The dimension of one of the axes of a group.
+int File::group_axis(const Group& group, AxisIndex axis_index) {
+  FileVariable like;
+  std::string name;
+  if (axis_index == level_axis_index) {
+    const std::string& type = group.header.level_type;
+    return axis(type.empty() ? "level" : type, group.axes[axis_index], level_axis(type));
   }
-  if (omitted.empty()) return;
-  contents_.notes.push_back(in_quotes(group.header.short_name) +
-                            ": members of the ensemble with fewer messages than others are "
-                            "omitted: " +
-                            omitted);
+  if (axis_index == member_axis) {
+    name = "number";
+    like.standard_name = "realization";
+    like.units = "1";
+  } else if (axis_index == time_axis && by_lead_time_) {
+    name = "step";
+    like.standard_name = "forecast_period";
+    like.units = "hours";
+  } else {
+    like.standard_name = axis_index == time_axis ? "time" : "forecast_reference_time";
+    name = like.standard_name;
+    like.units = "hours since 1970-01-01 00:00:00";
+    like.calendar = "proleptic_gregorian";
+  }
+  return axis(name, group.axes[axis_index], like);
+}
+
+std::string File::free_name(const Group& group) const {
+  const Header& header = group.header;
+  std::string name = header.short_name;
+  if (group.is_distinguished && !header.product.suffix.empty()) {
+    name += "_" + header.product.suffix;
+  }
+  const auto taken = [&] { return cf::variable_named(contents_, name) >= 0; };
+  if (taken()) name += "_" + header.level_type;
+  const std::string base = name;
+  for (int n = 2; taken(); ++n) name = base + "_" + std::to_string(n);
+  return name;
+}
+
+void File::name_field(const Group& group, FileVariable& variable) {
+  const Product& product = group.header.product;
+  variable.name = free_name(group);
+  variable.long_name = group.names.name;
+  variable.units = group.names.units;
+  if (product.linear) {
+    variable.standard_name = group.names.standard_name.empty() ? component_name(group.names.name)
+                                                               : group.names.standard_name;
+    if (group.is_distinguished) variable.process = product.suffix;
+    const bool both = !variable.process.empty() && !group.height.empty();
+    variable.process = group.height + (both ? "_" : "") + variable.process;
+  } else {
+    variable.process = variable.name;  // not a component
+  }
+  if (!product.words.empty()) variable.long_name += " (" + product.words + ")";
+  const Grid& grid = grids_[group.grid];
+  const bool is_turned = grid.projected || grid.rotated;
+  if (group.header.relative_to_grid && is_turned && tell_by_grid(variable)) {
+    contents_.notes.push_back(in_quotes(variable.name) +
+                              " is along the rows or columns of its grid, not to east or north");
+  }
 }
 
 void File::add_field(std::size_t g) {
-  omit_incomplete_members(groups_[g]);
   const Group& group = groups_[g];
-  const Header& header = group.header;
   FileVariable variable;
-  variable.name = header.short_name;
-  const auto taken = [&] {
-    return std::any_of(contents_.variables.begin(), contents_.variables.end(),
-                       [&](const FileVariable& known) { return known.name == variable.name; });
-  };
-  if (taken()) variable.name += "_" + header.level_type;
-  const std::string base = variable.name;
-  for (int n = 2; taken(); ++n) variable.name = base + "_" + std::to_string(n);
+  name_field(group, variable);
   variable.type = "float32";
-  variable.standard_name = header.standard_name;
-  variable.long_name = header.name;
-  variable.units = header.units;
   variable.unread = grids_[group.grid].problem;
   variable.numeric = variable.unread.empty();
   Content held;
   held.group = static_cast<int>(g);
-  std::set<double> members;
-  std::set<double> times;
-  std::set<double> levels;
-  for (const auto& [place, field] : group.fields) {
-    members.insert(place[0]);
-    times.insert(place[1]);
-    levels.insert(place[2]);
-  }
-  held.members.assign(members.begin(), members.end());
-  held.times.assign(times.begin(), times.end());
-  held.levels.assign(levels.begin(), levels.end());
   if (variable.numeric) {
-    if (members.size() > 1) {
-      FileVariable number;
-      number.standard_name = "realization";
-      number.units = "1";
-      variable.dims.push_back(axis("number", held.members, number));
-    }
-    FileVariable time;
-    time.standard_name = "time";
-    time.units = "hours since 1970-01-01 00:00:00";
-    time.calendar = "proleptic_gregorian";
-    variable.dims.push_back(axis("time", held.times, time));
-    if (levels.size() > 1) {
-      variable.dims.push_back(axis(header.level_type.empty() ? "level" : header.level_type,
-                                   held.levels, level_axis(header.level_type)));
+    for (const AxisIndex one : {member_axis, reference_axis, time_axis, level_axis_index}) {
+      if (one != time_axis && group.axes[one].size() < 2) continue;
+      variable.dims.push_back(group_axis(group, one));
+      held.axes.push_back(one);
     }
     const auto grid = grid_dimensions(group.grid);
     variable.dims.insert(variable.dims.end(), grid.begin(), grid.end());
@@ -303,12 +317,6 @@ void File::add_field(std::size_t g) {
     contents_.notes.push_back(in_quotes(variable.name) + ": " + std::to_string(group.repeated) +
                               " more messages of the same members, times and levels are omitted; "
                               "the first ones are used");
-  }
-  const Grid& on_grid = grids_[group.grid];
-  const bool is_turned = on_grid.projected || on_grid.rotated;
-  if (header.relative_to_grid && is_turned && tell_by_grid(variable)) {
-    contents_.notes.push_back(in_quotes(variable.name) +
-                              " is along the rows or columns of its grid, not to east or north");
   }
   contents_.variables.push_back(std::move(variable));
   held_.push_back(std::move(held));
@@ -381,16 +389,15 @@ Result<void> File::read_block(int variable, const std::vector<std::size_t>& star
   const std::lock_guard lock(mutex_);
   if (auto same = input_->check_unchanged(); !same) return same;
   const Group& group = groups_[static_cast<std::size_t>(held.group)];
-  const std::size_t time = held.members.size() > 1 ? 1 : 0;
-  const bool has_levels = held.levels.size() > 1;
-  const std::size_t members = time == 0 ? 1 : count[0];
-  const std::size_t levels = has_levels ? count[time + 1] : 1;
-  for (std::size_t n = 0; n < members * count[time] * levels; ++n) {
-    const std::size_t m = n / levels / count[time];
-    const std::size_t t = n / levels % count[time];
-    const std::size_t l = n % levels;
-    const Place place{held.members[time == 0 ? 0 : start[0] + m], held.times[start[time] + t],
-                      held.levels[has_levels ? start[time + 1] + l : 0]};
+  std::size_t fields = 1;
+  for (std::size_t d = 0; d < held.axes.size(); ++d) fields *= count[d];
+  for (std::size_t n = 0; n < fields; ++n) {
+    Place place{};
+    for (std::size_t one = 0; one < axis_count; ++one) place.at(one) = group.axes.at(one).front();
+    std::size_t rest = n;
+    for (std::size_t d = held.axes.size(); d-- > 0; rest /= count[d]) {
+      place.at(held.axes[d]) = group.axes.at(held.axes[d])[start[d] + rest % count[d]];
+    }
     const auto at = group.fields.find(place);
     if (at == group.fields.end()) {
       out = std::fill_n(out, rows * count.back(), std::numeric_limits<Out>::quiet_NaN());

@@ -1,7 +1,6 @@
 // The fields of a GRIB file combined into arrays over member, time, level, row and column.
 #pragma once
 
-#include <array>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -12,6 +11,7 @@
 #include "server/data/cf/array_file.hpp"
 #include "server/data/files/input_file.hpp"
 #include "server/data/formats/grib/fields.hpp"
+#include "server/data/formats/grib/groups.hpp"
 #include "server/data/formats/grib/index.hpp"
 
 namespace windsplat::data::grib {
@@ -34,26 +34,19 @@ class File final : public cf::ArrayFile {
   void forget_chunks(int variable) const override;
 
  private:
-  using Place = std::array<double, 3>;  // member of an ensemble, time, level
-  // The fields of one quantity, kind of level and grid.
-  struct Group {
-    Header header;  // header of its first field
-    std::size_t grid = 0;
-    std::map<Place, std::size_t> fields;
-    std::size_t repeated = 0;
-  };
   // Content of a variable: numbers, the fields of a group, or the mapping of a grid.
   struct Content {
     std::vector<double> numbers;
     int group = -1;
-    std::vector<double> members;
-    std::vector<double> times;
-    std::vector<double> levels;
+    std::vector<AxisIndex> axes;  // of a group: those of its dimensions before rows and columns
     int mapped_grid = -1;
   };
 
   explicit File(std::shared_ptr<const InputFile> input) : input_(std::move(input)) {}
   Result<void> scan();
+  // message: may be empty if its header is that of an earlier one apart from times.
+  Result<void> add_message(std::size_t field, const std::vector<unsigned char>& message,
+                           const Header& header);
   Result<std::size_t> grid_of(const std::vector<unsigned char>& message, const std::string& key);
   void add_variables();
   [[nodiscard]] Result<void> check_any_field() const;
@@ -62,8 +55,10 @@ class File final : public cf::ArrayFile {
   std::vector<int> add_plane(std::size_t grid);
   void add_mapping(std::size_t grid);
   int axis(const std::string& name, const std::vector<double>& values, const FileVariable& like);
+  int group_axis(const Group& group, AxisIndex axis_index);
+  std::string free_name(const Group& group) const;
+  void name_field(const Group& group, FileVariable& variable);
   void add_field(std::size_t group);
-  void omit_incomplete_members(Group& group);
   template <class Out>
   Result<void> read_block(int variable, const std::vector<std::size_t>& start,
                           const std::vector<std::size_t>& count, Out* out) const;
@@ -76,6 +71,8 @@ class File final : public cf::ArrayFile {
   std::map<std::string, std::size_t>
       grid_keys_;  // keyed by the bytes of the grid definition; several keys may describe one grid
   std::vector<Group> groups_;
+  std::map<std::string, std::size_t> group_keys_;
+  bool by_lead_time_ = false;  // times of groups are hours after their reference time
   std::map<std::size_t, std::vector<int>> grid_dims_;
   std::vector<Content> held_;  // parallel to the variables
   FileContents contents_;

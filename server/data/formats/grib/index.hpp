@@ -19,10 +19,13 @@ struct FieldPlace {
   int edition = 0;
   std::vector<Part> parts;  // if `split`, without section 0 and the end marker
   bool split = false;
+  Part head;  // bytes for HeaderCache; none if `split`, or if the sections are not as usual
 };
 
 // Errors: bad_data for truncated messages, or lengths beyond the end of the file.
 Result<std::vector<FieldPlace>> find_fields(const InputFile& input);
+
+Result<std::vector<unsigned char>> read_head(const InputFile& input, const FieldPlace& field);
 
 // The field as a separate message.
 Result<std::vector<unsigned char>> read_message(const InputFile& input, const FieldPlace& field);

@@ -24,16 +24,18 @@ double surface(const Message& message, const std::string& which) {
   return factor < 0 ? static_cast<double>(value) * power : static_cast<double>(value) / power;
 }
 
-// NaN for types of levels that are numbered, and for missing surfaces.
+// NaN for levels that are numbered, and for missing surfaces.
 double measured_2(const Message& message) {
   // Pressure, heights, sigma, depth, temperature, distance in pressure, eta, depth in the sea.
   constexpr auto measured = std::to_array<long>({100, 102, 103, 104, 106, 107, 108, 111, 160});
   const long code = message.whole("typeOfFirstFixedSurface", 255);
-  if (std::find(measured.begin(), measured.end(), code) == measured.end()) return nothing;
+  const bool is_layer = message.whole("typeOfSecondFixedSurface", 255) == code;
   double place = surface(message, "First");
-  if (message.whole("typeOfSecondFixedSurface", 255) == code) {
-    place = (place + surface(message, "Second")) / 2;
+  if (std::find(measured.begin(), measured.end(), code) == measured.end()) {
+    // `level` is the second number of a layer, which some producers leave 0.
+    return is_layer && place > surface(message, "Second") ? place : nothing;
   }
+  if (is_layer) place = (place + surface(message, "Second")) / 2;
   constexpr long pressure = 100;
   constexpr long pressure_from_ground = 108;
   return code == pressure || code == pressure_from_ground ? place / 100 : place;
@@ -45,19 +47,36 @@ double measured_1(const Message& message) {
   const double bottom = message.number("bottomLevel");
   const double middle = (top + bottom) / 2;
   switch (message.whole("indicatorOfTypeOfLevel", 255)) {
-    case 101: return middle * 10;                      // kPa
-    case 104: case 106: return middle * 100;           // hm
-    case 107: case 119: return level / 10000;
-    case 108: case 120: return middle / 100;
-    case 111: case 125: return level / 100;            // cm
-    case 112: return middle / 100;                     // cm
-    case 114: return 475 - middle;
-    case 116: return middle;                           // hPa
-    case 121: return 1100 - middle;                    // hPa
-    case 128: return 1.1 - middle / 1000;
-    case 141: return (top * 10 + 1100 - bottom) / 2;   // kPa and hPa
-    case 210: return level / 100;                      // Pa
-    default: return nothing;
+    case 101:
+      return middle * 10;  // kPa
+    case 104:
+    case 106:
+      return middle * 100;  // hm
+    case 107:
+    case 119:
+      return level / 10000;
+    case 108:
+    case 120:
+      return middle / 100;
+    case 111:
+    case 125:
+      return level / 100;  // cm
+    case 112:
+      return middle / 100;  // cm
+    case 114:
+      return 475 - middle;
+    case 116:
+      return middle;  // hPa
+    case 121:
+      return 1100 - middle;  // hPa
+    case 128:
+      return 1.1 - middle / 1000;
+    case 141:
+      return (top * 10 + 1100 - bottom) / 2;  // kPa and hPa
+    case 210:
+      return level / 100;  // Pa
+    default:
+      return nothing;
   }
 }
 
@@ -101,8 +120,8 @@ FileVariable level_axis(const std::string& type) {
     constexpr auto downward = std::to_array<std::string_view>(
         {"hybrid", "sigma", "eta", "generalVertical", "soil", "snow", "seaIce", "oceanModel"});
     const auto begins = [&](std::string_view start) { return type.starts_with(start); };
-    const bool is_down = !begins("hybridHeight") &&
-                         std::any_of(downward.begin(), downward.end(), begins);
+    const bool is_down =
+        !begins("hybridHeight") && std::any_of(downward.begin(), downward.end(), begins);
     out.positive = is_down ? "down" : "";
   }
   return out;

@@ -18,13 +18,10 @@ namespace {
 using testing::DoubleEq;
 using testing::ElementsAre;
 
-// Temperature of `value` everywhere; 16 x 31 points of the sample.
+// A temperature of `value` everywhere.
 std::string constant(Maker& maker, double value) {
   maker.set("shortName", std::string("t"));
-  maker.set("bitsPerValue", 16L);
-  std::size_t points = 0;
-  EXPECT_EQ(codes_get_size(maker.handle(), "values", &points), CODES_SUCCESS);
-  maker.values(std::vector<double>(points, value));
+  maker.fill(value);
   return maker.bytes();
 }
 
@@ -47,13 +44,13 @@ std::string layer(int edition, const std::string& type, long top, long bottom, d
 std::string surfaces(long type, long factor, long first, long second, double value) {
   Maker maker("GRIB2");
   maker.set("typeOfFirstFixedSurface", type);
-  maker.set("scaleFactorOfFirstFixedSurface", factor);
-  maker.set("scaledValueOfFirstFixedSurface", first);
   if (second >= 0) {
     maker.set("typeOfSecondFixedSurface", type);
     maker.set("scaleFactorOfSecondFixedSurface", factor);
     maker.set("scaledValueOfSecondFixedSurface", second);
   }
+  maker.set("scaleFactorOfFirstFixedSurface", factor);
+  maker.set("scaledValueOfFirstFixedSurface", first);
   return constant(maker, value);
 }
 
@@ -68,8 +65,9 @@ class GribLevels : public GribFiles {
     if (!source) return {};
     const Axis axis = source->info().grid.axes[2];
     const auto volume = source->read(0, 0);
-    EXPECT_TRUE(volume);
+    EXPECT_TRUE(volume) << volume.error().message;
     Column out{axis, {}};
+    if (!volume) return out;
     const auto& dims = source->info().grid.dims();
     const auto plane = static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]);
     for (int level = 0; level < dims[2]; ++level) {
@@ -80,16 +78,16 @@ class GribLevels : public GribFiles {
 };
 
 TEST_F(GribLevels, DepthsAndHeightsOfEdition1AreInMetres) {
-  const Column land = column(at_level(1, "depthBelowLand", 7, 7) +
-                             at_level(1, "depthBelowLand", 28, 28) +
-                             at_level(1, "depthBelowLand", 100, 100));
+  const Column land =
+      column(at_level(1, "depthBelowLand", 7, 7) + at_level(1, "depthBelowLand", 28, 28) +
+             at_level(1, "depthBelowLand", 100, 100));
   EXPECT_EQ(land.axis.kind, AxisKind::depth);
   EXPECT_EQ(land.axis.units, "m");
   EXPECT_THAT(land.axis.coordinates, ElementsAre(1, 0.28, 0.07));
   EXPECT_THAT(land.values, ElementsAre(100, 28, 7));
 
-  const Column soil = column(layer(1, "depthBelowLandLayer", 0, 7, 1) +
-                             layer(1, "depthBelowLandLayer", 7, 28, 2));
+  const Column soil =
+      column(layer(1, "depthBelowLandLayer", 0, 7, 1) + layer(1, "depthBelowLandLayer", 7, 28, 2));
   EXPECT_THAT(soil.axis.coordinates, ElementsAre(0.175, 0.035));
   EXPECT_THAT(soil.values, ElementsAre(2, 1));
 
@@ -97,15 +95,15 @@ TEST_F(GribLevels, DepthsAndHeightsOfEdition1AreInMetres) {
                                layer(1, "heightAboveGroundLayer", 40, 20, 2));
   EXPECT_EQ(ground.axis.kind, AxisKind::height);
   EXPECT_THAT(ground.axis.coordinates, ElementsAre(1500, 3000));
-  const Column sea = column(layer(1, "heightAboveSeaLayer", 2, 0, 1) +
-                            layer(1, "heightAboveSeaLayer", 4, 2, 2));
+  const Column sea =
+      column(layer(1, "heightAboveSeaLayer", 2, 0, 1) + layer(1, "heightAboveSeaLayer", 4, 2, 2));
   EXPECT_EQ(sea.axis.kind, AxisKind::height);
   EXPECT_THAT(sea.axis.coordinates, ElementsAre(100, 300));
 }
 
 TEST_F(GribLevels, SurfacesOfEdition2KeepTheirFractions) {
-  const Column soil = column(surfaces(106, 2, 0, 10, 1) + surfaces(106, 2, 10, 40, 2) +
-                             surfaces(106, 1, 4, 10, 3));
+  const Column soil =
+      column(surfaces(106, 2, 0, 10, 1) + surfaces(106, 2, 10, 40, 2) + surfaces(106, 1, 4, 10, 3));
   EXPECT_EQ(soil.axis.kind, AxisKind::depth);
   EXPECT_THAT(soil.axis.coordinates, ElementsAre(0.7, 0.25, 0.05));
   EXPECT_THAT(soil.values, ElementsAre(3, 2, 1));
@@ -131,8 +129,8 @@ TEST_F(GribLevels, PressuresBelowAndAbove1HPaAreOneAxis) {
 // Level 1, 2, 3 with their number as value; the lowest first.
 TEST_F(GribLevels, NumberedLevelsRunAsTheirKindIsNumbered) {
   const std::vector<std::pair<std::string, bool>> falls{
-      {"hybrid", true},    {"hybridHeight", false}, {"sigma", true},     {"eta", true},
-      {"soilLayer", true}, {"snowLayer", true},     {"soil", true},      {"oceanModel", true},
+      {"hybrid", true},    {"hybridHeight", false},   {"sigma", true},      {"eta", true},
+      {"soilLayer", true}, {"snowLayer", true},       {"soil", true},       {"oceanModel", true},
       {"theta", false},    {"oceanModelLayer", true}, {"hybridLayer", true}};
   for (const auto& [type, down] : falls) {
     SCOPED_TRACE(type);
@@ -149,8 +147,8 @@ TEST_F(GribLevels, NumberedLevelsRunAsTheirKindIsNumbered) {
 TEST_F(GribLevels, SigmaOfEdition1IsAFraction) {
   const Column air = column(at_level(1, "sigma", 9950, 1) + at_level(1, "sigma", 5000, 2));
   EXPECT_THAT(air.axis.coordinates, ElementsAre(0.995, 0.5));
-  const Column layers = column(layer(1, "sigmaLayer", 44, 100, 1) +
-                               layer(1, "sigmaLayer", 33, 44, 2));
+  const Column layers =
+      column(layer(1, "sigmaLayer", 44, 100, 1) + layer(1, "sigmaLayer", 33, 44, 2));
   EXPECT_THAT(layers.axis.coordinates, ElementsAre(0.72, DoubleEq(0.385)));
   EXPECT_THAT(layers.values, ElementsAre(1, 2));
 }

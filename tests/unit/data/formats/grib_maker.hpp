@@ -38,6 +38,19 @@ class Maker {
   void values(const std::vector<double>& list) {
     EXPECT_EQ(codes_set_double_array(handle_, "values", list.data(), list.size()), CODES_SUCCESS);
   }
+  // 4 columns and 3 rows with one value.
+  void fill(double value) {
+    set("Ni", 4L);
+    set("Nj", 3L);
+    set("longitudeOfFirstGridPointInDegrees", 10.0);
+    set("longitudeOfLastGridPointInDegrees", 40.0);
+    set("latitudeOfFirstGridPointInDegrees", 60.0);
+    set("latitudeOfLastGridPointInDegrees", 20.0);
+    set("iDirectionIncrementInDegrees", 10.0);
+    set("jDirectionIncrementInDegrees", 20.0);
+    set("bitsPerValue", 16L);
+    values(std::vector<double>(12, value));
+  }
   [[nodiscard]] std::string bytes() const {
     const void* data = nullptr;
     std::size_t size = 0;

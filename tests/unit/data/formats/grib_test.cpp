@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/data/cf/array_file.hpp"
@@ -222,6 +223,60 @@ TEST_F(Grib, BitmapsAndAbsentMessagesAreMasked) {
   EXPECT_EQ(second->masked, rows * columns);
 }
 
+// Sections 1 to 7 of a message of edition 2.
+std::vector<std::string> sections_of(const std::string& bytes) {
+  std::vector<std::string> out(8);
+  for (std::size_t at = 16; at + 5 < bytes.size();) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      length = length << 8U | static_cast<unsigned char>(bytes[at + i]);
+    }
+    out.at(static_cast<unsigned char>(bytes[at + 4])) = bytes.substr(at, length);
+    at += length;
+  }
+  return out;
+}
+
+std::string message_of(const std::string& sections) {
+  std::string out("GRIB\xff\xff\0\2", 8);
+  const std::size_t length = 16 + sections.size() + 4;
+  for (int shift = 56; shift >= 0; shift -= 8) out += static_cast<char>(length >> shift);
+  return out + sections + "7777";
+}
+
+// Code table 6.0: 254 is the last bitmap defined in the message, not that of the field before.
+TEST_F(Grib, FieldsShareTheLastBitmapOfTheirMessage) {
+  const auto t = sections_of(message(2, "t", 500, 0, {}, 20));
+  const auto q = sections_of(message(2, "q", 500, 0, {}, 20));
+  const auto whole = sections_of(message(2, "u", 500, 0));
+  const std::string same("\0\0\0\6\6\xfe", 6);
+  const std::string begin = t[1] + t[3];
+  const std::string masked = t[4] + t[5] + t[6] + t[7];
+  const std::string unmasked = whole[4] + whole[5] + whole[6] + whole[7];
+  const auto source = open(message_of(begin + masked + unmasked + q[4] + q[5] + same + q[7]));
+  ASSERT_NE(source, nullptr);
+  const DatasetInfo& info = source->info();
+  for (const auto& [name, count] : {std::pair("t", rows), {"q", rows}, {"u", 0L}}) {
+    SCOPED_TRACE(name);
+    ASSERT_NE(info.find(name), nullptr);
+    const auto volume =
+        source->read(static_cast<std::size_t>(info.find(name) - info.fields.data()), 0);
+    ASSERT_TRUE(volume) << volume.error().message;
+    EXPECT_EQ(volume->masked, count);
+    EXPECT_NEAR(volume->values[0], value_at(10, 20, 500, 0), 0.02);
+  }
+  EXPECT_THAT(fault(message_of(begin + q[4] + q[5] + same + q[7])), HasSubstr("bitmap before"));
+}
+
+TEST_F(Grib, MessagesBehindALargeGapAreRead) {
+  for (const std::size_t gap : {15U, 65536U, 65549U, 200000U}) {
+    const auto source =
+        open(message(2, "t", 1000, 0) + std::string(gap, '\0') + message(2, "t", 500, 0));
+    ASSERT_NE(source, nullptr);
+    EXPECT_THAT(source->info().grid.axes[2].coordinates, ElementsAre(1000, 500)) << gap;
+  }
+}
+
 TEST_F(Grib, SeveralFieldsInOneMessageAreAllRead) {
   codes_multi_handle* all = codes_grib_multi_handle_new(nullptr);
   for (const char* quantity : {"u", "v"}) {
@@ -266,21 +321,27 @@ std::string lambert_wind(const std::string& component, bool along_rows) {
   maker.set("level", 500L);
   maker.set("shortName", component);
   maker.set("bitsPerValue", 16L);
-  maker.values(std::vector<double>(12, component == "u" ? 10 : 0));
+  maker.values(std::vector<double>(12, component.starts_with("u") ? 10 : 0));
   return maker.bytes();
 }
 
+// Gusts and the motion of storms have no standard name.
 TEST_F(Grib, WindsAlongRowsStayAndOthersAreRotated) {
   const double angle = 35 * std::sin(25 * M_PI / 180) * M_PI / 180;
-  for (const bool along_rows : {true, false}) {
-    const auto source = open(lambert_wind("u", along_rows) + lambert_wind("v", along_rows));
-    ASSERT_NE(source, nullptr);
-    ASSERT_EQ(source->info().fields.front().kind, FieldKind::vector);
-    const auto wind = source->read(0, 0);
-    ASSERT_TRUE(wind);
-    const double turned = along_rows ? 0 : angle;
-    EXPECT_NEAR(wind->component(0)[0], 10 * std::cos(turned), 0.02);
-    EXPECT_NEAR(wind->component(1)[0], -10 * std::sin(turned), 0.02);
+  for (const char* name : {"u", "ugust", "ust"}) {
+    for (const bool along_rows : {true, false}) {
+      SCOPED_TRACE(name);
+      const std::string x = name;
+      const auto source =
+          open(lambert_wind(x, along_rows) + lambert_wind("v" + x.substr(1), along_rows));
+      ASSERT_NE(source, nullptr);
+      ASSERT_EQ(source->info().fields.front().kind, FieldKind::vector);
+      const auto wind = source->read(0, 0);
+      ASSERT_TRUE(wind);
+      const double turned = along_rows ? 0 : angle;
+      EXPECT_NEAR(wind->component(0)[0], 10 * std::cos(turned), 0.02);
+      EXPECT_NEAR(wind->component(1)[0], -10 * std::sin(turned), 0.02);
+    }
   }
 }
 
