@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "server/data/formats/grib/levels.hpp"
+
 namespace windsplat::data::grib {
 
 namespace {
@@ -21,6 +23,7 @@ struct Timed {
   double reference = 0;  // hours since 1970-01-01
   double step = 0;       // hours
   bool is_instant = true;
+  std::optional<double> level;  // if the key is without it
 };
 
 long number_at(const Bytes& bytes, std::size_t at, std::size_t count) {
@@ -58,6 +61,32 @@ std::size_t section(const Bytes& head, unsigned char number) {
   return 0;
 }
 
+// Pressures in hPa and numbers of hybrid levels, for which no name of ecCodes depends on the level.
+void blank_level_2(const Bytes& head, std::size_t four, Timed& out) {
+  constexpr unsigned char pressure = 100;  // code table 4.5
+  constexpr unsigned char hybrid = 105;
+  constexpr unsigned char none = 255;
+  const unsigned char type = head[four + 22];
+  const unsigned char factor = head[four + 23];
+  const bool by_number = type == hybrid && factor == 0;
+  if ((type != pressure && !by_number) || head[four + 28] != none || factor == none) return;
+  const long exponent = (factor & 0x80) != 0 ? -long{factor & 0x7f} : long{factor};
+  const double value = scaled(number_at(head, four + 24, 4), exponent);
+  if (std::isnan(value)) return;
+  out.level = by_number ? value : value / 100;
+  blank(out.key, four + 24, 4);
+}
+
+void blank_level_1(const Bytes& head, std::size_t begin, Timed& out) {
+  constexpr unsigned char pressure = 100;  // code table 3
+  constexpr unsigned char hybrid = 109;
+  constexpr unsigned char table_with_levels = 202;  // has a name for one level
+  const unsigned char type = head[begin + 9];
+  if ((type != pressure && type != hybrid) || head[begin + 3] == table_with_levels) return;
+  out.level = static_cast<double>(number_at(head, begin + 10, 2));
+  blank(out.key, begin + 10, 2);
+}
+
 std::optional<Timed> timed_2(const Bytes& head) {
   constexpr std::size_t smallest = 34;  // bytes of section 4
   const std::size_t one = section(head, 1);
@@ -75,10 +104,11 @@ std::optional<Timed> timed_2(const Bytes& head) {
   if (known == templates.end() || !unit || forecast > forecast_max || head[one + 18] != 0) {
     return {};
   }
-  Timed out{text(head, 0), 0, static_cast<double>(forecast) * *unit, known->second == 0};
+  Timed out{text(head, 0), 0, static_cast<double>(forecast) * *unit, known->second == 0, {}};
   blank(out.key, 8, 8);  // length of the message
   blank(out.key, one + 12, 7);
   blank(out.key, four + 18, 4);
+  blank_level_2(head, four, out);
   if (!out.is_instant) {
     const std::size_t end = four + known->second;
     if (end + 19 > head.size() || head[end + 7] != 1 || !hours_in(head[end + 14])) return {};
@@ -100,11 +130,12 @@ std::optional<Timed> timed_1(const Bytes& head) {
   if ((range != 0 && range != 10) || !unit) return {};
   const std::size_t octets = range == 0 ? 1 : 2;
   const auto step = static_cast<double>(number_at(head, begin + 18, octets)) * *unit;
-  Timed out{text(head, 0), 0, step, true};
+  Timed out{text(head, 0), 0, step, true, {}};
   blank(out.key, 4, 3);  // length of the message
   blank(out.key, begin + 12, 5);
   blank(out.key, begin + 18, octets);
   blank(out.key, begin + 24, 1);
+  blank_level_1(head, begin, out);
   const long year = (head[begin + 24] - 1L) * 100 + head[begin + 12];
   out.reference = hours_of(year * 10000 + head[begin + 13] * 100L + head[begin + 14],
                            head[begin + 15] * 100L + head[begin + 16]);
@@ -126,6 +157,7 @@ std::optional<Header> HeaderCache::find(int edition, const Bytes& head) const {
   if (at == known_.end()) return {};
   Header out = at->second.header;
   out.reference = found->reference;
+  if (found->level) out.level = *found->level;
   out.hours = found->reference + found->step + at->second.range_hours;
   return out;
 }
@@ -136,7 +168,7 @@ void HeaderCache::remember(int edition, const Bytes& head, const Header& header)
   constexpr double tolerance = 1e-6;  // hours
   const double range = header.hours - found->reference - found->step;
   if (std::abs(header.reference - found->reference) > tolerance || range < -tolerance ||
-      (found->is_instant && range > tolerance)) {
+      (found->is_instant && range > tolerance) || (found->level && *found->level != header.level)) {
     return;
   }
   bytes_ += head.size();

@@ -1,5 +1,5 @@
-// Headers of GRIB messages that differ from an earlier one in their times only: these need no
-// decoding by ecCodes, which takes about a millisecond.
+// Headers of GRIB messages that differ from an earlier one only in their times, pressure or number
+// of a hybrid level: these need no decoding by ecCodes, which takes about a millisecond.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,8 @@ class HeaderCache {
   // over one range of time, in units of minutes to days.
   [[nodiscard]] std::optional<Header> find(int edition,
                                            const std::vector<unsigned char>& head) const;
-  // Does nothing if the times of the header are not those of the head, or beyond a limit of memory.
+  // Does nothing if the times or the level of the header are not those of the head, or beyond a
+  // limit of memory.
   void remember(int edition, const std::vector<unsigned char>& head, const Header& header);
 
  private:
@@ -28,7 +29,7 @@ class HeaderCache {
     Header header;
     double range_hours = 0;  // from the step to the time of validity
   };
-  std::unordered_map<std::string, Known> known_;  // by the bytes of the head without times
+  std::unordered_map<std::string, Known> known_;  // by the bytes of the head without these
   std::size_t bytes_ = 0;
 };
 

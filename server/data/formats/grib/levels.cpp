@@ -15,13 +15,8 @@ constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 // A fixed surface of edition 2, in the unit of code table 4.5; NaN if missing.
 double surface(const Message& message, const std::string& which) {
-  const long value = message.whole(("scaledValueOf" + which + "FixedSurface").c_str(), -1);
-  const long factor = message.whole(("scaleFactorOf" + which + "FixedSurface").c_str(), 255);
-  constexpr long value_max = 0x7ffffffe;  // beyond: missing, or negative
-  constexpr long factor_max = 20;
-  if (value < 0 || value > value_max || std::abs(factor) > factor_max) return nothing;
-  const double power = std::pow(10.0, static_cast<double>(std::abs(factor)));
-  return factor < 0 ? static_cast<double>(value) * power : static_cast<double>(value) / power;
+  return scaled(message.whole(("scaledValueOf" + which + "FixedSurface").c_str(), -1),
+                message.whole(("scaleFactorOf" + which + "FixedSurface").c_str(), 255));
 }
 
 // NaN for levels that are numbered, and for missing surfaces.
@@ -94,6 +89,14 @@ std::string type_of(const Message& message) {
 }
 
 }  // namespace
+
+double scaled(long value, long factor) {
+  constexpr long value_max = 0x7ffffffe;  // beyond: missing, or negative
+  constexpr long factor_max = 20;
+  if (value < 0 || value > value_max || std::abs(factor) > factor_max) return nothing;
+  const double power = std::pow(10.0, static_cast<double>(std::abs(factor)));
+  return factor < 0 ? static_cast<double>(value) * power : static_cast<double>(value) / power;
+}
 
 Level read_level(const Message& message) {
   const double measured =

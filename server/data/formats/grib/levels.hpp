@@ -15,6 +15,9 @@ struct Level {
   double value = 0;
 };
 
+// value * 10^-factor, as rounded once; NaN if missing or beyond limits.
+double scaled(long value, long factor);
+
 // Code table 4.5 of edition 2, code table 3 of edition 1.
 Level read_level(const Message& message);
 

@@ -24,6 +24,7 @@ struct Made {
   long time = 0;
   std::string range = "0";
   std::string type = "instant";
+  std::string level_type = "isobaricInhPa";
   long level = 500;
   long unit = 1;  // code table 4.4
 };
@@ -32,7 +33,7 @@ Bytes made(const Made& wanted) {
   Maker maker(wanted.edition == 1 ? "regular_ll_pl_grib1" : "regular_ll_pl_grib2");
   maker.set("dataDate", wanted.date);
   maker.set("dataTime", wanted.time);
-  maker.set("typeOfLevel", std::string("isobaricInhPa"));
+  maker.set("typeOfLevel", wanted.level_type);
   maker.set("level", wanted.level);
   maker.set("shortName", wanted.quantity);
   maker.set("indicatorOfUnitOfTimeRange", wanted.unit);
@@ -113,6 +114,21 @@ TEST(GribHeaderCache, AveragesOfOneLengthFollowAndOthersDoNot) {
   EXPECT_FALSE(follow(first, other));
 }
 
+TEST(GribHeaderCache, HeadersFollowFromThoseOfOtherPressuresAndHybridLevels) {
+  for (const int edition : {1, 2}) {
+    for (const char* type : {"isobaricInhPa", "hybrid"}) {
+      SCOPED_TRACE(type);
+      Made first;
+      first.edition = edition;
+      first.level_type = type;
+      Made other = first;
+      other.level = 70;
+      other.range = "9";
+      expect_same(first, other);
+    }
+  }
+}
+
 TEST(GribHeaderCache, OtherQuantitiesLevelsAndTemplatesDoNotFollow) {
   for (const int edition : {1, 2}) {
     SCOPED_TRACE(edition);
@@ -121,9 +137,11 @@ TEST(GribHeaderCache, OtherQuantitiesLevelsAndTemplatesDoNotFollow) {
     Made other = first;
     other.quantity = "u";
     EXPECT_FALSE(follow(first, other));
-    other = first;
-    other.level = 850;
-    EXPECT_FALSE(follow(first, other));
+    Made ground = first;
+    ground.level_type = "heightAboveGround";
+    other = ground;
+    other.level = 10;
+    EXPECT_FALSE(follow(ground, other));
     other = first;
     other.type = "avg";
     other.range = "0-6";
