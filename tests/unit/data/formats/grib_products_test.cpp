@@ -86,6 +86,7 @@ TEST_F(GribProducts, StatisticsOverTimeAreFieldsOfTheirOwn) {
     EXPECT_EQ(value_of(*source, "t"), 10);
     EXPECT_EQ(value_of(*source, "t_avg"), 20);
     EXPECT_EQ(value_of(*source, "t_accum"), 30);
+    ASSERT_NE(source->info().find("t_avg"), nullptr);
     EXPECT_THAT(source->info().find("t_avg")->long_name, HasSubstr("average over time"));
     EXPECT_EQ(source->info().steps.size(), 1U);
   }
@@ -124,6 +125,8 @@ TEST_F(GribProducts, ExtremesMeansSpreadsPercentilesAndProbabilitiesAreApart) {
   EXPECT_EQ(value_of(*source, "t_spread"), 2);
   EXPECT_EQ(value_of(*source, "t_p90"), 3);
   EXPECT_EQ(value_of(*source, "t_prob"), 4);
+  ASSERT_NE(source->info().find("t_prob"), nullptr);
+  ASSERT_NE(source->info().find("t_prob_isobaricInhPa"), nullptr);
   EXPECT_THAT(source->info().find("t_prob")->long_name, HasSubstr("above 273.1"));
   EXPECT_THAT(source->info().find("t_prob_isobaricInhPa")->long_name, HasSubstr("above 283.1"));
   EXPECT_EQ(value_of(*source, "t_max"), 6);
