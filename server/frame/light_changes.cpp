@@ -108,7 +108,8 @@ class Layer {
 
  private:
   static std::size_t number(int x, int y) {
-    return static_cast<std::size_t>((y + reach) * wide + x + reach);
+    return static_cast<std::size_t>(y + reach) * std::size_t{wide} +
+           static_cast<std::size_t>(x + reach);
   }
   std::array<Medium, std::size_t{wide} * wide> cells_{};
   std::array<double, 2> from_{};  // of the ray from the centre of the cell in the middle

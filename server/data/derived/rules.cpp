@@ -331,9 +331,9 @@ class Finder {
     if (!rule.humidity) rule.humidity = scalar("humidity_mixing_ratio", mixing, mass_fraction);
     if (!rule.humidity) return;
     rule.quantity = Quantity::relative_humidity;
-    std::string source = "relative humidity over water (Bolton 1980), from " +
-                         info_.fields[rule.humidity->field].name;
-    add(std::move(rule), "relative_humidity", "%", std::move(source));
+    const std::string source = "relative humidity over water (Bolton 1980), from " +
+                               info_.fields[rule.humidity->field].name;
+    add(std::move(rule), "relative_humidity", "%", source);
   }
 
   const DatasetInfo& info_;

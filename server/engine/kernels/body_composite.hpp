@@ -218,11 +218,11 @@ KERNEL_INLINE Light splat_block(const Lanes& s, float x, float y, const float* H
 // A line in a homogeneous cell at a vector of pixels; see add_cell.
 struct CellLight {
   Pixel tau;
+  Pixel opacity;
+  Pixel x_line;
   Attenuation<Pixel> medium;
   const Pixel* color;  // of the medium
-  Pixel opacity;
   const Pixel* line_color;
-  Pixel x_line;
 };
 
 // The first form of [CM92]: the front part of the medium, the line and the back part composited one
@@ -278,7 +278,7 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
     Pixel line_color[3];
     for (int c = 0; c < 3; ++c) line_color[c] = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
     const Pixel t = load<Pixel>(to.transmittance + l);
-    const CellLight cell = {tau, medium, s.color, line.opacity, line_color, x_line};
+    const CellLight cell = {tau, line.opacity, x_line, medium, s.color, line_color};
     const Pixel left = bounded_light<Compositing>(t * add_cell<Compositing>(cell, t, to, l));
     store(left, to.transmittance + l);
     see_light<Compositing>(left, light);

@@ -319,8 +319,8 @@ Light divided_block(const DividedKernel& kernel, const std::int32_t* partial, fl
         return bounded_light<Compositing>(t * medium.transmitted);
       }
       const Pixel x_here = clamped(place / hn::Max(part, least), 0.0F, 1.0F);
-      const CellLight cell = {here,  attenuation_by<Compositing>(here), color, opacity, line.color,
-                              x_here};
+      const CellLight cell = {here,  opacity,   x_here, attenuation_by<Compositing>(here),
+                              color, line.color};
       return bounded_light<Compositing>(t * add_cell<Compositing>(cell, t, into, l));
     };
     const Pixel left = add(splat.x_body, hn::IfThenElseZero(before, line.opacity), splat.x_line,

@@ -78,8 +78,9 @@ std::vector<MadeGrid> made_grids() {
              maker.set("LaDInDegrees", 20.0);
              maker.set("longitudeOfLastGridPointInDegrees", 200.0);
              maker.set("latitudeOfLastGridPointInDegrees", 10.0);
+             // Equal steps: ecCodes 2.28 takes the first for both.
              maker.set("DiInMetres", 300000.0);
-             maker.set("DjInMetres", 200000.0);
+             maker.set("DjInMetres", 300000.0);
            }}};
 }
 
