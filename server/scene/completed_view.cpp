@@ -230,7 +230,7 @@ Result<void> outline_scalar(protocol::ScalarView& scalar, const std::string& poi
                             const data::DatasetInfo& info) {
   const auto field = find_field(info, scalar.field, data::FieldKind::scalar, pointer + "/field");
   if (!field) return field.error();
-  if (!scalar.color.map) scalar.color.map = scalar_style(**field).map;
+  if (!scalar.color.map) scalar.color.map = default_map(**field, info);
   if (auto ok = check_map(*scalar.color.map, pointer + "/color/map"); !ok) return ok;
   if (auto ok = check_color_range(scalar.color.range, pointer + "/color/range"); !ok) return ok;
   return check_extinction(scalar, pointer);

@@ -295,6 +295,11 @@ bool is_map(const data::DatasetInfo& info) {
   return info.grid.dims()[2] == 1 && info.first(data::FieldKind::vector) == nullptr;
 }
 
+std::string default_map(const data::FieldInfo& field, const data::DatasetInfo& info) {
+  const std::string map = scalar_style(field).map;
+  return is_map(info) && map == other_style.map ? "viridis" : map;  // whose low end is not black
+}
+
 std::vector<std::string> default_scalars(const data::DatasetInfo& info) {
   if (is_map(info)) {
     const auto shown =

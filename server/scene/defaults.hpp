@@ -60,6 +60,9 @@ ScalarStyle scalar_style(const data::FieldInfo& field);
 // Whether a dataset is a map: one layer of scalars, without a vector field.
 bool is_map(const data::DatasetInfo& info);
 
+// The colour map of a scalar.
+std::string default_map(const data::FieldInfo& field, const data::DatasetInfo& info);
+
 // Names of the scalars shown by default: the best match of a cloud or density, and solid bodies in
 // the flow; in a dataset without a vector field at least the first scalar; of a map the first.
 std::vector<std::string> default_scalars(const data::DatasetInfo& info);

@@ -398,6 +398,7 @@ TEST(Defaults, AMapShowsItsFirstFieldAndIsOpaqueEverywhere) {
   ASSERT_EQ(view.scalars->size(), 1U);
   const protocol::ScalarView& shown = view.scalars->front();
   EXPECT_EQ(shown.field, "sst");
+  EXPECT_EQ(shown.color.map, "viridis") << "the low end of the usual map is black";
   // exp(-12) of the light from behind passes one layer.
   const Scene scene = built(View{}, *map);
   const double thickness = scene.lattice.spacing[2][0];
