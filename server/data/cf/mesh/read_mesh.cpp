@@ -278,15 +278,17 @@ Result<Mesh> mesh_of_corners(const std::vector<double>& longitudes,
     }
     nodes[own.index] = static_cast<std::uint32_t>(x.size() - 1);
   }
-  // Equal corners differ by rounding, and may lie on both sides of a bin's edge.
+  // Equal corners differ by rounding, and may lie on both sides of a bin's edge. Of two neighbours
+  // the later one finds the earlier: in the last column of a row that is the first column.
   std::vector<std::uint32_t> same(bins.size());
   for (std::size_t n = 0; n < bins.size(); ++n) {
     same[n] = static_cast<std::uint32_t>(n);
+    const auto own = bins.begin() + static_cast<std::ptrdiff_t>(n);
     const auto [row, column] = bins[n];
-    for (const auto& [up, aside] : {std::pair(0, -1), {-1, -1}, {-1, 0}, {-1, 1}}) {
+    for (const auto& [up, aside] : {std::pair(0, -1), {0, 1}, {-1, -1}, {-1, 0}, {-1, 1}}) {
       const std::array near{row + up, (column + aside + columns) % columns};
-      const auto at = std::lower_bound(bins.begin(), bins.end(), near);
-      if (at == bins.end() || *at != near) continue;
+      const auto at = std::lower_bound(bins.begin(), own, near);
+      if (at == own || *at != near) continue;
       same[n] = same[static_cast<std::size_t>(at - bins.begin())];
       break;
     }

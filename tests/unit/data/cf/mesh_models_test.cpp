@@ -2,8 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/unit/data/cf/mesh_maker.hpp"
@@ -153,6 +155,83 @@ TEST(MeshModels, AGridFileMayNameTheCellsOtherwiseAndIconNumbersLevelsFromTheTop
       *source, "w", [](double, double) { return 5; }, 0, 0);
   expect_function(
       *source, "w", [](double, double) { return 2; }, 0, 1);
+}
+
+TEST(MeshModels, LevelsOfIconOnLatitudesAndLongitudesRunFromTheTopTooWhateverTheirUnit) {
+  const Folder folder;
+  for (const char* unit : {"", "1"}) {
+    {
+      NetcdfMaker file(folder / "r.nc");
+      const int level = file.axis("height", {1, 2, 3}, unit, "height");
+      file.text(file.variable_id("height"), "long_name", "generalized_height");
+      const int lat = file.axis("lat", {10, 20}, "degrees_north");
+      const int lon = file.axis("lon", {30, 40}, "degrees_east");
+      file.variable("t", NC_FLOAT, {level, lat, lon}, counting(12));
+    }
+    const auto source = opened(folder / "r.nc");
+    EXPECT_EQ(source->info().grid.axes[2].coordinates, (Table{3, 2, 1})) << unit;
+    EXPECT_EQ(volume_of(*source, "t").values[0], 8.0F) << unit;
+  }
+}
+
+// What the notes say of the error of a mesh of 20 x 12 cells, whose corners are float32 and every
+// third of which is one step above, if `apart`.
+std::string error_by_float_corners(const std::string& path, bool apart) {
+  {
+    NetcdfMaker file(path);
+    const int cell = file.dimension("cell", 240);
+    const int corner = file.dimension("nv", 4);
+    std::vector<Table> places(4);
+    for (std::size_t c = 0; c < 240; ++c) {
+      const auto i = static_cast<double>(c % 20);
+      const auto j = static_cast<double>(c / 20);
+      places[0].push_back(300 + 0.1 * (i + 0.5));
+      places[1].push_back(40 + 0.1 * (j + 0.5));
+      for (const auto& [right, up] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 1}}) {
+        const auto x = static_cast<float>(300 + 0.1 * (i + right));
+        const auto y = static_cast<float>(40 + 0.1 * (j + up));
+        const bool moved = apart && places[2].size() % 3 == 0;
+        places[2].push_back(moved ? std::nextafter(x, 400.0F) : x);
+        places[3].push_back(moved ? std::nextafter(y, 90.0F) : y);
+      }
+    }
+    for (const std::size_t a : {0U, 1U}) {
+      const std::string name = a == 0 ? "lon" : "lat";
+      const int v = file.variable(name, NC_DOUBLE, {cell}, places[a]);
+      file.text(v, "units", a == 0 ? "degrees_east" : "degrees_north");
+      file.text(v, "bounds", name + "_bounds");
+      file.variable(name + "_bounds", NC_FLOAT, {cell, corner}, places[2 + a]);
+    }
+    file.text(file.variable("t", NC_FLOAT, {cell}, counting(240)), "coordinates", "lon lat");
+  }
+  const auto source = opened(path);
+  for (const std::string& note : source->info().notes) {
+    const auto at = note.find("an rms error of");
+    if (at != std::string::npos) return note.substr(at);
+  }
+  return "";
+}
+
+TEST(MeshModels, CornersApartByTheRoundingOfTheirTypeAreOneNode) {
+  const Folder folder;
+  const std::string exact = error_by_float_corners(folder / "exact.nc", false);
+  EXPECT_NE(exact, "");
+  EXPECT_EQ(error_by_float_corners(folder / "apart.nc", true), exact);
+}
+
+TEST(MeshModels, FvcomWithoutPositionsBesidesNorthwardDistancesIsRefused) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "f.nc");
+    const int node = file.dimension("node", nodes);
+    const int nele = file.dimension("nele", cells);
+    file.variable("nv", NC_INT, {file.dimension("three", 4), nele}, turned(corners(1), 4));
+    file.text(file.variable("lon", NC_DOUBLE, {node}, Table(nodes, 0)), "units", "degrees_east");
+    file.text(file.variable("lat", NC_DOUBLE, {node}, Table(nodes, 0)), "units", "degrees_north");
+    file.variable("y", NC_DOUBLE, {node}, at_nodes([](double, double y) { return y; }));
+    file.variable("t", NC_FLOAT, {nele}, at_cells(sum_of));
+  }
+  EXPECT_THAT(refusal(folder / "f.nc"), HasSubstr("no cell of the mesh has an area"));
 }
 
 TEST(MeshModels, DataInSeveralFilesAreJoinedWithAGridFile) {

@@ -11,6 +11,8 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <set>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -204,7 +206,33 @@ TEST(MeshLattice, ItHasNoMoreSamplesThanAllowed) {
   ASSERT_TRUE(lattice);
   EXPECT_TRUE(lattice->is_coarse);
   EXPECT_GT(lattice->samples(), 1900U);
-  EXPECT_LT(lattice->samples(), 2100U);  // whole rows and columns
+  EXPECT_LE(lattice->samples(), 2000U);
+}
+
+TEST(MeshLattice, ThinStripsHaveNoMoreSamplesThanAllowed) {
+  for (const auto& [width, height, on_sphere] :
+       {std::tuple(360.0, 1e-11, true), {1e11, 1e-11, false}, {1e-11, 1e11, false}}) {
+    Mesh mesh = mixed_square(4, 0);
+    mesh.on_sphere = on_sphere;
+    for (double& x : mesh.x) x = width * (x - 0.5);
+    for (double& y : mesh.y) y *= height;
+    const auto lattice = lattice_of(mesh, many);
+    ASSERT_TRUE(lattice);
+    EXPECT_LE(lattice->samples(), samples_of_small_mesh) << width;
+    EXPECT_GT(lattice->samples(), samples_of_small_mesh / 2) << width;
+  }
+}
+
+TEST(MeshLattice, CellsWhoseSizeIsBelowEveryFloatHaveNoArea) {
+  for (const bool on_sphere : {false, true}) {
+    Mesh mesh = mixed_square(4, 0);
+    mesh.on_sphere = on_sphere;
+    for (double& x : mesh.x) x *= 1e-160;
+    for (double& y : mesh.y) y *= 1e-160;
+    const auto lattice = lattice_of(mesh, many);
+    ASSERT_FALSE(lattice) << on_sphere;
+    EXPECT_EQ(lattice.error().message, "no cell of the mesh has an area");
+  }
 }
 
 TEST(MeshLattice, SamplesOnEdgesAndNodesBelongToOneCell) {
@@ -420,6 +448,36 @@ TEST(MeshCorners, EqualCornersAreOneNodeWhateverTheTurn) {
   EXPECT_EQ(mesh->cells(), 3U);
   EXPECT_EQ(mesh->nodes(), 7U);
   EXPECT_EQ(mesh->first, (std::vector<std::uint32_t>{0, 4, 8, 11}));
+}
+
+// Two quadrilaterals that share an edge, of which the second is displaced by a step of float32 at
+// its longitude; on both sides of the edges of bins, and of the circle.
+TEST(MeshCorners, CornersWithinTheToleranceAreOneNodeAtEveryLongitude) {
+  for (std::size_t n = 0; n <= 720; ++n) {
+    const auto x = static_cast<float>(0.4999 * static_cast<double>(n) + 0.05);
+    const auto y = static_cast<float>(0.237 * static_cast<double>(n) - 85);
+    const double left = x;
+    const double right = std::nextafter(x, n % 2 == 0 ? 400.0F : -400.0F);
+    const double low = y;
+    const double again = std::nextafter(y, n % 3 == 0 ? 90.0F : -90.0F);
+    const auto mesh =
+        mesh_of_corners({left - 1, left, left, left - 1, right, left + 1, left + 1, right},
+                        {low, low, low + 2, low + 2, again, low, low + 2, again + 2}, 4, 4e-5, "b");
+    ASSERT_TRUE(mesh);
+    const auto& c = mesh->corners;
+    EXPECT_EQ((std::array{c[1], c[2]}), (std::array{c[4], c[7]})) << left << ' ' << low;
+    EXPECT_EQ(std::set<std::uint32_t>(c.begin(), c.end()).size(), 6U);
+  }
+  const double below = std::nextafter(360.0F, 0.0F);
+  const auto mesh = mesh_of_corners({50, 60, 60, 50, 359, below, below, 359, 0, 1, 1, 0},
+                                    {10, 10, 20, 20, 30, 30, 40, 40, 30, 30, 40, 40}, 4, 4e-5, "b");
+  ASSERT_TRUE(mesh);
+  for (const auto& [a, b] : {std::pair(5, 8), {6, 11}}) {
+    const std::uint32_t node = mesh->corners.at(static_cast<std::size_t>(a));
+    EXPECT_EQ(mesh->corners.at(static_cast<std::size_t>(b)), node);
+    EXPECT_NEAR(std::remainder(mesh->x[node], 360), 0, 4e-5);
+    EXPECT_EQ(mesh->y[node], a == 5 ? 30 : 40);
+  }
 }
 
 }  // namespace
