@@ -2,6 +2,7 @@
 // here with other groupings of terms.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -89,6 +90,49 @@ TEST(LevelFormulas, DoubleSigmaLevelsRunFromTheSurfaceThroughTheInterfaceToTheFl
                             0.5 * interface, 0};
     for (std::size_t k = 0; k < 5; ++k) {  // lowest first
       EXPECT_NEAR(height.values[k * 6 + n], -depth[k], 1e-3) << k << n;
+    }
+  }
+}
+
+TEST(LevelFormulas, LevelsOfSigmaAboveDepthsHaveNoHeightOnLand) {
+  const Folder folder;
+  const double none = -9999;
+  const double critical = 50;
+  const Basin basin;
+  const std::vector<double> deep{-100, -60, none, none};
+  const std::vector<double> sigma{none, none, -0.5, 0};
+  {
+    NetcdfMaker file(folder / "z.nc");
+    const int z = file.axis("lev", {0, 1, 2, 3}, "1", "ocean_sigma_z_coordinate");
+    file.text(file.variable_id("lev"), "formula_terms",
+              "sigma: sigma eta: eta depth: depth depth_c: hc nsigma: count zlev: deep");
+    file.text(file.variable_id("lev"), "positive", "up");
+    const int y = file.axis("lat", {10, 20}, "degrees_north");
+    const int x = file.axis("lon", {30, 40, 50}, "degrees_east");
+    std::vector<double> depth = basin.depth;
+    depth[4] = none;
+    const std::vector<int> filled{file.variable("depth", NC_DOUBLE, {y, x}, depth),
+                                  file.variable("deep", NC_DOUBLE, {z}, deep),
+                                  file.variable("sigma", NC_DOUBLE, {z}, sigma)};
+    for (const int v : filled) file.number(v, "_FillValue", NC_DOUBLE, {none});
+    file.variable("eta", NC_DOUBLE, {y, x}, basin.eta);
+    file.variable("hc", NC_DOUBLE, {}, {critical});
+    file.variable("count", NC_DOUBLE, {}, {2});
+    file.variable("f", NC_FLOAT, {z, y, x}, counting(24));
+  }
+  const auto source = opened(folder / "z.nc");
+  const Volume height = volume_of(*source, "height");
+  ASSERT_EQ(height.samples(), 24U);
+  EXPECT_EQ(height.masked, 4);
+  for (std::size_t n = 0; n < 24; ++n) {
+    const std::size_t column = n % 6;
+    const std::size_t k = n / 6;
+    const double eta = basin.eta[column];
+    const double up = std::min(critical, basin.depth[column]) + eta;
+    if (column == 4) {
+      EXPECT_TRUE(std::isnan(height.values[n])) << k;
+    } else {
+      EXPECT_NEAR(height.values[n], k < 2 ? deep[k] : eta + sigma[k] * up, 1e-3) << n;
     }
   }
 }

@@ -66,6 +66,65 @@ TEST(ProjectedGrids, CornersOfALensAreMasked) {
   }
 }
 
+// A map around a centre near the date line: of its column through the centre the distances are arcs
+// of the meridian, the others follow from the same map elsewhere.
+TEST(ProjectedGrids, EquidistantMapsContinueAcrossTheDateLine) {
+  const Sheet sheet{{-1e6, -4e5, 0, 3e5, 1e6}, {-9e5, 0, 1e6}};
+  const auto columns_at = [&](double longitude) {
+    const Folder folder;
+    const auto source = on_sheet(
+        folder, {"azimuthal_equidistant", with(wgs84, at_origin(-40, longitude)), {}}, sheet);
+    EXPECT_EQ(volume_of(*source, "f").masked, 0) << longitude;
+    return *source->info().grid.columns;
+  };
+  const auto here = columns_at(175);
+  const auto elsewhere = columns_at(10);
+  const Forward along = transverse(wgs84, 1, 175);
+  for (std::size_t n = 0; n < 15; ++n) {
+    EXPECT_NEAR(std::remainder(here.longitude[n] - elsewhere.longitude[n] - 165, 360), 0, 1e-9);
+    EXPECT_NEAR(here.latitude[n], elsewhere.latitude[n], 1e-9) << n;
+    if (n % 5 != 2) continue;
+    EXPECT_NEAR(std::remainder(here.longitude[n] - 175, 360), 0, 1e-9) << n;
+    EXPECT_NEAR(along(175, here.latitude[n]).y - along(175, -40).y, sheet.y[n / 5], 0.01) << n;
+  }
+}
+
+// Albers' map of a sphere is a sector of a ring (Snyder, (14-1) to (14-6)).
+TEST(ProjectedGrids, ColumnsBesideTheRingOfAlbersAreMasked) {
+  Sheet sheet;
+  for (int i = -10; i <= 10; ++i) sheet.x.push_back(1.6e6 * i + 1e4);
+  for (int j = -6; j <= 9; ++j) sheet.y.push_back(1.6e6 * j + 2e4);
+  const Folder folder;
+  const auto source = on_sheet(
+      folder, {"albers_conical_equal_area", with(sphere, conic({29.5, 45.5}, 23, -96)), {}}, sheet);
+  const auto& columns = source->info().grid.columns;
+  ASSERT_NE(columns, nullptr) << source->info().notes.at(0);
+  const Volume f = volume_of(*source, "f");
+  const double s_1 = std::sin(29.5 * degree);
+  const double n = (s_1 + std::sin(45.5 * degree)) / 2;
+  const double c = 1 - s_1 * s_1 + 2 * n * s_1;
+  const double origin = std::sqrt(c - 2 * n * std::sin(23 * degree)) / n;
+  std::size_t beside = 0;
+  for (std::size_t at = 0; at < f.values.size(); ++at) {
+    const double x = sheet.x[at % 21];
+    const double y = sheet.y[at / 21];
+    const double across = origin - y / sphere.a;
+    const double rho = std::hypot(x / sphere.a, across);
+    const double sine = (c - rho * rho * n * n) / (2 * n);
+    const bool on_map =
+        std::abs(sine) <= 1 && std::abs(std::atan2(x / sphere.a, across)) <= n * M_PI;
+    beside += on_map ? 0 : 1;
+    ASSERT_EQ(std::isnan(f.values[at]), !on_map) << x << ' ' << y;
+    if (!on_map) continue;
+    const Point again =
+        albers(sphere, 29.5, 45.5, 23, -96)(columns->longitude[at], columns->latitude[at]);
+    EXPECT_NEAR(again.x, x, 1e-3);
+    EXPECT_NEAR(again.y, y, 1e-3);
+  }
+  EXPECT_GT(beside, 50U);
+  EXPECT_EQ(f.masked, static_cast<std::int64_t>(beside));
+}
+
 // A map that runs more than once around the globe, as a Mercator grid from 0 to 360 degrees.
 TEST(ProjectedGrids, CylindersMayRunBeyondTheirOpposite) {
   const Folder folder;
