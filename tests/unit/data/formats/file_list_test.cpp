@@ -104,6 +104,17 @@ TEST_F(FileList, BracesAreAlternativesAsOnTheCommandLine) {
   EXPECT_EQ(listed->info().digest, braces->info().digest);
 }
 
+TEST_F(FileList, AHeaderInAFolderNamesTheDataBesideIt) {
+  fs::create_directory(root() / "run/sub");
+  std::ofstream(root() / "run/sub/h.nhdr")
+      << "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: d.raw\n";
+  std::ofstream(root() / "run/sub/d.raw") << std::string(8, '\7');
+  std::ofstream(root() / "run/d.raw") << std::string(8, '\x63');
+  const auto source = open_list(R"({"windsplat": "files", "files": ["sub/h.nhdr"]})");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(volume_of(*source, source->info().fields.at(0).name).values[0], 7);
+}
+
 TEST_F(FileList, AGroupIsThatOfEveryFile) {
   EXPECT_THAT(why_not(R"({"windsplat": "files", "files": ["ta_9.nc"], "group": "/none"})"),
               HasSubstr("none"));
@@ -121,6 +132,7 @@ TEST_F(FileList, NamesDoNotLeadOutOfTheFolder) {
            {"l*.nc", "lies outside the dataset's folder"},
            {"none_*.nc", "'none_*.nc': no file matches"},
            {"v.vtk", "'v.vtk' is a VTK file: only files of arrays"},
+           {"list.json", "'list.json' is a list of files, which cannot be a part of a list"},
            {"none.nc", "'none.nc': no such file"}}) {
     EXPECT_THAT(why_not(R"({"windsplat": "files", "files": [")" + name + "\"]}"), HasSubstr(why));
   }
@@ -128,11 +140,17 @@ TEST_F(FileList, NamesDoNotLeadOutOfTheFolder) {
 
 TEST_F(FileList, FaultsNameTheKeyAndTheLimit) {
   std::string many = "\"ta_9.nc\"";
-  for (int n = 0; n < 64; ++n) many += ", \"ta_9.nc\"";
+  std::string alternatives = "ta_9.nc";
+  for (int n = 0; n < 64; ++n) {
+    many += ", \"ta_9.nc\"";
+    alternatives += ",ta_9.nc";
+  }
   for (const auto& [rest, why] : std::vector<std::pair<std::string, std::string>>{
            {"", "'list.json' is invalid: /files: is required"},
            {R"(, "files": [])", "/files: must list 1 to 64 names or patterns"},
            {", \"files\": [" + many + "]", "/files: must list 1 to 64 names or patterns"},
+           {R"(, "files": ["{)" + alternatives + "}\"]",
+            "'list.json' has more than 64 parts, counting alternatives in braces"},
            {R"(, "files": [7])", "/files/0: must be a string"},
            {R"(, "files": ["ta_9.nc"], "file": 1)", "/file: unknown key"},
            {R"(, "files": ["ta_9.nc"], "selection": 3)",
