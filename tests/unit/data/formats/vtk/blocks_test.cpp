@@ -108,6 +108,22 @@ TEST_F(VtkBlocks, GapsBetweenImagesAreMasked) {
   EXPECT_THAT(all_notes(source->info()), HasSubstr("4 points of the whole extent are in no piece"));
 }
 
+TEST_F(VtkBlocks, WhereImagesOverlapTheFirstCounts) {
+  for (const int x : {0, 1}) {
+    VtkXml xml;
+    const std::string values = xml.array("Float64", "a", 1, std::vector<double>(8, 5 + x));
+    folder_.write(std::to_string(x) + ".vti",
+                  xml.image({2, 2, 2}, "Origin=\"" + std::to_string(x) + " 0 0\"", values));
+  }
+  const auto source = opened(folder_.write(
+      "all.vtm",
+      blocks_of("vtkMultiBlockDataSet", data_set("first", "0.vti") + data_set("second", "1.vti"))));
+  ASSERT_TRUE(source);
+  const Volume volume = volume_of(*source, "a");
+  ASSERT_EQ(volume.dims, (std::array<int, 3>{3, 2, 2}));
+  for (std::size_t n = 0; n < 12; ++n) EXPECT_EQ(volume.values[n], n % 3 == 2 ? 6 : 5) << n;
+}
+
 TEST_F(VtkBlocks, OtherImagesAndMeshesBecomeOneMesh) {
   const std::string turned = "0 -1 0 1 0 0 0 0 1";
   const auto source = opened(folder_.write(

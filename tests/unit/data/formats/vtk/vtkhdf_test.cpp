@@ -160,6 +160,29 @@ TEST_F(VtkHdf, StepsOfImagesHaveTimesAndOffsets) {
   EXPECT_EQ(volume_of(*source, "b", 2).values[9], static_cast<float>(values[9]));
 }
 
+TEST_F(VtkHdf, ACollectionDoesNotNameAFileOfSeveralSteps) {
+  const std::string collection = folder_.write(
+      "all.pvd",
+      "<VTKFile type=\"Collection\"><Collection><DataSet timestep=\"0\" file=\"a.vtkhdf\"/>"
+      "</Collection></VTKFile>");
+  for (const hsize_t steps : {1U, 2U}) {
+    {
+      const HdfMaker file(path_);
+      file.group("/VTKHDF", "ImageData");
+      describe_image(file, "/VTKHDF");
+      file.set("/VTKHDF/PointData/a", {steps, 5, 3, 4}, std::vector<double>(60 * steps, 1));
+      file.group("/VTKHDF/Steps", "");
+      file.attribute("/VTKHDF/Steps", "NSteps", {static_cast<double>(steps)});
+      file.set("/VTKHDF/Steps/Values", {steps}, std::vector<double>(steps, 3));
+    }
+    if (steps == 1) {
+      EXPECT_EQ(refusal(collection), "");
+    } else {
+      EXPECT_THAT(refusal(collection), HasSubstr("'a.vtkhdf' has 2 steps; open it by itself"));
+    }
+  }
+}
+
 struct MeshLists {
   std::vector<double> points, connectivity, offsets, types, a, counts, cells, indices;
 
@@ -220,8 +243,10 @@ TEST_F(VtkHdf, PartsOfMeshesAreOneMesh) {
 }
 
 // Two steps with the same mesh, stored once and used twice; then the second with its own copy.
+// Without NumberOfParts, both have equally many parts.
 TEST_F(VtkHdf, StepsOfMeshesFollowTheirOffsets) {
-  for (const bool copied : {false, true}) {
+  for (const auto& [copied, is_numbered] :
+       {std::pair(false, true), {true, true}, {false, false}, {true, false}}) {
     {
       const HdfMaker file(path_);
       file.group("/VTKHDF", "UnstructuredGrid");
@@ -245,7 +270,7 @@ TEST_F(VtkHdf, StepsOfMeshesFollowTheirOffsets) {
         file.set(std::string("/VTKHDF/Steps/") + name, {2}, {0, second}, H5T_STD_I64LE);
       };
       file.set("/VTKHDF/Steps/Values", {2}, {1, 2});
-      file.set("/VTKHDF/Steps/NumberOfParts", {2}, {2, 2}, H5T_STD_I64LE);
+      if (is_numbered) file.set("/VTKHDF/Steps/NumberOfParts", {2}, {2, 2}, H5T_STD_I64LE);
       offsets("PartOffsets", 2 * own);
       offsets("PointOffsets", 128 * own);
       file.set("/VTKHDF/Steps/CellOffsets", {2, 1}, {0, 54 * own}, H5T_STD_I64LE);
@@ -256,6 +281,7 @@ TEST_F(VtkHdf, StepsOfMeshesFollowTheirOffsets) {
     ASSERT_TRUE(source);
     ASSERT_EQ(source->info().steps.size(), 2U);
     EXPECT_EQ(source->info().steps[1].value, 2);
+    EXPECT_THAT(all_notes(source->info()), HasSubstr("resampled from 128 points"));
     EXPECT_LT(compare(*source, linear).worst, 1e-5);
     const Volume second = volume_of(*source, "a", 1);
     EXPECT_NEAR(second.range[1], 10, 1e-5);
@@ -323,6 +349,19 @@ TEST_F(VtkHdf, BrokenFilesAreErrors) {
   };
   EXPECT_THAT(typed("OverlappingAMR"), HasSubstr("VTKHDF data of the type 'OverlappingAMR'"));
   EXPECT_THAT(typed(""), HasSubstr("of the type ''"));
+  for (const double version : {1, 2, 3, 9}) {
+    {
+      const HdfMaker file(path_);
+      file.group("/VTKHDF", "ImageData");
+      file.attribute("/VTKHDF", "Version", {version, 0});
+      describe_image(file, "/VTKHDF");
+      file.set("/VTKHDF/PointData/a", {5, 3, 4}, image_values());
+    }
+    const std::string why = version < 3 ? "" : "a version of VTKHDF other than 1 and 2";
+    const std::string found = refusal(path_);
+    EXPECT_THAT(found, HasSubstr(why)) << version;
+    EXPECT_EQ(found.empty(), why.empty()) << found;
+  }
   // An image of 2^31 samples, of which none is stored.
   {
     const HdfMaker file(path_);
