@@ -19,6 +19,28 @@ using testing::IsEmpty;
 
 const ChosenDatasets::Clock::time_point begin{};
 
+// The second of two datasets named e.nc.
+TEST(ChosenEntries, OtherEntriesAreOneDatasetHoweverTheyAreWrittenAndKeepItsId) {
+  DatasetInfo info;
+  info.id = "e-2";
+  info.choices = {{"number", 4, {"0", "1.5", "3", "7"}, "0"}};
+  Location location;
+  location.stem = "e";
+  for (const char* text : {"3", "3.0", "03", "3e0"}) {
+    const auto chosen = choose_entries(info, location, {{"number", text}});
+    ASSERT_TRUE(chosen) << text;
+    EXPECT_EQ(chosen->shown.at("number"), "3") << text;
+    EXPECT_EQ(chosen->location.wanted_id(), "e-2,number=3") << text;
+  }
+  info.id = "e-2,number=3";
+  info.choices[0].chosen = "3";
+  location.selection = {{"number", "3"}};
+  const auto chosen = choose_entries(info, location, {{"number", "7"}});
+  ASSERT_TRUE(chosen);
+  EXPECT_EQ(chosen->location.wanted_id(), "e-2,number=7");
+  EXPECT_EQ(choose_entries(info, location, {{"number", "3.5"}})->shown.at("number"), "3.5");
+}
+
 TEST(ChosenDatasets, OnesThatAreNotUsedAreClosedAfterFiveMinutes) {
   ChosenDatasets chosen;
   chosen.add("a", begin);
