@@ -379,8 +379,11 @@ TEST(Defaults, AnOceanHasNoMediumOfCurrentsOrSalinity) {
   salinity.standard_name = "sea_water_salinity";
   data::DatasetInfo info;
   info.grid = atmosphere_grid();
-  info.fields = {wind_info(), current, salinity};
-  EXPECT_TRUE(default_scalars(info).empty());
+  for (const char* name : {"so", "sea_water_salinity"}) {
+    salinity.name = name;
+    info.fields = {wind_info(), current, salinity};
+    EXPECT_TRUE(default_scalars(info).empty()) << name;
+  }
   info.fields.push_back(scalar_info("q", "kg kg-1"));
   EXPECT_EQ(default_scalars(info), std::vector<std::string>{"q"});
 }
