@@ -37,7 +37,7 @@ std::uint16_t default_port(std::string_view scheme) {
   return scheme == "https" ? https_port : scheme == "http" ? http_port : std::uint16_t{0};
 }
 
-Error refused(std::string_view url, const std::string& why) {
+Error refused_url(std::string_view url, const std::string& why) {
   return make_error(ErrorKind::invalid, in_quotes(without_secrets(url)) + ' ' + why);
 }
 
@@ -178,23 +178,23 @@ Result<Url> parse_url(std::string_view text) {
   }
   Url out;
   const std::size_t mark = text.find("://");
-  if (mark == std::string_view::npos) return refused(text, "is not a URL");
+  if (mark == std::string_view::npos) return refused_url(text, "is not a URL");
   out.scheme = lower(text.substr(0, mark));
   if (out.scheme != "https" && out.scheme != "http" && out.scheme != "s3") {
-    return refused(text, "is a URL with a scheme other than https, http and s3");
+    return refused_url(text, "is a URL with a scheme other than https, http and s3");
   }
   const std::string_view rest = text.substr(mark + 3);
   const std::size_t slash = std::min(rest.find('/'), rest.size());
   const std::string_view authority = rest.substr(0, slash);
   if (authority.find('@') != std::string_view::npos) {
-    return refused(text, "is given with a user or password, which a URL must not contain");
+    return refused_url(text, "is given with a user or password, which a URL must not contain");
   }
   if (!set_authority(authority, out))
-    return refused(text, "is not a URL with a valid host and port");
+    return refused_url(text, "is not a URL with a valid host and port");
   auto path = plain_path(slash == rest.size() ? "/" : rest.substr(slash));
-  if (!path) return refused(text, "has a character that must be percent-encoded in a URL");
+  if (!path) return refused_url(text, "has a character that must be percent-encoded in a URL");
   if (has_odd_segment(*path))
-    return refused(text, "is a URL with an empty segment, or '.' or '..'");
+    return refused_url(text, "is a URL with an empty segment, or '.' or '..'");
   out.path = std::move(*path);
   return out;
 }
@@ -206,20 +206,20 @@ Result<Location> locate_url(const std::string& text) {
   if (const std::size_t mark = selection_mark(plain); mark != std::string::npos) {
     auto selection = parse_selection(std::string_view(plain).substr(mark + 1));
     if (!selection) {
-      return refused(text, "has a query that is not a selection (?NAME=VALUE&NAME=VALUE)");
+      return refused_url(text, "has a query that is not a selection (?NAME=VALUE&NAME=VALUE)");
     }
     if (is_signature(*selection)) {
-      return refused(text,
-                     "has a signature or token, which a URL must not contain: queries are not "
-                     "sent to the host");
+      return refused_url(text,
+                         "has a signature or token, which a URL must not contain: queries are not "
+                         "sent to the host");
     }
     out.selection = std::move(*selection);
     plain.resize(mark);
   }
   if (plain.find('?') != std::string::npos) {
-    return refused(text,
-                   "has a query; only a selection (?NAME=VALUE) may follow, which is not sent "
-                   "to the host");
+    return refused_url(text,
+                       "has a query; only a selection (?NAME=VALUE) may follow, which is not sent "
+                       "to the host");
   }
   if (const auto mark = plain.rfind("#/"); mark != std::string::npos) {
     out.inside = plain.substr(mark + 2);
@@ -228,13 +228,13 @@ Result<Location> locate_url(const std::string& text) {
   const auto url = parse_url(plain);
   if (!url) return url.error();
   if (is_opendap(*url)) {
-    return refused(text,
-                   "is an OPeNDAP service, which is not supported: give the URL of the file "
-                   "itself (on a THREDDS server, 'fileServer' instead of 'dodsC')");
+    return refused_url(text,
+                       "is an OPeNDAP service, which is not supported: give the URL of the file "
+                       "itself (on a THREDDS server, 'fileServer' instead of 'dodsC')");
   }
   const std::string_view path = url->path;
   if (path.find_first_of("*{") != std::string_view::npos) {
-    return refused(text, "is a pattern; a URL names one file or one Zarr store");
+    return refused_url(text, "is a pattern; a URL names one file or one Zarr store");
   }
   const bool ends_in_slash = path.ends_with('/');
   const std::string_view named = path.substr(0, path.size() - (ends_in_slash ? 1 : 0));
@@ -243,13 +243,14 @@ Result<Location> locate_url(const std::string& text) {
   const std::string base = url->text().substr(0, url->text().size() - path.size());
   out.stem = std::filesystem::path(name.empty() ? url->host : name).stem().native();
   if (ends_in_slash || lower(name).ends_with(".zarr")) {
-    if (!out.inside.empty()) return refused(text, "names a group, which a folder does not have");
+    if (!out.inside.empty())
+      return refused_url(text, "names a group, which a folder does not have");
     out.kind = Location::Kind::folder;
     out.folder = base + std::string(named);
     return out;
   }
   if (name.find('/') != std::string::npos)
-    return refused(text, "is a URL with '/' in the name of a file");
+    return refused_url(text, "is a URL with '/' in the name of a file");
   out.folder = base + std::string(named.substr(0, last));
   out.members.push_back({name, base + std::string(named)});
   out.companions = may_have_companions(name);
