@@ -110,7 +110,7 @@ void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
     reply(open_entries(options, backend, *wanted));
     return;
   }
-  if (options.data_root.empty() && !options.locate_url) {
+  if (options.data_root.empty() && (!options.locate_url || !wanted->list.empty())) {
     reply(http::problem_response(403, "Forbidden",
                                  "opening files is disabled: start the server with "
                                  "--data-root, or --data-host for URLs"));
