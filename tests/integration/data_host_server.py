@@ -181,6 +181,30 @@ class Handler(http.server.BaseHTTPRequestHandler):
         host.files[name + "-now"] = host.files.get(name + "-now", host.files[name]) + b"0"
         self.fault_flaky(name + "-now")
 
+    def resumed(self, name, etag, left_out):
+        """Half of the file, then the rest with this ETag and without its last bytes."""
+        body = self.server.host.files[name]
+        begin = int(self.headers.get("Range", "bytes=0-").removeprefix("bytes=").rstrip("-"))
+        if not begin:
+            self.answer(200, body[:len(body) // 2], ETag='"1"', Content_Length=str(len(body)))
+        else:
+            part = body[begin:len(body) - left_out]
+            self.answer(206, part, ETag=etag, Content_Length=str(len(part)),
+                        Content_Range=f"bytes {begin}-{begin + len(part) - 1}/{len(body)}")
+        self.close_connection = True
+
+    def fault_spliced(self, name):
+        self.resumed(name, '"2"', 0)
+
+    def fault_short(self, name):
+        self.resumed(name, '"1"', 100)
+
+    def fault_identity(self, name):
+        body = self.server.host.files[name]
+        self.answer(200, body[:len(body) // 2], Content_Length=None, Connection="close",
+                    Transfer_Encoding="identity")
+        self.close_connection = True
+
     def fault_unbounded(self, name):
         self.answer(200, self.server.host.files[name], Content_Length=None, Connection="close")
         self.close_connection = True

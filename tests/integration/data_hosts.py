@@ -232,7 +232,8 @@ class DataHosts(unittest.TestCase):
         self.tls.asked()
         self.same(self.tls.origin + "/flaky/storm.nc", self.netcdf, *self.options())
         self.assertEqual(self.tls.asked()[:3], ["/flaky/storm.nc"] * 3)
-        self.refused(self.tls.origin + "/mutated/storm.nc", "the rest of the same file")
+        for fault in ("mutated", "spliced", "short"):
+            self.refused(f"{self.tls.origin}/{fault}/storm.nc", "the rest of the same file")
 
     # --- S3 -----------------------------------------------------------------------------------
 
@@ -317,6 +318,7 @@ class DataHosts(unittest.TestCase):
     def test_faulty_answers_are_refused(self):
         for path, text in (("truncated/storm.nc", "incompletely"),
                            ("unbounded/storm.nc", "without a length"),
+                           ("identity/storm.nc", "without a length"),
                            ("coded/storm.nc", "content coding 'gzip'"),
                            ("denied/storm.nc", "status 403"), ("absent.nc", "status 404"),
                            ("absent.zarr", "no metadata of a Zarr store"),

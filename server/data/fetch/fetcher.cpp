@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t idle_clients_max = 8;
 constexpr std::size_t list_entries_max = 1'000'000;
+constexpr int list_pages_max = 1100;  // pages have 1000 entries
 constexpr std::size_t list_page_bytes_max = std::size_t{4} << 20;
 
 Error no_s3(const Url& url) {
@@ -33,6 +34,9 @@ Result<Request> Fetcher::request_of(const Url& url, const Cancelled& cancelled) 
   out.url = url;
   if (url.scheme == "s3") {
     if (!options_.s3) return no_s3(url);
+    if (url.host == "." || url.host == "..") {
+      return make_error(ErrorKind::invalid, in_quotes(url.text()) + ": no such bucket");
+    }
     out.url = options_.s3->url_of(url);
     out.key = &options_.s3->key;
   }
@@ -106,6 +110,7 @@ Result<std::vector<std::string>> Fetcher::list(const std::string& folder_url,
   if (!prefix.empty() && !prefix.ends_with('/')) prefix += '/';
   std::vector<std::string> out;
   std::string continuation;
+  int pages = 0;
   do {
     request->query = list_query(prefix, continuation);
     std::string xml;
@@ -122,7 +127,7 @@ Result<std::vector<std::string>> Fetcher::list(const std::string& folder_url,
     }
     out.insert(out.end(), page->names.begin(), page->names.end());
     continuation = std::move(page->continuation);
-    if (out.size() > list_entries_max) {
+    if (out.size() > list_entries_max || ++pages > list_pages_max) {
       return make_error(ErrorKind::bad_data, in_quotes(url->text()) + " has more than " +
                                                  std::to_string(list_entries_max) + " entries");
     }

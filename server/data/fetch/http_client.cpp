@@ -36,6 +36,7 @@ void start_library() {
 // What was received of a file before its connection ended.
 struct Part {
   std::uint64_t bytes = 0;
+  std::uint64_t total = 0;  // of the file, by its first Content-Length; 0: unknown
   std::string etag;
 };
 
@@ -78,6 +79,15 @@ std::string_view validator(std::string_view value) {
   return plain ? value : std::string_view();
 }
 
+// Whether an answer 206 is the whole rest of the same file; hosts may ignore If-Range, or send
+// less.
+bool is_rest(const Exchange& exchange) {
+  const std::string total = std::to_string(exchange.part.total);
+  return exchange.part.total > 0 && exchange.response.validators.etag == exchange.part.etag &&
+         exchange.range == "bytes " + std::to_string(exchange.part.bytes) + '-' +
+                               std::to_string(exchange.part.total - 1) + '/' + total;
+}
+
 // Callbacks have the types of libcurl.
 std::size_t on_header(char* data, std::size_t size, std::size_t count, void* user) {
   auto& exchange = *static_cast<Exchange*>(user);
@@ -97,7 +107,10 @@ std::size_t on_header(char* data, std::size_t size, std::size_t count, void* use
   const std::string_view value = trim(line.substr(colon + 1));
   if (name == "etag") exchange.response.validators.etag = validator(value);
   if (name == "last-modified") exchange.response.validators.last_modified = validator(value);
-  if (name == "content-length" || name == "transfer-encoding") exchange.has_length = true;
+  if (name == "content-length" ||
+      (name == "transfer-encoding" && lower(value).ends_with("chunked"))) {
+    exchange.has_length = true;
+  }
   if (name == "content-encoding") exchange.encoding = lower(value);
   if (name == "content-range") exchange.range = value;
   return line.size();
@@ -111,9 +124,7 @@ std::size_t on_body(char* data, std::size_t size, std::size_t count, void* user)
   const Part& part = exchange.part;
   // A host that ignores the range, or whose file has changed, answers 200 (RFC 9110, 13.1.5).
   exchange.not_resumed =
-      part.bytes > 0 &&
-      (status == ok || (status == partial_content &&
-                        !exchange.range.starts_with("bytes " + std::to_string(part.bytes) + '-')));
+      part.bytes > 0 && (status == ok || (status == partial_content && !is_rest(exchange)));
   if (exchange.not_resumed) return 0;
   if (status != exchange.whole_status()) {
     // Reading a short body to its end keeps the connection usable.
@@ -359,6 +370,7 @@ Result<void> HttpClient::redirect(Request& request, long status, std::string_vie
     return fault(ErrorKind::invalid, request.url,
                  "is redirected to another host: " + permitted.error().message);
   }
+  request.known.last_modified.clear();  // says nothing of another file, which may be older
   request.query = mark == std::string_view::npos ? "" : std::string(next.substr(mark + 1));
   request.url = std::move(*url);
   return {};
@@ -382,6 +394,11 @@ Result<Response> HttpClient::get(const Request& first, const Sink& sink) {
     const long status = status_of(handle_->curl);
     if (code == CURLE_OK && status == exchange.whole_status()) return std::move(exchange.response);
     if (may_resume(exchange, code, status) && ++resumed <= resumptions_max) {
+      if (part.bytes == 0) {
+        curl_off_t length = -1;
+        curl_easy_getinfo(handle_->curl, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
+        part.total = length > 0 ? static_cast<std::uint64_t>(length) : 0;
+      }
       part.etag = exchange.response.validators.etag;
       part.bytes += exchange.body_bytes;
       request.known = {};

@@ -1,5 +1,5 @@
 // Of each URL two files: URL-DIGEST.meta (validators, bytes and the digest of the data) and
-// URL-DIGEST.DATA-DIGEST. Those being received are part-PROCESS-NUMBER.
+// URL-DIGEST.DATA-DIGEST. Those being received are part-RANDOM.
 #include "server/data/fetch/object_cache.hpp"
 
 #include <fcntl.h>
@@ -54,6 +54,20 @@ Sha256 finish(EVP_MD_CTX* digest) {
   Sha256 out{};
   if (EVP_DigestFinal_ex(digest, out.data(), nullptr) != 1) throw std::bad_alloc();
   return out;
+}
+
+bool is_hex(std::string_view text, std::size_t count) {
+  return text.size() == count && text.find_first_not_of("0123456789abcdef") == text.npos;
+}
+
+// Only files with names that this cache gives are counted or removed.
+bool is_data(std::string_view name) {
+  return name.size() == 129 && name[64] == '.' && is_hex(name.substr(0, 64), 64) &&
+         is_hex(name.substr(65), 64);
+}
+
+bool is_part(std::string_view name) {
+  return name.starts_with(part_prefix) && is_hex(name.substr(part_prefix.size()), 32);
 }
 
 std::string name_of(const std::string& url) {
@@ -196,10 +210,10 @@ void ObjectCache::scan() {
     const std::string name = at->path().filename().native();
     struct stat status {};
     if (::stat(at->path().c_str(), &status) != 0) continue;
-    if (name.starts_with(part_prefix)) {
+    if (is_part(name)) {
       const auto written = std::chrono::system_clock::from_time_t(status.st_mtim.tv_sec);
       if (now - written > part_age_max) ::unlink(at->path().c_str());
-    } else if (!name.ends_with(meta_suffix)) {
+    } else if (is_data(name)) {
       bytes_ += space_of(status);
     }
   }
@@ -219,8 +233,7 @@ void ObjectCache::evict(std::uint64_t bytes_max) {
        at.increment(fault)) {
     std::string name = at->path().filename().native();
     struct stat status {};
-    if (name.starts_with(part_prefix) || name.ends_with(meta_suffix) ||
-        ::stat(at->path().c_str(), &status) != 0) {
+    if (!is_data(name) || ::stat(at->path().c_str(), &status) != 0) {
       continue;
     }
     bytes_ += space_of(status);
@@ -263,18 +276,14 @@ std::optional<ObjectCache::Entry> ObjectCache::find(const std::string& url) {
 }
 
 Result<PartialFile> ObjectCache::begin() {
-  std::uint64_t number = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    number = ++parts_;
-  }
-  std::string path =
-      path_of(std::string(part_prefix) + std::to_string(::getpid()) + '-' + std::to_string(number));
-  ::unlink(path.c_str());  // of an earlier process with the same id
+  // Process ids are not unique among containers that share the folder.
+  std::array<unsigned char, 16> number{};
+  if (::getentropy(number.data(), number.size()) != 0) return disk_fault(errno);
+  const std::string path = path_of(std::string(part_prefix) + hex(number.data(), number.size()));
   Descriptor file(
       ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR));
   if (!file) return disk_fault(errno);
-  return PartialFile(std::move(file), std::move(path));
+  return PartialFile(std::move(file), path);
 }
 
 Result<Descriptor> ObjectCache::keep(const std::string& url, PartialFile part,

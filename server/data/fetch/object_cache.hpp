@@ -82,7 +82,6 @@ class ObjectCache {
   CacheOptions options_;
   mutable std::mutex mutex_;  // guards the members below
   std::uint64_t bytes_ = 0;   // at the last scan, and what was added since
-  std::uint64_t parts_ = 0;
   std::unordered_map<std::string, std::chrono::steady_clock::time_point> confirmed_;
 };
 

@@ -146,7 +146,8 @@ std::optional<ListedPage> parse_list(std::string_view xml, std::string_view pref
   ListedPage out;
   const auto add = [&](std::string_view text) {
     const std::string key = decoded_key(text);
-    if (!key.starts_with(prefix)) return false;
+    constexpr std::size_t key_bytes_max = 1024;  // of S3
+    if (!key.starts_with(prefix) || key.size() > key_bytes_max) return false;
     if (key.size() > prefix.size()) out.names.push_back(key.substr(prefix.size()));
     return true;
   };

@@ -68,7 +68,8 @@ bool has_odd_segment(std::string_view path) {
   for (std::size_t from = 1; from < path.size();) {
     const std::size_t end = std::min(path.find('/', from), path.size());
     const std::string segment = percent_decoded(path.substr(from, end - from));
-    if (segment.empty() || segment == "." || segment == "..") return true;
+    const bool is_step = segment.empty() || segment == "." || segment == "..";
+    if (is_step || segment.find('/') != std::string::npos) return true;
     from = end + 1;
   }
   return false;
@@ -194,7 +195,7 @@ Result<Url> parse_url(std::string_view text) {
   auto path = plain_path(slash == rest.size() ? "/" : rest.substr(slash));
   if (!path) return refused_url(text, "has a character that must be percent-encoded in a URL");
   if (has_odd_segment(*path))
-    return refused_url(text, "is a URL with an empty segment, or '.' or '..'");
+    return refused_url(text, "is a URL with an empty segment, '.', '..' or an encoded '/'");
   out.path = std::move(*path);
   return out;
 }

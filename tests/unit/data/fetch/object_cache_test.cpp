@@ -165,13 +165,43 @@ TEST_F(CachedObjects, DamagedValidatorsAreAFileThatIsNotThere) {
 }
 
 TEST_F(CachedObjects, LeftoversOfOtherProcessesAreRemovedAfterADay) {
-  std::ofstream(folder_ / "part-1-1") << "old";
-  std::ofstream(folder_ / "part-1-2") << "new";
+  const std::string old_part = "part-" + std::string(32, 'a');
+  const std::string new_part = "part-" + std::string(32, 'b');
+  std::ofstream(folder_ / old_part) << "old";
+  std::ofstream(folder_ / new_part) << "new";
   const auto long_ago = fs::file_time_type::clock::now() - std::chrono::hours(48);
-  fs::last_write_time(folder_ / "part-1-1", long_ago);
+  fs::last_write_time(folder_ / old_part, long_ago);
   cache_ = opened(1 << 20);
-  EXPECT_FALSE(fs::exists(folder_ / "part-1-1"));
-  EXPECT_TRUE(fs::exists(folder_ / "part-1-2"));
+  EXPECT_FALSE(fs::exists(folder_ / old_part));
+  EXPECT_TRUE(fs::exists(folder_ / new_part));
+}
+
+TEST_F(CachedObjects, FilesOfTheUserInTheFolderAreNeitherCountedNorRemoved) {
+  const auto long_ago = fs::file_time_type::clock::now() - std::chrono::hours(48);
+  for (const char* name : {"precious.nc", "part-00000", "part-1-1", "notes.meta"}) {
+    std::ofstream(folder_ / name) << std::string(100'000, 'x');
+    fs::last_write_time(folder_ / name, long_ago);
+  }
+  cache_ = opened(50'000);
+  EXPECT_EQ(cache_->bytes(), 0U);
+  for (const char* url : {"1", "2"}) put(url, std::string(30'000, 'y'));
+  for (const char* name : {"precious.nc", "part-00000", "part-1-1", "notes.meta"}) {
+    EXPECT_TRUE(fs::exists(folder_ / name)) << name;
+  }
+}
+
+// As of two containers that share the folder, whose processes have the same id.
+TEST_F(CachedObjects, TwoCachesOfOneFolderKeepTheirPartsApart) {
+  const auto other = opened(1 << 20);
+  auto first = cache_->begin();
+  auto second = other->begin();
+  ASSERT_TRUE(first && second);
+  ASSERT_TRUE(first->append("first"));
+  ASSERT_TRUE(second->append("other"));
+  ASSERT_TRUE(cache_->keep("https://h/1", std::move(*first), {}));
+  ASSERT_TRUE(other->keep("https://h/2", std::move(*second), {}));
+  EXPECT_EQ(text_of("https://h/1"), "first");
+  EXPECT_EQ(text_of("https://h/2"), "other");
 }
 
 TEST_F(CachedObjects, AFolderThatOthersMayChangeIsRefused) {

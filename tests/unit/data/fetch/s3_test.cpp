@@ -65,6 +65,14 @@ TEST(S3Lists, AnswersThatAreNoListAreRefused) {
   EXPECT_FALSE(parse_list(
       "<ListBucketResult><Contents><Key>other/a</Key></Contents></ListBucketResult>", "runs/"));
   EXPECT_FALSE(parse_list("<ListBucketResult><Contents></Contents></ListBucketResult>", ""));
+  for (const std::size_t length : {1024U, 1025U}) {
+    EXPECT_EQ(parse_list("<ListBucketResult><Contents><Key>" + std::string(length, 'a') +
+                             "</Key></Contents></ListBucketResult>",
+                         "")
+                  .has_value(),
+              length <= 1024)
+        << "longer than a key of S3";
+  }
   EXPECT_FALSE(
       parse_list("<ListBucketResult><IsTruncated>true</IsTruncated></ListBucketResult>", ""));
 }
