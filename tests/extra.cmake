@@ -20,6 +20,7 @@ windsplat_tidy_test(includes python3 tests/tidy/check_includes.py)
 windsplat_tidy_test(links python3 tests/tidy/check_links.py)
 windsplat_tidy_test(routes python3 tests/tidy/check_routes.py)
 windsplat_tidy_test(web_imports python3 tests/tidy/check_web_imports.py)
+windsplat_tidy_test(local_names python3 tests/tidy/check_local_names.py)
 windsplat_tidy_test(style python3 tests/tidy/check_style.py)
 windsplat_tidy_test(self_test python3 tests/tidy/self_test.py)
 windsplat_tidy_test(format scripts/format --check)
@@ -41,20 +42,18 @@ endfunction()
 
 # Debian's python, which has access to Debian's modules.
 find_program(SYSTEM_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
-# The fuzzers apply the same mutations to the readers under the sanitizers.
-set(spoiled_count 300)
 set(drawn_options --count=340)
 if(WINDSPLAT_SANITIZE)
-  set(spoiled_count 60)
   set(drawn_options --count=68 --peak-mib=1500)  # sanitizers retain freed memory
 endif()
-windsplat_program_test(spoiled python3 tests/fuzz/mutate_files.py --program=$<TARGET_FILE:windsplat>
-  --count=${spoiled_count})
 # Mutated datasets: opened, compared with the known values, rendered.
 windsplat_program_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py
   --program=$<TARGET_FILE:windsplat> ${drawn_options})
-# Well-formed files; the fuzzers replay small ones of every format.
+# Mutated and well-formed files. Under the sanitizers the fuzzers replay small files of every
+# format, and --thorough has the mutated ones.
 if(NOT WINDSPLAT_SANITIZE)
+  windsplat_program_test(spoiled python3 tests/fuzz/mutate_files.py
+    --program=$<TARGET_FILE:windsplat> --count=300)
   windsplat_program_test(real ${SYSTEM_PYTHON} tests/integration/real_files.py
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(models ${SYSTEM_PYTHON} tests/integration/model_files.py
@@ -75,11 +74,14 @@ if(NOT WINDSPLAT_SANITIZE)
 endif()
 
 # HTTP and WebSocket edge cases against a daemon. Sanitizers retain freed memory, so memory growth
-# is not checked there, and their leak detection does not work under strace.
+# is not checked there, and their leak detection does not work under strace. Of the sizes at
+# boundaries they test a sample.
 set(edge_options)
+set(boundary_options)
 set(attack_options)
 if(WINDSPLAT_SANITIZE)
   set(edge_options --growth-kib=0)
+  set(boundary_options --count=1200)
   set(attack_options --strace=no)
 endif()
 function(windsplat_edge_test name script)
@@ -92,7 +94,7 @@ endfunction()
 
 windsplat_edge_test(rfc6455 rfc6455)
 windsplat_edge_test(http11 http11)
-windsplat_edge_test(boundaries boundaries)
+windsplat_edge_test(boundaries boundaries ${boundary_options})
 foreach(attack chunked_trailer external_files url_paths)
   windsplat_edge_test(attack_${attack} attacks --attack=${attack} ${attack_options})
 endforeach()
@@ -113,7 +115,9 @@ function(windsplat_long_test name)
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endfunction()
 
-if(NOT WINDSPLAT_SANITIZE)
+if(WINDSPLAT_SANITIZE)
+  windsplat_long_test(spoiled python3 tests/fuzz/mutate_files.py --count=300)
+else()
   windsplat_long_test(spoiled python3 tests/fuzz/mutate_files.py --count=10000)
   windsplat_long_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py --count=3400)
 endif()

@@ -10,14 +10,13 @@ namespace {
 
 using testing::HasSubstr;
 
-// The grid of an atmospheric model: `n` levels that follow a hill from the ground to the top, over
-// 24 x 20 columns.
+// The grid of an atmospheric model: levels that follow a hill from the ground to the top.
 struct Terrain {
-  static constexpr int columns = 24;
-  static constexpr int rows = 20;
   static constexpr double step = 20e3;
   static constexpr double lid = 15e3;
   int levels;
+  int columns = 24;
+  int rows = 20;
   [[nodiscard]] Place at(int i, int j, int k) const {
     const double ground = 1000 * std::exp(-(std::pow(i - 12, 2) + std::pow(j - 10, 2)) / 20.0);
     return {i * step, j * step, ground + (lid - ground) * k / (levels - 1)};
@@ -28,15 +27,17 @@ std::string terrain_vts(const Terrain& terrain, VtkXml& xml) {
   std::vector<double> points;
   std::vector<double> height;
   for (int k = 0; k < terrain.levels; ++k) {
-    for (int j = 0; j < Terrain::rows; ++j) {
-      for (int i = 0; i < Terrain::columns; ++i) {
+    for (int j = 0; j < terrain.rows; ++j) {
+      for (int i = 0; i < terrain.columns; ++i) {
         const Place p = terrain.at(i, j, k);
         points.insert(points.end(), p.begin(), p.end());
         height.push_back(p[2]);
       }
     }
   }
-  const std::string extent = "0 23 0 19 0 " + std::to_string(terrain.levels - 1);
+  const std::string extent = "0 " + std::to_string(terrain.columns - 1) + " 0 " +
+                             std::to_string(terrain.rows - 1) + " 0 " +
+                             std::to_string(terrain.levels - 1);
   std::string inner = "<Piece Extent=\"" + extent + "\"><PointData>";
   inner += xml.array("Float64", "a", 1, height) + "</PointData><Points>";
   inner += xml.array("Float64", "p", 3, points) + "</Points></Piece>";
@@ -63,12 +64,12 @@ TEST_F(VtkResampling, LayersOfAShallowGridStayResolved) {
 }
 
 TEST_F(VtkResampling, MoreLayersThanSamplesAreNoted) {
-  const Terrain terrain{400};
+  const Terrain terrain{400, 8, 6};
   VtkXml xml({"appended-raw", "", false, 8});
   const auto source = opened(folder_.write("a.vts", terrain_vts(terrain, xml)));
   ASSERT_TRUE(source);
   EXPECT_EQ(source->info().grid.dims()[2], 256);
-  EXPECT_GE(source->info().grid.dims()[0], 24);
+  EXPECT_GE(source->info().grid.dims()[0], 8);
   EXPECT_THAT(all_notes(source->info()),
               HasSubstr("along z fewer samples than cells: 256 for about 399"));
 }
