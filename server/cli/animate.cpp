@@ -15,6 +15,7 @@
 #include <string_view>
 
 #include "server/base/cancel.hpp"
+#include "server/base/elapsed.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/limited_picture.hpp"
@@ -128,7 +129,7 @@ class Progress {
     if (!terminal_) return;
     constexpr int cells = 30;
     const int full = static_cast<int>(std::int64_t{cells} * done / total_);
-    const double spent = std::chrono::duration<double>(Clock::now() - start_).count();
+    const double spent = seconds_since(start_);
     std::string line(1, '\r');
     if (colored_) line += "\x1b[32m";
     line.append(static_cast<std::size_t>(full), '#');

@@ -23,7 +23,7 @@ struct CloseFile {
 };
 using File = std::unique_ptr<std::FILE, CloseFile>;
 
-Error file_error(ErrorKind kind, const char* what, const std::string& path) {
+Error error_of_system(ErrorKind kind, const char* what, const std::string& path) {
   return make_error(kind, std::string(what) + " '" + printable(path) +
                               "': " + std::generic_category().message(errno));
 }
@@ -147,10 +147,11 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text) {
 
 Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max) {
   const File file(std::fopen(path.c_str(), "rbe"));
-  if (!file) return file_error(ErrorKind::not_found, "cannot open", path);
+  if (!file) return error_of_system(ErrorKind::not_found, "cannot open", path);
   std::string text(bytes_max + 1, '\0');
   text.resize(std::fread(text.data(), 1, text.size(), file.get()));
-  if (std::ferror(file.get()) != 0) return file_error(ErrorKind::not_found, "cannot read", path);
+  if (std::ferror(file.get()) != 0)
+    return error_of_system(ErrorKind::not_found, "cannot read", path);
   if (text.size() > bytes_max) {
     return make_error(ErrorKind::too_large, "'" + printable(path) + "' has more than " +
                                                 std::to_string(bytes_max) + " bytes");

@@ -15,6 +15,7 @@
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
 #include "server/base/cancel.hpp"
+#include "server/base/elapsed.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/data_hosts.hpp"
@@ -67,8 +68,7 @@ class Reporter {
     line.append(static_cast<std::size_t>(bar_width - full), '.');
     line += "] " + std::to_string(static_cast<int>(100 * progress.done)) + " %";
     if (progress.done > 0.02) {
-      const double spent =
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+      const double spent = seconds_since(start_);
       const auto left = std::lround(spent / progress.done * (1 - progress.done));
       line += ", " + std::to_string(left / 60) + (left % 60 < 10 ? ":0" : ":");
       line += std::to_string(left % 60) + " left";

@@ -9,6 +9,7 @@
 #include <random>
 #include <utility>
 
+#include "server/base/elapsed.hpp"
 #include "server/engine/render.hpp"
 #include "server/frame/difference.hpp"
 #include "server/frame/measure.hpp"
@@ -41,10 +42,6 @@ constexpr int learnt_quality = 90;
 double uniform(std::mt19937_64& random, double low, double high) {
   const double share = static_cast<double>(random() >> 11U) * 0x1p-53;
   return low + share * (high - low);
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // Errors of one view by setting; NaN where a setting is not allowed.

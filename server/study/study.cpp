@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "server/base/elapsed.hpp"
 #include "server/study/keys.hpp"
 #include "server/study/metrics.hpp"
 #include "server/study/points_file.hpp"
@@ -23,10 +24,6 @@ constexpr double truth_weight = 12;       // cost of a reference, in points
 constexpr double pictures_weight = 2;     // work of the remaining part of a scene
 constexpr double calibration_weight = 3;  // work of one view of a calibration
 constexpr int amplification = 10;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 bool finite(const Picture& picture) {
   return std::all_of(picture.rgba.begin(), picture.rgba.end(),

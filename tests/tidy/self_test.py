@@ -6,6 +6,7 @@ import unittest
 
 import check_includes
 import check_links
+import check_local_names
 import check_routes
 import check_spelling
 import check_style
@@ -102,6 +103,17 @@ class Planted(unittest.TestCase):
         for n in range(check_web_imports.MAX_FILES):
             self.plant(f"web/src/base/f{n}.ts", "\n")
         self.expect(check_web_imports, "web/src/base: 31 files")
+
+    def test_local_functions_that_a_call_could_confuse(self):
+        local = "namespace {{\nint f({}) {{\n}}\n}}  // namespace\n"
+        self.plant("server/data/cf/a.cpp", local.format("const std::string& text, double x"))
+        for other in ("Box box, double x", "std::string text"):
+            self.plant("server/data/cf/b.cpp", local.format(other))
+            self.expect(check_local_names)
+        self.plant("server/scene/b.cpp", local.format("const char* text, int n"))
+        self.expect(check_local_names)
+        self.plant("server/data/open/b.cpp", local.format("const char* text, int n"))
+        self.expect(check_local_names, "server/data/open/b.cpp:2: f is also a function of server/d")
 
     def test_misspelled_word(self):
         wrong = "rec" + "ieved"

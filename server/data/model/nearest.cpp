@@ -47,7 +47,7 @@ bool goes_round(const Axis& axis) {
   return axis.kind == AxisKind::longitude && axis.units.substr(0, 3) != "rad";
 }
 
-double difference(double a, double b, bool round) {
+double distance_along(double a, double b, bool round) {
   return std::abs(round ? std::remainder(a - b, turn) : a - b);
 }
 
@@ -79,9 +79,10 @@ Result<int> nearest_along(const Axis& axis, std::size_t letter, const std::optio
   const bool round = goes_round(axis);
   const std::array<double, 2> box = box_of(axis);
   if (!within(box, *at, round)) return outside(letter, *at, interval(box, axis.units));
-  const auto nearest = std::min_element(
-      axis.coordinates.begin(), axis.coordinates.end(),
-      [&](double a, double b) { return difference(a, *at, round) < difference(b, *at, round); });
+  const auto nearest =
+      std::min_element(axis.coordinates.begin(), axis.coordinates.end(), [&](double a, double b) {
+        return distance_along(a, *at, round) < distance_along(b, *at, round);
+      });
   return static_cast<int>(nearest - axis.coordinates.begin());
 }
 

@@ -43,8 +43,6 @@ constexpr float cloud_rate = 2.2F;  // increase of cloud fraction per unit of co
 constexpr std::array<double, 19> levels_hpa = {1000, 925, 850, 775, 700, 600, 500, 400, 300, 250,
                                                200,  150, 125, 100, 70,  50,  30,  20,  10};
 
-double bump(double x) { return std::exp(-x * x); }
-
 // `count` pressures from 1000 to 10 hPa: the list of the sample's own 19 levels, interpolated
 // linearly in its index and in log p.
 std::vector<double> pressure_levels(int count) {
@@ -88,7 +86,7 @@ WindProfile wind_profile(double pressure_hpa) {
   // stratosphere.
   const double rise = smooth_step(1000, 600, pressure_hpa) * smooth_step(110, 350, pressure_hpa);
   const double reach = depth > 0 ? 0.50 : 0.45;  // scale depth below and above the jets
-  return {bump(depth / reach),
+  return {climate::bump(depth / reach),
           low * (1.0 - 0.35 * smooth_step(880, 1000, pressure_hpa)),
           (1.0 - low) * smooth_step(90, 220, pressure_hpa) * 0.9,
           std::cos(friction),
@@ -100,15 +98,15 @@ WindProfile wind_profile(double pressure_hpa) {
 std::array<double, 2> zonal_wind(double latitude, double pressure_hpa) {
   const double poleward = std::abs(latitude);
   const double ground = smooth_step(650, 850, pressure_hpa);
-  const double outflow = bump(std::log(pressure_hpa / 180.0) / 0.35);
+  const double outflow = climate::bump(std::log(pressure_hpa / 180.0) / 0.35);
   const double stratosphere = smooth_step(120, 15, pressure_hpa);
   const double to_equator = -std::tanh(latitude / 6.0);
-  const double cell = bump((poleward - 12.0) / 9.0);
-  const double u =
-      ground * (-7.5 * bump((poleward - 13.0) / 8.0) + 4.0 * bump((poleward - 48.0) / 12.0) -
-                3.0 * bump((poleward - 74.0) / 8.0)) +
-      stratosphere *
-          (15.0 * bump((latitude - 65.0) / 14.0) - 10.0 * bump((latitude + 15.0) / 30.0));
+  const double cell = climate::bump((poleward - 12.0) / 9.0);
+  const double u = ground * (-7.5 * climate::bump((poleward - 13.0) / 8.0) +
+                             4.0 * climate::bump((poleward - 48.0) / 12.0) -
+                             3.0 * climate::bump((poleward - 74.0) / 8.0)) +
+                   stratosphere * (15.0 * climate::bump((latitude - 65.0) / 14.0) -
+                                   10.0 * climate::bump((latitude + 15.0) / 30.0));
   const double v = to_equator * cell * (3.0 * ground - 2.5 * outflow);
   return {u, v};
 }
@@ -118,7 +116,7 @@ enum CloudLayer : std::size_t { low_layer, middle_layer, high_layer, deep_layer,
 // The coverage above which a column has cloud at this level: least in the middle of the layer, more
 // towards its base and top. Tropical clouds reach higher.
 std::array<double, layer_count> cloud_thresholds(double latitude, double pressure_hpa) {
-  const double tropics = bump(latitude / 30.0);
+  const double tropics = climate::bump(latitude / 30.0);
   const double top = std::log(270.0 - 130.0 * tropics);
   const double bottom = std::log(960.0);
   const double level = std::log(pressure_hpa);

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 namespace windsplat::data::climate {
 
 using Map = std::vector<float>;
+
+inline double bump(double x) { return std::exp(-x * x); }
 
 // Column positions, degrees.
 struct Columns {

@@ -14,8 +14,6 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
 
-double bump(double x) { return std::exp(-x * x); }
-
 double wrap_degrees(double angle) { return angle - 360.0 * std::floor((angle + 180.0) / 360.0); }
 
 // Parameters of the storm track of a hemisphere.
