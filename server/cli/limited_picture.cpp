@@ -55,12 +55,8 @@ Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
                                         const CancelToken& cancel) {
   const quality::SceneSignature signature = quality::signature_of(completed.view());
   if (!tables_.begin_study(signature, frame::viewpoint_of(completed, dataset_))) return {};
-  // Loads the levels of coarser settings as far as memory allows; the run itself loads nothing.
-  for (const int coarser : {0, 1, 2}) {
-    quality::Setting setting = frame::own_setting(completed);
-    setting.coarser = coarser;
-    const auto loaded = frame::prepare(completed, setting, dataset_, {});
-    if (!loaded && coarser == 0) return loaded.error();
+  if (auto loaded = frame::load_for_calibration(completed, dataset_, cancel); !loaded) {
+    return loaded.error();
   }
   data::Dataset resident = dataset_.resident_only();
   const auto keep = [&](const frame::CalibrationSample& found) {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <mutex>
+#include <set>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -179,13 +180,14 @@ class CalibrationRun {
   Result<void> run() {
     workspace_.space.image() = {};  // a picture that was drawn before
     if (auto drawn = draw_truth(); !drawn) return drawn.error();
+    const std::size_t own = quality::own_setting(completed_.view());
     for (std::size_t i = 0; i < quality::settings_count; ++i) {
       const quality::Setting& setting = quality::settings[i];
       if (!quality::is_allowed(setting, completed_.view())) continue;
       const bool slab = setting.method == protocol::MethodName::slab;
       if (slab && setting.thinner > 1 && told_) continue;
       const auto measured = measure(setting);
-      if (!measured && setting.coarser > 0 && is_absent(measured.error())) continue;
+      if (!measured && i != own && is_absent(measured.error())) continue;
       if (!measured) return measured.error();
       report_({i, viewpoint_, *measured});
     }
@@ -193,7 +195,7 @@ class CalibrationRun {
   }
 
  private:
-  // The merged data of a coarser setting do not fit into memory.
+  // The merged data of another setting do not fit into memory.
   static bool is_absent(const Error& error) {
     return error.kind == ErrorKind::not_resident || error.kind == ErrorKind::out_of_memory;
   }
@@ -336,6 +338,18 @@ class CalibrationRun {
                         // been reported
 };
 
+// The view with a picture of at most retained_pixels.
+Result<scene::CompletedView> calibrated(const scene::CompletedView& completed) {
+  const protocol::ImageView& image = completed.view().image;
+  const double pixels = static_cast<double>(image.width) * image.height;
+  const double scale = std::sqrt(static_cast<double>(retained_pixels) / pixels);
+  return completed.with([scale](protocol::View& view) {
+    if (scale >= 1) return;
+    view.image.width = std::max(1, static_cast<int>(view.image.width * scale));
+    view.image.height = std::max(1, static_cast<int>(view.image.height * scale));
+  });
+}
+
 }  // namespace
 
 quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const scene::Scene* scene) {
@@ -393,17 +407,28 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
   return std::optional(std::max(quality::error_least, error));
 }
 
+Result<void> load_for_calibration(const scene::CompletedView& completed, data::Dataset& dataset,
+                                  const CancelToken& cancel) {
+  const auto sized = calibrated(completed);
+  if (!sized) return sized.error();
+  const std::size_t own = quality::own_setting(sized->view());
+  if (auto scene = prepare(*sized, quality::settings[own], dataset, {}); !scene) {
+    return scene.error();
+  }
+  std::set<std::array<int, 2>> loaded;
+  for (const quality::Setting& setting : quality::settings) {
+    if (!quality::is_allowed(setting, sized->view())) continue;
+    if (!loaded.insert({setting.half_level, setting.coarser}).second) continue;
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "calibration cancelled");
+    (void)prepare(*sized, setting, dataset, {});  // without memory the setting is left out
+  }
+  return {};
+}
+
 Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,
                        ThreadPool& pool, const CancelToken& cancel, Workspace& workspace,
                        const std::function<void(const CalibrationSample&)>& report) {
-  const protocol::ImageView& image = completed.view().image;
-  const double pixels = static_cast<double>(image.width) * image.height;
-  const double scale = std::sqrt(static_cast<double>(retained_pixels) / pixels);
-  const auto sized = completed.with([scale](protocol::View& view) {
-    if (scale >= 1) return;
-    view.image.width = std::max(1, static_cast<int>(view.image.width * scale));
-    view.image.height = std::max(1, static_cast<int>(view.image.height * scale));
-  });
+  const auto sized = calibrated(completed);
   if (!sized) return sized.error();
   return CalibrationRun(*sized, dataset, pool, cancel, workspace, report).run();
 }

@@ -58,6 +58,12 @@ inline std::uint64_t calibration_bytes(const protocol::ImageView& image) {
 inline bool is_worth_calibrating(const protocol::View& view) {  // thumbnails are not calibrated
   return std::min(view.image.width, view.image.height) >= 64;
 }
+//
+// load_for_calibration reads the data of every setting, as far as memory allows: smaller pictures
+// and coarser settings show data of other levels of detail. Settings whose data are not resident
+// are left out, except the view's own. Errors: cancelled; those of the data of the own setting.
+Result<void> load_for_calibration(const scene::CompletedView& completed, data::Dataset& dataset,
+                                  const CancelToken& cancel);
 Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,
                        ThreadPool& pool, const CancelToken& cancel, Workspace& workspace,
                        const std::function<void(const CalibrationSample&)>& report);

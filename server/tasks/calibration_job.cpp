@@ -22,17 +22,9 @@ class Study {
   Study(const Study&) = delete;
   Study& operator=(const Study&) = delete;
 
-  // Prepares the levels of coarser settings as far as memory allows. Nothing is pinned: others
-  // may need the memory until the renderer is idle.
+  // Nothing is pinned: others may need the memory until the renderer is idle.
   Result<void> load(data::Dataset& dataset, const CancelToken& unwanted) {
-    for (const int coarser : {0, 1, 2}) {
-      if (unwanted.cancelled()) return make_error(ErrorKind::cancelled, "calibration cancelled");
-      quality::Setting setting = frame::own_setting(completed_);
-      setting.coarser = coarser;
-      const auto loaded = frame::prepare(completed_, setting, dataset, {});
-      if (!loaded && coarser == 0) return loaded.error();
-    }
-    return {};
+    return frame::load_for_calibration(completed_, dataset, unwanted);
   }
 
   void draw(data::Dataset& dataset, const CancelToken& stop, const CancelToken& unwanted) {
@@ -40,13 +32,17 @@ class Study {
       if (unwanted.cancelled()) stop.cancel();
       backend_.quality.add(signature_, found.setting, found.viewpoint, found.measured);
     };
-    complete_ =
-        static_cast<bool>(run_guarded<void>("a calibration run", stop, [&]() -> Result<void> {
-          const auto room =
-              backend_.catalogue.store().reserve(frame::calibration_bytes(completed_.view().image));
-          if (!room) return room.error();  // other users occupy the memory
-          return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
-        }));
+    const auto run = run_guarded<void>("a calibration run", stop, [&]() -> Result<void> {
+      const auto room =
+          backend_.catalogue.store().reserve(frame::calibration_bytes(completed_.view().image));
+      if (!room) return room.error();  // other users occupy the memory
+      return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
+    });
+    complete_ = static_cast<bool>(run);
+    if (!run) {
+      log::debug("calibration ended early",
+                 {{"dataset", completed_.view().dataset}, {"error", run.error().message}});
+    }
   }
 
  private:

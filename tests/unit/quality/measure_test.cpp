@@ -8,6 +8,7 @@
 #include <cstring>
 #include <map>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include "server/data/resident/dataset.hpp"
@@ -220,6 +221,39 @@ TEST_F(Measure, CalibrationRunReportsEveryAllowedSettingOnce) {
     EXPECT_GT(measured.error.value(), 0) << setting;
     EXPECT_GT(measured.ms.value(), 0) << setting;
   }
+}
+
+// Smaller pictures show coarser levels of detail of these data than the view.
+TEST(MeasureMerged, EverySettingIsCalibratedFromWhatWasLoadedForIt) {
+  auto source = data::open_sample("climate", {160, 80, 10}, 1);
+  ASSERT_TRUE(source) << source.error().message;
+  data::Dataset dataset(std::move(*source), "climate", 1ULL << 30);
+  protocol::View view;
+  view.dataset = "climate";
+  view.image.width = 640;
+  view.image.height = 480;
+  const auto completed = scene::complete(view, dataset).value();
+  std::set<std::array<int, 3>> levels;
+  for (const quality::Setting& setting : quality::settings) {
+    auto other = data::Dataset(data::open_sample("climate", {160, 80, 10}, 1).value(), "climate",
+                               1ULL << 30);
+    levels.insert(prepare(completed, setting, other, {}).value().scene.level);
+  }
+  EXPECT_GT(levels.size(), 3U);  // more than the three of the coarser settings
+  CancelToken cancel;
+  ASSERT_TRUE(load_for_calibration(completed, dataset, cancel));
+  data::Dataset resident = dataset.resident_only();
+  Workspace workspace;
+  ThreadPool pool{2};
+  std::size_t reported = 0;
+  const auto done = calibrate(completed, resident, pool, cancel, workspace,
+                              [&](const CalibrationSample&) { ++reported; });
+  ASSERT_TRUE(done) << done.error().message;
+  std::size_t allowed = 0;
+  for (const quality::Setting& setting : quality::settings) {
+    allowed += quality::is_allowed(setting, completed.view()) ? 1 : 0;
+  }
+  EXPECT_EQ(reported, allowed);
 }
 
 // Two estimates of the same error: a calibration run and a frame use different references.
