@@ -219,6 +219,13 @@ Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<
 
 }  // namespace
 
+void multiply(double factor, std::size_t count, float* values) {
+  if (factor == 1) return;
+  for (std::size_t n = 0; n < count; ++n) {
+    values[n] = static_cast<float>(static_cast<double>(values[n]) * factor);
+  }
+}
+
 double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int variable,
                           const Levels& levels) {
   std::ptrdiff_t origin = 0;

@@ -32,6 +32,9 @@ Result<void> read_variable(const ArrayFile& file, const Placement& grid, int var
                            std::size_t step, const Levels& levels, float* out,
                            const Progress& tell);
 
+// Converts values to another unit.
+void multiply(double factor, std::size_t count, float* values);
+
 // Bytes decoded to read those levels of a variable at one step (see decoded_bytes()), at least the
 // size of the volume.
 double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int variable,

@@ -115,6 +115,7 @@ class ArraySource final : public FileSource {
           !done) {
         return done;
       }
+      multiply(plan.factors[c], samples, out + c * samples);
     }
     if (plan.rotated) rotate(bearing(), placement_.length[2], out, out + samples);
     if (plan.follows_rows) follow_axes(out, out + samples);
@@ -126,8 +127,9 @@ class ArraySource final : public FileSource {
   // How a field is read or derived.
   struct Plan {
     std::vector<int> variables;
-    int derived = -1;           // index into derived_
-    bool rotated = false;       // rotation of components from east and north to the axes
+    std::vector<double> factors;  // of variables, from their units to those of the field
+    int derived = -1;             // index into derived_
+    bool rotated = false;         // rotation of components from east and north to the axes
     bool follows_rows = false;  // exchange and sign of components from rows and columns of the file
                                 // to the axes
   };
@@ -267,16 +269,17 @@ class ArraySource final : public FileSource {
     const bool in_water =
         z >= 0 && (roles_.at(at(z)).kind == AxisKind::depth || is_ocean_level(coordinate_of(z)));
     auto plans = cf::find_fields(file_->contents(), choice_.variables,
-                                 in_water ? AxisKind::depth : info_.grid.axes[2].kind);
+                                 in_water ? AxisKind::depth : info_.grid.axes[2].kind, info_.notes);
     auto derived = find_derived(*file_, placement_, plans, choice_.variables, pressures_, heights_,
                                 info_.notes);
     if (!derived) return derived.error();
     derived_ = std::move(*derived);
     for (FieldPlan& plan : plans) {
-      add_field(std::move(plan.info), {std::move(plan.variables), -1, false, false});
+      add_field(std::move(plan.info),
+                {std::move(plan.variables), std::move(plan.factors), -1, false, false});
     }
     for (std::size_t d = 0; d < derived_.size(); ++d) {
-      add_field(derived_[d].info, {derived_[d].inputs, static_cast<int>(d), false, false});
+      add_field(derived_[d].info, {derived_[d].inputs, {}, static_cast<int>(d), false, false});
     }
     return {};
   }

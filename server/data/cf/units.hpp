@@ -11,6 +11,11 @@ std::optional<double> pascals_in(std::string_view unit);  // nullopt: not a pres
 bool is_speed(std::string_view unit);                     // a known unit of speed; false if empty
 std::optional<double> pascals_per_second_in(std::string_view unit);
 
+// What a value in the unit `from` is multiplied by to be in `to`, for products of powers such as
+// "kg m-2 s-1" or "m/s"; nullopt if they measure different quantities or a part is unknown and not
+// common to both. Offsets (degrees Celsius) are not known.
+std::optional<double> unit_ratio(std::string_view from, std::string_view to);
+
 // The standard name of omega, in Pa s-1.
 inline constexpr std::string_view omega_name = "lagrangian_tendency_of_air_pressure";
 

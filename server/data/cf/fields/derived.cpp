@@ -225,6 +225,7 @@ class DerivedFinder {
     DerivedField field;
     field.rule = DerivedField::Rule::rise;
     field.inputs = plan.variables;
+    field.factors = plan.factors;
     field.scale = unit;
     field.temperature = temperature_beside(omega);
     std::string note = "the vertical part of ";
@@ -280,6 +281,7 @@ Result<void> fill_rise(const ArrayFile& file, const Placement& grid, const Press
         !done) {
       return done;
     }
+    if (c < 2) multiply(field.factors[c], samples, out + c * samples);
   }
   float* vertical = out + 2 * samples;
   const std::size_t levels = std::max<std::size_t>(1, values_at_a_time / layer);

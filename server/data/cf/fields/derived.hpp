@@ -29,10 +29,11 @@ struct DerivedField {
   };
   Rule rule = Rule::pressure;
   FieldInfo info;
-  std::vector<int> inputs;  // indices of variables
-  double scale = 1;         // factor to metres for height (inputs[0]), to Pa/s for rise (omega)
-  int temperature = -1;     // temperature variable; -1: standard atmosphere
-  double celsius = 0;       // added to temperatures
+  std::vector<int> inputs;      // indices of variables
+  std::vector<double> factors;  // of u and v for rise, to m/s
+  double scale = 1;             // factor to metres for height (inputs[0]), to Pa/s for rise (omega)
+  int temperature = -1;         // temperature variable; -1: standard atmosphere
+  double celsius = 0;           // added to temperatures
 };
 
 // plans: the fields of the file; variables: those on the grid. Adds notes of the assumptions.

@@ -23,8 +23,9 @@ bool is_velocity(const std::string& units) { return units.empty() || is_speed(un
 
 class FieldFinder {
  public:
-  FieldFinder(const FileContents& contents, const std::vector<int>& variables, AxisKind vertical)
-      : contents_(contents), variables_(variables), vertical_(vertical) {}
+  FieldFinder(const FileContents& contents, const std::vector<int>& variables, AxisKind vertical,
+              std::vector<std::string>& notes)
+      : contents_(contents), variables_(variables), vertical_(vertical), notes_(notes) {}
 
   std::vector<FieldPlan> find() {
     by_mark();
@@ -72,8 +73,30 @@ class FieldFinder {
     return partner(like, standard_name, [](const FileVariable& v) { return v.standard_name; });
   }
 
-  [[nodiscard]] bool same_units(int a, int b) const {
-    return variable(a).units == variable(b).units;
+  [[nodiscard]] bool is_omega(int v) const {
+    return pascals_per_second_in(variable(v).units).has_value() ||
+           (variable(v).units.empty() && variable(v).standard_name == omega_name);
+  }
+
+  // Whether the unit of component v can be that of the vector of `first`; a note says if not. A
+  // third one may also be a rate of pressure beside velocities, or lack a unit.
+  [[nodiscard]] bool joins(int first, int v, bool is_third) {
+    const std::string& own = variable(v).units;
+    const std::string& wanted = variable(first).units;
+    if (is_third && (own.empty() || wanted.empty())) return true;
+    if (is_third && is_omega(v) && is_velocity(wanted)) return true;
+    if (own.empty() == wanted.empty() && unit_ratio(own, wanted)) return true;
+    const auto shown = [](const std::string& unit) { return unit.empty() ? "no unit" : unit; };
+    tell(in_quotes(variable(v).name) + " (" + shown(own) + ") is no component of a vector with " +
+         in_quotes(variable(first).name) + " (" + shown(wanted) +
+         "): its unit cannot be converted to that");
+    return false;
+  }
+
+  void tell(std::string note) {
+    if (std::find(notes_.begin(), notes_.end(), note) == notes_.end()) {
+      notes_.push_back(std::move(note));
+    }
   }
 
   // A name different from those of all variables and vectors, since views refer to fields by name.
@@ -106,18 +129,39 @@ class FieldFinder {
     plan.info.kind = FieldKind::vector;
     plan.info.units = first.units;
     plan.info.dtype = dtype_of(first);
+    const bool with_omega = components.size() > 2 && is_omega(components[2]);
+    if (with_omega && unit_ratio(first.units, "m s-1").value_or(1) != 1) plan.info.units = "m s-1";
     for (const int v : components) {
       plan.info.components.push_back(variable(v).name);
-      // The unit by convention if the file has none.
-      const bool is_bare_omega =
-          variable(v).units.empty() && variable(v).standard_name == omega_name;
-      plan.info.component_units.push_back(is_bare_omega ? "Pa s-1" : variable(v).units);
+      add_unit(plan, v, with_omega && v == components[2]);
       plan.info.long_name +=
           (plan.info.long_name.empty() ? "" : ", ") +
           (variable(v).long_name.empty() ? variable(v).name : variable(v).long_name);
     }
     plan.variables = std::move(components);
     plans_.push_back(std::move(plan));
+  }
+
+  // Adds the unit of a component and the factor to it.
+  void add_unit(FieldPlan& plan, int v, bool is_rate_of_pressure) {
+    const std::string& own = variable(v).units;
+    const std::string& wanted = plan.info.units;
+    plan.factors.push_back(is_rate_of_pressure ? 1 : unit_ratio(own, wanted).value_or(1));
+    if (is_rate_of_pressure) {
+      // The unit by convention if the file has none.
+      plan.info.component_units.push_back(own.empty() ? "Pa s-1" : own);
+      return;
+    }
+    plan.info.component_units.push_back(own.empty() ? own : wanted);
+    const std::string of = " of " + in_quotes(plan.info.name) + ' ';
+    if (plan.factors.back() != 1) {
+      tell("the component " + in_quotes(variable(v).name) + of + "is converted from " + own +
+           " to " + wanted);
+    } else if (own.empty() != wanted.empty()) {
+      tell("the component " + in_quotes(variable(v).name) + of +
+           (own.empty() ? "has no unit: it is taken to be in " + wanted
+                        : "is in " + own + ", but the others have no unit: they are taken to be"));
+    }
   }
 
   void add_scalar(int v) {
@@ -131,6 +175,7 @@ class FieldFinder {
     plan.info.long_name = source.long_name;
     plan.info.dtype = dtype_of(source);
     plan.variables = {v};
+    plan.factors = {1};
     plans_.push_back(std::move(plan));
   }
 
@@ -146,8 +191,9 @@ class FieldFinder {
         return partner(v, name + index, [](const FileVariable& f) { return f.vector_mark; });
       };
       const int second = component(" 1");
-      const int third = component(" 2");
-      if (!name.empty() && second >= 0) {
+      int third = component(" 2");
+      if (third >= 0 && !joins(v, third, true)) third = -1;
+      if (!name.empty() && second >= 0 && joins(v, second, false)) {
         add_vector(name,
                    third >= 0 ? std::vector<int>{v, second, third} : std::vector<int>{v, second});
       }
@@ -186,10 +232,11 @@ class FieldFinder {
         continue;
       }
       const int y = standing_for(v, second);
-      if (y < 0 || !same_units(v, y)) {
+      if (y < 0 || !joins(v, y, false)) {
         continue;
       }
       int z = quantity == "wind" ? rising_air(v) : standing_for(v, third);
+      if (z >= 0 && !joins(v, z, true)) z = -1;
       if (z < 0) {  // the vertical component often lacks standard_name
         const std::string short_name = lower(variable(v).name);
         z = vertical_partner(v, short_name.starts_with('u') ? short_name.substr(1) : "");
@@ -207,10 +254,11 @@ class FieldFinder {
     }
     const std::string stem = name.substr(0, name.size() - 1);
     const int y = named(v, stem + 'y');
-    if (y < 0 || !same_units(v, y)) {
+    if (y < 0 || !joins(v, y, false)) {
       return;
     }
-    const int z = named(v, stem + 'z');
+    int z = named(v, stem + 'z');
+    if (z >= 0 && !joins(v, z, true)) z = -1;
     std::string shown = variable(v).name.substr(0, stem.size());
     while (shown.size() > 1 && (shown.back() == '_' || shown.back() == '-')) {
       shown.pop_back();
@@ -226,7 +274,7 @@ class FieldFinder {
     }
     const std::string rest = name.substr(1);
     const int y = named(v, 'v' + rest);
-    if (y < 0 || !same_units(v, y)) {
+    if (y < 0 || !joins(v, y, false)) {
       return;
     }
     const int z = vertical_partner(v, rest);
@@ -239,14 +287,15 @@ class FieldFinder {
   }
 
   // w... with the same rest, otherwise a common name of vertical velocity.
-  [[nodiscard]] int vertical_partner(int v, const std::string& rest) const {
+  [[nodiscard]] int vertical_partner(int v, const std::string& rest) {
     const int alike = named(v, 'w' + rest);
-    if (alike >= 0 || !is_velocity(variable(v).units)) {
-      return alike;
+    const bool is_third = alike >= 0 && joins(v, alike, true);
+    if (is_third || !is_velocity(variable(v).units)) {
+      return is_third ? alike : -1;
     }
     for (const char* usual : {"w", "wa", "wap", "omega", "vvel", "dzdt", "wwnd", "wgrd"}) {
       const int found = named(v, usual);
-      if (found >= 0) {
+      if (found >= 0 && joins(v, found, true)) {
         return found;
       }
     }
@@ -256,6 +305,7 @@ class FieldFinder {
   const FileContents& contents_;
   const std::vector<int>& variables_;
   AxisKind vertical_;
+  std::vector<std::string>& notes_;
   std::vector<FieldPlan> plans_;
 };
 
@@ -277,8 +327,8 @@ bool is_velocity_component(const FileVariable& variable) {
 }
 
 std::vector<FieldPlan> find_fields(const FileContents& contents, const std::vector<int>& variables,
-                                   AxisKind vertical) {
-  return FieldFinder(contents, variables, vertical).find();
+                                   AxisKind vertical, std::vector<std::string>& notes) {
+  return FieldFinder(contents, variables, vertical, notes).find();
 }
 
 }  // namespace windsplat::data::cf

@@ -2,6 +2,7 @@
 // scalar.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "server/data/cf/contents.hpp"
@@ -11,7 +12,8 @@ namespace windsplat::data::cf {
 
 struct FieldPlan {
   FieldInfo info;
-  std::vector<int> variables;  // one per component, indices into FileContents::variables
+  std::vector<int> variables;   // one per component, indices into FileContents::variables
+  std::vector<double> factors;  // one per component: from the variable's unit to that of the field
 };
 
 // Whether a variable is by its name a component of a velocity.
@@ -20,9 +22,11 @@ bool is_velocity_component(const FileVariable& variable);
 // variables: those on the chosen grid. vertical: the kind of its z axis (with a depth axis, u and v
 // are a current). Components are identified by the attribute of the netCDF writer, then by
 // standard_name (eastward_, northward_, upward_...), then by common names (u v w, ua va wap, ugrd
-// vgrd, Ex Ey Ez, b_x b_y b_z, ...). They must have the same dimensions in any order, and the first
-// two the same units.
+// vgrd, Ex Ey Ez, b_x b_y b_z, ...). They must have the same dimensions in any order, and units
+// that can be converted to that of the first; the third may also be a rate of pressure (omega),
+// beside which velocities are in m s-1. Adds notes of conversions and of components that are left
+// alone.
 std::vector<FieldPlan> find_fields(const FileContents& contents, const std::vector<int>& variables,
-                                   AxisKind vertical);
+                                   AxisKind vertical, std::vector<std::string>& notes);
 
 }  // namespace windsplat::data::cf

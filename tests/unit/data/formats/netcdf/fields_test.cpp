@@ -51,7 +51,8 @@ std::vector<Found> vectors(const std::vector<FileVariable>& variables,
   }
   std::vector<Found> out;
   std::size_t scalars = 0;
-  for (const cf::FieldPlan& plan : cf::find_fields(contents, all, vertical)) {
+  std::vector<std::string> notes;
+  for (const cf::FieldPlan& plan : cf::find_fields(contents, all, vertical, notes)) {
     if (plan.info.kind == FieldKind::vector) {
       out.push_back({plan.info.name, plan.info.components});
     } else {
@@ -185,6 +186,92 @@ TEST(NetcdfFields, VectorInfoReplacesThatOfItsComponents) {
   auto alone = (*source)->read(static_cast<std::size_t>(info.find("v") - info.fields.data()), 0);
   ASSERT_TRUE(alone);
   EXPECT_EQ(alone->masked, 0);
+}
+
+// A wind of constant components in the given units beside lon, lat and heights or pressures.
+Result<std::unique_ptr<Source>> wind_in(const std::string& path,
+                                        const std::array<std::string, 3>& units,
+                                        const std::string& level_units = "m") {
+  {
+    NetcdfMaker file(path);
+    const int z = file.axis("lev", {1000, 500}, level_units);
+    const int y = file.axis("lat", {0, 1}, "degrees_north");
+    const int x = file.axis("lon", {0, 1, 2}, "degrees_east");
+    const std::array<const char*, 3> names{"u", "v", "w"};
+    const std::array<double, 3> values{36, 72, 50};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const int v =
+          file.variable(names.at(c), NC_FLOAT, {z, y, x}, std::vector<double>(12, values.at(c)));
+      if (!units.at(c).empty()) file.text(v, "units", units.at(c));
+    }
+  }
+  return open_file(path);
+}
+
+TEST(NetcdfFields, ComponentsAreConvertedToOneUnit) {
+  const Folder folder;
+  struct Case {
+    std::array<std::string, 3> units;
+    std::string shown;
+    std::array<double, 3> values;
+  };
+  const double knot = 1852.0 / 3600;
+  for (const Case& one :
+       std::vector<Case>{{{"knots", "knots", "cm/s"}, "knots", {36, 72, 0.5 / knot}},
+                         {{"m s-1", "m/s", "m day-1"}, "m s-1", {36, 72, 50.0 / 86400}},
+                         {{"m s**-1", "km/h", "m.s-1"}, "m s**-1", {36, 20, 50}},
+                         {{"mV m-1", "V/m", "V.m^-1"}, "mV m-1", {36, 72e3, 50e3}},
+                         {{"m/s", "m/s", ""}, "m/s", {36, 72, 50}}}) {
+    const auto source = wind_in(folder / "w.nc", one.units);
+    ASSERT_TRUE(source) << source.error().message;
+    const FieldInfo& wind = (*source)->info().fields.front();
+    ASSERT_EQ(wind.components.size(), 3U) << one.shown;
+    EXPECT_EQ(wind.units, one.shown);
+    EXPECT_EQ(wind.component_units[1], one.shown);
+    const auto volume = (*source)->read(0, 0);
+    ASSERT_TRUE(volume) << volume.error().message;
+    for (int c = 0; c < 3; ++c) {
+      const double wanted = one.values.at(static_cast<std::size_t>(c));
+      EXPECT_NEAR(volume->component(c)[5], wanted, 1e-6 * wanted) << one.shown << c;
+    }
+    // A component by itself has the unit of the file.
+    const FieldInfo* w = (*source)->info().find("w");
+    ASSERT_NE(w, nullptr);
+    EXPECT_EQ(w->units, one.units[2]);
+  }
+}
+
+TEST(NetcdfFields, BesideARateOfPressureVelocitiesAreInMetresPerSecond) {
+  const Folder folder;
+  const auto source = wind_in(folder / "w.nc", {"km/h", "km/h", "hPa/s"}, "hPa");
+  ASSERT_TRUE(source) << source.error().message;
+  const DatasetInfo& info = (*source)->info();
+  for (const char* name : {"wind", "wind_m"}) {
+    const FieldInfo* wind = info.find(name);
+    ASSERT_NE(wind, nullptr);
+    EXPECT_EQ(wind->component_units[0], "m s-1");
+    EXPECT_EQ(wind->component_units[2], std::string(name) == "wind" ? "hPa/s" : "m s-1");
+    const auto volume = (*source)->read(static_cast<std::size_t>(wind - info.fields.data()), 0);
+    ASSERT_TRUE(volume) << volume.error().message;
+    EXPECT_FLOAT_EQ(volume->component(0)[5], 10);
+    EXPECT_FLOAT_EQ(volume->component(1)[5], 20);
+  }
+}
+
+TEST(NetcdfFields, ComponentsOfOtherQuantitiesAreNotJoined) {
+  const Folder folder;
+  for (const auto& [units, count] : std::map<std::array<std::string, 3>, std::size_t>{
+           {{"m/s", "m/s", "s-1"}, 2}, {{"V/m", "V/m", "T"}, 2}, {{"m/s", "K", "m/s"}, 1}}) {
+    const auto source = wind_in(folder / "w.nc", units);
+    ASSERT_TRUE(source) << source.error().message;
+    const DatasetInfo& info = (*source)->info();
+    EXPECT_EQ(info.fields.front().components.size(), count) << units[2];
+    const std::string other = count == 2 ? "'w' (" + units[2] : "'v' (" + units[1];
+    EXPECT_TRUE(std::any_of(info.notes.begin(), info.notes.end(), [&](const std::string& note) {
+      return note == other + ") is no component of a vector with 'u' (" + units[0] +
+                         "): its unit cannot be converted to that";
+    })) << units[2];
+  }
 }
 
 TEST(NetcdfFields, LargestGridIsUsedAndTheRestIsExplained) {
