@@ -192,6 +192,11 @@ std::vector<std::string> HdfFile::groups_in(const std::string& group) const {
   return {found.begin(), found.end()};
 }
 
+bool HdfFile::has_attribute(const std::string& group, const char* name) const {
+  const LibraryLock lock;
+  return H5Aexists_by_name(file_.id(), group.c_str(), name, H5P_DEFAULT) > 0;
+}
+
 std::optional<std::string> HdfFile::text(const std::string& group, const char* name) const {
   const LibraryLock lock;
   const Handle attribute(H5Aopen_by_name(file_.id(), group.c_str(), name, H5P_DEFAULT, H5P_DEFAULT),

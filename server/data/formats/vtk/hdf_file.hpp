@@ -37,6 +37,7 @@ class HdfFile : public std::enable_shared_from_this<HdfFile> {
   [[nodiscard]] std::vector<std::string> datasets_in(const std::string& group) const;
   [[nodiscard]] std::vector<std::string> groups_in(const std::string& group) const;
 
+  [[nodiscard]] bool has_attribute(const std::string& group, const char* name) const;
   // Attributes of a group; nullopt if absent, or not of this kind. Texts have at most 64 bytes.
   [[nodiscard]] std::optional<std::string> text(const std::string& group, const char* name) const;
   [[nodiscard]] std::optional<std::vector<double>> numbers(const std::string& group,

@@ -85,13 +85,14 @@ class HdfGrid {
       out_.whole.first[a] = std::llround(first);
       out_.whole.last[a] = std::llround(last);
     }
-    const auto list = [&](const char* name, auto& to) {
+    const auto list = [&](const char* name, auto& to) -> Result<void> {
+      if (!file_.has_attribute(group_, name)) return {};
       const auto found = file_.numbers(group_, name, to.size());
       if (found) std::copy(found->begin(), found->end(), to.begin());
     };
-    list("Origin", out_.place.origin);
-    list("Spacing", out_.place.spacing);
-    list("Direction", out_.place.direction);
+    if (auto done = list("Origin", out_.place.origin); !done) return done;
+    if (auto done = list("Spacing", out_.place.spacing); !done) return done;
+    if (auto done = list("Direction", out_.place.direction); !done) return done;
     Piece piece;
     piece.extent = out_.whole;
     const auto points = out_.whole.points();

@@ -134,6 +134,21 @@ TEST_F(VtkHdf, ImagesHaveTheirPlaceOrderAndVectors) {
   }
 }
 
+TEST_F(VtkHdf, PlacesOfAnotherLengthAreRefused) {
+  for (const auto& [name, values] : std::map<std::string, std::vector<double>>{
+           {"Origin", {0.5, 2}}, {"Spacing", {0.5}}, {"Direction", {1, 0, 0}}}) {
+    {
+      const HdfMaker file(path_);
+      file.group("/VTKHDF", "ImageData");
+      file.attribute("/VTKHDF", "WholeExtent", {1, 4, 0, 2, 0, 4});
+      file.attribute("/VTKHDF", name.c_str(), values, H5T_IEEE_F64LE);
+      file.set("/VTKHDF/PointData/a", {5, 3, 4}, image_values());
+    }
+    const std::string count = name == "Direction" ? "9" : "3";
+    EXPECT_THAT(refusal(path_), HasSubstr("has no " + count + " numbers in its " + name));
+  }
+}
+
 TEST_F(VtkHdf, StepsOfImagesHaveTimesAndOffsets) {
   {
     const HdfMaker file(path_);
