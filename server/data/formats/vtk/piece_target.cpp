@@ -1,6 +1,9 @@
 #include "server/data/formats/vtk/piece_target.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "server/data/cf/time.hpp"
 
 namespace windsplat::data::vtk {
 
@@ -20,6 +23,32 @@ Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
     out.origin += turned[a] ? (all[a] - 1 - first) * step : first * step;
   }
   return out;
+}
+
+void SharedSamples::begin_block(std::size_t block) {
+  if (block == block_) return;
+  block_ = block;
+  std::fill(is_stored_.begin(), is_stored_.end(), false);
+}
+
+void SharedSamples::add(std::size_t sample, const double* values, std::size_t components,
+                        const float* held, std::size_t stride) {
+  for (std::size_t c = 0; c < components; ++c) {
+    if (!std::isfinite(values[c])) continue;
+    largest_ = std::max(largest_, std::abs(values[c]));
+    const auto before = static_cast<double>(held[c * stride]);
+    if (!is_stored_[sample] || !std::isfinite(before)) continue;
+    difference_ = std::max(difference_, std::abs(values[c] - before));
+  }
+  is_stored_[sample] = true;
+}
+
+Result<void> SharedSamples::check(const InputFile& file, const std::string& field) const {
+  constexpr double tolerance = 1e-3;  // neighbours may have computed their copies
+  if (difference_ <= tolerance * largest_) return {};
+  return file.fault("has pieces that overlap with different values of " + in_quotes(field) +
+                    " (by up to " + cf::number_text(difference_) +
+                    "), which no vtkGhostType marks as copies");
 }
 
 }  // namespace windsplat::data::vtk

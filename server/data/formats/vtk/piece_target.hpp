@@ -4,7 +4,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
+#include <vector>
 
+#include "server/base/error.hpp"
+#include "server/data/files/input_file.hpp"
 #include "server/data/formats/vtk/snapshot.hpp"
 
 namespace windsplat::data::vtk {
@@ -40,6 +44,27 @@ class TargetWalk {
   Target target_;
   std::ptrdiff_t at_;
   std::array<std::int64_t, 3> index_{};
+};
+
+// Compares what the pieces of a block store for the same samples and do not mark as copies.
+class SharedSamples {
+ public:
+  explicit SharedSamples(std::size_t samples) : is_stored_(samples) {}
+
+  // Begins another block, whose samples may differ from those of the blocks before.
+  void begin_block(std::size_t block);
+  // The components that a piece stores for a sample. held: those before, from any piece, of which
+  // each is `stride` after the one before.
+  void add(std::size_t sample, const double* values, std::size_t components, const float* held,
+           std::size_t stride);
+  // Errors: bad_data if two pieces differ by more than a thousandth of the largest value.
+  [[nodiscard]] Result<void> check(const InputFile& file, const std::string& field) const;
+
+ private:
+  std::vector<bool> is_stored_;
+  std::size_t block_ = 0;
+  double largest_ = 0;
+  double difference_ = 0;
 };
 
 // The target of a piece of `whole`. world: for each index axis the axis of the volume; turned:

@@ -188,6 +188,11 @@ Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapsh
   return {};
 }
 
+bool has_overlaps(const Snapshot& snapshot) {
+  return std::any_of(snapshot.pieces.begin(), snapshot.pieces.end(),
+                     [](const Piece& piece) { return piece.overlaps; });
+}
+
 const StoredArray* find_array(const std::vector<StoredArray>& arrays, const std::string& name) {
   const auto at = std::find_if(arrays.begin(), arrays.end(),
                                [&](const StoredArray& array) { return array.name == name; });

@@ -55,6 +55,7 @@ struct Piece {
   Kind kind = Kind::image;  // differs from that of the snapshot in a mesh of several blocks
   Placement place;          // for images
   Extent extent;            // unused for unstructured grids
+  bool overlaps = false;    // shares more than a layer of points with another one of its block
   std::uint64_t points = 0;
   std::uint64_t cells = 0;
   // For a rectilinear grid x, y and z with one component each; otherwise one array of 3 components.
@@ -117,6 +118,9 @@ Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapsh
 // Checks that the whole extent is within the limits and holds the pieces, which cover it. Errors:
 // bad_data.
 Result<void> check_cover(const InputFile& file, const Snapshot& snapshot);
+
+// Whether check_overlap() found pieces that overlap.
+bool has_overlaps(const Snapshot& snapshot);
 
 // "0 7 0 5 0 3", as in files.
 std::string text_of(const Extent& extent);

@@ -343,7 +343,8 @@ class VtkSource final : public FileSource {
   // Reads a piece of a grid with indices into `out`, whose components have `samples` values. Tuples
   // that `mask` hides are left out; copies of those of other pieces yield to them.
   Result<void> fill_piece(const Snapshot& snapshot, const Piece& piece, std::size_t field,
-                          const Target& target, unsigned mask, std::size_t samples, float* out) {
+                          const Target& target, unsigned mask, std::size_t samples,
+                          SharedSamples& shared, float* out) {
     const auto array = array_of(snapshot, piece, field);
     if (!array || *array == nullptr) return array ? Result<void>() : array.error();
     const auto file = piece.file.open(*files_);
@@ -352,12 +353,13 @@ class VtkSource final : public FileSource {
     if (!ghosts) return ghosts.error();
     const auto components = static_cast<std::size_t>((*array)->components);
     TargetWalk walk(target);
+    shared.begin_block(piece.block);
     return read_tuples(*file, **array, [&](std::uint64_t tuple, const double* values) {
       const std::size_t at = walk.next();
-      if (!ghosts->empty()) {
-        const double ghost = (*ghosts)[tuple];
-        if (has_bit(ghost, mask) || (has_bit(ghost, duplicate) && !std::isnan(out[at]))) return;
-      }
+      const double ghost = ghosts->empty() ? 0 : (*ghosts)[tuple];
+      const bool is_copy = has_bit(ghost, duplicate);
+      if (has_bit(ghost, mask) || (is_copy && !std::isnan(out[at]))) return;
+      if (piece.overlaps && !is_copy) shared.add(at, values, components, out + at, samples);
       for (std::size_t c = 0; c < components; ++c) {
         out[at + c * samples] = static_cast<float>(values[c]);
       }
@@ -378,13 +380,14 @@ class VtkSource final : public FileSource {
     std::fill_n(out, samples * info_.fields[field].components.size(),
                 std::numeric_limits<float>::quiet_NaN());
     const unsigned mask = of_cells_ ? hidden_cell | refined_cell : hidden_point;
+    SharedSamples shared(has_overlaps(snapshot) ? samples : 0);
     // The last first: where blocks overlap, the first one counts.
     for (auto piece = snapshot.pieces.rbegin(); piece != snapshot.pieces.rend(); ++piece) {
       const Target target = target_of(whole_, piece->extent, of_cells_, grid_.world, grid_.turned);
-      auto done = fill_piece(snapshot, *piece, field, target, mask, samples, out);
+      auto done = fill_piece(snapshot, *piece, field, target, mask, samples, shared, out);
       if (!done) return done;
     }
-    return {};
+    return shared.check(*file_, info_.fields[field].name);
   }
 
   // Reads the values of the points or cells of the mesh.
@@ -393,10 +396,11 @@ class VtkSource final : public FileSource {
     const std::uint64_t count = of_cells_ ? mesh_->cell_count() : mesh_->point_count();
     std::vector<float> values(count * components, std::numeric_limits<float>::quiet_NaN());
     std::uint64_t base = 0;
+    SharedSamples shared(has_overlaps(snapshot) ? count : 0);
     for (const Piece& piece : snapshot.pieces) {
       if (kind_ == Kind::structured) {
         const Target target = target_of(whole_, piece.extent, of_cells_, {0, 1, 2}, {});
-        auto done = fill_piece(snapshot, piece, field, target, 0, count, values.data());
+        auto done = fill_piece(snapshot, piece, field, target, 0, count, shared, values.data());
         if (!done) return done.error();
         continue;
       }
@@ -418,6 +422,7 @@ class VtkSource final : public FileSource {
       }
       base += tuples;
     }
+    if (auto done = shared.check(*file_, info_.fields[field].name); !done) return done.error();
     return values;
   }
 

@@ -209,13 +209,12 @@ Result<Snapshot> unite(Files& files, const FilePtr& file, std::vector<Block> blo
   return out;
 }
 
-Result<void> check_overlap(const InputFile& file, const Snapshot& snapshot,
-                           std::int64_t ghost_level) {
+Result<void> check_overlap(const InputFile& file, Snapshot& snapshot, std::int64_t ghost_level) {
   const auto counts = snapshot.whole.points();
   const auto longest =
       static_cast<std::size_t>(std::max_element(counts.begin(), counts.end()) - counts.begin());
-  std::vector<const Piece*> sorted;
-  for (const Piece& piece : snapshot.pieces) sorted.push_back(&piece);
+  std::vector<Piece*> sorted;
+  for (Piece& piece : snapshot.pieces) sorted.push_back(&piece);
   std::sort(sorted.begin(), sorted.end(), [longest](const Piece* a, const Piece* b) {
     return a->extent.first.at(longest) < b->extent.first.at(longest);
   });
@@ -230,6 +229,7 @@ Result<void> check_overlap(const InputFile& file, const Snapshot& snapshot,
         least = std::min(
             least, std::min(one.last[a], other.last[a]) - std::max(one.first[a], other.first[a]));
       }
+      if (least > 0) sorted[n]->overlaps = sorted[m]->overlaps = true;
       if (least <= 2 * ghost_level) continue;
       return file.fault("has the pieces " + in_quotes(sorted[n]->file.name) + " and " +
                         in_quotes(sorted[m]->file.name) + " that overlap by " +

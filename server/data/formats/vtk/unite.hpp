@@ -23,9 +23,8 @@ struct Block {
 Result<Snapshot> unite(Files& files, const std::shared_ptr<const InputFile>& file,
                        std::vector<Block> blocks);
 
-// Checks that the pieces of a parallel file overlap by no more cells than its ghost level explains.
-// Errors: bad_data, with the names of two pieces.
-Result<void> check_overlap(const InputFile& file, const Snapshot& snapshot,
-                           std::int64_t ghost_level);
+// Checks that the pieces of a parallel file overlap by no more cells than its ghost level explains,
+// and marks those that overlap. Errors: bad_data, with the names of two pieces.
+Result<void> check_overlap(const InputFile& file, Snapshot& snapshot, std::int64_t ghost_level);
 
 }  // namespace windsplat::data::vtk

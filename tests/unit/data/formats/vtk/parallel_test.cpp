@@ -284,6 +284,37 @@ TEST_F(VtkParallel, GhostPointsYieldToTheirOwner) {
   }
 }
 
+TEST_F(VtkParallel, OverlapsWithoutMarksMustAgree) {
+  const std::array<Box, 2> boxes{{{0, 3, 0, 1, 0, 1}, {2, 4, 0, 1, 0, 1}}};
+  // Of the second piece relative to the first; copies computed twice differ by rounding.
+  for (const double difference : {0.0, 1e-5, 0.5}) {
+    Header header;
+    header.attributes = "WholeExtent=\"0 4 0 1 0 1\" GhostLevel=\"4\"";
+    for (std::size_t n = 0; n < 2; ++n) {
+      std::vector<double> values;
+      for (const Place& p : places_of(boxes.at(n), [](const Place& at) { return at; })) {
+        values.push_back(p[0] + static_cast<double>(n) * difference);
+      }
+      VtkXml xml;
+      const std::string text = extent_text(boxes.at(n));
+      const std::string name = "o" + std::to_string(n) + ".vti";
+      folder_.write(name,
+                    xml.file("ImageData", "WholeExtent=\"" + text + "\"",
+                             "<Piece Extent=\"" + text + "\"><PointData>" +
+                                 xml.array("Float64", "a", 1, values) + "</PointData></Piece>"));
+      header.piece(name, &boxes.at(n));
+    }
+    const auto source = opened(folder_.write("all.pvti", header.text()));
+    ASSERT_TRUE(source);
+    const auto volume = source->read(0, 0);
+    EXPECT_EQ(volume.has_value(), difference < 0.1) << difference;
+    if (!volume) {
+      EXPECT_THAT(volume.error().message,
+                  HasSubstr("pieces that overlap with different values of 'a' (by up to 0.5)"));
+    }
+  }
+}
+
 TEST_F(VtkParallel, ArraysMustBeDeclaredAndAgree) {
   Header header;
   header.attributes = "WholeExtent=\"0 8 0 6 0 4\" Origin=\"10 -3 0\" Spacing=\"0.5 2 0.25\"";
