@@ -182,7 +182,8 @@ Result<std::unique_ptr<ArrayFile>> meshed(std::unique_ptr<ArrayFile> file) {
   const auto named = [&](const Error& error) {
     return make_error(error.kind, in_quotes(file->name()) + ": " + error.message);
   };
-  auto mesh = read_mesh(*file, *topology);
+  std::vector<std::string> notes;
+  auto mesh = read_mesh(*file, *topology, notes);
   if (!mesh) return named(mesh.error());
   auto grid = MeshGrid::of(std::move(*mesh), samples_for(file->stored_bytes()));
   if (!grid) return named(grid.error());
@@ -191,8 +192,10 @@ Result<std::unique_ptr<ArrayFile>> meshed(std::unique_ptr<ArrayFile> file) {
   const auto fits = check_centers(*file, shown->cell_dimensions, grid->mesh());
   if (!fits) return named(fits.error());
   for (std::string& note : grid->notes(topology->convention, shown->most())) {
-    shown->contents.notes.push_back(std::move(note));
+    notes.push_back(std::move(note));
   }
+  auto& all = shown->contents.notes;
+  all.insert(all.end(), notes.begin(), notes.end());
   return std::unique_ptr<ArrayFile>(
       std::make_unique<MeshedFile>(std::move(file), std::move(*grid), std::move(*shown)));
 }

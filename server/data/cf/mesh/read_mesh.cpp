@@ -49,7 +49,8 @@ Result<void> check_width(std::size_t width, const std::string& name) {
 
 class MeshReader {
  public:
-  MeshReader(const ArrayFile& file, const Topology& topology) : file_(file), from_(topology) {}
+  MeshReader(const ArrayFile& file, const Topology& topology, std::vector<std::string>& notes)
+      : file_(file), from_(topology), notes_(notes) {}
 
   Result<Mesh> read() {
     for (const int d : {from_.cells, from_.nodes}) {
@@ -116,13 +117,80 @@ class MeshReader {
         }
       }
     }
-    for (double& number : *numbers) number -= from_.start_index;
     const std::size_t nodes = length(from_.nodes);
+    const auto start = start_index(*numbers, width, nodes);
+    if (!start) return start.error();
+    for (double& number : *numbers) number -= *start;
     auto mesh = mesh_of_indices(*numbers, width, nodes, name);
     if (!mesh) return mesh;
     numbers->clear();
     numbers->shrink_to_fit();
     return with_positions(std::move(*mesh));
+  }
+
+  // The number of the first node. Without one in the file it is 1 if the number 0 does not occur
+  // and either the number after the last node does, or cells from 0 are much longer than from 1.
+  Result<double> start_index(const std::vector<double>& numbers, std::size_t width,
+                             std::size_t nodes) {
+    if (!from_.start_is_assumed) return from_.start_index;
+    double least = std::numeric_limits<double>::infinity();
+    double most = -least;
+    for (const double number : numbers) {
+      if (std::isnan(number)) continue;
+      least = std::min(least, number);
+      most = std::max(most, number);
+    }
+    if (least < 1 || !(most <= static_cast<double>(nodes))) return 0.0;
+    bool counts_from_one = most == static_cast<double>(nodes);
+    if (!counts_from_one) {
+      std::array<std::vector<double>, 2> positions;
+      for (std::size_t a = 0; a < 2; ++a) {
+        auto values = angles(from_.node_positions.at(a), from_.on_sphere);
+        if (!values) return values.error();
+        positions.at(a) = std::move(*values);
+        if (positions.at(a).size() != nodes) return 0.0;  // with_positions() reports it
+      }
+      const double from_zero = length_of_edges(numbers, width, 0, positions);
+      const double from_one = length_of_edges(numbers, width, 1, positions);
+      constexpr double much = 0.9;  // a row of cells around an edge has a cell along all of it
+      counts_from_one = from_one < much * from_zero;
+      if (!counts_from_one && !(from_zero < much * from_one)) {
+        return make_error(ErrorKind::bad_data,
+                          in_quotes(variable(from_.connectivity).name) +
+                              " has no start_index, and no cell has the node 0: whether nodes are "
+                              "numbered from 0 or 1 is unknown");
+      }
+    }
+    if (!counts_from_one) return 0.0;
+    notes_.push_back(in_quotes(variable(from_.connectivity).name) +
+                     " has no start_index, but its numbers of nodes can only count from 1: they "
+                     "are read so");
+    return 1.0;
+  }
+
+  // The sum over the edges of all cells, in degrees of latitude or lengths of the plane. numbers:
+  // of nodes, counted from `start`; those that do not exist have no edges.
+  [[nodiscard]] double length_of_edges(const std::vector<double>& numbers, std::size_t width,
+                                       double start,
+                                       const std::array<std::vector<double>, 2>& positions) const {
+    const auto& [x, y] = positions;
+    double sum = 0;
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const bool is_last = (i + 1) % width == 0 || std::isnan(numbers[i + 1]);
+      const double from = numbers[i] - start;
+      const double to = (is_last ? numbers[i / width * width] : numbers[i + 1]) - start;
+      const auto count = static_cast<double>(x.size());
+      if (!(from >= 0 && from < count && to >= 0 && to < count)) continue;
+      const auto a = static_cast<std::size_t>(from);
+      const auto b = static_cast<std::size_t>(to);
+      double way = x[b] - x[a];
+      if (from_.on_sphere) {
+        way = std::remainder(way, 360.0) * std::cos((y[a] + y[b]) / 2 * std::numbers::pi / 180);
+      }
+      const double length = std::hypot(way, y[b] - y[a]);
+      if (std::isfinite(length)) sum += length;
+    }
+    return sum;
   }
 
   Result<Mesh> with_positions(Mesh mesh) {
@@ -200,6 +268,7 @@ class MeshReader {
 
   const ArrayFile& file_;
   const Topology& from_;
+  std::vector<std::string>& notes_;
 };
 
 }  // namespace
@@ -318,8 +387,9 @@ Result<Mesh> mesh_of_corners(const std::vector<double>& longitudes,
   return mesh;
 }
 
-Result<Mesh> read_mesh(const ArrayFile& file, const Topology& topology) {
-  return MeshReader(file, topology).read();
+Result<Mesh> read_mesh(const ArrayFile& file, const Topology& topology,
+                       std::vector<std::string>& notes) {
+  return MeshReader(file, topology, notes).read();
 }
 
 }  // namespace windsplat::data::cf

@@ -92,6 +92,7 @@ class TopologyFinder {
       if (cells < 0 || !set_connectivity(cells, faces_of(mesh, cells), out)) continue;
       const auto first = file_.numbers(cells, "start_index").values;
       out.start_index = first.empty() ? 0 : first[0];
+      out.start_is_assumed = first.empty();
       out.edges = edges_of(mesh);
       out.others = {mesh};
       for (const char* attribute :

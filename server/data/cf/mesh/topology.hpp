@@ -24,6 +24,7 @@ struct Topology {
   int connectivity = -1;
   int degrees = -1;  // the number of corners of each cell; -1: padding tells
   double start_index = 0;
+  bool start_is_assumed = false;  // the file does not give it
   std::array<int, 2> node_positions{-1, -1};
   // used where the longitudes are all equal, as in models of a plane
   std::array<int, 2> plane_positions{-1, -1};
@@ -46,10 +47,12 @@ std::vector<int> variables_of(const Topology& topology);
 // such variables. The choice has no variables.
 std::optional<GridChoice> grid_of_lists(const ArrayFile& file);
 
-// Reads and checks a mesh. Errors: bad_data, naming the variable and the cell: numbers of nodes
-// that do not exist, cells of fewer than three corners or more than mesh_corners_max, positions
-// that are missing or no latitudes.
-Result<Mesh> read_mesh(const ArrayFile& file, const Topology& topology);
+// Reads and checks a mesh. Numbers of nodes without a start index count from 0 (UGRID 1.0) unless
+// they can only count from 1, which a note says. Errors: bad_data, naming the variable and the
+// cell: numbers of nodes that do not exist, or that may count from 0 or 1; cells of fewer than
+// three corners or more than mesh_corners_max; positions that are missing or no latitudes.
+Result<Mesh> read_mesh(const ArrayFile& file, const Topology& topology,
+                       std::vector<std::string>& notes);
 inline constexpr std::size_t mesh_corners_max = 64;
 
 // Numbers of nodes, counted from 0, NaN where padding: `width` corners for each cell -> a mesh

@@ -248,6 +248,72 @@ TEST(UgridFiles, CellsThatDoNotLieAtTheirCentersAreRefused) {
       EXPECT_THAT(refusal(path), HasSubstr("do not lie where 'fx' and 'fy' place them: 24 of 24"));
     } else {
       EXPECT_NE(opened(path), nullptr);
+// Without start_index: the numbers as they are, and two ways to know better.
+TEST(UgridFiles, NumbersThatCanOnlyCountFromOneAreReadSo) {
+  const Folder folder;
+  struct Case {
+    double first;
+    std::size_t spare;  // nodes after the last that cells have, so that no number is out of range
+    bool noted;
+  };
+  for (const Case& one : {Case{0, 0, false}, Case{1, 0, true}, Case{1, 3, true}}) {
+    const std::string path = folder / "n.nc";
+    {
+      UgridMaker maker(path);
+      NetcdfMaker& file = maker.file;
+      const int node = file.dimension("nodes_and_spare", nodes + one.spare);
+      for (const bool is_x : {true, false}) {
+        Table places = at_nodes([&](double x, double y) { return is_x ? x : y; });
+        places.resize(nodes + one.spare, is_x ? 17 : 45);
+        const int v = file.variable(is_x ? "px" : "py", NC_DOUBLE, {node}, places);
+        file.text(v, "units", is_x ? "degrees_east" : "degrees_north");
+      }
+      file.text(maker.topology, "node_coordinates", "px py");
+      file.variable("corners", NC_INT, {maker.face, file.dimension("four", 4)}, corners(one.first));
+      file.variable("b", NC_DOUBLE, {maker.face}, at_cells(sum_of));
+    }
+    const auto source = opened(path);
+    ASSERT_NE(source, nullptr);
+    expect_function(*source, "b", sum_of, 1);
+    EXPECT_EQ(has_note(source->info(),
+                       "'corners' has no start_index, but its numbers of nodes "
+                       "can only count from 1"),
+              one.noted);
+  }
+}
+
+// A strip of triangles between two rows of nodes, numbered across: every node has the same
+// neighbours by number, so that both readings are meshes.
+TEST(UgridFiles, NumbersThatMayCountFromZeroOrOneAreRefused) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "s.nc");
+    const int node = file.dimension("node", 42);
+    const int face = file.dimension("face", 38);
+    const int mesh = file.variable("Mesh2", NC_INT, {});
+    file.text(mesh, "cf_role", "mesh_topology");
+    file.number(mesh, "topology_dimension", NC_INT, {2});
+    file.text(mesh, "node_coordinates", "nx ny");
+    file.text(mesh, "face_node_connectivity", "corners");
+    Table x;
+    Table y;
+    Table table;
+    for (std::size_t n = 0; n < 42; ++n) {
+      x.push_back(static_cast<double>(n) / 2);
+      y.push_back(n % 2 == 0 ? 0 : 1);
+    }
+    for (std::size_t c = 0; c < 38; ++c) {
+      for (std::size_t i = 1; i < 4; ++i) table.push_back(static_cast<double>(c + i));
+    }
+    file.text(file.variable("nx", NC_DOUBLE, {node}, x), "units", "degrees_east");
+    file.text(file.variable("ny", NC_DOUBLE, {node}, y), "units", "degrees_north");
+    file.variable("corners", NC_INT, {face, file.dimension("three", 3)}, table);
+    file.variable("t", NC_FLOAT, {face}, Table(38, 1));
+  }
+  EXPECT_THAT(refusal(folder / "s.nc"),
+              HasSubstr("whether nodes are numbered from 0 or 1 is unknown"));
+}
+
     }
   }
 }
