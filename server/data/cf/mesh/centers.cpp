@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <string>
 
 #include "server/data/cf/coordinates.hpp"
@@ -49,6 +50,48 @@ bool is_near_cell(const Mesh& mesh, std::size_t cell, double longitude, double l
          std::abs(latitude - (low[1] + high[1]) / 2) <= sizes_max * (high[1] - low[1]);
 }
 
+// Whether a position is equally far from all corners of a cell, within a twentieth of its longest
+// edge, on the sphere or in a plane of longitudes and latitudes. The circumcentre of a cell with an
+// obtuse angle lies outside of it.
+bool is_circumcenter(const Mesh& mesh, std::size_t cell, double longitude, double latitude,
+                     ChartCell& chart) {
+  constexpr double radian = std::numbers::pi / 180;
+  chart_of(mesh, cell, false, chart);
+  const PlanePoint center = chart.in_chart(longitude, latitude);
+  const auto in_space = [](const PlanePoint& p) {
+    const double from_axis = std::cos(p[1] * radian);
+    return std::array<double, 3>{from_axis * std::cos(p[0] * radian),
+                                 from_axis * std::sin(p[0] * radian), std::sin(p[1] * radian)};
+  };
+  const auto chord = [&](const PlanePoint& a, const PlanePoint& b) {
+    const auto one = in_space(a);
+    const auto other = in_space(b);
+    return std::hypot(one[0] - other[0], one[1] - other[1], one[2] - other[2]);
+  };
+  const double shrink = std::cos(chart.mean()[1] * radian);
+  const auto shrunk = [&](const PlanePoint& a, const PlanePoint& b) {
+    return std::hypot((a[0] - b[0]) * shrink, a[1] - b[1]);
+  };
+  const auto plain = [](const PlanePoint& a, const PlanePoint& b) {
+    return std::hypot(a[0] - b[0], a[1] - b[1]);
+  };
+  const auto is_equally_far = [&](const auto& distance) {
+    constexpr double tolerance = 0.05;
+    double nearest = std::numeric_limits<double>::infinity();
+    double farthest = 0;
+    double longest = 0;
+    for (std::size_t i = 0; i < chart.points.size(); ++i) {
+      const double own = distance(center, chart.points[i]);
+      nearest = std::min(nearest, own);
+      farthest = std::max(farthest, own);
+      const PlanePoint& next = chart.points[(i + 1) % chart.points.size()];
+      longest = std::max(longest, distance(chart.points[i], next));
+    }
+    return farthest - nearest <= tolerance * longest;
+  };
+  return is_equally_far(chord) || is_equally_far(shrunk) || is_equally_far(plain);
+}
+
 }  // namespace
 
 Result<void> check_centers(const ArrayFile& file, const std::vector<int>& dimensions,
@@ -56,6 +99,7 @@ Result<void> check_centers(const ArrayFile& file, const std::vector<int>& dimens
   if (!mesh.on_sphere) return {};
   const std::size_t stride = std::max<std::size_t>(1, mesh.cells() / cells_compared);
   Outline outline;
+  ChartCell chart;
   for (const int dimension : dimensions) {
     const auto [x, y] = centers_on(file.contents(), dimension);
     if (x < 0 || y < 0) continue;
@@ -68,7 +112,10 @@ Result<void> check_centers(const ArrayFile& file, const std::vector<int>& dimens
     std::size_t first = 0;
     for (std::size_t c = 0; c < mesh.cells(); c += stride) {
       ++compared;
-      if (is_near_cell(mesh, c, (*longitudes)[c], (*latitudes)[c], outline)) continue;
+      if (is_near_cell(mesh, c, (*longitudes)[c], (*latitudes)[c], outline) ||
+          is_circumcenter(mesh, c, (*longitudes)[c], (*latitudes)[c], chart)) {
+        continue;
+      }
       if (apart++ == 0) first = c;
     }
     if (apart * 100 <= compared) continue;

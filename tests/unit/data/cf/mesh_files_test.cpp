@@ -248,6 +248,10 @@ TEST(UgridFiles, CellsThatDoNotLieAtTheirCentersAreRefused) {
       EXPECT_THAT(refusal(path), HasSubstr("do not lie where 'fx' and 'fy' place them: 24 of 24"));
     } else {
       EXPECT_NE(opened(path), nullptr);
+    }
+  }
+}
+
 // Without start_index: the numbers as they are, and two ways to know better.
 TEST(UgridFiles, NumbersThatCanOnlyCountFromOneAreReadSo) {
   const Folder folder;
@@ -314,6 +318,44 @@ TEST(UgridFiles, NumbersThatMayCountFromZeroOrOneAreRefused) {
               HasSubstr("whether nodes are numbered from 0 or 1 is unknown"));
 }
 
+// Triangles whose circumcentres lie outside of them.
+TEST(UgridFiles, CircumcentersOfObtuseTrianglesAreCenters) {
+  const Folder folder;
+  // The circumcentres of these triangles, and those of their neighbours, which are no centres.
+  for (const std::size_t aside : {0U, 1U}) {
+    const std::string path = folder / "o.nc";
+    {
+      NetcdfMaker file(path);
+      // Flat triangles along the equator, each with its own nodes and height.
+      constexpr std::size_t count = 40;
+      const int node = file.dimension("node", 3 * count);
+      const int face = file.dimension("face", count);
+      const int mesh = file.variable("Mesh2", NC_INT, {});
+      file.text(mesh, "cf_role", "mesh_topology");
+      file.number(mesh, "topology_dimension", NC_INT, {2});
+      file.text(mesh, "node_coordinates", "nx ny");
+      file.text(mesh, "face_node_connectivity", "corners");
+      Table x, y, table, center_x, center_y;
+      for (std::size_t c = 0; c < count; ++c) {
+        const auto west = static_cast<double>(c);
+        const double height = 0.1 + 0.002 * static_cast<double>(c);
+        x.insert(x.end(), {west, west + 1, west + 0.5});
+        y.insert(y.end(), {0, 0, height});
+        for (std::size_t i = 0; i < 3; ++i) table.push_back(static_cast<double>(3 * c + i));
+        center_x.push_back(west + 0.5 + static_cast<double>(aside));
+        center_y.push_back((height * height - 0.25) / (2 * height));
+      }
+      file.text(file.variable("nx", NC_DOUBLE, {node}, x), "units", "degrees_east");
+      file.text(file.variable("ny", NC_DOUBLE, {node}, y), "units", "degrees_north");
+      file.text(file.variable("fx", NC_DOUBLE, {face}, center_x), "units", "degrees_east");
+      file.text(file.variable("fy", NC_DOUBLE, {face}, center_y), "units", "degrees_north");
+      file.variable("corners", NC_INT, {face, file.dimension("three", 3)}, table);
+      file.variable("t", NC_FLOAT, {face}, Table(count, 1));
+    }
+    if (aside == 0) {
+      EXPECT_NE(opened(path), nullptr);
+    } else {
+      EXPECT_THAT(refusal(path), HasSubstr("place them: 40 of 40 compared"));
     }
   }
 }
