@@ -29,7 +29,8 @@ CONFINED = [
      r"protocol/codec\w*\.[ch]pp|server/data/formats/(zarr/json|(raw|list)/document)\.cpp|"
      r"server/data/formats/plain/json_text\.[ch]pp|tests/.*"),
     ("ecCodes", r"eccodes\.h", r"server/data/formats/grib/.*|tests/.*"),
-    ("PROJ", r"proj\.h", r"server/data/cf/grid/projected_columns\.cpp|tests/.*"),
+    ("PROJ", r"proj\.h",
+     r"server/data/cf/grid/(proj_context\.hpp|(projected_columns|crs_wkt)\.cpp)|tests/.*"),
     ("a compressor", r"(blosc|lz4|zlib|zstd)\.h", r"server/data/.*|tests/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
     ("libcurl", r"curl/", r"server/data/fetch/http_client\.cpp"),

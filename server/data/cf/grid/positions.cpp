@@ -10,6 +10,7 @@
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/grid/crs_wkt.hpp"
 #include "server/data/cf/grid/curvilinear.hpp"
 #include "server/data/cf/grid/projected_columns.hpp"
 #include "server/data/cf/grid/projection.hpp"
@@ -63,7 +64,13 @@ class PositionFinder {
       : file_(file), axes_(axes), placement_(placement), info_(info) {
     const int x = axes[0];
     mapping_ = grid_mapping_of(file, variables, x < 0 ? "" : variable(x).name);
-    if (mapping_ >= 0) kind_ = lower(file.text_of(mapping_, "grid_mapping_name"));
+    if (mapping_ < 0) return;
+    attributes_ = grid_mapping_at(file, mapping_);
+    if (attributes_.texts.count("grid_mapping_name") == 0) read_wkt();
+    if (const auto name = attributes_.texts.find("grid_mapping_name");
+        name != attributes_.texts.end()) {
+      kind_ = lower(name->second);
+    }
   }
 
   Result<Positions> find() {
@@ -98,6 +105,21 @@ class PositionFinder {
   }
   [[nodiscard]] std::string mapping_name() const { return in_quotes(variable(mapping_).name); }
 
+  // A mapping without attributes may have well-known text.
+  void read_wkt() {
+    for (const char* name : {"crs_wkt", "spatial_ref"}) {
+      const std::string text = file_.text_of(mapping_, name);
+      if (text.empty()) continue;
+      auto found = mapping_of_wkt(text);
+      if (found) {
+        attributes_ = std::move(*found);
+      } else {
+        fault_ = found.error();
+      }
+      return;
+    }
+  }
+
   // Whether the axes have the coordinates that a map projection needs.
   [[nodiscard]] bool is_projected(bool about_pole) const {
     const auto& [x, y, z] = info_.grid.axes;
@@ -107,7 +129,7 @@ class PositionFinder {
   }
 
   void shift_longitudes() {
-    const double shift = prime_meridian(grid_mapping_at(file_, mapping_));
+    const double shift = prime_meridian(attributes_);
     if (shift == 0) return;
     for (double& longitude : info_.grid.axes[0].coordinates) longitude += shift;
     info_.notes.push_back("longitudes are relative to the prime meridian of " + mapping_name() +
@@ -128,7 +150,8 @@ class PositionFinder {
   }
 
   Result<ProjectedColumns> positions() {
-    auto projection = projection_of(grid_mapping_at(file_, mapping_));
+    if (fault_) return *fault_;
+    auto projection = projection_of(attributes_);
     if (!projection) return projection.error();
     const std::vector<double>& x = info_.grid.axes[0].coordinates;
     const std::vector<double>& y = info_.grid.axes[1].coordinates;
@@ -167,7 +190,7 @@ class PositionFinder {
 
   // Notes 2-D positions that contradict the map projection, at some columns.
   void compare(const Columns& own) {
-    const auto projection = projection_of(grid_mapping_at(file_, mapping_));
+    const auto projection = projection_of(attributes_);
     if (!projection) return;
     constexpr std::size_t parts = 4;
     std::array<std::vector<std::size_t>, 2> chosen;
@@ -208,7 +231,9 @@ class PositionFinder {
   const Placement& placement_;
   DatasetInfo& info_;
   int mapping_ = -1;
-  std::string kind_;  // grid_mapping_name
+  GridMapping attributes_;
+  std::optional<Error> fault_;  // of well-known text
+  std::string kind_;            // grid_mapping_name
 };
 
 }  // namespace

@@ -1,5 +1,4 @@
-// All calls to PROJ. It opens no file: every parameter is a number, and the file interface that it
-// is given has no files.
+// Calls to PROJ, whose every parameter is a number.
 #include "server/data/cf/grid/projected_columns.hpp"
 
 #include <proj.h>
@@ -13,6 +12,7 @@
 #include <utility>
 
 #include "server/data/cf/grid/curvilinear.hpp"
+#include "server/data/cf/grid/proj_context.hpp"
 
 namespace windsplat::data::cf {
 
@@ -20,31 +20,12 @@ namespace {
 
 constexpr double degree_in_radians = std::numbers::pi / 180;
 
-// A file system without files.
-constexpr PROJ_FILE_API no_files{
-    1,
-    [](PJ_CONTEXT*, const char*, PROJ_OPEN_ACCESS, void*) -> PROJ_FILE_HANDLE* { return nullptr; },
-    [](PJ_CONTEXT*, PROJ_FILE_HANDLE*, void*, std::size_t, void*) -> std::size_t { return 0; },
-    [](PJ_CONTEXT*, PROJ_FILE_HANDLE*, const void*, std::size_t, void*) -> std::size_t {
-      return 0;
-    },
-    [](PJ_CONTEXT*, PROJ_FILE_HANDLE*, long long, int, void*) { return 0; },
-    [](PJ_CONTEXT*, PROJ_FILE_HANDLE*, void*) -> unsigned long long { return 0; },
-    [](PJ_CONTEXT*, PROJ_FILE_HANDLE*, void*) {},
-    [](PJ_CONTEXT*, const char*, void*) { return 0; },
-    [](PJ_CONTEXT*, const char*, void*) { return 0; },
-    [](PJ_CONTEXT*, const char*, void*) { return 0; },
-    [](PJ_CONTEXT*, const char*, const char*, void*) { return 0; }};
-
 // A projection and its inverse.
 class Transform {
  public:
   explicit Transform(const Projection& projection)
-      : projection_(projection), context_(proj_context_create()) {
+      : projection_(projection), context_(context_without_files()) {
     if (context_ == nullptr) return;
-    proj_log_func(context_, nullptr, [](void*, int, const char*) {});
-    proj_context_set_fileapi(context_, &no_files, nullptr);
-    proj_context_set_enable_network(context_, 0);
     operation_ = proj_create(context_, projection.definition.c_str());
   }
   ~Transform() {
