@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -117,7 +118,10 @@ class ArraySource final : public FileSource {
       }
       multiply(plan.factors[c], samples, out + c * samples);
     }
-    if (plan.rotated) rotate(bearing(), placement_.length[2], out, out + samples);
+    if (plan.rotated) {
+      if (auto found = find_bearing_of_columns(); !found) return found;
+      rotate(*bearing_, placement_.length[2], out, out + samples);
+    }
     if (plan.follows_rows) follow_axes(out, out + samples);
     if (!outside_.empty()) mask_outside(out, info_.fields[field].components.size());
     return {};
@@ -208,6 +212,7 @@ class ArraySource final : public FileSource {
     if (!positions) return positions.error();
     info_.grid.columns = std::move(positions->columns);
     outside_ = std::move(positions->outside);
+    tangents_ = std::move(positions->tangents);
     follows_other_axes_ = positions->follow_other_axes;
     return {};
   }
@@ -407,9 +412,16 @@ class ArraySource final : public FileSource {
     }
   }
 
-  const GridBearing& bearing() {
-    if (!bearing_) bearing_ = bearing_of(*info_.grid.columns, placement_.length[0]);
-    return *bearing_;
+  Result<void> find_bearing_of_columns() {
+    if (bearing_) return {};
+    if (!tangents_) {
+      bearing_ = bearing_of(*info_.grid.columns, placement_.length[0]);
+      return {};
+    }
+    const auto tangents = tangents_();
+    if (!tangents) return named(tangents.error());
+    bearing_ = bearing_of(*tangents);
+    return {};
   }
 
   std::unique_ptr<ArrayFile> file_;
@@ -422,6 +434,7 @@ class ArraySource final : public FileSource {
   bool follows_other_axes_ = false;  // rows may not run east
   std::vector<bool> outside_;        // columns that do not lie on the Earth; empty: all do
   ToAxes to_axes_;
+  std::function<Result<AxisTangents>()> tangents_;  // as in Positions
   std::optional<GridBearing> bearing_;
   std::vector<DerivedField> derived_;
   std::vector<Plan> plans_;  // parallel to info_.fields

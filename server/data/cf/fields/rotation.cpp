@@ -73,27 +73,32 @@ GridBearing bearing_of(const Columns& columns, std::size_t width) {
   const Tangents tangents(columns);
   const std::size_t count = columns.longitude.size();
   const std::size_t height = count / width;
-  std::vector<Plane> x(count);
-  std::vector<Plane> y(count);
-  double turning = 0;  // positive if y is to the left of x
+  AxisTangents out;
   for (std::size_t n = 0; n < count; ++n) {
-    const std::size_t i = n % width;
-    const std::size_t j = n / width;
-    x[n] = tangents.along(n, i, width, 1);
-    y[n] = tangents.along(n, j, height, width);
-    turning += x[n].east * y[n].north - x[n].north * y[n].east;
+    const Plane x = tangents.along(n, n % width, width, 1);
+    const Plane y = tangents.along(n, n / width, height, width);
+    out.x.push_back({static_cast<float>(x.east), static_cast<float>(x.north)});
+    out.y.push_back({static_cast<float>(y.east), static_cast<float>(y.north)});
+  }
+  return bearing_of(out);
+}
+
+GridBearing bearing_of(const AxisTangents& tangents) {
+  const auto& [x, y] = tangents;
+  double turning = 0;  // positive if y is to the left of x
+  for (std::size_t n = 0; n < x.size(); ++n) {
+    turning += static_cast<double>(x[n][0] * y[n][1] - x[n][1] * y[n][0]);
   }
   GridBearing bearing;
   bearing.side = turning < 0 ? -1.0F : 1.0F;
-  const double side = turning < 0 ? -1 : 1;
-  for (std::size_t n = 0; n < count; ++n) {
-    double east = x[n].east + side * y[n].north;
-    double north = x[n].north - side * y[n].east;
-    const double length = std::hypot(east, north);
+  for (std::size_t n = 0; n < x.size(); ++n) {
+    float east = x[n][0] + bearing.side * y[n][1];
+    float north = x[n][1] - bearing.side * y[n][0];
+    const float length = std::hypot(east, north);
     east = length > 0 ? east / length : 1;
     north = length > 0 ? north / length : 0;
-    bearing.east.push_back(static_cast<float>(east));
-    bearing.north.push_back(static_cast<float>(north));
+    bearing.east.push_back(east);
+    bearing.north.push_back(north);
   }
   return bearing;
 }

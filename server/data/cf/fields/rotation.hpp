@@ -2,6 +2,7 @@
 // longitudes and latitudes of its columns.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -20,6 +21,13 @@ struct GridBearing {
 // width: columns along x. Computed from neighbours on the sphere; if the axes are not
 // perpendicular, the mean direction of both.
 GridBearing bearing_of(const Columns& columns, std::size_t width);
+
+// Of a column: the directions of the x and y axes as unit vectors along east and north.
+struct AxisTangents {
+  std::vector<std::array<float, 2>> x;
+  std::vector<std::array<float, 2>> y;
+};
+GridBearing bearing_of(const AxisTangents& tangents);
 
 // Converts components along east and north to those along x and y in place, for `levels` layers.
 void rotate(const GridBearing& bearing, std::size_t levels, float* east, float* north);

@@ -184,6 +184,15 @@ class PositionFinder {
                             std::to_string(found->outside.size()) +
                             " columns do not lie on the Earth: they are masked");
     }
+    if (found->outside_count > 0) {
+      const auto projection = projection_of(attributes_);
+      const auto& [x, y, z] = info_.grid.axes;
+      out.tangents = [projection = *projection, columns = *found,
+                      x = scaled(x.coordinates, factor_of(*projection, x).value_or(1)),
+                      y = scaled(y.coordinates, factor_of(*projection, y).value_or(1))] {
+        return tangents_on_map(projection, x, y, columns);
+      };
+    }
     out.columns = std::move(found->columns);
     out.outside = std::move(found->outside);
   }

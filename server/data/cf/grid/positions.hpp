@@ -2,11 +2,13 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <vector>
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
+#include "server/data/cf/fields/rotation.hpp"
 #include "server/data/cf/read_blocks.hpp"
 #include "server/data/model/dataset_info.hpp"
 
@@ -16,6 +18,8 @@ struct Positions {
   std::shared_ptr<const Columns> columns;  // null if they lie along the axes, or are unknown
   std::vector<bool> outside;               // as in ProjectedColumns
   bool follow_other_axes = false;          // rows and columns do not run east and north
+  // The directions of the axes of a map with an edge; null: as neighbours tell.
+  std::function<Result<AxisTangents>()> tangents;
 };
 
 // Precedence: 2-D longitudes and latitudes of the file, then the map projection of its grid

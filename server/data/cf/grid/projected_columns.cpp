@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <tuple>
@@ -165,6 +166,32 @@ double farthest(const std::vector<double>& coordinates, double origin) {
   return out;
 }
 
+struct ColumnPlace {
+  double longitude;
+  double latitude;
+};
+
+// The direction of the way between two places near `here`: along east and north, of length 1, or 0
+// if there is no way.
+std::array<float, 2> direction(const ColumnPlace& here, const ColumnPlace& from,
+                               const ColumnPlace& to) {
+  const double shrink = std::cos(here.latitude * degree_in_radians);
+  const double east = std::remainder(to.longitude - from.longitude, 360.0) * shrink;
+  const double north = to.latitude - from.latitude;
+  const double length = std::hypot(east, north);
+  if (!(length > 0)) return {0, 0};
+  return {static_cast<float>(east / length), static_cast<float>(north / length)};
+}
+
+// The shortest distance of neighbours; 1 if there are none.
+double shortest_step(const std::vector<double>& coordinates) {
+  double out = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < coordinates.size(); ++i) {
+    out = std::min(out, std::abs(coordinates[i] - coordinates[i - 1]));
+  }
+  return std::isfinite(out) ? out : 1;
+}
+
 }  // namespace
 
 Result<ProjectedColumns> project_columns(const Projection& projection, const std::vector<double>& x,
@@ -209,6 +236,44 @@ Result<ProjectedColumns> project_columns(const Projection& projection, const std
   }
   unwrap_longitudes(columns->longitude, x.size());
   out.columns = std::move(columns);
+  return out;
+}
+
+Result<AxisTangents> tangents_on_map(const Projection& projection, const std::vector<double>& x,
+                                     const std::vector<double>& y,
+                                     const ProjectedColumns& columns) {
+  Transform inverse(projection);
+  if (!inverse.exists()) return unusable("is refused by PROJ: " + inverse.reason());
+  const double step = 1e-3 * std::min(shortest_step(x), shortest_step(y));
+  AxisTangents out;
+  out.x.resize(x.size() * y.size());
+  out.y.resize(out.x.size());
+  std::array<std::vector<double>, 2> before;  // longitudes and latitudes
+  std::array<std::vector<double>, 2> after;
+  for (std::size_t row = 0; row < y.size(); ++row) {
+    for (const bool along_x : {true, false}) {
+      for (const bool is_after : {false, true}) {
+        auto& [to_x, to_y] = is_after ? after : before;
+        const double aside = is_after ? step : -step;
+        to_x = x;
+        to_y.assign(x.size(), y[row] + (along_x ? 0 : aside));
+        if (along_x) {
+          for (double& v : to_x) v += aside;
+        }
+        inverse.apply(to_x, to_y);
+      }
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        const std::size_t n = row * x.size() + i;
+        if (!columns.outside.empty() && columns.outside[n]) continue;
+        const ColumnPlace here{columns.columns->longitude[n], columns.columns->latitude[n]};
+        ColumnPlace from{before[0][i], before[1][i]};
+        ColumnPlace to{after[0][i], after[1][i]};
+        if (!std::isfinite(from.longitude)) from = here;
+        if (!std::isfinite(to.longitude)) to = here;
+        (along_x ? out.x : out.y)[n] = direction(here, from, to);
+      }
+    }
+  }
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/base/error.hpp"
+#include "server/data/cf/fields/rotation.hpp"
 #include "server/data/cf/grid/projection.hpp"
 #include "server/data/model/dataset_info.hpp"
 
@@ -26,6 +27,12 @@ struct ProjectedColumns {
 // proportion, or no column lies on the Earth.
 Result<ProjectedColumns> project_columns(const Projection& projection, const std::vector<double>& x,
                                          const std::vector<double>& y);
+
+// The directions of the axes at the columns that project_columns() gives, by steps far shorter than
+// a cell, since neighbours are no guide at the edge of a map: there cells are stretched without
+// bound. Zero for columns outside. Errors: as above.
+Result<AxisTangents> tangents_on_map(const Projection& projection, const std::vector<double>& x,
+                                     const std::vector<double>& y, const ProjectedColumns& columns);
 
 // The coordinates of a place, in metres. Errors: as above.
 Result<std::array<double, 2>> project_place(const Projection& projection, double longitude,

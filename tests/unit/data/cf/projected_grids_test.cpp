@@ -204,6 +204,61 @@ TEST(ProjectedGrids, AWindAlongTheRowsIsThatByEastAndNorth) {
   }
 }
 
+// At the rim of a satellite's disc, where a cell is many degrees long and its neighbours are not
+// seen, winds by east and north turn as the formula of the view says: t_x and t_y are the columns
+// of the inverse of its Jacobian by east and north.
+TEST(ProjectedGrids, WindsAtTheRimOfADiscTurnWithTheMap) {
+  const Folder folder;
+  const double height = 35785831;
+  std::vector<double> angles;
+  for (int i = -10; i <= 10; ++i) angles.push_back(0.015 * i);
+  {
+    NetcdfMaker file(folder / "g.nc");
+    const int y = file.axis("y", angles, "radian", "projection_y_coordinate");
+    const int x = file.axis("x", angles, "radian", "projection_x_coordinate");
+    write_mapping(file, {"geostationary",
+                         with(wgs84, at_origin(0, 0, {{"perspective_point_height", {height}}})),
+                         {{"sweep_angle_axis", "y"}}});
+    for (const bool is_east : {true, false}) {
+      const int v = file.variable(is_east ? "ua" : "va", NC_FLOAT, {y, x},
+                                  std::vector<double>(441, is_east ? 10 : 0));
+      file.text(v, "standard_name", is_east ? "eastward_wind" : "northward_wind");
+      file.text(v, "units", "m s-1");
+      file.text(v, "grid_mapping", "crs");
+    }
+  }
+  const auto source = opened(folder / "g.nc");
+  const Volume wind = volume_of(*source, "wind");
+  const auto& columns = *source->info().grid.columns;
+  const auto view = satellite(wgs84, height, 0, false);
+  std::size_t at_rim = 0;
+  for (std::size_t n = 0; n < 441; ++n) {
+    const double radius = std::hypot(angles[n % 21], angles[n / 21]);
+    if (radius > 0.1513) continue;
+    const double lon = columns.longitude[n];
+    const double lat = columns.latitude[n];
+    constexpr double step = 1e-4;
+    const double shrink = std::cos(lat * degree);
+    const Point east[] = {view(lon - step / shrink, lat), view(lon + step / shrink, lat)};
+    const Point north[] = {view(lon, lat - step), view(lon, lat + step)};
+    const double a = east[1].x - east[0].x;
+    const double b = north[1].x - north[0].x;
+    const double c = east[1].y - east[0].y;
+    const double d = north[1].y - north[0].y;
+    const double x_length = std::hypot(d, c);  // t_x = (d, -c), t_y = (-b, a)
+    const double y_length = std::hypot(b, a);
+    const double mean_east = d / x_length + a / y_length;
+    const double mean_north = -c / x_length + b / y_length;
+    const double turn = std::atan2(mean_north, mean_east);
+    const double found = std::atan2(-static_cast<double>(wind.component(1)[n]),
+                                    static_cast<double>(wind.component(0)[n]));
+    EXPECT_NEAR(std::remainder(found - turn, 2 * M_PI), 0, 0.02) << n << ' ' << radius;
+    EXPECT_NEAR(std::hypot(wind.component(0)[n], wind.component(1)[n]), 10, 1e-4);
+    at_rim += radius > 0.1495 ? 1 : 0;
+  }
+  EXPECT_EQ(at_rim, 20U);
+}
+
 // A file's own positions are used, and compared with its projection.
 TEST(ProjectedGrids, PositionsOfTheFileComeFirstAndContradictionsAreNoted) {
   for (const double shift : {0.0, 30.0}) {
