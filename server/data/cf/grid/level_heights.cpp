@@ -36,11 +36,15 @@ double ocean_s_g2(const LevelTerms& level, const ColumnTerms& column, const Cons
   const double s = (constants[0] * level[0] + column[0] * level[1]) / (constants[0] + column[0]);
   return column[1] + (column[1] + column[0]) * s;
 }
-// level = {sigma, zlev}; NaN in sigma below the sigma levels.
+// level = {sigma, zlev}; NaN in sigma below the sigma levels. NaN below the sea floor.
 double ocean_sigma_z(const LevelTerms& level, const ColumnTerms& column,
                      const Constants& constants) {
   if (std::isnan(column[0])) return column[0];
-  if (std::isnan(level[0])) return level[1];
+  if (std::isnan(level[0])) {
+    constexpr double rounding = 1e-6;  // of the depth, in float32
+    const bool is_below = level[1] < -column[0] - rounding * std::abs(column[0]);
+    return is_below ? std::numeric_limits<double>::quiet_NaN() : level[1];
+  }
   return column[1] + level[0] * (std::min(constants[0], column[0]) + column[1]);
 }
 // constants = {depth_c, a, b}; level[1] is C, which set_stretching() computes.
