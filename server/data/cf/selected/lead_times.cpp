@@ -19,7 +19,7 @@ namespace {
 struct ForecastTimes {
   int dimension = -1;  // of the lead times; -1: a single one without a dimension
   int lead = -1;       // variables
-  int reference = -1;
+  std::vector<int> references;
 };
 
 bool is_single(const FileContents& contents, const FileVariable& variable) {
@@ -28,15 +28,18 @@ bool is_single(const FileContents& contents, const FileVariable& variable) {
          });
 }
 
-// The first variable with a single value and that standard name; -1: none.
-int single_named(const FileContents& contents, std::string_view standard_name, bool counts) {
-  const auto found = std::find_if(
-      contents.variables.begin(), contents.variables.end(), [&](const FileVariable& variable) {
-        return variable.standard_name == standard_name && is_single(contents, variable) &&
-               counts_from_a_time(variable.units) == counts;
-      });
-  return found == contents.variables.end() ? -1
-                                           : static_cast<int>(found - contents.variables.begin());
+// The variables with a single value and that standard name.
+std::vector<int> singles_named(const FileContents& contents, std::string_view standard_name,
+                               bool counts) {
+  std::vector<int> out;
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    const FileVariable& variable = contents.variables[v];
+    if (variable.standard_name == standard_name && is_single(contents, variable) &&
+        counts_from_a_time(variable.units) == counts) {
+      out.push_back(static_cast<int>(v));
+    }
+  }
+  return out;
 }
 
 // Whether the file gives its times itself.
@@ -54,8 +57,8 @@ std::optional<ForecastTimes> times_of(const FileContents& contents) {
   const std::vector<DimensionRole> roles = classify_dimensions(contents);
   const bool timeless = !has_times(contents, roles);
   ForecastTimes out;
-  out.reference = single_named(contents, "forecast_reference_time", true);
-  if (out.reference < 0) return std::nullopt;
+  out.references = singles_named(contents, "forecast_reference_time", true);
+  if (out.references.empty()) return std::nullopt;
   for (std::size_t d = 0; d < roles.size(); ++d) {
     const int own = roles[d].coordinate;
     const FileDimension& dimension = contents.dimensions[d];
@@ -67,11 +70,14 @@ std::optional<ForecastTimes> times_of(const FileContents& contents) {
       out.lead = own;
     }
   }
-  if (out.lead < 0 && timeless) out.lead = single_named(contents, "forecast_period", false);
+  if (out.lead < 0 && timeless) {
+    const std::vector<int> leads = singles_named(contents, "forecast_period", false);
+    if (!leads.empty()) out.lead = leads.front();
+  }
   return out.lead < 0 ? std::nullopt : std::optional(out);
 }
 
-// A file and a variable of known values, the last one.
+// A file with other contents: a variable of known values, the last one, unless it has no values.
 class TimedFile final : public ArrayFile {
  public:
   TimedFile(std::unique_ptr<ArrayFile> base, FileContents contents, std::vector<double> times)
@@ -118,13 +124,28 @@ class TimedFile final : public ArrayFile {
 
  private:
   [[nodiscard]] bool is_own(int variable) const {
-    return at(variable) + 1 == contents_.variables.size();
+    return !times_.empty() && at(variable) + 1 == contents_.variables.size();
   }
 
   std::unique_ptr<ArrayFile> base_;
   FileContents contents_;
   std::vector<double> times_;
 };
+
+// The dates of reference times, in their order; empty if one of them is none.
+Result<std::vector<std::string>> dates_of(const ArrayFile& file,
+                                          const std::vector<int>& variables) {
+  std::vector<std::string> out;
+  for (const int v : variables) {
+    const FileVariable& one = file.contents().variables[at(v)];
+    const auto values = unpacked_values(file, v);
+    if (!values) return values.error();
+    const auto decoded = decode_time(*values, one.units, one.calendar);
+    if (!decoded.reason.empty()) return std::vector<std::string>();
+    out.push_back(decoded.steps.front().text);
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -137,14 +158,22 @@ Result<std::unique_ptr<ArrayFile>> with_valid_times(std::unique_ptr<ArrayFile> f
   if (!found) return file;
   FileContents contents = file->contents();
   FileVariable& lead = contents.variables[at(found->lead)];
-  FileVariable& reference = contents.variables[at(found->reference)];
+  FileVariable& reference = contents.variables[at(found->references.front())];
   const auto leads = unpacked_values(*file, found->lead);
   if (!leads) return leads.error();
-  const auto since = unpacked_values(*file, found->reference);
-  if (!since) return since.error();
-  const auto decoded = decode_time(*since, reference.units, reference.calendar);
-  if (!decoded.reason.empty()) return file;
-  const std::string date = decoded.steps.front().text;
+  const auto dates = dates_of(*file, found->references);
+  if (!dates) return dates.error();
+  if (dates->empty()) return file;
+  const std::string& date = dates->front();
+  for (std::size_t n = 1; n < dates->size(); ++n) {
+    if ((*dates)[n] == date) continue;
+    contents.notes.push_back("lead times are not shown as dates: there are two reference times, " +
+                             in_quotes(reference.name) + " (" + date + ") and " +
+                             in_quotes(contents.variables[at(found->references[n])].name) + " (" +
+                             (*dates)[n] + ')');
+    return std::unique_ptr<ArrayFile>(
+        std::make_unique<TimedFile>(std::move(file), std::move(contents), std::vector<double>()));
+  }
   auto times = convert_times(*leads, {lead.units + " since " + date, reference.calendar},
                              {reference.units, reference.calendar});
   if (!times) return file;

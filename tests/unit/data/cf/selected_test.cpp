@@ -11,56 +11,13 @@
 #include <vector>
 
 #include "server/data/files/files.hpp"
-#include "tests/unit/data/dataset_probe.hpp"
-#include "tests/unit/data/netcdf_maker.hpp"
+#include "tests/unit/data/cf/selected_maker.hpp"
 
-namespace windsplat::data::test {
+namespace windsplat::data::test::entries {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-// Values whose decimal digits are the sample's indices, the first dimension's first.
-std::vector<double> tagged(const std::vector<std::size_t>& lengths) {
-  std::vector<double> out{0};
-  for (const std::size_t length : lengths) {
-    std::vector<double> next;
-    next.reserve(out.size() * length);
-    for (const double tag : out) {
-      for (std::size_t i = 0; i < length; ++i) next.push_back(10 * tag + static_cast<double>(i));
-    }
-    out = std::move(next);
-  }
-  return out;
-}
-
-float last_of(const Volume& volume) { return volume.values[volume.values.size() - 1]; }
-
-struct Space {
-  int z, y, x;
-};
-
-Space space_of(NetcdfMaker& file) {
-  return {file.axis("lev", {1000, 500}, "hPa", "air_pressure"),
-          file.axis("lat", {0, 10, 20}, "degrees_north", "latitude"),
-          file.axis("lon", {0, 10, 20, 30}, "degrees_east", "longitude")};
-}
-
-// Members 3, 5 and 9; t(number, time, lev, lat, lon), oro(lat, lon).
-void write_ensemble(const std::string& path, double hour = 0) {
-  NetcdfMaker file(path);
-  const int n = file.axis("number", {3, 5, 9}, "1", "realization");
-  const int t = file.axis("time", {hour, hour + 6}, "hours since 2001-01-01", "time");
-  const auto [z, y, x] = space_of(file);
-  file.variable("t", NC_FLOAT, {n, t, z, y, x}, tagged({3, 2, 2, 3, 4}));
-  file.variable("steady", NC_FLOAT, {z, y, x}, tagged({2, 3, 4}));
-}
-
-std::string why_not(const std::string& path) {
-  const auto source = open_file(path);
-  EXPECT_FALSE(source) << path << " was opened";
-  return source ? "" : source.error().message;
-}
 
 TEST(SelectedEntries, EveryMemberIsShownByItsValue) {
   const Folder folder;
@@ -234,184 +191,6 @@ TEST(SelectedEntries, CornersOfCellsAreNotMembers) {
   EXPECT_EQ(reason_of(source->info(), "area"), "its dimension 'nv' is neither space nor time");
 }
 
-// t(reference, lead, lev, lat, lon), with valid times or without.
-void write_forecast(const std::string& path, bool valid_times) {
-  NetcdfMaker file(path);
-  const int r = file.axis("reftime", {0, 24}, "hours since 2001-01-01", "forecast_reference_time");
-  const int l = file.axis("leadtime", {0, 6, 12}, "hours", "forecast_period");
-  const auto [z, y, x] = space_of(file);
-  if (valid_times) {
-    const int valid = file.variable("valid_time", NC_DOUBLE, {r, l}, {0, 6, 12, 24, 30, 36});
-    file.text(valid, "units", "hours since 2001-01-01");
-    file.text(valid, "standard_name", "time");
-  }
-  file.variable("t", NC_FLOAT, {r, l, z, y, x}, tagged({2, 3, 2, 3, 4}));
-}
-
-TEST(SelectedEntries, LeadTimesAreStepsWithTheirValidTimes) {
-  const Folder folder;
-  write_forecast(folder / "f.nc", true);
-  const auto source = opened(folder / "f.nc?reftime=2001-01-02T00:00:00Z");
-  ASSERT_NE(source, nullptr);
-  ASSERT_EQ(source->info().steps.size(), 3U);
-  EXPECT_EQ(source->info().steps[0].text, "2001-01-02T00:00:00Z");
-  EXPECT_EQ(source->info().steps[2].text, "2001-01-02T12:00:00Z");
-  EXPECT_EQ(source->info().time_units, "hours since 2001-01-01");
-  EXPECT_EQ(last_of(volume_of(*source, "t", 2)), 12123);
-  EXPECT_TRUE(has_note(source->info(), "valid times 'valid_time' of the lead times 'leadtime'"));
-  const auto first = opened(folder / "f.nc");
-  ASSERT_NE(first, nullptr);
-  EXPECT_EQ(first->info().steps[2].text, "2001-01-01T12:00:00Z");
-  EXPECT_EQ(last_of(volume_of(*first, "t", 2)), 2123);
-  EXPECT_TRUE(has_note(first->info(),
-                       "'reftime' has 2 entries (2001-01-01T00:00:00Z .. "
-                       "2001-01-02T00:00:00Z): the first is shown"));
-}
-
-TEST(SelectedEntries, LeadTimesFollowTheChosenReferenceTime) {
-  const Folder folder;
-  write_forecast(folder / "f.nc", false);
-  const auto source = opened(folder / "f.nc?reftime=24");
-  ASSERT_NE(source, nullptr);
-  ASSERT_EQ(source->info().steps.size(), 3U);
-  EXPECT_EQ(source->info().steps[1].value, 30);
-  EXPECT_EQ(source->info().steps[1].text, "2001-01-02T06:00:00Z");
-  EXPECT_EQ(source->info().time_units, "hours since 2001-01-01");
-  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 11123);
-  EXPECT_TRUE(has_note(source->info(),
-                       "time steps are the lead times 'leadtime' after the reference time "
-                       "2001-01-02T00:00:00Z"));
-  EXPECT_TRUE(source->info().left_out.empty());
-}
-
-// A forecast of two steps, with a single reference time in days. Times in half days.
-void write_one_forecast(const std::string& path, const std::string& lead_units, double day,
-                        const char* axis = "") {
-  NetcdfMaker file(path);
-  const int l = file.axis("step", {0.5, 1}, lead_units, "forecast_period");
-  if (*axis != '\0') file.text(file.variable_id("step"), "axis", axis);
-  const auto [z, y, x] = space_of(file);
-  const int reference = file.variable("start", NC_DOUBLE, {}, {day});
-  file.text(reference, "units", "days since 2000-02-28");
-  file.text(reference, "calendar", "noleap");
-  file.text(reference, "standard_name", "forecast_reference_time");
-  file.variable("t", NC_FLOAT, {l, z, y, x}, tagged({2, 2, 3, 4}));
-}
-
-TEST(SelectedEntries, LeadTimesFollowTheOnlyReferenceTime) {
-  const Folder folder;
-  write_one_forecast(folder / "f_1.nc", "days", 0.5);
-  write_one_forecast(folder / "f_2.nc", "days", 1.5);
-  const auto source = opened(folder / "f_1.nc");
-  ASSERT_NE(source, nullptr);
-  ASSERT_EQ(source->info().steps.size(), 2U);
-  EXPECT_EQ(source->info().steps[0].text, "2000-03-01T00:00:00Z") << "no leap day";
-  EXPECT_EQ(source->info().steps[1].value, 1.5);
-  EXPECT_TRUE(source->info().left_out.empty());
-  const auto series = opened(folder / "f_*.nc");
-  ASSERT_NE(series, nullptr);
-  ASSERT_EQ(series->info().steps.size(), 4U);
-  EXPECT_EQ(series->info().steps[3].text, "2000-03-02T12:00:00Z");
-  EXPECT_EQ(last_of(volume_of(*series, "t", 3)), 1123);
-}
-
-TEST(SelectedEntries, LeadTimesOnADeclaredTimeAxisFollowItToo) {
-  const Folder folder;
-  write_one_forecast(folder / "f.nc", "hours", 0.5, "T");
-  const auto source = opened(folder / "f.nc");
-  ASSERT_NE(source, nullptr);
-  ASSERT_EQ(source->info().steps.size(), 2U);
-  EXPECT_EQ(source->info().steps[1].text, "2000-02-28T13:00:00Z");
-  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 1123);
-}
-
-// One lead time, as a dimension of length 1 or without a dimension.
-void write_one_lead(const std::string& path, double hours, bool with_dimension) {
-  NetcdfMaker file(path);
-  const int reference = file.variable("start", NC_DOUBLE, {}, {31});
-  file.text(reference, "units", "days since 2000-01-01");
-  file.text(reference, "standard_name", "forecast_reference_time");
-  std::vector<int> dims;
-  if (with_dimension) {
-    dims.push_back(file.axis("lead", {hours}, "hours", "forecast_period"));
-  } else {
-    const int lead = file.variable("lead", NC_DOUBLE, {}, {hours});
-    file.text(lead, "units", "hours");
-    file.text(lead, "standard_name", "forecast_period");
-  }
-  const auto [z, y, x] = space_of(file);
-  dims.insert(dims.end(), {z, y, x});
-  file.variable("t", NC_FLOAT, dims, std::vector<double>(24, hours));
-}
-
-TEST(SelectedEntries, FilesOfOneLeadTimeEachAreASeries) {
-  for (const bool with_dimension : {true, false}) {
-    const Folder folder;
-    write_one_lead(folder / "f_a.nc", 12, with_dimension);
-    write_one_lead(folder / "f_b.nc", 6, with_dimension);
-    const auto one = opened(folder / "f_a.nc");
-    ASSERT_NE(one, nullptr);
-    ASSERT_EQ(one->info().steps.size(), 1U);
-    EXPECT_EQ(one->info().steps[0].text, "2000-02-01T12:00:00Z") << with_dimension;
-    EXPECT_TRUE(one->info().left_out.empty()) << with_dimension;
-    EXPECT_TRUE(has_note(one->info(), "'lead' after the reference time 2000-02-01T00:00:00Z"));
-    const auto series = opened(folder / "f_*.nc");
-    ASSERT_NE(series, nullptr);
-    ASSERT_EQ(series->info().steps.size(), 2U);
-    EXPECT_EQ(series->info().steps[0].text, "2000-02-01T06:00:00Z") << "by time, not by name";
-    EXPECT_EQ(last_of(volume_of(*series, "t", 0)), 6);
-    EXPECT_EQ(last_of(volume_of(*series, "t", 1)), 12);
-  }
-}
-
-TEST(SelectedEntries, LeadTimesOfUnknownUnitsAreSteps) {
-  const Folder folder;
-  write_one_forecast(folder / "f.nc", "fortnights", 0.5);
-  const auto source = opened(folder / "f.nc");
-  ASSERT_NE(source, nullptr);
-  ASSERT_EQ(source->info().steps.size(), 2U);
-  EXPECT_EQ(source->info().steps[0].value, 0.5);
-  EXPECT_TRUE(has_note(source->info(), "time steps are the lead times 'step'"));
-  EXPECT_FALSE(has_note(source->info(), "after the reference time"));
-}
-
-TEST(SelectedEntries, TheCoordinateOfAChoiceIsNotOmitted) {
-  const Folder folder;
-  write_ensemble(folder / "e.nc");
-  for (const char* name : {"e.nc", "e.nc?number=5", "e.nc?number=5&time=6"}) {
-    const auto source = opened(folder / name);
-    ASSERT_NE(source, nullptr) << name;
-    EXPECT_TRUE(source->info().left_out.empty()) << name;
-  }
-}
-
-TEST(SelectedEntries, ReferenceTimesAreStepsIfALeadTimeIsChosen) {
-  const Folder folder;
-  write_forecast(folder / "f.nc", false);
-  const auto source = opened(folder / "f.nc?leadtime=12");
-  ASSERT_NE(source, nullptr);
-  ASSERT_EQ(source->info().steps.size(), 2U);
-  EXPECT_EQ(source->info().steps[1].text, "2001-01-02T00:00:00Z");
-  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 12123);
-}
-
-TEST(SelectedEntries, AReferenceTimeThatIsMissingIsNoDate) {
-  const Folder folder;
-  {
-    NetcdfMaker file(folder / "f.nc");
-    const int r =
-        file.axis("reftime", {-999, 24}, "hours since 2001-01-01", "forecast_reference_time");
-    file.number(file.variable_id("reftime"), "missing_value", NC_DOUBLE, {-999});
-    const int l = file.axis("leadtime", {0, 6}, "hours", "forecast_period");
-    const auto [z, y, x] = space_of(file);
-    file.variable("t", NC_FLOAT, {r, l, z, y, x}, tagged({2, 2, 2, 3, 4}));
-  }
-  const auto source = opened(folder / "f.nc");
-  ASSERT_NE(source, nullptr);
-  EXPECT_THAT(source->info().choices.at(0).values, ElementsAre("nan", "2001-01-02T00:00:00Z"));
-  EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 1123);
-}
-
 TEST(SelectedEntries, ASeriesShowsOneMemberOfEveryFile) {
   const Folder folder;
   write_ensemble(folder / "e_1.nc", 0);
@@ -486,4 +265,4 @@ TEST(SelectedEntries, APathBelowTheDataRootHasThemToo) {
 }
 
 }  // namespace
-}  // namespace windsplat::data::test
+}  // namespace windsplat::data::test::entries
