@@ -181,6 +181,9 @@ class ArraySource final : public FileSource {
     for (std::size_t which = 0; which < 3; ++which) {
       if (choice_.space.at(which) < 0) {
         info_.grid.axes.at(which) = flat_axis(which);
+        if (which == 2) {
+          if (auto done = find_level(); !done) return done;
+        }
         continue;
       }
       if (auto done = find_axis(which); !done) {
@@ -228,6 +231,27 @@ class ArraySource final : public FileSource {
     axis.kind = over_globe ? AxisKind::level : AxisKind::cartesian;
     axis.coordinates = {0};
     return axis;
+  }
+
+  // The place of a chosen level, whose coordinate has lost its dimension.
+  Result<void> find_level() {
+    for (std::size_t v = 0; v < file_->contents().variables.size(); ++v) {
+      const FileVariable& variable = file_->contents().variables[v];
+      if (!variable.in_use || !variable.numeric || !variable.dims.empty()) continue;
+      FileContents level;
+      level.dimensions.push_back({.name = variable.name, .length = 1});
+      level.variables.push_back(variable);
+      level.variables.front().dims = {0};
+      const DimensionRole role = classify_dimensions(level).front();
+      if (role.role != Role::z) continue;
+      auto value = unpacked_values(*file_, static_cast<int>(v));
+      if (!value) return value.error();
+      auto oriented = orient_axis(level, role, 0, 2, std::move(*value), info_.grid.axes[0].kind);
+      if (!oriented) return oriented.error();
+      info_.grid.axes[2] = std::move(oriented->axis);
+      return {};
+    }
+    return {};
   }
 
   Result<void> find_axis(std::size_t which) {

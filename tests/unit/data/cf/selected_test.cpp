@@ -121,6 +121,18 @@ TEST(SelectedEntries, SpaceAndTimeMayBeChosenToo) {
   EXPECT_EQ(last_of(volume), 21123);
 }
 
+TEST(SelectedEntries, AChosenLevelStaysInItsPlace) {
+  const Folder folder;
+  write_ensemble(folder / "e.nc");
+  const auto source = opened(folder / "e.nc?number=9&lev=500");
+  ASSERT_NE(source, nullptr);
+  const Axis& z = source->info().grid.axes[2];
+  EXPECT_EQ(z.name, "lev");
+  EXPECT_EQ(z.kind, AxisKind::pressure);
+  EXPECT_EQ(z.units, "hPa");
+  EXPECT_EQ(z.coordinates, std::vector<double>{500});
+}
+
 TEST(SelectedEntries, BandsWithoutACoordinateAreNumberedFromZero) {
   const Folder folder;
   {
