@@ -61,6 +61,11 @@ class Entries {
     const bool numeric = fault == std::errc() && stop == end;
     const bool by_text =
         !numeric || (variable_ != nullptr && !counts_from_a_time(variable_->units));
+    const bool is_narrow = variable_ != nullptr && variable_->type == "float32";
+    const auto equals = [&](double value) {
+      return value == number ||
+             (is_narrow && static_cast<float>(value) == static_cast<float>(number));
+    };
     for (std::size_t i = 0; i < values_.size(); ++i) {
       if ((numeric && values_[i] == number) || (by_text && text(i) == wanted)) return i;
     }

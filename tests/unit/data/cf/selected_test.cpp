@@ -164,6 +164,9 @@ TEST(SelectedEntries, SinglePrecisionValuesAreNamedAsTheyWereWritten) {
     const auto [z, y, x] = space_of(file);
     file.variable("aerosol", NC_FLOAT, {b, z, y, x}, tagged({2, 2, 3, 4}));
   }
+  const auto first = opened(folder / "waves.nc?wavelength=0.10");
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(last_of(volume_of(*first, "aerosol")), 123);
   const auto source = opened(folder / "waves.nc?wavelength=0.55");
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(last_of(volume_of(*source, "aerosol")), 1123);
