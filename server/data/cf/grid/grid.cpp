@@ -120,6 +120,13 @@ std::string nothing_to_show(const FileContents& contents, const std::vector<Left
       most = &variable;
     }
   }
+  constexpr std::size_t listed_max = 16;
+  std::size_t count = 0;
+  for (const LeftOut& left : left_out) {
+    if (!left.reason.starts_with("group") || ++count > listed_max) continue;
+    text += (count == 1 ? "; it has the groups " : ", ") + in_quotes(left.name);
+  }
+  if (count > listed_max) text += ", ...";
   if (most == nullptr || most->dims.empty()) return text;
   text += ": " + in_quotes(most->name) + " is of ";
   const char* separator = "";

@@ -193,6 +193,17 @@ TEST(ZarrGroups, TheFinestLevelOfAnImageOfOmeZarr4) {
   expect_image(store);
 }
 
+// The root that bioformats2raw writes: no arrays, but a group for each image.
+TEST(ZarrGroups, ARefusalNamesTheGroupsOfARootWithoutArrays) {
+  const ZarrStore store;
+  store.put("zarr.json", group3(R"({"ome":{"version":"0.5","bioformats2raw.layout":3}})"));
+  store.put("0/zarr.json", group3("{}"));
+  store.put("OME/zarr.json", group3("{}"));
+  const auto source = open_file(store.path());
+  ASSERT_FALSE(source);
+  EXPECT_THAT(source.error().message, HasSubstr("; it has the groups '0', 'OME'"));
+}
+
 TEST(ZarrGroups, ChannelsAreChosenFrom) {
   const ZarrStore store("cell.zarr", "zarr.json",
                         group3(R"({"ome":{"multiscales":[)" + kImage + "]}}"));
