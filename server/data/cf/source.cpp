@@ -319,6 +319,8 @@ class ArraySource final : public FileSource {
     for (const LeftOut& left : info_.left_out) {
       const int v = variable_named(file_->contents(), left.name);
       if (v < 0 || !is_velocity_component(file_->contents().variables[at(v)])) continue;
+      const auto& shown = choice_.variables;
+      if (std::find(shown.begin(), shown.end(), v) != shown.end()) continue;  // of another file
       text += (text.empty() ? "" : "; ") + in_quotes(left.name) + ": " + left.reason;
     }
     if (!text.empty()) info_.notes.push_back("components of a velocity are not shown: " + text);

@@ -274,6 +274,25 @@ TEST(NetcdfFields, ComponentsOfOtherQuantitiesAreNotJoined) {
   }
 }
 
+TEST(NetcdfFields, VelocitiesThatTwoFilesHaveAreNotNotedAsAbsent) {
+  const Folder folder;
+  for (const char* name : {"a.nc", "b.nc"}) {
+    const auto source = wind_in(folder / name, {"m/s", "m/s", "m/s"});
+    ASSERT_TRUE(source) << source.error().message;
+  }
+  const auto joined = open_file(folder / "{a,b}.nc");
+  ASSERT_TRUE(joined) << joined.error().message;
+  const DatasetInfo& info = (*joined)->info();
+  EXPECT_EQ(info.fields.front().components.size(), 3U);
+  EXPECT_EQ(std::count_if(
+                info.left_out.begin(), info.left_out.end(),
+                [](const LeftOut& left) { return left.reason.starts_with("in several files"); }),
+            3);
+  for (const std::string& note : info.notes) {
+    EXPECT_EQ(note.find("components of a velocity are not shown"), std::string::npos) << note;
+  }
+}
+
 TEST(NetcdfFields, LargestGridIsUsedAndTheRestIsExplained) {
   const Folder folder;
   {
