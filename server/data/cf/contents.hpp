@@ -46,6 +46,7 @@ struct FileVariable {
   std::string unread;        // why a variable cannot be read; `numeric` is then false
   bool packed = false;       // has scale_factor or add_offset
   bool is_unsigned = false;  // _Unsigned = "true" on a signed integer type
+  bool preferred = false;    // its grid is shown, whatever others the file has
   bool in_use = false;       // a coordinate that named an entry or gave the times: not omitted
 };
 

@@ -56,6 +56,7 @@ class ArraySource final : public FileSource {
     }
     info_.left_out = std::move(choice_.left_out);
     info_.notes = file_->contents().notes;
+    if (!choice_.note.empty()) info_.notes.push_back(choice_.note);
     info_.choices = file_->contents().choices;
     if (auto done = find_axes(); !done) {
       return named(done.error());

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <unordered_set>
 #include <utility>
 
@@ -20,6 +22,7 @@ struct Candidate {
 struct Group {
   std::array<int, 3> space{};
   int rank = 0;
+  bool preferred = false;
   double samples = 0;  // over all variables; only compared, so rounding is harmless
   std::vector<Candidate> members;
 };
@@ -153,9 +156,11 @@ void add_to_group(const FileContents& contents, std::vector<Group>& groups, Cand
   auto at = std::find_if(groups.begin(), groups.end(),
                          [&](const Group& group) { return group.space == space; });
   if (at == groups.end()) {
-    groups.push_back({space, candidate.layout.rank(), 0, {}});
+    groups.push_back({space, candidate.layout.rank(), false, 0, {}});
     at = groups.end() - 1;
   }
+  at->preferred = at->preferred ||
+                  contents.variables.at(static_cast<std::size_t>(candidate.variable)).preferred;
   at->samples += samples_of(contents, space);
   at->members.push_back(std::move(candidate));
 }
@@ -189,6 +194,42 @@ int common_time(const std::vector<Candidate>& members) {
     }
   }
   return best;
+}
+
+// Says how to show the grids that are not chosen, by one variable of each.
+void tell_other_grids(const FileContents& contents, const std::vector<Group>& groups,
+                      GridChoice& choice) {
+  constexpr std::size_t listed_max = 8;
+  std::string text;
+  std::size_t count = 0;
+  for (const Group& group : groups) {
+    if (group.space == choice.space || ++count > listed_max) continue;
+    const auto first = static_cast<std::size_t>(group.members.front().variable);
+    text += (count == 1 ? "" : ", ") + printable(contents.variables[first].name);
+  }
+  if (count == 0) return;
+  choice.note = (count == 1 ? "fields on another grid are shown by appending ?field="
+                            : "fields on " + std::to_string(count) +
+                                  " other grids are shown by appending ?field=NAME to the file's "
+                                  "name, with the name of one of them: ") +
+                text +
+                (count == 1           ? " to the file's name"
+                 : count > listed_max ? ", ..."
+                                      : "");
+}
+
+// Why a preferred variable is no field; empty if none is preferred.
+std::optional<Error> not_shown(const FileContents& contents, const std::vector<LeftOut>& left_out) {
+  for (const FileVariable& variable : contents.variables) {
+    if (!variable.preferred) continue;
+    std::string text = in_quotes(variable.name) + " cannot be shown";
+    for (const LeftOut& left : left_out) {
+      if (left.name == variable.name)
+        return make_error(ErrorKind::bad_data, text + ": " + left.reason);
+    }
+    return make_error(ErrorKind::bad_data, text);
+  }
+  return std::nullopt;
 }
 
 Result<void> check_size(const FileContents& contents, const GridChoice& choice) {
@@ -245,10 +286,18 @@ Result<GridChoice> choose_grid(const FileContents& contents,
   }
   const auto best =
       std::max_element(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
-        return std::pair(a.rank, a.samples) < std::pair(b.rank, b.samples);
+        return std::tuple(a.preferred, a.rank, a.samples) <
+               std::tuple(b.preferred, b.rank, b.samples);
       });
+  if (const auto wanted = not_shown(contents, choice.left_out); wanted && !best->preferred) {
+    return *wanted;
+  }
   choice.space = best->space;
   choice.time = common_time(best->members);
+  for (const Candidate& member : best->members) {
+    const FileVariable& variable = contents.variables[static_cast<std::size_t>(member.variable)];
+    if (variable.preferred && member.layout.time >= 0) choice.time = member.layout.time;
+  }
   for (const Candidate& member : best->members) {
     if (member.layout.time >= 0 && member.layout.time != choice.time) {
       choice.left_out.push_back({contents.variables[static_cast<std::size_t>(member.variable)].name,
@@ -257,6 +306,7 @@ Result<GridChoice> choose_grid(const FileContents& contents,
       choice.variables.push_back(member.variable);
     }
   }
+  tell_other_grids(contents, groups, choice);
   for (const Group& group : groups) {
     if (group.space != choice.space) {
       for (const Candidate& member : group.members) {

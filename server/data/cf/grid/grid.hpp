@@ -21,14 +21,16 @@ struct GridChoice {
   int time = -1;                         // dimension id, -1 if no field depends on time
   std::vector<int> variables;            // those shown, in the order of the file
   std::vector<LeftOut> left_out;
+  std::string note;  // how to show other grids of the file; empty if there are none
 };
 
 // For each variable why it cannot be a field on any grid; empty if it can.
 std::vector<std::string> reasons_of_no_field(const FileContents& contents,
                                              const std::vector<DimensionRole>& roles);
 
-// Prefers grids with three spatial dimensions, then the one with the most samples over all its
-// variables. Errors: bad_data if there is none, or if it exceeds samples_max.
+// Prefers the grid of a preferred variable, then grids with three spatial dimensions, then the one
+// with the most samples over all its variables. Errors: bad_data if there is none, or if it exceeds
+// samples_max.
 Result<GridChoice> choose_grid(const FileContents& contents,
                                const std::vector<DimensionRole>& roles);
 

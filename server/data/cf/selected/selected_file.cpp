@@ -67,7 +67,7 @@ class Entries {
              (is_narrow && static_cast<float>(value) == static_cast<float>(number));
     };
     for (std::size_t i = 0; i < values_.size(); ++i) {
-      if ((numeric && values_[i] == number) || (by_text && text(i) == wanted)) return i;
+      if ((numeric && equals(values_[i])) || (by_text && text(i) == wanted)) return i;
     }
     const bool by_index =
         variable_ == nullptr && numeric && number >= 0 && number < static_cast<double>(length_);
@@ -95,6 +95,15 @@ class Entries {
   std::vector<double> values_;
 };
 
+// Prefers the grid of a variable; false if the file does not have it.
+bool prefer(FileContents& contents, const std::string& name) {
+  const int v = variable_named(contents, name);
+  if (v < 0) return false;
+  contents.variables[at(v)].preferred = true;
+  contents.choices.push_back({field_choice, 1, {name}, name});
+  return true;
+}
+
 class SelectedFile final : public ArrayFile {
  public:
   explicit SelectedFile(std::unique_ptr<ArrayFile> base)
@@ -109,6 +118,8 @@ class SelectedFile final : public ArrayFile {
     Selection found;
     for (const SelectedEntry& one : selection) {
       const int d = dimension_named(contents_, one.dimension);
+      if (d < 0 && one.dimension == field_choice && prefer(contents_, one.value))
+        found.push_back(one);
       if (d < 0) continue;
       if (auto fixed = fix(d, &one.value); !fixed) return fixed;
       found.push_back(one);
@@ -280,6 +291,9 @@ Result<void> check_selection(const FileContents& contents, const Selection& sele
                     [&](const DimensionChoice& choice) { return choice.name == one.dimension; });
     if (found) continue;
     constexpr std::size_t listed_max = 20;
+    if (one.dimension == field_choice && dimension_named(contents, field_choice) < 0) {
+      return make_error(ErrorKind::not_found, "there is no field " + in_quotes(one.value));
+    }
     std::string text = "there is no dimension " + in_quotes(one.dimension) + ": there are";
     for (std::size_t d = 0; d < std::min(contents.dimensions.size(), listed_max); ++d) {
       text += (d == 0 ? " " : ", ") + in_quotes(contents.dimensions[d].name) + " (" +

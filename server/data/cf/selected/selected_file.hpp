@@ -10,6 +10,9 @@
 
 namespace windsplat::data::cf {
 
+// The name of the choice of a variable whose grid is shown: "?field=pr".
+inline constexpr const char* field_choice = "field";
+
 // The file itself if nothing is to be chosen. Otherwise a file with the same variables in the same
 // order, without the dimensions that `selection` names and without those of
 // find_extra_dimensions(), of which the first entry is taken and noted. A dimension that it does

@@ -133,6 +133,48 @@ TEST(SelectedEntries, AChosenLevelStaysInItsPlace) {
   EXPECT_EQ(z.coordinates, std::vector<double>{500});
 }
 
+// t(time, lev, lat, lon) beside pr(time, lat, lon) and pr_day(day, lat, lon).
+TEST(SelectedEntries, FieldsOnAnotherGridAreShownByName) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "m.nc");
+    const int t = file.axis("time", {0, 6}, "hours since 2001-01-01", "time");
+    const int day = file.axis("day", {0}, "days since 2001-01-01", "time");
+    const auto [z, y, x] = space_of(file);
+    file.variable("t", NC_FLOAT, {t, z, y, x}, tagged({2, 2, 3, 4}));
+    file.variable("pr", NC_FLOAT, {t, y, x}, tagged({2, 3, 4}));
+    file.variable("ps", NC_FLOAT, {t, y, x}, tagged({2, 3, 4}));
+    file.variable("pr_day", NC_FLOAT, {day, y, x}, tagged({1, 3, 4}));
+    file.variable("lat_bnds", NC_DOUBLE, {y, file.dimension("bnds", 2)}, tagged({3, 2}));
+    file.text(file.variable_id("lat"), "bounds", "lat_bnds");
+  }
+  const auto all = opened(folder / "m.nc");
+  ASSERT_NE(all, nullptr);
+  EXPECT_NE(all->info().find("t"), nullptr);
+  EXPECT_EQ(all->info().find("pr"), nullptr);
+  EXPECT_TRUE(has_note(all->info(),
+                       "fields on another grid are shown by appending ?field=pr to the file's"));
+  const auto flat = opened(folder / "m.nc?field=pr");
+  ASSERT_NE(flat, nullptr);
+  EXPECT_EQ(flat->info().find("t"), nullptr);
+  EXPECT_NE(flat->info().find("ps"), nullptr);
+  ASSERT_EQ(flat->info().steps.size(), 2U);
+  EXPECT_EQ(flat->info().title, "m (field=pr)");
+  const Volume volume = volume_of(*flat, "pr", 1);
+  ASSERT_EQ(volume.dims, (std::array<int, 3>{4, 3, 1}));
+  EXPECT_EQ(last_of(volume), 123);
+  const auto daily = opened(folder / "m.nc?field=pr_day");
+  ASSERT_NE(daily, nullptr);
+  EXPECT_NE(daily->info().find("pr_day"), nullptr) << "its own time";
+  EXPECT_THAT(why_not(folder / "m.nc?field=nothing"), HasSubstr("there is no field 'nothing'"));
+  EXPECT_THAT(why_not(folder / "m.nc?field=lat_bnds"),
+              HasSubstr("'lat_bnds' cannot be shown: bounds of a coordinate"));
+  std::filesystem::copy(folder / "m.nc", folder / "m_2.nc");
+  const auto series = opened(folder / "m*.nc?field=pr");
+  ASSERT_NE(series, nullptr);
+  EXPECT_EQ(last_of(volume_of(*series, "pr", 1)), 123);
+}
+
 TEST(SelectedEntries, BandsWithoutACoordinateAreNumberedFromZero) {
   const Folder folder;
   {
