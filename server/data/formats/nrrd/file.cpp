@@ -220,9 +220,18 @@ class Opener {
     add_components(variable, placement, components, component_stride);
   }
 
+  // The file's name; in a series without its number, as files must agree on the names of fields.
+  [[nodiscard]] std::string field_name() const {
+    std::string name = std::filesystem::path(input_->name()).stem().native();
+    if (files_->location().kind != Location::Kind::series) return name;
+    const std::size_t end = name.find_last_not_of("0123456789-_.");
+    name.resize(end == std::string::npos ? 0 : end + 1);
+    return name.empty() ? "values" : name;
+  }
+
   void add_components(FileVariable variable, const bytes::Placement& placement,
                       std::uint64_t components, std::uint64_t stride) {
-    const std::string name = std::filesystem::path(input_->name()).stem().native();
+    const std::string name = field_name();
     if (components == 1) {
       variable.name = name;
       file_->add_array(std::move(variable), placement, {});

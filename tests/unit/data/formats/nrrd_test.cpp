@@ -291,6 +291,18 @@ TEST(Nrrd, DetachedDataOneFilePatternAndList) {
   }
 }
 
+TEST(Nrrd, FilesOfAPatternAreSteps) {
+  const Folder folder;
+  for (const int n : {1, 2, 3}) {
+    write_file(folder / ("smoke_00" + std::to_string(n) + ".nrrd"),
+               header(plain_2x3x2 + "encoding: raw\n\n") + packed<float>(counted(12, n)));
+  }
+  const auto source = opened(folder / "smoke_*.nrrd");
+  ASSERT_TRUE(source);
+  ASSERT_EQ(source->info().steps.size(), 3U);
+  EXPECT_EQ(values_of(*source, "smoke", 2), floats(counted(12, 3)));
+}
+
 TEST(Nrrd, DataFilesOutsideTheFolderAreRefused) {
   const Folder folder;
   const std::string fields = plain_2x3x2 + "encoding: raw\ndata file: ";
