@@ -58,18 +58,38 @@ Error misfit(const ArrayFile& file, const ArrayFile& first, const std::string& w
 
 }  // namespace
 
+std::string damaged_files_note(const std::vector<Error>& damaged, std::size_t members) {
+  constexpr std::size_t listed_max = 8;
+  std::string text = std::to_string(damaged.size()) + " of " + std::to_string(members) +
+                     " files cannot be read, their steps are left out: ";
+  for (std::size_t n = 0; n < std::min(damaged.size(), listed_max); ++n) {
+    text += (n > 0 ? "; " : "") + damaged[n].message;
+  }
+  if (damaged.size() > listed_max) text += "; ...";
+  return text;
+}
+
 Result<std::unique_ptr<SeriesFile>> SeriesFile::open(std::string name, std::size_t members,
                                                      OpenMember open_member, std::string origin) {
   std::unique_ptr<SeriesFile> series(new SeriesFile(std::move(name), std::move(open_member)));
   series->origin_ = std::move(origin);
+  std::vector<Error> damaged;
   for (std::size_t m = 0; m < members; ++m) {
-    if (auto added = series->add(m); !added) return added.error();
+    auto opened = series->open_member_(m);
+    if (!opened && opened.error().kind != ErrorKind::bad_data) return opened.error();
+    if (!opened) {
+      damaged.push_back(opened.error());
+      continue;
+    }
+    if (auto added = series->add(m, std::move(*opened)); !added) return added.error();
   }
+  if (series->members_.empty() && !damaged.empty()) return damaged.front();
   series->sort_steps();
   if (series->steps_.empty()) {
     return make_error(ErrorKind::bad_data, in_quotes(series->name_) + ": no file has a time step");
   }
   series->finish();
+  if (!damaged.empty()) series->contents_.notes.push_back(damaged_files_note(damaged, members));
   return series;
 }
 
@@ -122,16 +142,15 @@ bool SeriesFile::is_static(std::size_t in_first) const {
   return variable.dims.size() < 2 || !variable.numeric || is_position(variable) || is_part;
 }
 
-Result<void> SeriesFile::add(std::size_t member) {
-  auto opened = open_member_(member);
-  if (!opened) return opened.error();
+Result<void> SeriesFile::add(std::size_t index, std::unique_ptr<ArrayFile> opened) {
+  const std::size_t member = members_.size();
   const bool is_first = member == 0;
   if (is_first) {
-    first_ = std::move(*opened);
+    first_ = std::move(opened);
     if (auto begun = begin(); !begun) return begun;
   }
-  const ArrayFile& file = is_first ? *first_ : **opened;
-  members_.push_back({file.identity(), {}});
+  const ArrayFile& file = is_first ? *first_ : *opened;
+  members_.push_back({index, file.identity(), {}});
   if (!is_first) {
     if (auto fine = check_space(file); !fine) return fine;
     if (auto fine = check_values(file); !fine) return fine;

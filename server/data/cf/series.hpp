@@ -16,6 +16,10 @@ namespace windsplat::data::cf {
 // Opens the member with this index.
 using OpenMember = std::function<Result<std::unique_ptr<ArrayFile>>(std::size_t member)>;
 
+// For users: that files of a series cannot be read, with the reasons, which name them. members: of
+// the series.
+std::string damaged_files_note(const std::vector<Error>& damaged, std::size_t members);
+
 // All members are opened once to read their times; afterwards at most `open_max` are open at a
 // time. Steps are sorted by time across epochs; of steps with equal times, that of the later file
 // is used. A file without a time dimension is one step.
@@ -24,7 +28,8 @@ class SeriesFile final : public ArrayFile {
   static constexpr std::size_t open_max = 32;
 
   // `name`: name of the series; `origin`: pattern or folder of its files. Errors: bad_data, naming
-  // the first member that does not match the first file, and the difference.
+  // the first member that does not match the first file, and the difference. Damaged files are left
+  // out with a note unless all are.
   static Result<std::unique_ptr<SeriesFile>> open(std::string name, std::size_t members,
                                                   OpenMember open_member, std::string origin = "");
 
@@ -48,6 +53,7 @@ class SeriesFile final : public ArrayFile {
 
  private:
   struct Member {
+    std::size_t index = 0;  // for open_member_
     std::string identity;
     std::vector<int> variables;  // index of each variable of the first member; empty: identical
   };
@@ -70,7 +76,7 @@ class SeriesFile final : public ArrayFile {
   SeriesFile(std::string name, OpenMember open_member)
       : name_(std::move(name)), open_member_(std::move(open_member)) {}
   Result<void> begin();
-  Result<void> add(std::size_t member);
+  Result<void> add(std::size_t index, std::unique_ptr<ArrayFile> opened);
   Result<void> add_times(std::size_t member, const ArrayFile& file);
   Result<void> check_space(const ArrayFile& file) const;
   Result<void> check_values(const ArrayFile& file) const;

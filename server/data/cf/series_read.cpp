@@ -74,7 +74,7 @@ Result<const ArrayFile*> SeriesFile::member_file(std::size_t member) const {
     return opened_.front().file.get();
   }
   if (opened_.size() + 2 > open_max) opened_.pop_back();
-  auto file = open_member_(member);
+  auto file = open_member_(members_[member].index);
   if (!file) return file.error();
   if ((*file)->identity() != members_[member].identity) {
     return make_error(ErrorKind::bad_data, in_quotes((*file)->name()) +

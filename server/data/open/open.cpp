@@ -53,12 +53,21 @@ constexpr auto array_formats = std::to_array<ArrayFormat>({
     {dx::looks_like, dx::open},
 });
 
-// The first bytes of the file, or of the first file of a series; empty if there is none.
+// The first bytes of the file, or of the first file of a series that is not damaged at its start;
+// empty if there is none.
 Result<std::string> first_bytes(Files& files) {
-  if (files.location().members.empty()) return std::string();
-  const auto input = files.open(files.location().members.front().name);
-  if (!input) return input.error();
-  return (*input)->head(4096);
+  constexpr std::size_t looked_at_max = 64;
+  const auto& members = files.location().members;
+  if (members.empty()) return std::string();
+  Result<std::string> first = std::string();
+  for (std::size_t m = 0; m < std::min(members.size(), looked_at_max); ++m) {
+    const auto input = files.open(members[m].name);
+    auto head = input ? (*input)->head(4096) : Result<std::string>(input.error());
+    const bool has_text = head && head->find_first_not_of('\0') != std::string::npos;
+    if (m == 0) first = head;
+    if (has_text) return head;
+  }
+  return first;
 }
 
 SourceResult source_of(const Files& files, Result<std::unique_ptr<cf::ArrayFile>> file,

@@ -13,6 +13,7 @@
 #include "server/base/ascii.hpp"
 #include "server/base/check.hpp"
 #include "server/data/cf/grid/grid.hpp"
+#include "server/data/cf/series.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/formats/vtk/grid.hpp"
 #include "server/data/formats/vtk/mesh.hpp"
@@ -50,13 +51,21 @@ class VtkSource final : public FileSource {
   Result<void> prepare() {
     auto steps = steps_of(*files_);
     if (!steps) return steps.error();
-    steps_ = std::move(*steps);
-    if (steps_.size() > steps_max) {
+    if (steps->size() > steps_max) {
       return make_error(ErrorKind::bad_data, "more than " + std::to_string(steps_max) + " steps");
     }
     std::string identity;
-    for (std::size_t s = 0; s < steps_.size(); ++s) {
+    std::vector<Error> damaged;  // which a series does without
+    const bool in_series = files_->location().kind == Location::Kind::series;
+    for (Step& step : *steps) {
+      const std::size_t s = steps_.size();
+      steps_.push_back(std::move(step));
       auto snapshot = open_step(s);
+      if (!snapshot && in_series && snapshot.error().kind == ErrorKind::bad_data) {
+        damaged.push_back(snapshot.error());
+        steps_.pop_back();
+        continue;
+      }
       if (!snapshot) return snapshot.error();
       if (files_read_ > files_max) {
         return step_fault(s, "refers, with the steps before, to more than " +
@@ -66,6 +75,8 @@ class VtkSource final : public FileSource {
       if (!done) return done;
       identity += steps_[s].identity + '\n';
     }
+    if (steps_.empty()) return damaged.front();
+    if (!damaged.empty()) info_.notes.push_back(cf::damaged_files_note(damaged, steps->size()));
     if (info_.fields.empty()) {
       return file_->fault("has no array of 1, 2 or 3 components that all pieces and steps have");
     }
@@ -73,7 +84,7 @@ class VtkSource final : public FileSource {
     info_.id = files_->location().stem;
     if (info_.title.empty() || info_.title == "vtk output") info_.title = info_.id;
     info_.source = files_->location().members.front().name;
-    if (files_->location().kind == Location::Kind::series) {
+    if (in_series) {
       info_.source += " .. " + files_->location().members.back().name;
     }
     info_.digest = digest_of(identity + WINDSPLAT_VERSION);

@@ -130,7 +130,11 @@ Result<std::vector<Step>> steps_of(Files& files) {
   for (const auto& member : files.location().members) {
     steps.push_back({{{"", member.name}}, {}, {}, ""});
   }
-  const auto file = files.open(steps.front().parts.front().source);
+  auto file = files.open(steps.front().parts.front().source);
+  const bool in_series = files.location().kind == Location::Kind::series;
+  for (std::size_t s = 1; in_series && !file && s < steps.size(); ++s) {
+    file = files.open(steps[s].parts.front().source);
+  }
   if (!file) return file.error();
   if (HdfFile::is_vtkhdf(**file)) return steps_in_files(files);
   if (files.location().kind != Location::Kind::file) return steps;

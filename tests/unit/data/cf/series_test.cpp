@@ -97,6 +97,39 @@ TEST(Series, StepsAreOrderedByTimeForAnyFileEpochsAndNames) {
 }
 
 // Sample (y, x) of time t is 100 t + 10 y + x, for any order of dimensions.
+// An empty file, one of zeros and a truncated one, in any place.
+TEST(Series, DamagedFilesAreLeftOutAndNamed) {
+  for (const std::size_t whole : {1U, 2U, 3U}) {
+    const Folder folder;
+    for (const double n : {1, 2, 3, 4}) {
+      const std::string path = folder / ("f_" + std::to_string(static_cast<int>(n)) + ".nc");
+      write_part(path, {{6 * n}, "hours since 2001-01-01", "", 1000 * n});
+      if (n == static_cast<double>(whole) || n == 4) continue;
+      const std::string bytes = bytes_of(path);
+      write_bytes(path, n == 1   ? ""
+                        : n == 2 ? std::string(bytes.size(), '\0')
+                                 : bytes.substr(0, bytes.size() / 2));
+    }
+    const auto source = opened(folder / "f_*.nc");
+    ASSERT_NE(source, nullptr);
+    const auto start = static_cast<double>(whole);
+    ASSERT_EQ(source->info().steps.size(), 2U);
+    EXPECT_EQ(source->info().steps[0].value, 6 * start);
+    EXPECT_EQ(first_sample(*source, 0), static_cast<float>(1000 * start));
+    EXPECT_EQ(first_sample(*source, 1), 4000);
+    EXPECT_TRUE(
+        has_note(source->info(), "2 of 4 files cannot be read, their steps are left out: "));
+    for (const std::size_t n : {1U, 2U, 3U, 4U}) {
+      const std::string name = "'f_" + std::to_string(n) + ".nc'";
+      EXPECT_EQ(has_note(source->info(), name), n != whole && n != 4) << name;
+    }
+  }
+  const Folder folder;
+  write_bytes(folder / "g_1.nc", "CDF");
+  write_bytes(folder / "g_2.nc", "CDF");
+  EXPECT_NE(refusal(folder / "g_*.nc").find("'g_1.nc'"), std::string::npos);
+}
+
 TEST(Series, TimeMayBeAnyDimension) {
   const Folder folder;
   for (const int part : {0, 1}) {
@@ -162,9 +195,10 @@ TEST(Series, IncompatibleMembersAreReportedWithTheDifference) {
   const Folder folder;
   write_part(folder / "s1.nc", {{0}, "hours since 2001-01-01"});
   write_bytes(folder / "s2.nc", "not a netCDF file at all");
-  auto source = open_file(folder / "s*.nc");
-  ASSERT_FALSE(source);
-  EXPECT_NE(source.error().message.find("'s2.nc'"), std::string::npos) << source.error().message;
+  const auto source = opened(folder / "s*.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_TRUE(has_note(source->info(), "1 of 2 files cannot be read"));
+  EXPECT_TRUE(has_note(source->info(), "'s2.nc'"));
 }
 
 TEST(Series, FilesWithOtherDimensionsAreReferredToAListInBraces) {

@@ -45,6 +45,22 @@ TEST(VtkSeries, PatternGivesOrderedStepsWithTheFilesTimes) {
   EXPECT_EQ(volume_of(*source, "b", 2).values[7], -10);
 }
 
+TEST(VtkSeries, DamagedFilesAreLeftOutAndNamed) {
+  const VtkFolder folder;
+  folder.write("f1.vti", "");
+  folder.write("f2.vti", image(2, "2"));
+  folder.write("f3.vti", image(3, "3").substr(0, 300));
+  folder.write("f4.vti", image(4, "4"));
+  const auto source = opened(folder.path("f*.vti"));
+  ASSERT_TRUE(source);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  EXPECT_EQ(source->info().steps[1].value, 4);
+  EXPECT_EQ(volume_of(*source, "a", 0).values[0], 2);
+  EXPECT_EQ(volume_of(*source, "a", 1).values[0], 4);
+  EXPECT_THAT(all_notes(source->info()),
+              testing::ContainsRegex("2 of 4 files cannot be read.*'f1.vti'.*'f3.vti'"));
+}
+
 TEST(VtkSeries, StepsWithoutTimesAreNumbered) {
   const VtkFolder folder;
   folder.write("f1.vti", image(1, ""));
