@@ -177,6 +177,10 @@ Result<void> check_snapshot(const std::shared_ptr<const InputFile>& file, Snapsh
     if (piece.points > cf::samples_max || piece.cells > cf::samples_max) {
       return file->fault("has more than " + std::to_string(cf::samples_max) + " points or cells");
     }
+    if (piece.point_data.size() + piece.cell_data.size() > piece_arrays_max) {
+      return file->fault("has more than " + std::to_string(piece_arrays_max) +
+                         " arrays of points and cells");
+    }
     if (auto done = check_geometry(file, snapshot, piece); !done) return done;
     if (auto done = check_data(file, snapshot, piece.point_data, piece.points); !done) return done;
     if (auto done = check_data(file, snapshot, piece.cell_data, piece.cells); !done) return done;

@@ -102,6 +102,9 @@ bool is_xml(std::string_view head);
 bool is_legacy(std::string_view head);
 inline constexpr std::size_t head_bytes = 4096;
 
+// Limit on the arrays of points and cells of a piece, or that a header declares.
+inline constexpr std::size_t piece_arrays_max = 4096;
+
 // Reads a legacy file. Errors: bad_data.
 Result<Snapshot> read_legacy(const std::shared_ptr<const InputFile>& file);
 

@@ -13,7 +13,7 @@ namespace {
 using Counts64 = std::vector<std::uint64_t>;
 
 constexpr const char* root_group = "/VTKHDF";
-constexpr std::size_t hdf_steps_max = 100'000;
+constexpr std::size_t hdf_steps_max = 20'000;
 constexpr std::size_t hdf_parts_max = 65'536;
 
 // A whole number from a file, within what sizes may be.
@@ -88,7 +88,9 @@ class HdfGrid {
     const auto list = [&](const char* name, auto& to) -> Result<void> {
       if (!file_.has_attribute(group_, name)) return {};
       const auto found = file_.numbers(group_, name, to.size());
-      if (found) std::copy(found->begin(), found->end(), to.begin());
+      if (!found) return fault("has no " + std::to_string(to.size()) + " numbers in its " + name);
+      std::copy(found->begin(), found->end(), to.begin());
+      return {};
     };
     if (auto done = list("Origin", out_.place.origin); !done) return done;
     if (auto done = list("Spacing", out_.place.spacing); !done) return done;

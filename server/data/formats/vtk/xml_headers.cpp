@@ -84,6 +84,10 @@ Result<ParallelHeader> read_parallel_header(const Document& document, const Grid
   }
   out.point_data = declared_in(set.child("PPointData"));
   out.cell_data = declared_in(set.child("PCellData"));
+  if (out.point_data.size() + out.cell_data.size() > piece_arrays_max) {
+    return file->fault("declares more than " + std::to_string(piece_arrays_max) +
+                       " arrays of points and cells");
+  }
   for (const xml_node piece : set.children("Piece")) {
     ParallelHeader::Member member;
     member.source = piece.attribute("Source").value();

@@ -17,6 +17,7 @@ namespace windsplat::data::zarr {
 namespace {
 
 constexpr std::size_t text_max = 4096;
+constexpr std::size_t dimensions_max = 4096;
 constexpr const char* group_reason = "group: to see it, open its folder";
 constexpr std::uint64_t stamped_files_max = 4096;
 
@@ -89,6 +90,7 @@ class StoreScan {
     if (out_.name.empty()) out_.name = files_.location().stem;
     if (auto done = find_arrays(); !done) return broken_store(out_.name, done.error().message);
     describe_all();
+    if (auto fine = check_dimensions(); !fine) return fine.error();
     if (auto fine = check_any_field(out_); !fine) return fine.error();
     identify();
     return std::move(out_);
@@ -172,7 +174,15 @@ class StoreScan {
   void describe_all() {
     std::stable_partition(out_.arrays.begin(), out_.arrays.end(),
                           std::mem_fn(&Array::is_coordinate));
-    for (const Array& array : out_.arrays) describe(array);
+    for (const Array& array : out_.arrays) {
+      if (out_.file.dimensions.size() <= dimensions_max) describe(array);
+    }
+  }
+
+  [[nodiscard]] Result<void> check_dimensions() const {
+    if (out_.file.dimensions.size() <= dimensions_max) return {};
+    return broken_store(out_.name,
+                        "it has more than " + std::to_string(dimensions_max) + " dimensions");
   }
 
   void describe(const Array& array) {

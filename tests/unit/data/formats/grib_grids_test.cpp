@@ -215,6 +215,13 @@ TEST_F(GribGrids, ReducedWindsAreOneVectorAndBitmapsMask) {
   EXPECT_TRUE(std::isnan(wind->component(0)[31U * 80]));
 }
 
+TEST_F(GribGrids, GaussianGridsWhoseLatitudesTakeLongAreRefused) {
+  Maker maker("regular_gg_pl_grib2");
+  maker.set("N", 8001L);
+  EXPECT_THAT(fault(maker.bytes()),
+              HasSubstr("on a Gaussian grid of more than 8000 rows between pole and equator"));
+}
+
 TEST_F(GribGrids, ReducedGridsThatCannotBeReadAreRefused) {
   const Reduced made;
   Maker part("reduced_gg_pl_32_grib2");

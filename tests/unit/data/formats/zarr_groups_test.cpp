@@ -193,6 +193,27 @@ TEST(ZarrGroups, TheFinestLevelOfAnImageOfOmeZarr4) {
   expect_image(store);
 }
 
+TEST(ZarrGroups, TooManyDimensionsAreRefused) {
+  const ZarrStore store;
+  std::string arrays;
+  for (int n = 0; n < 600; ++n) {
+    const std::string name = "v" + std::to_string(n);
+    std::string names;
+    for (const char c : std::string("abcdefgh")) {
+      names += std::string(names.empty() ? "" : ",") + '"' + c + name + '"';
+    }
+    arrays += std::string(n > 0 ? "," : "") + '"' + name + "\":" +
+              v3_array("[2,2,1,1,1,1,1,1]", "[2,2,1,1,1,1,1,1]", "uint8", "[" + names + "]");
+  }
+  store.put("zarr.json",
+            group3("{}", R"(,"consolidated_metadata":{"kind":"inline","must_understand":false,)"
+                         R"("metadata":{)" +
+                             arrays + "}}"));
+  const auto source = open_file(store.path());
+  ASSERT_FALSE(source);
+  EXPECT_THAT(source.error().message, HasSubstr("it has more than 4096 dimensions"));
+}
+
 // The root that bioformats2raw writes: no arrays, but a group for each image.
 TEST(ZarrGroups, ARefusalNamesTheGroupsOfARootWithoutArrays) {
   const ZarrStore store;

@@ -376,6 +376,19 @@ TEST_F(VtkParallel, ContradictionsOfHeaderAndPiecesAreRefused) {
               HasSubstr("overlap by 4 cells, more than its GhostLevel of 0"));
 }
 
+TEST_F(VtkParallel, TooManyArraysAreRefused) {
+  Header header;
+  header.attributes = "WholeExtent=\"0 8 0 6 0 4\"";
+  header.declared = "<PPointData>";
+  for (int n = 0; n < 4097; ++n) {
+    header.declared += "<PDataArray type=\"Float64\" Name=\"a" + std::to_string(n) + "\"/>";
+  }
+  header.declared += "</PPointData>";
+  header.piece("p.vti", parts.data());
+  EXPECT_THAT(refusal(folder_.write("all.pvti", header.text())),
+              HasSubstr("declares more than 4096 arrays of points and cells"));
+}
+
 TEST_F(VtkParallel, ReferencesAreConfined) {
   write_all("ImageData", "vti", image_place);
   const auto refused = [&](const std::string& source) {

@@ -175,6 +175,18 @@ TEST_F(VtkHdf, StepsOfImagesHaveTimesAndOffsets) {
   EXPECT_EQ(volume_of(*source, "b", 2).values[9], static_cast<float>(values[9]));
 }
 
+TEST_F(VtkHdf, TooManyStepsAreRefused) {
+  {
+    const HdfMaker file(path_);
+    file.group("/VTKHDF", "ImageData");
+    describe_image(file, "/VTKHDF");
+    file.set("/VTKHDF/PointData/a", {5, 3, 4}, image_values());
+    file.group("/VTKHDF/Steps", "");
+    file.attribute("/VTKHDF/Steps", "NSteps", {20001});
+  }
+  EXPECT_THAT(refusal(path_), HasSubstr("has a number of steps outside 1 to 20000"));
+}
+
 TEST_F(VtkHdf, ACollectionDoesNotNameAFileOfSeveralSteps) {
   const std::string collection = folder_.write(
       "all.pvd",
