@@ -300,6 +300,19 @@ Result<Grid> read_grid(const std::vector<unsigned char>& bytes) {
   return grid;
 }
 
+Result<std::vector<double>> read_coefficients(const std::vector<unsigned char>& bytes) {
+  constexpr std::size_t coefficients_max = 4096;
+  const LibraryLock lock;
+  const Message message(bytes);
+  if (message.handle() == nullptr) return broken("is not understood by ecCodes");
+  std::size_t count = 0;
+  if (message.whole("PVPresent", 0) == 0 ||
+      codes_get_size(message.handle(), "pv", &count) != CODES_SUCCESS || count > coefficients_max) {
+    return std::vector<double>();
+  }
+  return message.numbers("pv", count);
+}
+
 Result<std::vector<float>> read_values(const std::vector<unsigned char>& bytes, const Grid& grid) {
   const LibraryLock lock;
   const Message message(bytes);

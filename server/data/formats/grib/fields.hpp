@@ -55,6 +55,8 @@ struct Names {
 // Errors: bad_data; the message is a predicate without subject.
 Result<Header> read_header(const std::vector<unsigned char>& message);
 Result<Names> read_names(const std::vector<unsigned char>& message);
+// The coefficients of vertical coordinates, `pv` of ecCodes; empty if there are none.
+Result<std::vector<double>> read_coefficients(const std::vector<unsigned char>& message);
 Result<Grid> read_grid(const std::vector<unsigned char>& message);
 // values of rows x columns, columns fastest, in the order of the coordinates of the grid; NaN if
 // missing; of a reduced grid, interpolated along its rows

@@ -68,7 +68,7 @@ Result<std::unique_ptr<cf::ArrayFile>> open(std::shared_ptr<const InputFile> inp
 Result<std::unique_ptr<cf::ArrayFile>> File::open(std::shared_ptr<const InputFile> input) {
   std::unique_ptr<File> file(new File(std::move(input)));
   if (auto done = file->scan(); !done) return done.error();
-  file->add_variables();
+  if (auto done = file->add_variables(); !done) return done.error();
   if (auto fine = file->check_any_field(); !fine) return fine.error();
   return std::unique_ptr<cf::ArrayFile>(std::move(file));
 }
@@ -157,13 +157,14 @@ Result<void> File::check_any_field() const {
                        " is " + grids_[group.grid].problem);
 }
 
-void File::add_variables() {
+Result<void> File::add_variables() {
   merge_heights(groups_);
   by_lead_time_ = tell_references(groups_);
   order(groups_);
   for (Group& group : groups_) omit_incomplete_members(group, contents_.notes);
   find_axes(groups_, contents_.notes);
   for (std::size_t g = 0; g < groups_.size(); ++g) add_field(g);
+  return add_hybrid_levels();
 }
 
 // Returns the dimension with these coordinates, adding it if necessary.
@@ -187,7 +188,7 @@ int File::axis(const std::string& name, const std::vector<double>& values,
   variable.numeric = true;
   variable.dims = {static_cast<int>(contents_.dimensions.size()) - 1};
   contents_.variables.push_back(std::move(variable));
-  held_.push_back({values, -1, {}, -1});
+  held_.push_back({values, -1, {}, -1, false, {}});
   return static_cast<int>(contents_.dimensions.size()) - 1;
 }
 
@@ -331,7 +332,9 @@ cf::Numbers File::numbers(int variable, const char* attribute) const {
 }
 
 std::string File::text_of(int variable, const char* attribute) const {
-  const int at = held_.at(static_cast<std::size_t>(variable)).mapped_grid;
+  const Content& held = held_.at(static_cast<std::size_t>(variable));
+  if (std::string_view(attribute) == "formula_terms") return held.formula;
+  const int at = held.mapped_grid;
   if (at < 0) return {};
   const auto& texts = grids_[static_cast<std::size_t>(at)].mapping.texts;
   const auto found = texts.find(attribute);
@@ -378,8 +381,9 @@ Result<void> File::read_block(int variable, const std::vector<std::size_t>& star
   const auto copy_rows = [&](const auto* from) {
     for (std::size_t j = 0; j < rows; ++j) {
       const auto* row = from + (first_row + j) * columns + start.back();
-      out = std::transform(row, row + count.back(), out,
-                           [](auto value) { return static_cast<Out>(value); });
+      out = std::transform(row, row + count.back(), out, [&](auto value) {
+        return static_cast<Out>(held.is_logarithm ? std::exp(value) : value);
+      });
     }
   };
   if (held.group < 0) {

@@ -40,6 +40,8 @@ class File final : public cf::ArrayFile {
     int group = -1;
     std::vector<AxisIndex> axes;  // of a group: those of its dimensions before rows and columns
     int mapped_grid = -1;
+    bool is_logarithm = false;  // of a group: its values are logarithms of those of the variable
+    std::string formula;        // of a coordinate: its formula_terms
   };
 
   explicit File(std::shared_ptr<const InputFile> input) : input_(std::move(input)) {}
@@ -48,7 +50,7 @@ class File final : public cf::ArrayFile {
   Result<void> add_message(std::size_t field, const std::vector<unsigned char>& message,
                            const Header& header);
   Result<std::size_t> grid_of(const std::vector<unsigned char>& message, const std::string& key);
-  void add_variables();
+  Result<void> add_variables();
   [[nodiscard]] Result<void> check_any_field() const;
   std::vector<int> grid_dimensions(std::size_t grid);
   std::vector<int> add_axes(std::size_t grid);
@@ -59,6 +61,9 @@ class File final : public cf::ArrayFile {
   std::string free_name(const Group& group) const;
   void name_field(const Group& group, FileVariable& variable);
   void add_field(std::size_t group);
+  Result<void> add_hybrid_levels();
+  Result<std::vector<double>> coefficients_of(const Group& group) const;
+  int surface_pressure(std::size_t grid);
   template <class Out>
   Result<void> read_block(int variable, const std::vector<std::size_t>& start,
                           const std::vector<std::size_t>& count, Out* out) const;

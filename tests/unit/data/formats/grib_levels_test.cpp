@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -151,6 +153,79 @@ TEST_F(GribLevels, SigmaOfEdition1IsAFraction) {
       column(layer(1, "sigmaLayer", 44, 100, 1) + layer(1, "sigmaLayer", 33, 44, 2));
   EXPECT_THAT(layers.axis.coordinates, ElementsAre(0.72, DoubleEq(0.385)));
   EXPECT_THAT(layers.values, ElementsAre(1, 2));
+}
+
+// A message of a hybrid level with coefficients, a and b of half levels.
+std::string at_hybrid(const char* name, long level, double value, const std::vector<double>& pv) {
+  Maker maker("GRIB2");
+  maker.set("typeOfLevel", std::string("hybrid"));
+  maker.set("level", level);
+  maker.set("shortName", std::string(name));
+  maker.set("PVPresent", 1L);
+  EXPECT_EQ(codes_set_double_array(maker.handle(), "pv", pv.data(), pv.size()), CODES_SUCCESS);
+  maker.fill(value);
+  return maker.bytes();
+}
+
+// Full levels lie at the means of their half levels: p = a + b ps.
+TEST_F(GribLevels, HybridLevelsHavePressuresByTheirCoefficients) {
+  const std::vector<double> pv{0, 2000, 8000, 0, 0, 0, 0.25, 1};
+  for (const bool by_logarithm : {true, false}) {
+    const double surface = 96000;
+    std::string bytes;
+    for (const long level : {1L, 2L, 3L}) {
+      bytes += at_hybrid("t", level, 200 + 10.0 * static_cast<double>(level), pv);
+    }
+    if (by_logarithm) {
+      bytes += at_hybrid("lnsp", 1, std::log(surface), pv);
+    } else {
+      Maker maker("GRIB2");
+      maker.set("typeOfLevel", std::string("surface"));
+      maker.set("shortName", std::string("sp"));
+      maker.fill(surface);
+      bytes += maker.bytes();
+    }
+    const auto source = open(bytes);
+    ASSERT_TRUE(source);
+    const DatasetInfo& info = source->info();
+    const Axis& z = info.grid.axes[2];
+    EXPECT_EQ(z.kind, AxisKind::pressure);
+    ASSERT_EQ(z.coordinates.size(), 3U);
+    const std::vector<double> expected{4000 + 0.625 * surface, 5000 + 0.125 * surface, 1000};
+    const FieldInfo* pressure = info.find("pressure");
+    ASSERT_NE(pressure, nullptr);
+    const auto volume = source->read(static_cast<std::size_t>(pressure - info.fields.data()), 0);
+    ASSERT_TRUE(volume) << volume.error().message;
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(z.coordinates[k], expected[k], 1);
+      EXPECT_NEAR(volume->values[12 * k + 5], expected[k], 1);
+    }
+    const FieldInfo* t = info.find("t");
+    ASSERT_NE(t, nullptr);
+    const auto warmth = source->read(static_cast<std::size_t>(t - info.fields.data()), 0);
+    ASSERT_TRUE(warmth);
+    EXPECT_NEAR(warmth->values[0], 230, 0.1) << "the third level is the lowest";
+  }
+}
+
+// Other coefficients, and levels without a surface pressure, stay numbers.
+TEST_F(GribLevels, HybridLevelsOfOtherKindsStayNumbers) {
+  const std::vector<double> pressures{0, 2000, 8000, 0, 0, 0, 0.25, 1};
+  const std::vector<double> heights{2, 3, 1e5, 288, 42, 0.1, 0.5, 1};
+  for (const bool of_pressure : {true, false}) {
+    const auto& pv = of_pressure ? pressures : heights;
+    std::string bytes = at_hybrid("t", 1, 200, pv) + at_hybrid("t", 2, 210, pv);
+    if (!of_pressure) bytes += at_hybrid("lnsp", 1, 11.5, pv);
+    const auto source = open(bytes);
+    ASSERT_TRUE(source);
+    EXPECT_EQ(source->info().grid.axes[2].kind, AxisKind::level);
+    const auto& notes = source->info().notes;
+    EXPECT_EQ(std::any_of(notes.begin(), notes.end(),
+                          [](const std::string& note) {
+                            return note.find("neither 'sp' nor 'lnsp'") != std::string::npos;
+                          }),
+              of_pressure);
+  }
 }
 
 }  // namespace
