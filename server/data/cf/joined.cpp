@@ -13,6 +13,7 @@
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/grid/curvilinear.hpp"
 #include "server/data/cf/selected/selected_file.hpp"
+#include "server/data/cf/series.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/model/digest.hpp"
 
@@ -89,6 +90,14 @@ std::optional<std::array<double, 2>> offset_between(const Positions& a, const Po
 Error cannot_join(const ArrayFile& part, const ArrayFile& first, const std::string& what) {
   return make_error(ErrorKind::bad_data, in_quotes(part.origin()) + " cannot be joined with " +
                                              in_quotes(first.origin()) + ": " + what);
+}
+
+// Which files of a series are damaged, as its note says; empty if none is.
+std::string damage_of(const ArrayFile& series) {
+  for (const std::string& note : series.contents().notes) {
+    if (note.find(damaged_files_mark) != std::string::npos) return "; " + note;
+  }
+  return {};
 }
 
 int add_dimension(FileContents& contents, FileDimension dimension) {
@@ -203,7 +212,8 @@ Result<int> JoinedFile::dimension_of(const ArrayFile& part, int dimension,
     if (is_time) {
       return cannot_join(part, *parts_.front(),
                          "its times are others (" + std::to_string(wanted.length) + " and " +
-                             std::to_string(found.length) + " steps)");
+                             std::to_string(found.length) + " steps)" + damage_of(part) +
+                             damage_of(*parts_.front()));
     }
   }
   FileDimension added = wanted;

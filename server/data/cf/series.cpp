@@ -60,8 +60,8 @@ Error misfit(const ArrayFile& file, const ArrayFile& first, const std::string& w
 
 std::string damaged_files_note(const std::vector<Error>& damaged, std::size_t members) {
   constexpr std::size_t listed_max = 8;
-  std::string text = std::to_string(damaged.size()) + " of " + std::to_string(members) +
-                     " files cannot be read, their steps are left out: ";
+  std::string text =
+      std::to_string(damaged.size()) + " of " + std::to_string(members) + damaged_files_mark;
   for (std::size_t n = 0; n < std::min(damaged.size(), listed_max); ++n) {
     text += (n > 0 ? "; " : "") + damaged[n].message;
   }

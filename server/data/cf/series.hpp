@@ -16,6 +16,8 @@ namespace windsplat::data::cf {
 // Opens the member with this index.
 using OpenMember = std::function<Result<std::unique_ptr<ArrayFile>>(std::size_t member)>;
 
+inline constexpr const char* damaged_files_mark =
+    " files cannot be read, their steps are left out: ";
 // For users: that files of a series cannot be read, with the reasons, which name them. members: of
 // the series.
 std::string damaged_files_note(const std::vector<Error>& damaged, std::size_t members);
