@@ -103,10 +103,13 @@ def image_part(low, high, ghost=False):
     """A piece of an image: the indices from `low` to `high` along x."""
     xml = VtkXml("appended", "ZLib")
     extent = f"{low} {high} 0 5 0 3"
-    count = (high - low + 1) * 24
-    data = "<PointData>" + xml.array("heat", [float(i % 7) for i in range(count)])
+    columns = high - low + 1
+    count = columns * 24
+    # Pieces agree where they overlap.
+    heat = [float((low + i % columns + i // columns) % 7) for i in range(count)]
+    data = "<PointData>" + xml.array("heat", heat)
     if ghost:
-        data += xml.array("vtkGhostType", [i % 5 == 0 for i in range(count)], 1, "UInt8")
+        data += xml.array("vtkGhostType", [i % columns == 0 for i in range(count)], 1, "UInt8")
     return xml.file("ImageData", f'WholeExtent="{extent}" Spacing="1 1 2"',
                     f'<Piece Extent="{extent}">\n{data}</PointData></Piece>\n')
 
