@@ -145,11 +145,11 @@ bool SeriesFile::is_static(std::size_t in_first) const {
 Result<void> SeriesFile::add(std::size_t index, std::unique_ptr<ArrayFile> opened) {
   const std::size_t member = members_.size();
   const bool is_first = member == 0;
+  const ArrayFile& file = *opened;
   if (is_first) {
     first_ = std::move(opened);
     if (auto begun = begin(); !begun) return begun;
   }
-  const ArrayFile& file = is_first ? *first_ : *opened;
   members_.push_back({index, file.identity(), {}});
   if (!is_first) {
     if (auto fine = check_space(file); !fine) return fine;
