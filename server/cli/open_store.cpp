@@ -82,12 +82,13 @@ data::StoreOptions options_of(std::uint64_t memory_bytes, data::Storage storage,
   options.storage = storage;
   if (fetcher) let_fetch(limits, fetcher);
   options.open = [limits, fetcher = std::move(fetcher)](
-                     const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
+                     const data::Location& location,
+                     const CancelToken& cancel) -> Result<std::unique_ptr<data::Source>> {
     if (location.fetched) {
       if (auto permitted = check_host(fetcher.get(), location); !permitted)
         return permitted.error();
     }
-    auto source = data::loader::open(location, limits);
+    auto source = data::loader::open(location, limits, cancel);
     if (!source) return source.error();
     return std::unique_ptr<data::Source>(std::move(*source));
   };

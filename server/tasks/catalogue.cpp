@@ -89,7 +89,7 @@ Result<std::string> Catalogue::open(const data::Location& location, const Cancel
 
 Result<std::pair<std::string, bool>> Catalogue::open_listed(const data::Location& location,
                                                             const CancelToken& cancel) {
-  const auto opened = open_and_want(location);
+  const auto opened = open_and_want(location, cancel);
   if (!opened) return opened.error();
   const auto& [dataset, openers, is_new] = *opened;
   std::string id = dataset->info().id;
@@ -102,9 +102,9 @@ Result<std::pair<std::string, bool>> Catalogue::open_listed(const data::Location
 }
 
 Result<std::tuple<std::shared_ptr<data::Dataset>, std::shared_ptr<Catalogue::Openers>, bool>>
-Catalogue::open_and_want(const data::Location& location) {
+Catalogue::open_and_want(const data::Location& location, const CancelToken& cancel) {
   for (;;) {
-    auto added = store_->add_or_find(location);
+    auto added = store_->add_or_find(location, cancel);
     if (!added) return added.error();
     const std::string& id = added->dataset->info().id;
     const std::lock_guard lock(mutex_);

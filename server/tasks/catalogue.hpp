@@ -99,7 +99,7 @@ class Catalogue {
   };
   // The last value: whether this call opened it.
   [[nodiscard]] Result<std::tuple<std::shared_ptr<data::Dataset>, std::shared_ptr<Openers>, bool>>
-  open_and_want(const data::Location& location);
+  open_and_want(const data::Location& location, const CancelToken& cancel);
   // The id, and whether this call opened it.
   [[nodiscard]] Result<std::pair<std::string, bool>> open_listed(const data::Location& location,
                                                                  const CancelToken& cancel);

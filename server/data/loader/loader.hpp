@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/model/dataset_info.hpp"
@@ -79,14 +80,17 @@ class RemoteSource : public Source {
   [[nodiscard]] pid_t process() const;
 
  private:
-  friend Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits);
+  friend Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits,
+                                                    const CancelToken& cancel);
   struct State;
   explicit RemoteSource(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 
-// Errors: those of open_dataset(), and those of RemoteSource::read().
-Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits = {});
+// `cancel` ends the opening, and what is fetched for it. Errors: those of open_dataset(), and those
+// of RemoteSource::read().
+Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits = {},
+                                           const CancelToken& cancel = {});
 
 // Entry point of `windsplat load`. Returns the exit code, once the daemon closes the socket.
 int run();

@@ -30,9 +30,10 @@ struct RemoteSource::State {
   std::optional<Transfer> transfer;  // as mapped by the loader
   // Memory of a transfer that is reused; otherwise it belongs to the volume that is being read.
   Reservation transfer_memory;
-  std::mutex mutex;  // guards the next two members
+  std::mutex mutex;  // guards the next three members
   bool under_way = false;
   bool cancelled = false;
+  std::optional<CancelToken> opening;  // while it is opened
 
   // Starts a loader, which opens the dataset; returns the encoded info.
   Result<std::string> start() {
@@ -42,7 +43,12 @@ struct RemoteSource::State {
 
   [[nodiscard]] bool is_cancelled() {
     const std::lock_guard lock(mutex);
-    return cancelled;
+    return cancelled || (opening && opening->cancelled());
+  }
+  void set_opening(const std::optional<CancelToken>& cancel) {
+    const std::lock_guard lock(mutex);
+    opening.reset();
+    if (cancel) opening.emplace(*cancel);
   }
   void begin() {
     const std::lock_guard lock(mutex);
@@ -170,9 +176,12 @@ void RemoteSource::release() { state_->release(); }
 
 pid_t RemoteSource::process() const { return state_->loader.process().id(); }
 
-Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits) {
+Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits,
+                                           const CancelToken& cancel) {
   auto state = std::make_unique<RemoteSource::State>(std::move(location), std::move(limits));
+  state->set_opening(cancel);
   auto encoded = state->start();
+  state->set_opening({});
   if (!encoded) return encoded.error();
   if (!state->loader.count_memory()) state->release();  // after its answer it can be restarted
   auto info = decode_info(*encoded);

@@ -168,7 +168,7 @@ Deadline RunningLoader::next_deadline(const Patience& patience) const {
 }
 
 // Waits for the next message. Processor time counts as progress, since a reader may compute for a
-// long time. Errors: out_of_memory, since readers allocate while they read.
+// long time. Errors: out_of_memory, since readers allocate while they read; cancelled.
 Result<Fate> RunningLoader::wait(Patience& patience) {
   constexpr std::chrono::milliseconds look_every{50};
   constexpr std::chrono::seconds pause_min{1};
@@ -183,6 +183,9 @@ Result<Fate> RunningLoader::wait(Patience& patience) {
     patience.looked = now;
     const auto end = std::min(patience.end, patience.moved + limits_.stall_time);
     if (now >= end) return wait_for_message(process_.socket(), now);
+    if (limits_.cancelled && limits_.cancelled()) {
+      return make_error(ErrorKind::cancelled, "it was cancelled");
+    }
     if (auto room = count_memory(); !room) return room.error();
     const Fate fate = wait_for_message(process_.socket(), std::min(end, now + look_every));
     if (fate != Fate::late) return fate;

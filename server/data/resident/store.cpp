@@ -27,7 +27,7 @@ namespace {
 
 using DatasetPtr = std::shared_ptr<Dataset>;
 
-Result<std::unique_ptr<Source>> open_here(const Location& location) {
+Result<std::unique_ptr<Source>> open_here(const Location& location, const CancelToken& /*cancel*/) {
   auto source = open_dataset(direct_files(location));
   if (!source) return source.error();
   return std::unique_ptr<Source>(std::move(*source));
@@ -129,9 +129,12 @@ struct Store::State {
   template <class Open>
   Result<Added> add(const std::string& key, const std::string& wanted_id,
                     std::optional<Location> location, const Open& open,
-                    const std::string& failed_id = "") {
+                    const std::string& failed_id = "", const CancelToken& cancel = {}) {
+    constexpr std::chrono::milliseconds look_every{100};
     std::unique_lock lock(mutex);
-    opened.wait(lock, [&] { return opening.count(key) == 0; });
+    while (!opened.wait_for(lock, look_every, [&] { return opening.count(key) == 0; })) {
+      if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "opening was cancelled");
+    }
     if (auto there = known(key)) {
       unlist_failed(key);
       return Added{std::move(there), false};
@@ -225,7 +228,7 @@ struct Store::State {
       }
       if (!location) continue;
       const auto added = add(
-          key, id, *location, [&] { return options.open(*location); }, id);
+          key, id, *location, [&] { return options.open(*location, {}); }, id);
       if (added) {
         if (!added->is_new) continue;
         out.push_back(added->dataset->info().id);
@@ -298,12 +301,13 @@ Result<DatasetPtr> Store::add(const Location& location) {
   return std::move(added->dataset);
 }
 
-Result<Store::Added> Store::add_or_find(const Location& location) {
+Result<Store::Added> Store::add_or_find(const Location& location, const CancelToken& cancel) {
   // Ends idle loaders, so that their number is limited when many files are opened in sequence.
   constexpr double hardly_idle_s = 0.5;
   release_idle(hardly_idle_s);
-  return state_->add(key_of(location), printable(location.wanted_id()), location,
-                     [&] { return state_->options.open(location); });
+  return state_->add(
+      key_of(location), printable(location.wanted_id()), location,
+      [&] { return state_->options.open(location, cancel); }, "", cancel);
 }
 
 Result<void> Store::remove(const std::string& id) {
@@ -402,7 +406,7 @@ std::vector<std::string> Store::look_for_changes(double rest_s) {
     }
     const std::string id = old->info().id;
     auto opened = State::open_entry(key_of(*entry.location), entry.location,
-                                    [&] { return state_->options.open(*entry.location); });
+                                    [&] { return state_->options.open(*entry.location, {}); });
     Result<void> usable = opened ? Result<void>() : opened.error();
     // Out of memory is retried; other errors persist until the files change.
     bool lasts = !usable && usable.error().kind != ErrorKind::out_of_memory;

@@ -34,7 +34,7 @@ struct StoreOptions {
   std::uint64_t bytes_max = 0;
   Storage storage = Storage::float32;
   // Opens datasets other than samples; the default reads files in this process.
-  std::function<Result<std::unique_ptr<Source>>(const Location&)> open;
+  std::function<Result<std::unique_ptr<Source>>(const Location&, const CancelToken&)> open;
   std::shared_ptr<Budget> budget =
       nullptr;  // replaces the store's own budget of bytes_max; shared with sources
   // A check that a dataset must pass to be listed or reopened; null: no check. Called under the
@@ -62,7 +62,8 @@ class Store {
     std::shared_ptr<Dataset> dataset;
     bool is_new = false;
   };
-  Result<Added> add_or_find(const Location& location);
+  // Errors also: cancelled.
+  Result<Added> add_or_find(const Location& location, const CancelToken& cancel = {});
   // Removes a dataset; existing references stay valid. Errors: not_found.
   Result<void> remove(const std::string& id);
   [[nodiscard]] Result<std::shared_ptr<Dataset>> find(const std::string& id) const;

@@ -77,7 +77,8 @@ class SharedDataset : public testing::Test {
     server_ = std::make_unique<TestServer>(
         with_root(root_),
         [gate = gate_, server_has_begun = begun_](
-            const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
+            const data::Location& location,
+            const CancelToken&) -> Result<std::unique_ptr<data::Source>> {
           if (*server_has_begun) gate->pass();
           auto source = data::open_dataset(data::direct_files(location));
           if (!source) return source.error();
@@ -160,14 +161,14 @@ TEST(ForgottenDatasets, WaitingPictureReportsTheRemoval) {
   fs::copy_file(small_file(), name + "/posted.nc");
   const auto gate = std::make_shared<Gate>();
   {
-    TestServer server(
-        with_root(name),
-        [gate](const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
-          auto source = data::open_dataset(data::direct_files(location));
-          if (!source) return source.error();
-          return std::unique_ptr<data::Source>(
-              std::make_unique<StuckSource>(std::move(*source), gate));
-        });
+    TestServer server(with_root(name),
+                      [gate](const data::Location& location,
+                             const CancelToken&) -> Result<std::unique_ptr<data::Source>> {
+                        auto source = data::open_dataset(data::direct_files(location));
+                        if (!source) return source.error();
+                        return std::unique_ptr<data::Source>(
+                            std::make_unique<StuckSource>(std::move(*source), gate));
+                      });
     const std::uint16_t port = server.port();
     ASSERT_EQ(finished_job(port, post_file(port, "posted.nc"))["state"], "done");
     int reads = 0;
@@ -224,15 +225,16 @@ TEST(Loads, HangingDatasetDoesNotBlockOthers) {
   ASSERT_NE(mkdtemp(name.data()), nullptr);
   const fs::path root = name;
   fs::copy_file(small_file(), root / "hangs.nc");
-  TestServer server(
-      with_root(root),
-      [gate](const data::Location& location) -> Result<std::unique_ptr<data::Source>> {
-        auto source = data::open_dataset(data::direct_files(location));
-        if (!source) return source.error();
-        if (location.stem != "hangs") return std::unique_ptr<data::Source>(std::move(*source));
-        return std::unique_ptr<data::Source>(
-            std::make_unique<SlowSource>(std::move(*source), gate));
-      });
+  TestServer server(with_root(root),
+                    [gate](const data::Location& location,
+                           const CancelToken&) -> Result<std::unique_ptr<data::Source>> {
+                      auto source = data::open_dataset(data::direct_files(location));
+                      if (!source) return source.error();
+                      if (location.stem != "hangs")
+                        return std::unique_ptr<data::Source>(std::move(*source));
+                      return std::unique_ptr<data::Source>(
+                          std::make_unique<SlowSource>(std::move(*source), gate));
+                    });
   ASSERT_EQ(finished_job(server.port(), post_file(server.port(), "hangs.nc"))["state"], "done");
   const std::string probe = "/v1/datasets/hangs/probe?x=0&y=0&z=500&step=";
   std::vector<std::unique_ptr<Socket>> waiting;

@@ -350,7 +350,8 @@ TEST(Limits, PicturesWaitingForASlowDiskAreBounded) {
   const auto gate = std::make_shared<Gate>();
   TestServer server(
       {},
-      [gate](const data::Location& location) -> windsplat::Result<std::unique_ptr<data::Source>> {
+      [gate](const data::Location& location,
+             const windsplat::CancelToken&) -> windsplat::Result<std::unique_ptr<data::Source>> {
         auto source = data::open_dataset(data::direct_files(location));
         if (!source) return source.error();
         return std::unique_ptr<data::Source>(

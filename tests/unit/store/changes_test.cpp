@@ -111,7 +111,8 @@ TEST(Store, FailedReopenIsRetriedAfterAChange) {
   std::atomic<int> opened{0};
   StoreOptions options;
   options.bytes_max = 1 << 20;
-  options.open = [&](const Location& location) -> Result<std::unique_ptr<Source>> {
+  options.open = [&](const Location& location,
+                     const CancelToken&) -> Result<std::unique_ptr<Source>> {
     ++opened;
     return open_file(location.members.front().path);
   };
@@ -136,7 +137,8 @@ TEST(Store, DatasetThatFailsTheCheckDoesNotReplaceAValidOne) {
   bool is_too_large = false;
   StoreOptions options;
   options.bytes_max = 1 << 20;
-  options.open = [&](const Location& location) -> Result<std::unique_ptr<Source>> {
+  options.open = [&](const Location& location,
+                     const CancelToken&) -> Result<std::unique_ptr<Source>> {
     ++opened;
     return open_file(location.members.front().path);
   };
@@ -170,7 +172,8 @@ TEST(Store, FailedDatasetIsOpenedWhenItsFileIsReplaced) {
   std::atomic<int> opened{0};
   StoreOptions options;
   options.bytes_max = 1 << 20;
-  options.open = [&](const Location& location) -> Result<std::unique_ptr<Source>> {
+  options.open = [&](const Location& location,
+                     const CancelToken&) -> Result<std::unique_ptr<Source>> {
     ++opened;
     return open_file(location.members.front().path);
   };
@@ -216,7 +219,8 @@ TEST(Store, DatasetRemovedWhileOpeningStaysRemoved) {
   bool removed = false;
   StoreOptions options;
   options.bytes_max = 1 << 20;
-  options.open = [&](const Location& location) -> Result<std::unique_ptr<Source>> {
+  options.open = [&](const Location& location,
+                     const CancelToken&) -> Result<std::unique_ptr<Source>> {
     if (whole != nullptr) removed = whole->remove_failed("rain");
     return open_file(location.members.front().path);
   };

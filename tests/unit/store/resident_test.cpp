@@ -86,7 +86,8 @@ struct Fixture {
           StoreOptions options;
           options.bytes_max = volumes * volume_bytes;
           options.storage = storage;
-          options.open = [log = log](const Location&) -> Result<std::unique_ptr<Source>> {
+          options.open = [log = log](const Location&,
+                                     const CancelToken&) -> Result<std::unique_ptr<Source>> {
             return std::unique_ptr<Source>(std::make_unique<Series>(log));
           };
           return options;

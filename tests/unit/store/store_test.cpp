@@ -114,7 +114,8 @@ TEST(Store, SameFilesAreOneDatasetWhenAddedAgain) {
   std::atomic<int> opened{0};
   StoreOptions options;
   options.bytes_max = 1 << 20;
-  options.open = [&](const Location& location) -> Result<std::unique_ptr<Source>> {
+  options.open = [&](const Location& location,
+                     const CancelToken&) -> Result<std::unique_ptr<Source>> {
     ++opened;
     return open_file(location.members.front().path);
   };
@@ -213,7 +214,7 @@ TEST(Store, ChangeOfTheLastFileOfALongSeriesIsDetected) {
   for (int i = 100; i < 200; ++i) std::ofstream(folder / numbered(i)) << "a step";
   StoreOptions options;
   options.bytes_max = 1 << 20;
-  options.open = [](const Location&) -> Result<std::unique_ptr<Source>> {
+  options.open = [](const Location&, const CancelToken&) -> Result<std::unique_ptr<Source>> {
     return std::unique_ptr<Source>(std::make_unique<FakeSource>());
   };
   Store store(options);
@@ -229,7 +230,7 @@ TEST(Store, DatasetRemovedWhileReopeningStaysRemoved) {
   Store* whole = nullptr;
   StoreOptions options;
   options.bytes_max = 1 << 20;
-  options.open = [&](const Location&) -> Result<std::unique_ptr<Source>> {
+  options.open = [&](const Location&, const CancelToken&) -> Result<std::unique_ptr<Source>> {
     if (whole != nullptr) static_cast<void>(whole->remove("rain"));
     return std::unique_ptr<Source>(std::make_unique<FakeSource>());
   };
