@@ -71,11 +71,27 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if body is None:
             self.answer(404, b"no such file" * 10)
             return
-        etag = f'"{digest(body)[:16]}"'
-        if self.headers.get("If-None-Match") == etag:
+        host = self.server.host
+        etag = f'{host.etag_mark}"{digest(body)[:16]}"'
+        dated = {}
+        if host.date:
+            etag, dated = None, {"Last_Modified": host.date}
+        if etag and self.headers.get("If-None-Match") == etag:
             self.answer(304, ETag=etag, Content_Length=None)
-        else:
-            self.answer(200, body, ETag=etag)
+            return
+        wanted = self.headers.get("Range") if host.ranges else None
+        if self.headers.get("If-Range", etag) != etag:
+            wanted = None
+        if not wanted:
+            self.answer(200, body, ETag=etag, **dated)
+            return
+        first, last = (int(number or len(body)) for number in
+                       wanted.removeprefix("bytes=").split("-"))
+        last = min(last, len(body) - 1)
+        part = body[first:last + 1]
+        with host.lock:
+            host.parts.append((self.path, first, len(part)))
+        self.answer(206, part, ETag=etag, Content_Range=f"bytes {first}-{last}/{len(body)}")
 
     # --- S3 -----------------------------------------------------------------------------------
 
@@ -184,7 +200,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def resumed(self, name, etag, left_out):
         """Half of the file, then the rest with this ETag and without its last bytes."""
         body = self.server.host.files[name]
-        begin = int(self.headers.get("Range", "bytes=0-").removeprefix("bytes=").rstrip("-"))
+        wanted = self.headers.get("Range", "bytes=0-").removeprefix("bytes=")
+        begin = int(wanted.partition("-")[0])
         if not begin:
             self.answer(200, body[:len(body) // 2], ETag='"1"', Content_Length=str(len(body)))
         else:
@@ -238,6 +255,10 @@ class DataHost:
         self.signed = False
         self.requests = []
         self.lock = threading.Lock()
+        self.ranges = True
+        self.etag_mark = ""  # "W/": weak
+        self.date = ""  # Last-Modified of every file, which then have no ETag
+        self.parts = []  # path, first byte and number of bytes of each part that was sent
         self.stalled = set()  # names of files that are never sent to their end
         self.waits, self.left = threading.Event(), threading.Event()  # a client for one of these
         self.plain_port = plain_port

@@ -1,6 +1,7 @@
 // Names of files of a location -> URLs below its folder.
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -20,12 +21,31 @@ class FetchedFiles final : public Files {
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
     const auto url = url_of(name);
     if (!url) return url.error();
-    auto descriptor = fetcher_.fetch(*url, cancelled_);
-    if (!descriptor) return descriptor.error();
-    auto file = InputFile::adopt(descriptor->give(), name.substr(name.find_last_of('/') + 1));
+    // Files of a folder are small, or chunks that are read as a whole.
+    const Fetch how = location_.kind == Location::Kind::folder ? Fetch::whole : Fetch::parts;
+    auto fetched = fetcher_.fetch(*url, how, cancelled_);
+    if (!fetched) return fetched.error();
+    FileParts parts;
+    if (fetched->parts) {
+      parts = {++last_number_, fetched->parts->state()};
+      parts_[parts.number] = {*url, std::move(fetched->parts)};
+    }
+    auto file = InputFile::adopt(fetched->file.give(), name.substr(name.find_last_of('/') + 1),
+                                 std::move(parts));
     if (file) count_opened(name, (*file)->size());
     return file;
   }
+
+  Result<Extent> fetch_part(std::uint64_t number, std::uint64_t offset,
+                            std::uint64_t count) override {
+    const auto at = parts_.find(number);
+    if (at == parts_.end()) return make_error(ErrorKind::not_found, "no such file is open");
+    auto out = fetcher_.fetch_part(at->second.url, *at->second.file, offset, count, cancelled_);
+    if (!out && !fault_) fault_ = out.error();
+    return out;
+  }
+
+  void close_parts(std::uint64_t number) override { parts_.erase(number); }
 
   Result<std::vector<std::string>> list(const std::string& folder) override {
     if (location_.kind != Location::Kind::folder) return not_permitted(folder);
@@ -39,6 +59,7 @@ class FetchedFiles final : public Files {
   bool exists(const std::string& name) override {
     if (location_.kind == Location::Kind::folder && name.ends_with('/')) return true;
     const auto file = open(name);
+    if (file) close_parts((*file)->parts().number);
     if (!file && file.error().kind != ErrorKind::not_found && !fault_) fault_ = file.error();
     return file.has_value();
   }
@@ -71,6 +92,12 @@ class FetchedFiles final : public Files {
   Location location_;
   Cancelled cancelled_;
   std::optional<Error> fault_;
+  struct Parts {
+    std::string url;
+    std::shared_ptr<SparseFile> file;
+  };
+  std::map<std::uint64_t, Parts> parts_;  // by number
+  std::uint64_t last_number_ = 0;
 };
 
 }  // namespace

@@ -8,12 +8,19 @@ namespace windsplat::data::fetch {
 namespace {
 
 constexpr std::size_t idle_clients_max = 8;
+constexpr std::size_t idle_parts_max = 64;  // files open without a reader
 constexpr std::size_t list_entries_max = 1'000'000;
 constexpr int list_pages_max = 1100;  // pages have 1000 entries
 constexpr std::size_t list_page_bytes_max = std::size_t{4} << 20;
 
 Error no_s3(const Url& url) {
   return make_error(ErrorKind::invalid, in_quotes(url.text()) + ": no S3 service is set");
+}
+
+Result<FetchedFile> opened(std::shared_ptr<SparseFile> parts) {
+  auto file = parts->open();
+  if (!file) return file.error();
+  return FetchedFile{std::move(*file), std::move(parts)};
 }
 
 }  // namespace
@@ -69,27 +76,109 @@ Result<Response> Fetcher::get(const Request& request, const HttpClient::Sink& si
   return response;
 }
 
-Result<Descriptor> Fetcher::fetch(const std::string& text, const Cancelled& cancelled) {
+Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Cancelled& cancelled) {
   const auto url = parse_url(text);
   if (!url) return url.error();
   auto request = request_of(*url, cancelled);
   if (!request) return request.error();
   const std::string key = request->url.text();
   if (auto permitted = rules_->check(request->url); !permitted) return permitted.error();
-  auto known = cache_->find(key);
-  if (known && known->is_fresh) return std::move(known->file);
+  auto parts = how == Fetch::parts ? find_parts(key) : std::nullopt;
+  if (parts && Clock::now() - parts->confirmed < options_.cache.fresh_time) {
+    return opened(std::move(parts->file));
+  }
+  auto known = parts ? std::nullopt : cache_->find(key);
+  if (known && known->is_fresh) return FetchedFile{std::move(known->file), nullptr};
+  if (parts) request->known = parts->file->validators();
   if (known) request->known = known->validators;
+  if (known) request->known_bytes = known->bytes;
+  if (how == Fetch::parts) request->range = ByteRange{0, SparseFile::begin_bytes};
   auto part = cache_->begin();
   if (!part) return part.error();
   const auto response =
       get(*request, [&part](std::string_view bytes) { return part->append(bytes); });
   if (!response) {
-    if (response.error().kind == ErrorKind::not_found) cache_->remove(key);
+    if (response.error().kind == ErrorKind::not_found) {
+      cache_->remove(key);
+      forget_parts(key);
+    }
     return response.error();
   }
-  if (!response->is_unchanged) return cache_->keep(key, std::move(*part), response->validators);
-  cache_->confirm(key);
-  return std::move(known->file);
+  if (response->is_unchanged) {
+    if (parts) {
+      keep_parts(key, parts->file);
+      return opened(std::move(parts->file));
+    }
+    cache_->confirm(key);
+    return FetchedFile{std::move(known->file), nullptr};
+  }
+  if (response->file_bytes > part->bytes()) {
+    cache_->remove(key);
+    auto sparse = SparseFile::make(key, std::move(*part), *response, options_.limits.bytes_max);
+    if (!sparse) return sparse.error();
+    keep_parts(key, *sparse);
+    return opened(std::move(*sparse));
+  }
+  forget_parts(key);
+  auto file = cache_->keep(key, std::move(*part), response->validators);
+  if (!file) return file.error();
+  return FetchedFile{std::move(*file), nullptr};
+}
+
+Result<Extent> Fetcher::fetch_part(const std::string& text, SparseFile& file, std::uint64_t offset,
+                                   std::uint64_t count, const Cancelled& cancelled) {
+  const auto url = parse_url(text);
+  if (!url) return url.error();
+  auto request = request_of(*url, cancelled);
+  if (!request) return request.error();
+  request->state = file.validators().etag;
+  request->state_bytes = file.bytes();
+  const auto get_bytes = [&](ByteRange range, const HttpClient::Sink& sink) -> Result<void> {
+    drop_idle_parts();
+    request->range = range;
+    request->limits.bytes_max = range.count;
+    const auto response = get(*request, sink);
+    if (!response) return response.error();
+    return {};
+  };
+  auto out = file.fetch(offset, count, get_bytes, request->cancelled);
+  // Whoever opens it next asks for its state.
+  if (!out && out.error().kind == ErrorKind::bad_data) forget_parts(request->url.text());
+  return out;
+}
+
+std::optional<Fetcher::KnownParts> Fetcher::find_parts(const std::string& key) {
+  const std::lock_guard lock(mutex_);
+  const auto at = std::find_if(parts_.begin(), parts_.end(),
+                               [&](const KnownParts& known) { return known.key == key; });
+  if (at == parts_.end()) return {};
+  parts_.splice(parts_.begin(), parts_, at);
+  return *at;
+}
+
+void Fetcher::keep_parts(const std::string& key, std::shared_ptr<SparseFile> file) {
+  const std::lock_guard lock(mutex_);
+  parts_.remove_if([&](const KnownParts& known) { return known.key == key; });
+  parts_.push_front({key, std::move(file), Clock::now()});
+  std::size_t idle = 0;
+  parts_.remove_if([&](const KnownParts& known) {
+    return known.file.use_count() == 1 && ++idle > idle_parts_max;
+  });
+}
+
+void Fetcher::forget_parts(const std::string& key) {
+  const std::lock_guard lock(mutex_);
+  parts_.remove_if([&](const KnownParts& known) { return known.key == key; });
+}
+
+void Fetcher::drop_idle_parts() {
+  const std::lock_guard lock(mutex_);
+  for (auto at = parts_.end(); at != parts_.begin();) {
+    constexpr std::uint64_t margin = SparseFile::blocks_ahead_max * SparseFile::block_bytes;
+    if (cache_->bytes() + margin <= options_.cache.bytes_max) return;
+    --at;
+    if (at->file.use_count() == 1) at = parts_.erase(at);
+  }
 }
 
 Result<std::vector<std::string>> Fetcher::list(const std::string& folder_url,

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -15,6 +17,7 @@
 #include "server/data/fetch/http_client.hpp"
 #include "server/data/fetch/object_cache.hpp"
 #include "server/data/fetch/s3.hpp"
+#include "server/data/fetch/sparse_file.hpp"
 #include "server/data/files/descriptor.hpp"
 #include "server/data/files/files.hpp"
 
@@ -30,6 +33,14 @@ struct FetchOptions {
 
 using Cancelled = std::function<bool()>;
 
+// A file that is open for reading.
+struct FetchedFile {
+  Descriptor file;
+  std::shared_ptr<SparseFile> parts;  // null: all bytes are present
+};
+
+enum class Fetch { whole, parts };  // parts: as many files as their hosts send parts of
+
 // Thread-safe.
 class Fetcher {
  public:
@@ -41,7 +52,11 @@ class Fetcher {
 
   // The file at a URL of https, http or s3, from the cache if its host confirms it, or did so
   // recently. Errors: those of HttpClient::get(), out_of_memory if it cannot be stored.
-  Result<Descriptor> fetch(const std::string& url, const Cancelled& cancelled);
+  Result<FetchedFile> fetch(const std::string& url, Fetch how, const Cancelled& cancelled);
+  // Bytes of a file that is here in parts, which is that of the URL. Errors: those of
+  // SparseFile::fetch() and HttpClient::get().
+  Result<Extent> fetch_part(const std::string& url, SparseFile& file, std::uint64_t offset,
+                            std::uint64_t count, const Cancelled& cancelled);
   // Names directly below a folder of an S3 service, sorted; folders end in '/'. Errors: bad_data,
   // also for other hosts, which have no lists.
   Result<std::vector<std::string>> list(const std::string& folder_url, const Cancelled& cancelled);
@@ -55,12 +70,26 @@ class Fetcher {
   [[nodiscard]] Result<Request> request_of(const Url& url, const Cancelled& cancelled) const;
   Result<Response> get(const Request& request, const HttpClient::Sink& sink);
 
+  using Clock = std::chrono::steady_clock;
+  // Those used last come first.
+  struct KnownParts {
+    std::string key;
+    std::shared_ptr<SparseFile> file;
+    Clock::time_point confirmed;
+  };
+  [[nodiscard]] std::optional<KnownParts> find_parts(const std::string& key);
+  void keep_parts(const std::string& key, std::shared_ptr<SparseFile> file);
+  void forget_parts(const std::string& key);
+  // Removes files that no dataset has open until there is room in the cache.
+  void drop_idle_parts();
+
   FetchOptions options_;
   std::shared_ptr<const HostRules> rules_;
   std::unique_ptr<ObjectCache> cache_;
   std::atomic<bool> ended_ = false;
   std::mutex mutex_;
   std::vector<std::unique_ptr<HttpClient>> idle_;  // guarded by the mutex
+  std::list<KnownParts> parts_;                    // guarded by the mutex
 };
 
 // The files of a location that is fetched. `cancelled` ends a request that is under way. The

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "server/base/ascii.hpp"
+#include "server/data/fetch/content_range.hpp"
 
 namespace windsplat::data::fetch {
 
@@ -22,6 +23,7 @@ constexpr std::size_t discarded_bytes_max = std::size_t{64} << 10;  // of the bo
 constexpr long ok = 200;
 constexpr long partial_content = 206;
 constexpr long not_modified = 304;
+constexpr long no_such_range = 416;
 
 struct ListDeleter {
   void operator()(curl_slist* list) const { curl_slist_free_all(list); }
@@ -33,10 +35,10 @@ void start_library() {
   std::call_once(once, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
 }
 
-// What was received of a file before its connection ended.
+// What was received of a body before its connection ended.
 struct Part {
   std::uint64_t bytes = 0;
-  std::uint64_t total = 0;  // of the file, by its first Content-Length; 0: unknown
+  std::uint64_t total = 0;  // of the file, by the first answer; 0: unknown
   std::string etag;
 };
 
@@ -58,10 +60,18 @@ struct Exchange {
   bool not_stored = false;
   bool encoded = false;
   bool has_length = false;  // the end of the body is known
-  bool not_resumed = false;
+  bool wrong_part = false;  // not the bytes that were asked for, or of another state
 
-  [[nodiscard]] long whole_status() const { return part.bytes == 0 ? ok : partial_content; }
-  [[nodiscard]] bool is_refused() const { return header_too_large || not_resumed; }
+  // A strong ETag that the answer must have; empty: any.
+  [[nodiscard]] const std::string& state() const {
+    return part.bytes > 0 ? part.etag : request->state;
+  }
+  // Whether the body of an answer with this status is what was asked for, or must be checked.
+  [[nodiscard]] bool has_body(long status) const {
+    if (status == partial_content) return part.bytes > 0 || request->range;
+    return status == ok && part.bytes == 0 && request->state.empty();
+  }
+  [[nodiscard]] bool is_refused() const { return header_too_large || wrong_part; }
 };
 
 long status_of(CURL* curl) {
@@ -79,13 +89,31 @@ std::string_view validator(std::string_view value) {
   return plain ? value : std::string_view();
 }
 
-// Whether an answer 206 is the whole rest of the same file; hosts may ignore If-Range, or send
-// less.
-bool is_rest(const Exchange& exchange) {
-  const std::string total = std::to_string(exchange.part.total);
-  return exchange.part.total > 0 && exchange.response.validators.etag == exchange.part.etag &&
-         exchange.range == "bytes " + std::to_string(exchange.part.bytes) + '-' +
-                               std::to_string(exchange.part.total - 1) + '/' + total;
+// Whether an answer 206 is all that was asked for of the same file; hosts may ignore If-Range, or
+// send less.
+bool is_wanted_part(const Exchange& exchange) {
+  const Request& request = *exchange.request;
+  const auto got = parse_content_range(exchange.range);
+  const std::string& etag = exchange.response.validators.etag;
+  if (!got || got->total == 0 || !etag.starts_with('"')) return false;
+  if (!exchange.state().empty() && etag != exchange.state()) return false;
+  const std::uint64_t begin = request.range ? request.range->first : 0;
+  std::uint64_t end = got->total;
+  if (request.range && begin < end) end = begin + std::min(request.range->count, end - begin);
+  const std::uint64_t total = exchange.part.bytes > 0 ? exchange.part.total : request.state_bytes;
+  const bool is_same_file = got->total == total || (exchange.state().empty() && total == 0);
+  return is_same_file && got->first == begin + exchange.part.bytes && got->last + 1 == end;
+}
+
+// Whether an answer with a body is the known file of a host without ETags.
+bool is_known(const Exchange& exchange) {
+  const Validators& known = exchange.request->known;
+  const Validators& now = exchange.response.validators;
+  curl_off_t length = -1;
+  curl_easy_getinfo(exchange.curl, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
+  return known.etag.empty() && now.etag.empty() && !known.last_modified.empty() &&
+         now.last_modified == known.last_modified && length > 0 &&
+         static_cast<std::uint64_t>(length) == exchange.request->known_bytes;
 }
 
 // Callbacks have the types of libcurl.
@@ -123,10 +151,12 @@ std::size_t on_body(char* data, std::size_t size, std::size_t count, void* user)
   const long status = status_of(exchange.curl);
   const Part& part = exchange.part;
   // A host that ignores the range, or whose file has changed, answers 200 (RFC 9110, 13.1.5).
-  exchange.not_resumed =
-      part.bytes > 0 && (status == ok || (status == partial_content && !is_rest(exchange)));
-  if (exchange.not_resumed) return 0;
-  if (status != exchange.whole_status()) {
+  exchange.wrong_part =
+      (status == ok && !exchange.state().empty()) ||
+      (status == partial_content && exchange.has_body(status) && !is_wanted_part(exchange));
+  if (exchange.wrong_part) return 0;
+  exchange.response.is_unchanged = status == ok && part.bytes == 0 && is_known(exchange);
+  if (!exchange.has_body(status) || exchange.response.is_unchanged) {
     // Reading a short body to its end keeps the connection usable.
     return exchange.body_bytes <= discarded_bytes_max ? bytes.size() : 0;
   }
@@ -207,11 +237,17 @@ Error fault_of_transfer(const Exchange& exchange, const Url& url, CURLcode code,
                      std::to_string(limits.stall_time.count()) + " s");
   }
   const std::uint64_t received = exchange.part.bytes + exchange.body_bytes;
-  if (exchange.not_resumed) {
+  if (exchange.wrong_part && exchange.part.bytes > 0) {
     return fault(ErrorKind::bad_data, url,
                  "was received incompletely: the connection ended after " +
                      std::to_string(exchange.part.bytes) +
                      " bytes, and the host does not send the rest of the same file");
+  }
+  if (exchange.wrong_part) {
+    const bool is_same = exchange.response.validators.etag == exchange.request->state;
+    return fault(ErrorKind::bad_data, url,
+                 is_same ? "is answered with other bytes than those that were asked for"
+                         : "has changed on its host since it was opened; open it again");
   }
   if (code == CURLE_PARTIAL_FILE) {
     return fault(ErrorKind::bad_data, url,
@@ -232,11 +268,9 @@ void append(HeaderList& list, const std::string& line) {
 
 HeaderList headers_of(const Request& request, const Part& part) {
   HeaderList out;
-  if (part.bytes > 0) append(out, "If-Range: " + part.etag);
+  const std::string& state = part.bytes > 0 ? part.etag : request.state;
+  if (!state.empty()) append(out, "If-Range: " + state);
   if (!request.known.etag.empty()) append(out, "If-None-Match: " + request.known.etag);
-  if (request.known.etag.empty() && !request.known.last_modified.empty()) {
-    append(out, "If-Modified-Since: " + request.known.last_modified);
-  }
   // S3 requires the SHA-256 of the body, which is empty.
   if (request.key != nullptr && !request.key->id.empty()) {
     append(out,
@@ -249,11 +283,19 @@ HeaderList headers_of(const Request& request, const Part& part) {
   return out;
 }
 
+// Bytes of the file of which an answer has all or a part; 0: unknown.
+std::uint64_t total_of(const Exchange& exchange) {
+  if (const auto range = parse_content_range(exchange.range)) return range->total;
+  curl_off_t length = -1;
+  curl_easy_getinfo(exchange.curl, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
+  return length > 0 ? static_cast<std::uint64_t>(length) : 0;
+}
+
 // Whether the rest of a file can be asked for: by a strong validator, if anything was received.
 bool may_resume(const Exchange& exchange, CURLcode code, long status) {
   const std::string& etag = exchange.response.validators.etag;
   return (code == CURLE_PARTIAL_FILE || code == CURLE_RECV_ERROR) && exchange.body_bytes > 0 &&
-         status == exchange.whole_status() && !exchange.is_refused() && etag.starts_with('"') &&
+         exchange.has_body(status) && !exchange.is_refused() && etag.starts_with('"') &&
          (exchange.part.bytes == 0 || etag == exchange.part.etag);
 }
 
@@ -318,6 +360,13 @@ HttpClient::HttpClient(std::shared_ptr<const HostRules> rules, std::string autho
 
 HttpClient::~HttpClient() = default;
 
+// The value of the header Range; empty: the whole file.
+std::string range_of(const Request& request, const Part& part) {
+  if (!request.range) return part.bytes == 0 ? "" : std::to_string(part.bytes) + '-';
+  const auto [first, count] = *request.range;
+  return std::to_string(first + part.bytes) + '-' + std::to_string(first + count - 1);
+}
+
 // Sends one request and receives its answer.
 CURLcode HttpClient::Handle::perform(Exchange& exchange, const std::string& authorities,
                                      std::chrono::milliseconds left) {
@@ -331,8 +380,8 @@ CURLcode HttpClient::Handle::perform(Exchange& exchange, const std::string& auth
   set(CURLOPT_PATH_AS_IS, 1L);
   const HeaderList headers = headers_of(request, exchange.part);
   set(CURLOPT_HTTPHEADER, headers.get());
-  const std::string range = std::to_string(exchange.part.bytes) + '-';
-  if (exchange.part.bytes > 0) set(CURLOPT_RANGE, range.c_str());
+  const std::string range = range_of(request, exchange.part);
+  if (!range.empty()) set(CURLOPT_RANGE, range.c_str());
   set(CURLOPT_HEADERFUNCTION, &on_header);
   set(CURLOPT_HEADERDATA, &exchange);
   set(CURLOPT_WRITEFUNCTION, &on_body);
@@ -392,16 +441,24 @@ Result<Response> HttpClient::get(const Request& first, const Sink& sink) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
     const CURLcode code = handle_->perform(exchange, authorities_, left);
     const long status = status_of(handle_->curl);
-    if (code == CURLE_OK && status == exchange.whole_status()) return std::move(exchange.response);
+    const bool is_part = status == partial_content;
+    if (exchange.response.is_unchanged) return Response{true, first.known, 0};
+    if (code == CURLE_OK && exchange.has_body(status)) {
+      if (is_part && request.range) exchange.response.file_bytes = total_of(exchange);
+      return std::move(exchange.response);
+    }
     if (may_resume(exchange, code, status) && ++resumed <= resumptions_max) {
-      if (part.bytes == 0) {
-        curl_off_t length = -1;
-        curl_easy_getinfo(handle_->curl, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
-        part.total = length > 0 ? static_cast<std::uint64_t>(length) : 0;
-      }
+      if (part.bytes == 0) part.total = total_of(exchange);
+      if (!is_part) request.range.reset();
       part.etag = exchange.response.validators.etag;
       part.bytes += exchange.body_bytes;
       request.known = {};
+      continue;
+    }
+    // The host cannot send parts of a file in a known state, or this one has no first byte.
+    if (request.range && request.state.empty() && part.bytes == 0 &&
+        (exchange.wrong_part || status == no_such_range)) {
+      request.range.reset();
       continue;
     }
     // The body of an error may be longer than what is discarded.
@@ -410,8 +467,8 @@ Result<Response> HttpClient::get(const Request& first, const Sink& sink) {
     if (code != CURLE_OK && !is_error_body) {
       return fault_of_transfer(exchange, request.url, code, handle_->detail.data());
     }
-    const bool asked = !request.known.etag.empty() || !request.known.last_modified.empty();
-    if (status == not_modified && asked) return Response{true, first.known};
+    const bool asked = !request.known.etag.empty();
+    if (status == not_modified && asked) return Response{true, first.known, 0};
     char* location = nullptr;
     curl_easy_getinfo(handle_->curl, CURLINFO_REDIRECT_URL, &location);
     if (status < 301 || status > 308 || location == nullptr) {

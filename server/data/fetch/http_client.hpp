@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,10 +44,24 @@ inline constexpr std::size_t header_bytes_max = std::size_t{64} << 10;
 inline constexpr int redirects_max = 5;
 inline constexpr int resumptions_max = 3;
 
+// Some bytes of a file, at least one.
+struct ByteRange {
+  std::uint64_t first = 0;
+  std::uint64_t count = 0;
+};
+
 struct Request {
-  Url url;            // https or http
-  std::string query;  // percent-encoded, sorted by name; empty: none
-  Validators known;   // the body is sent only if it differs from this state
+  Url url;                        // https or http
+  std::string query;              // percent-encoded, sorted by name; empty: none
+  Validators known;               // the body is sent only if it differs from this state
+  std::uint64_t known_bytes = 0;  // of the file in this state
+  // Asks for these bytes, as many as the file has. A host may send the whole file instead; it does
+  // so, too, if it gives no strong ETag.
+  std::optional<ByteRange> range;
+  // The strong ETag and the size of the file whose bytes are asked for; those of any other state
+  // are an error. Empty: the state is not known yet.
+  std::string state;
+  std::uint64_t state_bytes = 0;
   RequestLimits limits;
   const S3Key* key =
       nullptr;  // signs the request (AWS Signature Version 4), which is not redirected
@@ -54,8 +69,9 @@ struct Request {
 };
 
 struct Response {
-  bool is_unchanged = false;  // 304: the state is that of `known`
+  bool is_unchanged = false;  // the state is that of `known`; there was no body
   Validators validators;
+  std::uint64_t file_bytes = 0;  // only `range` of a file of this size was sent; 0: the whole file
 };
 
 // One connection at a time, kept for the next request to the same host. Not thread-safe.
@@ -70,11 +86,14 @@ class HttpClient {
   // Takes the bytes of the body in order. False: they cannot be stored; the request ends.
   using Sink = std::function<bool(std::string_view bytes)>;
 
-  // The rest of a file whose connection ends early is asked for by its ETag. Redirects are followed
-  // to permitted hosts, from https only to https. Certificates are always verified; proxies,
-  // cookies, netrc files and compressed bodies are not used. Errors: not_found for 404 and 410;
-  // too_large; cancelled; invalid for a host or address that is not permitted; bad_data for
-  // everything else. Messages name the URL without query.
+  // Parts of files follow RFC 9110, 13.1.5 and 14. The rest of a body whose connection ends early
+  // is asked for by its ETag. A host that gives a Last-Modified only is asked without a condition,
+  // and its body is not received if date and size are the known ones: If-Modified-Since would take
+  // an older file for the same. Redirects are followed to permitted hosts, from https only to
+  // https. Certificates are always verified; proxies, cookies, netrc files and compressed bodies
+  // are not used. Errors: not_found for 404 and 410; too_large; cancelled; invalid for a host or
+  // address that is not permitted; bad_data for everything else. Messages name the URL without
+  // query.
   Result<Response> get(const Request& request, const Sink& sink);
 
  private:

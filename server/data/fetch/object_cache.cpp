@@ -70,13 +70,6 @@ bool is_part(std::string_view name) {
   return name.starts_with(part_prefix) && is_hex(name.substr(part_prefix.size()), 32);
 }
 
-std::string name_of(const std::string& url) {
-  const auto digest = new_digest();
-  EVP_DigestUpdate(digest.get(), url.data(), url.size());
-  const Sha256 out = finish(digest.get());
-  return hex(out.data(), out.size());
-}
-
 // A time of modification derived from the digest of a file's bytes; also marks the file as used.
 std::array<timespec, 2> times_of(const Sha256& digest) {
   std::uint64_t number = 0;
@@ -143,11 +136,28 @@ Error disk_fault(int reason) {
 
 }  // namespace
 
-PartialFile::PartialFile(Descriptor file, std::string path)
-    : file_(std::move(file)), path_(std::move(path)), digest_(new_digest()) {}
+OpenSpace::OpenSpace(OpenSpace&& other) noexcept
+    : cache_(other.cache_), bytes_(std::exchange(other.bytes_, 0)) {}
+
+OpenSpace::~OpenSpace() {
+  if (bytes_ == 0) return;
+  const std::lock_guard lock(cache_->mutex_);
+  cache_->open_bytes_ -= bytes_;
+}
+
+void OpenSpace::add(std::uint64_t bytes) {
+  const std::lock_guard lock(cache_->mutex_);
+  bytes_ += bytes;
+  cache_->open_bytes_ += bytes;
+  cache_->evict(cache_->options_.bytes_max);
+}
+
+PartialFile::PartialFile(Descriptor file, std::string path, ObjectCache& cache)
+    : file_(std::move(file)), space_(cache), path_(std::move(path)), digest_(new_digest()) {}
 
 PartialFile::PartialFile(PartialFile&& other) noexcept
     : file_(std::move(other.file_)),
+      space_(std::move(other.space_)),
       path_(std::exchange(other.path_, {})),
       bytes_(other.bytes_),
       digest_(std::move(other.digest_)) {}
@@ -157,8 +167,13 @@ PartialFile::~PartialFile() {
 }
 
 bool PartialFile::append(std::string_view bytes) {
+  constexpr std::uint64_t counted_at_once = std::uint64_t{64} << 10;
   EVP_DigestUpdate(digest_.get(), bytes.data(), bytes.size());
+  const std::uint64_t counted = bytes_ / counted_at_once;
   bytes_ += bytes.size();
+  if (const std::uint64_t more = bytes_ / counted_at_once - counted; more > 0) {
+    space_.add(more * counted_at_once);
+  }
   while (!bytes.empty()) {
     const ssize_t wrote = ::write(file_.number(), bytes.data(), bytes.size());
     if (wrote < 0 && errno == EINTR) continue;
@@ -168,7 +183,20 @@ bool PartialFile::append(std::string_view bytes) {
   return true;
 }
 
+std::pair<Descriptor, OpenSpace> PartialFile::take() {
+  ::unlink(path_.c_str());
+  path_.clear();
+  return {std::move(file_), std::move(space_)};
+}
+
 ObjectCache::ObjectCache(CacheOptions options) : options_(std::move(options)) {}
+
+std::string ObjectCache::digest_of(const std::string& text) {
+  const auto digest = new_digest();
+  EVP_DigestUpdate(digest.get(), text.data(), text.size());
+  const Sha256 out = finish(digest.get());
+  return hex(out.data(), out.size());
+}
 
 Result<std::unique_ptr<ObjectCache>> ObjectCache::open(CacheOptions options) {
   std::error_code fault;
@@ -220,7 +248,7 @@ void ObjectCache::scan() {
 }
 
 void ObjectCache::evict(std::uint64_t bytes_max) {
-  if (bytes_ <= bytes_max) return;
+  if (bytes_ + open_bytes_ <= bytes_max) return;
   struct Candidate {
     timespec used;
     std::uint64_t space;
@@ -245,7 +273,7 @@ void ObjectCache::evict(std::uint64_t bytes_max) {
   // Some space beyond what is needed, so that the next files do not read the folder again.
   const std::uint64_t goal = bytes_max - bytes_max / 16;
   for (const Candidate& one : candidates) {
-    if (bytes_ <= goal) break;
+    if (bytes_ + open_bytes_ <= goal) break;
     const std::string url = one.name.substr(0, one.name.find('.'));
     ::unlink(path_of(one.name).c_str());
     ::unlink(path_of(url + std::string(meta_suffix)).c_str());
@@ -255,7 +283,7 @@ void ObjectCache::evict(std::uint64_t bytes_max) {
 }
 
 std::optional<ObjectCache::Entry> ObjectCache::find(const std::string& url) {
-  const std::string name = name_of(url);
+  const std::string name = digest_of(url);
   auto meta = read_meta(path_of(name + std::string(meta_suffix)));
   if (!meta) return {};
   Entry out;
@@ -268,6 +296,7 @@ std::optional<ObjectCache::Entry> ObjectCache::find(const std::string& url) {
   }
   mark_used(out.file.number());
   out.validators = std::move(meta->validators);
+  out.bytes = meta->bytes;
   const std::lock_guard lock(mutex_);
   const auto confirmed = confirmed_.find(name);
   out.is_fresh = confirmed != confirmed_.end() &&
@@ -283,13 +312,13 @@ Result<PartialFile> ObjectCache::begin() {
   Descriptor file(
       ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR));
   if (!file) return disk_fault(errno);
-  return PartialFile(std::move(file), path);
+  return PartialFile(std::move(file), path, *this);
 }
 
 Result<Descriptor> ObjectCache::keep(const std::string& url, PartialFile part,
                                      const Validators& validators) {
   const Sha256 digest = finish(part.digest_.get());
-  const std::string name = name_of(url);
+  const std::string name = digest_of(url);
   const std::string meta_path = path_of(name + std::string(meta_suffix));
   const Meta meta{validators, hex(digest.data(), digest.size()), part.bytes_};
   const std::string path = path_of(name + '.' + meta.data);
@@ -310,6 +339,7 @@ Result<Descriptor> ObjectCache::keep(const std::string& url, PartialFile part,
   }
   if (before && before->data != meta.data) ::unlink(path_of(name + '.' + before->data).c_str());
   bytes_ += space_of(status);
+  open_bytes_ -= std::exchange(part.space_.bytes_, 0);
   if (confirmed_.size() >= confirmed_max) confirmed_.clear();
   confirmed_[name] = std::chrono::steady_clock::now();
   evict(options_.bytes_max);
@@ -319,11 +349,11 @@ Result<Descriptor> ObjectCache::keep(const std::string& url, PartialFile part,
 void ObjectCache::confirm(const std::string& url) {
   const std::lock_guard lock(mutex_);
   if (confirmed_.size() >= confirmed_max) confirmed_.clear();
-  confirmed_[name_of(url)] = std::chrono::steady_clock::now();
+  confirmed_[digest_of(url)] = std::chrono::steady_clock::now();
 }
 
 void ObjectCache::remove(const std::string& url) {
-  const std::string name = name_of(url);
+  const std::string name = digest_of(url);
   const auto meta = read_meta(path_of(name + std::string(meta_suffix)));
   const std::lock_guard lock(mutex_);
   confirmed_.erase(name);
@@ -334,7 +364,7 @@ void ObjectCache::remove(const std::string& url) {
 
 std::uint64_t ObjectCache::bytes() const {
   const std::lock_guard lock(mutex_);
-  return bytes_;
+  return bytes_ + open_bytes_;
 }
 
 }  // namespace windsplat::data::fetch

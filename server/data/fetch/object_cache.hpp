@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 
 #include "server/base/error.hpp"
 #include "server/data/fetch/http_client.hpp"
@@ -25,6 +26,26 @@ struct CacheOptions {
   std::chrono::milliseconds fresh_time{60'000};
 };
 
+class ObjectCache;
+
+// Space on disk of a file that has no name in the cache; counts in its size while this exists.
+class OpenSpace {
+ public:
+  explicit OpenSpace(ObjectCache& cache) : cache_(&cache) {}
+  OpenSpace(OpenSpace&& other) noexcept;
+  OpenSpace& operator=(OpenSpace&&) = delete;
+  OpenSpace(const OpenSpace&) = delete;
+  OpenSpace& operator=(const OpenSpace&) = delete;
+  ~OpenSpace();
+  // Removes other files if the cache becomes too large.
+  void add(std::uint64_t bytes);
+
+ private:
+  friend class ObjectCache;
+  ObjectCache* cache_;
+  std::uint64_t bytes_ = 0;
+};
+
 // A file that is being received; removed unless it is kept.
 class PartialFile {
  public:
@@ -35,11 +56,15 @@ class PartialFile {
   ~PartialFile();
   // False: the disk is full or faulty.
   bool append(std::string_view bytes);
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  // Removes its name, and gives up the file and its space.
+  std::pair<Descriptor, OpenSpace> take();
 
  private:
   friend class ObjectCache;
-  PartialFile(Descriptor file, std::string path);
+  PartialFile(Descriptor file, std::string path, ObjectCache& cache);
   Descriptor file_;
+  OpenSpace space_;
   std::string path_;
   std::uint64_t bytes_ = 0;
   std::shared_ptr<evp_md_ctx_st> digest_;
@@ -54,10 +79,13 @@ class ObjectCache {
  public:
   // Errors: invalid, if the folder cannot be used.
   static Result<std::unique_ptr<ObjectCache>> open(CacheOptions options);
+  // SHA-256 in hexadecimal digits.
+  static std::string digest_of(const std::string& text);
 
   struct Entry {
     Descriptor file;
     Validators validators;
+    std::uint64_t bytes = 0;
     bool is_fresh = false;
   };
   // Empty: not in the cache. Marks the file as used.
@@ -70,18 +98,20 @@ class ObjectCache {
   void confirm(const std::string& url);
   void remove(const std::string& url);
 
-  // Space of all files on disk.
+  // Space of all files on disk, also of those without a name.
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
+  friend class OpenSpace;
   explicit ObjectCache(CacheOptions options);
   void scan();
   void evict(std::uint64_t bytes_max);
   [[nodiscard]] std::string path_of(const std::string& name) const;
 
   CacheOptions options_;
-  mutable std::mutex mutex_;  // guards the members below
-  std::uint64_t bytes_ = 0;   // at the last scan, and what was added since
+  mutable std::mutex mutex_;      // guards the members below
+  std::uint64_t bytes_ = 0;       // at the last scan, and what was added since
+  std::uint64_t open_bytes_ = 0;  // of files without a name
   std::unordered_map<std::string, std::chrono::steady_clock::time_point> confirmed_;
 };
 

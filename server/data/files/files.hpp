@@ -66,6 +66,12 @@ Result<Location> locate_beneath(const std::string& root, const std::string& path
 // Matches the pattern of a series again. Errors: those of the function that located it.
 Result<Location> locate_again(const Location& series);
 
+// Bytes [begin, end) of a file.
+struct Extent {
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+};
+
 class Files {
  public:
   virtual ~Files() = default;
@@ -78,6 +84,15 @@ class Files {
   virtual Result<std::vector<std::string>> list(const std::string& folder) = 0;
   // Whether a file or folder with this name exists.
   virtual bool exists(const std::string& name) = 0;
+  // Fetches bytes of an open file that is here in parts, by the number of its parts
+  // (InputFile::parts()); the result contains them, clipped to the file. Errors: those of open();
+  // they are also a fault (take_fault()).
+  virtual Result<Extent> fetch_part(std::uint64_t /*number*/, std::uint64_t /*offset*/,
+                                    std::uint64_t /*count*/) {
+    return make_error(ErrorKind::not_found, "no file is here in parts");
+  }
+  // No more bytes of that file will be fetched.
+  virtual void close_parts(std::uint64_t /*number*/) {}
   // The first error other than not_found that exists() has met since the last call: whether the
   // file exists is then unknown.
   [[nodiscard]] virtual std::optional<Error> take_fault() { return {}; }

@@ -11,8 +11,10 @@
 
 namespace windsplat::data {
 
-Result<std::shared_ptr<const InputFile>> InputFile::adopt(int descriptor, std::string name) {
-  const std::shared_ptr<InputFile> file(new InputFile(descriptor, std::move(name)));
+Result<std::shared_ptr<const InputFile>> InputFile::adopt(int descriptor, std::string name,
+                                                          FileParts parts) {
+  const std::shared_ptr<InputFile> file(
+      new InputFile(descriptor, std::move(name), std::move(parts)));
   struct stat status {};
   if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     return file->fault(S_ISDIR(status.st_mode) ? "is a directory, not a file"
@@ -47,11 +49,15 @@ Result<std::string> InputFile::head(std::size_t bytes_max) const {
 }
 
 std::string InputFile::identity() const {
+  if (parts_.number != 0) {
+    return name_ + '\n' + std::to_string(stamp_.bytes) + '\n' + parts_.state;
+  }
   return name_ + '\n' + std::to_string(stamp_.bytes) + '\n' + std::to_string(stamp_.seconds) + '.' +
          std::to_string(stamp_.nanoseconds);
 }
 
 Result<void> InputFile::check_unchanged() const {
+  if (parts_.number != 0) return {};  // checked with every part; storing parts changes its times
   struct stat status {};
   const bool known = ::fstat(descriptor_, &status) == 0;
   const Stamp now{static_cast<std::uint64_t>(status.st_size), status.st_mtim.tv_sec,

@@ -17,6 +17,7 @@
 #include <string_view>
 #include <utility>
 
+#include "server/data/loader/by_parts.hpp"
 #include "server/data/loader/channel.hpp"
 
 namespace windsplat::data::loader {
@@ -81,6 +82,11 @@ long open_named(const char* name, int flags) {
   const bool writes = (flags & O_ACCMODE) != O_RDONLY || (flags & (O_CREAT | O_TRUNC)) != 0;
   if (writes || (flags & O_DIRECTORY) != 0) return -EACCES;
   if (const int number = own_file(path); number >= 0) {
+    if (number >= first_of_parts()) {
+      const int copy = copy_of_parts(number);
+      if (copy >= 0) ::lseek(copy, 0, SEEK_SET);
+      return copy;
+    }
     const int copy = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
     if (copy < 0) return -errno;
     // A duplicate shares its file offset with the original, which InputFile does not use.
@@ -111,6 +117,10 @@ const char* name_at(const Arguments& given, std::size_t i) {
   return reinterpret_cast<const char*>(given.at(i));  // NOLINT: a call's arguments are numbers
 }
 
+void* memory_at(const Arguments& given, std::size_t i) {
+  return reinterpret_cast<void*>(given.at(i));  // NOLINT: as above
+}
+
 long answer(int call, const Arguments& given) {
   const auto number = [&](std::size_t i) { return static_cast<int>(given.at(i)); };
   const auto status_at = [&](std::size_t i) {
@@ -135,6 +145,10 @@ long answer(int call, const Arguments& given) {
       return look_at(name_at(given, 0), status_at(1));
     case SCMP_SYS(access):
       return may_read(name_at(given, 0), number(1));
+    case SCMP_SYS(read):
+      return read_part(number(0), memory_at(given, 1), given[2]);
+    case SCMP_SYS(pread64):
+      return read_part(number(0), memory_at(given, 1), given[2], static_cast<off_t>(given[3]));
     default:
       return -EACCES;
   }

@@ -18,7 +18,7 @@ enum class Kind : std::uint32_t {
   open = 1,  // settings and location -> opened or failed
   read,      // field, step; with the memory to fill -> filled or failed
   // daemon -> loader: answers to requests of the loader
-  descriptor,  // answer: success, with a descriptor
+  descriptor,  // answer: success, with a descriptor; of a file in parts its number and state
   names,
   yes,
   no,  // answer: failure, with an error or empty
@@ -32,6 +32,10 @@ enum class Kind : std::uint32_t {
   opened,
   filled,
   failed,
+  // of files in parts
+  ask_bytes,    // loader -> daemon: number of parts, offset, count -> extent, or no without payload
+  extent,       // daemon -> loader: bytes that are present
+  close_parts,  // loader -> daemon: number of parts; no answer
 };
 
 using Clock = std::chrono::steady_clock;

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "server/data/bytes/decode_limits.hpp"
+#include "server/data/loader/by_parts.hpp"
 #include "server/data/loader/bytes.hpp"
 #include "server/data/loader/channel.hpp"
 #include "server/data/loader/confine.hpp"
@@ -56,9 +57,24 @@ class BrokeredFiles final : public Files {
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
     Message answer = ask(Kind::ask_open, name);
     if (answer.kind != Kind::descriptor) return decode_error(answer.payload);
-    auto file = InputFile::adopt(answer.descriptor.give(), name.substr(name.find_last_of('/') + 1));
+    auto parts = decode_parts(answer.payload);
+    if (!parts) return parts.error();
+    const std::uint64_t number = parts->number;
+    const int descriptor = place(answer.descriptor.give(), number);
+    if (descriptor < 0) {
+      return make_error(ErrorKind::bad_data, in_quotes(name) + ": too many files are open");
+    }
+    auto file =
+        InputFile::adopt(descriptor, name.substr(name.find_last_of('/') + 1), std::move(*parts));
     if (file) count_opened(name, (*file)->size());
-    return file;
+    if (!file || number == 0) return file;
+    return std::shared_ptr<const InputFile>(file->get(),
+                                            [kept = *file, number](const InputFile*) mutable {
+                                              kept.reset();
+                                              Writer out;
+                                              out.number(number);
+                                              say(Kind::close_parts, out.bytes());
+                                            });
   }
   Result<std::vector<std::string>> list(const std::string& folder) override {
     const Message answer = ask(Kind::ask_list, folder);

@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "server/data/loader/by_name.hpp"
+#include "server/data/loader/by_parts.hpp"
 
 namespace windsplat::data::loader {
 
@@ -53,7 +54,11 @@ Result<void> set_limits(const Confinement& how) {
   const bool memory = memory_is_shadowed ||
                       limit(RLIMIT_DATA, how.memory_bytes + room_of_libraries,
                             std::min(how.opening_bytes, how.memory_bytes) + room_of_libraries);
-  if (!memory || !limit(RLIMIT_NOFILE, how.files) || !limit(RLIMIT_FSIZE, 0) ||
+  rlimit files{};
+  if (::getrlimit(RLIMIT_NOFILE, &files) != 0) return not_confined("limits");
+  const std::uint64_t half = std::min<std::uint64_t>(how.files, files.rlim_max / 2);
+  reserve_parts(static_cast<int>(half), static_cast<int>(2 * half), how.socket);
+  if (!memory || !limit(RLIMIT_NOFILE, 2 * half) || !limit(RLIMIT_FSIZE, 0) ||
       !limit(RLIMIT_CORE, 0) || !limit(RLIMIT_NPROC, 0)) {
     return not_confined("limits");
   }
@@ -144,33 +149,51 @@ scmp_arg_cmp equals(unsigned argument, int value) {
 int forbid_calls() {
   Filter filter;
   for (const int call :
-       {SCMP_SYS(read), SCMP_SYS(pread64), SCMP_SYS(readv), SCMP_SYS(preadv), SCMP_SYS(lseek),
-        SCMP_SYS(fstat), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(brk), SCMP_SYS(madvise),
-        SCMP_SYS(futex), SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep),
-        SCMP_SYS(gettimeofday), SCMP_SYS(getrandom), SCMP_SYS(rt_sigaction),
-        SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
-        SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group),
+       {SCMP_SYS(preadv2), SCMP_SYS(lseek), SCMP_SYS(fstat), SCMP_SYS(munmap), SCMP_SYS(mremap),
+        SCMP_SYS(brk), SCMP_SYS(madvise), SCMP_SYS(futex), SCMP_SYS(clock_gettime),
+        SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep), SCMP_SYS(gettimeofday), SCMP_SYS(getrandom),
+        SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn),
+        SCMP_SYS(sigaltstack), SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group),
 #ifdef WINDSPLAT_SANITIZED
         // Sanitizers probe through a pipe whether memory can be read.
         SCMP_SYS(pipe2), SCMP_SYS(pipe),
 #endif
         SCMP_SYS(sendmsg), SCMP_SYS(recvmsg), SCMP_SYS(ppoll), SCMP_SYS(poll), SCMP_SYS(write),
-        SCMP_SYS(writev), SCMP_SYS(close), SCMP_SYS(dup), SCMP_SYS(getpid), SCMP_SYS(gettid),
+        SCMP_SYS(writev), SCMP_SYS(close), SCMP_SYS(getpid), SCMP_SYS(gettid),
         SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity), SCMP_SYS(sysinfo), SCMP_SYS(getrusage),
         SCMP_SYS(fadvise64), SCMP_SYS(time)}) {
     filter.add(SCMP_ACT_ALLOW, call);
   }
   for (const int call : calls_by_name()) filter.add(SCMP_ACT_TRAP, call);
+  // Bytes of files in parts may have to be fetched first; what is not redirected would read zeros.
+  // An argument with garbage in its upper half is redirected, and read like any other.
+  const auto parts = static_cast<scmp_datum_t>(first_of_parts());
+  const scmp_arg_cmp is_whole{0, SCMP_CMP_LT, parts, 0};
+  const scmp_arg_cmp is_in_parts{0, SCMP_CMP_GE, parts, 0};
+  for (const int call : {SCMP_SYS(read), SCMP_SYS(pread64)}) {
+    filter.add(SCMP_ACT_ALLOW, call, {is_whole});
+    filter.add(SCMP_ACT_TRAP, call, {is_in_parts});
+  }
+  for (const int call : {SCMP_SYS(readv), SCMP_SYS(preadv), SCMP_SYS(dup)}) {
+    filter.add(SCMP_ACT_ALLOW, call, {is_whole});
+  }
   // Mappings must not be executable, nor escape the memory limit: neither shared and anonymous nor
   // growing automatically.
-  for (const int kind : {0, MAP_SHARED, MAP_ANONYMOUS}) {
-    filter.add(
-        SCMP_ACT_ALLOW, SCMP_SYS(mmap),
-        {has_bits(2, PROT_EXEC, 0), has_bits(3, MAP_SHARED | MAP_ANONYMOUS | MAP_GROWSDOWN, kind)});
+  constexpr int kinds = MAP_SHARED | MAP_ANONYMOUS | MAP_GROWSDOWN;
+  for (const int kind : {0, MAP_SHARED}) {
+    filter.add(SCMP_ACT_ALLOW, SCMP_SYS(mmap),
+               {has_bits(2, PROT_EXEC, 0), has_bits(3, kinds, kind), {4, SCMP_CMP_LT, parts, 0}});
   }
+  filter.add(SCMP_ACT_ALLOW, SCMP_SYS(mmap),
+             {has_bits(2, PROT_EXEC, 0), has_bits(3, kinds, MAP_ANONYMOUS)});
   filter.add(SCMP_ACT_ALLOW, SCMP_SYS(mprotect), {has_bits(2, PROT_EXEC, 0)});
-  for (const int command : {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL}) {
+  for (const int command : {F_GETFD, F_SETFD, F_GETFL}) {
     filter.add(SCMP_ACT_ALLOW, SCMP_SYS(fcntl), {equals(1, command)});
+  }
+  for (const int command : {F_DUPFD, F_DUPFD_CLOEXEC}) {
+    filter.add(SCMP_ACT_ALLOW, SCMP_SYS(fcntl), {is_whole, equals(1, command)});
+    filter.add(SCMP_ACT_ALLOW, SCMP_SYS(fcntl),
+               {is_in_parts, equals(1, command), {2, SCMP_CMP_GE, parts, 0}});
   }
   // Signals that abort() sends to its own process.
   filter.add(SCMP_ACT_ALLOW, SCMP_SYS(tgkill), {equals(0, ::getpid())});

@@ -293,6 +293,25 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
   return info;
 }
 
+std::string encode_parts(const FileParts& parts) {
+  if (parts.number == 0) return {};
+  Writer out;
+  out.number(parts.number);
+  out.text(parts.state);
+  return out.take();
+}
+
+Result<FileParts> decode_parts(std::string_view bytes) {
+  constexpr std::size_t state_bytes_max = 1024;
+  FileParts out;
+  if (bytes.empty()) return out;
+  Reader in(bytes);
+  out.number = in.number<std::uint64_t>();
+  out.state = in.text(state_bytes_max);
+  if (in.complete() && out.number != 0) return out;
+  return make_error(ErrorKind::internal, "an answer of the daemon is malformed");
+}
+
 std::string encode_names(const std::vector<std::string>& names) {
   Writer out;
   put_texts(out, names);

@@ -37,6 +37,10 @@ std::string encode_info(const DatasetInfo& info);
 // Strings are made printable.
 Result<DatasetInfo> decode_info(std::string_view bytes);
 
+// Empty for a file of which all bytes are present.
+std::string encode_parts(const FileParts& parts);
+Result<FileParts> decode_parts(std::string_view bytes);
+
 std::string encode_names(const std::vector<std::string>& names);
 Result<std::vector<std::string>> decode_names(std::string_view bytes);
 

@@ -223,8 +223,26 @@ Fate RunningLoader::answer(const Message& question, Kind during, Patience& patie
   if (question.kind == Kind::ask_open) {
     const auto file = files_->open(name);
     if (during == Kind::open) process_.allow_memory(opening_memory_bytes(files_->opened_bytes()));
-    return file ? say(Kind::descriptor, {}, (*file)->descriptor())
+    return file ? say(Kind::descriptor, encode_parts((*file)->parts()), (*file)->descriptor())
                 : say(Kind::no, encode_error(file.error()));
+  }
+  if (question.kind == Kind::ask_bytes) {
+    Reader in(question.payload);
+    const auto number = in.number<std::uint64_t>();
+    const auto offset = in.number<std::uint64_t>();
+    const auto count = in.number<std::uint64_t>();
+    if (!in.complete()) return Fate::broken;
+    const auto extent = files_->fetch_part(number, offset, count);
+    if (!extent) return say(Kind::no, {});
+    Writer out;
+    out.number(extent->begin);
+    out.number(extent->end);
+    return say(Kind::extent, out.bytes());
+  }
+  if (question.kind == Kind::close_parts) {
+    Reader in(question.payload);
+    files_->close_parts(in.number<std::uint64_t>());
+    return in.complete() ? Fate::done : Fate::broken;
   }
   if (question.kind == Kind::ask_list) {
     const auto names = files_->list(name);

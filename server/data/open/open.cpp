@@ -193,14 +193,15 @@ ArraysResult open_parts(const std::shared_ptr<Files>& files, std::vector<Part> p
 }
 
 // Cases of OpenFOAM and EnSight are refused with advice: the errors of other formats would not say
-// what they are.
+// what they are. A host is not asked for files of such a case, since its refusal would name a file
+// that nobody wanted.
 Result<void> not_a_case(Files& files, const Result<std::string>& head) {
   const Location& location = files.location();
   const std::string name = location.members.empty() ? location.stem : location.members.front().name;
   const bool is_folder = location.kind == Location::Kind::folder;
   const std::string ending = lower(name.substr(std::min(name.size(), name.find_last_of('.'))));
   const bool foam =
-      (is_folder && files.exists("system/controlDict")) || ending == ".foam" ||
+      (is_folder && !location.fetched && files.exists("system/controlDict")) || ending == ".foam" ||
       ending == ".openfoam" ||
       (head && head->find("FoamFile") != std::string::npos && head->find('{') != std::string::npos);
   if (foam) {
@@ -238,6 +239,12 @@ Result<std::vector<std::string>> files_named(Files& files, const std::string& na
   const std::string folder = slash == std::string::npos ? "" : name.substr(0, slash + 1);
   const std::string pattern = name.substr(slash + 1);
   if (!has_wildcard(pattern) || files.exists(name)) return std::vector<std::string>{name};
+  if (files.location().fetched) {
+    return make_error(ErrorKind::bad_data,
+                      in_quotes(name) +
+                          " is a pattern, but a host does not list its files: a list "
+                          "on a host must name each file");
+  }
   const auto entries = files.list(folder.substr(0, folder.size() - (folder.empty() ? 0 : 1)));
   if (!entries) return entries.error();
   std::vector<std::string> out;

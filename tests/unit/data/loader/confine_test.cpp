@@ -11,6 +11,7 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
+#include <sys/uio.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -105,6 +106,48 @@ const std::vector<Attempt> on_the_given_file{
      }},
 };
 
+// Numbers that are reserved for files in parts. Reads of them are redirected; what is not would
+// return the zeros of bytes that were not fetched.
+constexpr int in_parts = 70;
+const std::vector<Attempt> on_a_file_in_parts{
+    {"read a file in parts", 0,
+     [](int) -> long {
+       char text[4] = {};
+       ::lseek(in_parts, 1, SEEK_SET);
+       if (::read(in_parts, text, 2) != 2 || ::pread(in_parts, text + 2, 1, 0) != 1) return -1;
+       errno = ENOMSG;
+       return text[2] == 'f' && ::lseek(in_parts, 0, SEEK_CUR) == 3 ? 0 : -1;
+     }},
+    {"open a file in parts again", 0,
+     [](int) -> long {
+       char name[64];
+       own_name(in_parts, name, sizeof name);
+       const int again = ::open(name, O_RDONLY | O_CLOEXEC);
+       errno = ENOMSG;
+       return again > in_parts ? ::close(again) : -1;
+     }},
+    {"copy a file in parts out of their numbers", EPERM,
+     [](int) -> long { return ::dup(in_parts); }},
+    {"copy it with a lowest number", EPERM,
+     [](int) -> long { return ::fcntl(in_parts, F_DUPFD_CLOEXEC, 0); }},
+    {"map a file in parts", EPERM,
+     [](int) -> long {
+       return ::mmap(nullptr, 4096, PROT_READ, MAP_PRIVATE, in_parts, 0) == MAP_FAILED ? -1 : 0;
+     }},
+    {"scatter a file in parts", EPERM,
+     [](int) -> long {
+       char text[4];
+       iovec part{text, sizeof text};
+       return ::readv(in_parts, &part, 1);
+     }},
+    {"scatter a file in parts from an offset", EPERM,
+     [](int) -> long {
+       char text[4];
+       iovec part{text, sizeof text};
+       return ::preadv(in_parts, &part, 1, 0);
+     }},
+};
+
 const std::vector<Attempt> on_the_world{
     // Network and processes.
     {"socket", EPERM, [](int) -> long { return ::socket(AF_INET, SOCK_STREAM, 0); }},
@@ -192,8 +235,8 @@ const std::vector<Attempt> on_much_memory;
 
 std::vector<Attempt> all_attempts() {
   std::vector<Attempt> out;
-  for (const auto* some :
-       {&on_names, &on_the_given_file, &on_the_world, &on_memory, &on_much_memory}) {
+  for (const auto* some : {&on_names, &on_the_given_file, &on_a_file_in_parts, &on_the_world,
+                           &on_memory, &on_much_memory}) {
     out.insert(out.end(), some->begin(), some->end());
   }
   return out;
@@ -210,6 +253,7 @@ std::vector<int> outcomes(const std::string& path) {
   const pid_t child = ::fork();
   if (child == 0) {
     ::dup2(ends[1], 1);
+    ::dup2(file, in_parts);
     Confinement how;
     how.memory_bytes = std::uint64_t{256} << 20;
     how.files = 64;

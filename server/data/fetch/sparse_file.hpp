@@ -1,0 +1,76 @@
+// A file of a host of which only the bytes that were read are on disk: extent -> requests for the
+// blocks that are missing.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/fetch/http_client.hpp"
+#include "server/data/fetch/object_cache.hpp"
+#include "server/data/files/descriptor.hpp"
+#include "server/data/files/files.hpp"
+
+namespace windsplat::data::fetch {
+
+// Thread-safe. The file has no name on disk, so that it ends with the process; its blocks count in
+// the size of the cache, which must outlive it.
+class SparseFile {
+ public:
+  // The metadata of HDF5 files lie scattered among their data, so that blocks are small.
+  static constexpr std::uint64_t block_bytes = std::uint64_t{64} << 10;
+  static constexpr std::uint64_t begin_bytes = 4 * block_bytes;  // of the first request
+  // Of a file that is read in sequence: each request asks for twice as many blocks as the last one.
+  static constexpr std::size_t blocks_ahead_max = 128;
+
+  // Sends a request for bytes of the file in its state.
+  using Get = std::function<Result<void>(ByteRange range, const HttpClient::Sink& sink)>;
+  using Cancelled = std::function<bool()>;
+
+  // `begin`: the first bytes of the file, whole blocks, of a file that is longer.
+  // `bytes_max`: of all blocks that are fetched. Errors: out_of_memory.
+  static Result<std::shared_ptr<SparseFile>> make(const std::string& url, PartialFile begin,
+                                                  const Response& response,
+                                                  std::uint64_t bytes_max);
+
+  // Fetches what is missing of [offset, offset + count), clipped to the file. The result contains
+  // it and is present. Errors: those of `get`; too_large; cancelled; out_of_memory.
+  Result<Extent> fetch(std::uint64_t offset, std::uint64_t count, const Get& get,
+                       const Cancelled& cancelled);
+  // Opens it for reading, with a position of its own. Errors: out_of_memory.
+  [[nodiscard]] Result<Descriptor> open() const;
+
+  [[nodiscard]] const Validators& validators() const { return validators_; }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  [[nodiscard]] std::uint64_t fetched_bytes() const;
+  // Digest of URL, size and ETag.
+  [[nodiscard]] const std::string& state() const { return state_; }
+
+ private:
+  SparseFile(const std::string& url, std::pair<Descriptor, OpenSpace> file,
+             const Response& response, std::uint64_t begin_bytes, std::uint64_t bytes_max);
+  Result<void> fetch_blocks(std::size_t first, std::size_t end, const Get& get);
+  [[nodiscard]] std::size_t first_missing(std::size_t from, std::size_t end) const;
+  [[nodiscard]] Extent present_around(std::uint64_t offset, std::uint64_t end) const;
+
+  const std::string url_;
+  const Descriptor file_;
+  OpenSpace space_;
+  const Validators validators_;
+  const std::uint64_t bytes_;
+  const std::uint64_t bytes_max_;
+  const std::string state_;
+  mutable std::mutex mutex_;   // guards the next two members
+  std::vector<bool> present_;  // blocks
+  std::uint64_t fetched_bytes_ = 0;
+  std::timed_mutex fetching_;  // one request at a time; guards the members below
+  std::size_t next_ = 0;       // the block after the last request
+  std::size_t ahead_ = 1;      // blocks of that request at least
+};
+
+}  // namespace windsplat::data::fetch
