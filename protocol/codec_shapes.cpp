@@ -193,30 +193,32 @@ Json problem_json(const Problem& problem) {
 }
 
 Json frame_info_json(const FrameInfo& info) {
-  return Json{{"method", info.method},
-              {"compositing", info.compositing},
-              {"stride", info.stride},
-              {"slabThickness", number_or_null(info.slab_thickness)},
-              {"width", info.width},
-              {"height", info.height},
-              {"error", {{"value", number_or_null(info.error_value)}, {"kind", info.error_kind}}},
-              {"jpegError", number_or_null(info.jpeg_error)},
-              {"work",
-               {{"samples", info.samples},
-                {"culled", info.culled},
-                {"skippedVector", info.skipped_vector},
-                {"skippedScalar", info.skipped_scalar},
-                {"skippedBoth", info.skipped_both},
-                {"occluded", info.occluded},
-                {"pixelUpdates", info.pixel_updates},
-                {"exponentials", info.exponentials},
-                {"tiles", info.tiles},
-                {"tilesStopped", info.tiles_stopped},
-                {"skippedBound", number_or_null(info.skipped_bound)},
-                {"stopBound", number_or_null(info.stop_bound)},
-                {"fields", info.fields},
-                {"bytes", info.bytes},
-                {"variant", info.variant}}}};
+  Json out{{"method", info.method},
+           {"compositing", info.compositing},
+           {"stride", info.stride},
+           {"slabThickness", number_or_null(info.slab_thickness)},
+           {"width", info.width},
+           {"height", info.height},
+           {"error", {{"value", number_or_null(info.error_value)}, {"kind", info.error_kind}}},
+           {"jpegError", number_or_null(info.jpeg_error)},
+           {"work",
+            {{"samples", info.samples},
+             {"culled", info.culled},
+             {"skippedVector", info.skipped_vector},
+             {"skippedScalar", info.skipped_scalar},
+             {"skippedBoth", info.skipped_both},
+             {"occluded", info.occluded},
+             {"pixelUpdates", info.pixel_updates},
+             {"exponentials", info.exponentials},
+             {"tiles", info.tiles},
+             {"tilesStopped", info.tiles_stopped},
+             {"skippedBound", number_or_null(info.skipped_bound)},
+             {"stopBound", number_or_null(info.stop_bound)},
+             {"fields", info.fields},
+             {"bytes", info.bytes},
+             {"variant", info.variant}}}};
+  if (!info.empty.empty()) out["empty"] = info.empty;
+  return out;
 }
 
 Json dataset_summary_json(const DatasetDescription& dataset) {

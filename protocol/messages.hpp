@@ -131,6 +131,7 @@ struct FrameInfo {
   std::vector<std::string> fields;
   std::int64_t bytes = 0;
   std::string variant;
+  std::string empty;  // why the picture shows nothing of the data; absent in JSON if empty
 };
 // RFC 9457.
 struct Problem {

@@ -211,10 +211,13 @@ Error interrupted(int done, int total) {
                                               " of " + std::to_string(total) + " frames");
 }
 
-// Reports of the pictures, a line each, and how many of them exceed a limit of the view.
+// Reports of the pictures, a line each, and how many of them exceed a limit of the view or are
+// empty.
 struct Reports {
   std::string lines;
   int exceeding = 0;
+  int empty = 0;            // pictures that show nothing of the data
+  std::string first_empty;  // why the first of them does
 };
 
 Result<Reports> draw_all(const Plan& plan, protocol::View view, LimitedPictures& pictures,
@@ -236,6 +239,9 @@ Result<Reports> draw_all(const Plan& plan, protocol::View view, LimitedPictures&
       return done.error();
     }
     if (!exceeded_limits(*picture).empty()) ++reports.exceeding;
+    if (!picture->frame.empty.empty() && reports.empty++ == 0) {
+      reports.first_empty = picture->frame.empty;
+    }
     reports.lines += report_line(*picture);
   }
   progress.show(total);
@@ -260,6 +266,10 @@ Result<void> animate(const AnimateArguments& arguments, const CancelToken& cance
   if (!reports) return reports.error();
   if (reports->exceeding > 0) {
     complain(std::to_string(reports->exceeding) + " pictures exceed a limit of /quality");
+  }
+  if (reports->empty > 0) {
+    complain(std::to_string(reports->empty) +
+             " pictures show nothing of the data; the first: " + reports->first_empty);
   }
   if (arguments.report.empty()) return {};
   const std::string& lines = reports->lines;

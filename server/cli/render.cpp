@@ -51,6 +51,7 @@ Result<void> render(const RenderArguments& arguments) {
   const auto picture = LimitedPictures(**dataset, encoding, pool).draw(view, CancelToken());
   if (!picture) return picture.error();
   if (const std::string text = exceeded_limits(*picture); !text.empty()) complain(text);
+  if (!picture->frame.empty.empty()) complain(empty_text(*picture));
   auto written = write_output(arguments.output, picture->frame.bytes);
   if (!written || arguments.report.empty()) return written;
   return write_report(arguments.report, *picture);

@@ -9,6 +9,7 @@
 #include "server/base/trim_storage.hpp"
 #include "server/engine/reference/reference.hpp"
 #include "server/frame/content.hpp"
+#include "server/frame/empty_picture.hpp"
 #include "server/frame/measure.hpp"
 #include "server/image/decode.hpp"
 #include "server/quality/setting.hpp"
@@ -154,6 +155,13 @@ Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& po
   return work;
 }
 
+bool is_transparent(const engine::Image& picture) {
+  for (std::size_t at = 3; at < picture.rgba.size(); at += 4) {
+    if (picture.rgba[at] > 0) return false;
+  }
+  return true;
+}
+
 // Pixels that are not encoded are freed: they may occupy half a gigabyte.
 Error given_up(Error error, Workspace& workspace) {
   trim_storage(workspace.space.image().rgba, 0, 0);
@@ -219,6 +227,8 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.work = std::move(*work);
   name_fields(scene, prepared.completed, drawn.work);
   drawn.view = prepared.completed.view();
+  const bool transparent = drawn.work.variant.reference && is_transparent(workspace.space.image());
+  drawn.empty = why_empty(scene, drawn.view, drawn.work, transparent);
   drawn.view.image = prepared.asked;
   drawn.detail = scene::detail_shown(prepared.completed) * prepared.asked.height / drawn.height;
   drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());

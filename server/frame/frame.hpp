@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "protocol/view.hpp"
@@ -47,6 +48,7 @@ struct Frame {
   double detail = 0;                        // at the size of the view (scene::detail_shown)
   std::optional<quality::Content> content;  // if the encoding asks for it
   engine::WorkReport work;
+  std::string empty;           // why the picture shows nothing of the data; empty if it shows some
   std::int64_t render_us = 0;  // time of scene and engine, including the tone mapping of JPEG tiles
   std::int64_t measure_us = 0;
   std::int64_t encode_us = 0;

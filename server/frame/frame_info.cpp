@@ -67,6 +67,7 @@ protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
   info.fields = work.fields;
   info.bytes = work.bytes;
   info.variant = engine::text_of(work.variant);
+  info.empty = frame.empty;
   return info;
 }
 

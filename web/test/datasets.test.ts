@@ -129,3 +129,12 @@ test("choosing the shown dataset while another opens keeps it", () => {
     assert.equal(page.element("loading").hidden, true);
   }
 });
+
+test("a picture that shows nothing of the data says why, until one shows some", () => {
+  const page = new Page([described("a")]);
+  page.opened(page.datasets[0]!);
+  page.draws({ empty: "the camera does not show the data" });
+  assert.equal(page.emptyText, "Nothing is shown: the camera does not show the data.");
+  page.draws();
+  assert.equal(page.emptyText, null);
+});

@@ -210,6 +210,7 @@ export interface Drawing {
   rev?: number;
   final?: boolean;
   view?: View;
+  empty?: string;
 }
 
 export class Page {
@@ -319,7 +320,7 @@ export class Page {
   }
 
   // A frame of the requested view, completed with its defaults and the server's own choices.
-  draws({ rev = this.rev, final = true, view: own = {} }: Drawing = {}): void {
+  draws({ rev = this.rev, final = true, view: own = {}, empty }: Drawing = {}): void {
     this.seq += 1;
     const view = { ...this.app.view(), ...own };
     this.receives({
@@ -328,6 +329,7 @@ export class Page {
       rev,
       view,
       work: {},
+      empty,
     } as unknown as ServerMessage);
     const header = { seq: this.seq, rev, step: view.step ?? 0, final, t: 0 };
     this.app.onDrawn({ header, decodeMs: 1, arrivedAt: 0, drawnAt: 1 } as DrawnFrame);
@@ -345,6 +347,11 @@ export class Page {
 
   get alert(): string | null {
     return this.element("alert").hidden ? null : this.element("alert-text").textContent;
+  }
+
+  // The text over a picture that shows nothing.
+  get emptyText(): string | null {
+    return this.element("empty").hidden ? null : this.element("empty").textContent;
   }
 
   get entries(): string[] {

@@ -70,6 +70,16 @@ TEST_F(CliLimits, RenderSaysThatTheErrorBoundCannotBeKept) {
   EXPECT_THAT(err, HasSubstr("exceeds /quality/maxError 5e-06"));
 }
 
+TEST_F(CliLimits, RenderSaysWhyThePictureIsEmpty) {
+  std::string err;
+  const json report = report_of(
+      {"--size", "96x72", "--set", "/scalars=[]", "--set", "/vector/minMagnitude=1000000"}, &err);
+  const std::string reason = report.at("empty");
+  EXPECT_THAT(reason, HasSubstr("below /vector/minMagnitude 1e+06"));
+  EXPECT_EQ(err, "windsplat: the picture shows nothing of the data: " + reason + "\n");
+  EXPECT_FALSE(report_of({"--size", "96x72"}).contains("empty"));
+}
+
 TEST_F(CliLimits, RenderChoosesTheSettingByTheTimeBudget) {
   const json ample = report_of({"--size", "640x480", "--set", "/quality/budgetMs=10000"});
   EXPECT_EQ(ample["width"], 640);

@@ -1,6 +1,7 @@
 // frame::produce on a built-in sample: sizes, levels, formats, reports, and frame infos.
 #include "server/frame/frame.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -67,6 +68,73 @@ TEST_F(Produce, LevelHalvesBothSidesAndKeepsAtLeastOnePixel) {
     EXPECT_EQ(frame->height, height) << level;
     EXPECT_EQ(frame->view.image.width, 96) << "the reported view is the requested one";
   }
+}
+
+// The largest magnitude and value of the fields are below the thresholds.
+TEST_F(Produce, EmptyPictureSaysWhy) {
+  const auto drawn = produce_as(Format::png);
+  ASSERT_TRUE(drawn) << drawn.error().message;
+  EXPECT_EQ(drawn->empty, "");
+  EXPECT_EQ(frame_info(*drawn, view).empty, "");
+
+  const auto why = [this] {
+    const auto frame = produce_as(Format::jpeg);
+    return frame ? frame->empty : "failed: " + frame.error().message;
+  };
+  view.scalars = std::vector<protocol::ScalarView>();
+  view.vector.min_magnitude = 1e6;
+  view.vector.magnitude_range = protocol::Range{0, 2e6};
+  EXPECT_THAT(why(), testing::HasSubstr("is below /vector/minMagnitude 1e+06"));
+  view.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 3};
+  EXPECT_THAT(why(), testing::HasSubstr("is below /vector/minMagnitude 1e+06"));
+  view.geometry.slice.reset();
+  view.vector = {};
+  view.camera.eye = protocol::Vec3{0, -5, 0};
+  view.camera.target = protocol::Vec3{0, -10, 0};
+  EXPECT_EQ(why(), "the camera does not show the data");
+  view.method.name = protocol::MethodName::kernel;
+  EXPECT_EQ(why(), "the camera does not show the data");
+  view.vector.field.kind = protocol::FieldChoice::Kind::none;
+  EXPECT_THAT(why(), testing::HasSubstr("the view shows no field"));
+}
+
+TEST_F(Produce, EmptyMediumSaysWhy) {
+  view.vector.field.kind = protocol::FieldChoice::Kind::none;
+  protocol::ScalarView cloud;
+  cloud.field = "cloud";
+  cloud.extinction = std::vector<std::array<double, 2>>{{1e6, 0}, {2e6, 5}};
+  view.scalars = std::vector<protocol::ScalarView>{cloud};
+  for (const auto name : {protocol::MethodName::slab, protocol::MethodName::reference}) {
+    view.method.name = name;
+    Encoding encoding;
+    encoding.allow_reference = true;
+    const auto frame = produce(view, *dataset, encoding, pool, cancel);
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_THAT(frame->empty,
+                testing::HasSubstr("/scalars/0/extinction is 0 at every value of \"cloud\""));
+  }
+}
+
+TEST(EmptyPicture, MaskedSamplesAreNamed) {
+  auto source = std::make_unique<scene::FakeSource>(
+      scene::atmosphere_grid(),
+      std::vector<data::FieldInfo>{scene::wind_info(), scene::scalar_info("cloud", "1")}, 1);
+  source->values = [](const std::string& field, std::size_t n) {
+    // Of the wind, a level is masked; of the cloud, everything.
+    return field == "wind" && n >= 12 ? 1.0 : std::nan("");
+  };
+  const auto dataset = scene::dataset_of(std::move(source));
+  protocol::View view;
+  view.dataset = "fake";
+  ThreadPool pool{1};
+  const auto whole = produce(view, *dataset, {}, pool, {});
+  ASSERT_TRUE(whole) << whole.error().message;
+  EXPECT_EQ(whole->empty, "");
+  view.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 0};
+  const auto slice = produce(view, *dataset, {}, pool, {});
+  ASSERT_TRUE(slice) << slice.error().message;
+  EXPECT_EQ(slice->empty.rfind("every sample of \"wind\" in the slice is masked at step 0", 0), 0U)
+      << slice->empty;
 }
 
 // Mean coverage must not depend on the resolution.

@@ -369,7 +369,10 @@ export class App {
     if (!this.opener.waiting) status.loaded(); // the data that the view was waiting for
     const chosen = this.answers.drawn(header);
     this.flowing.answered(header.rev);
-    if (chosen !== null) this.model.drew(chosen, header.final);
+    if (chosen !== null) {
+      this.model.drew(chosen, header.final);
+      status.empty(chosen.empty);
+    }
     // The server's step is adopted if no newer view was requested or playback is running.
     if (this.playback.running || header.rev === this.model.state.rev) this.followStep(header.step);
     hud.show(frame, chosen, viewport.canvas.width);

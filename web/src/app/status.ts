@@ -20,6 +20,7 @@ export class Status {
   private noteTimer: number | undefined;
   private noted: string | null = null; // the text that a note has temporarily replaced
   private countdown: number | undefined;
+  private readonly emptyText = byId("empty", HTMLElement);
   private readonly offline = byId("offline", HTMLElement);
   private readonly offlineText = byId("offline-text", HTMLElement);
   private lost = false; // the line reports the lost connection and must not be overwritten
@@ -92,6 +93,13 @@ export class Status {
     if (topic !== undefined && topic !== this.alertTopic) return;
     this.alert.hidden = true;
     this.alertText.textContent = "";
+  }
+
+  // Why the picture shows nothing of the data; undefined: it shows some.
+  empty(reason: string | undefined): void {
+    const text = reason === undefined ? "" : `Nothing is shown: ${reason}.`;
+    if (this.emptyText.textContent !== text) this.emptyText.textContent = text;
+    this.emptyText.hidden = reason === undefined;
   }
 
   // Keeps the error even if its operation succeeds, because another view replaced the failed one.
