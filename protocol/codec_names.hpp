@@ -10,11 +10,12 @@ namespace windsplat::protocol {
 
 inline constexpr std::array<Name<Projection>, 2> projection_names{
     {{Projection::perspective, "perspective"}, {Projection::orthographic, "orthographic"}}};
-inline constexpr std::array<Name<VerticalPlacement>, 4> vertical_names{
+inline constexpr std::array<Name<VerticalPlacement>, 5> vertical_names{
     {{VerticalPlacement::automatic, "auto"},
      {VerticalPlacement::linear, "linear"},
      {VerticalPlacement::logp, "logp"},
-     {VerticalPlacement::index, "index"}}};
+     {VerticalPlacement::index, "index"},
+     {VerticalPlacement::metric, "metric"}}};
 inline constexpr std::array<Name<GeometryMapping>, 3> mapping_names{
     {{GeometryMapping::flat, "flat"},
      {GeometryMapping::curvilinear, "curvilinear"},

@@ -255,6 +255,9 @@ Json dataset_json(const DatasetDescription& dataset) {
                  {"y", axis_json(dataset.axes[1])},
                  {"z", axis_json(dataset.axes[2])}};
   out["world"] = {{"min", vec3_json(dataset.world_min)}, {"max", vec3_json(dataset.world_max)}};
+  if (dataset.vertical_exaggeration) {
+    out["verticalExaggeration"] = canonical_number(*dataset.vertical_exaggeration);
+  }
   out["mappings"] = dataset.mappings;
   out["leftOut"] = std::move(left_out);
   out["choices"] = std::move(choices);

@@ -99,6 +99,7 @@ struct DatasetDescription {
   std::array<AxisDescription, 3> axes;
   Vec3 world_min{};
   Vec3 world_max{};
+  std::optional<double> vertical_exaggeration;  // of the default view
   std::vector<std::string> mappings;  // values of /geometry/mapping that its grid supports
   std::vector<FieldDescription> fields;
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason

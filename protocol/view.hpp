@@ -15,7 +15,7 @@ using Vec3 = std::array<double, 3>;
 using Range = std::array<double, 2>;
 
 enum class Projection { perspective, orthographic };
-enum class VerticalPlacement { automatic, linear, logp, index };
+enum class VerticalPlacement { automatic, linear, logp, index, metric };
 enum class GeometryMapping { flat, curvilinear, sphere };
 enum class BodyShow { automatic, on, off };
 enum class GridAxis { x, y, z };

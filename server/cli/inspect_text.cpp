@@ -26,6 +26,12 @@ std::string number(double value) {
   return text.data();
 }
 
+std::string short_number(double value) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", value);
+  return text.data();
+}
+
 // A name or unit from the file.
 std::string word(std::string_view text, std::string_view if_empty = "-") {
   return text.empty() ? std::string(if_empty) : printable(text, 80);
@@ -115,6 +121,11 @@ std::string grid_text(const protocol::DatasetDescription& dataset) {
     world += number(dataset.world_min[a]);
     world += " .. ";
     world += number(dataset.world_max[a]);
+  }
+  if (const auto& times = dataset.vertical_exaggeration) {
+    world += "\nheights are drawn ";
+    world += short_number(*times);
+    world += " times as high as to scale";
   }
   return "axes (first .. last)\n" + table(rows) + world + '\n';
 }

@@ -17,6 +17,7 @@ namespace {
 
 using data::AxisKind;
 using protocol::GeometryMapping;
+using protocol::VerticalPlacement;
 
 constexpr double shell_share = 0.15;  // fraction of the inner radius
 
@@ -403,6 +404,10 @@ Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryVie
                              const Heights* heights) {
   const bool flat = geometry.mapping == GeometryMapping::flat;
   const bool sphere = geometry.mapping == GeometryMapping::sphere;
+  if (sphere && geometry.vertical == VerticalPlacement::metric) {
+    return make_error_at(ErrorKind::invalid, "/geometry/vertical",
+                         "metric is not available on a sphere: set /geometry/scale/2");
+  }
   data::Grid even = grid;
   protocol::GeometryView straight_geometry = geometry;
   std::optional<std::array<double, 2>> extent;
@@ -410,7 +415,9 @@ Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryVie
     auto raised = grid_with_heights(grid, *heights);
     if (!raised) return raised.error();
     even = std::move(*raised);
-    straight_geometry.vertical = protocol::VerticalPlacement::linear;
+    if (geometry.vertical != VerticalPlacement::metric) {
+      straight_geometry.vertical = VerticalPlacement::linear;
+    }
     extent = extent_of(*heights, even.axes[2]);
   }
   std::optional<data::Columns> columns;

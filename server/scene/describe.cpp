@@ -129,6 +129,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
     out.world_min[a] = lattice->box_min[index];
     out.world_max[a] = lattice->box_max[index];
   }
+  out.vertical_exaggeration = vertical_exaggeration(info.grid, *lattice);
   out.mappings = mappings_of(info.grid);
   const std::size_t steps = ranges == RangesOf::all_steps ? info.steps.size() : 1;
   std::uint64_t components = 0;

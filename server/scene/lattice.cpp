@@ -10,6 +10,8 @@
 #include <sstream>
 #include <utility>
 
+#include "server/data/cf/units.hpp"
+#include "server/scene/angles.hpp"
 #include "server/scene/bend.hpp"
 
 namespace windsplat::scene {
@@ -25,6 +27,7 @@ constexpr double box_edge = 2.0;  // length of the longest edge, world units
 // times as flat; the engine is exact up to 1e9 (tests/numerics/truth/aspect_test.cpp).
 constexpr double aspect_max = 1e7;
 constexpr double vertical_share = 0.15;  // fraction of the longest horizontal edge, if units differ
+constexpr double flat_share = 0.05;      // a box of lengths that is flatter gets vertical_share
 
 bool all_positive(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return v > 0; });
@@ -100,20 +103,74 @@ double smallest_cell(const RawAxis& axis) {
   return smallest * (axis.length / axis.raw_length());
 }
 
+// Metres per raw unit of an axis; nullopt: neither a length nor an angle, or without unit.
+std::optional<double> metres_per_unit(const Axis& axis) {
+  if (is_angle(axis)) return metres_per_degree;
+  if (axis.kind == AxisKind::pressure || axis.kind == AxisKind::level) return std::nullopt;
+  return data::metres_in(axis.units);
+}
+
+// Factor of the edge along longitudes. A regional map is equirectangular with its true scale along
+// the latitude in the middle of the box, phi: a degree of longitude is cos(phi) times as wide as a
+// degree of latitude. A map around the globe, or over more than 90 degrees of latitude, of which no
+// latitude is representative, is the plate carree (factor 1).
+double longitude_share(const Axis& x, const Axis& y, const std::array<RawAxis, 3>& axes) {
+  constexpr double whole_circle = 360 - 1e-3;  // degrees; coordinates in single precision
+  constexpr double latitudes_max = 90;
+  if (x.kind != AxisKind::longitude || y.kind != AxisKind::latitude) return 1;
+  if (axes[0].thin || axes[1].thin || axes[0].raw_length() >= whole_circle) return 1;
+  const double middle = 0.5 * axes[1].extent[0] + 0.5 * axes[1].extent[1];
+  if (axes[1].raw_length() > latitudes_max || std::abs(middle) >= 90) return 1;
+  return std::cos(middle * radians_per_degree);
+}
+
+// Sets the length of the vertical axis relative to the horizontal ones.
+Result<void> set_height(const data::Grid& grid, VerticalPlacement placement, double horizontal,
+                        std::array<RawAxis, 3>& axes) {
+  const Axis& z = grid.axes[2];
+  const Axis& reference = axes[0].thin ? grid.axes[1] : grid.axes[0];
+  const auto unit = metres_per_unit(reference);
+  const auto vertical_unit = metres_per_unit(z);
+  const bool to_scale = unit && vertical_unit;
+  if (placement == VerticalPlacement::metric) {
+    if (!to_scale) {
+      return make_error_at(ErrorKind::invalid, "/geometry/vertical",
+                           "metric requires a vertical axis in a unit of length above horizontal "
+                           "ones in units of length or degrees");
+    }
+    axes[2].length = axes[2].raw_length() * *vertical_unit / *unit;
+    return {};
+  }
+  // Indices and log p have no unit in common with the horizontal axes.
+  const bool places_coordinates =
+      placement != VerticalPlacement::index && z.kind != AxisKind::pressure;
+  const bool lengths = to_scale && !is_angle(reference);
+  if (places_coordinates && lengths) {
+    axes[2].length = axes[2].raw_length() * *vertical_unit / *unit;
+    if (axes[2].thin || axes[2].length >= flat_share * horizontal) return {};
+  } else if (places_coordinates && same_unit(z, reference)) {
+    return {};
+  }
+  if (horizontal > 0) axes[2].length = vertical_share * horizontal;
+  return {};
+}
+
 // Relative lengths of the axes; an axis of one sample gets the smallest cell of the others.
-void proportion(const data::Grid& grid, VerticalPlacement placement, std::array<RawAxis, 3>& axes) {
+Result<void> proportion(const data::Grid& grid, VerticalPlacement placement,
+                        std::array<RawAxis, 3>& axes) {
   const auto& [x, y, z] = grid.axes;
   for (RawAxis& axis : axes) axis.length = axis.raw_length();
-  if (!axes[0].thin && !axes[1].thin && !same_unit(x, y)) axes[1].length = axes[0].length;
+  if (!axes[0].thin && !axes[1].thin && !same_unit(x, y)) {
+    const auto unit_x = is_angle(x) ? std::nullopt : metres_per_unit(x);
+    const auto unit_y = is_angle(y) ? std::nullopt : metres_per_unit(y);
+    axes[1].length = unit_x && unit_y ? axes[1].length * *unit_y / *unit_x : axes[0].length;
+  }
+  axes[0].length *= longitude_share(x, y, axes);
   double horizontal = 0;
   for (std::size_t a = 0; a < 2; ++a) {
     if (!axes[a].thin) horizontal = std::max(horizontal, axes[a].length);
   }
-  // Indices and log p have no unit in common with the horizontal axes.
-  const Axis& reference = axes[0].thin ? y : x;
-  const bool shared = same_unit(z, reference) && placement != VerticalPlacement::index &&
-                      z.kind != AxisKind::pressure;
-  if (horizontal > 0 && !shared) axes[2].length = vertical_share * horizontal;
+  if (auto ok = set_height(grid, placement, horizontal, axes); !ok) return ok;
   double smallest = std::numeric_limits<double>::infinity();
   for (const RawAxis& axis : axes) {
     if (!axis.thin) smallest = std::min(smallest, smallest_cell(axis));
@@ -122,6 +179,7 @@ void proportion(const data::Grid& grid, VerticalPlacement placement, std::array<
   for (RawAxis& axis : axes) {
     if (axis.thin) axis.length = smallest;
   }
+  return {};
 }
 
 // Widths of the narrowest and the widest cell, and their axes.
@@ -192,6 +250,22 @@ double cell_size(const Lattice& lattice, std::size_t axis) {
   return length / lattice.dims.at(axis);
 }
 
+std::optional<double> vertical_exaggeration(const data::Grid& grid, const Lattice& lattice) {
+  // World units per metre along an axis; nullopt: unknown.
+  const auto scale = [&](std::size_t a) -> std::optional<double> {
+    const std::vector<double>& at = grid.axes.at(a).coordinates;
+    const std::vector<double>& world = lattice.positions.at(a);
+    const auto unit = metres_per_unit(grid.axes.at(a));
+    if (!unit || at.size() < 2) return std::nullopt;
+    return (world.back() - world.front()) / (std::abs(at.back() - at.front()) * *unit);
+  };
+  const auto up = scale(2);
+  auto across = scale(1);
+  if (!across && grid.axes[0].kind != AxisKind::longitude) across = scale(0);
+  if (!up || !across || !(*across > 0)) return std::nullopt;
+  return *up / *across;
+}
+
 Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryView& geometry,
                                const std::optional<std::array<double, 2>>& vertical_extent) {
   std::array<RawAxis, 3> axes;
@@ -210,7 +284,7 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
         stretched ? *vertical_extent : std::array{axes[a].edges.front(), axes[a].edges.back()};
     axes[a].thin = axes[a].positions.size() == 1 && !stretched;
   }
-  proportion(grid, geometry.vertical, axes);
+  if (auto ok = proportion(grid, geometry.vertical, axes); !ok) return ok.error();
   double longest = 0;
   for (std::size_t a = 0; a < 3; ++a) {
     axes[a].length *= geometry.scale[a];

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,11 @@ struct Heights {
 // not allow).
 Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
                               const Heights* heights = nullptr);
+
+// How many times as high as to the scale of y (without y, of x) the vertical axis of a flat lattice
+// is drawn; a degree of latitude has 111 km. nullopt: the axes are not both lengths or degrees, as
+// with pressure.
+std::optional<double> vertical_exaggeration(const data::Grid& grid, const Lattice& lattice);
 
 // Mean width of the lattice's cells along an axis, world units.
 double cell_size(const Lattice& lattice, std::size_t axis);

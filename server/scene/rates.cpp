@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "server/data/cf/units.hpp"
+#include "server/scene/angles.hpp"
 
 namespace windsplat::scene {
 
@@ -16,8 +17,6 @@ namespace {
 using data::Axis;
 using data::AxisKind;
 
-constexpr double earth_radius_m = 6371000.0;
-constexpr double metres_per_degree = earth_radius_m * std::numbers::pi / 180.0;
 constexpr double scale_height_m = 7400.0;
 constexpr double ground_pressure_pa = 100000.0;
 constexpr double cosine_min = 1e-3;  // avoids division by zero at the poles

@@ -167,7 +167,7 @@ class TrialSource final : public data::Source {
     for (std::size_t a = 0; a < 3; ++a) {
       data::Axis& axis = info_.grid.axes[a];
       axis.name = std::string(1, "xyz"[a]);
-      axis.units = "m";
+      axis.units = "";  // proportions are kept, also those of sheets
       axis.kind = data::AxisKind::cartesian;
       for (int i = 0; i < field.dims[a]; ++i) {
         axis.coordinates.push_back((i + 0.5) / field.dims[a] * field.extent_m[a]);

@@ -7,6 +7,7 @@ import {
   compositingHints,
   compositingOptions,
   controlStates,
+  exaggerationText,
   depthCuePatch,
   heightOptions,
   mappingOptions,
@@ -160,8 +161,8 @@ test("controls without effect are hidden or disabled", () => {
     [true, true, true, false, true, true],
   );
   assert.deepEqual(
-    [plain.motion, plain.slab, plain.vertical, plain.slice, plain.fovY, plain.depthCue],
-    [false, false, true, false, true, true],
+    [plain.motion, plain.slab, plain.slice, plain.fovY, plain.depthCue],
+    [false, false, false, true, true],
   );
   const off = (view: View) => controlStates({ ...whole, ...view });
   assert.equal(off({ vector: { field: null, motion: { mode: "phase" } } }).motion, false);
@@ -172,7 +173,6 @@ test("controls without effect are hidden or disabled", () => {
   assert.equal(off({ vector: { color: { by: "constant" } } }).ranged, false);
   assert.equal(off({ vector: { motion: { mode: "phase" } } }).motion, true);
   assert.equal(off({ method: { name: "slab" } }).slab, true);
-  assert.equal(off({ geometry: { heightField: "zg" } }).vertical, false);
   assert.equal(off({ geometry: { slice: { axis: "x", index: 0 } } }).slice, true);
   assert.equal(off({ camera: { projection: "orthographic" } }).fovY, false);
   assert.equal(off({ geometry: { mapping: "flat" } }).body, false);
@@ -269,4 +269,16 @@ test("the HUD names method and compositing, and the samples that were skipped", 
   ]) {
     assert.ok(words.includes(part), `${part} in ${words}`);
   }
+});
+
+test("the vertical exaggeration follows the scales, and is 1 to scale", () => {
+  const wide = { ...dataset, dims: { x: 4, y: 3, z: 5 }, verticalExaggeration: 15 } as Dataset;
+  const text = (geometry: View["geometry"]) => exaggerationText(wide, { geometry });
+  assert.match(text({}), /drawn 15 times/);
+  assert.match(text({ scale: [1, 2, 4] }), /drawn 30 times/);
+  assert.match(text({ vertical: "metric" }), /drawn 1 times/);
+  assert.equal(text({ mapping: "sphere" }), "");
+  assert.equal(text({ heightField: "height" }), "");
+  assert.equal(text({ vertical: "index" }), "");
+  assert.equal(exaggerationText(dataset, {}), "", "pressures");
 });

@@ -214,8 +214,10 @@ std::vector<Case> plates(Projection projection) {
   std::vector<Case> cases;
   cases.reserve(aspects.size());
   for (const double aspect : aspects) {
+    View view = base_view(projection, aspect / 2);
+    view.geometry.vertical = protocol::VerticalPlacement::metric;
     cases.push_back(
-        numbered(aspect, base_view(projection, aspect / 2),
+        numbered(aspect, std::move(view),
                  make_dataset(waves(box_grid({side, side, side}, {1, 1, 1 / aspect})))));
   }
   refuse_beyond(1, aspect_max, "the narrowest cell of axis", cases);

@@ -222,12 +222,14 @@ TEST(Curvilinear, EveryColumnHasItsLongitudeAndLatitude) {
   const auto lattice = place_lattice(sheared(), mapped(GeometryMapping::curvilinear));
   ASSERT_TRUE(lattice) << lattice.error().message;
   // Samples span 34 by 10 degrees; half a cell reaches (10 + 2) / 2 and 5 / 2 beyond them.
-  const double scale = 2.0 / (34 + 12);
+  // In the middle, at 5 N, a degree of longitude is cos(5 degrees) times as wide.
+  const double narrow = std::cos(5 * degree);
+  const double scale = 2.0 / (34 + 12) / narrow;
   for (int k = 0; k < 2; ++k) {
     for (int j = 0; j < 3; ++j) {
       for (int i = 0; i < 4; ++i) {
         const glm::dvec3 p = place(*lattice, i, j, k);
-        EXPECT_NEAR(p.x, (10 * i + 2 * j - 17) * scale, tolerance);
+        EXPECT_NEAR(p.x, (10 * i + 2 * j - 17) * narrow * scale, tolerance);
         EXPECT_NEAR(p.y, (5 * j - 5) * scale, tolerance);
         EXPECT_NEAR(p.z, lattice->positions[2][static_cast<std::size_t>(k)], tolerance);
       }
@@ -235,8 +237,8 @@ TEST(Curvilinear, EveryColumnHasItsLongitudeAndLatitude) {
   }
   EXPECT_NEAR(lattice->box_min.x, -1, tolerance);
   EXPECT_NEAR(lattice->box_max.y, 7.5 * scale, tolerance);
-  EXPECT_NEAR(lattice->spacing[0][1], 10 * scale, tolerance);
-  EXPECT_NEAR(lattice->spacing[1][1], std::hypot(5, 2) * scale, tolerance);
+  EXPECT_NEAR(lattice->spacing[0][1], 10 * narrow * scale, tolerance);
+  EXPECT_NEAR(lattice->spacing[1][1], std::hypot(5, 2 * narrow) * scale, tolerance);
 }
 
 TEST(Curvilinear, ColumnsArePlacedOnTheGlobe) {
@@ -415,10 +417,10 @@ TEST(WorldRates, OnACurvilinearMapAreThoseOfDegrees) {
   view.vector.space = protocol::VectorSpace::world;
   const auto scene = build_scene(*complete(view, *dataset), *dataset);
   ASSERT_TRUE(scene) << scene.error().message;
-  const double metre = 2.0 / 46 / (6371000.0 * degree);
+  const double metre = 2.0 / 46 / std::cos(5 * degree) / (6371000.0 * degree);
   EXPECT_NEAR(scene->vector->rate_y, metre, 1e-5 * metre);
   for (int j = 0; j < 3; ++j) {
-    const double wanted = metre / std::cos(5 * j * degree);
+    const double wanted = metre * std::cos(5 * degree) / std::cos(5 * j * degree);
     EXPECT_NEAR(scene->vector->rate_x[static_cast<std::size_t>(j)], wanted, 1e-5 * wanted);
   }
 }

@@ -258,7 +258,7 @@ TEST(WorldRates, HeightAxesUseMetersPerSecondUnchanged) {
   const Scene scene = built(view, *dataset);
   EXPECT_NEAR(scene.vector->rate_x[0], 0.5 / 1000.0, 1e-12);
   EXPECT_NEAR(scene.vector->rate_y, 0.5 / 1000.0, 1e-12);
-  EXPECT_NEAR(scene.vector->rate_z[1], 0.3 / 3000.0, 1e-12);
+  EXPECT_NEAR(scene.vector->rate_z[1], 0.5 / 1000.0, 1e-12);
 }
 
 TEST(WorldRates, AreAbsentForComponentsAndRefusedForUnknownUnits) {

@@ -95,6 +95,7 @@ TEST(Slice, CountsItsOwnLinesOnly) {
   View view;
   view.vector.magnitude_range = protocol::Range{0, 1};
   view.geometry.slice = SliceView{GridAxis::z, 0};
+  view.geometry.vertical = protocol::VerticalPlacement::metric;
   const auto full = complete(view, *dataset);
   ASSERT_TRUE(full);
   // The layer is 2 by 2; seen from 35 degrees above, 720 pixels are 2.08 (sin 35 + 0.01) high, so

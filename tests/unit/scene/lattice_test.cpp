@@ -124,6 +124,83 @@ TEST(Lattice, LongitudeAndLatitudeShareTheirUnit) {
   EXPECT_NEAR(lattice->box_max.y, 0.75, 1e-14);  // 30 degrees
 }
 
+data::Grid map_of(std::vector<double> longitudes, std::vector<double> latitudes) {
+  data::Grid grid;
+  grid.axes = {axis(AxisKind::longitude, "degrees_east", std::move(longitudes)),
+               axis(AxisKind::latitude, "degrees_north", std::move(latitudes)),
+               axis(AxisKind::height, "m", {0, 1000})};
+  return grid;
+}
+
+double width_to_height(const Lattice& lattice) {
+  return (lattice.box_max.x - lattice.box_min.x) / (lattice.box_max.y - lattice.box_min.y);
+}
+
+// cos(60 degrees) = 1/2.
+TEST(Lattice, RegionalMapIsTrueToScaleInItsMiddle) {
+  const auto lattice = place_lattice(map_of({0, 5, 10}, {55, 60, 65}), GeometryView{});
+  ASSERT_TRUE(lattice);
+  EXPECT_NEAR(width_to_height(*lattice), 0.5, 1e-14);
+  EXPECT_NEAR(lattice->box_max.y, 1.0, 1e-14);
+  EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 0.15 * 2, 1e-14);
+  const auto south = place_lattice(map_of({0, 5, 10}, {-65, -60, -55}), GeometryView{});
+  ASSERT_TRUE(south);
+  EXPECT_NEAR(width_to_height(*south), 0.5, 1e-14);
+}
+
+TEST(Lattice, MapsAroundTheGlobeAndBeyondNinetyDegreesOfLatitudeArePlateCarree) {
+  std::vector<double> around;
+  for (int i = 0; i < 36; ++i) around.push_back(10.0 * i);
+  const auto ring = place_lattice(map_of(around, {55, 60, 65}), GeometryView{});
+  ASSERT_TRUE(ring);
+  EXPECT_NEAR(width_to_height(*ring), 360.0 / 15, 1e-12);
+  const auto tall = place_lattice(map_of({0, 5, 10}, {-10, 25, 60}), GeometryView{});
+  ASSERT_TRUE(tall);
+  EXPECT_NEAR(width_to_height(*tall), 15.0 / 105, 1e-14);
+}
+
+TEST(Lattice, FlatBoxOfLengthsIsExaggeratedLikeThatOfDegrees) {
+  // 1000 km x 1000 km x 10 km, and a box of a twentieth, which keeps its proportions.
+  const std::vector<double> wide = {0, 500000};
+  const auto flat = place_lattice(metres(wide, wide, {0, 5000}), GeometryView{});
+  ASSERT_TRUE(flat);
+  EXPECT_NEAR(flat->box_max.z - flat->box_min.z, 0.15 * 2, 1e-14);
+  EXPECT_NEAR(*vertical_exaggeration(metres(wide, wide, {0, 5000}), *flat), 15, 1e-12);
+  const data::Grid thick = metres(wide, wide, {0, 25000});
+  const auto kept = place_lattice(thick, GeometryView{});
+  ASSERT_TRUE(kept);
+  EXPECT_NEAR(kept->box_max.z - kept->box_min.z, 0.05 * 2, 1e-14);
+  EXPECT_NEAR(*vertical_exaggeration(thick, *kept), 1, 1e-12);
+}
+
+TEST(Lattice, LengthsInDifferentUnitsKeepTheirProportion) {
+  data::Grid grid = metres({0, 1}, {0, 2000}, {0, 500});
+  grid.axes[0].units = "km";
+  const auto lattice = place_lattice(grid, GeometryView{});
+  ASSERT_TRUE(lattice);
+  EXPECT_NEAR(width_to_height(*lattice), 0.5, 1e-14);
+  EXPECT_NEAR(lattice->box_max.z - lattice->box_min.z, 0.5, 1e-14);
+}
+
+TEST(Lattice, VerticalAxisIsToScaleOnRequest) {
+  GeometryView geometry;
+  geometry.vertical = VerticalPlacement::metric;
+  const std::vector<double> wide = {0, 500000};
+  const auto flat = place_lattice(metres(wide, wide, {0, 5000}), geometry);
+  ASSERT_TRUE(flat);
+  EXPECT_NEAR(flat->box_max.z - flat->box_min.z, 0.01 * 2, 1e-14);
+  const data::Grid map = map_of({0, 5, 10}, {55, 60, 65});
+  const auto placed = place_lattice(map, geometry);
+  ASSERT_TRUE(placed);
+  // 2 km over 15 degrees of 111.19 km.
+  EXPECT_NEAR(placed->box_max.z - placed->box_min.z, 2 * 2 / (15 * 111.194926645), 1e-9);
+  EXPECT_NEAR(*vertical_exaggeration(map, *placed), 1, 1e-12);
+  const auto refused = place_lattice(atmosphere_grid(), geometry);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().at.at(0).pointer, "/geometry/vertical");
+  EXPECT_FALSE(vertical_exaggeration(atmosphere_grid(), *place_lattice(atmosphere_grid(), {})));
+}
+
 TEST(Lattice, DimensionOfOneIsOneCellThick) {
   auto lattice = place_lattice(metres({0, 1, 3, 7}, {0, 2}, {5}), GeometryView{});
   ASSERT_TRUE(lattice);
@@ -164,10 +241,11 @@ TEST(Lattice, SpacingsAMillionfoldApartStayFinite) {
 
 // The engine draws kernels of single precision, with a limit of 1e-7 of the widths of cells.
 TEST(Lattice, CellsTooNarrowForSinglePrecisionAreRefused) {
-  const auto placed = place_lattice(metres({0, 1, 2}, {0, 1, 2}, {0, 2e-7, 4e-7}), GeometryView{});
+  GeometryView geometry;
+  geometry.vertical = VerticalPlacement::metric;
+  const auto placed = place_lattice(metres({0, 1, 2}, {0, 1, 2}, {0, 2e-7, 4e-7}), geometry);
   EXPECT_TRUE(placed);
-  const auto refused =
-      place_lattice(metres({0, 1, 2}, {0, 1, 2}, {0, 0.5e-7, 1e-7}), GeometryView{});
+  const auto refused = place_lattice(metres({0, 1, 2}, {0, 1, 2}, {0, 0.5e-7, 1e-7}), geometry);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::bad_data);
   EXPECT_NE(refused.error().message.find("5e-08 times as wide"), std::string::npos)
@@ -180,6 +258,7 @@ TEST(Lattice, CellsTooNarrowForSinglePrecisionAreRefused) {
 TEST(Lattice, ScaleThatFlattensCellsBeyondTheLimitIsInvalid) {
   GeometryView geometry;
   geometry.scale = {1e3, 1, 1e-3};
+  geometry.vertical = VerticalPlacement::metric;
   const auto even = metres({0, 1, 2}, {0, 1, 2}, {0, 1, 2});
   EXPECT_TRUE(place_lattice(even, geometry));
   const auto refused = place_lattice(metres({0, 1, 2}, {0, 1, 2}, {0, 0.05, 0.1}), geometry);

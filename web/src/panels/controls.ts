@@ -151,6 +151,17 @@ export function sliceText(dataset: Dataset, view: View): string {
   return `${layer}: ${axis.name} ${place} ${unitText(axis.units)}`.trim() + ".";
 }
 
+// How heights are exaggerated in a box; empty: unknown.
+export function exaggerationText(dataset: Dataset, view: View): string {
+  const { vertical = "auto", mapping = "flat", heightField = null, scale } = view.geometry ?? {};
+  if (mapping !== "flat" || heightField !== null || vertical === "index") return "";
+  const base = vertical === "metric" ? 1 : dataset.verticalExaggeration;
+  if (base === undefined) return "";
+  const across = dataset.dims.y > 1 ? 1 : 0;
+  const times = (base * (scale?.[2] ?? 1)) / (scale?.[across] ?? 1);
+  return `Heights are drawn ${formatNumber(times, 3)} times as high as to scale.`;
+}
+
 // Colours the lines by a different quantity: the old range has the wrong unit and is removed, and a
 // scalar field is named.
 export function colorByPatch(dataset: Dataset, view: View, by: string): Patch {
@@ -219,7 +230,6 @@ export function controlStates(view: View) {
     pattern: lines && (jitter.center !== 0 || jitter.stride !== 0),
     motion: lines && vector.motion?.mode === "phase",
     slab: view.method?.name === "slab",
-    vertical: (view.geometry?.heightField ?? null) === null,
     slice: (view.geometry?.slice ?? null) !== null,
     plane: (view.geometry?.plane ?? null) !== null,
     combined: lines && (view.geometry?.slice ?? view.geometry?.plane ?? null) !== null,

@@ -4,6 +4,7 @@ import { withProjection, type Camera } from "../view/camera";
 import {
   bodyOptions,
   depthCuePatch,
+  exaggerationText,
   fieldOptions,
   heightOptions,
   mappingOptions,
@@ -44,13 +45,13 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
   if (Object.keys(mappings).length < 2) {
     kit.showWhen(() => kit.host.view().geometry?.mapping !== "flat", mapping);
   }
-  const vertical = kit.choice(folder, "vertical axis", keyAccess("/geometry/vertical"), {
+  kit.choice(folder, "vertical axis", keyAccess("/geometry/vertical"), {
     automatic: "auto",
     linear: "linear",
     "log p": "logp",
     index: "index",
+    "to scale": "metric",
   });
-  kit.enableWhen((states) => states.vertical, vertical);
   if (Object.keys(fieldOptions(dataset, "scalar")).length > 0) {
     kit.choice(
       folder,
@@ -65,6 +66,7 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
     );
   }
   addStretch(folder, kit);
+  kit.note(folder, () => exaggerationText(dataset, kit.host.view()));
   kit.choice(folder, "opaque surface", keyAccess("/geometry/body/show"), bodyOptions);
   const color = kit.color(folder, "surface colour", keyAccess("/geometry/body/surfaceColor"));
   kit.showWhen((states) => states.body, color);
