@@ -10,6 +10,7 @@
 
 #include "server/base/check.hpp"
 #include "server/scene/angles.hpp"
+#include "server/scene/masked_heights.hpp"
 
 namespace windsplat::scene {
 
@@ -64,31 +65,41 @@ Affine map_of(const data::Axis& axis, const std::vector<double>& world) {
   return map;
 }
 
-// World height of every sample; masked heights are replaced by the mean of their level.
+// World height of every sample; masked heights are replaced (extend_over_mask).
 class Elevations {
  public:
   Elevations(const Lattice& straight, const Heights* heights,
              const std::optional<std::array<double, 2>>& extent)
-      : levels_(straight.positions[2]) {
+      : levels_(straight.positions[2]), width_(static_cast<std::size_t>(straight.dims[0])) {
+    layer_.resize(width_ * static_cast<std::size_t>(straight.dims[1]));
     if (heights == nullptr) return;
     values_ = heights->values->component(0);
-    layer_ =
-        static_cast<std::size_t>(straight.dims[0]) * static_cast<std::size_t>(straight.dims[1]);
+    masked_ = heights->values->masked > 0;
     if (!extent) return;
     map_.scale = (straight.box_max.z - straight.box_min.z) / ((*extent)[1] - (*extent)[0]);
     map_.centre = 0.5 * ((*extent)[0] + (*extent)[1]);
   }
-  [[nodiscard]] double at(std::size_t level, std::size_t column) const {
-    if (values_ == nullptr) return levels_[level];
-    const auto value = static_cast<double>(values_[level * layer_ + column]);
-    return std::isfinite(value) ? map_(value) : levels_[level];
+  // By column. Valid until the next call.
+  const std::vector<double>& of_level(std::size_t level) {
+    if (values_ == nullptr) {
+      std::fill(layer_.begin(), layer_.end(), levels_[level]);
+      return layer_;
+    }
+    const float* const from = values_ + level * layer_.size();
+    for (std::size_t c = 0; c < layer_.size(); ++c) {
+      layer_[c] = map_(static_cast<double>(from[c]));
+    }
+    if (masked_) extend_over_mask(layer_, width_);
+    return layer_;
   }
 
  private:
   const std::vector<double>& levels_;
+  std::size_t width_ = 0;
   const float* values_ = nullptr;
-  std::size_t layer_ = 0;
+  bool masked_ = false;
   Affine map_;
+  std::vector<double> layer_;
 };
 
 // Bottom and top of the box as raw heights: half a mean cell beyond the extreme samples. Empty for
@@ -297,15 +308,16 @@ int columns_around(const data::Columns& columns, const std::vector<glm::dvec3>& 
   return width >= fewest && meet(up, width, width - 1, next) ? static_cast<int>(width) : 0;
 }
 
-Places on_sphere(const Lattice& straight, const std::vector<glm::dvec3>& up,
-                 const Elevations& elevations, const Shell& shell) {
+Places on_sphere(const Lattice& straight, const std::vector<glm::dvec3>& up, Elevations& elevations,
+                 const Shell& shell) {
   const double bottom = straight.box_min.z;
   const double height = straight.box_max.z - bottom;
   Places places;
   places.reserve(up.size() * straight.positions[2].size());
   for (std::size_t k = 0; k < straight.positions[2].size(); ++k) {
+    const std::vector<double>& heights = elevations.of_level(k);
     for (std::size_t c = 0; c < up.size(); ++c) {
-      const glm::dvec3 p = up[c] * shell.radius((elevations.at(k, c) - bottom) / height);
+      const glm::dvec3 p = up[c] * shell.radius((heights[c] - bottom) / height);
       places.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
     }
   }
@@ -314,7 +326,7 @@ Places on_sphere(const Lattice& straight, const std::vector<glm::dvec3>& up,
 
 // columns: null if the columns lie along the axes.
 Places on_map(const Lattice& straight, const data::Grid& even, const data::Columns* columns,
-              const Elevations& elevations) {
+              Elevations& elevations) {
   Affine map_x = map_of(even.axes[0], straight.positions[0]);
   Affine map_y = map_of(even.axes[1], straight.positions[1]);
   if (map_x.scale == 0) map_x.scale = map_y.scale;
@@ -324,13 +336,14 @@ Places on_map(const Lattice& straight, const data::Grid& even, const data::Colum
   Places places;
   places.reserve(layer * straight.positions[2].size());
   for (std::size_t k = 0; k < straight.positions[2].size(); ++k) {
+    const std::vector<double>& heights = elevations.of_level(k);
     for (std::size_t c = 0; c < layer; ++c) {
       const double x =
           columns == nullptr ? straight.positions[0][c % width] : map_x(columns->longitude[c]);
       const double y =
           columns == nullptr ? straight.positions[1][c / width] : map_y(columns->latitude[c]);
       places.push_back(
-          {static_cast<float>(x), static_cast<float>(y), static_cast<float>(elevations.at(k, c))});
+          {static_cast<float>(x), static_cast<float>(y), static_cast<float>(heights[c])});
     }
   }
   return places;
@@ -430,7 +443,7 @@ Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryVie
   if (sphere) straight_geometry.scale = {1, 1, 1};
   auto straight = place_straight(even, straight_geometry, extent);
   if (!straight) return straight.error();
-  const Elevations elevations(*straight, heights, extent);
+  Elevations elevations(*straight, heights, extent);
   const bool one_height = !extent;
   const Shell shell = shell_of(*straight, even, geometry.scale[2], one_height);
   Lattice lattice = *straight;

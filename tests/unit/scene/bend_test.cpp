@@ -305,7 +305,7 @@ TEST(HeightField, TerrainKeepsItsSlope) {
   EXPECT_NEAR(lattice.box_min.z, -lattice.box_max.z, tolerance);
 }
 
-TEST(HeightField, MaskedHeightIsTheMeanOfItsLevel) {
+TEST(HeightField, MaskedHeightIsTheMeanOfItsNeighbours) {
   auto dataset = terrain(metres(), "m", [](std::size_t n) {
     if (n == 9) return std::nan("");
     return 10.0 * static_cast<double>(n / 8) + (n % 8 == 0 ? 7.0 : 0.0);
@@ -313,10 +313,45 @@ TEST(HeightField, MaskedHeightIsTheMeanOfItsLevel) {
   const auto placed = place_dataset(with_heights(), *dataset);
   ASSERT_TRUE(placed);
   const Lattice& lattice = (*placed)->lattice;
-  // One of the seven present heights is 17, the others are 10.
+  // One of the three neighbours has the height 17, the others 10.
   const double one = place(lattice, 0, 0, 1).z - place(lattice, 2, 0, 1).z;
-  EXPECT_NEAR(place(lattice, 1, 0, 1).z - place(lattice, 2, 0, 1).z, one / 7, tolerance);
-  EXPECT_NEAR(place(lattice, 1, 0, 1).z, lattice.positions[2][1], tolerance);
+  EXPECT_NEAR(place(lattice, 1, 0, 1).z - place(lattice, 2, 0, 1).z, one / 3, tolerance);
+}
+
+// A sea of 100 m in the west and 10 m at the coast: the cells at the coast are level towards land.
+TEST(HeightField, MaskedColumnsContinueTheHeightsAtTheirCoast) {
+  auto dataset = terrain(metres(), "m", [](std::size_t n) {
+    const std::size_t column = n % 4;
+    const double level = static_cast<double>(n / 8) - 3.0;
+    return column >= 2 ? std::nan("") : level * (column == 0 ? 100.0 : 10.0);
+  });
+  const auto placed = place_dataset(with_heights(), *dataset);
+  ASSERT_TRUE(placed) << placed.error().message;
+  const Lattice& lattice = (*placed)->lattice;
+  for (int level = 0; level < 3; ++level) {
+    for (const int land : {2, 3}) {
+      EXPECT_NEAR(place(lattice, land, 0, level).z, place(lattice, 1, 0, level).z, tolerance);
+    }
+  }
+  EXPECT_LT(place(lattice, 0, 0, 0).z, place(lattice, 1, 0, 0).z - 0.1);
+}
+
+TEST(HeightField, IsPlacedToScaleOnRequest) {
+  auto dataset =
+      terrain(globe(), "m", [](std::size_t n) { return 1000.0 * static_cast<double>(n / 84); });
+  GeometryView geometry = with_heights();
+  geometry.vertical = protocol::VerticalPlacement::metric;
+  const auto placed = place_dataset(geometry, *dataset);
+  ASSERT_TRUE(placed) << placed.error().message;
+  const glm::dvec3 up = place((*placed)->lattice, 0, 0, 1) - place((*placed)->lattice, 0, 0, 0);
+  const glm::dvec3 north = place((*placed)->lattice, 0, 1, 0) - place((*placed)->lattice, 0, 0, 0);
+  const double degrees =
+      (*placed)->grid.axes[1].coordinates[1] - (*placed)->grid.axes[1].coordinates[0];
+  EXPECT_NEAR(up.z / north.y, 1000 / (degrees * 6371000 * std::numbers::pi / 180), tolerance);
+  geometry.mapping = GeometryMapping::sphere;
+  const auto refused = place_dataset(geometry, *dataset);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().at.at(0).pointer, "/geometry/vertical");
 }
 
 TEST(HeightField, IsPlacedOnTheGlobe) {
