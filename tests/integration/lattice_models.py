@@ -134,6 +134,90 @@ def write_cm1(path):
                         "w": "m/s", "wind": "m/s"})
 
 
+def between_all(values, along, count):
+    """Means of both neighbours of `count` samples, of which the first lies before all of them."""
+    before = np.take(values, np.clip(np.arange(count) - 1, 0, None), along)
+    after = np.take(values, np.clip(np.arange(count), None, values.shape[along] - 1), along)
+    return (before.astype(float) + after) / 2
+
+
+def write_palm(path):
+    """As many levels of w as of the others; the lowest of both is the ground."""
+    file = netCDF4.Dataset(path, "w")
+    file.title = "PALM 6.0"
+    z = axis(file, "zu_3d", np.array([0, 2.5, 7.5, 12.5, 17.5]), units="meters", axis="Z")
+    axis(file, "zw_3d", np.array([0, 5, 10, 15, 20.0]), units="meters", axis="Z")
+    x = axis(file, "x", np.arange(6.0) * 10 + 5, units="meters", axis="X")
+    axis(file, "xu", np.arange(6.0) * 10, units="meters", axis="X")
+    y = axis(file, "y", np.arange(4.0) * 10 + 5, units="meters", axis="Y")
+    axis(file, "yv", np.arange(4.0) * 10, units="meters", axis="Y")
+    u = put(file, "u", ("zu_3d", "y", "xu"), noise(5, 4, 6), units="m/s", long_name="u")
+    v = put(file, "v", ("zu_3d", "yv", "x"), noise(5, 4, 6), units="m/s", long_name="v")
+    w = put(file, "w", ("zw_3d", "y", "x"), noise(5, 4, 6), units="m/s", long_name="w")
+    theta = put(file, "theta", ("zu_3d", "y", "x"), noise(5, 4, 6), units="K", long_name="theta")
+    file.close()
+    def from_the_next(values, along):  # the last has no face beyond it
+        return np.flip(between_all(np.flip(values, along), along, values.shape[along]), along)
+    fields = {"theta": theta, "u": from_the_next(u, 2), "v": from_the_next(v, 1),
+              "w": between_all(w, 0, 5)}
+    return Independent({"x": x, "y": y, "z": z},
+                       as_masked({name: values[None] for name, values in fields.items()}),
+                       {"wind": ("u", "v", "w")},
+                       {"x": "meters", "y": "meters", "z": "meters", "u": "m/s", "v": "m/s",
+                        "w": "m/s", "theta": "K", "wind": "m/s"})
+
+
+def write_um(path, levels_shared=False):
+    """The Unified Model as saved by iris: winds half a cell beside and half a level below, on a
+    dimension of their own unless their levels have the same numbers."""
+    file = netCDF4.Dataset(path, "w")
+    lat = axis(file, "latitude", np.arange(5.0) + 50, units="degrees_north",
+               standard_name="latitude")
+    lon = axis(file, "longitude", np.arange(6.0) + 3, units="degrees_east",
+               standard_name="longitude")
+    axis(file, "latitude_0", np.arange(6.0) + 49.5, units="degrees_north",
+         standard_name="latitude")
+    axis(file, "longitude_0", np.arange(6.0) + 2.5, units="degrees_east",
+         standard_name="longitude")
+    theta = np.array([0, 20, 60, 120, 200.0])[levels_shared:]
+    rho = np.array([10, 40, 90, 160.0])
+    z = axis(file, "model_level_number", np.arange(5.0)[levels_shared:], units="1", positive="up",
+             standard_name="model_level_number")
+    winds = "model_level_number"
+    if not levels_shared:
+        winds += "_0"
+        axis(file, winds, np.arange(4.0) + 1, units="1", positive="up",
+             standard_name="model_level_number")
+    for name, along, heights in (("level_height", "model_level_number", theta),
+                                 ("level_height_0", winds, rho)):
+        put(file, name, (along,), heights, units="m", long_name="level_height", positive="up")
+    fields = {}
+    for name, units in (("air_temperature", "K"), ("specific_humidity", "1"),
+                        ("upward_air_velocity", "m s-1")):
+        fields[name] = put(file, name, ("model_level_number", "latitude", "longitude"),
+                           noise(len(theta), 5, 6), units=units, standard_name=name,
+                           coordinates="level_height")
+    u = put(file, "x_wind", (winds, "latitude", "longitude_0"), noise(4, 5, 6), units="m s-1",
+            standard_name="x_wind", coordinates="level_height_0")
+    v = put(file, "y_wind", (winds, "latitude_0", "longitude"), noise(4, 6, 6), units="m s-1",
+            standard_name="y_wind", coordinates="level_height_0")
+    file.close()
+    # Longitude i lies between faces i and i + 1, of which the last is missing.
+    u, v = np.flip(between_all(np.flip(u, 2), 2, 6), 2), between(v, 1)
+    for name, values in (("x_wind", u), ("y_wind", v)):
+        fields[name] = between_all(values, 0, 5)[levels_shared:]
+    units = {name: "m s-1" for name in ("x_wind", "y_wind", "upward_air_velocity", "wind")}
+    return Independent({"x": lon, "y": lat, "z": z},
+                       as_masked({name: values[None] for name, values in fields.items()}),
+                       {"wind": ("x_wind", "y_wind", "upward_air_velocity")},
+                       units | {"x": "degrees_east", "y": "degrees_north", "z": "1",
+                                "air_temperature": "K", "specific_humidity": "1"})
+
+
+def write_um_of_one_dimension(path):
+    return write_um(path, levels_shared=True)
+
+
 def write_chain(path):
     """Names of faces of faces, and positions of steps of which there are none yet."""
     file = netCDF4.Dataset(path, "w")

@@ -83,12 +83,14 @@ bool is_position_of_each_step(const FileContents& contents, const std::vector<Di
 
 class CollocatedFile final : public ArrayFile {
  public:
-  CollocatedFile(std::unique_ptr<ArrayFile> base, const std::vector<Stagger>& staggers)
+  // staggers: by dimension; levels: by variable.
+  CollocatedFile(std::unique_ptr<ArrayFile> base, const std::vector<Stagger>& staggers,
+                 const std::vector<Stagger>& levels)
       : base_(std::move(base)), contents_(base_->contents()) {
     const std::vector<DimensionRole> roles = classify_dimensions(contents_);
     std::string names;
     for (FileVariable& variable : contents_.variables) {
-      ways_.push_back(way_of(variable, staggers));
+      ways_.push_back(way_of(variable, staggers, levels.at(ways_.size())));
       ways_.back().first_step = is_position_of_each_step(contents_, roles, variable);
       const Way& way = ways_.back();
       if (!way.is_changed()) continue;
@@ -176,15 +178,18 @@ class CollocatedFile final : public ArrayFile {
     [[nodiscard]] bool is_changed() const { return first_step || !staggers.empty(); }
   };
 
-  static Way way_of(const FileVariable& variable, const std::vector<Stagger>& staggers) {
+  static Way way_of(const FileVariable& variable, const std::vector<Stagger>& staggers,
+                    const Stagger& levels) {
     Way way;
     const std::vector<int>& dims = variable.dims;
     if (!variable.numeric || dims.size() < 2 || is_position(variable)) return way;
     const bool staggered = std::any_of(dims.begin(), dims.end(), [&](int dimension) {
       return staggers.at(at(dimension)).centers >= 0;
     });
-    if (!staggered) return way;
-    for (const int dimension : dims) way.staggers.push_back(staggers.at(at(dimension)));
+    if (!staggered && levels.centers < 0) return way;
+    for (const int dimension : dims) {
+      way.staggers.push_back(dimension == levels.centers ? levels : staggers.at(at(dimension)));
+    }
     way.walls = is_speed(variable.units);
     return way;
   }
@@ -279,10 +284,14 @@ bool has_positions_of_each_step(const FileContents& contents) {
 Result<std::unique_ptr<ArrayFile>> collocated(std::unique_ptr<ArrayFile> file) {
   auto staggers = find_staggering(*file);
   if (!staggers) return staggers.error();
-  const bool staggered = std::any_of(staggers->begin(), staggers->end(),
-                                     [](const Stagger& one) { return one.centers >= 0; });
+  const auto levels = find_shared_levels(*file);
+  if (!levels) return levels.error();
+  const auto is_staggered = [](const Stagger& one) { return one.centers >= 0; };
+  const bool staggered = std::any_of(staggers->begin(), staggers->end(), is_staggered) ||
+                         std::any_of(levels->begin(), levels->end(), is_staggered);
   if (!staggered && !has_positions_of_each_step(file->contents())) return file;
-  return std::unique_ptr<ArrayFile>(std::make_unique<CollocatedFile>(std::move(file), *staggers));
+  return std::unique_ptr<ArrayFile>(
+      std::make_unique<CollocatedFile>(std::move(file), *staggers, *levels));
 }
 
 }  // namespace windsplat::data::cf

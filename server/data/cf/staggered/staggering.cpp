@@ -26,6 +26,24 @@ class StaggerFinder {
   explicit StaggerFinder(const ArrayFile& file)
       : file_(file), contents_(file.contents()), found_(contents_.dimensions.size()) {}
 
+  // See find_shared_levels().
+  [[nodiscard]] Result<std::vector<Stagger>> shared_levels() const {
+    std::vector<Stagger> out(contents_.variables.size());
+    for (std::size_t d = 0; d < found_.size(); ++d) {
+      std::vector<Heights> all = heights_on(static_cast<int>(d));
+      if (all.size() != 2 || contents_.dimensions[d].length > compared_length_max) continue;
+      if (all[0].users.size() < all[1].users.size()) std::swap(all[0], all[1]);
+      const auto centers = unpacked_values(file_, all[0].variable);
+      if (!centers) return centers.error();
+      const auto faces = unpacked_values(file_, all[1].variable);
+      if (!faces) return faces.error();
+      const auto first = interleaved(*faces, *centers);
+      if (!first) continue;
+      for (const int user : all[1].users) out[at(user)] = {static_cast<int>(d), false, *first};
+    }
+    return out;
+  }
+
   Result<std::vector<Stagger>> find() {
     by_reader();
     by_sgrid();
@@ -34,6 +52,7 @@ class StaggerFinder {
     by_roms_names();
     by_generalized_heights();
     by_counted_levels();
+    if (auto done = by_palm_levels(); !done) return done.error();
     if (auto done = by_coordinates(); !done) return done.error();
     forget_chains();
     return std::move(found_);
@@ -169,6 +188,27 @@ class StaggerFinder {
     if (length(faces) == length(centers) + 1) add(faces, centers, false, 0);
   }
 
+  // PALM: zu_3d, and zw_3d with as many levels, each above that of zu_3d (zw = 0, dz, ...; zu = 0
+  // or -dz/2, dz/2, ...). The lowest of both may coincide at the ground.
+  Result<void> by_palm_levels() {
+    const int faces = dimension_named(contents_, "zw_3d");
+    const int centers = dimension_named(contents_, "zu_3d");
+    const int above = variable_named(contents_, "zw_3d");
+    const int at_centers = variable_named(contents_, "zu_3d");
+    if (faces < 0 || centers < 0 || above < 0 || at_centers < 0) return {};
+    if (length(faces) != length(centers) || length(faces) > compared_length_max) return {};
+    const auto high = unpacked_values(file_, above);
+    if (!high) return high.error();
+    const auto mid = unpacked_values(file_, at_centers);
+    if (!mid) return mid.error();
+    if (high->size() != length(faces) || mid->size() != length(faces)) return {};
+    for (std::size_t i = 1; i < mid->size(); ++i) {
+      if (!is_middle((*mid)[i], (*high)[i - 1], (*high)[i])) return {};
+    }
+    add(faces, centers, false, -1);
+    return {};
+  }
+
   // How many variables of two or more dimensions run along a dimension.
   [[nodiscard]] std::ptrdiff_t uses(int dimension) const {
     return std::count_if(contents_.variables.begin(), contents_.variables.end(),
@@ -237,8 +277,37 @@ class StaggerFinder {
     AxisKind kind = AxisKind::cartesian;
     std::ptrdiff_t uses = 0;
     bool falls = false;
+    bool by_height = false;      // values are those of heights_on()
     std::vector<double> values;  // ascending: with the opposite sign if the coordinate falls
   };
+
+  // Heights of the Unified Model's levels (level_height, as iris writes it): the numbers of its
+  // levels do not tell that winds lie between those of temperature.
+  struct Heights {
+    int variable = -1;
+    std::vector<int> users;  // variables along the dimension whose `coordinates` name it
+  };
+  [[nodiscard]] std::vector<Heights> heights_on(int dimension) const {
+    std::vector<Heights> out;
+    for (std::size_t v = 0; v < contents_.variables.size(); ++v) {
+      const FileVariable& variable = contents_.variables[v];
+      const bool named =
+          variable.long_name == "level_height" || variable.name.starts_with("level_height");
+      if (!named || !variable.numeric || variable.dims != std::vector<int>{dimension}) continue;
+      out.push_back({static_cast<int>(v), {}});
+      if (out.size() > 2) break;  // not understood
+      for (std::size_t u = 0; u < contents_.variables.size(); ++u) {
+        const FileVariable& user = contents_.variables[u];
+        if (user.dims.size() < 2 || std::count(user.dims.begin(), user.dims.end(), dimension) == 0)
+          continue;
+        std::istringstream words(user.coordinates);
+        for (std::string word; words >> word;) {
+          if (word == variable.name) out.back().users.push_back(static_cast<int>(u));
+        }
+      }
+    }
+    return out;
+  }
 
   // Dimensions with coordinates that no name has explained, those of most variables first.
   Result<std::vector<Line>> lines() const {
@@ -247,12 +316,17 @@ class StaggerFinder {
     for (std::size_t d = 0; d < roles.size(); ++d) {
       const DimensionRole& role = roles[d];
       const bool in_space = role.role == Role::x || role.role == Role::y || role.role == Role::z;
-      Line line{static_cast<int>(d), role.role, role.kind, uses(static_cast<int>(d)), false, {}};
+      Line line{
+          static_cast<int>(d), role.role, role.kind, uses(static_cast<int>(d)), false, false, {}};
       if (!in_space || role.coordinate < 0 || line.uses == 0 || found_[d].centers >= 0 ||
           contents_.dimensions[d].length > compared_length_max) {
         continue;
       }
-      auto values = unpacked_values(file_, role.coordinate);
+      const auto heights =
+          role.role == Role::z ? heights_on(line.dimension) : std::vector<Heights>();
+      line.by_height = !heights.empty();
+      auto values =
+          unpacked_values(file_, line.by_height ? heights.front().variable : role.coordinate);
       if (!values) return values.error();
       line.values = std::move(*values);
       line.falls = line.values.size() > 1 && line.values[1] < line.values[0];
@@ -274,7 +348,7 @@ class StaggerFinder {
       for (std::size_t f = c + 1; f < found->size(); ++f) {
         const Line& faces = (*found)[f];
         if (faces.role != centers.role || faces.kind != centers.kind ||
-            faces.falls != centers.falls) {
+            faces.falls != centers.falls || faces.by_height != centers.by_height) {
           continue;
         }
         // As many levels between others are faces only if a velocity lies on them.
@@ -306,6 +380,10 @@ class StaggerFinder {
 
 Result<std::vector<Stagger>> find_staggering(const ArrayFile& file) {
   return StaggerFinder(file).find();
+}
+
+Result<std::vector<Stagger>> find_shared_levels(const ArrayFile& file) {
+  return StaggerFinder(file).shared_levels();
 }
 
 }  // namespace windsplat::data::cf
