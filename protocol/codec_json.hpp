@@ -129,6 +129,9 @@ class ObjectReader {
     }
   }
 
+  std::optional<std::string> read_text(const Json& value, const std::string& pointer,
+                                       std::size_t chars_min,
+                                       std::size_t chars_max = limits::name_chars_max);
   [[nodiscard]] std::string at(const char* key) const { return join_pointer(pointer_, key); }
   [[nodiscard]] const std::string& pointer() const { return pointer_; }
   Faults& faults() { return faults_; }
@@ -154,9 +157,6 @@ class ObjectReader {
                                            IntegerRange range);
   std::optional<std::size_t> read_name(const Json& value, const std::string& pointer,
                                        std::span<const std::string_view> names);
-  std::optional<std::string> read_text(const Json& value, const std::string& pointer,
-                                       std::size_t chars_min,
-                                       std::size_t chars_max = limits::name_chars_max);
 
   const Json* value_ = nullptr;  // null if the value is not an object
   std::string pointer_;

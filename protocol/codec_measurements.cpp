@@ -1,5 +1,11 @@
 // Measurements and jobs -> JSON; dataset request -> its path.
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "protocol/codec_json.hpp"
 #include "protocol/codec_shapes.hpp"
@@ -167,33 +173,76 @@ std::string encode_jobs(const std::vector<JobDescription>& jobs) {
   return dump(Json{{"jobs", std::move(list)}});
 }
 
+namespace {
+
+constexpr std::size_t listed_files_max = 64;  // as of a list in a file
+
+// A name or pattern of a list: relative to the data root, and below it.
+void check_listed_name(const std::string& name, const std::string& pointer, Faults& faults) {
+  if (name.starts_with('/')) return faults.add(pointer, "must be relative to the data root");
+  for (std::string_view rest = name; !rest.empty();) {
+    const std::size_t end = std::min(rest.find('/'), rest.size());
+    if (rest.substr(0, end) == "..") return faults.add(pointer, "leads out of the data root");
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+}
+
+void read_list(const Json& tree, Faults& faults, DatasetRequest& out) {
+  ObjectReader reader(tree, "", faults);
+  std::string text;
+  reader.text("windsplat", text, 1);
+  if (tree.contains("windsplat") && text != "files") {
+    faults.add("/windsplat", "must be \"files\"");
+  }
+  reader.text("title", text, 0, Presence::optional, limits::path_chars_max);
+  reader.text("group", text, 0, Presence::optional, limits::path_chars_max);
+  if (const Json* selection = reader.child("selection")) {
+    std::vector<std::pair<std::string, std::string>> entries;  // read again when it is opened
+    read_selection(*selection, reader.at("selection"), faults, entries);
+  }
+  const Json& files = *reader.child("files");
+  if (!files.is_array() || files.empty() || files.size() > listed_files_max) {
+    faults.add("/files",
+               "must list 1 to " + std::to_string(listed_files_max) + " names or patterns");
+  } else {
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      const std::string at = "/files/" + std::to_string(i);
+      const auto name = reader.read_text(files[i], at, 1, limits::path_chars_max);
+      if (name) check_listed_name(*name, at, faults);
+    }
+  }
+  reader.finish();
+  if (!faults.empty()) return;
+  out.list = dump(tree);
+  out.first = files.front().get<std::string>();
+}
+
+}  // namespace
+
 Result<DatasetRequest> parse_dataset_request(std::string_view json) {
   const auto tree = parse_json(json);
   if (!tree) return tree.error();
   Faults faults;
   DatasetRequest out;
-  if (tree->is_object() && tree->contains("files")) {
-    const Json& files = (*tree)["files"];
-    if (!files.is_array() || files.empty() || !files.front().is_string()) {
-      faults.add("/files", "must be a list of names or patterns");
-      return faults.error();
-    }
-    out.list = dump(*tree);
-    out.first = files.front().get<std::string>();
-    return out;
-  }
-  ObjectReader reader(*tree, "", faults);
-  const bool by_entry =
-      tree->is_object() && (tree->contains("from") || tree->contains("selection"));
-  if (by_entry) {
+  if (tree->is_object() && tree->contains("path") && tree->contains("selection") &&
+      !tree->contains("from")) {
+    faults.add("/selection",
+               "is not a key beside path: name the entry behind the path, as in "
+               "\"winds.nc?number=3\"");
+  } else if (tree->is_object() && tree->contains("files")) {
+    read_list(*tree, faults, out);
+  } else if (tree->is_object() && (tree->contains("from") || tree->contains("selection"))) {
+    ObjectReader reader(*tree, "", faults);
     reader.text("from", out.from, 1, Presence::required);
     if (const Json* value = reader.child("selection", Presence::required)) {
       read_selection(*value, reader.at("selection"), faults, out.selection);
     }
+    reader.finish();
   } else {
+    ObjectReader reader(*tree, "", faults);
     reader.text("path", out.path, 1, Presence::required, limits::path_chars_max);
+    reader.finish();
   }
-  reader.finish();
   if (!faults.empty()) return faults.error();
   return out;
 }

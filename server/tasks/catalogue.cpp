@@ -10,6 +10,13 @@ namespace windsplat::tasks {
 
 Result<std::shared_ptr<data::Dataset>> Catalogue::find(const std::string& id) const {
   auto dataset = store_->find(id);
+  if (!dataset && chosen_.was_closed(id)) {
+    return make_error_at(
+        ErrorKind::not_found, "/dataset",
+        "dataset " + in_quotes(id) + " was closed, because it was not used for " +
+            std::to_string(data::ChosenDatasets::kept.count()) +
+            " minutes or made room for other entries; choose the entry again to open it");
+  }
   if (!dataset) return make_error_at(ErrorKind::not_found, "/dataset", dataset.error().message);
   chosen_.touch(id, data::ChosenDatasets::Clock::now());
   return dataset;
@@ -133,13 +140,19 @@ Result<std::string> Catalogue::open_entries(const data::ChosenEntries& entries,
     chosen_.touch(id, data::ChosenDatasets::Clock::now());
     return id;
   }
-  const auto surplus = chosen_.make_room();
-  if (!surplus) return surplus.error();
-  if (*surplus) forget(**surplus);
+  if (auto room = chosen_.check_room(); !room) return room.error();
   auto opened = open_listed(entries.location, cancel);
   if (!opened) return opened.error();
   auto& [id, is_new] = *opened;
-  if (is_new) chosen_.add(id, data::ChosenDatasets::Clock::now());
+  if (!is_new) return std::move(id);
+  // Only now is it known that the entries exist.
+  const auto surplus = chosen_.make_room();
+  if (!surplus) {
+    forget(id);
+    return surplus.error();
+  }
+  if (*surplus) forget(**surplus);
+  chosen_.add(id, data::ChosenDatasets::Clock::now());
   return std::move(id);
 }
 

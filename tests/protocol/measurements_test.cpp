@@ -158,12 +158,23 @@ TEST(Measurements, DatasetRequestIsAPathOrEntries) {
            {R"({"from":"b","selection":{"":1}})", "/selection/"},
            {R"({"files":[]})", "/files"},
            {R"({"files":"a.nc"})", "/files"},
-           {R"({"files":[3]})", "/files"},
+           {R"({"files":[3]})", "/files/0"},
+           {R"({"files":["a.nc",""]})", "/files/1"},
+           {R"({"files":["a.nc","b/../../c.nc"]})", "/files/1"},
+           {R"({"files":["/a.nc"]})", "/files/0"},
+           {R"({"files":["a.nc"],"titles":"T"})", "/titles"},
+           {R"({"files":["a.nc"],"title":3})", "/title"},
+           {R"({"files":["a.nc"],"windsplat":"raw"})", "/windsplat"},
+           {R"({"files":["a.nc"],"selection":[3]})", "/selection"},
+           {R"({"files":["a.nc"],"path":"b.nc"})", "/path"},
+           {R"({"path":"b.nc","selection":{"number":3}})", "/selection"},
            {R"([])", ""}}) {
     const auto refused = parse_dataset_request(json);
     ASSERT_FALSE(refused) << json;
     EXPECT_EQ(refused.error().at.front().pointer, pointer) << json;
   }
+  EXPECT_THAT(parse_dataset_request(R"({"path":"b.nc","selection":{"number":3}})").error().message,
+              HasSubstr("winds.nc?number=3"));
   for (const char* json : {"", "{", R"({"path":"a","path":"b"})", "{\"path\":\"\xff\"}"}) {
     const auto refused = parse_dataset_request(json);
     ASSERT_FALSE(refused) << json;

@@ -61,6 +61,10 @@ class Validator {
       if (value.is_array() && value.size() < rule.get<std::size_t>()) complain(at, "minItems");
     } else if (keyword == "maxItems") {
       if (value.is_array() && value.size() > rule.get<std::size_t>()) complain(at, "maxItems");
+    } else if (keyword == "minProperties") {
+      if (value.is_object() && value.size() < rule.get<std::size_t>()) complain(at, keyword);
+    } else if (keyword == "maxProperties") {
+      if (value.is_object() && value.size() > rule.get<std::size_t>()) complain(at, keyword);
     } else if (keyword == "items" || keyword == "prefixItems") {
       check_items(file, schema, keyword, rule, value, at);
     } else if (keyword == "required") {

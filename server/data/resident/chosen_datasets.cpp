@@ -86,6 +86,7 @@ void ChosenDatasets::add(const std::string& id, Clock::time_point now) {
   Entry entry;
   entry.used_at = now;
   const std::lock_guard lock(mutex_);
+  std::erase(closed_, id);
   entries_.insert_or_assign(id, std::move(entry));
 }
 
@@ -115,27 +116,53 @@ std::vector<std::string> ChosenDatasets::take_unused(Clock::time_point now) {
       continue;
     }
     out.push_back(at->first);
+    note_closed(at->first);
     at = entries_.erase(at);
   }
   return out;
 }
 
-Result<std::optional<std::string>> ChosenDatasets::make_room() {
-  const std::lock_guard lock(mutex_);
-  if (entries_.size() < count_max) return std::optional<std::string>();
+ChosenDatasets::Entries::const_iterator ChosenDatasets::oldest() const {
   auto oldest = entries_.end();
   for (auto at = entries_.begin(); at != entries_.end(); ++at) {
     if (at->second.use.use_count() > 1) continue;
     if (oldest == entries_.end() || at->second.used_at < oldest->second.used_at) oldest = at;
   }
-  if (oldest == entries_.end()) {
-    return make_error(ErrorKind::busy, std::to_string(count_max) +
-                                           " other entries of dimensions are shown by sessions, "
-                                           "which is the limit; try again later");
-  }
-  std::optional<std::string> out = oldest->first;
-  entries_.erase(oldest);
+  return oldest;
+}
+
+Result<void> ChosenDatasets::find_room() const {
+  if (entries_.size() < count_max || oldest() != entries_.end()) return {};
+  return make_error(ErrorKind::busy, std::to_string(count_max) +
+                                         " other entries of dimensions are shown by sessions, "
+                                         "which is the limit; try again later");
+}
+
+Result<void> ChosenDatasets::check_room() const {
+  const std::lock_guard lock(mutex_);
+  return find_room();
+}
+
+Result<std::optional<std::string>> ChosenDatasets::make_room() {
+  const std::lock_guard lock(mutex_);
+  if (auto room = find_room(); !room) return room.error();
+  if (entries_.size() < count_max) return std::optional<std::string>();
+  const auto at = oldest();
+  std::optional<std::string> out = at->first;
+  note_closed(at->first);
+  entries_.erase(at);
   return out;
+}
+
+void ChosenDatasets::note_closed(const std::string& id) {
+  std::erase(closed_, id);
+  closed_.push_back(id);
+  if (closed_.size() > closed_max) closed_.pop_front();
+}
+
+bool ChosenDatasets::was_closed(const std::string& id) const {
+  const std::lock_guard lock(mutex_);
+  return std::find(closed_.begin(), closed_.end(), id) != closed_.end();
 }
 
 }  // namespace windsplat::data

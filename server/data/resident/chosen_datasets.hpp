@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -37,6 +38,7 @@ class ChosenDatasets {
   using Use = std::shared_ptr<const void>;
   static constexpr std::size_t count_max = 16;
   static constexpr std::chrono::minutes kept{5};
+  static constexpr std::size_t closed_max = 256;
 
   void add(const std::string& id, Clock::time_point now);
   // It was closed, or is to remain open.
@@ -48,17 +50,29 @@ class ChosenDatasets {
 
   // Removes and returns those that were not used for `kept`.
   [[nodiscard]] std::vector<std::string> take_unused(Clock::time_point now);
+  // Whether there is room for one more, or one that is not in use. Errors: busy.
+  [[nodiscard]] Result<void> check_room() const;
   // Makes room for one more: the one to close, removed from the list; none if there is room.
   // Errors: busy if all are in use.
   [[nodiscard]] Result<std::optional<std::string>> make_room();
+  // Whether take_unused() or make_room() closed it, and not since added or opened otherwise. Of the
+  // last closed_max.
+  [[nodiscard]] bool was_closed(const std::string& id) const;
 
  private:
   struct Entry {
     Use use = std::make_shared<const char>('\0');
     Clock::time_point used_at;
   };
-  std::mutex mutex_;
-  std::map<std::string, Entry> entries_;  // by id
+  using Entries = std::map<std::string, Entry>;  // by id
+  // These require the mutex.
+  [[nodiscard]] Result<void> find_room() const;
+  [[nodiscard]] Entries::const_iterator oldest() const;  // unused for longest; or the end
+  void note_closed(const std::string& id);
+
+  mutable std::mutex mutex_;
+  Entries entries_;
+  std::deque<std::string> closed_;  // the last ones, without duplicates
 };
 
 }  // namespace windsplat::data

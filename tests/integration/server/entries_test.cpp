@@ -121,9 +121,9 @@ TEST_F(ChosenEntries, APostedListOfFilesIsADatasetBelowTheDataRoot) {
   EXPECT_EQ(job(list)["result"], "e") << "the same list is the same dataset";
   EXPECT_EQ(chosen(port, "e", {{"number", 5}})["result"], "e,number=5");
   EXPECT_EQ(value_in(port, "e,number=5"), 5);
-  const Json outside = job({{"files", {"../e.nc"}}});
-  EXPECT_EQ(outside["state"], "failed");
-  EXPECT_NE(outside.dump().find("/files/0: leads out of the folder"), std::string::npos) << outside;
+  const Answer outside = post({{"files", {"../e.nc"}}});
+  EXPECT_EQ(outside.status, 422) << "at once, not by a job that fails";
+  EXPECT_EQ(json_of(outside)["errors"][0]["pointer"], "/files/0") << outside.body;
   EXPECT_EQ(post({{"files", 3}}).status, 422);
   std::ofstream(root_ / "l.json") << R"({"windsplat": "files", "files": ["e.nc"]})";
   EXPECT_EQ(finished_job(port, post_file(port, "l.json?number=1"))["result"], "l,number=1");
@@ -148,10 +148,16 @@ TEST_F(ChosenEntries, BeyondSixteenTheOneUnusedLongestIsClosedButNoneThatASessio
       "image":{"width":32,"height":24}}})");
   ASSERT_TRUE(viewer.next_frame());
   ASSERT_EQ(chosen(port, "e", {{"number", 2}})["result"], "e,number=2");
-  for (int number = 5; number < 20; ++number) {
+  for (int number = 5; number < 19; ++number) {
     ASSERT_EQ(chosen(port, "e", {{"number", number}})["state"], "done") << number;
   }
+  ASSERT_EQ(chosen(port, "e", {{"number", 3}})["state"], "failed");
+  EXPECT_EQ(status_of(2), 200) << "an entry that does not exist closes no other";
+  // The request named it last, so that it would be kept.
+  for (int number = 5; number < 19; ++number) ASSERT_EQ(status_of(number), 200);
+  ASSERT_EQ(chosen(port, "e", {{"number", 19}})["state"], "done");
   EXPECT_EQ(status_of(2), 404) << "closed for the seventeenth";
+  EXPECT_NE(get(port, "/v1/datasets/e,number=2").body.find("was closed"), std::string::npos);
   EXPECT_EQ(status_of(1), 200) << "the session shows it";
   EXPECT_EQ(status_of(5), 200);
   EXPECT_EQ(get(port, "/v1/datasets/e").status, 200) << "it was not chosen";

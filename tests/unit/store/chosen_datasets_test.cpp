@@ -48,8 +48,12 @@ TEST(ChosenDatasets, OnesThatAreNotUsedAreClosedAfterFiveMinutes) {
   chosen.touch("b", begin + minutes(1));
   EXPECT_THAT(chosen.take_unused(begin + minutes(5) - seconds(1)), IsEmpty());
   EXPECT_THAT(chosen.take_unused(begin + minutes(5)), ElementsAre("a"));
+  EXPECT_TRUE(chosen.was_closed("a"));
+  EXPECT_FALSE(chosen.was_closed("b"));
   EXPECT_THAT(chosen.take_unused(begin + minutes(6)), ElementsAre("b"));
   EXPECT_THAT(chosen.take_unused(begin + minutes(60)), IsEmpty());
+  chosen.add("a", begin);
+  EXPECT_FALSE(chosen.was_closed("a")) << "it is open again";
 }
 
 TEST(ChosenDatasets, OneInUseIsKeptAndTheTimeBeginsWithItsLastUse) {
@@ -87,7 +91,10 @@ TEST(ChosenDatasets, BeyondTheLimitTheOneThatWasUnusedLongestMakesRoom) {
   EXPECT_THAT(refused.error().message, HasSubstr("16 other entries"));
   uses[7].reset();
   uses[3].reset();
+  EXPECT_TRUE(chosen.check_room());
+  EXPECT_FALSE(chosen.was_closed("3")) << "looking for room closes nothing";
   EXPECT_EQ(chosen.make_room()->value(), "3");
+  EXPECT_TRUE(chosen.was_closed("3"));
   EXPECT_FALSE(chosen.make_room()->has_value());
 }
 
