@@ -484,12 +484,6 @@ class VtkSource final : public FileSource {
 
 bool is_vtk(std::string_view head) { return is_legacy(head) || is_xml(head); }
 
-bool is_vtkhdf(Files& files) {
-  if (files.location().members.empty()) return false;
-  const auto file = files.open(files.location().members.front().name);
-  return file && HdfFile::is_vtkhdf(**file);
-}
-
 Result<std::unique_ptr<FileSource>> open(const std::shared_ptr<Files>& files) {
   auto source = std::make_unique<VtkSource>(files);
   if (auto done = source->prepare(); !done) return done.error();

@@ -8,6 +8,7 @@
 #include "server/base/ascii.hpp"
 #include "server/data/bytes/byte_store.hpp"
 #include "server/data/bytes/scalar.hpp"
+#include "server/data/formats/vtk/source.hpp"
 #include "server/data/model/digest.hpp"
 
 namespace windsplat::data::vtk {
@@ -106,15 +107,25 @@ std::string list_of(const std::vector<BlockFile>& blocks) {
   return out;
 }
 
-// The steps of VTKHDF files, each of which may have several.
+Result<std::vector<std::optional<double>>> times_in(Files& files, const std::string& name) {
+  auto file = files.open(name);
+  if (!file) return file.error();
+  auto hdf = HdfFile::open(std::move(*file));
+  if (!hdf) return hdf.error();
+  return times_of(**hdf);
+}
+
+// The steps of VTKHDF files, each of which may have several. A damaged file of a series is a step
+// that cannot be read.
 Result<std::vector<Step>> steps_in_files(Files& files) {
   std::vector<Step> steps;
+  const bool in_series = files.location().kind == Location::Kind::series;
   for (const auto& member : files.location().members) {
-    auto file = files.open(member.name);
-    if (!file) return file.error();
-    auto hdf = HdfFile::open(std::move(*file));
-    if (!hdf) return hdf.error();
-    const auto times = times_of(**hdf);
+    const auto times = times_in(files, member.name);
+    if (!times && in_series && times.error().kind == ErrorKind::bad_data) {
+      steps.push_back({{{"", member.name}}, {}, {}, ""});
+      continue;
+    }
     if (!times) return times.error();
     for (std::size_t index = 0; index < times->size(); ++index) {
       steps.push_back({{{"", member.name}}, index, (*times)[index], ""});
@@ -125,7 +136,18 @@ Result<std::vector<Step>> steps_in_files(Files& files) {
 
 }  // namespace
 
+bool is_vtkhdf(Files& files) {
+  constexpr std::size_t damaged_max = 4;  // before a file that tells
+  const auto& members = files.location().members;
+  for (std::size_t m = 0; m < std::min(members.size(), damaged_max); ++m) {
+    const auto file = files.open(members[m].name);
+    if (file && HdfFile::is_vtkhdf(**file)) return true;
+  }
+  return false;
+}
+
 Result<std::vector<Step>> steps_of(Files& files) {
+  if (is_vtkhdf(files)) return steps_in_files(files);
   std::vector<Step> steps;
   for (const auto& member : files.location().members) {
     steps.push_back({{{"", member.name}}, {}, {}, ""});
@@ -136,7 +158,6 @@ Result<std::vector<Step>> steps_of(Files& files) {
     file = files.open(steps[s].parts.front().source);
   }
   if (!file) return file.error();
-  if (HdfFile::is_vtkhdf(**file)) return steps_in_files(files);
   if (files.location().kind != Location::Kind::file) return steps;
   const auto head = (*file)->head(head_bytes);
   if (!head) return head.error();

@@ -175,6 +175,22 @@ TEST_F(VtkHdf, StepsOfImagesHaveTimesAndOffsets) {
   EXPECT_EQ(volume_of(*source, "b", 2).values[9], static_cast<float>(values[9]));
 }
 
+TEST_F(VtkHdf, DamagedFilesOfASeriesAreLeftOut) {
+  for (const double step : {1, 2, 3}) {
+    const HdfMaker file(folder_.path("s" + std::to_string(static_cast<int>(step)) + ".vtkhdf"));
+    file.group("/VTKHDF", "ImageData");
+    describe_image(file, "/VTKHDF");
+    file.set("/VTKHDF/PointData/a", {5, 3, 4}, image_values(step));
+  }
+  std::filesystem::resize_file(folder_.path("s1.vtkhdf"), 600);
+  const auto source = opened(folder_.path("s*.vtkhdf"));
+  ASSERT_TRUE(source);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  EXPECT_EQ(volume_of(*source, "a", 1).values[9], static_cast<float>(3 * image_values()[9]));
+  EXPECT_THAT(all_notes(source->info()), HasSubstr("1 of 3 files cannot be read"));
+  EXPECT_THAT(all_notes(source->info()), HasSubstr("'s1.vtkhdf'"));
+}
+
 TEST_F(VtkHdf, TooManyStepsAreRefused) {
   {
     const HdfMaker file(path_);
