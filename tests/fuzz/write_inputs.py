@@ -119,6 +119,22 @@ def configurations():
     yield "config", "twice", b'{"a":1,"a":2}'
 
 
+def descriptions():
+    """Texts of an OPeNDAP service."""
+    yield "dap", "dds", (
+        b"Dataset {\n    Float64 lat[lat = 2];\n    Grid {\n     ARRAY:\n"
+        b"        Int16 t[lev = 2][lat = 2];\n     MAPS:\n        Float32 lev[lev = 2];\n"
+        b"        Float64 lat[lat = 2];\n    } t;\n    Structure { Byte a; } other[2];\n"
+        b"    String title;\n    Sequence { Int32 n; } rows;\n} air.nc;\n")
+    yield "dap", "sent", (b"Dataset {\n    Structure {\n        UInt32 lon[lon = 3];\n    } t;\n"
+                          b"} air.nc;\n")
+    yield "dap", "das", (
+        b'Attributes {\n    t {\n        String units "K";\n        String name "a \\"b\\"";\n'
+        b"        Float32 scale_factor 0.5;\n        Int16 valid_range -100, 100;\n"
+        b'        Float64 odd NaN;\n        lat { Url u "x"; }\n    }\n    # comment\n'
+        b'    NC_GLOBAL { String title "Air"; Alias same .t; }\n}\n')
+
+
 def files(program):
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
@@ -167,7 +183,7 @@ def main():
     options = parser.parse_args()
     shutil.rmtree(options.out, ignore_errors=True)
     for kind, inputs in (("seed", vectors()), ("seed", requests()),
-                         ("seed", configurations()),
+                         ("seed", configurations()), ("seed", descriptions()),
                          ("seed", files(options.program)), ("seed", files_of_models()),
                          ("seed", loader_inputs.loader_seeds()), ("size", sizes.sizes()),
                          ("size", loader_inputs.loader_sizes())):

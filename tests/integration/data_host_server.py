@@ -34,6 +34,24 @@ def signature(method, path, query, headers, signed):
     return sign(key, text).hex()
 
 
+DAP_TYPES = {"f4": "Float32", "f8": "Float64", "i2": "Int16"}
+
+
+def dap_declaration(dataset, variable, shape):
+    array, dims, _ = dataset[variable]
+    sizes = "".join(f"[{dim} = {size}]" for dim, size in zip(dims, shape))
+    return f"    {DAP_TYPES[array.dtype.str[1:]]} {variable}{sizes};\n"
+
+
+def dap_attributes(dataset):
+    out = "Attributes {\n"
+    for name, (_, _, attributes) in dataset.items():
+        lines = "".join(f'        String {key} "{value}";\n' if isinstance(value, str) else
+                        f"        Float64 {key} {value!r};\n" for key, value in attributes.items())
+        out += f"    {name} {{\n{lines}    }}\n"
+    return out + "}\n"
+
+
 class Handler(http.server.BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
@@ -59,6 +77,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if name in host.stalled:
             self.fault_stalled(name)
             return
+        if name.startswith("dodsC/"):
+            self.service(name.removeprefix("dodsC/"), urllib.parse.unquote(query))
+            return
         fault = getattr(self, "fault_" + name.partition("/")[0].replace("-", "_"), None)
         if fault:
             fault(name.partition("/")[2])
@@ -80,7 +101,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.answer(304, ETag=etag, Content_Length=None)
             return
         wanted = self.headers.get("Range") if host.ranges else None
-        if self.headers.get("If-Range", etag) != etag:
+        if host.if_range and self.headers.get("If-Range", etag) != etag:
             wanted = None
         if not wanted:
             self.answer(200, body, ETag=etag, **dated)
@@ -92,6 +113,32 @@ class Handler(http.server.BaseHTTPRequestHandler):
         with host.lock:
             host.parts.append((self.path, first, len(part)))
         self.answer(206, part, ETag=etag, Content_Range=f"bytes {first}-{last}/{len(body)}")
+
+    # --- OPeNDAP ------------------------------------------------------------------------------
+
+    def service(self, name, constraint):
+        """DAP 2.0: one variable at a time, by hyperslabs."""
+        served = self.server.host.served
+        name, _, ending = name.rpartition(".")
+        if name not in served:
+            self.answer(404, b'Error { code = 404; message = "no such dataset"; };')
+        elif ending == "das":
+            self.answer(200, dap_attributes(served[name]).encode())
+        elif ending == "dds":
+            names = "".join(dap_declaration(served[name], variable, array.shape)
+                            for variable, (array, _, _) in served[name].items())
+            self.answer(200, f"Dataset {{\n{names}}} {name};\n".encode())
+        else:
+            variable, *slabs = constraint.replace("]", "").split("[")
+            array, _, _ = served[name][variable]
+            cuts = [slice(int(first), int(last) + 1) for first, _, last in
+                    (slab.split(":") for slab in slabs)]
+            part = array[tuple(cuts)]
+            declaration = dap_declaration(served[name], variable, part.shape)
+            count = part.size.to_bytes(4, "big") * 2
+            stored = part.astype({"f4": ">f4", "f8": ">f8", "i2": ">i4"}[array.dtype.str[1:]])
+            self.answer(200, f"Dataset {{\n{declaration}}} {name};\n\nData:\n".encode() + count +
+                        stored.tobytes())
 
     # --- S3 -----------------------------------------------------------------------------------
 
@@ -255,7 +302,8 @@ class DataHost:
         self.signed = False
         self.requests = []
         self.lock = threading.Lock()
-        self.ranges = True
+        self.served = {}  # OPeNDAP: dataset -> variable -> array, dimensions, attributes
+        self.ranges, self.if_range = True, True  # whether it heeds these headers
         self.etag_mark = ""  # "W/": weak
         self.date = ""  # Last-Modified of every file, which then have no ETag
         self.parts = []  # path, first byte and number of bytes of each part that was sent

@@ -114,7 +114,8 @@ class HostParts(unittest.TestCase):
 
     def setUp(self):
         self.host.files = dict(self.bodies)
-        self.host.ranges, self.host.etag_mark, self.host.date = True, "", ""
+        self.host.ranges, self.host.if_range = True, True
+        self.host.etag_mark, self.host.date = "", ""
         self.host.parts, self.host.stalled = [], set()
         self.host.asked()
         self.cache = pathlib.Path(tempfile.mkdtemp(dir=self.folder)) / "cache"
@@ -167,18 +168,22 @@ class HostParts(unittest.TestCase):
         self.assertEqual(self.left_in_cache(), [], "also if it is killed")
 
     def test_a_file_that_changes_is_an_error_and_never_a_mixture(self):
-        with Daemon(self.host.origin + "/four.nc", *self.options()) as daemon:
-            frame = "/v1/datasets/four/frame.npy?width=64&height=48&step="
-            before = daemon.get(frame + "0")
-            self.assertEqual(before[0], 200)
-            self.host.files["four.nc"] = (self.folder / "other.nc").read_bytes()
-            self.assertEqual(len(self.host.files["four.nc"]), len(self.bodies["four.nc"]),
-                             "only the ETag tells")
-            status, body = daemon.get(frame + "2")
-            self.assertNotEqual(status, 200)
-            self.assertIn("has changed on its host since it was opened",
-                          json.loads(body)["detail"])
-            self.assertEqual(daemon.get(frame + "0"), before)
+        frame = "/v1/datasets/four/frame.npy?width=64&height=48&step="
+        for heeds in (True, False):
+            with self.subTest(if_range=heeds):
+                self.setUp()
+                self.host.if_range = heeds
+                with Daemon(self.host.origin + "/four.nc", *self.options()) as daemon:
+                    before = daemon.get(frame + "0")
+                    self.assertEqual(before[0], 200)
+                    self.host.files["four.nc"] = (self.folder / "other.nc").read_bytes()
+                    self.assertEqual(len(self.host.files["four.nc"]), len(self.bodies["four.nc"]),
+                                     "only the ETag tells")
+                    status, body = daemon.get(frame + "2")
+                    self.assertNotEqual(status, 200)
+                    self.assertIn("has changed on its host since it was opened",
+                                  json.loads(body)["detail"])
+                    self.assertEqual(daemon.get(frame + "0"), before)
 
     def test_whole_files_are_fetched_where_parts_have_no_state(self):
         for what in ({"ranges": False}, {"etag_mark": "W/"},
@@ -211,6 +216,61 @@ class HostParts(unittest.TestCase):
                                 "--max-download", size, *self.options())
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("--max-download", done.stderr)
+
+    def refusal(self, path):
+        done = self.run_program("inspect", self.host.origin + path, *self.options())
+        self.assertNotEqual(done.returncode, 0)
+        return done.stderr
+
+    def test_a_pattern_in_a_list_on_a_host_is_refused_as_such(self):
+        self.host.files["all.json"] = b'{"windsplat": "files", "files": ["*.nc"]}'
+        self.assertIn("a list on a host must name each file", self.refusal("/all.json"))
+
+    def test_a_host_is_asked_for_no_file_of_another_format(self):
+        self.refusal("/absent.zarr")
+        asked = self.host.asked()
+        self.assertIn("/absent.zarr/.zgroup", asked)
+        self.assertEqual([path for path in asked if "control" in path], [])
+
+    def test_a_dataset_of_an_opendap_service_draws_the_same_pixels(self):
+        path = self.folder / "packed.nc"
+        axes = {"lev": ([1000.0, 500.0], "hPa"), "lat": (np.linspace(50, 20, 5), "degrees_north"),
+                "lon": (np.arange(0, 60, 10.0), "degrees_east"),
+                "time": ([0.0, 6.0], "hours since 2001-01-01")}
+        stored = np.arange(2 * 2 * 5 * 6).reshape(2, 2, 5, 6).astype("i2") * 100
+        packing = {"scale_factor": 0.01, "add_offset": 250.0}
+        served = {name: (np.array(values, dtype="f8"), (name,), {"units": units})
+                  for name, (values, units) in axes.items()}
+        served["t"] = (stored, ("time", "lev", "lat", "lon"), {"units": "K"} | packing)
+        with netCDF4.Dataset(path, "w") as file:
+            for name, (array, dims, attributes) in served.items():
+                for dim, size in zip(dims, array.shape):
+                    if dim not in file.dimensions:
+                        file.createDimension(dim, size)
+                variable = file.createVariable(name, array.dtype, dims)
+                variable.set_auto_maskandscale(False)
+                variable.setncatts(attributes)
+                variable[:] = array
+        self.host.served = {"packed.nc": served}
+        url = self.host.origin + "/dodsC/packed.nc"
+        far, near = (self.run_program("inspect", name, "--json", "--ranges", "all", *options)
+                     for name, options in ((url, self.options()), (path, ())))
+        self.assertEqual(far.returncode, 0, far.stderr)
+        self.assertEqual(json.loads(far.stdout)["fields"], json.loads(near.stdout)["fields"])
+        field = json.loads(far.stdout)["fields"][0]
+        np.testing.assert_allclose(field["range"], [250, 250 + 119], rtol=1e-6)
+        pictures = []
+        for name, options in ((url, self.options()), (path, ())):
+            out = self.cache.parent / "picture.npy"
+            done = self.run_program("render", name, "--step", 1, "--size", "64x48", "-o", out,
+                                    *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            pictures.append(np.load(out))
+        np.testing.assert_array_equal(*pictures)
+        for wrong, text in (("/dodsC/none.nc", "404"), ("/dodsC/packed.nc.dds", "without this")):
+            done = self.run_program("inspect", self.host.origin + wrong, *self.options())
+            self.assertNotEqual(done.returncode, 0)
+            self.assertIn(text, done.stderr)
 
     def test_cancelling_a_job_ends_its_request(self):
         self.host.stalled = {"a.nc", "b.nc"}

@@ -22,7 +22,8 @@ class FetchedFiles final : public Files {
     const auto url = url_of(name);
     if (!url) return url.error();
     // Files of a folder are small, or chunks that are read as a whole.
-    const Fetch how = location_.kind == Location::Kind::folder ? Fetch::whole : Fetch::parts;
+    const bool is_whole = location_.kind == Location::Kind::folder || location_.service;
+    const Fetch how = is_whole ? Fetch::whole : Fetch::parts;
     auto fetched = fetcher_.fetch(*url, how, cancelled_);
     if (!fetched) return fetched.error();
     FileParts parts;
@@ -72,6 +73,7 @@ class FetchedFiles final : public Files {
   }
 
   [[nodiscard]] Result<std::string> url_of(const std::string& name) const {
+    if (location_.service) return url_of_answer(name);
     const auto member =
         std::find_if(location_.members.begin(), location_.members.end(),
                      [&](const Location::Member& known) { return known.name == name; });
@@ -86,6 +88,17 @@ class FetchedFiles final : public Files {
       if (part.empty() || part == "." || part == "..") return not_permitted(name);
     }
     return location_.folder + '/' + percent_encoded(name);
+  }
+
+  // NAME.dds, NAME.das or NAME.dods?CONSTRAINT; constraints are percent-encoded as a whole.
+  [[nodiscard]] Result<std::string> url_of_answer(std::string_view name) const {
+    const Location::Member& dataset = location_.members.front();
+    if (!name.starts_with(dataset.name)) return not_permitted(std::string(name));
+    name.remove_prefix(dataset.name.size());
+    if (name == ".dds" || name == ".das") return dataset.path + std::string(name);
+    constexpr std::string_view values = ".dods?";
+    if (!name.starts_with(values)) return not_permitted(std::string(name));
+    return dataset.path + std::string(values) + percent_encoded(name.substr(values.size()));
   }
 
   Fetcher& fetcher_;

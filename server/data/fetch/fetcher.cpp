@@ -77,11 +77,13 @@ Result<Response> Fetcher::get(const Request& request, const HttpClient::Sink& si
 }
 
 Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Cancelled& cancelled) {
-  const auto url = parse_url(text);
+  const std::size_t mark = std::min(text.find('?'), text.size());
+  const auto url = parse_url(std::string_view(text).substr(0, mark));
   if (!url) return url.error();
   auto request = request_of(*url, cancelled);
   if (!request) return request.error();
-  const std::string key = request->url.text();
+  if (mark < text.size()) request->query = text.substr(mark + 1);
+  const std::string key = request->url.text() + text.substr(mark);
   if (auto permitted = rules_->check(request->url); !permitted) return permitted.error();
   auto parts = how == Fetch::parts ? find_parts(key) : std::nullopt;
   if (parts && Clock::now() - parts->confirmed < options_.cache.fresh_time) {

@@ -51,7 +51,8 @@ class Fetcher {
   [[nodiscard]] Result<void> check(const Location& location) const;
 
   // The file at a URL of https, http or s3, from the cache if its host confirms it, or did so
-  // recently. Errors: those of HttpClient::get(), out_of_memory if it cannot be stored.
+  // recently. A URL may have a percent-encoded query. Errors: those of HttpClient::get(),
+  // out_of_memory if it cannot be stored.
   Result<FetchedFile> fetch(const std::string& url, Fetch how, const Cancelled& cancelled);
   // Bytes of a file that is here in parts, which is that of the URL. Errors: those of
   // SparseFile::fetch() and HttpClient::get().

@@ -339,7 +339,10 @@ struct HttpClient::Handle {
     set(CURLOPT_CONNECTTIMEOUT_MS, static_cast<long>(limits.connect_time.count()));
     set(CURLOPT_LOW_SPEED_LIMIT, stall_bytes_per_second);
     set(CURLOPT_LOW_SPEED_TIME, static_cast<long>(limits.stall_time.count()));
-    set(CURLOPT_MAXFILESIZE_LARGE, static_cast<curl_off_t>(limits.bytes_max));
+    // The whole file in place of a part is refused for another reason than its size.
+    if (request.state.empty()) {
+      set(CURLOPT_MAXFILESIZE_LARGE, static_cast<curl_off_t>(limits.bytes_max));
+    }
   }
 
   CURLcode perform(Exchange& exchange, const std::string& authorities,

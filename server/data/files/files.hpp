@@ -32,6 +32,9 @@ struct Location {
   bool companions = false;      // other files below `folder` may be opened too
   // Fetched from a host: `folder` and the paths of members are URLs without a final '/'.
   bool fetched = false;
+  // Fetched from an OPeNDAP service, of which the member is a dataset. Its files are answers, named
+  // NAME.dds, NAME.das and NAME.dods?CONSTRAINT.
+  bool service = false;
   std::string inside;   // a group within the file or files ("a/b"), for formats with groups
   std::string stem;     // name of the dataset: without folder and extension
   std::string pattern;  // for a series: absolute, or below `root` if that is not empty

@@ -106,11 +106,13 @@ bool set_authority(std::string_view authority, Url& out) {
          out.scheme != "s3";
 }
 
-bool is_opendap(const Url& url) {
+// Of a THREDDS server; others are recognised by the scheme dods only.
+bool is_service(const Url& url) { return url.path.find("/dodsC/") != std::string::npos; }
+
+bool is_answer_of_service(const Url& url) {
   constexpr auto endings =
       std::to_array<std::string_view>({".dods", ".dds", ".das", ".dmr", ".dap"});
-  return url.path.find("/dodsC/") != std::string::npos ||
-         std::any_of(endings.begin(), endings.end(),
+  return std::any_of(endings.begin(), endings.end(),
                      [&](std::string_view ending) { return url.path.ends_with(ending); });
 }
 
@@ -226,12 +228,18 @@ Result<Location> locate_url(const std::string& text) {
     out.inside = plain.substr(mark + 2);
     plain.resize(mark);
   }
+  constexpr std::string_view service_scheme = "dods://";
+  if (lower(plain.substr(0, service_scheme.size())) == service_scheme) {
+    out.service = true;
+    plain = "https://" + plain.substr(service_scheme.size());
+  }
   const auto url = parse_url(plain);
   if (!url) return url.error();
-  if (is_opendap(*url)) {
+  out.service = out.service || is_service(*url);
+  if (is_answer_of_service(*url)) {
     return refused_url(text,
-                       "is an OPeNDAP service, which is not supported: give the URL of the file "
-                       "itself (on a THREDDS server, 'fileServer' instead of 'dodsC')");
+                       "is an answer of an OPeNDAP service: give the URL of the dataset, without "
+                       "this ending, as dods://HOST/PATH");
   }
   const std::string_view path = url->path;
   if (path.find_first_of("*{") != std::string_view::npos) {
@@ -243,7 +251,10 @@ Result<Location> locate_url(const std::string& text) {
   const std::string name = percent_decoded(named.substr(std::min(last + 1, named.size())));
   const std::string base = url->text().substr(0, url->text().size() - path.size());
   out.stem = std::filesystem::path(name.empty() ? url->host : name).stem().native();
-  if (ends_in_slash || lower(name).ends_with(".zarr")) {
+  if (out.service && (ends_in_slash || url->scheme == "s3" || name.empty())) {
+    return refused_url(text, "is not a dataset of an OPeNDAP service");
+  }
+  if (!out.service && (ends_in_slash || lower(name).ends_with(".zarr"))) {
     if (!out.inside.empty())
       return refused_url(text, "names a group, which a folder does not have");
     out.kind = Location::Kind::folder;
@@ -254,7 +265,7 @@ Result<Location> locate_url(const std::string& text) {
     return refused_url(text, "is a URL with '/' in the name of a file");
   out.folder = base + std::string(named.substr(0, last));
   out.members.push_back({name, base + std::string(named)});
-  out.companions = may_have_companions(name);
+  out.companions = !out.service && may_have_companions(name);
   return out;
 }
 

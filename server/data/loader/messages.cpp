@@ -161,6 +161,7 @@ std::string encode_task(const Task& task) {
   out.number(static_cast<std::uint8_t>(task.location.kind));
   out.number(static_cast<std::uint8_t>(task.location.companions ? 1 : 0));
   out.number(static_cast<std::uint8_t>(task.location.fetched ? 1 : 0));
+  out.number(static_cast<std::uint8_t>(task.location.service ? 1 : 0));
   out.text(task.location.stem);
   out.text(task.location.inside);
   out.text(task.location.pattern);
@@ -186,6 +187,7 @@ Result<Task> decode_task(std::string_view bytes) {
   out.location.kind = static_cast<Location::Kind>(kind);
   out.location.companions = in.number<std::uint8_t>() != 0;
   out.location.fetched = in.number<std::uint8_t>() != 0;
+  out.location.service = in.number<std::uint8_t>() != 0;
   out.location.stem = in.text(text_max);
   out.location.inside = in.text(text_max);
   out.location.pattern = in.text(text_max);

@@ -110,6 +110,7 @@ Result<std::string> RunningLoader::open() {
   task.location.kind = location_.kind;
   task.location.companions = location_.companions;
   task.location.fetched = location_.fetched;
+  task.location.service = location_.service;
   task.location.stem = location_.stem;
   task.location.inside = location_.inside;
   task.location.selection = location_.selection;

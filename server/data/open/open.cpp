@@ -21,6 +21,7 @@
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
 #include "server/data/files/pattern.hpp"
+#include "server/data/formats/dap/file.hpp"
 #include "server/data/formats/dx/file.hpp"
 #include "server/data/formats/grads/file.hpp"
 #include "server/data/formats/grib/open.hpp"
@@ -301,6 +302,11 @@ SourceResult open_list(const std::shared_ptr<Files>& files, Result<list::Documen
 SourceResult open_by_content(const std::shared_ptr<Files>& files) {
   if (const std::string& text = files->location().list; !text.empty()) {
     return open_list(files, list::parse_document(text));
+  }
+  if (files->location().service) {
+    const std::string& name = files->location().members.front().name;
+    if (auto plain = without_group(*files, name); !plain) return plain.error();
+    return source_of(*files, as_arrays(*files, dap::open(files)));
   }
   const auto head = first_bytes(*files);
   if (auto fine = not_a_case(*files, head); !fine) return fine.error();

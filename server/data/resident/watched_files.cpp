@@ -55,7 +55,7 @@ std::string key_of(const Location& location) {
   std::string key = std::to_string(static_cast<int>(location.kind)) + location.folder + '#' +
                     location.inside + '?' + selection_text(location.selection) + location.list;
   for (const Location::Member& member : location.members) {
-    key += '\n';
+    key += location.service ? "\nservice " : "\n";
     key += member.path;
   }
   return key;

@@ -87,8 +87,21 @@ TEST(UrlLocation, GroupAndSelectionFollowAsInPaths) {
 
 TEST(UrlLocation, PatternsAndServicesAreRefusedByName) {
   EXPECT_THAT(locate_url("https://h/wrf_*.nc").error().message, HasSubstr("pattern"));
-  EXPECT_THAT(locate_url("https://h/thredds/dodsC/x.nc").error().message, HasSubstr("fileServer"));
-  EXPECT_THAT(locate_url("https://h/x.nc.dods").error().message, HasSubstr("OPeNDAP"));
+  EXPECT_THAT(locate_url("https://h/x.nc.dods").error().message, HasSubstr("dods://HOST/PATH"));
+}
+
+TEST(UrlLocation, ServicesHaveASchemeOrTheirPathOnThredds) {
+  const auto named = locate_url("DODS://h/opendap/x.nc?number=3");
+  ASSERT_TRUE(named) << named.error().message;
+  EXPECT_TRUE(named->service && named->fetched);
+  EXPECT_EQ(named->members[0].name, "x.nc");
+  EXPECT_EQ(named->members[0].path, "https://h/opendap/x.nc");
+  EXPECT_EQ(selection_text(named->selection), "number=3");
+  EXPECT_TRUE(locate_url("http://h/thredds/dodsC/a/x.zarr")->service);
+  EXPECT_FALSE(locate_url("https://h/x.nc")->service);
+  EXPECT_FALSE(locate_url("dods://h/"));
+  EXPECT_FALSE(locate_url("dods://h/folder/"));
+  EXPECT_FALSE(locate_url("s3://bucket/dodsC/x.nc"));
 }
 
 TEST(UrlLocation, NothingIsOpenedOnDiskForAUrl) {
