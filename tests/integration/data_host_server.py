@@ -7,6 +7,7 @@ import ssl
 import threading
 import urllib.parse
 import xml.sax.saxutils
+from email.utils import parsedate_to_datetime
 
 KEY_ID, SECRET, TOKEN, REGION = "AKIDTEST", "secret/of+the.test", "token/of+the.test", "test-1"
 
@@ -97,6 +98,10 @@ class Handler(http.server.BaseHTTPRequestHandler):
         dated = {}
         if host.date:
             etag, dated = None, {"Last_Modified": host.date}
+            since = self.headers.get("If-Modified-Since")
+            if since and parsedate_to_datetime(host.date) <= parsedate_to_datetime(since):
+                self.answer(304, Content_Length=None)
+                return
         if etag and self.headers.get("If-None-Match") == etag:
             self.answer(304, ETag=etag, Content_Length=None)
             return

@@ -182,7 +182,8 @@ TEST(Store, ExceptionWhileOpeningIsAnErrorAndCanBeRetried) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
   int asked = 0;
-  Store store({1 << 20, Storage::float32, [&](const Location&) -> Result<std::unique_ptr<Source>> {
+  Store store({1 << 20, Storage::float32,
+               [&](const Location&, const CancelToken&) -> Result<std::unique_ptr<Source>> {
                  if (++asked == 1) throw std::runtime_error("a bug");
                  return std::unique_ptr<Source>(std::make_unique<FakeSource>());
                }});
@@ -196,7 +197,8 @@ TEST(Store, ExceptionWhileOpeningIsAnErrorAndCanBeRetried) {
 TEST(Store, MetadataOfADatasetCountsInTheLimit) {
   const Folder folder;
   write_small(folder / "rain.nc", 0);
-  Store store({4 << 20, Storage::float32, [](const Location&) -> Result<std::unique_ptr<Source>> {
+  Store store({4 << 20, Storage::float32,
+               [](const Location&, const CancelToken&) -> Result<std::unique_ptr<Source>> {
                  auto source = std::make_unique<FakeSource>();
                  source->change().steps.resize(100'000, {0, std::string(40, 't')});
                  return std::unique_ptr<Source>(std::move(source));
