@@ -187,12 +187,12 @@ TEST_F(Loader, ChangedCompanionFileIsDetected) {
       << R"({"windsplat": "raw", "file": "c.raw", "type": "float32", "endian": "little",
              "dims": {"x": 4, "y": 4, "z": 4}, "fields": [{"name": "cloud"}]})";
   test::write_floats(folder_ / "c.raw", 64, 1);
-  Store store(
-      {1 << 20, Storage::float32, [](const Location& location) -> Result<std::unique_ptr<Source>> {
-         auto source = open(location);
-         if (!source) return source.error();
-         return std::unique_ptr<Source>(std::move(*source));
-       }});
+  Store store({1 << 20, Storage::float32,
+               [](const Location& location, const CancelToken&) -> Result<std::unique_ptr<Source>> {
+                 auto source = open(location);
+                 if (!source) return source.error();
+                 return std::unique_ptr<Source>(std::move(*source));
+               }});
   ASSERT_EQ(store.add(folder_ / "c.json").value()->volume("cloud", 0).value()->values[0], 1.0F);
   EXPECT_TRUE(store.look_for_changes(0).empty());
   test::write_floats(folder_ / "c.raw", 64, 2);
