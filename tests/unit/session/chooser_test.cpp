@@ -125,6 +125,35 @@ TEST(Chooser, WithoutACalibrationRunFinerPicturesAreTriedOneByOne) {
   EXPECT_LE(0.5 * guessed[fast.back()].ms, 30);
 }
 
+// A try that did not fit doubles the wait once, also if the same setting, chosen then for its
+// measured time, does not fit either.
+TEST(Chooser, OnlyATryThatDidNotFitPostponesTheNextOne) {
+  Chooser chooser;
+  const protocol::View view;
+  Micros now = 0;
+  const auto frames = [&](double full_ms, bool timed, int count) {
+    Forecasts known = calibrated(full_ms);
+    for (quality::Forecast& one : known) one.timed = timed;
+    std::size_t chosen = 0;
+    for (int n = 0; n < count; ++n) {
+      now += frame_us;
+      chosen = chooser.choose(view, known, {30.0, std::nullopt}, no_limit, now);
+    }
+    return chosen;
+  };
+  chooser.restart();
+  const std::size_t coarse = frames(100, false, 1);
+  const std::size_t fine = frames(50, false, Chooser::slack_frames);
+  const Micros tried_at = now;
+  ASSERT_LT(settings[fine].half_level, settings[coarse].half_level) << "it is tried";
+  ASSERT_EQ(frames(100, false, 1), coarse) << "it did not fit";
+  ASSERT_EQ(frames(50, true, Chooser::slack_frames), fine) << "by its measured time";
+  ASSERT_EQ(frames(100, false, 1), coarse);
+  ASSERT_LT(now - tried_at, 500'000);
+  while (frames(50, false, 1) == coarse && now - tried_at < 20'000'000) continue;
+  EXPECT_NEAR(static_cast<double>(now - tried_at), 8e6, 6e5);
+}
+
 TEST(Chooser, ExcludesPicturesTheLinkCannotCarry) {
   Chooser chooser;
   const Forecasts known = calibrated(10);
