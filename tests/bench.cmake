@@ -22,7 +22,8 @@ function(windsplat_bench name)
 endfunction()
 
 set(naive_dir ${CMAKE_CURRENT_LIST_DIR}/numerics)
-windsplat_bench(bench_frame ${naive_dir}/naive_renderer.cpp ${naive_dir}/naive_order.cpp)
+windsplat_bench(bench_frame ${bench_dir}/scenes/scene_set.cpp ${bench_dir}/scenes/scene_times.cpp
+  ${naive_dir}/naive_renderer.cpp ${naive_dir}/naive_order.cpp ${naive_dir}/trial_fields.cpp)
 target_link_libraries(bench_frame PRIVATE windsplat_truth)
 windsplat_bench(bench_kernels)
 windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
@@ -44,6 +45,7 @@ endfunction()
 # Sanitizers increase memory use, so memory is not measured there.
 
 windsplat_smoke(frame bench_frame --smoke)
+windsplat_smoke(scenes bench_frame --scenes --smoke --rounds=1)
 windsplat_smoke(kernels bench_kernels --smoke)
 windsplat_smoke(stages bench_stages --smoke)
 windsplat_smoke(estimates bench_estimates --measure=bench_estimates.csv --list=bench_estimates.csv

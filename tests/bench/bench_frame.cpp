@@ -2,6 +2,11 @@
 // stdout, and optionally JSON with machine, compiler and target:
 //
 //   bench_frame [--all] [--markdown=FILE] [--benchmark_out=FILE] [--benchmark_filter=REGEX]
+//
+// The same for generated scenes, whose names contain TEXT, with both methods:
+//
+//   bench_frame --scenes[=TEXT] [--rounds=N] [--side=N] [--no-naive] [--processor-time]
+//               [--markdown=FILE]
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -17,6 +22,8 @@
 #include "server/engine/render.hpp"
 #include "server/image/encode.hpp"
 #include "server/scene/build.hpp"
+#include "tests/bench/scenes/scene_set.hpp"
+#include "tests/bench/scenes/scene_times.hpp"
 #include "tests/bench/support.hpp"
 #include "tests/bench/text_table.hpp"
 #include "tests/numerics/naive_renderer.hpp"
@@ -25,12 +32,9 @@ namespace windsplat {
 namespace {
 
 using bench::number;
+using bench::Size;
 using bench::value_or_give_up;
 using bench::Workload;
-
-struct Size {
-  int width, height;
-};
 
 std::string named(const std::string& what, const Size& size) {
   return what + " " + std::to_string(size.width) + "x" + std::to_string(size.height);
@@ -310,7 +314,28 @@ void register_frames(const std::vector<Workload>& workloads) {
   }
 }
 
+int run_scenes(int argc, char** argv, const std::string& only) {
+  bench::SceneOptions options;
+  if (only != "set") options.only = only;
+  options.smoke = !bench::take_option(argc, argv, "--smoke").empty();
+  options.naive = bench::take_option(argc, argv, "--no-naive").empty();
+  options.processor_time = !bench::take_option(argc, argv, "--processor-time").empty();
+  const std::string markdown = bench::take_option(argc, argv, "--markdown");
+  const std::string rounds = bench::take_option(argc, argv, "--rounds");
+  const std::string side = bench::take_option(argc, argv, "--side");
+  if (argc > 1) bench::give_up("unknown option '" + std::string(argv[1]) + "'");
+  if (!rounds.empty()) options.rounds = std::stoi(rounds);
+  if (!side.empty()) options.side = std::stoi(side);
+  const bench::Table table = bench::scene_times(options);
+  std::printf("%s", bench::plain(table, 3).c_str());
+  if (!markdown.empty())
+    bench::write_file(markdown, bench::machine_line() + bench::markdown(table));
+  return table.size() > 1 ? 0 : 1;
+}
+
 int run(int argc, char** argv) {
+  const std::string scenes = bench::take_option(argc, argv, "--scenes");
+  if (!scenes.empty()) return run_scenes(argc, argv, scenes);
   benchmark::Initialize(&argc, argv);
   const bool all = !bench::take_option(argc, argv, "--all").empty();
   const bool smoke = !bench::take_option(argc, argv, "--smoke").empty();

@@ -175,6 +175,7 @@ class TrialSource final : public data::Source {
     }
     info_.fields = {described("flow", {"u", "v", "w"}, "m s-1"),
                     described("cloud", {"cloud"}, "1")};
+    if (field.terrain) info_.fields.push_back(described("height", {"height"}, "m"));
     info_.steps = {{0.0, "0"}};
   }
 
@@ -195,6 +196,7 @@ class TrialSource final : public data::Source {
           for (std::size_t a = 0; a < 3; ++a) at[a] = (i[a] + 0.5) / volume.dims[a];
           const Values values = formula_(at, i);
           if (field == 1) volume.values[n] = static_cast<float>(values.cloud);
+          if (field == 2) volume.values[n] = static_cast<float>(values.height);
           for (std::size_t c = 0; field == 0 && c < 3; ++c) {
             volume.values[c * samples + n] = static_cast<float>(values.flow[c]);
           }

@@ -17,6 +17,7 @@ struct TrialField {
   std::string name;
   std::array<int, 3> dims;
   std::array<double, 3> extent_m;
+  bool terrain = false;  // has a third field, "height" in m
 };
 
 // Vector and scalar at a sample. `at`: position in [0, 1] along each axis; `index`: its indices.
@@ -24,6 +25,7 @@ using Point = std::array<double, 3>;
 struct Values {
   std::array<double, 3> flow{};
   double cloud = 0;
+  double height = 0;
 };
 using TrialFormula = std::function<Values(const Point& at, const std::array<int, 3>& index)>;
 
