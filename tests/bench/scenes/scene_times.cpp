@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -96,6 +97,7 @@ class SceneRows {
   }
 
   void add(const GeneratedScene& scene) {
+    std::fprintf(stderr, "%s\n", scene.name.c_str());
     const int reduction = options_.smoke ? 8 : 1;
     // By content, kernel and slab, for the smaller picture.
     std::vector<std::array<double, 2>> eighth;
