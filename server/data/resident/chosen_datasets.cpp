@@ -1,31 +1,24 @@
 #include "server/data/resident/chosen_datasets.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <system_error>
 #include <utility>
 
+#include "server/data/bytes/text.hpp"
 #include "server/data/resident/watched_files.hpp"
 
 namespace windsplat::data {
 
 namespace {
 
-std::optional<double> number_of(const std::string& text) {
-  double out = 0;
-  const char* end = text.data() + text.size();
-  const auto [stop, fault] = std::from_chars(text.data(), end, out);
-  return fault == std::errc() && stop == end ? std::optional(out) : std::nullopt;
-}
-
 // The entry as a dataset that shows it names it: "3" for "3.0" or "03".
 std::string known_name(const DimensionChoice& choice, const std::string& value) {
   const auto& listed = choice.values;
   if (std::find(listed.begin(), listed.end(), value) != listed.end()) return value;
-  const auto number = number_of(value);
+  const auto number = bytes::to_double(value);
   if (!number) return value;
-  const auto same = std::find_if(listed.begin(), listed.end(),
-                                 [&](const std::string& one) { return number_of(one) == number; });
+  const auto same = std::find_if(listed.begin(), listed.end(), [&](const std::string& one) {
+    return bytes::to_double(one) == number;
+  });
   return same == listed.end() ? value : *same;
 }
 

@@ -1,23 +1,20 @@
 #include "server/data/formats/dap/das.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include "server/base/ascii.hpp"
+#include "server/data/bytes/text.hpp"
 #include "server/data/formats/dap/text.hpp"
 
 namespace windsplat::data::dap {
 
 namespace {
 
-std::optional<double> number_of(const std::string& text) {
-  double out = 0;
-  const char* const end = text.data() + text.size();
-  const auto [at, fault] = std::from_chars(text.data(), end, out);
-  if (fault == std::errc() && at == end) return out;
+std::optional<double> attribute_number(const std::string& text) {
+  if (const auto number = bytes::to_double(text)) return number;
   if (lower(text).find("nan") != std::string::npos) return std::numeric_limits<double>::quiet_NaN();
   return {};
 }
@@ -84,7 +81,7 @@ class DasParser {
         out.text += value.text;
         continue;
       }
-      const auto number = number_of(value.text);
+      const auto number = attribute_number(value.text);
       if (!number) return malformed("a number of an attribute");
       out.numbers.push_back(*number);
     } while (words_.take(','));

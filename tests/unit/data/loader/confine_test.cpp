@@ -108,6 +108,7 @@ const std::vector<Attempt> on_the_given_file{
 
 // Numbers that are reserved for files in parts. Reads of them are redirected; what is not would
 // return the zeros of bytes that were not fetched.
+constexpr int first_in_parts = 64;  // as Confinement::files below
 constexpr int in_parts = 70;
 const std::vector<Attempt> on_a_file_in_parts{
     {"read a file in parts", 0,
@@ -124,7 +125,7 @@ const std::vector<Attempt> on_a_file_in_parts{
        own_name(in_parts, name, sizeof name);
        const int again = ::open(name, O_RDONLY | O_CLOEXEC);
        errno = ENOMSG;
-       return again > in_parts ? ::close(again) : -1;
+       return again >= first_in_parts ? ::close(again) : -1;
      }},
     {"copy a file in parts out of their numbers", EPERM,
      [](int) -> long { return ::dup(in_parts); }},
@@ -256,7 +257,7 @@ std::vector<int> outcomes(const std::string& path) {
     ::dup2(file, in_parts);
     Confinement how;
     how.memory_bytes = std::uint64_t{256} << 20;
-    how.files = 64;
+    how.files = first_in_parts;
     if (!confine(how)) ::_exit(2);
     for (const Attempt& attempt : attempts) {
       errno = 0;
