@@ -9,6 +9,7 @@
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/grid/cell_lists.hpp"
+#include "server/data/cf/grid/longitudes.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/cf/units.hpp"
 
@@ -475,10 +476,9 @@ Result<OrientedAxis> orient_axis(const FileContents& contents, const DimensionRo
     out.axis.kind = is_length(lower(variable.units)) ? AxisKind::height : AxisKind::level;
   }
   for (const double value : coordinates) {
-    if (!std::isfinite(value)) {
-      return bad_axis(variable.name, "has missing values");
-    }
+    if (!std::isfinite(value)) return bad_axis(variable.name, "has missing values");
   }
+  if (role.kind == AxisKind::longitude) continue_over_seam(coordinates);
   const bool rises = coordinates.size() < 2 || coordinates[1] > coordinates[0];
   for (std::size_t i = 1; i < coordinates.size(); ++i) {
     const double step = coordinates[i] - coordinates[i - 1];
