@@ -336,8 +336,12 @@ protocol::Range default_scalar_range(const data::FieldInfo& field, const data::V
   const auto least = static_cast<double>(volume.range[0]);
   const auto most = static_cast<double>(volume.range[1]);
   if (signature.fraction && least >= -1e-6) {
-    if (field.units == "%" && most <= 100.5) return {0, 100};
-    if (field.units == "1" && most <= 1.0001) return {0, 1};
+    // Mixing ratios have the unit 1 too; as shares, all of them would be too small to be seen.
+    const auto is_share = [&](double whole, double tolerance) {
+      return most <= whole + tolerance && (most <= 0 || most > signature.clear_below * whole);
+    };
+    if (field.units == "%" && is_share(100, 0.5)) return {0, 100};
+    if (field.units == "1" && is_share(1, 1e-4)) return {0, 1};
   }
   if (is_body(field)) return {0, 2};
   const protocol::Range middle = quantiles(volume, 0.01, 0.995);

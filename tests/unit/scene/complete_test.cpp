@@ -410,5 +410,23 @@ TEST(Defaults, AMapShowsItsFirstFieldAndIsOpaqueEverywhere) {
   }
 }
 
+// The range of a field "cloud" of which a quarter of the samples has the largest value.
+protocol::Range range_of_cloud(const std::string& units, float most) {
+  data::Volume volume;
+  volume.dims = {4, 1, 1};
+  volume.values = {0, 0, 0, most};
+  data::finish_volume(volume);
+  return default_scalar_range(scalar_info("cloud", units), volume);
+}
+
+// Clouds begin at 0.12 of their range.
+TEST(Defaults, SharesHaveTheWholeRangeAndMixingRatiosTheirOwn) {
+  EXPECT_EQ(range_of_cloud("1", 0.3F), (protocol::Range{0, 1}));
+  EXPECT_EQ(range_of_cloud("%", 30), (protocol::Range{0, 100}));
+  EXPECT_EQ(range_of_cloud("1", 0), (protocol::Range{0, 1}));
+  EXPECT_NEAR(range_of_cloud("1", 9e-4F)[1], 1e-3, 1e-9);
+  EXPECT_NEAR(range_of_cloud("%", 3)[1], 3, 1e-6);
+}
+
 }  // namespace
 }  // namespace windsplat::scene
