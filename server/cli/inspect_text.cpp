@@ -124,8 +124,8 @@ std::string grid_text(const protocol::DatasetDescription& dataset) {
   }
   if (const auto& times = dataset.vertical_exaggeration) {
     world += "\nheights are drawn ";
-    world += short_number(*times);
-    world += " times as high as to scale";
+    const bool to_scale = std::abs(*times - 1) < 0.005;
+    world += to_scale ? "to scale" : short_number(*times) + " times as high as to scale";
   }
   return "axes (first .. last)\n" + table(rows) + world + '\n';
 }

@@ -195,6 +195,11 @@ TEST(Lattice, VerticalAxisIsToScaleOnRequest) {
   // 2 km over 15 degrees of 111.19 km.
   EXPECT_NEAR(placed->box_max.z - placed->box_min.z, 2 * 2 / (15 * 111.194926645), 1e-9);
   EXPECT_NEAR(*vertical_exaggeration(map, *placed), 1, 1e-12);
+  // A section along 60 N, where a degree of longitude has half the length.
+  const auto section = place_lattice(map_of({0, 5, 10}, {60}), geometry);
+  ASSERT_TRUE(section);
+  EXPECT_NEAR((section->box_max.z - section->box_min.z) / (section->box_max.x - section->box_min.x),
+              2 / (7.5 * 111.194926645), 1e-12);
   const auto refused = place_lattice(atmosphere_grid(), geometry);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().at.at(0).pointer, "/geometry/vertical");

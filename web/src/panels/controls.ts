@@ -159,6 +159,7 @@ export function exaggerationText(dataset: Dataset, view: View): string {
   if (base === undefined) return "";
   const across = dataset.dims.y > 1 ? 1 : 0;
   const times = (base * (scale?.[2] ?? 1)) / (scale?.[across] ?? 1);
+  if (Math.abs(times - 1) < 0.005) return "Heights are drawn to scale.";
   return `Heights are drawn ${formatNumber(times, 3)} times as high as to scale.`;
 }
 
