@@ -158,7 +158,6 @@ TEST_F(SparseFiles, BlocksCountInTheCacheWhichHasNoNameForThem) {
 }
 
 TEST_F(SparseFiles, OtherFilesGiveWayToBlocks) {
-  cache_ = nullptr;
   file_.reset();
   cache_ = ObjectCache::open({folder_.native(), 8 * block}).value();
   auto other = cache_->begin();
