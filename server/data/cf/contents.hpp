@@ -48,6 +48,7 @@ struct FileVariable {
   bool is_unsigned = false;  // _Unsigned = "true" on a signed integer type
   bool preferred = false;    // its grid is shown, whatever others the file has
   bool in_use = false;       // a coordinate that named an entry or gave the times: not omitted
+  std::string level;  // the coordinate of the vertical dimension of which one entry was chosen
 };
 
 struct FileContents {
@@ -58,6 +59,7 @@ struct FileContents {
   std::vector<std::string> groups;       // names of groups below the root, which are not searched
   std::vector<LeftOut> left_out;         // variables that cannot be read
   std::vector<DimensionChoice> choices;  // dimensions of which one entry was chosen
+  bool has_selection = false;            // entries or a field were chosen by the user
   std::vector<std::string> notes;        // assumptions and conversions of the reader, for users
 };
 

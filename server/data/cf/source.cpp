@@ -23,6 +23,7 @@
 #include "server/data/cf/fields/fields.hpp"
 #include "server/data/cf/fields/rotation.hpp"
 #include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/grid/chosen_level.hpp"
 #include "server/data/cf/grid/curvilinear.hpp"
 #include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/grid/level_heights.hpp"
@@ -234,24 +235,13 @@ class ArraySource final : public FileSource {
     return axis;
   }
 
-  // The place of a chosen level, whose coordinate has lost its dimension.
   Result<void> find_level() {
-    for (std::size_t v = 0; v < file_->contents().variables.size(); ++v) {
-      const FileVariable& variable = file_->contents().variables[v];
-      if (!variable.in_use || !variable.numeric || !variable.dims.empty()) continue;
-      FileContents level;
-      level.dimensions.push_back({.name = variable.name, .length = 1});
-      level.variables.push_back(variable);
-      level.variables.front().dims = {0};
-      const DimensionRole role = classify_dimensions(level).front();
-      if (role.role != Role::z) continue;
-      auto value = unpacked_values(*file_, static_cast<int>(v));
-      if (!value) return value.error();
-      auto oriented = orient_axis(level, role, 0, 2, std::move(*value), info_.grid.axes[0].kind);
-      if (!oriented) return oriented.error();
-      info_.grid.axes[2] = std::move(oriented->axis);
-      return {};
-    }
+    auto level = find_chosen_level(*file_, choice_.variables, info_.grid.axes[0].kind);
+    if (!level) return level.error();
+    if (!*level) return {};
+    info_.grid.axes[2] = std::move((*level)->axis);
+    level_ = std::move((*level)->name);
+    if (!(*level)->note.empty()) info_.notes.push_back(std::move((*level)->note));
     return {};
   }
 
@@ -300,6 +290,10 @@ class ArraySource final : public FileSource {
         z >= 0 && (roles_.at(at(z)).kind == AxisKind::depth || is_ocean_level(coordinate_of(z)));
     auto plans = cf::find_fields(file_->contents(), choice_.variables,
                                  in_water ? AxisKind::depth : info_.grid.axes[2].kind, info_.notes);
+    for (FieldPlan& plan : plans) {
+      const std::string& own = file_->contents().variables[at(plan.variables.front())].level;
+      plan.info.off_level = !level_.empty() && own != level_;
+    }
     auto derived = find_derived(*file_, placement_, plans, choice_.variables, pressures_, heights_,
                                 info_.notes);
     if (!derived) return derived.error();
@@ -454,6 +448,7 @@ class ArraySource final : public FileSource {
   std::unique_ptr<ArrayFile> file_;
   std::vector<DimensionRole> roles_;
   GridChoice choice_;
+  std::string level_;  // as in ChosenLevel; empty if none was chosen
   Placement placement_;
   DatasetInfo info_;
   PressureLevels pressures_;

@@ -179,6 +179,7 @@ std::optional<double> unit_ratio(std::string_view from, std::string_view to) {
   const auto b = product_of(to);
   if (!a || !b || a->powers != b->powers) return std::nullopt;
   const double ratio = a->factor / b->factor;
+  if (!std::isfinite(ratio) || !(ratio > 0)) return std::nullopt;
   return std::abs(ratio - 1) < 1e-12 ? 1.0 : ratio;
 }
 

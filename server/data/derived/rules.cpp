@@ -117,7 +117,8 @@ class Finder {
   }
 
  private:
-  // The best of the scalars: by standard name, otherwise one without that has a common name.
+  // The best of the scalars at the grid's place: by standard name, otherwise one without that has a
+  // common name.
   template <std::size_t count>
   [[nodiscard]] std::optional<Input> scalar(std::string_view standard_name,
                                             const std::array<std::string_view, count>& usual,
@@ -125,7 +126,7 @@ class Finder {
     std::optional<Input> best;
     for (std::size_t f = 0; f < info_.fields.size(); ++f) {
       const FieldInfo& field = info_.fields[f];
-      if (field.kind != FieldKind::scalar) continue;
+      if (field.kind != FieldKind::scalar || field.off_level) continue;
       const auto input = reading(field, f);
       if (!input) continue;
       if (field.standard_name == standard_name) return input;

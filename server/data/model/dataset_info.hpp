@@ -48,8 +48,9 @@ struct FieldInfo {
   std::vector<std::string> component_units;  // one per component; may differ (m/s, Pa/s)
   std::string standard_name;
   std::string long_name;
-  std::string dtype;     // type in the file: "float32", "int16 packed", ...
-  bool derived = false;  // computed on request from other fields, not stored in the file
+  std::string dtype;       // type in the file: "float32", "int16 packed", ...
+  bool derived = false;    // computed on request from other fields, not stored in the file
+  bool off_level = false;  // not at the place of the vertical axis, which a chosen level gives
   // Bytes decoded to read one step, including whole chunks; 0 if equal to the size of the volume.
   std::uint64_t decoded_bytes = 0;
   std::uint64_t chunk_bytes = 0;  // the largest chunk, decoded; at least the fields that a derived

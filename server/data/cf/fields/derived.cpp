@@ -181,7 +181,8 @@ class DerivedFinder {
       const FileVariable& source = variable(v);
       const auto& same = variable(like).dims;
       const std::string units = lower(source.units);
-      if (!std::is_permutation(source.dims.begin(), source.dims.end(), same.begin(), same.end()) ||
+      if (source.level != variable(like).level ||
+          !std::is_permutation(source.dims.begin(), source.dims.end(), same.begin(), same.end()) ||
           !(is_kelvin(units) || is_celsius(units))) {
         continue;
       }
@@ -221,7 +222,7 @@ class DerivedFinder {
     if (plan.variables.size() < 3) return {};
     const int omega = plan.variables[2];
     const double unit = omega_unit(variable(omega));
-    if (unit == 0) return {};
+    if (unit == 0 || plan.info.off_level) return {};
     DerivedField field;
     field.rule = DerivedField::Rule::rise;
     field.inputs = plan.variables;

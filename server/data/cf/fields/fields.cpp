@@ -21,6 +21,15 @@ bool contains(std::string_view text, std::string_view part) {
 // Whether units are those of a velocity; absent units are accepted.
 bool is_velocity(const std::string& units) { return units.empty() || is_speed(units); }
 
+// A unit for notes, cut where it is longer than any usual one.
+std::string shown_unit(const std::string& unit) {
+  constexpr std::size_t most = 64;
+  if (unit.size() <= most) return unit;
+  std::size_t end = most;
+  while (end > 0 && (static_cast<unsigned char>(unit[end]) & 0xC0U) == 0x80U) --end;
+  return unit.substr(0, end) + "...";
+}
+
 class FieldFinder {
  public:
   FieldFinder(const FileContents& contents, const std::vector<int>& variables, AxisKind vertical,
@@ -60,6 +69,7 @@ class FieldFinder {
       const auto& same = variable(like).dims;
       if (v != like && !is_used(v) && text(variable(v)) == wanted &&
           variable(v).process == variable(like).process &&
+          variable(v).level == variable(like).level &&
           std::is_permutation(dims.begin(), dims.end(), same.begin(), same.end())) {
         return v;
       }
@@ -86,7 +96,9 @@ class FieldFinder {
     if (is_third && (own.empty() || wanted.empty())) return true;
     if (is_third && is_omega(v) && is_velocity(wanted)) return true;
     if (own.empty() == wanted.empty() && unit_ratio(own, wanted)) return true;
-    const auto shown = [](const std::string& unit) { return unit.empty() ? "no unit" : unit; };
+    const auto shown = [](const std::string& unit) {
+      return unit.empty() ? "no unit" : shown_unit(unit);
+    };
     tell(in_quotes(variable(v).name) + " (" + shown(own) + ") is no component of a vector with " +
          in_quotes(variable(first).name) + " (" + shown(wanted) +
          "): its unit cannot be converted to that");
@@ -155,12 +167,13 @@ class FieldFinder {
     plan.info.component_units.push_back(own.empty() ? own : wanted);
     const std::string of = " of " + in_quotes(plan.info.name) + ' ';
     if (plan.factors.back() != 1) {
-      tell("the component " + in_quotes(variable(v).name) + of + "is converted from " + own +
-           " to " + wanted);
+      tell("the component " + in_quotes(variable(v).name) + of + "is converted from " +
+           shown_unit(own) + " to " + shown_unit(wanted));
     } else if (own.empty() != wanted.empty()) {
       tell("the component " + in_quotes(variable(v).name) + of +
-           (own.empty() ? "has no unit: it is taken to be in " + wanted
-                        : "is in " + own + ", but the others have no unit: they are taken to be"));
+           (own.empty() ? "has no unit: it is taken to be in " + shown_unit(wanted)
+                        : "is in " + shown_unit(own) +
+                              ", but the others have no unit: they are taken to be"));
     }
   }
 

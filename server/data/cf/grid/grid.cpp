@@ -208,14 +208,15 @@ void tell_other_grids(const FileContents& contents, const std::vector<Group>& gr
     text += (count == 1 ? "" : ", ") + printable(contents.variables[first].name);
   }
   if (count == 0) return;
-  choice.note = (count == 1 ? "fields on another grid are shown by appending ?field="
-                            : "fields on " + std::to_string(count) +
-                                  " other grids are shown by appending ?field=NAME to the file's "
-                                  "name, with the name of one of them: ") +
-                text +
-                (count == 1           ? " to the file's name"
-                 : count > listed_max ? ", ..."
-                                      : "");
+  const std::string field = contents.has_selection ? "&field=" : "?field=";
+  choice.note =
+      (count == 1 ? "fields on another grid are shown by appending " + field
+                  : "fields on " + std::to_string(count) + " other grids are shown by appending " +
+                        field + "NAME to the file's name, with the name of one of them: ") +
+      text +
+      (count == 1           ? " to the file's name"
+       : count > listed_max ? ", ..."
+                            : "");
 }
 
 // Why a preferred variable is no field; empty if none is preferred.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -61,7 +62,9 @@ class Entries {
     const bool numeric = fault == std::errc() && stop == end;
     const bool by_text =
         !numeric || (variable_ != nullptr && !counts_from_a_time(variable_->units));
-    const bool is_narrow = variable_ != nullptr && variable_->type == "float32";
+    constexpr auto narrow_max = static_cast<double>(std::numeric_limits<float>::max());
+    const bool is_narrow =
+        variable_ != nullptr && variable_->type == "float32" && std::abs(number) <= narrow_max;
     const auto equals = [&](double value) {
       return value == number ||
              (is_narrow && static_cast<float>(value) == static_cast<float>(number));
@@ -115,6 +118,7 @@ class SelectedFile final : public ArrayFile {
   }
 
   Result<void> choose(const Selection& selection) {
+    contents_.has_selection = !selection.empty();
     Selection found;
     for (const SelectedEntry& one : selection) {
       const int d = dimension_named(contents_, one.dimension);
@@ -133,6 +137,11 @@ class SelectedFile final : public ArrayFile {
       if (auto done = fix(d, nullptr); !done) return done;
     }
     for (FileVariable& variable : contents_.variables) {
+      for (const int d : variable.dims) {
+        const DimensionRole& role = roles_[at(d)];
+        if (!entry_[at(d)] || role.role != Role::z || role.coordinate < 0) continue;
+        variable.level = contents_.variables[at(role.coordinate)].name;
+      }
       std::erase_if(variable.dims, [&](int d) { return entry_[at(d)].has_value(); });
     }
     for (const int d : extra.times) make_time(d);
@@ -238,8 +247,9 @@ class SelectedFile final : public ArrayFile {
     contents_.choices.push_back(entries->choice(name, *index));
     if (value == nullptr) {
       contents_.notes.push_back(in_quotes(name) + " has " + entries->range() +
-                                ": the first is shown; choose another by appending ?" +
-                                printable(name) + "=VALUE to the file's name");
+                                ": the first is shown; choose another by appending " +
+                                (contents_.has_selection ? '&' : '?') + printable(name) +
+                                "=VALUE to the file's name");
     }
     return {};
   }

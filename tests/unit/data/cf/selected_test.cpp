@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -134,6 +135,65 @@ TEST(SelectedEntries, AChosenLevelStaysInItsPlace) {
 }
 
 // t(time, lev, lat, lon) beside pr(time, lat, lon) and pr_day(day, lat, lon).
+// Fields of the surface beside fields of levels, first in the file.
+void write_surface_and_levels(const std::string& path) {
+  NetcdfMaker file(path);
+  const Space space = space_of(file);
+  const auto add = [&](const char* name, const char* units, const char* standard_name, bool high,
+                       double value) {
+    const int v =
+        file.variable(name, NC_FLOAT,
+                      high ? std::vector{space.z, space.y, space.x} : std::vector{space.y, space.x},
+                      std::vector<double>(high ? 24 : 12, value));
+    file.text(v, "units", units);
+    file.text(v, "standard_name", standard_name);
+  };
+  add("tas", "K", "air_temperature", false, 300);
+  add("huss", "1", "specific_humidity", false, 0.01);
+  add("v10", "m s-1", "northward_wind", false, 2);
+  add("ta", "K", "air_temperature", true, 250);
+  add("ua", "m s-1", "eastward_wind", true, 3);
+  add("va", "m s-1", "northward_wind", true, 4);
+  add("wap", "Pa s-1", "lagrangian_tendency_of_air_pressure", true, -1);
+}
+
+TEST(SelectedEntries, FieldsWithoutTheChosenLevelHaveNotItsPressure) {
+  const Folder folder;
+  write_surface_and_levels(folder / "p.nc");
+  const auto source = opened(folder / "p.nc?lev=500");
+  ASSERT_NE(source, nullptr);
+  const DatasetInfo& info = source->info();
+  EXPECT_EQ(info.grid.axes[2].coordinates, std::vector<double>{500});
+  EXPECT_EQ(info.find("relative_humidity"), nullptr);
+  EXPECT_TRUE(has_note(info, "not at the chosen level 'lev': 'tas', 'huss', 'v10'"));
+  const FieldInfo* wind = info.find("wind");
+  ASSERT_NE(wind, nullptr);
+  EXPECT_THAT(wind->components, ElementsAre("ua", "va", "wap"));
+  // -omega R T / (p g), with the temperature of the level.
+  const Volume volume = volume_of(*source, "wind_m");
+  EXPECT_NEAR(last_of(volume), 287.05 * 250 / (50000 * 9.80665), 1e-4);
+}
+
+TEST(SelectedEntries, AGridWithoutTheChosenLevelHasNoLevel) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "o.nc");
+    const auto [z, y, x] = space_of(file);
+    file.variable("ua", NC_FLOAT, {z, y, x}, tagged({2, 3, 4}));
+    const int north = file.axis("lat2", counting(9), "degrees_north", "latitude");
+    const int east = file.axis("lon2", counting(9), "degrees_east", "longitude");
+    file.variable("orog", NC_FLOAT, {north, east}, tagged({9, 9}));
+  }
+  const auto other = opened(folder / "o.nc?field=orog&lev=500");
+  ASSERT_NE(other, nullptr);
+  EXPECT_EQ(other->info().grid.axes[2].coordinates, std::vector<double>{0});
+  EXPECT_NE(other->info().grid.axes[2].kind, AxisKind::pressure);
+  EXPECT_TRUE(has_note(other->info(), "by appending &field=ua"));
+  const auto own = opened(folder / "o.nc?field=ua&lev=500");
+  ASSERT_NE(own, nullptr);
+  EXPECT_EQ(own->info().grid.axes[2].coordinates, std::vector<double>{500});
+}
+
 TEST(SelectedEntries, FieldsOnAnotherGridAreShownByName) {
   const Folder folder;
   {
@@ -213,6 +273,19 @@ TEST(SelectedEntries, SinglePrecisionValuesAreNamedAsTheyWereWritten) {
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(last_of(volume_of(*source, "aerosol")), 1123);
   EXPECT_THAT(source->info().choices[0].values, ElementsAre("0.1", "0.55"));
+}
+
+TEST(SelectedEntries, NumbersBeyondSinglePrecisionNameNoEntry) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "f.nc");
+    const int m = file.dimension("scale", 2);
+    file.variable("scale", NC_FLOAT, {m}, {1, std::numeric_limits<double>::infinity()});
+    const auto [z, y, x] = space_of(file);
+    file.variable("t", NC_FLOAT, {m, z, y, x}, tagged({2, 2, 3, 4}));
+  }
+  EXPECT_THAT(why_not(folder / "f.nc?scale=1e300"), HasSubstr("no entry '1e300'"));
+  EXPECT_NE(opened(folder / "f.nc?scale=inf"), nullptr);
 }
 
 TEST(SelectedEntries, AnAxisOfAnotherVariableIsNotChosen) {

@@ -273,6 +273,22 @@ TEST(NetcdfFields, ComponentsOfOtherQuantitiesAreNotJoined) {
   }
 }
 
+// Factors beyond the largest number have no ratio; notes do not repeat units of any length.
+TEST(NetcdfFields, ComponentsOfUnitsWithoutAFiniteRatioAreNotJoined) {
+  const Folder folder;
+  std::string unit;
+  for (int n = 0; n < 60; ++n) unit += "km9 ";
+  const auto source = wind_in(folder / "w.nc", {unit + "m1", unit + "m", "s-1"});
+  ASSERT_TRUE(source) << source.error().message;
+  const DatasetInfo& info = (*source)->info();
+  EXPECT_EQ(info.fields.front().components.size(), 1U);
+  const auto joined = std::find_if(info.notes.begin(), info.notes.end(), [](const auto& note) {
+    return note.find("'v' (km9 km9") != std::string::npos;
+  });
+  ASSERT_NE(joined, info.notes.end());
+  EXPECT_LT(joined->size(), 250U);
+}
+
 TEST(NetcdfFields, VelocitiesThatTwoFilesHaveAreNotNotedAsAbsent) {
   const Folder folder;
   for (const char* name : {"a.nc", "b.nc"}) {
