@@ -111,6 +111,7 @@ Result<void> check_centers(const ArrayFile& file, const std::vector<int>& dimens
     std::size_t apart = 0;
     std::size_t first = 0;
     for (std::size_t c = 0; c < mesh.cells(); c += stride) {
+      if (!std::isfinite((*longitudes)[c]) || !std::isfinite((*latitudes)[c])) continue;
       ++compared;
       if (is_near_cell(mesh, c, (*longitudes)[c], (*latitudes)[c], outline) ||
           is_circumcenter(mesh, c, (*longitudes)[c], (*latitudes)[c], chart)) {

@@ -11,6 +11,7 @@
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/mesh/centers.hpp"
 #include "server/data/cf/mesh/topology.hpp"
 #include "server/data/cf/time.hpp"
 
@@ -129,7 +130,8 @@ class MeshReader {
   }
 
   // The number of the first node. Without one in the file it is 1 if the number 0 does not occur
-  // and either the number after the last node does, or cells from 0 are much longer than from 1.
+  // and the number after the last node does, or only cells from 1 lie at their centers; without
+  // centers, if cells from 0 are much longer than from 1. Otherwise it is 0, as UGRID says.
   Result<double> start_index(const std::vector<double>& numbers, std::size_t width,
                              std::size_t nodes) {
     if (!from_.start_is_assumed) return from_.start_index;
@@ -141,31 +143,50 @@ class MeshReader {
       most = std::max(most, number);
     }
     if (least < 1 || !(most <= static_cast<double>(nodes))) return 0.0;
-    bool counts_from_one = most == static_cast<double>(nodes);
-    if (!counts_from_one) {
-      std::array<std::vector<double>, 2> positions;
-      for (std::size_t a = 0; a < 2; ++a) {
-        auto values = angles(from_.node_positions.at(a), from_.on_sphere);
-        if (!values) return values.error();
-        positions.at(a) = std::move(*values);
-        if (positions.at(a).size() != nodes) return 0.0;  // with_positions() reports it
-      }
-      const double from_zero = length_of_edges(numbers, width, 0, positions);
-      const double from_one = length_of_edges(numbers, width, 1, positions);
-      constexpr double much = 0.9;  // a row of cells around an edge has a cell along all of it
-      counts_from_one = from_one < much * from_zero;
-      if (!counts_from_one && !(from_zero < much * from_one)) {
-        return make_error(ErrorKind::bad_data,
-                          in_quotes(variable(from_.connectivity).name) +
-                              " has no start_index, and no cell has the node 0: whether nodes are "
-                              "numbered from 0 or 1 is unknown");
-      }
+    const std::string named = in_quotes(variable(from_.connectivity).name) + " has no start_index";
+    if (most == static_cast<double>(nodes)) {
+      notes_.push_back(named +
+                       ", but its numbers of nodes can only count from 1: they are read so");
+      return 1.0;
     }
-    if (!counts_from_one) return 0.0;
-    notes_.push_back(in_quotes(variable(from_.connectivity).name) +
-                     " has no start_index, but its numbers of nodes can only count from 1: they "
-                     "are read so");
-    return 1.0;
+    const auto fits_zero = lie_at_centers(numbers, width, nodes, 0);
+    const auto fits_one = lie_at_centers(numbers, width, nodes, 1);
+    if (fits_zero != fits_one) {
+      notes_.push_back(named + ": numbers of nodes count from " + (fits_zero ? '0' : '1') +
+                       ", which places the cells at their centers");
+      return fits_zero ? 0.0 : 1.0;
+    }
+    std::array<std::vector<double>, 2> positions;
+    for (std::size_t a = 0; a < 2; ++a) {
+      auto values = angles(from_.node_positions.at(a), from_.on_sphere);
+      if (!values) return values.error();
+      positions.at(a) = std::move(*values);
+      if (positions.at(a).size() != nodes) return 0.0;  // with_positions() reports it
+    }
+    const double from_zero = length_of_edges(numbers, width, 0, positions);
+    const double from_one = length_of_edges(numbers, width, 1, positions);
+    constexpr double much = 0.9;  // a row of cells around an edge has a cell along all of it
+    if (from_one < much * from_zero) {
+      notes_.push_back(named +
+                       ", but its numbers of nodes can only count from 1: they are read so");
+      return 1.0;
+    }
+    if (!(from_zero < much * from_one)) {
+      notes_.push_back(named +
+                       ", and no cell has the node 0: numbers of nodes count from 0, the default "
+                       "of UGRID");
+    }
+    return 0.0;
+  }
+
+  // Whether cells whose numbers of nodes count from `start` lie at the centers in the file; true
+  // without centers.
+  bool lie_at_centers(std::vector<double> numbers, std::size_t width, std::size_t nodes,
+                      double start) {
+    for (double& number : numbers) number -= start;
+    auto mesh = mesh_of_indices(numbers, width, nodes, variable(from_.connectivity).name);
+    if (mesh) mesh = with_positions(std::move(*mesh));
+    return mesh && check_positions(*mesh) && check_centers(file_, {from_.cells}, *mesh);
   }
 
   // The sum over the edges of all cells, in degrees of latitude or lengths of the plane. numbers:

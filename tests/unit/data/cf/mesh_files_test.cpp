@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -286,36 +287,70 @@ TEST(UgridFiles, NumbersThatCanOnlyCountFromOneAreReadSo) {
   }
 }
 
-// A strip of triangles between two rows of nodes, numbered across: every node has the same
-// neighbours by number, so that both readings are meshes.
-TEST(UgridFiles, NumbersThatMayCountFromZeroOrOneAreRefused) {
+// Rows of cells around the globe without those at the poles: the nodes of the next row are beside
+// those of the one before by number, so that both readings are meshes.
+TEST(UgridFiles, NumbersThatMayCountFromZeroOrOneFollowTheCentersOrElseTheConvention) {
   const Folder folder;
-  {
-    NetcdfMaker file(folder / "s.nc");
-    const int node = file.dimension("node", 42);
-    const int face = file.dimension("face", 38);
-    const int mesh = file.variable("Mesh2", NC_INT, {});
-    file.text(mesh, "cf_role", "mesh_topology");
-    file.number(mesh, "topology_dimension", NC_INT, {2});
-    file.text(mesh, "node_coordinates", "nx ny");
-    file.text(mesh, "face_node_connectivity", "corners");
-    Table x;
-    Table y;
-    Table table;
-    for (std::size_t n = 0; n < 42; ++n) {
-      x.push_back(static_cast<double>(n) / 2);
-      y.push_back(n % 2 == 0 ? 0 : 1);
+  constexpr std::size_t around = 12;
+  for (const int start : {-1, 0, 1}) {  // of the numbers; -1: 0 without centers
+    const std::string path = folder / "s.nc";
+    {
+      NetcdfMaker file(path);
+      const int node = file.dimension("node", 8 * around);
+      const int face = file.dimension("face", 5 * around);
+      const int mesh = file.variable("Mesh2", NC_INT, {});
+      file.text(mesh, "cf_role", "mesh_topology");
+      file.number(mesh, "topology_dimension", NC_INT, {2});
+      file.text(mesh, "node_coordinates", "nx ny");
+      file.text(mesh, "face_node_connectivity", "corners");
+      Table x, y, table, center_x, center_y;
+      for (std::size_t n = 0; n < 8 * around; ++n) {
+        x.push_back(30 * static_cast<double>(n % around));
+        y.push_back(20 * static_cast<double>(n / around) - 70);
+      }
+      for (std::size_t low = around; low < 6 * around; ++low) {
+        const std::size_t row = low / around * around;
+        const std::size_t next = row + (low + 1) % around;
+        for (const std::size_t n : {low, next, next + around, low + around}) {
+          table.push_back(static_cast<double>(n + (start == 1 ? 1 : 0)));
+        }
+        center_x.push_back(x[low] + 15);
+        center_y.push_back(y[low] + 10);
+      }
+      file.text(file.variable("nx", NC_DOUBLE, {node}, x), "units", "degrees_east");
+      file.text(file.variable("ny", NC_DOUBLE, {node}, y), "units", "degrees_north");
+      file.variable("corners", NC_INT, {face, file.dimension("four", 4)}, table);
+      file.variable("t", NC_FLOAT, {face}, Table(5 * around, 1));
+      if (start >= 0) {
+        file.text(file.variable("fx", NC_DOUBLE, {face}, center_x), "units", "degrees_east");
+        file.text(file.variable("fy", NC_DOUBLE, {face}, center_y), "units", "degrees_north");
+      }
     }
-    for (std::size_t c = 0; c < 38; ++c) {
-      for (std::size_t i = 1; i < 4; ++i) table.push_back(static_cast<double>(c + i));
-    }
-    file.text(file.variable("nx", NC_DOUBLE, {node}, x), "units", "degrees_east");
-    file.text(file.variable("ny", NC_DOUBLE, {node}, y), "units", "degrees_north");
-    file.variable("corners", NC_INT, {face, file.dimension("three", 3)}, table);
-    file.variable("t", NC_FLOAT, {face}, Table(38, 1));
+    const auto source = opened(path);
+    ASSERT_NE(source, nullptr);
+    EXPECT_TRUE(has_note(source->info(), start < 0    ? "count from 0, the default of UGRID"
+                                         : start == 0 ? "count from 0, which places the cells"
+                                                      : "count from 1, which places the cells"))
+        << start;
   }
-  EXPECT_THAT(refusal(folder / "s.nc"),
-              HasSubstr("whether nodes are numbered from 0 or 1 is unknown"));
+}
+
+// Centers that are missing tell nothing; the others are compared.
+TEST(UgridFiles, MissingCentersDoNotHideThoseThatLieElsewhere) {
+  const Folder folder;
+  UgridMaker maker(folder / "m.nc");
+  maker.plain_corners();
+  const double missing = std::numeric_limits<double>::quiet_NaN();
+  const auto known = [&](double value) { return value < 13 ? value + 2 : missing; };
+  maker.file.text(maker.file.variable("fx", NC_DOUBLE, {maker.face},
+                                      at_cells([&](double a, double) { return known(a); })),
+                  "units", "degrees_east");
+  maker.file.text(maker.file.variable("fy", NC_DOUBLE, {maker.face},
+                                      at_cells([](double, double b) { return b; })),
+                  "units", "degrees_north");
+  maker.file.variable("t", NC_FLOAT, {maker.face}, at_cells(sum_of));
+  maker.file.finish();
+  EXPECT_THAT(refusal(folder / "m.nc"), HasSubstr("12 of 12 compared"));
 }
 
 // Triangles whose circumcentres lie outside of them.
