@@ -25,7 +25,9 @@ Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
   return out;
 }
 
-void SharedSamples::begin_block(std::size_t block) {
+void SharedSamples::begin_piece(std::size_t block, bool of_integers) {
+  names_pieces_ = names_pieces_ && of_integers;
+  name_.reset();
   if (block == block_) return;
   block_ = block;
   std::fill(is_stored_.begin(), is_stored_.end(), false);
@@ -35,6 +37,8 @@ void SharedSamples::add(std::size_t sample, const double* values, std::size_t co
                         const float* held, std::size_t stride) {
   for (std::size_t c = 0; c < components; ++c) {
     if (!std::isfinite(values[c])) continue;
+    names_pieces_ = names_pieces_ && name_.value_or(values[c]) == values[c];
+    name_ = values[c];
     largest_ = std::max(largest_, std::abs(values[c]));
     const auto before = static_cast<double>(held[c * stride]);
     if (!is_stored_[sample] || !std::isfinite(before)) continue;
@@ -45,7 +49,7 @@ void SharedSamples::add(std::size_t sample, const double* values, std::size_t co
 
 Result<void> SharedSamples::check(const InputFile& file, const std::string& field) const {
   constexpr double tolerance = 1e-3;  // neighbours may have computed their copies
-  if (difference_ <= tolerance * largest_) return {};
+  if (difference_ <= tolerance * largest_ || names_pieces_) return {};
   return file.fault("has pieces that overlap with different values of " + in_quotes(field) +
                     " (by up to " + cf::number_text(difference_) +
                     "), which no vtkGhostType marks as copies");

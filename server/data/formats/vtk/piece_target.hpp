@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,13 +52,14 @@ class SharedSamples {
  public:
   explicit SharedSamples(std::size_t samples) : is_stored_(samples) {}
 
-  // Begins another block, whose samples may differ from those of the blocks before.
-  void begin_block(std::size_t block);
+  // Begins a piece. The samples of a block may differ from those of the blocks before.
+  void begin_piece(std::size_t block, bool of_integers);
   // The components that a piece stores for a sample. held: those before, from any piece, of which
   // each is `stride` after the one before.
   void add(std::size_t sample, const double* values, std::size_t components, const float* held,
            std::size_t stride);
-  // Errors: bad_data if two pieces differ by more than a thousandth of the largest value.
+  // Errors: bad_data if two pieces differ by more than a thousandth of the largest value,
+  // unless the values name the pieces, as those of vtkProcessId do: one integer in each.
   [[nodiscard]] Result<void> check(const InputFile& file, const std::string& field) const;
 
  private:
@@ -65,6 +67,8 @@ class SharedSamples {
   std::size_t block_ = 0;
   double largest_ = 0;
   double difference_ = 0;
+  bool names_pieces_ = true;
+  std::optional<double> name_;  // the first value of a piece
 };
 
 // The target of a piece of `whole`. world: for each index axis the axis of the volume; turned:

@@ -364,7 +364,7 @@ class VtkSource final : public FileSource {
     if (!ghosts) return ghosts.error();
     const auto components = static_cast<std::size_t>((*array)->components);
     TargetWalk walk(target);
-    shared.begin_block(piece.block);
+    shared.begin_piece(piece.block, (*array)->type < bytes::Scalar::float32);
     return read_tuples(*file, **array, [&](std::uint64_t tuple, const double* values) {
       const std::size_t at = walk.next();
       const double ghost = ghosts->empty() ? 0 : (*ghosts)[tuple];

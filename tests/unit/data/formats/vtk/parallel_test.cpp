@@ -315,6 +315,36 @@ TEST_F(VtkParallel, OverlapsWithoutMarksMustAgree) {
   }
 }
 
+// vtkProcessId; but integers that vary within a piece must agree.
+TEST_F(VtkParallel, OverlappingPiecesMayNumberThemselves) {
+  const std::array<Box, 2> boxes{{{0, 3, 0, 1, 0, 1}, {2, 4, 0, 1, 0, 1}}};
+  for (const bool varies : {false, true}) {
+    Header header;
+    header.attributes = "WholeExtent=\"0 4 0 1 0 1\" GhostLevel=\"4\"";
+    header.declared = "<PPointData><PDataArray type=\"Int32\" Name=\"a\"/></PPointData>";
+    for (std::size_t n = 0; n < 2; ++n) {
+      std::vector<double> ranks(places_of(boxes.at(n), image_place).size(),
+                                static_cast<double>(n + 3));
+      if (varies) ranks.front() = 7;
+      VtkXml xml;
+      const std::string text = extent_text(boxes.at(n));
+      const std::string name = "r" + std::to_string(n) + ".vti";
+      folder_.write(name, xml.file("ImageData", "WholeExtent=\"" + text + "\"",
+                                   "<Piece Extent=\"" + text + "\"><PointData>" +
+                                       xml.array("Int32", "a", 1, ranks) + "</PointData></Piece>"));
+      header.piece(name, &boxes.at(n));
+    }
+    const auto source = opened(folder_.write("all.pvti", header.text()));
+    ASSERT_TRUE(source);
+    const auto volume = source->read(0, 0);
+    EXPECT_EQ(volume.has_value(), !varies);
+    if (volume) {
+      EXPECT_EQ(volume->values[0], 3);
+      EXPECT_EQ(volume->values[4], 4);
+    }
+  }
+}
+
 TEST_F(VtkParallel, ArraysMustBeDeclaredAndAgree) {
   Header header;
   header.attributes = "WholeExtent=\"0 8 0 6 0 4\" Origin=\"10 -3 0\" Spacing=\"0.5 2 0.25\"";
