@@ -136,13 +136,16 @@ std::unique_ptr<ArrayStream> hdf_stream(const StoredArray& array) {
   return std::make_unique<HdfStream>(array);
 }
 
-bool HdfFile::is_vtkhdf(const InputFile& input) {
+bool HdfFile::is_vtkhdf(const InputFile& input) { return has_vtkhdf(input).value_or(false); }
+
+std::optional<bool> HdfFile::has_vtkhdf(const InputFile& input) {
   const auto head = input.head(8);
-  if (!head || *head != "\x89HDF\r\n\x1a\n") return false;
+  if (!head || *head != "\x89HDF\r\n\x1a\n") return std::nullopt;
   const LibraryLock lock;
   const Handle file = netcdf::open_hdf5(input);
   H5L_info_t about{};
-  return file && H5Lexists(file.id(), "VTKHDF", H5P_DEFAULT) > 0 &&
+  if (!file) return std::nullopt;
+  return H5Lexists(file.id(), "VTKHDF", H5P_DEFAULT) > 0 &&
          H5Lget_info(file.id(), "VTKHDF", &about, H5P_DEFAULT) >= 0 && about.type == H5L_TYPE_HARD;
 }
 

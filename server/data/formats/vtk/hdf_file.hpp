@@ -24,6 +24,8 @@ class HdfFile : public std::enable_shared_from_this<HdfFile> {
  public:
   // Whether the file is HDF5 and has the group. Does not follow links.
   static bool is_vtkhdf(const InputFile& input);
+  // The same; nullopt if the file is no HDF5 file that can be opened.
+  static std::optional<bool> has_vtkhdf(const InputFile& input);
   // Examines the file like any HDF5 file (see netcdf::scan_storage()). Errors: bad_data.
   static Result<std::shared_ptr<HdfFile>> open(std::shared_ptr<const InputFile> input);
   ~HdfFile();

@@ -137,11 +137,10 @@ Result<std::vector<Step>> steps_in_files(Files& files) {
 }  // namespace
 
 bool is_vtkhdf(Files& files) {
-  constexpr std::size_t damaged_max = 4;  // before a file that tells
-  const auto& members = files.location().members;
-  for (std::size_t m = 0; m < std::min(members.size(), damaged_max); ++m) {
-    const auto file = files.open(members[m].name);
-    if (file && HdfFile::is_vtkhdf(**file)) return true;
+  for (const Location::Member& member : files.location().members) {
+    const auto file = files.open(member.name);
+    const auto found = file ? HdfFile::has_vtkhdf(**file) : std::nullopt;
+    if (found) return *found;
   }
   return false;
 }
@@ -209,7 +208,11 @@ Result<Snapshot> StepReader::read_one(const std::string& name, std::optional<std
   const auto head = (*file)->head(head_bytes);
   if (!head) return head.error();
   const bool legacy = is_legacy(*head);
-  if (!legacy && !is_xml(*head)) return (*file)->fault("is not a VTK file");
+  if (!legacy && !is_xml(*head)) {
+    return (*file)->fault(head->starts_with("\x89HDF")
+                              ? "is an HDF5 file that is damaged, or has no group VTKHDF"
+                              : "is not a VTK file");
+  }
   auto out = legacy ? read_legacy(*file) : read_xml(*file, name);
   if (!out) return out;
   out->file = *file;

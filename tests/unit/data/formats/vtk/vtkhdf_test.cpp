@@ -176,19 +176,25 @@ TEST_F(VtkHdf, StepsOfImagesHaveTimesAndOffsets) {
 }
 
 TEST_F(VtkHdf, DamagedFilesOfASeriesAreLeftOut) {
-  for (const double step : {1, 2, 3}) {
-    const HdfMaker file(folder_.path("s" + std::to_string(static_cast<int>(step)) + ".vtkhdf"));
+  constexpr int damaged = 6;
+  for (int step = 1; step <= damaged + 2; ++step) {
+    const HdfMaker file(folder_.path("s" + std::to_string(step) + ".vtkhdf"));
     file.group("/VTKHDF", "ImageData");
     describe_image(file, "/VTKHDF");
     file.set("/VTKHDF/PointData/a", {5, 3, 4}, image_values(step));
   }
-  std::filesystem::resize_file(folder_.path("s1.vtkhdf"), 600);
+  for (int step = 1; step <= damaged; ++step) {
+    std::filesystem::resize_file(folder_.path("s" + std::to_string(step) + ".vtkhdf"), 600);
+  }
   const auto source = opened(folder_.path("s*.vtkhdf"));
   ASSERT_TRUE(source);
+  EXPECT_THAT(source->info().format, HasSubstr("VTK"));
   ASSERT_EQ(source->info().steps.size(), 2U);
-  EXPECT_EQ(volume_of(*source, "a", 1).values[9], static_cast<float>(3 * image_values()[9]));
-  EXPECT_THAT(all_notes(source->info()), HasSubstr("1 of 3 files cannot be read"));
-  EXPECT_THAT(all_notes(source->info()), HasSubstr("'s1.vtkhdf'"));
+  EXPECT_EQ(volume_of(*source, "a", 1).values[9], static_cast<float>(8 * image_values()[9]));
+  const std::string notes = all_notes(source->info());
+  EXPECT_THAT(notes, HasSubstr("6 of 8 files cannot be read"));
+  EXPECT_THAT(notes, HasSubstr("'s1.vtkhdf'"));
+  EXPECT_THAT(notes, HasSubstr("is an HDF5 file that is damaged"));
 }
 
 TEST_F(VtkHdf, TooManyStepsAreRefused) {
