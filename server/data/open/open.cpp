@@ -54,8 +54,15 @@ constexpr auto array_formats = std::to_array<ArrayFormat>({
     {dx::looks_like, dx::open},
 });
 
-// The first bytes of the file, or of the first file of a series that is not damaged at its start;
-// empty if there is none.
+bool is_known(std::string_view head) {
+  return head.starts_with("\x89HDF") || head.starts_with("CDF") || head.starts_with("GRIB") ||
+         vtk::is_vtk(head) || list::looks_like(head) ||
+         std::any_of(array_formats.begin(), array_formats.end(),
+                     [&](const ArrayFormat& format) { return format.looks_like(head); });
+}
+
+// The first bytes of the file, or of the first file of a series whose format they tell; those of
+// the first file if there is none.
 Result<std::string> first_bytes(Files& files) {
   constexpr std::size_t looked_at_max = 64;
   const auto& members = files.location().members;
@@ -64,9 +71,8 @@ Result<std::string> first_bytes(Files& files) {
   for (std::size_t m = 0; m < std::min(members.size(), looked_at_max); ++m) {
     const auto input = files.open(members[m].name);
     auto head = input ? (*input)->head(4096) : Result<std::string>(input.error());
-    const bool has_text = head && head->find_first_not_of('\0') != std::string::npos;
-    if (m == 0) first = head;
-    if (has_text) return head;
+    if (head && is_known(*head)) return head;
+    if (m == 0) first = std::move(head);
   }
   return first;
 }

@@ -61,6 +61,18 @@ TEST(VtkSeries, DamagedFilesAreLeftOutAndNamed) {
               testing::ContainsRegex("2 of 4 files cannot be read.*'f1.vti'.*'f3.vti'"));
 }
 
+TEST(VtkSeries, AFirstFileOfAnotherFormatIsLeftOut) {
+  const VtkFolder folder;
+  folder.write("f1.vti", "<html><body>404 Not Found</body></html>");
+  folder.write("f2.vti", image(2, "2"));
+  folder.write("f3.vti", image(3, "3"));
+  const auto source = opened(folder.path("f*.vti"));
+  ASSERT_TRUE(source);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  EXPECT_EQ(volume_of(*source, "a", 1).values[0], 3);
+  EXPECT_THAT(all_notes(source->info()), HasSubstr("'f1.vti'"));
+}
+
 TEST(VtkSeries, StepsWithoutTimesAreNumbered) {
   const VtkFolder folder;
   folder.write("f1.vti", image(1, ""));
