@@ -225,6 +225,10 @@ Result<std::optional<HybridLevels>> find_hybrid(const ArrayFile& file, const Pla
   if (!by_formula) terms = usual_terms(file, coordinate, grid);
   HybridLevels out;
   out.surface = term_variable(file.contents(), terms["ps"]);
+  const int of_formula = out.surface;
+  if (by_formula && of_formula >= 0 && !on_columns(file.contents(), grid, of_formula)) {
+    out.surface = find_surface_pressure(file.contents(), grid);
+  }
   if (out.surface < 0 || !on_columns(file.contents(), grid, out.surface)) return Found();
   const auto made = terms.count("sigma") != 0 ? sigma_levels(file, grid, terms, out)
                                               : hybrid_levels(file, grid, terms, out);
@@ -238,6 +242,10 @@ Result<std::optional<HybridLevels>> find_hybrid(const ArrayFile& file, const Pla
   std::string note =
       "terrain-following levels: the vertical axis has their pressures for the mean of ";
   note += in_quotes(surface.name) + " at the first step" + out.note;
+  if (out.surface != of_formula) {
+    note += "; " + in_quotes(file.contents().variables[at(of_formula)].name) +
+            " of the formula lies on another grid";
+  }
   if (!by_formula) note += "; without formula_terms, identified by common names";
   out.note = std::move(note);
   return Found(std::move(out));

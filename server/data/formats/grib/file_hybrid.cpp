@@ -1,6 +1,7 @@
 // Hybrid levels of a file: their coefficients and the surface pressure as variables.
 #include <algorithm>
 #include <cstddef>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -14,7 +15,10 @@ namespace windsplat::data::grib {
 
 // Gives hybrid levels the terms of CF's atmosphere_hybrid_sigma_pressure_coordinate.
 Result<void> File::add_hybrid_levels() {
-  std::set<int> seen;  // dimensions
+  std::set<std::pair<int, std::size_t>> seen;  // dimensions on grids
+  std::map<std::size_t, int> surfaces;         // of grids: the variable of the pressure, or -1
+  std::map<int, bool> lacking;                 // dimensions: whether a grid has no pressure
+  std::set<int> placed;                        // dimensions with a formula
   const std::size_t fields = contents_.variables.size();
   for (std::size_t v = 0; v < fields; ++v) {
     if (held_[v].group < 0) continue;
@@ -23,18 +27,17 @@ Result<void> File::add_hybrid_levels() {
     const auto at = std::find(axes.begin(), axes.end(), level_axis_index);
     if (group.header.level_type != "hybrid" || at == axes.end()) continue;
     const int levels = contents_.variables[v].dims[static_cast<std::size_t>(at - axes.begin())];
-    if (!seen.insert(levels).second) continue;
+    if (!seen.insert({levels, group.grid}).second) continue;
     const auto pv = coefficients_of(group);
     if (!pv) return pv.error();
     const auto found = at_full_levels(*pv, group.axes[level_axis_index]);
     if (!found) continue;
     const std::string& name = contents_.dimensions[static_cast<std::size_t>(levels)].name;
-    const int surface = surface_pressure(group.grid);
-    if (surface < 0) {
-      contents_.notes.push_back("the pressures of the levels " + in_quotes(name) +
-                                " are unknown: the file has neither 'sp' nor 'lnsp' on their grid");
-      continue;
-    }
+    const auto [at_grid, is_new] = surfaces.try_emplace(group.grid, -1);
+    if (is_new) at_grid->second = surface_pressure(group.grid);
+    const int surface = at_grid->second;
+    lacking[levels] = lacking[levels] || surface < 0;
+    if (surface < 0 || !placed.insert(levels).second) continue;
     std::string formula;
     for (const auto& [term, values] : {std::pair("ap", &found->a), std::pair("b", &found->b)}) {
       FileVariable variable;
@@ -49,6 +52,15 @@ Result<void> File::add_hybrid_levels() {
     }
     formula += "ps: " + contents_.variables[static_cast<std::size_t>(surface)].name;
     held_[static_cast<std::size_t>(cf::variable_named(contents_, name))].formula = formula;
+  }
+  for (const auto& [levels, is_lacking] : lacking) {
+    if (!is_lacking) continue;
+    const bool is_partial = placed.count(levels) != 0;
+    contents_.notes.push_back(
+        "the pressures of the levels " +
+        in_quotes(contents_.dimensions[static_cast<std::size_t>(levels)].name) + " are unknown" +
+        (is_partial ? " on grids where the file has neither 'sp' nor 'lnsp'"
+                    : ": the file has neither 'sp' nor 'lnsp' on their grid"));
   }
   return {};
 }

@@ -208,6 +208,43 @@ TEST_F(GribLevels, HybridLevelsHavePressuresByTheirCoefficients) {
   }
 }
 
+// Two grids share the levels; the surface pressure of the shown one counts, wherever it is.
+TEST_F(GribLevels, HybridLevelsOfTwoGridsHavePressuresWhereTheSurfaceIsKnown) {
+  const std::vector<double> pv{0, 2000, 8000, 0, 0, 0, 0.25, 1};
+  const auto coarse = [&](const char* name, long level, double value) {
+    Maker maker("GRIB2");
+    maker.set("typeOfLevel", std::string("hybrid"));
+    maker.set("level", level);
+    maker.set("shortName", std::string(name));
+    maker.set("PVPresent", 1L);
+    EXPECT_EQ(codes_set_double_array(maker.handle(), "pv", pv.data(), pv.size()), CODES_SUCCESS);
+    maker.fill(value);
+    maker.set("Ni", 2L);
+    maker.set("longitudeOfLastGridPointInDegrees", 20.0);
+    maker.values(std::vector<double>(6, value));
+    return maker.bytes();
+  };
+  for (const bool has_both : {false, true}) {
+    std::string bytes;
+    for (const long level : {1L, 2L, 3L}) bytes += coarse("t", level, 250);
+    if (has_both) bytes += coarse("lnsp", 1, std::log(50000.0));
+    for (const long level : {1L, 2L, 3L}) bytes += at_hybrid("t", level, 200, pv);
+    bytes += at_hybrid("lnsp", 1, std::log(96000.0), pv);
+    const auto source = open(bytes);
+    ASSERT_TRUE(source);
+    const Axis& z = source->info().grid.axes[2];
+    ASSERT_EQ(z.kind, AxisKind::pressure) << has_both;
+    EXPECT_NEAR(z.coordinates[0], 4000 + 0.625 * 96000, 1);
+    const auto& notes = source->info().notes;
+    EXPECT_EQ(std::any_of(notes.begin(), notes.end(),
+                          [](const std::string& note) {
+                            return note.find("unknown on grids where the file has neither") !=
+                                   std::string::npos;
+                          }),
+              !has_both);
+  }
+}
+
 // Other coefficients, and levels without a surface pressure, stay numbers.
 TEST_F(GribLevels, HybridLevelsOfOtherKindsStayNumbers) {
   const std::vector<double> pressures{0, 2000, 8000, 0, 0, 0, 0.25, 1};
