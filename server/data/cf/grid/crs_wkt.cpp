@@ -98,6 +98,11 @@ class Reader {
     if (!is_geographic && type != PJ_TYPE_PROJECTED_CRS) {
       return fault("has well-known text of a system that is neither geographic nor projected");
     }
+    if (is_geographic && proj_crs_is_derived(context_, crs.get()) != 0) {
+      return fault(
+          "has well-known text of a derived geographic system, such as one with a "
+          "rotated pole, which is not read");
+    }
     if (auto done = shape(crs.get()); !done) return done.error();
     if (is_geographic) {
       out_.texts["grid_mapping_name"] = "latitude_longitude";

@@ -94,6 +94,13 @@ class PositionFinder {
         project(out);
       }
     }
+    if (is_placed && !out.columns && kind_ == "latitude_longitude" &&
+        x.kind == AxisKind::cartesian) {
+      info_.notes.push_back("longitudes and latitudes are unknown: " + mapping_name() +
+                            " is geographic, but " + in_quotes(x.name) + " and " +
+                            in_quotes(info_.grid.axes[1].name) +
+                            " are not marked as longitude and latitude");
+    }
     const bool on_map = x.standard_name == "projection_x_coordinate" || !kind_.empty();
     out.follow_other_axes = out.columns || about_pole || (on_map && !is_along_east(kind_));
     return out;

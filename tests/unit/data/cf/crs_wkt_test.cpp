@@ -119,6 +119,14 @@ TEST(CrsWkt, PositionsInvertTheFormulas) {
 TEST(CrsWkt, WhatIsNotKnownIsNoted) {
   for (const auto& [wkt, reason] : std::vector<std::pair<std::string, std::string>>{
            {"PROJCS[", "has well-known text that PROJ does not understand"},
+           {R"(GEOGCRS["rotated",BASEGEOGCRS["WGS 84",DATUM["World Geodetic System 1984",)"
+            R"(ELLIPSOID["WGS 84",6378137,298.257223563]]],DERIVINGCONVERSION["pole",)"
+            R"(METHOD["PROJ ob_tran o_proj=longlat"],)"
+            R"(PARAMETER["o_lat_p",39.25,ANGLEUNIT["degree",0.0174532925199433]],)"
+            R"(PARAMETER["lon_0",18,ANGLEUNIT["degree",0.0174532925199433]]],)"
+            R"(CS[ellipsoidal,2],AXIS["latitude",north],AXIS["longitude",east],)"
+            R"(ANGLEUNIT["degree",0.0174532925199433]])",
+            "a derived geographic system"},
            {R"(LOCAL_CS["l",UNIT["metre",1]])", "neither geographic nor projected"},
            {projcs("Cassini_Soldner",
                    parameter("latitude_of_origin", "45") + parameter("central_meridian", "0")),
