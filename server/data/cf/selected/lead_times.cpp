@@ -132,7 +132,7 @@ class TimedFile final : public ArrayFile {
   std::vector<double> times_;
 };
 
-// The dates of reference times, in their order; empty if one of them is none.
+// The dates of reference times, in their order; without those from the first that is none.
 Result<std::vector<std::string>> dates_of(const ArrayFile& file,
                                           const std::vector<int>& variables) {
   std::vector<std::string> out;
@@ -141,7 +141,7 @@ Result<std::vector<std::string>> dates_of(const ArrayFile& file,
     const auto values = unpacked_values(file, v);
     if (!values) return values.error();
     const auto decoded = decode_time(*values, one.units, one.calendar);
-    if (!decoded.reason.empty()) return std::vector<std::string>();
+    if (!decoded.reason.empty()) break;
     out.push_back(decoded.steps.front().text);
   }
   return out;
@@ -163,16 +163,22 @@ Result<std::unique_ptr<ArrayFile>> with_valid_times(std::unique_ptr<ArrayFile> f
   if (!leads) return leads.error();
   const auto dates = dates_of(*file, found->references);
   if (!dates) return dates.error();
-  if (dates->empty()) return file;
+  const auto without_dates = [&](const std::string& why) {
+    contents.notes.push_back("lead times are not shown as dates: " + why);
+    return std::unique_ptr<ArrayFile>(
+        std::make_unique<TimedFile>(std::move(file), std::move(contents), std::vector<double>()));
+  };
+  if (dates->size() < found->references.size()) {
+    const int missing = found->references[dates->size()];
+    return without_dates("the reference time " + in_quotes(contents.variables[at(missing)].name) +
+                         " is missing or no date");
+  }
   const std::string& date = dates->front();
   for (std::size_t n = 1; n < dates->size(); ++n) {
     if ((*dates)[n] == date) continue;
-    contents.notes.push_back("lead times are not shown as dates: there are two reference times, " +
-                             in_quotes(reference.name) + " (" + date + ") and " +
-                             in_quotes(contents.variables[at(found->references[n])].name) + " (" +
-                             (*dates)[n] + ')');
-    return std::unique_ptr<ArrayFile>(
-        std::make_unique<TimedFile>(std::move(file), std::move(contents), std::vector<double>()));
+    return without_dates(
+        "there are two reference times, " + in_quotes(reference.name) + " (" + date + ") and " +
+        in_quotes(contents.variables[at(found->references[n])].name) + " (" + (*dates)[n] + ')');
   }
   auto times = convert_times(*leads, {lead.units + " since " + date, reference.calendar},
                              {reference.units, reference.calendar});

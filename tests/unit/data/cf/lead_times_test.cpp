@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tests/unit/data/cf/selected_maker.hpp"
@@ -120,6 +121,29 @@ TEST(SelectedEntries, TwoReferenceTimesAreNoDates) {
               second == 32);
     EXPECT_EQ(last_of(volume_of(*source, "t", 1)), 1123);
   }
+}
+
+TEST(SelectedEntries, AMissingSecondReferenceTimeIsNoted) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "f.nc");
+    for (const char* name : {"start", "analysis"}) {
+      const bool is_missing = std::string_view(name) == "analysis";
+      const int v = file.variable(name, NC_DOUBLE, {}, {is_missing ? -999.0 : 24});
+      file.number(v, "missing_value", NC_DOUBLE, {-999});
+      file.text(v, "units", "hours since 2000-01-01");
+      file.text(v, "standard_name", "forecast_reference_time");
+    }
+    const int l = file.axis("lead", {6, 12}, "hours", "forecast_period");
+    const auto [z, y, x] = space_of(file);
+    file.variable("t", NC_FLOAT, {l, z, y, x}, tagged({2, 2, 3, 4}));
+  }
+  const auto source = opened(folder / "f.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().steps.at(1).text, "12");
+  EXPECT_TRUE(has_note(source->info(),
+                       "lead times are not shown as dates: the reference time 'analysis' is "
+                       "missing or no date"));
 }
 
 TEST(SelectedEntries, LeadTimesOnADeclaredTimeAxisFollowItToo) {
