@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -50,10 +51,9 @@ SparseFile::SparseFile(const std::string& url, std::pair<Descriptor, OpenSpace> 
       bytes_(response.file_bytes),
       bytes_max_(bytes_max),
       state_(ObjectCache::digest_of(url + '\n' + std::to_string(bytes_) + '\n' + validators_.etag)),
-      present_(blocks_to(bytes_)),
       fetched_bytes_(begin_bytes),
       next_(block_of(begin_bytes)) {
-  std::fill_n(present_.begin(), next_, true);
+  if (next_ > 0) present_[0] = next_;
 }
 
 Result<std::shared_ptr<SparseFile>> SparseFile::make(const std::string& url, PartialFile begin,
@@ -89,16 +89,22 @@ std::uint64_t SparseFile::fetched_bytes() const {
 
 std::size_t SparseFile::first_missing(std::size_t from, std::size_t end) const {
   const std::lock_guard lock(mutex_);
-  while (from < end && present_[from]) ++from;
-  return from;
+  const auto after = present_.upper_bound(from);
+  if (after == present_.begin()) return from;
+  return std::min(end, std::max(from, std::prev(after)->second));
+}
+
+std::size_t SparseFile::first_present(std::size_t from, std::size_t end) const {
+  const std::lock_guard lock(mutex_);
+  const auto after = present_.lower_bound(from);
+  return after == present_.end() ? end : std::min(end, after->first);
 }
 
 Extent SparseFile::present_around(std::uint64_t offset, std::uint64_t end) const {
   const std::lock_guard lock(mutex_);
-  std::size_t first = block_of(offset);
-  std::size_t last = blocks_to(end);
-  while (first > 0 && present_[first - 1]) --first;
-  while (last < present_.size() && present_[last]) ++last;
+  const auto after = present_.upper_bound(block_of(offset));
+  if (after == present_.begin()) return {offset, end};
+  const auto [first, last] = *std::prev(after);
   return {first * block_bytes, std::min(bytes_, last * block_bytes)};
 }
 
@@ -119,12 +125,8 @@ Result<Extent> SparseFile::fetch(std::uint64_t offset, std::uint64_t count, cons
   }
   while ((missing = first_missing(missing, end_block)) < end_block) {
     ahead_ = missing == next_ ? std::min(2 * ahead_, blocks_ahead_max) : 1;
-    std::size_t to = missing;
-    {
-      const std::lock_guard present(mutex_);
-      const std::size_t wanted = std::min(std::max(end_block, missing + ahead_), present_.size());
-      while (to < wanted && !present_[to]) ++to;
-    }
+    const std::size_t wanted = std::min(std::max(end_block, missing + ahead_), blocks_to(bytes_));
+    const std::size_t to = first_present(missing, wanted);
     if (auto done = fetch_blocks(missing, to, get); !done) return done.error();
     next_ = to;
   }
@@ -153,7 +155,15 @@ Result<void> SparseFile::fetch_blocks(std::size_t first, std::size_t end, const 
   space_.add(wanted);
   const std::lock_guard lock(mutex_);
   fetched_bytes_ += wanted;
-  for (std::size_t block = first; block < end; ++block) present_[block] = true;
+  const auto before = present_.lower_bound(first);
+  if (before != present_.begin() && std::prev(before)->second == first) {
+    first = std::prev(before)->first;
+  }
+  if (const auto after = present_.find(end); after != present_.end()) {
+    end = after->second;
+    present_.erase(after);
+  }
+  present_[first] = end;
   return {};
 }
 

@@ -4,11 +4,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <string_view>
-#include <vector>
+#include <utility>
 
 #include "server/base/error.hpp"
 #include "server/data/fetch/http_client.hpp"
@@ -39,7 +40,8 @@ class SparseFile {
                                                   std::uint64_t bytes_max);
 
   // Fetches what is missing of [offset, offset + count), clipped to the file. The result contains
-  // it and is present. Errors: those of `get`; too_large; cancelled; out_of_memory.
+  // it and is present. Errors: those of `get`; too_large; cancelled; out_of_memory, also if the
+  // cache has no room for it.
   Result<Extent> fetch(std::uint64_t offset, std::uint64_t count, const Get& get,
                        const Cancelled& cancelled);
   // Opens it for reading, with a position of its own. Errors: out_of_memory.
@@ -55,7 +57,9 @@ class SparseFile {
   SparseFile(const std::string& url, std::pair<Descriptor, OpenSpace> file,
              const Response& response, std::uint64_t begin_bytes, std::uint64_t bytes_max);
   Result<void> fetch_blocks(std::size_t first, std::size_t end, const Get& get);
+  // The first block that is missing, or `end`; the first from `from` on that is present, or `end`.
   [[nodiscard]] std::size_t first_missing(std::size_t from, std::size_t end) const;
+  [[nodiscard]] std::size_t first_present(std::size_t from, std::size_t end) const;
   [[nodiscard]] Extent present_around(std::uint64_t offset, std::uint64_t end) const;
 
   const std::string url_;
@@ -65,8 +69,10 @@ class SparseFile {
   const std::uint64_t bytes_;
   const std::uint64_t bytes_max_;
   const std::string state_;
-  mutable std::mutex mutex_;   // guards the next two members
-  std::vector<bool> present_;  // blocks
+  mutable std::mutex mutex_;  // guards the next two members
+  // Blocks [key, value) that are present, not side by side: as much memory as was fetched deserves,
+  // whatever size the host claims.
+  std::map<std::size_t, std::size_t> present_;
   std::uint64_t fetched_bytes_ = 0;
   std::timed_mutex fetching_;  // one request at a time; guards the members below
   std::size_t next_ = 0;       // the block after the last request

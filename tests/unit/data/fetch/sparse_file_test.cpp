@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -39,13 +40,13 @@ class SparseFiles : public testing::Test {
     std::error_code ignored;
     fs::remove_all(folder_, ignored);
   }
-  void make(std::uint64_t bytes_max) {
+  void make(std::uint64_t bytes_max, std::uint64_t claimed_bytes = file_bytes) {
     auto part = cache_->begin();
     ASSERT_TRUE(part);
     ASSERT_TRUE(part->append(bytes_of({0, block})));
     Response response;
     response.validators.etag = "\"1\"";
-    response.file_bytes = file_bytes;
+    response.file_bytes = claimed_bytes;
     auto made = SparseFile::make("https://h/a.nc", std::move(*part), response, bytes_max);
     ASSERT_TRUE(made) << made.error().message;
     file_ = *made;
@@ -126,6 +127,43 @@ TEST_F(SparseFiles, ExtentsAreClippedToTheFile) {
   const auto beyond = fetch(~std::uint64_t{0}, ~std::uint64_t{0}).value();
   EXPECT_EQ(beyond.begin, file_bytes);
   EXPECT_EQ(beyond.end, file_bytes);
+}
+
+// Fetched in an order that joins extents on both sides, and compared with one bit for each block.
+TEST_F(SparseFiles, KnowsWhichBlocksArePresentInAnyOrder) {
+  std::vector<bool> present(41);
+  present[0] = true;
+  for (std::size_t i = 0; i < present.size(); ++i) {
+    const std::size_t one = (i * 17 + 5) % present.size();
+    const bool was_present = present[one];
+    asked_.clear();
+    const auto extent = fetch(one * block, 1).value();
+    EXPECT_EQ(asked_.empty(), was_present) << one;
+    for (const auto& [first, count] : asked_) {
+      for (std::uint64_t at = first; at < first + count; at += block) present[at / block] = true;
+    }
+    std::size_t first = one;
+    std::size_t end = one + 1;
+    while (first > 0 && present[first - 1]) --first;
+    while (end < present.size() && present[end]) ++end;
+    EXPECT_EQ(extent.begin, first * block);
+    EXPECT_EQ(extent.end, std::min(file_bytes, end * block));
+    EXPECT_TRUE(is_there(extent));
+  }
+}
+
+TEST_F(SparseFiles, AFileOfTheLargestSizeTakesNoMemoryForWhatIsMissing) {
+  constexpr std::uint64_t largest = std::uint64_t{1} << 42;
+  std::vector<std::shared_ptr<SparseFile>> files;
+  const auto before = mallinfo2();
+  for (int i = 0; i < 16; ++i) {
+    make(file_bytes, largest);
+    files.push_back(file_);
+  }
+  const auto after = mallinfo2();
+  EXPECT_LT(after.uordblks + after.hblkhd - before.uordblks - before.hblkhd, 1U << 20U);
+  ASSERT_TRUE(fetch(largest - 10, 10));
+  EXPECT_THAT(asked_, ElementsAre(Pair(largest - block, block)));
 }
 
 TEST_F(SparseFiles, BlocksThatFailAreStillMissing) {
