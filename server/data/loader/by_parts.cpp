@@ -84,11 +84,13 @@ long bytes_from(int descriptor, off_t offset, std::size_t count) {
   return static_cast<long>(std::min<std::uint64_t>(count, static_cast<std::uint64_t>(left)));
 }
 
+static_assert(sizeof(long) == sizeof(off_t), "the mark would be the upper half of the offset");
+
 // The call itself, under a number that is not redirected; offset -1: at the position of the file.
 long read_now(int descriptor, void* out, std::size_t count, off_t offset) {
   iovec part{out, count};
   const long got = ::syscall(SYS_preadv2, descriptor, &part, 1UL, static_cast<long>(offset),
-                             static_cast<long>(offset < 0 ? -1 : 0), 0);
+                             mark_of_own_reads, 0);
   return got < 0 ? -errno : got;
 }
 

@@ -13,6 +13,9 @@ namespace windsplat::data::loader {
 // From this number on descriptors are those of files in parts, and reads of them are redirected.
 // Before reserve_parts(): none are.
 int first_of_parts();
+// The last-but-one argument of preadv2 by which the reads of this file are told from those of
+// libraries, which are forbidden. The kernel ignores it where offsets have 64 bits.
+inline constexpr std::uint64_t mark_of_own_reads = 0x7061'7274'736f'776e;
 // Descriptors [first, end) are for files in parts; `socket` leads to the daemon.
 void reserve_parts(int first, int end, int socket);
 // Notes the number of the parts (FileParts) of an open file, and moves its descriptor there unless

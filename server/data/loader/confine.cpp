@@ -149,11 +149,11 @@ scmp_arg_cmp equals(unsigned argument, int value) {
 int forbid_calls() {
   Filter filter;
   for (const int call :
-       {SCMP_SYS(preadv2), SCMP_SYS(lseek), SCMP_SYS(fstat), SCMP_SYS(munmap), SCMP_SYS(mremap),
-        SCMP_SYS(brk), SCMP_SYS(madvise), SCMP_SYS(futex), SCMP_SYS(clock_gettime),
-        SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep), SCMP_SYS(gettimeofday), SCMP_SYS(getrandom),
-        SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn),
-        SCMP_SYS(sigaltstack), SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group),
+       {SCMP_SYS(lseek), SCMP_SYS(fstat), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(brk),
+        SCMP_SYS(madvise), SCMP_SYS(futex), SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep),
+        SCMP_SYS(nanosleep), SCMP_SYS(gettimeofday), SCMP_SYS(getrandom), SCMP_SYS(rt_sigaction),
+        SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
+        SCMP_SYS(restart_syscall), SCMP_SYS(exit), SCMP_SYS(exit_group),
 #ifdef WINDSPLAT_SANITIZED
         // Sanitizers probe through a pipe whether memory can be read.
         SCMP_SYS(pipe2), SCMP_SYS(pipe),
@@ -177,6 +177,7 @@ int forbid_calls() {
   for (const int call : {SCMP_SYS(readv), SCMP_SYS(preadv), SCMP_SYS(dup)}) {
     filter.add(SCMP_ACT_ALLOW, call, {is_whole});
   }
+  filter.add(SCMP_ACT_ALLOW, SCMP_SYS(preadv2), {{4, SCMP_CMP_EQ, mark_of_own_reads, 0}});
   // Mappings must not be executable, nor escape the memory limit: neither shared and anonymous nor
   // growing automatically.
   constexpr int kinds = MAP_SHARED | MAP_ANONYMOUS | MAP_GROWSDOWN;

@@ -147,6 +147,12 @@ const std::vector<Attempt> on_a_file_in_parts{
        iovec part{text, sizeof text};
        return ::preadv(in_parts, &part, 1, 0);
      }},
+    {"scatter a file in parts with flags", EPERM,
+     [](int) -> long {
+       char text[4];
+       iovec part{text, sizeof text};
+       return ::preadv2(in_parts, &part, 1, 0, RWF_HIPRI);
+     }},
 };
 
 const std::vector<Attempt> on_the_world{
