@@ -152,6 +152,22 @@ void OpenSpace::add(std::uint64_t bytes) {
   cache_->evict(cache_->options_.bytes_max);
 }
 
+bool OpenSpace::reserve(std::uint64_t bytes) {
+  const std::lock_guard lock(cache_->mutex_);
+  const std::uint64_t bytes_max = cache_->options_.bytes_max;
+  if (bytes > bytes_max || cache_->open_bytes_ > bytes_max - bytes) return false;
+  bytes_ += bytes;
+  cache_->open_bytes_ += bytes;
+  cache_->evict(bytes_max);
+  return true;
+}
+
+void OpenSpace::give_back(std::uint64_t bytes) {
+  const std::lock_guard lock(cache_->mutex_);
+  bytes_ -= bytes;
+  cache_->open_bytes_ -= bytes;
+}
+
 PartialFile::PartialFile(Descriptor file, std::string path, ObjectCache& cache)
     : file_(std::move(file)), space_(cache), path_(std::move(path)), digest_(new_digest()) {}
 

@@ -37,8 +37,12 @@ class OpenSpace {
   OpenSpace(const OpenSpace&) = delete;
   OpenSpace& operator=(const OpenSpace&) = delete;
   ~OpenSpace();
-  // Removes other files if the cache becomes too large.
+  // Removes other files if the cache becomes too large. A file that is being received as a whole
+  // may exceed its size, until it is kept.
   void add(std::uint64_t bytes);
+  // The same, but false, and nothing is added, if files without a name alone would be too large.
+  [[nodiscard]] bool reserve(std::uint64_t bytes);
+  void give_back(std::uint64_t bytes);
 
  private:
   friend class ObjectCache;

@@ -42,6 +42,10 @@ std::size_t blocks_to(std::uint64_t end) { return block_of(end + SparseFile::blo
 
 }  // namespace
 
+std::string state_of(const std::string& url, std::uint64_t bytes, const std::string& etag) {
+  return ObjectCache::digest_of(url + '\n' + std::to_string(bytes) + '\n' + etag);
+}
+
 SparseFile::SparseFile(const std::string& url, std::pair<Descriptor, OpenSpace> file,
                        const Response& response, std::uint64_t begin_bytes, std::uint64_t bytes_max)
     : url_(url),
@@ -50,7 +54,7 @@ SparseFile::SparseFile(const std::string& url, std::pair<Descriptor, OpenSpace> 
       validators_(response.validators),
       bytes_(response.file_bytes),
       bytes_max_(bytes_max),
-      state_(ObjectCache::digest_of(url + '\n' + std::to_string(bytes_) + '\n' + validators_.etag)),
+      state_(state_of(url, bytes_, validators_.etag)),
       fetched_bytes_(begin_bytes),
       next_(block_of(begin_bytes)) {
   if (next_ > 0) present_[0] = next_;
@@ -87,17 +91,13 @@ std::uint64_t SparseFile::fetched_bytes() const {
   return fetched_bytes_;
 }
 
-std::size_t SparseFile::first_missing(std::size_t from, std::size_t end) const {
+std::pair<std::size_t, std::size_t> SparseFile::first_missing(std::size_t from,
+                                                              std::size_t end) const {
   const std::lock_guard lock(mutex_);
   const auto after = present_.upper_bound(from);
-  if (after == present_.begin()) return from;
-  return std::min(end, std::max(from, std::prev(after)->second));
-}
-
-std::size_t SparseFile::first_present(std::size_t from, std::size_t end) const {
-  const std::lock_guard lock(mutex_);
-  const auto after = present_.lower_bound(from);
-  return after == present_.end() ? end : std::min(end, after->first);
+  if (after != present_.begin()) from = std::max(from, std::prev(after)->second);
+  from = std::min(from, end);
+  return {from, after == present_.end() ? end : std::min(end, after->first)};
 }
 
 Extent SparseFile::present_around(std::uint64_t offset, std::uint64_t end) const {
@@ -115,7 +115,7 @@ Result<Extent> SparseFile::fetch(std::uint64_t offset, std::uint64_t count, cons
   const std::uint64_t end = offset + std::min(count, bytes_ - offset);
   const std::size_t end_block = blocks_to(end);
   if (offset == end) return Extent{offset, offset};
-  std::size_t missing = first_missing(block_of(offset), end_block);
+  std::size_t missing = first_missing(block_of(offset), end_block).first;
   if (missing == end_block) return present_around(offset, end);
   std::unique_lock lock(fetching_, std::defer_lock);
   while (!lock.try_lock_for(look_every)) {
@@ -123,10 +123,10 @@ Result<Extent> SparseFile::fetch(std::uint64_t offset, std::uint64_t count, cons
       return make_error(ErrorKind::cancelled, in_quotes(url_) + " was cancelled");
     }
   }
-  while ((missing = first_missing(missing, end_block)) < end_block) {
+  while ((missing = first_missing(missing, end_block).first) < end_block) {
     ahead_ = missing == next_ ? std::min(2 * ahead_, blocks_ahead_max) : 1;
     const std::size_t wanted = std::min(std::max(end_block, missing + ahead_), blocks_to(bytes_));
-    const std::size_t to = first_present(missing, wanted);
+    const std::size_t to = first_missing(missing, wanted).second;
     if (auto done = fetch_blocks(missing, to, get); !done) return done.error();
     next_ = to;
   }
@@ -141,6 +141,12 @@ Result<void> SparseFile::fetch_blocks(std::size_t first, std::size_t end, const 
                       "the parts of " + in_quotes(url_) + " that were read have more than the " +
                           std::to_string(bytes_max_) + " bytes of --max-download");
   }
+  if (!space_.reserve(wanted)) {
+    return make_error(ErrorKind::out_of_memory,
+                      in_quotes(url_) +
+                          " cannot be read on: the parts of files in use have all of "
+                          "--data-cache-size");
+  }
   std::uint64_t came = 0;
   const auto got = get({begin, wanted}, [&](std::string_view bytes) {
     if (bytes.size() > wanted - came) return false;
@@ -148,11 +154,11 @@ Result<void> SparseFile::fetch_blocks(std::size_t first, std::size_t end, const 
     came += bytes.size();
     return true;
   });
-  if (!got) return got.error();
-  if (came != wanted) {
+  if (!got || came != wanted) {
+    space_.give_back(wanted);
+    if (!got) return got.error();
     return make_error(ErrorKind::bad_data, in_quotes(url_) + " was received incompletely");
   }
-  space_.add(wanted);
   const std::lock_guard lock(mutex_);
   fetched_bytes_ += wanted;
   const auto before = present_.lower_bound(first);

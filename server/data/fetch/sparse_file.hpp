@@ -19,6 +19,9 @@
 
 namespace windsplat::data::fetch {
 
+// Digest of URL, size and ETag of a file.
+std::string state_of(const std::string& url, std::uint64_t bytes, const std::string& etag);
+
 // Thread-safe. The file has no name on disk, so that it ends with the process; its blocks count in
 // the size of the cache, which must outlive it.
 class SparseFile {
@@ -47,19 +50,20 @@ class SparseFile {
   // Opens it for reading, with a position of its own. Errors: out_of_memory.
   [[nodiscard]] Result<Descriptor> open() const;
 
+  [[nodiscard]] const std::string& url() const { return url_; }
   [[nodiscard]] const Validators& validators() const { return validators_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] std::uint64_t fetched_bytes() const;
-  // Digest of URL, size and ETag.
+  // state_of() of it.
   [[nodiscard]] const std::string& state() const { return state_; }
 
  private:
   SparseFile(const std::string& url, std::pair<Descriptor, OpenSpace> file,
              const Response& response, std::uint64_t begin_bytes, std::uint64_t bytes_max);
   Result<void> fetch_blocks(std::size_t first, std::size_t end, const Get& get);
-  // The first block that is missing, or `end`; the first from `from` on that is present, or `end`.
-  [[nodiscard]] std::size_t first_missing(std::size_t from, std::size_t end) const;
-  [[nodiscard]] std::size_t first_present(std::size_t from, std::size_t end) const;
+  // The first blocks side by side in [from, end) that are missing: first and end, or twice `end`.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> first_missing(std::size_t from,
+                                                                  std::size_t end) const;
   [[nodiscard]] Extent present_around(std::uint64_t offset, std::uint64_t end) const;
 
   const std::string url_;

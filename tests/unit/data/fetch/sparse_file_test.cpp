@@ -209,6 +209,26 @@ TEST_F(SparseFiles, OtherFilesGiveWayToBlocks) {
   EXPECT_EQ(cache_->bytes(), 7 * block);
 }
 
+TEST_F(SparseFiles, BlocksInUseAreLimitedByTheSizeOfTheCache) {
+  cache_ = nullptr;
+  file_.reset();
+  cache_ = ObjectCache::open({folder_.native(), 8 * block}).value();
+  make(file_bytes);
+  ASSERT_TRUE(fetch(10 * block, 4 * block));
+  asked_.clear();
+  const auto refused = fetch(20 * block, 4 * block);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::out_of_memory);
+  EXPECT_THAT(refused.error().message, HasSubstr("--data-cache-size"));
+  EXPECT_TRUE(asked_.empty());
+  EXPECT_EQ(cache_->bytes(), 5 * block);
+  fault_ = make_error(ErrorKind::bad_data, "the host failed");
+  EXPECT_FALSE(fetch(20 * block, 3 * block));
+  EXPECT_EQ(cache_->bytes(), 5 * block) << "what did not come takes no room";
+  fault_.reset();
+  EXPECT_TRUE(fetch(20 * block, 3 * block));
+}
+
 TEST_F(SparseFiles, FilesBeingReceivedCountInTheCache) {
   file_.reset();
   auto part = cache_->begin();
