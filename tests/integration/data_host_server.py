@@ -117,7 +117,11 @@ class Handler(http.server.BaseHTTPRequestHandler):
         part = body[first:last + 1]
         with host.lock:
             host.parts.append((self.path, first, len(part)))
-        self.answer(206, part, ETag=etag, Content_Range=f"bytes {first}-{last}/{len(body)}")
+        sent = {"ETag": etag, "Content_Range": f"bytes {first}-{last}/{len(body)}"}
+        status, part = 206, host.altered(first, part, sent) if host.altered else part
+        if part is None:
+            status, part, sent = 500, b"", {}
+        self.answer(status, part, **sent)
 
     # --- OPeNDAP ------------------------------------------------------------------------------
 
@@ -312,6 +316,8 @@ class DataHost:
         self.etag_mark = ""  # "W/": weak
         self.date = ""  # Last-Modified of every file, which then have no ETag
         self.parts = []  # path, first byte and number of bytes of each part that was sent
+        # First byte, bytes and headers (to change) of a part -> its bytes; None: status 500.
+        self.altered = None
         self.stalled = set()  # names of files that are never sent to their end
         self.waits, self.left = threading.Event(), threading.Event()  # a client for one of these
         self.plain_port = plain_port

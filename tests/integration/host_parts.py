@@ -116,7 +116,7 @@ class HostParts(unittest.TestCase):
         self.host.files = dict(self.bodies)
         self.host.ranges, self.host.if_range = True, True
         self.host.etag_mark, self.host.date = "", ""
-        self.host.parts, self.host.stalled = [], set()
+        self.host.parts, self.host.stalled, self.host.altered = [], set(), None
         self.host.asked()
         self.cache = pathlib.Path(tempfile.mkdtemp(dir=self.folder)) / "cache"
 
@@ -184,6 +184,79 @@ class HostParts(unittest.TestCase):
                     self.assertIn("has changed on its host since it was opened",
                                   json.loads(body)["detail"])
                     self.assertEqual(daemon.get(frame + "0"), before)
+
+    def test_a_longer_file_can_be_opened_after_the_error(self):
+        frame = "/v1/datasets/four/frame.npy?width=64&height=48&step="
+        url = self.host.origin + "/four.nc"
+        with Daemon("tornado", *self.options()) as daemon:
+            daemon.finished(job_of(daemon.root, url))
+            before = daemon.get(frame + "0")
+            self.assertEqual(before[0], 200, before[1])
+            other = (self.folder / "other.nc").read_bytes()
+            self.host.files["four.nc"] = other + bytes(100_000)
+            status, body = daemon.get(frame + "2")
+            self.assertEqual(status, 422, body)
+            self.assertIn("has changed on its host since it was opened",
+                          json.loads(body)["detail"])
+            request = urllib.request.Request(daemon.root + "v1/datasets/four?forget=true",
+                                             method="DELETE")
+            urllib.request.urlopen(request).close()
+            state = daemon.finished(job_of(daemon.root, url))
+            self.assertEqual(state["state"], "done", state)
+            after = daemon.get(frame + "0")
+            self.assertEqual(after[0], 200, after[1])
+            self.assertNotEqual(after, before)
+
+    def test_parts_that_do_not_fit_together_are_replaced_by_the_whole_file(self):
+        def tagged(tag):
+            def alter(first, part, sent):
+                sent["ETag"] = tag if first else sent["ETag"]
+                return part
+            return alter
+        near = self.picture(self.folder / "four.nc", 2, 1)
+        for name, altered in (
+                ("no ETag", tagged(None)), ("weak ETag", tagged('W/"1"')),
+                ("mirror", tagged('"of a mirror"')),
+                ("longer", lambda first, part, _: part + b"xxxx" if first else part),
+                ("shorter", lambda first, part, _: part[:-4] if first else part),
+                ("empty", lambda first, part, _: b""),
+                ("empty later", lambda first, part, _: b"" if first else part)):
+            with self.subTest(name):
+                self.setUp()
+                self.host.altered = altered
+                np.testing.assert_array_equal(
+                    self.picture(self.host.origin + "/four.nc", 2, 1, *self.options()), near)
+                self.assertLessEqual(len(self.host.asked()), 4)
+                self.assertIn(len(self.bodies["four.nc"]),
+                              [path.stat().st_size for path in self.cache.iterdir()])
+
+    def test_a_part_that_fails_ends_the_reading(self):
+        self.host.altered = lambda first, part, _: None if first else part
+        self.assertIn("is answered with status 500", self.refusal("/four.nc"))
+        self.assertLessEqual(len(self.host.asked()), 2)
+
+    def test_a_coded_part_is_refused_as_such(self):
+        def alter(first, part, sent):
+            if first:
+                sent |= {"Content_Encoding": "gzip", "ETag": 'W/"coded"'}
+            return part[:100] if first else part
+        self.host.altered = alter
+        self.assertIn("content coding 'gzip'", self.refusal("/four.nc"))
+
+    def inspect_all(self, *options):
+        return self.run_program("inspect", self.host.origin + "/classic.nc", "--ranges", "all",
+                                *options, *self.options())
+
+    def test_a_file_that_was_read_to_its_end_is_kept(self):
+        first = self.inspect_all()
+        self.assertEqual(first.returncode, 0, first.stderr)
+        self.assertIn(len(self.bodies["classic.nc"]),
+                      [path.stat().st_size for path in self.cache.iterdir()])
+        self.host.parts = []
+        self.host.asked()
+        again = self.inspect_all()
+        self.assertEqual(again.stdout, first.stdout)
+        self.assertEqual((self.host.parts, len(self.host.asked())), ([], 1), "confirmed only")
 
     def test_whole_files_are_fetched_where_parts_have_no_state(self):
         for what in ({"ranges": False}, {"etag_mark": "W/"},

@@ -26,9 +26,12 @@ class FetchedFiles final : public Files {
     const Fetch how = is_whole ? Fetch::whole : Fetch::parts;
     auto fetched = fetcher_.fetch(*url, how, cancelled_);
     if (!fetched) return fetched.error();
-    FileParts parts;
+    FileParts parts{0, std::move(fetched->state)};
     if (fetched->parts) {
-      parts = {++last_number_, fetched->parts->state()};
+      if (parts_.size() >= location_.members.size() + open_besides_members_max) {
+        return make_error(ErrorKind::bad_data, in_quotes(name) + ": too many files are open");
+      }
+      parts.number = ++last_number_;
       parts_[parts.number] = {*url, std::move(fetched->parts)};
     }
     auto file = InputFile::adopt(fetched->file.give(), name.substr(name.find_last_of('/') + 1),
@@ -41,8 +44,12 @@ class FetchedFiles final : public Files {
                             std::uint64_t count) override {
     const auto at = parts_.find(number);
     if (at == parts_.end()) return make_error(ErrorKind::not_found, "no such file is open");
+    // Libraries read on after a fault, and each request may take as long as the first.
+    if (fault_) return *fault_;
     auto out = fetcher_.fetch_part(at->second.url, *at->second.file, offset, count, cancelled_);
-    if (!out && !fault_) fault_ = out.error();
+    if (out) return out;
+    fault_ = out.error();
+    is_unfit_ = fetcher_.is_unfit(at->second.file->url());
     return out;
   }
 
@@ -66,6 +73,7 @@ class FetchedFiles final : public Files {
   }
 
   [[nodiscard]] std::optional<Error> take_fault() override { return std::exchange(fault_, {}); }
+  [[nodiscard]] bool is_unfit_for_parts() const override { return is_unfit_; }
 
  private:
   static Error not_permitted(const std::string& name) {
@@ -105,6 +113,7 @@ class FetchedFiles final : public Files {
   Location location_;
   Cancelled cancelled_;
   std::optional<Error> fault_;
+  bool is_unfit_ = false;
   struct Parts {
     std::string url;
     std::shared_ptr<SparseFile> file;

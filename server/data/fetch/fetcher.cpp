@@ -1,5 +1,7 @@
 #include "server/data/fetch/fetcher.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -9,6 +11,9 @@ namespace {
 
 constexpr std::size_t idle_clients_max = 8;
 constexpr std::size_t idle_parts_max = 64;  // files open without a reader
+constexpr std::chrono::minutes unfit_time{1};
+constexpr std::size_t noted_files_max = 4096;
+constexpr std::uint64_t kept_share = 4;  // of the cache, for a file that was read to its end
 constexpr std::size_t list_entries_max = 1'000'000;
 constexpr int list_pages_max = 1100;  // pages have 1000 entries
 constexpr std::size_t list_page_bytes_max = std::size_t{4} << 20;
@@ -20,7 +25,20 @@ Error no_s3(const Url& url) {
 Result<FetchedFile> opened(std::shared_ptr<SparseFile> parts) {
   auto file = parts->open();
   if (!file) return file.error();
-  return FetchedFile{std::move(*file), std::move(parts)};
+  std::string state = parts->state();
+  return FetchedFile{std::move(*file), std::move(parts), std::move(state)};
+}
+
+// Why a part is not one of the file.
+Error fault_of_part(const Url& url, const SparseFile& file, const std::string& etag) {
+  std::string why = " has changed on its host since it was opened; open it again";
+  if (etag == file.validators().etag) {
+    why = " is answered with other bytes than those that were asked for";
+  } else if (!etag.starts_with('"')) {
+    why =
+        " is answered without a strong ETag, so that its parts may be of two states; open it again";
+  }
+  return make_error(ErrorKind::bad_data, in_quotes(url.text()) + why);
 }
 
 }  // namespace
@@ -85,12 +103,14 @@ Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Can
   if (mark < text.size()) request->query = text.substr(mark + 1);
   const std::string key = request->url.text() + text.substr(mark);
   if (auto permitted = rules_->check(request->url); !permitted) return permitted.error();
+  if (is_unfit(key)) how = Fetch::whole;
   auto parts = how == Fetch::parts ? find_parts(key) : std::nullopt;
   if (parts && Clock::now() - parts->confirmed < options_.cache.fresh_time) {
     return opened(std::move(parts->file));
   }
   auto known = parts ? std::nullopt : cache_->find(key);
-  if (known && known->is_fresh) return FetchedFile{std::move(known->file), nullptr};
+  const std::string kept = known ? state_of_kept(key, *known) : "";
+  if (known && known->is_fresh) return FetchedFile{std::move(known->file), nullptr, kept};
   if (parts) request->known = parts->file->validators();
   if (known) request->known = known->validators;
   if (known) request->known_bytes = known->bytes;
@@ -112,7 +132,7 @@ Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Can
       return opened(std::move(parts->file));
     }
     cache_->confirm(key);
-    return FetchedFile{std::move(known->file), nullptr};
+    return FetchedFile{std::move(known->file), nullptr, kept};
   }
   if (response->file_bytes > part->bytes()) {
     cache_->remove(key);
@@ -124,7 +144,7 @@ Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Can
   forget_parts(key);
   auto file = cache_->keep(key, std::move(*part), response->validators);
   if (!file) return file.error();
-  return FetchedFile{std::move(*file), nullptr};
+  return FetchedFile{std::move(*file), nullptr, {}};
 }
 
 Result<Extent> Fetcher::fetch_part(const std::string& text, SparseFile& file, std::uint64_t offset,
@@ -136,17 +156,63 @@ Result<Extent> Fetcher::fetch_part(const std::string& text, SparseFile& file, st
   request->state = file.validators().etag;
   request->state_bytes = file.bytes();
   const auto get_bytes = [&](ByteRange range, const HttpClient::Sink& sink) -> Result<void> {
-    drop_idle_parts();
     request->range = range;
     request->limits.bytes_max = range.count;
     const auto response = get(*request, sink);
     if (!response) return response.error();
-    return {};
+    if (!response->is_other_part) return {};
+    if (file.bytes() <= options_.limits.bytes_max) note_unfit(file.url());
+    return fault_of_part(request->url, file, response->validators.etag);
   };
+  drop_idle_parts(std::min(count, file.bytes()));
   auto out = file.fetch(offset, count, get_bytes, request->cancelled);
-  // Whoever opens it next asks for its state.
-  if (!out && out.error().kind == ErrorKind::bad_data) forget_parts(request->url.text());
+  if (out && file.fetched_bytes() >= file.bytes()) keep_whole(file);
+  if (out) return out;
+  const ErrorKind kind = out.error().kind;
+  if (kind == ErrorKind::bad_data || kind == ErrorKind::not_found) forget_parts(file.url());
   return out;
+}
+
+bool Fetcher::is_unfit(const std::string& key) {
+  const std::lock_guard lock(mutex_);
+  const auto at = unfit_.find(key);
+  if (at == unfit_.end()) return false;
+  if (Clock::now() - at->second < unfit_time) return true;
+  unfit_.erase(at);
+  return false;
+}
+
+void Fetcher::note_unfit(const std::string& key) {
+  const std::lock_guard lock(mutex_);
+  if (unfit_.size() >= noted_files_max) unfit_.clear();
+  unfit_[key] = Clock::now();
+}
+
+// It is in use as it is: what cannot be kept is fetched again by the next program.
+void Fetcher::keep_whole(const SparseFile& file) {
+  constexpr std::size_t copied_at_once = std::size_t{1} << 20;
+  if (file.bytes() > options_.cache.bytes_max / kept_share) return;
+  {
+    const std::lock_guard lock(mutex_);
+    if (kept_.size() >= noted_files_max) kept_.clear();
+    if (!kept_.insert(file.state()).second) return;
+  }
+  const auto from = file.open();
+  auto part = cache_->begin();
+  if (!from || !part) return;
+  std::string bytes(copied_at_once, '\0');
+  while (part->bytes() < file.bytes()) {
+    const ssize_t got = ::read(from->number(), bytes.data(), bytes.size());
+    if (got <= 0 || !part->append({bytes.data(), static_cast<std::size_t>(got)})) return;
+  }
+  static_cast<void>(cache_->keep(file.url(), std::move(*part), file.validators()));
+}
+
+// Datasets that were opened when it was in parts know it by that state.
+std::string Fetcher::state_of_kept(const std::string& key, const ObjectCache::Entry& entry) {
+  std::string state = state_of(key, entry.bytes, entry.validators.etag);
+  const std::lock_guard lock(mutex_);
+  return kept_.contains(state) ? state : "";
 }
 
 std::optional<Fetcher::KnownParts> Fetcher::find_parts(const std::string& key) {
@@ -173,11 +239,11 @@ void Fetcher::forget_parts(const std::string& key) {
   parts_.remove_if([&](const KnownParts& known) { return known.key == key; });
 }
 
-void Fetcher::drop_idle_parts() {
+void Fetcher::drop_idle_parts(std::uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   for (auto at = parts_.end(); at != parts_.begin();) {
-    constexpr std::uint64_t margin = SparseFile::blocks_ahead_max * SparseFile::block_bytes;
-    if (cache_->bytes() + margin <= options_.cache.bytes_max) return;
+    constexpr std::uint64_t ahead = SparseFile::blocks_ahead_max * SparseFile::block_bytes;
+    if (cache_->bytes() + bytes + ahead <= options_.cache.bytes_max) return;
     --at;
     if (at->file.use_count() == 1) at = parts_.erase(at);
   }

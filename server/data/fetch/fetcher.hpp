@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -37,6 +39,7 @@ using Cancelled = std::function<bool()>;
 struct FetchedFile {
   Descriptor file;
   std::shared_ptr<SparseFile> parts;  // null: all bytes are present
+  std::string state;                  // identifies its bytes; empty: its times do
 };
 
 enum class Fetch { whole, parts };  // parts: as many files as their hosts send parts of
@@ -54,10 +57,14 @@ class Fetcher {
   // recently. A URL may have a percent-encoded query. Errors: those of HttpClient::get(),
   // out_of_memory if it cannot be stored.
   Result<FetchedFile> fetch(const std::string& url, Fetch how, const Cancelled& cancelled);
-  // Bytes of a file that is here in parts, which is that of the URL. Errors: those of
-  // SparseFile::fetch() and HttpClient::get().
+  // Bytes of a file that is here in parts, which is that of the URL; the file is kept in the cache
+  // when all are present. Errors: those of SparseFile::fetch() and HttpClient::get(), after which
+  // the next to open it asks for its state.
   Result<Extent> fetch_part(const std::string& url, SparseFile& file, std::uint64_t offset,
                             std::uint64_t count, const Cancelled& cancelled);
+  // Whether parts that do not fit together were received of a file (SparseFile::url()) that is thus
+  // fetched as a whole when it is opened next.
+  [[nodiscard]] bool is_unfit(const std::string& key);
   // Names directly below a folder of an S3 service, sorted; folders end in '/'. Errors: bad_data,
   // also for other hosts, which have no lists.
   Result<std::vector<std::string>> list(const std::string& folder_url, const Cancelled& cancelled);
@@ -81,8 +88,11 @@ class Fetcher {
   [[nodiscard]] std::optional<KnownParts> find_parts(const std::string& key);
   void keep_parts(const std::string& key, std::shared_ptr<SparseFile> file);
   void forget_parts(const std::string& key);
-  // Removes files that no dataset has open until there is room in the cache.
-  void drop_idle_parts();
+  // Removes files that no dataset has open until there is room for so many bytes in the cache.
+  void drop_idle_parts(std::uint64_t bytes);
+  void note_unfit(const std::string& key);
+  void keep_whole(const SparseFile& file);
+  [[nodiscard]] std::string state_of_kept(const std::string& key, const ObjectCache::Entry& entry);
 
   FetchOptions options_;
   std::shared_ptr<const HostRules> rules_;
@@ -91,6 +101,10 @@ class Fetcher {
   std::mutex mutex_;
   std::vector<std::unique_ptr<HttpClient>> idle_;  // guarded by the mutex
   std::list<KnownParts> parts_;                    // guarded by the mutex
+  // By key, since when; guarded by the mutex.
+  std::map<std::string, Clock::time_point> unfit_;
+  // States of the files in parts that were read to their end; guarded by the mutex.
+  std::set<std::string> kept_;
 };
 
 // The files of a location that is fetched. `cancelled` ends a request that is under way. The

@@ -57,6 +57,7 @@ struct Exchange {
   bool address_refused = false;
   bool too_large = false;
   bool header_too_large = false;
+  bool is_stored = false;  // a part of the body at least
   bool not_stored = false;
   bool encoded = false;
   bool has_length = false;  // the end of the body is known
@@ -89,20 +90,27 @@ std::string_view validator(std::string_view value) {
   return plain ? value : std::string_view();
 }
 
-// Whether an answer 206 is all that was asked for of the same file; hosts may ignore If-Range, or
-// send less.
-bool is_wanted_part(const Exchange& exchange) {
+// The number of bytes of an answer 206 that is all that was asked for of the same file; hosts may
+// ignore If-Range, or send less. Empty: it is something else.
+std::optional<std::uint64_t> bytes_of_wanted_part(const Exchange& exchange) {
   const Request& request = *exchange.request;
-  const auto got = parse_content_range(exchange.range);
   const std::string& etag = exchange.response.validators.etag;
-  if (!got || got->total == 0 || !etag.starts_with('"')) return false;
-  if (!exchange.state().empty() && etag != exchange.state()) return false;
-  const std::uint64_t begin = request.range ? request.range->first : 0;
-  std::uint64_t end = got->total;
-  if (request.range && begin < end) end = begin + std::min(request.range->count, end - begin);
-  const std::uint64_t total = exchange.part.bytes > 0 ? exchange.part.total : request.state_bytes;
-  const bool is_same_file = got->total == total || (exchange.state().empty() && total == 0);
-  return is_same_file && got->first == begin + exchange.part.bytes && got->last + 1 == end;
+  if (!etag.starts_with('"')) return {};
+  if (!exchange.state().empty() && etag != exchange.state()) return {};
+  const std::uint64_t received = exchange.part.bytes;
+  const std::uint64_t total = received > 0 ? exchange.part.total : request.state_bytes;
+  if (total == 0 && !exchange.state().empty()) return {};
+  const auto [first, count] = request.range.value_or(ByteRange{0, ~std::uint64_t{0}});
+  return bytes_of_part(exchange.range, first + received, count - received, total);
+}
+
+// Whether it is that part so far.
+bool is_wanted_part(const Exchange& exchange) {
+  const auto wanted = bytes_of_wanted_part(exchange);
+  curl_off_t length = -1;
+  curl_easy_getinfo(exchange.curl, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
+  return wanted && exchange.body_bytes <= *wanted &&
+         (length < 0 || static_cast<std::uint64_t>(length) == *wanted);
 }
 
 // Whether an answer with a body is the known file of a host without ETags.
@@ -149,20 +157,23 @@ std::size_t on_body(char* data, std::size_t size, std::size_t count, void* user)
   const std::string_view bytes(data, size * count);
   exchange.body_bytes += bytes.size();
   const long status = status_of(exchange.curl);
-  const Part& part = exchange.part;
+  const bool is_coded = !exchange.encoding.empty() && exchange.encoding != "identity";
+  exchange.encoded = is_coded && exchange.has_body(status);
+  if (exchange.encoded) return 0;
   // A host that ignores the range, or whose file has changed, answers 200 (RFC 9110, 13.1.5).
   exchange.wrong_part =
       (status == ok && !exchange.state().empty()) ||
       (status == partial_content && exchange.has_body(status) && !is_wanted_part(exchange));
   if (exchange.wrong_part) return 0;
-  exchange.response.is_unchanged = status == ok && part.bytes == 0 && is_known(exchange);
+  exchange.response.is_unchanged = status == ok && exchange.part.bytes == 0 && is_known(exchange);
   if (!exchange.has_body(status) || exchange.response.is_unchanged) {
     // Reading a short body to its end keeps the connection usable.
     return exchange.body_bytes <= discarded_bytes_max ? bytes.size() : 0;
   }
-  exchange.encoded = !exchange.encoding.empty() && exchange.encoding != "identity";
-  exchange.too_large = part.bytes + exchange.body_bytes > exchange.request->limits.bytes_max;
-  if (exchange.encoded || exchange.too_large || !exchange.has_length) return 0;
+  exchange.too_large =
+      exchange.part.bytes + exchange.body_bytes > exchange.request->limits.bytes_max;
+  if (exchange.too_large || !exchange.has_length) return 0;
+  exchange.is_stored = true;
   exchange.not_stored = !(*exchange.sink)(bytes);
   return exchange.not_stored ? 0 : bytes.size();
 }
@@ -187,14 +198,12 @@ Error fault(ErrorKind kind, const Url& url, const std::string& what) {
 }
 
 Error fault_of_status(const Url& url, long status) {
-  constexpr long gone = 410;
-  constexpr long missing = 404;
   const std::string text = "is answered with status " + std::to_string(status);
-  if (status == missing || status == gone)
+  if (status == 404 || status == 410) {
     return fault(ErrorKind::not_found, url, text + ": no such file");
-  if (status == 401 || status == 403)
-    return fault(ErrorKind::bad_data, url, text + ": not permitted");
-  return fault(ErrorKind::bad_data, url, text);
+  }
+  return fault(ErrorKind::bad_data, url,
+               status == 401 || status == 403 ? text + ": not permitted" : text);
 }
 
 Error fault_of_transfer(const Exchange& exchange, const Url& url, CURLcode code,
@@ -237,17 +246,12 @@ Error fault_of_transfer(const Exchange& exchange, const Url& url, CURLcode code,
                      std::to_string(limits.stall_time.count()) + " s");
   }
   const std::uint64_t received = exchange.part.bytes + exchange.body_bytes;
-  if (exchange.wrong_part && exchange.part.bytes > 0) {
-    return fault(ErrorKind::bad_data, url,
-                 "was received incompletely: the connection ended after " +
-                     std::to_string(exchange.part.bytes) +
-                     " bytes, and the host does not send the rest of the same file");
-  }
   if (exchange.wrong_part) {
-    const bool is_same = exchange.response.validators.etag == exchange.request->state;
     return fault(ErrorKind::bad_data, url,
-                 is_same ? "is answered with other bytes than those that were asked for"
-                         : "has changed on its host since it was opened; open it again");
+                 exchange.part.bytes == 0
+                     ? "is answered with other bytes than those that were asked for"
+                     : "was received incompletely: after " + std::to_string(exchange.part.bytes) +
+                           " bytes the host does not send the rest of the same file");
   }
   if (code == CURLE_PARTIAL_FILE) {
     return fault(ErrorKind::bad_data, url,
@@ -445,8 +449,13 @@ Result<Response> HttpClient::get(const Request& first, const Sink& sink) {
     const CURLcode code = handle_->perform(exchange, authorities_, left);
     const long status = status_of(handle_->curl);
     const bool is_part = status == partial_content;
-    if (exchange.response.is_unchanged) return Response{true, first.known, 0};
-    if (code == CURLE_OK && exchange.has_body(status)) {
+    if (exchange.response.is_unchanged) return {{.is_unchanged = true, .validators = first.known}};
+    // An empty body is not seen before its end.
+    if (code == CURLE_OK && is_part && exchange.has_body(status)) {
+      exchange.wrong_part = exchange.body_bytes != bytes_of_wanted_part(exchange);
+    }
+    if (code == CURLE_OK && status == ok) exchange.wrong_part = !exchange.state().empty();
+    if (code == CURLE_OK && exchange.has_body(status) && !exchange.wrong_part) {
       if (is_part && request.range) exchange.response.file_bytes = total_of(exchange);
       return std::move(exchange.response);
     }
@@ -459,19 +468,22 @@ Result<Response> HttpClient::get(const Request& first, const Sink& sink) {
       continue;
     }
     // The host cannot send parts of a file in a known state, or this one has no first byte.
-    if (request.range && request.state.empty() && part.bytes == 0 &&
+    if (request.range && request.state.empty() && part.bytes == 0 && !exchange.is_stored &&
         (exchange.wrong_part || status == no_such_range)) {
       request.range.reset();
       continue;
     }
+    exchange.response.is_other_part = exchange.wrong_part && !request.state.empty();
+    if (exchange.response.is_other_part) return std::move(exchange.response);
     // The body of an error may be longer than what is discarded.
-    const bool is_error_body =
-        code == CURLE_WRITE_ERROR && status != ok && status != 0 && !exchange.is_refused();
-    if (code != CURLE_OK && !is_error_body) {
+    const bool is_error_body = code == CURLE_WRITE_ERROR && status > ok &&
+                               !exchange.has_body(status) && !exchange.is_refused();
+    if (exchange.wrong_part || (code != CURLE_OK && !is_error_body)) {
       return fault_of_transfer(exchange, request.url, code, handle_->detail.data());
     }
-    const bool asked = !request.known.etag.empty();
-    if (status == not_modified && asked) return Response{true, first.known, 0};
+    if (status == not_modified && !request.known.etag.empty()) {
+      return Response{.is_unchanged = true, .validators = first.known};
+    }
     char* location = nullptr;
     curl_easy_getinfo(handle_->curl, CURLINFO_REDIRECT_URL, &location);
     if (status < 301 || status > 308 || location == nullptr) {

@@ -59,7 +59,7 @@ struct Request {
   // so, too, if it gives no strong ETag.
   std::optional<ByteRange> range;
   // The strong ETag and the size of the file whose bytes are asked for; those of any other state
-  // are an error. Empty: the state is not known yet.
+  // are not received (Response::is_other_part). Empty: the state is not known yet.
   std::string state;
   std::uint64_t state_bytes = 0;
   RequestLimits limits;
@@ -71,6 +71,7 @@ struct Request {
 struct Response {
   bool is_unchanged = false;  // the state is that of `known`; there was no body
   Validators validators;
+  bool is_other_part = false;    // not the bytes of `state` that were asked for; some may have come
   std::uint64_t file_bytes = 0;  // only `range` of a file of this size was sent; 0: the whole file
 };
 

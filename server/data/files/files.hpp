@@ -1,6 +1,7 @@
 // The files of a dataset. All files are opened here: user input -> Location -> Files -> InputFile.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -75,6 +76,9 @@ struct Extent {
   std::uint64_t end = 0;
 };
 
+// Files that a dataset may have open besides its members.
+inline constexpr std::size_t open_besides_members_max = 256;
+
 class Files {
  public:
   virtual ~Files() = default;
@@ -89,16 +93,19 @@ class Files {
   virtual bool exists(const std::string& name) = 0;
   // Fetches bytes of an open file that is here in parts, by the number of its parts
   // (InputFile::parts()); the result contains them, clipped to the file. Errors: those of open();
-  // they are also a fault (take_fault()).
+  // they are also a fault, which every further call returns until take_fault().
   virtual Result<Extent> fetch_part(std::uint64_t /*number*/, std::uint64_t /*offset*/,
                                     std::uint64_t /*count*/) {
     return make_error(ErrorKind::not_found, "no file is here in parts");
   }
   // No more bytes of that file will be fetched.
   virtual void close_parts(std::uint64_t /*number*/) {}
-  // The first error other than not_found that exists() has met since the last call: whether the
-  // file exists is then unknown.
+  // The first error of fetch_part(), or other than not_found of exists(), since the last call:
+  // whether the file exists is then unknown.
   [[nodiscard]] virtual std::optional<Error> take_fault() { return {}; }
+  // Whether fetch_part() met bytes that do not fit together; when it is opened again, the file is
+  // fetched as a whole.
+  [[nodiscard]] virtual bool is_unfit_for_parts() const { return false; }
   // The companions opened so far, at most a few hundred.
   [[nodiscard]] virtual std::vector<Companion> companions() const { return {}; }
   // Total size of all files opened until stop_counting(), which also forgets their names.

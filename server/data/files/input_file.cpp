@@ -49,7 +49,7 @@ Result<std::string> InputFile::head(std::size_t bytes_max) const {
 }
 
 std::string InputFile::identity() const {
-  if (parts_.number != 0) {
+  if (!parts_.state.empty()) {
     return name_ + '\n' + std::to_string(stamp_.bytes) + '\n' + parts_.state;
   }
   return name_ + '\n' + std::to_string(stamp_.bytes) + '\n' + std::to_string(stamp_.seconds) + '.' +

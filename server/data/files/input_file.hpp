@@ -13,7 +13,7 @@ namespace windsplat::data {
 // Of a file whose bytes are fetched when they are read (Files::fetch_part()).
 struct FileParts {
   std::uint64_t number = 0;  // 0: all bytes are present
-  std::string state;         // identifies the bytes of the file
+  std::string state;         // identifies the bytes of the file; empty: its times do
 };
 
 // Thread-safe: every read passes its own offset.

@@ -30,7 +30,6 @@ namespace windsplat::data::loader {
 namespace {
 
 constexpr int niceness = 5;
-constexpr std::uint64_t files_besides_members = 256;
 constexpr std::chrono::milliseconds progress_every{50};
 constexpr std::size_t answer_bytes_max = std::size_t{1} << 30;
 
@@ -149,7 +148,7 @@ class Loader {
     Confinement how;
     how.memory_bytes = task->memory_bytes;
     how.opening_bytes = opening_memory_bytes(0);
-    how.files = task->location.members.size() + files_besides_members;
+    how.files = task->location.members.size() + open_besides_members_max;
     how.socket = socket_of_loader;
     how.library_folders = std::move(task->library_folders);
     if (auto done = confine(std::move(how)); !done) {

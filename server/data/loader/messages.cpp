@@ -296,7 +296,7 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
 }
 
 std::string encode_parts(const FileParts& parts) {
-  if (parts.number == 0) return {};
+  if (parts.number == 0 && parts.state.empty()) return {};
   Writer out;
   out.number(parts.number);
   out.text(parts.state);
@@ -310,7 +310,7 @@ Result<FileParts> decode_parts(std::string_view bytes) {
   Reader in(bytes);
   out.number = in.number<std::uint64_t>();
   out.state = in.text(state_bytes_max);
-  if (in.complete() && out.number != 0) return out;
+  if (in.complete()) return out;
   return make_error(ErrorKind::internal, "an answer of the daemon is malformed");
 }
 

@@ -95,15 +95,8 @@ RunningLoader::RunningLoader(Location location, const Limits& limits)
     : location_(std::move(location)), limits_(limits), memory_(limits.budget) {}
 
 Result<std::string> RunningLoader::open() {
-  release();
   const std::string path = program_path();
   if (path.empty()) return make_error(ErrorKind::internal, "no loader executable is set");
-  if (auto room = memory_.resize(loader_bytes_min); !room) return room.error();
-  if (auto started = process_.start(path); !started) {
-    release();
-    return started.error();
-  }
-  files_ = limits_.files ? limits_.files(location_, limits_.cancelled) : direct_files(location_);
   Task task;
   task.memory_bytes = limits_.memory_bytes;
   task.library_folders = limits_.library_folders;
@@ -119,8 +112,15 @@ Result<std::string> RunningLoader::open() {
   for (const Location::Member& member : location_.members) {
     task.location.members.push_back({member.name, {}});
   }
-  auto answer =
-      call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits_.open_time});
+  const auto open_once = [&]() -> Result<Message> {
+    release();
+    if (auto room = memory_.resize(loader_bytes_min); !room) return room.error();
+    if (auto started = process_.start(path); !started) return started.error();
+    files_ = limits_.files ? limits_.files(location_, limits_.cancelled) : direct_files(location_);
+    return call({Kind::open, encode_task(task), -1, Kind::opened, "opening it", limits_.open_time});
+  };
+  auto answer = open_once();
+  if (!answer && files_ && files_->is_unfit_for_parts()) answer = open_once();
   if (!answer) {
     Error error = answer.error();
     // Without files, the loader has already exited because of lack of memory.

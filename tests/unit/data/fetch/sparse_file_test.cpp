@@ -265,5 +265,19 @@ TEST(ContentRange, IsReadOnlyIfItIsWhole) {
   }
 }
 
+TEST(ContentRange, IsTheWantedPartOfTheFileOrNone) {
+  EXPECT_EQ(bytes_of_part("bytes 5-99/1000", 5, 95, 1000), 95U);
+  EXPECT_EQ(bytes_of_part("bytes 5-99/1000", 5, 95, 0), 95U) << "the size is not known yet";
+  EXPECT_EQ(bytes_of_part("bytes 900-999/1000", 900, 200, 1000), 100U) << "as far as it has them";
+  EXPECT_EQ(bytes_of_part("bytes 900-999/1000", 900, ~std::uint64_t{0}, 1000), 100U);
+  EXPECT_FALSE(bytes_of_part("bytes 5-99/1000", 5, 95, 999)) << "another file";
+  EXPECT_FALSE(bytes_of_part("bytes 5-98/1000", 5, 95, 1000)) << "fewer";
+  EXPECT_FALSE(bytes_of_part("bytes 5-100/1000", 5, 95, 1000)) << "more";
+  EXPECT_FALSE(bytes_of_part("bytes 6-100/1000", 5, 95, 1000)) << "others";
+  EXPECT_FALSE(bytes_of_part("bytes 1000-1000/1000", 1000, 1, 1000)) << "none";
+  EXPECT_FALSE(bytes_of_part("bytes 0-0/0", 0, 1, 0)) << "none";
+  EXPECT_FALSE(bytes_of_part("", 0, 1, 0));
+}
+
 }  // namespace
 }  // namespace windsplat::data::fetch
