@@ -19,6 +19,7 @@ class FetchedFiles final : public Files {
   [[nodiscard]] const Location& location() const override { return location_; }
 
   Result<std::shared_ptr<const InputFile>> open(const std::string& name) override {
+    if (fault_) return *fault_;  // as in fetch_part
     const auto url = url_of(name);
     if (!url) return url.error();
     // Files of a folder are small, or chunks that are read as a whole.
