@@ -210,7 +210,6 @@ TEST_F(SparseFiles, OtherFilesGiveWayToBlocks) {
 }
 
 TEST_F(SparseFiles, BlocksInUseAreLimitedByTheSizeOfTheCache) {
-  cache_ = nullptr;
   file_.reset();
   cache_ = ObjectCache::open({folder_.native(), 8 * block}).value();
   make(file_bytes);
