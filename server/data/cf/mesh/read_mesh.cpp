@@ -168,7 +168,8 @@ class MeshReader {
     constexpr double much = 0.9;  // a row of cells around an edge has a cell along all of it
     if (from_one < much * from_zero) {
       notes_.push_back(named +
-                       ", but its numbers of nodes can only count from 1: they are read so");
+                       ", but cells would be much longer with numbers of nodes from 0: they are "
+                       "read as counting from 1");
       return 1.0;
     }
     if (!(from_zero < much * from_one)) {
