@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <numbers>
 
 #include "server/data/cf/grid/axes.hpp"
@@ -30,6 +32,17 @@ bool same_number(double a, double b) { return a == b || (std::isnan(a) && std::i
 
 bool same_place(double a, double b) {
   return same_number(a, b) || std::abs(a - b) <= 1e-6 * std::max(std::abs(a), std::abs(b)) + 1e-9;
+}
+
+double time_tolerance(const std::vector<double>& times) {
+  constexpr double rounding = static_cast<double>(std::numeric_limits<float>::epsilon());
+  double largest = 0;
+  double least_step = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    largest = std::max(largest, std::abs(times[i]));
+    if (i > 0) least_step = std::min(least_step, std::abs(times[i] - times[i - 1]));
+  }
+  return std::min(rounding * largest + 1e-9, 0.1 * least_step);
 }
 
 }  // namespace windsplat::data::cf

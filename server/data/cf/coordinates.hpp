@@ -20,4 +20,8 @@ bool same_number(double a, double b);
 // Whether coordinates are equal within single precision.
 bool same_place(double a, double b);
 
+// How far a time may be from one of these and be the same, where one is stored in single precision;
+// at most a tenth of the least step.
+double time_tolerance(const std::vector<double>& times);
+
 }  // namespace windsplat::data::cf

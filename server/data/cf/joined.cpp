@@ -123,7 +123,10 @@ Result<bool> same_coordinates(const ArrayFile& first, int own, const ArrayFile& 
   if (is_time) {
     const auto times = convert_times(*b, {from.units, from.calendar}, {to.units, to.calendar});
     if (!times) return false;
-    b = *times;
+    const double tolerance = time_tolerance(*a);
+    return std::equal(a->begin(), a->end(), times->begin(), times->end(), [&](double x, double y) {
+      return same_number(x, y) || std::abs(x - y) <= tolerance;
+    });
   } else if (from.units != to.units) {
     return false;
   }

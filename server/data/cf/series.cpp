@@ -50,6 +50,19 @@ std::vector<std::string> dimension_names(const FileContents& contents, int varia
   return out;
 }
 
+// Whether a file holds variables along a time, but no step, as a model writes it when it starts.
+bool has_no_step(const FileContents& contents) {
+  const std::vector<DimensionRole> roles = classify_dimensions(contents);
+  return std::any_of(
+      contents.variables.begin(), contents.variables.end(), [&](const FileVariable& variable) {
+        return variable.dims.size() > 1 &&
+               std::any_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
+                 const FileDimension& one = contents.dimensions.at(at(d));
+                 return one.length == 0 && (one.unlimited || roles.at(at(d)).role == Role::time);
+               });
+      });
+}
+
 Error misfit(const ArrayFile& file, const ArrayFile& first, const std::string& what) {
   return make_error(ErrorKind::bad_data, in_quotes(file.name()) +
                                              " does not fit into a series with " +
@@ -77,6 +90,9 @@ Result<std::unique_ptr<SeriesFile>> SeriesFile::open(std::string name, std::size
   for (std::size_t m = 0; m < members; ++m) {
     auto opened = series->open_member_(m);
     if (!opened && opened.error().kind != ErrorKind::bad_data) return opened.error();
+    if (opened && has_no_step((*opened)->contents())) {
+      opened = make_error(ErrorKind::bad_data, in_quotes((*opened)->name()) + " has no time step");
+    }
     if (!opened) {
       damaged.push_back(opened.error());
       continue;
@@ -90,6 +106,7 @@ Result<std::unique_ptr<SeriesFile>> SeriesFile::open(std::string name, std::size
   }
   series->finish();
   if (!damaged.empty()) series->contents_.notes.push_back(damaged_files_note(damaged, members));
+  series->has_damaged_files_ = !damaged.empty();
   return series;
 }
 
@@ -97,6 +114,30 @@ std::string SeriesFile::identity() const {
   std::string all;
   for (const Member& member : members_) all += member.identity + '\n';
   return digest_of(all);
+}
+
+const FileVariable* SeriesFile::time_coordinate() const {
+  return time_coordinate_ < 0 ? nullptr : &first_->contents().variables[at(time_coordinate_)];
+}
+
+std::vector<double> SeriesFile::times() const {
+  std::vector<double> out;
+  out.reserve(steps_.size());
+  for (const Step& step : steps_) out.push_back(step.time);
+  return out;
+}
+
+void SeriesFile::keep_steps(const std::vector<std::size_t>& kept) {
+  const std::size_t lost = steps_.size() - kept.size();
+  if (lost == 0) return;
+  std::vector<Step> steps;
+  for (const std::size_t step : kept) steps.push_back(steps_.at(step));
+  steps_ = std::move(steps);
+  contents_.dimensions.at(at(time_of_all_)).length = steps_.size();
+  contents_.notes.push_back(in_quotes(origin()) + ": " + std::to_string(lost) +
+                            (lost == 1 ? " step is" : " steps are") +
+                            " left out, since files of other parts with the same times cannot be "
+                            "read");
 }
 
 Result<void> SeriesFile::begin() {
@@ -370,6 +411,7 @@ void SeriesFile::finish() {
     variables_.push_back(way);
   }
   if (time_ >= 0) {
+    time_of_all_ = time_;
     contents_.dimensions[at(time_)].length = steps_.size();
   } else {
     add_time_dimension();
@@ -389,6 +431,7 @@ void SeriesFile::add_time_dimension() {
   dimension.unlimited = true;
   const auto added = static_cast<int>(contents_.dimensions.size());
   contents_.dimensions.push_back(std::move(dimension));
+  time_of_all_ = added;
   for (std::size_t v = 0; v < variables_.size(); ++v) {
     if (is_static(at(variables_[v].in_first))) continue;
     FileVariable& variable = contents_.variables[v];

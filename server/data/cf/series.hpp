@@ -41,6 +41,13 @@ class SeriesFile final : public ArrayFile {
   [[nodiscard]] std::string format() const override { return first_->format(); }
   [[nodiscard]] std::string identity() const override;
 
+  [[nodiscard]] bool has_damaged_files() const { return has_damaged_files_; }
+  // The variable whose values times() are in its unit; null if steps are numbered.
+  [[nodiscard]] const FileVariable* time_coordinate() const;
+  [[nodiscard]] std::vector<double> times() const;  // ascending
+  // Leaves out all steps but these, which ascend, with a note.
+  void keep_steps(const std::vector<std::size_t>& kept);
+
   [[nodiscard]] Numbers numbers(int variable, const char* attribute) const override;
   [[nodiscard]] std::string text_of(int variable, const char* attribute) const override;
   [[nodiscard]] std::vector<std::size_t> chunk(int variable) const override;
@@ -110,6 +117,8 @@ class SeriesFile final : public ArrayFile {
   std::vector<bool> as_values_;           // per variable of the first member
   std::vector<Member> members_;
   std::vector<Step> steps_;
+  bool has_damaged_files_ = false;
+  int time_of_all_ = -1;  // the time dimension of contents_
   FileContents contents_;
   std::vector<Variable> variables_;
   mutable std::list<Opened> opened_;  // most recently used first

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/base/ascii.hpp"
+#include "server/data/cf/common_steps.hpp"
 #include "server/data/cf/joined.hpp"
 #include "server/data/cf/mesh/meshed_file.hpp"
 #include "server/data/cf/selected/selected_file.hpp"
@@ -193,6 +194,11 @@ ArraysResult open_parts(const std::shared_ptr<Files>& files, std::vector<Part> p
     opened.push_back(std::move(*file));
   }
   if (!joins) return std::move(opened.front());
+  std::vector<cf::SeriesFile*> series;
+  for (const auto& part : opened) {
+    if (auto* const one = dynamic_cast<cf::SeriesFile*>(part.get())) series.push_back(one);
+  }
+  cf::keep_common_steps(series);
   auto joined = cf::JoinedFile::open(files->location().stem, origin, std::move(opened));
   if (!joined) return joined.error();
   (*joined)->set_stored_bytes(files->opened_bytes());

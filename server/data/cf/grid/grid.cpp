@@ -131,6 +131,13 @@ std::string nothing_to_show(const FileContents& contents, const std::vector<Left
   }
   if (count > listed_max) text += ", ...";
   if (most == nullptr || most->dims.empty()) return text;
+  const auto empty = std::find_if(most->dims.begin(), most->dims.end(),
+                                  [&](int d) { return length_of(contents, d) == 0; });
+  if (empty != most->dims.end() && most->dims.size() > 2) {
+    return "it has no values: the dimension " +
+           in_quotes(contents.dimensions.at(static_cast<std::size_t>(*empty)).name) + " of " +
+           in_quotes(most->name) + " has length 0";
+  }
   text += ": " + in_quotes(most->name) + " is of ";
   const char* separator = "";
   for (const int dimension : most->dims) {

@@ -125,17 +125,6 @@ TEST(Series, DamagedFilesAreLeftOutAndNamed) {
     }
   }
   const Folder folder;
-  for (const double n : {1, 2}) {
-    const std::string number = std::to_string(static_cast<int>(n));
-    write_part(folder / ("u_" + number + ".nc"), {{6 * n}, "hours since 2001-01-01"});
-    write_part(folder / ("v_" + number + ".nc"), {{6 * n}, "hours since 2001-01-01"});
-  }
-  write_bytes(folder / "v_2.nc", "CDF");
-  const std::string why = refusal(folder / "{u,v}_*.nc");
-  EXPECT_NE(why.find("its times are others (1 and 2 steps); 1 of 2 files cannot be read"),
-            std::string::npos)
-      << why;
-  EXPECT_NE(why.find("'v_2.nc'"), std::string::npos) << why;
   write_bytes(folder / "g_1.nc", "CDF");
   write_bytes(folder / "g_2.nc", "CDF");
   EXPECT_NE(refusal(folder / "g_*.nc").find("'g_1.nc'"), std::string::npos);
