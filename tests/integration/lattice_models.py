@@ -181,8 +181,8 @@ def write_um(path, levels_shared=False):
          standard_name="longitude")
     theta = np.array([0, 20, 60, 120, 200.0])[levels_shared:]
     rho = np.array([10, 40, 90, 160.0])
-    z = axis(file, "model_level_number", np.arange(5.0)[levels_shared:], units="1", positive="up",
-             standard_name="model_level_number")
+    axis(file, "model_level_number", np.arange(5.0)[levels_shared:], units="1", positive="up",
+         standard_name="model_level_number")
     winds = "model_level_number"
     if not levels_shared:
         winds += "_0"
@@ -207,10 +207,10 @@ def write_um(path, levels_shared=False):
     for name, values in (("x_wind", u), ("y_wind", v)):
         fields[name] = between_all(values, 0, 5)[levels_shared:]
     units = {name: "m s-1" for name in ("x_wind", "y_wind", "upward_air_velocity", "wind")}
-    return Independent({"x": lon, "y": lat, "z": z},
+    return Independent({"x": lon, "y": lat, "z": theta},
                        as_masked({name: values[None] for name, values in fields.items()}),
                        {"wind": ("x_wind", "y_wind", "upward_air_velocity")},
-                       units | {"x": "degrees_east", "y": "degrees_north", "z": "1",
+                       units | {"x": "degrees_east", "y": "degrees_north", "z": "m",
                                 "air_temperature": "K", "specific_humidity": "1"})
 
 

@@ -5,6 +5,8 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "server/base/ascii.hpp"
@@ -30,11 +32,97 @@ std::string shown_unit(const std::string& unit) {
   return unit.substr(0, end) + "...";
 }
 
+// Variables on one grid, by texts of theirs, of which some are components of vectors.
+class Candidates {
+ public:
+  using Index = std::unordered_map<std::string, std::vector<int>>;  // in the order of the file
+
+  Candidates(const FileContents& contents, const std::vector<int>& variables)
+      : contents_(contents), used_(contents.variables.size()) {
+    for (const int v : variables) {
+      const FileVariable& one = variable(v);
+      by_name_[lower(one.name)].push_back(v);
+      by_standard_name_[one.standard_name].push_back(v);
+      by_mark_[one.vector_mark].push_back(v);
+    }
+  }
+
+  [[nodiscard]] const FileVariable& variable(int v) const {
+    return contents_.variables.at(static_cast<std::size_t>(v));
+  }
+  [[nodiscard]] bool is_used(int v) const { return used_[static_cast<std::size_t>(v)]; }
+  void use(const std::vector<int>& components) {
+    for (const int v : components) used_[static_cast<std::size_t>(v)] = true;
+  }
+
+  // An unused variable on the dimensions of `like`, in any order, with that name in lower case,
+  // standard name or mark; -1 if there is none.
+  [[nodiscard]] int named(int like, const std::string& name) const {
+    return partner(like, name, by_name_);
+  }
+  [[nodiscard]] int standing_for(int like, const std::string& standard_name) const {
+    return partner(like, standard_name, by_standard_name_);
+  }
+  [[nodiscard]] int marked(int like, const std::string& mark) const {
+    return partner(like, mark, by_mark_);
+  }
+
+ private:
+  [[nodiscard]] int partner(int like, const std::string& wanted, const Index& index) const {
+    const auto found = index.find(wanted);
+    if (found == index.end()) return -1;
+    for (const int v : found->second) {
+      const auto& dims = variable(v).dims;
+      const auto& same = variable(like).dims;
+      if (v != like && !is_used(v) && variable(v).process == variable(like).process &&
+          variable(v).level == variable(like).level &&
+          std::is_permutation(dims.begin(), dims.end(), same.begin(), same.end())) {
+        return v;
+      }
+    }
+    return -1;
+  }
+
+  const FileContents& contents_;
+  std::vector<bool> used_;  // by variable
+  Index by_name_;
+  Index by_standard_name_;
+  Index by_mark_;
+};
+
+// Names different from those of all variables and vectors, since views refer to fields by name.
+class FieldNames {
+ public:
+  FieldNames(const FileContents& contents, const std::vector<int>& variables) {
+    for (const int v : variables) {
+      taken_.insert(contents.variables.at(static_cast<std::size_t>(v)).name);
+    }
+  }
+  [[nodiscard]] std::string free_name(const std::string& wanted) {
+    std::string name = wanted;
+    const std::string base = wanted + "_vector";
+    for (std::size_t& n = numbers_[wanted]; taken_.count(name) > 0; ++n) {
+      name = n == 0 ? base : base + '_' + std::to_string(n + 1);
+    }
+    taken_.insert(name);
+    return name;
+  }
+
+ private:
+  std::unordered_set<std::string> taken_;
+  std::unordered_map<std::string, std::size_t> numbers_;  // those tried, by name
+};
+
 class FieldFinder {
  public:
   FieldFinder(const FileContents& contents, const std::vector<int>& variables, AxisKind vertical,
               std::vector<std::string>& notes)
-      : contents_(contents), variables_(variables), vertical_(vertical), notes_(notes) {}
+      : contents_(contents),
+        variables_(variables),
+        vertical_(vertical),
+        notes_(notes),
+        candidates_(contents, variables),
+        names_(contents, variables) {}
 
   std::vector<FieldPlan> find() {
     by_mark();
@@ -46,41 +134,15 @@ class FieldFinder {
     for (const int v : variables_) {
       add_scalar(v);
     }
+    if (untold_ > 0) {
+      notes_.push_back(std::to_string(untold_) + " more notes on components of vectors");
+    }
     return std::move(plans_);
   }
 
  private:
   [[nodiscard]] const FileVariable& variable(int v) const {
     return contents_.variables.at(static_cast<std::size_t>(v));
-  }
-
-  [[nodiscard]] bool is_used(int v) const {
-    return std::any_of(plans_.begin(), plans_.end(), [v](const FieldPlan& plan) {
-      return std::find(plan.variables.begin(), plan.variables.end(), v) != plan.variables.end();
-    });
-  }
-
-  // An unused variable on the dimensions of `like`, in any order, whose text is `wanted`; -1 if
-  // there is none.
-  template <class Text>
-  [[nodiscard]] int partner(int like, std::string_view wanted, Text text) const {
-    for (const int v : variables_) {
-      const auto& dims = variable(v).dims;
-      const auto& same = variable(like).dims;
-      if (v != like && !is_used(v) && text(variable(v)) == wanted &&
-          variable(v).process == variable(like).process &&
-          variable(v).level == variable(like).level &&
-          std::is_permutation(dims.begin(), dims.end(), same.begin(), same.end())) {
-        return v;
-      }
-    }
-    return -1;
-  }
-  [[nodiscard]] int named(int like, const std::string& name) const {
-    return partner(like, name, [](const FileVariable& v) { return lower(v.name); });
-  }
-  [[nodiscard]] int standing_for(int like, const std::string& standard_name) const {
-    return partner(like, standard_name, [](const FileVariable& v) { return v.standard_name; });
   }
 
   [[nodiscard]] bool is_omega(int v) const {
@@ -106,28 +168,13 @@ class FieldFinder {
   }
 
   void tell(std::string note) {
-    if (std::find(notes_.begin(), notes_.end(), note) == notes_.end()) {
+    constexpr std::size_t told_max = 40;
+    if (std::find(notes_.begin(), notes_.end(), note) != notes_.end()) return;
+    if (told_++ < told_max) {
       notes_.push_back(std::move(note));
+    } else {
+      ++untold_;
     }
-  }
-
-  // A name different from those of all variables and vectors, since views refer to fields by name.
-  [[nodiscard]] std::string free_name(const std::string& wanted) const {
-    const auto is_taken = [&](const std::string& name) {
-      return std::any_of(variables_.begin(), variables_.end(),
-                         [&](int v) { return variable(v).name == name; }) ||
-             std::any_of(plans_.begin(), plans_.end(),
-                         [&](const FieldPlan& plan) { return plan.info.name == name; });
-    };
-    if (!is_taken(wanted)) {
-      return wanted;
-    }
-    const std::string base = wanted + "_vector";
-    std::string name = base;
-    for (int n = 2; is_taken(name); ++n) {
-      name = base + '_' + std::to_string(n);
-    }
-    return name;
   }
 
   [[nodiscard]] static std::string dtype_of(const FileVariable& variable) {
@@ -137,7 +184,7 @@ class FieldFinder {
   void add_vector(const std::string& name, std::vector<int> components) {
     FieldPlan plan;
     const FileVariable& first = variable(components.front());
-    plan.info.name = free_name(first.process.empty() ? name : name + "_" + first.process);
+    plan.info.name = names_.free_name(first.process.empty() ? name : name + "_" + first.process);
     plan.info.kind = FieldKind::vector;
     plan.info.units = first.units;
     plan.info.dtype = dtype_of(first);
@@ -150,6 +197,7 @@ class FieldFinder {
           (plan.info.long_name.empty() ? "" : ", ") +
           (variable(v).long_name.empty() ? variable(v).name : variable(v).long_name);
     }
+    candidates_.use(components);
     plan.variables = std::move(components);
     plans_.push_back(std::move(plan));
   }
@@ -196,13 +244,11 @@ class FieldFinder {
   void by_mark() {
     for (const int v : variables_) {
       const std::string& mark = variable(v).vector_mark;
-      if (is_used(v) || !mark.ends_with(" 0")) {
+      if (candidates_.is_used(v) || !mark.ends_with(" 0")) {
         continue;
       }
       const std::string name = mark.substr(0, mark.size() - 2);
-      const auto component = [&](const char* index) {
-        return partner(v, name + index, [](const FileVariable& f) { return f.vector_mark; });
-      };
+      const auto component = [&](const char* index) { return candidates_.marked(v, name + index); };
       const int second = component(" 1");
       int third = component(" 2");
       if (third >= 0 && !joins(v, third, true)) third = -1;
@@ -214,15 +260,15 @@ class FieldFinder {
   }
 
   [[nodiscard]] int rising_air(int like) const {
-    const int up = standing_for(like, "upward_air_velocity");
-    return up >= 0 ? up : standing_for(like, std::string(omega_name));
+    const int up = candidates_.standing_for(like, "upward_air_velocity");
+    return up >= 0 ? up : candidates_.standing_for(like, std::string(omega_name));
   }
 
   // Identifies components by pairs of standard_name: eastward_Q/northward_Q, x_Q/y_Q, Q_x_R/Q_y_R.
   void by_standard_name() {
     for (const int v : variables_) {
       const std::string& name = variable(v).standard_name;
-      if (is_used(v)) {
+      if (candidates_.is_used(v)) {
         continue;
       }
       std::string second;
@@ -244,11 +290,11 @@ class FieldFinder {
       } else {
         continue;
       }
-      const int y = standing_for(v, second);
+      const int y = candidates_.standing_for(v, second);
       if (y < 0 || !joins(v, y, false)) {
         continue;
       }
-      int z = quantity == "wind" ? rising_air(v) : standing_for(v, third);
+      int z = quantity == "wind" ? rising_air(v) : candidates_.standing_for(v, third);
       if (z >= 0 && !joins(v, z, true)) z = -1;
       if (z < 0) {  // the vertical component often lacks standard_name
         const std::string short_name = lower(variable(v).name);
@@ -262,17 +308,19 @@ class FieldFinder {
   // Ex Ey Ez, b_x b_y b_z, velocity_x velocity_y ...: named by the common stem.
   void by_suffix(int v) {
     const std::string name = lower(variable(v).name);
-    if (is_used(v) || name.size() < 2 || name.back() != 'x') {
+    if (candidates_.is_used(v) || name.size() < 2 || name.back() != 'x') {
       return;
     }
     const std::string stem = name.substr(0, name.size() - 1);
-    const int y = named(v, stem + 'y');
+    const int y = candidates_.named(v, stem + 'y');
     if (y < 0 || !joins(v, y, false)) {
       return;
     }
-    int z = named(v, stem + 'z');
+    int z = candidates_.named(v, stem + 'z');
+    const bool of_schism = stem == "horizontalvel";
+    if (z < 0 && of_schism) z = candidates_.named(v, "verticalvelocity");
     if (z >= 0 && !joins(v, z, true)) z = -1;
-    std::string shown = variable(v).name.substr(0, stem.size());
+    std::string shown = of_schism ? "current" : variable(v).name.substr(0, stem.size());
     while (shown.size() > 1 && (shown.back() == '_' || shown.back() == '-')) {
       shown.pop_back();
     }
@@ -282,11 +330,11 @@ class FieldFinder {
   // u.../v...: u v, ua va, uwnd vwnd, ugrd vgrd, uo vo, U_GRD_6_ISBL V_GRD_6_ISBL ...
   void by_first_letter(int v) {
     const std::string name = lower(variable(v).name);
-    if (is_used(v) || name.empty() || name.front() != 'u') {
+    if (candidates_.is_used(v) || name.empty() || name.front() != 'u') {
       return;
     }
     const std::string rest = name.substr(1);
-    const int y = named(v, 'v' + rest);
+    const int y = candidates_.named(v, 'v' + rest);
     if (y < 0 || !joins(v, y, false)) {
       return;
     }
@@ -301,13 +349,13 @@ class FieldFinder {
 
   // w... with the same rest, otherwise a common name of vertical velocity.
   [[nodiscard]] int vertical_partner(int v, const std::string& rest) {
-    const int alike = named(v, 'w' + rest);
+    const int alike = candidates_.named(v, 'w' + rest);
     const bool is_third = alike >= 0 && joins(v, alike, true);
     if (is_third || !is_velocity(variable(v).units)) {
       return is_third ? alike : -1;
     }
     for (const char* usual : {"w", "wa", "wap", "omega", "vvel", "dzdt", "wwnd", "wgrd"}) {
-      const int found = named(v, usual);
+      const int found = candidates_.named(v, usual);
       if (found >= 0 && joins(v, found, true)) {
         return found;
       }
@@ -319,6 +367,10 @@ class FieldFinder {
   const std::vector<int>& variables_;
   AxisKind vertical_;
   std::vector<std::string>& notes_;
+  Candidates candidates_;
+  FieldNames names_;
+  std::size_t told_ = 0;
+  std::size_t untold_ = 0;
   std::vector<FieldPlan> plans_;
 };
 
@@ -336,7 +388,10 @@ bool is_velocity_component(const FileVariable& variable) {
       {"u",        "v",        "w",        "ua",   "va",   "wa",   "uo",   "vo",
        "wo",       "uwnd",     "vwnd",     "ugrd", "vgrd", "uvel", "vvel", "wvel",
        "vozocrtx", "vomecrty", "vovecrtz", "ucx",  "ucy",  "ucz"});
-  return is_speed(variable.units) && is_one_of(lower(variable.name), usual);
+  constexpr auto of_schism = std::to_array<std::string_view>(  // which writes no units
+      {"horizontalvelx", "horizontalvely", "verticalvelocity"});
+  return (is_speed(variable.units) && is_one_of(lower(variable.name), usual)) ||
+         (is_velocity(variable.units) && is_one_of(lower(variable.name), of_schism));
 }
 
 std::vector<FieldPlan> find_fields(const FileContents& contents, const std::vector<int>& variables,

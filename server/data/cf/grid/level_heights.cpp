@@ -146,11 +146,11 @@ class HeightFinder {
     auto parametric = find_parametric();
     if (!parametric) return parametric.error();
     heights.parametric = std::move(*parametric);
-    const Axis& axis = info_.grid.axes[2];
-    const bool is_bare =
-        axis.kind == AxisKind::level || (axis.kind == AxisKind::cartesian && coordinate_ < 0);
-    if (!heights.parametric && is_bare) heights.variable = find_variable();
-    if (!heights.parametric && heights.variable < 0) return LevelHeights();
+    if (!heights.parametric && is_bare()) heights.variable = find_variable();
+    if (!heights.parametric && heights.variable < 0) {
+      if (auto done = place_by_auxiliary(); !done) return done.error();
+      return LevelHeights();
+    }
     if (auto done = place(heights); !done) return done.error();
     return heights;
   }
@@ -165,10 +165,33 @@ class HeightFinder {
     return v >= 0 && variable(v).numeric ? v : -1;
   }
 
+  // Whether the levels have no physical positions yet.
+  [[nodiscard]] bool is_bare() const {
+    const AxisKind kind = info_.grid.axes[2].kind;
+    return kind == AxisKind::level || (kind == AxisKind::cartesian && coordinate_ < 0);
+  }
+
+  [[nodiscard]] bool is_on_levels(int v) const {
+    return variable(v).numeric && variable(v).dims == std::vector{grid_.space[2]};
+  }
+
+  // The coordinate of the levels, or an auxiliary one that has a formula where it has none: files
+  // of the Unified Model number their levels.
+  [[nodiscard]] int with_formula() const {
+    const auto has = [&](int v) { return !file_.text_of(v, "formula_terms").empty(); };
+    if ((coordinate_ >= 0 && has(coordinate_)) || !is_bare()) return coordinate_;
+    for (std::size_t v = 0; v < file_.contents().variables.size(); ++v) {
+      const int one = static_cast<int>(v);
+      if (is_on_levels(one) && !variable(one).standard_name.empty() && has(one)) return one;
+    }
+    return coordinate_;
+  }
+
   Result<std::optional<ParametricLevels>> find_parametric() {
-    std::string name = coordinate_ < 0 ? "" : variable(coordinate_).standard_name;
+    const int by = with_formula();
+    std::string name = by < 0 ? "" : variable(by).standard_name;
     Terms terms;
-    if (coordinate_ >= 0) terms = formula_terms(file_.text_of(coordinate_, "formula_terms"));
+    if (by >= 0) terms = formula_terms(file_.text_of(by, "formula_terms"));
     if (terms.empty()) std::tie(name, terms) = terms_of_roms(file_);
     const auto* known =
         std::find_if(known_formulas.begin(), known_formulas.end(),
@@ -243,9 +266,82 @@ class HeightFinder {
                          one.standard_name == "altitude" ||
                          one.standard_name.starts_with("geometric_height_at_full_level") ||
                          one.standard_name == "height_above_geopotential_datum";
-      if (named && along_levels == 1 && metres_in(one.units) == 1.0) return v;
+      const bool of_schism = one.name == "zCoordinates" && one.units.empty();
+      const bool in_metres = named || one.name == "zCoordinates";
+      if (along_levels == 1 && (of_schism || (in_metres && metres_in(one.units) == 1.0))) return v;
     }
     return -1;
+  }
+
+  // An auxiliary coordinate of the levels in units of length: a height or depth by its standard
+  // name, level_height of the Unified Model, or one that variables name, that of most of them; -1
+  // if there is none.
+  [[nodiscard]] int find_auxiliary() const {
+    const FileContents& contents = file_.contents();
+    int best = -1;
+    std::ptrdiff_t most = -1;
+    for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+      const FileVariable& one = contents.variables[v];
+      const int self = static_cast<int>(v);
+      if (self == coordinate_ || !is_on_levels(self) || !metres_in(one.units)) continue;
+      const std::string& name = one.standard_name;
+      const bool named = name == "height" || name == "altitude" || name == "depth" ||
+                         name == "geopotential_height" || name.starts_with("height_above_") ||
+                         name.starts_with("depth_below_") || one.long_name == "level_height" ||
+                         one.name.starts_with("level_height");
+      const auto users = std::count_if(
+          contents.variables.begin(), contents.variables.end(), [&](const FileVariable& user) {
+            const std::string words = ' ' + user.coordinates + ' ';
+            return words.find(' ' + one.name + ' ') != std::string::npos &&
+                   std::count(user.dims.begin(), user.dims.end(), grid_.space[2]) > 0;
+          });
+      if ((named || users > 0) && users > most) {
+        best = self;
+        most = users;
+      }
+    }
+    return best;
+  }
+
+  Result<void> place_by_auxiliary() {
+    const int found = is_bare() ? find_auxiliary() : -1;
+    if (found < 0) return {};
+    const FileVariable& from = variable(found);
+    auto values = unpacked_values(file_, found);
+    if (!values) return values.error();
+    if (grid_.turned[2]) std::reverse(values->begin(), values->end());
+    const bool down = lower(from.positive) == "down" || from.standard_name.starts_with("depth");
+    const auto goes_up = [&] {
+      const auto wrong = [down](double a, double b) { return down ? !(b < a) : !(b > a); };
+      return std::adjacent_find(values->begin(), values->end(), wrong) == values->end();
+    };
+    const bool turned = !goes_up();
+    if (turned) std::reverse(values->begin(), values->end());
+    const bool finite =
+        std::all_of(values->begin(), values->end(), [](double z) { return std::isfinite(z); });
+    if (!finite || !goes_up()) {
+      info_.notes.push_back("the levels are not placed by " + in_quotes(from.name) +
+                            ": its values are missing or not monotonic");
+      return {};
+    }
+    grid_.turned[2] = grid_.turned[2] != turned;
+    Axis& axis = info_.grid.axes[2];
+    axis.coordinates = std::move(*values);
+    axis.kind = down ? AxisKind::depth : AxisKind::height;
+    axis.standard_name = from.standard_name;
+    axis.units = from.units;
+    info_.notes.push_back("levels are placed by " + in_quotes(from.name));
+    forget_left_out({from.name, axis.name});
+    return {};
+  }
+
+  // Removes what has become the place of the levels from the variables that are not used.
+  void forget_left_out(const std::vector<std::string>& names) {
+    const auto used = [&](const LeftOut& left) {
+      return std::count(names.begin(), names.end(), left.name) > 0;
+    };
+    info_.left_out.erase(std::remove_if(info_.left_out.begin(), info_.left_out.end(), used),
+                         info_.left_out.end());
   }
 
   // Sums and counts of the heights of each level at the first step.
@@ -319,9 +415,7 @@ class HeightFinder {
     info_.notes.emplace_back(
         "levels are placed at their mean heights at the first step; the field \"height\" has the "
         "height of every sample (geometry.heightField)");
-    const auto placed = [&](const LeftOut& left) { return left.name == axis.name; };
-    info_.left_out.erase(std::remove_if(info_.left_out.begin(), info_.left_out.end(), placed),
-                         info_.left_out.end());
+    forget_left_out({axis.name});
     for (LeftOut& left : info_.left_out) {
       if (!heights.parametric) break;
       for (const int v : heights.parametric->columns) {

@@ -1,0 +1,100 @@
+// Levels whose coordinate only numbers them, placed by an auxiliary coordinate, as in files of the
+// Unified Model written by iris.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "server/data/model/dataset_info.hpp"
+#include "tests/unit/data/dataset_probe.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+namespace windsplat::data::test {
+namespace {
+
+using testing::ElementsAre;
+
+struct Levels {
+  std::vector<double> numbers{1, 2, 3, 4};
+  std::vector<double> heights{20, 80, 200, 900};
+  std::string units = "m";
+  std::string positive = "up";
+  bool is_formula = false;  // with sigma and the altitude of the ground
+};
+
+constexpr std::size_t columns = 6;
+
+void write_levels(const std::string& path, const Levels& levels) {
+  NetcdfMaker file(path);
+  const int z = file.axis("model_level_number", levels.numbers, "1", "model_level_number");
+  const int height = file.variable("level_height", NC_DOUBLE, {z}, levels.heights);
+  file.text(height, "units", levels.units);
+  file.text(height, "positive", levels.positive);
+  file.text(height, "long_name", "level_height");
+  const int y = file.axis("latitude", {50, 51}, "degrees_north");
+  const int x = file.axis("longitude", {0, 1, 2}, "degrees_east");
+  const int t =
+      file.variable("t", NC_FLOAT, {z, y, x}, counting(columns * levels.heights.size(), 250));
+  file.text(t, "units", "K");
+  file.text(t, "coordinates", "level_height sigma surface_altitude");
+  if (!levels.is_formula) return;
+  file.text(height, "standard_name", "atmosphere_hybrid_height_coordinate");
+  file.text(height, "formula_terms", "a: level_height b: sigma orog: surface_altitude");
+  file.variable("sigma", NC_DOUBLE, {z}, {1, 0.9, 0.5, 0});
+  const int ground =
+      file.variable("surface_altitude", NC_DOUBLE, {y, x}, {0, 100, 200, 300, 400, 500});
+  file.text(ground, "units", "m");
+}
+
+TEST(AuxiliaryLevels, NumberedLevelsLieAtTheHeightsOfTheFile) {
+  const Folder folder;
+  write_levels(folder / "um.nc", {});
+  const auto source = opened(folder / "um.nc");
+  const Axis& axis = source->info().grid.axes[2];
+  EXPECT_EQ(axis.kind, AxisKind::height);
+  EXPECT_EQ(axis.units, "m");
+  EXPECT_THAT(axis.coordinates, ElementsAre(20, 80, 200, 900));
+  EXPECT_TRUE(has_note(source->info(), "levels are placed by 'level_height'"));
+  EXPECT_EQ(reason_of(source->info(), "level_height"), "");
+  EXPECT_EQ(volume_of(*source, "t").values[0], 250);
+}
+
+TEST(AuxiliaryLevels, LevelsNumberedFromTheTopAreTurned) {
+  const Folder folder;
+  write_levels(folder / "down.nc", {{1, 2, 3, 4}, {900, 200, 80, 20}});
+  const auto source = opened(folder / "down.nc");
+  EXPECT_THAT(source->info().grid.axes[2].coordinates, ElementsAre(20, 80, 200, 900));
+  EXPECT_EQ(volume_of(*source, "t").values[0], 250 + 3 * columns);
+}
+
+TEST(AuxiliaryLevels, DepthsRunDown) {
+  const Folder folder;
+  write_levels(folder / "sea.nc", {{1, 2, 3}, {5, 50, 500}, "m", "down"});
+  const auto source = opened(folder / "sea.nc");
+  EXPECT_EQ(source->info().grid.axes[2].kind, AxisKind::depth);
+  EXPECT_THAT(source->info().grid.axes[2].coordinates, ElementsAre(500, 50, 5));
+  EXPECT_EQ(volume_of(*source, "t").values[0], 250 + 2 * columns);
+}
+
+TEST(AuxiliaryLevels, ThatAreNoPlacesAreNoted) {
+  const Folder folder;
+  write_levels(folder / "odd.nc", {{1, 2, 3, 4}, {20, 80, 80, 900}});
+  const auto source = opened(folder / "odd.nc");
+  EXPECT_EQ(source->info().grid.axes[2].kind, AxisKind::level);
+  EXPECT_TRUE(has_note(source->info(), "the levels are not placed by 'level_height'"));
+}
+
+// height = level_height + sigma * altitude; its mean over the columns has the mean altitude, 250 m.
+TEST(AuxiliaryLevels, AFormulaGivesTheHeightOfEverySample) {
+  const Folder folder;
+  Levels levels;
+  levels.is_formula = true;
+  write_levels(folder / "hills.nc", levels);
+  const auto source = opened(folder / "hills.nc");
+  EXPECT_THAT(source->info().grid.axes[2].coordinates,
+              ElementsAre(20 + 250, 80 + 225, 200 + 125, 900));
+}
+
+}  // namespace
+}  // namespace windsplat::data::test
