@@ -18,7 +18,8 @@ struct FileDimension {
   // first center (cf/staggered).
   int centers = -1;
   int first_face = 0;
-  bool other = false;  // neither space nor time
+  bool other = false;    // neither space nor time
+  double spacing_m = 0;  // metres between samples without coordinates, in a plane; 0: not known
 };
 
 struct FileVariable {

@@ -28,6 +28,7 @@
 #include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/grid/level_heights.hpp"
 #include "server/data/cf/grid/level_pressures.hpp"
+#include "server/data/cf/grid/plane_spacing.hpp"
 #include "server/data/cf/grid/positions.hpp"
 #include "server/data/cf/packing.hpp"
 #include "server/data/cf/read_blocks.hpp"
@@ -40,6 +41,7 @@ namespace windsplat::data::cf {
 namespace {
 
 constexpr std::size_t axis_max = std::size_t{1} << 24;
+constexpr std::size_t notes_max = 200;
 
 class ArraySource final : public FileSource {
  public:
@@ -85,6 +87,7 @@ class ArraySource final : public FileSource {
     tell_absent_components();
     tell_valid_values();
     tell_unwritten();
+    bound_notes();
     const std::filesystem::path name(file_->name());
     info_.id = name.stem().native();
     info_.source = file_->origin();
@@ -183,8 +186,11 @@ class ArraySource final : public FileSource {
     for (std::size_t which = 0; which < 3; ++which) {
       if (choice_.space.at(which) < 0) {
         info_.grid.axes.at(which) = flat_axis(which);
-        if (which == 2) {
-          if (auto done = find_level(); !done) return done;
+        if (auto done = which == 2   ? find_level()
+                        : which == 1 ? find_latitude()
+                                     : Result<void>();
+            !done) {
+          return done;
         }
         continue;
       }
@@ -211,15 +217,14 @@ class ArraySource final : public FileSource {
 
   // The positions of axes with 1-D coordinates.
   Result<void> find_projection() {
-    auto positions = find_positions(
-        *file_, choice_.variables,
-        {coordinate_of(choice_.space[0]), coordinate_of(choice_.space[1])}, placement_, info_);
+    const std::array coordinates{coordinate_of(choice_.space[0]), coordinate_of(choice_.space[1])};
+    auto positions = find_positions(*file_, choice_.variables, coordinates, placement_, info_);
     if (!positions) return positions.error();
     info_.grid.columns = std::move(positions->columns);
     outside_ = std::move(positions->outside);
     tangents_ = std::move(positions->tangents);
     follows_other_axes_ = positions->follow_other_axes;
-    return {};
+    return place_in_plane(*file_, placement_, coordinates, info_);
   }
 
   [[nodiscard]] Levels all_levels() const { return {0, placement_.length[2]}; }
@@ -233,6 +238,14 @@ class ArraySource final : public FileSource {
     axis.kind = over_globe ? AxisKind::level : AxisKind::cartesian;
     axis.coordinates = {0};
     return axis;
+  }
+
+  Result<void> find_latitude() {
+    if (info_.grid.axes[0].kind != AxisKind::longitude) return {};
+    auto latitude = find_chosen_latitude(*file_);
+    if (!latitude) return latitude.error();
+    if (*latitude) info_.grid.axes[1] = std::move(**latitude);
+    return {};
   }
 
   Result<void> find_level() {
@@ -324,6 +337,13 @@ class ArraySource final : public FileSource {
   [[nodiscard]] bool is_ocean_level(int coordinate) const {
     return coordinate >= 0 &&
            file_->contents().variables.at(at(coordinate)).standard_name.starts_with("ocean_");
+  }
+
+  void bound_notes() {
+    if (info_.notes.size() <= notes_max) return;
+    const std::size_t more = info_.notes.size() - notes_max + 1;
+    info_.notes.resize(notes_max - 1);
+    info_.notes.push_back(std::to_string(more) + " more notes");
   }
 
   void tell_valid_values() {

@@ -1,6 +1,7 @@
 // The coordinate of a chosen level has lost its dimension: it becomes an axis of length 1 again.
 #include "server/data/cf/grid/chosen_level.hpp"
 
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -35,6 +36,15 @@ std::string note_of_others(const FileContents& contents, const std::vector<int>&
   return count == 0 ? "" : "not at the chosen level " + in_quotes(level) + ": " + text;
 }
 
+// A variable without dimensions as the coordinate of a dimension of length 1.
+FileContents on_one_entry(const FileVariable& variable) {
+  FileContents out;
+  out.dimensions.push_back({.name = variable.name, .length = 1});
+  out.variables.push_back(variable);
+  out.variables.front().dims = {0};
+  return out;
+}
+
 }  // namespace
 
 Result<std::optional<ChosenLevel>> find_chosen_level(const ArrayFile& file,
@@ -47,10 +57,7 @@ Result<std::optional<ChosenLevel>> find_chosen_level(const ArrayFile& file,
   if (v < 0) return std::optional<ChosenLevel>();
   const FileVariable& variable = contents.variables[at(v)];
   if (!variable.numeric || !variable.dims.empty()) return std::optional<ChosenLevel>();
-  FileContents level;
-  level.dimensions.push_back({.name = out.name, .length = 1});
-  level.variables.push_back(variable);
-  level.variables.front().dims = {0};
+  const FileContents level = on_one_entry(variable);
   const DimensionRole role = classify_dimensions(level).front();
   if (role.role != Role::z) return std::optional<ChosenLevel>();
   auto value = unpacked_values(file, v);
@@ -60,6 +67,26 @@ Result<std::optional<ChosenLevel>> find_chosen_level(const ArrayFile& file,
   out.axis = std::move(oriented->axis);
   out.note = note_of_others(contents, shown, out.name);
   return std::optional(std::move(out));
+}
+
+Result<std::optional<Axis>> find_chosen_latitude(const ArrayFile& file) {
+  std::optional<Axis> found;
+  const FileContents& contents = file.contents();
+  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+    const FileVariable& variable = contents.variables[v];
+    if (!variable.numeric || !variable.dims.empty()) continue;
+    const FileContents one = on_one_entry(variable);
+    const DimensionRole role = classify_dimensions(one).front();
+    if (role.role != Role::y || role.kind != AxisKind::latitude) continue;
+    auto value = unpacked_degrees(file, static_cast<int>(v));
+    if (!value) return value.error();
+    if (value->size() != 1 || !(std::abs(value->front()) <= 90)) continue;
+    if (found && found->coordinates != *value) return std::optional<Axis>();
+    auto oriented = orient_axis(one, role, 0, 1, std::move(*value), AxisKind::longitude);
+    if (!oriented) return oriented.error();
+    found = std::move(oriented->axis);
+  }
+  return found;
 }
 
 }  // namespace windsplat::data::cf

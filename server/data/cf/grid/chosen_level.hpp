@@ -1,4 +1,4 @@
-// The vertical place of a grid whose level was chosen by the user.
+// The place of a grid whose level or latitude was chosen by the user.
 #pragma once
 
 #include <optional>
@@ -23,5 +23,9 @@ struct ChosenLevel {
 Result<std::optional<ChosenLevel>> find_chosen_level(const ArrayFile& file,
                                                      const std::vector<int>& shown,
                                                      AxisKind horizontal);
+
+// The axis of one latitude along which a section of longitudes runs: a coordinate without
+// dimensions, as one that was chosen; nullopt if there is none, or several that differ.
+Result<std::optional<Axis>> find_chosen_latitude(const ArrayFile& file);
 
 }  // namespace windsplat::data::cf

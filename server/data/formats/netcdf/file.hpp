@@ -77,6 +77,7 @@ class File final : public cf::ArrayFile {
   Result<void> choose_group(const std::string& wanted, const std::vector<std::string>& groups);
   Result<void> scan_group(const std::string& path);
   Result<void> scan_dimensions(int group);
+  void set_spacing_of_wrf(int group);
   Result<void> scan_variables(int group, bool above);
   Result<void> scan_variable(const Place& place, bool above);
   [[nodiscard]] bool has_field() const;

@@ -236,7 +236,28 @@ Result<void> File::scan_dimensions(int group) {
     dimension.unlimited = std::find(unlimited.begin(), unlimited.end(), id) != unlimited.end();
     contents_.dimensions.push_back(std::move(dimension));
   }
+  set_spacing_of_wrf(group);
   return {};
+}
+
+// WRF gives the lengths of its cells in the plane of the map as DX and DY of the file.
+void File::set_spacing_of_wrf(int group) {
+  for (const auto& [name, attribute] :
+       {std::pair("west_east", "DX"), std::pair("south_north", "DY")}) {
+    const int dimension = cf::dimension_named(contents_, name);
+    double metres = 0;
+    nc_type type = NC_NAT;
+    std::size_t length = 0;
+    if (dimension < 0 || nc_inq_att(group, NC_GLOBAL, attribute, &type, &length) != NC_NOERR ||
+        length != 1 || number_type_name(type) == nullptr ||
+        nc_get_att_double(group, NC_GLOBAL, attribute, &metres) != NC_NOERR) {
+      continue;
+    }
+    constexpr double metres_max = 1e7;
+    if (metres > 0 && metres <= metres_max) {
+      contents_.dimensions[static_cast<std::size_t>(dimension)].spacing_m = metres;
+    }
+  }
 }
 
 Result<void> File::scan_variables(int group, bool above) {

@@ -1,0 +1,33 @@
+// A small header must not make notes without bound.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/unit/data/dataset_probe.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+namespace windsplat::data::test {
+namespace {
+
+TEST(ManyNotes, AreBoundedAndCounted) {
+  constexpr int vectors = 300;
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "a.nc", 0);
+    const int y = file.dimension("y", 2);
+    const int x = file.dimension("x", 2);
+    for (int n = 0; n < vectors; ++n) {
+      const std::string number = std::to_string(n);
+      file.text(file.variable("u" + number, NC_FLOAT, {y, x}, counting(4)), "units", "m s-1");
+      file.text(file.variable("v" + number, NC_FLOAT, {y, x}, counting(4)), "units", "knots");
+    }
+  }
+  const auto source = opened(folder / "a.nc");
+  EXPECT_LE(source->info().notes.size(), 200U);
+  EXPECT_TRUE(has_note(source->info(), " more notes"));
+  EXPECT_NE(source->info().find("wind_vector_299"), nullptr) << "all 300 vectors are there";
+  EXPECT_EQ(source->info().find("wind_vector_300"), nullptr);
+}
+
+}  // namespace
+}  // namespace windsplat::data::test
