@@ -9,6 +9,8 @@ namespace windsplat::data::cf {
 
 namespace {
 
+constexpr double full_circle = 360;
+
 bool is_monotonic(const std::vector<double>& values) {
   const auto never = [&](auto wrong) {
     return std::adjacent_find(values.begin(), values.end(), wrong) == values.end();
@@ -19,16 +21,26 @@ bool is_monotonic(const std::vector<double>& values) {
 }  // namespace
 
 void continue_over_seam(std::vector<double>& longitudes) {
-  constexpr double turn = 360;
   if (longitudes.size() < 2 || is_monotonic(longitudes)) return;
   std::vector<double> out = longitudes;
   double added = 0;
   for (std::size_t i = 1; i < out.size(); ++i) {
     const double step = longitudes[i] - longitudes[i - 1];
-    if (std::abs(step) > turn / 2) added += step > 0 ? -turn : turn;
+    if (std::abs(step) > full_circle / 2) added += step > 0 ? -full_circle : full_circle;
     out[i] += added;
   }
-  if (is_monotonic(out) && std::abs(out.back() - out.front()) < turn) longitudes = std::move(out);
+  constexpr double closed =
+      full_circle * (1 + 1e-6);  // the first one may be repeated; single precision
+  if (is_monotonic(out) && std::abs(out.back() - out.front()) <= closed)
+    longitudes = std::move(out);
+}
+
+std::vector<double> turned_near(std::vector<double> longitudes, const std::vector<double>& others) {
+  if (longitudes.empty() || others.empty()) return longitudes;
+  const double shift =
+      full_circle * std::round((others.front() - longitudes.front()) / full_circle);
+  for (double& longitude : longitudes) longitude += shift;
+  return longitudes;
 }
 
 }  // namespace windsplat::data::cf

@@ -13,6 +13,7 @@
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/fields/fields.hpp"
 #include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/grid/longitudes.hpp"
 
 namespace windsplat::data::cf {
 
@@ -325,10 +326,13 @@ class StaggerFinder {
       const auto heights =
           role.role == Role::z ? heights_on(line.dimension) : std::vector<Heights>();
       line.by_height = !heights.empty();
-      auto values =
-          unpacked_values(file_, line.by_height ? heights.front().variable : role.coordinate);
+      const bool is_longitude = role.kind == AxisKind::longitude;
+      auto values = is_longitude ? unpacked_degrees(file_, role.coordinate)
+                                 : unpacked_values(file_, line.by_height ? heights.front().variable
+                                                                         : role.coordinate);
       if (!values) return values.error();
       line.values = std::move(*values);
+      if (is_longitude) continue_over_seam(line.values);
       line.falls = line.values.size() > 1 && line.values[1] < line.values[0];
       for (double& value : line.values) value = line.falls ? -value : value;
       out.push_back(std::move(line));
@@ -356,7 +360,10 @@ class StaggerFinder {
                              faces.values.size() != centers.values.size() ||
                              has_velocity(faces.dimension);
         if (!is_sure) continue;
-        const auto first = interleaved(faces.values, centers.values);
+        const bool are_longitudes = faces.kind == AxisKind::longitude;
+        const auto first =
+            interleaved(are_longitudes ? turned_near(faces.values, centers.values) : faces.values,
+                        centers.values);
         if (first) add(faces.dimension, centers.dimension, false, *first);
       }
     }
