@@ -50,8 +50,9 @@ Result<Subject> find_subject(tasks::Catalogue& catalogue, const std::string& id,
   if (!dataset) return dataset.error();
   const data::FieldInfo* found = (*dataset)->info().find(field);
   if (found == nullptr) {
-    return make_error(ErrorKind::not_found,
-                      "dataset '" + printable(id) + "' has no field '" + printable(field) + "'");
+    return make_error(ErrorKind::not_found, "dataset '" + printable(id) + "' has no field '" +
+                                                printable(field) + "'" +
+                                                data::absence_text((*dataset)->info(), field));
   }
   return Subject{&catalogue, std::move(*dataset), *found, request.cancel};
 }

@@ -34,7 +34,7 @@ Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const s
   const data::FieldInfo* field = info.find(name);
   if (field == nullptr) {
     return invalid_at(pointer, "dataset " + in_double_quotes(info.id) + " has no field " +
-                                   in_double_quotes(name));
+                                   in_double_quotes(name) + data::absence_text(info, name));
   }
   if (field->kind != kind) {
     const bool scalar = field->kind == data::FieldKind::scalar;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "server/base/error.hpp"
+
 namespace windsplat::data {
 
 std::array<int, 3> Grid::dims() const {
@@ -27,6 +29,19 @@ const FieldInfo* DatasetInfo::first(FieldKind kind) const {
   const auto at = std::find_if(fields.begin(), fields.end(),
                                [&](const FieldInfo& field) { return field.kind == kind; });
   return at == fields.end() ? nullptr : &*at;
+}
+
+std::string absence_text(const DatasetInfo& info, const std::string& name) {
+  const auto left = std::find_if(info.left_out.begin(), info.left_out.end(),
+                                 [&](const LeftOut& one) { return one.name == name; });
+  if (left == info.left_out.end()) return {};
+  constexpr std::size_t shown_max = 200;
+  if (!left->reason.starts_with("on another grid")) {
+    return ": it is left out, " + printable(left->reason, shown_max);
+  }
+  return ": it lies " + printable(left->reason, shown_max) +
+         "; to show it, append ?field=" + printable(name, shown_max) +
+         " to the file's name (&field= behind other entries)";
 }
 
 }  // namespace windsplat::data

@@ -101,4 +101,8 @@ struct DatasetInfo {
   [[nodiscard]] const FieldInfo* first(FieldKind kind) const;          // null if there is none
 };
 
+// What the file has under a name that is no field of the dataset, for the end of a message, with
+// how to show it; empty if it has nothing.
+std::string absence_text(const DatasetInfo& info, const std::string& name);
+
 }  // namespace windsplat::data

@@ -114,8 +114,8 @@ struct Dataset::State {
   [[nodiscard]] Result<std::size_t> find(const std::string& field, std::size_t step) const {
     const FieldInfo* found = info.find(field);
     if (found == nullptr) {
-      return make_error(ErrorKind::not_found,
-                        "dataset " + in_quotes(info.id) + " has no field " + in_quotes(field));
+      return make_error(ErrorKind::not_found, "dataset " + in_quotes(info.id) + " has no field " +
+                                                  in_quotes(field) + absence_text(info, field));
     }
     if (step >= info.steps.size()) {
       return make_error(ErrorKind::not_found, "dataset " + in_quotes(info.id) + " has no step " +

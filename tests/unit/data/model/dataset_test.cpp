@@ -90,5 +90,16 @@ TEST(FinishVolume, RefusesAVolumeOfTheWrongSize) {
   EXPECT_THROW(finish_volume(volume), std::logic_error);
 }
 
+TEST(DatasetInfo, AbsentFieldsOnOtherGridsAreExplained) {
+  DatasetInfo info;
+  info.left_out = {{"pr", "on another grid (lat 3, lon 4)"},
+                   {"lon_bnds", "bounds of a coordinate"}};
+  EXPECT_EQ(absence_text(info, "pr"),
+            ": it lies on another grid (lat 3, lon 4); to show it, append ?field=pr to the file's "
+            "name (&field= behind other entries)");
+  EXPECT_EQ(absence_text(info, "lon_bnds"), ": it is left out, bounds of a coordinate");
+  EXPECT_EQ(absence_text(info, "none"), "");
+}
+
 }  // namespace
 }  // namespace windsplat::data
