@@ -8,6 +8,7 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -257,6 +258,25 @@ class HostParts(unittest.TestCase):
         again = self.inspect_all()
         self.assertEqual(again.stdout, first.stdout)
         self.assertEqual((self.host.parts, len(self.host.asked())), ([], 1), "confirmed only")
+
+    def test_a_whole_file_that_left_the_cache_while_in_use_is_still_the_same(self):
+        self.assertEqual(self.inspect_all().returncode, 0)
+        self.host.parts = []
+        frame = "/v1/datasets/classic/frame.npy?width=64&height=48&step="
+        with Daemon(self.host.origin + "/classic.nc", *self.options()) as daemon:
+            self.assertEqual(daemon.get(frame + "0")[0], 200)
+            self.assertEqual(self.host.parts, [], "the file is in the cache")
+            for path in self.cache.iterdir():
+                path.unlink()
+            children = pathlib.Path(f"/proc/{daemon.process.pid}/task/{daemon.process.pid}/"
+                                    "children").read_text().split()
+            self.assertTrue(children, "a loader")
+            for child in children:
+                os.kill(int(child), signal.SIGKILL)
+            status, body = daemon.get(frame + "1")
+            if status != 200:  # the call during which the loader ended
+                status, body = daemon.get(frame + "1")
+            self.assertEqual(status, 200, body)
 
     def test_whole_files_are_fetched_where_parts_have_no_state(self):
         for what in ({"ranges": False}, {"etag_mark": "W/"},

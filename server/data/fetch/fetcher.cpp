@@ -11,9 +11,7 @@ namespace {
 
 constexpr std::size_t idle_clients_max = 8;
 constexpr std::size_t idle_parts_max = 64;  // files open without a reader
-constexpr std::chrono::minutes unfit_time{1};
-constexpr std::size_t noted_files_max = 4096;
-constexpr std::uint64_t kept_share = 4;  // of the cache, for a file that was read to its end
+constexpr std::uint64_t kept_share = 4;     // of the cache, for a file that was read to its end
 constexpr std::size_t list_entries_max = 1'000'000;
 constexpr int list_pages_max = 1100;  // pages have 1000 entries
 constexpr std::size_t list_page_bytes_max = std::size_t{4} << 20;
@@ -103,13 +101,15 @@ Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Can
   if (mark < text.size()) request->query = text.substr(mark + 1);
   const std::string key = request->url.text() + text.substr(mark);
   if (auto permitted = rules_->check(request->url); !permitted) return permitted.error();
-  if (is_unfit(key)) how = Fetch::whole;
+  const bool wants_parts = how == Fetch::parts;
+  if (noted_.is_unfit(key) || noted_.was_whole(key)) how = Fetch::whole;
   auto parts = how == Fetch::parts ? find_parts(key) : std::nullopt;
   if (parts && Clock::now() - parts->confirmed < options_.cache.fresh_time) {
     return opened(std::move(parts->file));
   }
   auto known = parts ? std::nullopt : cache_->find(key);
   const std::string kept = known ? state_of_kept(key, *known) : "";
+  if (known && kept.empty() && wants_parts) noted_.note_whole(key);
   if (known && known->is_fresh) return FetchedFile{std::move(known->file), nullptr, kept};
   if (parts) request->known = parts->file->validators();
   if (known) request->known = known->validators;
@@ -120,6 +120,7 @@ Result<FetchedFile> Fetcher::fetch(const std::string& text, Fetch how, const Can
   const auto response =
       get(*request, [&part](std::string_view bytes) { return part->append(bytes); });
   if (!response) {
+    noted_.forget_whole(key);
     if (response.error().kind == ErrorKind::not_found) {
       cache_->remove(key);
       forget_parts(key);
@@ -161,7 +162,7 @@ Result<Extent> Fetcher::fetch_part(const std::string& text, SparseFile& file, st
     const auto response = get(*request, sink);
     if (!response) return response.error();
     if (!response->is_other_part) return {};
-    if (file.bytes() <= options_.limits.bytes_max) note_unfit(file.url());
+    if (file.bytes() <= options_.limits.bytes_max) noted_.note_unfit(file.url());
     return fault_of_part(request->url, file, response->validators.etag);
   };
   drop_idle_parts(std::min(count, file.bytes()));
@@ -173,30 +174,11 @@ Result<Extent> Fetcher::fetch_part(const std::string& text, SparseFile& file, st
   return out;
 }
 
-bool Fetcher::is_unfit(const std::string& key) {
-  const std::lock_guard lock(mutex_);
-  const auto at = unfit_.find(key);
-  if (at == unfit_.end()) return false;
-  if (Clock::now() - at->second < unfit_time) return true;
-  unfit_.erase(at);
-  return false;
-}
-
-void Fetcher::note_unfit(const std::string& key) {
-  const std::lock_guard lock(mutex_);
-  if (unfit_.size() >= noted_files_max) unfit_.clear();
-  unfit_[key] = Clock::now();
-}
-
 // It is in use as it is: what cannot be kept is fetched again by the next program.
 void Fetcher::keep_whole(const SparseFile& file) {
   constexpr std::size_t copied_at_once = std::size_t{1} << 20;
   if (file.bytes() > options_.cache.bytes_max / kept_share) return;
-  {
-    const std::lock_guard lock(mutex_);
-    if (kept_.size() >= noted_files_max) kept_.clear();
-    if (!kept_.insert(file.state()).second) return;
-  }
+  if (!noted_.note_kept(file.state())) return;
   const auto from = file.open();
   auto part = cache_->begin();
   if (!from || !part) return;
@@ -211,8 +193,7 @@ void Fetcher::keep_whole(const SparseFile& file) {
 // Datasets that were opened when it was in parts know it by that state.
 std::string Fetcher::state_of_kept(const std::string& key, const ObjectCache::Entry& entry) {
   std::string state = state_of(key, entry.bytes, entry.validators.etag);
-  const std::lock_guard lock(mutex_);
-  return kept_.contains(state) ? state : "";
+  return noted_.is_kept(state) ? state : "";
 }
 
 std::optional<Fetcher::KnownParts> Fetcher::find_parts(const std::string& key) {

@@ -6,17 +6,16 @@
 #include <cstdint>
 #include <functional>
 #include <list>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "server/base/error.hpp"
 #include "server/data/fetch/host_rules.hpp"
 #include "server/data/fetch/http_client.hpp"
+#include "server/data/fetch/noted_files.hpp"
 #include "server/data/fetch/object_cache.hpp"
 #include "server/data/fetch/s3.hpp"
 #include "server/data/fetch/sparse_file.hpp"
@@ -64,7 +63,7 @@ class Fetcher {
                             std::uint64_t count, const Cancelled& cancelled);
   // Whether parts that do not fit together were received of a file (SparseFile::url()) that is thus
   // fetched as a whole when it is opened next.
-  [[nodiscard]] bool is_unfit(const std::string& key);
+  [[nodiscard]] bool is_unfit(const std::string& key) { return noted_.is_unfit(key); }
   // Names directly below a folder of an S3 service, sorted; folders end in '/'. Errors: bad_data,
   // also for other hosts, which have no lists.
   Result<std::vector<std::string>> list(const std::string& folder_url, const Cancelled& cancelled);
@@ -90,7 +89,6 @@ class Fetcher {
   void forget_parts(const std::string& key);
   // Removes files that no dataset has open until there is room for so many bytes in the cache.
   void drop_idle_parts(std::uint64_t bytes);
-  void note_unfit(const std::string& key);
   void keep_whole(const SparseFile& file);
   [[nodiscard]] std::string state_of_kept(const std::string& key, const ObjectCache::Entry& entry);
 
@@ -101,10 +99,7 @@ class Fetcher {
   std::mutex mutex_;
   std::vector<std::unique_ptr<HttpClient>> idle_;  // guarded by the mutex
   std::list<KnownParts> parts_;                    // guarded by the mutex
-  // By key, since when; guarded by the mutex.
-  std::map<std::string, Clock::time_point> unfit_;
-  // States of the files in parts that were read to their end; guarded by the mutex.
-  std::set<std::string> kept_;
+  NotedFiles noted_;
 };
 
 // The files of a location that is fetched. `cancelled` ends a request that is under way. The

@@ -130,9 +130,20 @@ Result<HostRules> HostRules::parse(const std::vector<std::string>& hosts, bool s
 Result<void> HostRules::check(const Url& url) const {
   const std::string origin = origin_of(url);
   if (std::find(origins_.begin(), origins_.end(), origin) != origins_.end()) return {};
-  return make_error(ErrorKind::invalid, in_quotes(origin) +
-                                            " is not a permitted host: files are fetched only from "
-                                            "the hosts of --data-host");
+  std::string text =
+      in_quotes(origin) +
+      " is not a permitted host: files are fetched only from the hosts of --data-host";
+  const std::string host = origin.substr(origin.find("://") + 3);
+  const auto permits = [&](const std::string& other) {
+    return std::find(origins_.begin(), origins_.end(), other) != origins_.end();
+  };
+  if (url.scheme == "http" && permits("https://" + host)) {
+    text += "; --data-host " + host + " permits https, --data-host " + origin + " unencrypted http";
+  } else if (permits("http://" + host)) {
+    text += "; --data-host http://" + host + " permits unencrypted http, --data-host " + host +
+            " https";
+  }
+  return make_error(ErrorKind::invalid, std::move(text));
 }
 
 bool HostRules::permits(const sockaddr* address) const {

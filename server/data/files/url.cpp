@@ -109,11 +109,22 @@ bool set_authority(std::string_view authority, Url& out) {
 // Of a THREDDS server; others are recognised by the scheme dods only.
 bool is_service(const Url& url) { return url.path.find("/dodsC/") != std::string::npos; }
 
-bool is_answer_of_service(const Url& url) {
-  constexpr auto endings =
+// Whether a URL is an answer about a dataset of a service, or a page about it.
+bool is_answer_of_service(const Url& url, bool service) {
+  const auto has_ending = [&](const auto& endings) {
+    return std::any_of(endings.begin(), endings.end(),
+                       [&](std::string_view ending) { return url.path.ends_with(ending); });
+  };
+  constexpr auto answers =
       std::to_array<std::string_view>({".dods", ".dds", ".das", ".dmr", ".dap"});
-  return std::any_of(endings.begin(), endings.end(),
-                     [&](std::string_view ending) { return url.path.ends_with(ending); });
+  constexpr auto pages = std::to_array<std::string_view>({".html", ".info", ".ascii", ".asc"});
+  return has_ending(answers) || (service && has_ending(pages));
+}
+
+// A page of THREDDS that lists datasets, or describes one.
+bool is_catalogue(const Url& url) {
+  return url.path.find("/thredds/catalog/") != std::string::npos ||
+         url.path.ends_with("/catalog.html") || url.path.ends_with("/catalog.xml");
 }
 
 // Names of parameters that sign a URL; their values must not be taken for a selection, which
@@ -236,7 +247,12 @@ Result<Location> locate_url(const std::string& text) {
   const auto url = parse_url(plain);
   if (!url) return url.error();
   out.service = out.service || is_service(*url);
-  if (is_answer_of_service(*url)) {
+  if (is_catalogue(*url)) {
+    return refused_url(text,
+                       "is a page of a catalogue: give the address of a dataset on it, of OPENDAP "
+                       "(with /dodsC/, without .html) or HTTPServer (with /fileServer/)");
+  }
+  if (is_answer_of_service(*url, out.service)) {
     return refused_url(text,
                        "is an answer of an OPeNDAP service: give the URL of the dataset, without "
                        "this ending, as dods://HOST/PATH");

@@ -235,7 +235,11 @@ class StoreScan {
   // Looks at the files of chunks, and counts the absent ones; not of a store that is fetched, whose
   // chunks are fetched when they are read.
   void identify() {
-    if (files_.location().fetched) return;
+    if (files_.location().fetched) {
+      out_.file.notes.emplace_back(
+          "absent chunks are not counted, as chunks are fetched when they are read");
+      return;
+    }
     const auto is_stored = [](const Array& array) {
       return array.metadata.problem.empty() && !array.line;
     };

@@ -128,6 +128,21 @@ TEST(HostList, SchemeHostAndPortMustAllBePermitted) {
   EXPECT_FALSE(HostRules().check(parse_url("https://h/x").value()));
 }
 
+TEST(HostList, ARefusalNamesTheOptionForTheOtherScheme) {
+  const auto rules = HostRules::parse({"data.example:8000", "http://plain.example"}, false);
+  ASSERT_TRUE(rules);
+  const auto why = [&](const std::string& url) {
+    return rules->check(parse_url(url).value()).error().message;
+  };
+  EXPECT_THAT(why("http://data.example:8000/x"),
+              HasSubstr("--data-host data.example:8000 permits https, --data-host "
+                        "http://data.example:8000 unencrypted http"));
+  EXPECT_THAT(why("https://plain.example/x"),
+              HasSubstr("--data-host http://plain.example permits unencrypted http, --data-host "
+                        "plain.example https"));
+  EXPECT_THAT(why("https://other.example/x"), Not(HasSubstr("permits")));
+}
+
 TEST(HostList, WhatIsNoHostIsRefused) {
   for (const char* text :
        {"", "s3://bucket", "https://h/path", "h/path", "h:0", "a b", "user:p@h"}) {

@@ -88,6 +88,15 @@ TEST(UrlLocation, GroupAndSelectionFollowAsInPaths) {
 TEST(UrlLocation, PatternsAndServicesAreRefusedByName) {
   EXPECT_THAT(locate_url("https://h/wrf_*.nc").error().message, HasSubstr("pattern"));
   EXPECT_THAT(locate_url("https://h/x.nc.dods").error().message, HasSubstr("dods://HOST/PATH"));
+  for (const char* page : {"https://h/thredds/dodsC/a/x.nc.html", "dods://h/a/x.nc.info",
+                           "https://h/thredds/dodsC/a/x.nc.ascii"}) {
+    EXPECT_THAT(locate_url(page).error().message, HasSubstr("without this ending")) << page;
+  }
+  for (const char* page : {"https://h/thredds/catalog/a/catalog.html?dataset=x",
+                           "https://h/thredds/catalog/a/catalog.xml"}) {
+    EXPECT_THAT(locate_url(page).error().message, HasSubstr("is a page of a catalogue")) << page;
+  }
+  EXPECT_TRUE(locate_url("https://h/x.html"));
 }
 
 TEST(UrlLocation, ServicesHaveASchemeOrTheirPathOnThredds) {
