@@ -158,7 +158,8 @@ std::string fields_text(const protocol::DatasetDescription& dataset) {
       }
       kind += ')';
     }
-    std::string range = field.masked ? "no value" : any_range ? "computed when shown" : "not read";
+    const bool waits = any_range && field.dtype == "derived";
+    std::string range = field.masked ? "no value" : waits ? "computed when shown" : "not read";
     if (field.range) {
       range = field.kind == "vector" ? "|v| " : "";
       range.append(number((*field.range)[0])).append(" .. ").append(number((*field.range)[1]));

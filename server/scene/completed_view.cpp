@@ -5,8 +5,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <iomanip>
+#include <sstream>
+#include <string>
 #include <utility>
 
+#include "server/base/ascii.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
@@ -392,6 +396,26 @@ std::vector<std::string> fields_of(const View& view, const data::DatasetInfo& in
   }
   if (view.geometry.height_field) add(*view.geometry.height_field);
   return fields;
+}
+
+Result<std::string> hidden_vectors(const protocol::View& view, data::Dataset& dataset) {
+  constexpr double told_least = 0.01;
+  const protocol::VectorView& vector = view.vector;
+  const double least = vector.min_magnitude.value_or(0);
+  if (vector.field.kind != FieldChoice::Kind::named || !(least > 0)) return std::string();
+  const auto share = from_first_step(
+      dataset, "hidden", vector.field.name, {least},
+      [&](const data::Volume& volume) { return std::vector{hidden_share(least, volume)}; });
+  if (!share) return share.error();
+  if (share->front() < told_least) return std::string();
+  std::ostringstream text;
+  text << std::setprecision(3) << "the default view shows no vectors of "
+       << in_quotes(vector.field.name) << " shorter than " << least;
+  const data::FieldInfo* const field = dataset.info().find(vector.field.name);
+  if (field != nullptr && !field->units.empty()) text << ' ' << printable(field->units, 80);
+  text << " (/vector/minMagnitude): about " << std::lround(100 * share->front())
+       << " % of those at the first step";
+  return text.str();
 }
 
 }  // namespace windsplat::scene

@@ -32,8 +32,12 @@ struct Kind {
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> all = {
-      {{"cloud", "condens"},
-       {"cl", "cc", "clt", "clw", "cli", "clwc", "ciwc", "qc", "qi", "tcc", "cldtot"},
+      {{"cloud", "condens", "liquid water content", "liquid_water_content", "ice water content",
+        "ice_water_content", "liquid water mixing ratio", "liquid water specific", "cldliq",
+        "cldice"},
+       {"cl",  "cc",     "clt",  "clw",  "cli",  "clwc", "ciwc", "qc",  "qi",
+        "tcc", "cldtot", "ql",   "qn",   "qcl",  "qcf",  "qci",  "lwc", "iwc",
+        "cwc", "clwmr",  "icmr", "qliq", "qice", "rct",  "rit"},
        {"clouds", 0.12, 12, true}},
       {{"energy"}, {}, {"inferno", 0.30, 6, false}},
       {{"smoke", "dust", "aerosol", "ash", "concentration", "tracer"},
@@ -78,7 +82,8 @@ std::size_t kind_of(const data::FieldInfo& field) {
       text.erase(at, sea.size());
     }
   }
-  for (std::size_t n = 0; n < kinds().size(); ++n) {
+  const bool in_soil = text.find("soil") != std::string::npos;
+  for (std::size_t n = in_soil ? 1 : 0; n < kinds().size(); ++n) {
     for (const std::string_view word : kinds()[n].words) {
       if (text.find(word) != std::string::npos) return n;
     }
@@ -87,6 +92,25 @@ std::size_t kind_of(const data::FieldInfo& field) {
     }
   }
   return kinds().size();
+}
+
+bool says(const data::FieldInfo& field, const std::vector<std::string_view>& words) {
+  const std::string text =
+      lower(field.name) + " " + lower(field.standard_name) + " " + lower(field.long_name);
+  return std::any_of(words.begin(), words.end(),
+                     [&](std::string_view word) { return text.find(word) != std::string::npos; });
+}
+
+// Whether a quantity of clouds in the unit 1 or % is a share of an area or volume, as opposed to a
+// mixing ratio: by its names, otherwise by its values, since a range of shares would leave every
+// mixing ratio too small to be seen.
+bool is_share(const data::FieldInfo& field, double whole, double most) {
+  if (says(field, {"mixing", "mass_fraction", "mass fraction", "content", "specific"}))
+    return false;
+  if (says(field, {"area_fraction", "cover", "cloud fraction", "cloud_fraction", "cloud area"})) {
+    return true;
+  }
+  return most <= 0 || most > scalar_style(field).clear_below * whole;
 }
 
 // Indices of the samples that are shown.
@@ -196,6 +220,16 @@ protocol::Range default_magnitude_range(const data::Volume& volume) {
   }
   if (!(top > 1e-29) || !std::isfinite(top)) return {0, 1};
   return {0, std::min(nice_above(top), value_max)};
+}
+
+double hidden_share(double min_magnitude, const data::Volume& volume) {
+  std::size_t all = 0;
+  std::size_t hidden = 0;
+  for_some_samples(volume, std::nullopt, [&](std::size_t, double magnitude) {
+    ++all;
+    hidden += magnitude < min_magnitude ? 1 : 0;
+  });
+  return all == 0 ? 0 : static_cast<double>(hidden) / static_cast<double>(all);
 }
 
 double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
@@ -336,12 +370,8 @@ protocol::Range default_scalar_range(const data::FieldInfo& field, const data::V
   const auto least = static_cast<double>(volume.range[0]);
   const auto most = static_cast<double>(volume.range[1]);
   if (signature.fraction && least >= -1e-6) {
-    // Mixing ratios have the unit 1 too; as shares, all of them would be too small to be seen.
-    const auto is_share = [&](double whole, double tolerance) {
-      return most <= whole + tolerance && (most <= 0 || most > signature.clear_below * whole);
-    };
-    if (field.units == "%" && is_share(100, 0.5)) return {0, 100};
-    if (field.units == "1" && is_share(1, 1e-4)) return {0, 1};
+    if (field.units == "%" && most <= 100.5 && is_share(field, 100, most)) return {0, 100};
+    if (field.units == "1" && most <= 1.0001 && is_share(field, 1, most)) return {0, 1};
   }
   if (is_body(field)) return {0, 2};
   const protocol::Range middle = quantiles(volume, 0.01, 0.995);

@@ -33,6 +33,9 @@ protocol::Range default_magnitude_range(const data::Volume& volume);
 double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
                              const Lattice& lattice, const std::optional<Slice>& slice);
 
+// The share of unmasked samples whose magnitude is smaller, from at most 2^15 of them.
+double hidden_share(double min_magnitude, const data::Volume& volume);
+
 // Magnitudes from slightly below the weakest line drawn to the top of the range.
 protocol::Range default_magnitude_colors(const protocol::VectorView& vector);
 

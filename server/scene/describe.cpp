@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/ascii.hpp"
 #include "server/data/model/measure.hpp"
 #include "server/scene/bend.hpp"
 #include "server/scene/completed_view.hpp"
@@ -133,13 +134,19 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   out.mappings = mappings_of(info.grid);
   const std::size_t steps = ranges == RangesOf::all_steps ? info.steps.size() : 1;
   std::uint64_t components = 0;
+  std::vector<std::string> unread;
   for (const data::FieldInfo& field : info.fields) {
     protocol::FieldDescription description = describe_field(field);
     // Derived fields are computed only when they are shown.
     const bool all = ranges == RangesOf::first_step || ranges == RangesOf::all_steps;
     if (all && !field.derived) {
       description.range_of = ranges == RangesOf::all_steps ? "all" : "step";
-      if (auto ok = add_range(dataset, steps, description); !ok) return ok.error();
+      if (auto ok = add_range(dataset, steps, description); !ok) {
+        if (ok.error().kind != ErrorKind::bad_data) return ok.error();
+        description.range_of.clear();
+        unread.push_back("the range of " + in_quotes(field.name) +
+                         " is not known: " + ok.error().message);
+      }
     }
     if (!field.derived) components += field.components.size();
     out.fields.push_back(std::move(description));
@@ -149,6 +156,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
     out.choices.push_back({choice.name, choice.length, choice.values, choice.chosen});
   }
   out.notes = info.notes;
+  out.notes.insert(out.notes.end(), unread.begin(), unread.end());
   for (const data::TimeStep& step : info.steps) out.steps.push_back({step.value, step.text});
   out.time_units = info.time_units;
   out.resident_bytes = dataset.resident_bytes();
@@ -156,8 +164,14 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
   out.default_view.dataset = info.id;
   if (ranges != RangesOf::none) {
     auto completed = complete(out.default_view, dataset);
-    if (!completed) return completed.error();
-    out.default_view = completed->view();
+    const bool damaged = !completed && completed.error().kind == ErrorKind::bad_data;
+    if (!completed && !(damaged && !unread.empty())) return completed.error();
+    if (completed) {
+      out.default_view = completed->view();
+      auto hidden = hidden_vectors(out.default_view, dataset);
+      if (!hidden) return hidden.error();
+      if (!hidden->empty()) out.notes.push_back(std::move(*hidden));
+    }
     if (ranges == RangesOf::seen) add_seen_ranges(dataset, out);
   }
   return out;

@@ -21,6 +21,8 @@ void add_seen_ranges(const data::Dataset& dataset, protocol::DatasetDescription&
 // Description for lists: fields with their kinds and the number of steps; no axes, steps or ranges.
 protocol::DatasetDescription describe_briefly(const data::Dataset& dataset);
 
+// With first_step and all_steps, fields that cannot be read have no range, and notes name them with
+// the reason.
 Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf ranges);
 
 }  // namespace windsplat::scene

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -93,6 +94,40 @@ TEST(Inspect, ReadsRangesAboveTheLimitOnRequest) {
   EXPECT_FALSE(has_note(first, "ranges are"));
   EXPECT_TRUE(described(path, "none")["fields"][0]["range"].is_null());
   EXPECT_EQ(run({"inspect", "--ranges", "some", path}).code, 2);
+}
+
+// The numbers of q are damaged, those of the wind are not.
+TEST(Inspect, DescribesAFileOfWhichAFieldCannotBeRead) {
+  const Folder folder;
+  const std::string path = folder.file("a.nc");
+  {
+    NetcdfMaker file(path);
+    const std::vector<int> dims{file.dimension("z", 2), file.dimension("y", 40),
+                                file.dimension("x", 50)};
+    for (const char* name : {"u", "v", "q"}) {
+      std::vector<double> values = counting(4000);
+      for (double& value : values) value = std::sin(value * value);
+      file.deflate(file.variable(name, NC_FLOAT, dims, values));
+    }
+  }
+  std::string bytes = windsplat::data::test::bytes_of(path);
+  std::size_t chunk = 0;  // zlib's header at level 1; the last is that of q
+  for (std::size_t at = bytes.find("\x78\x01"); at != std::string::npos;
+       at = bytes.find("\x78\x01", at + 1)) {
+    if (at + 8000 < bytes.size()) chunk = at;
+  }
+  ASSERT_GT(chunk, 0U);
+  for (std::size_t n = chunk + 4000; n < chunk + 4200; ++n) bytes[n] = static_cast<char>(~bytes[n]);
+  windsplat::data::test::write_bytes(path, bytes);
+  const json dataset = described(path);
+  EXPECT_TRUE(has_note(dataset, "the range of 'q' is not known: ")) << dataset["notes"];
+  EXPECT_TRUE(has_note(dataset, "'q' cannot be read"));
+  for (const json& field : dataset["fields"]) {
+    const bool is_read = field["name"] == "u" || field["name"] == "v" || field["kind"] == "vector";
+    if (field["dtype"] == "derived") continue;
+    EXPECT_EQ(field["range"].is_null(), !is_read) << field;
+  }
+  EXPECT_EQ(run({"inspect", path}).code, 0);
 }
 
 TEST(Inspect, ShowsNotesInFull) {

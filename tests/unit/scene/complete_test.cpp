@@ -388,6 +388,22 @@ TEST(Defaults, AnOceanHasNoMediumOfCurrentsOrSalinity) {
   EXPECT_EQ(default_scalars(info), std::vector<std::string>{"q"});
 }
 
+TEST(Defaults, CloudWaterIsAMediumByItsUsualNames) {
+  data::DatasetInfo info;
+  info.grid = atmosphere_grid();
+  for (const char* name : {"ql", "QCL", "LWC", "iwc", "clwc", "CLDLIQ", "clwmr"}) {
+    info.fields = {wind_info(), scalar_info("hus", "1"), scalar_info(name, "kg kg-1")};
+    EXPECT_EQ(default_scalars(info), std::vector<std::string>{name});
+  }
+  data::FieldInfo plain = scalar_info("x1", "kg m-3");
+  plain.long_name = "Liquid water content";
+  info.fields = {wind_info(), scalar_info("hus", "1"), plain};
+  EXPECT_EQ(default_scalars(info), std::vector<std::string>{"x1"});
+  plain.long_name = "Liquid water content of soil layers";
+  info.fields = {wind_info(), scalar_info("cc", "1"), plain};
+  EXPECT_EQ(default_scalars(info), std::vector<std::string>{"cc"});
+}
+
 TEST(Defaults, AMapShowsItsFirstFieldAndIsOpaqueEverywhere) {
   data::Grid grid = atmosphere_grid();
   grid.axes[2].coordinates = {0};
@@ -411,12 +427,15 @@ TEST(Defaults, AMapShowsItsFirstFieldAndIsOpaqueEverywhere) {
 }
 
 // The range of a field "cloud" of which a quarter of the samples has the largest value.
-protocol::Range range_of_cloud(const std::string& units, float most) {
+protocol::Range range_of_cloud(const std::string& units, float most,
+                               const std::string& long_name = "") {
   data::Volume volume;
   volume.dims = {4, 1, 1};
   volume.values = {0, 0, 0, most};
   data::finish_volume(volume);
-  return default_scalar_range(scalar_info("cloud", units), volume);
+  data::FieldInfo field = scalar_info("cloud", units);
+  field.long_name = long_name;
+  return default_scalar_range(field, volume);
 }
 
 // Clouds begin at 0.12 of their range.
@@ -426,6 +445,26 @@ TEST(Defaults, SharesHaveTheWholeRangeAndMixingRatiosTheirOwn) {
   EXPECT_EQ(range_of_cloud("1", 0), (protocol::Range{0, 1}));
   EXPECT_NEAR(range_of_cloud("1", 9e-4F)[1], 1e-3, 1e-9);
   EXPECT_NEAR(range_of_cloud("%", 3)[1], 3, 1e-6);
+}
+
+// An almost clear first step must not decide on the range of the steps after it.
+TEST(Defaults, NamesTellSharesFromMixingRatios) {
+  EXPECT_EQ(range_of_cloud("1", 0.01F, "cloud area fraction"), (protocol::Range{0, 1}));
+  EXPECT_EQ(range_of_cloud("%", 3, "Total cloud cover"), (protocol::Range{0, 100}));
+  EXPECT_LT(range_of_cloud("1", 0.3F, "mass fraction of cloud water")[1], 0.5);
+}
+
+TEST(Defaults, HiddenVectorsAreCounted) {
+  const auto dataset = cloudy_weather();
+  View view = completed(View{}, *dataset);
+  view.vector.min_magnitude = 0;
+  EXPECT_EQ(hidden_vectors(view, *dataset).value(), "");
+  view.vector.min_magnitude = 1e6;
+  EXPECT_THAT(hidden_vectors(view, *dataset).value(),
+              testing::HasSubstr("shorter than 1e+06 m s-1 (/vector/minMagnitude): about 100 %"));
+  // Sample n has the components n, n + 100 and n + 200: a magnitude below 255 at n = 0 to 22 of 36.
+  view.vector.min_magnitude = 255;
+  EXPECT_THAT(hidden_vectors(view, *dataset).value(), testing::HasSubstr("about 64 %"));
 }
 
 }  // namespace
