@@ -68,9 +68,12 @@ Affine map_of(const data::Axis& axis, const std::vector<double>& world) {
 // World height of every sample; masked heights are replaced (extend_over_mask).
 class Elevations {
  public:
+  // around: as Lattice::around.
   Elevations(const Lattice& straight, const Heights* heights,
-             const std::optional<std::array<double, 2>>& extent)
-      : levels_(straight.positions[2]), width_(static_cast<std::size_t>(straight.dims[0])) {
+             const std::optional<std::array<double, 2>>& extent, int around)
+      : levels_(straight.positions[2]),
+        width_(static_cast<std::size_t>(straight.dims[0])),
+        period_(static_cast<std::size_t>(around)) {
     layer_.resize(width_ * static_cast<std::size_t>(straight.dims[1]));
     if (heights == nullptr) return;
     values_ = heights->values->component(0);
@@ -89,13 +92,14 @@ class Elevations {
     for (std::size_t c = 0; c < layer_.size(); ++c) {
       layer_[c] = map_(static_cast<double>(from[c]));
     }
-    if (masked_) extend_over_mask(layer_, width_);
+    if (masked_) extend_over_mask(layer_, width_, period_);
     return layer_;
   }
 
  private:
   const std::vector<double>& levels_;
   std::size_t width_ = 0;
+  std::size_t period_ = 0;
   const float* values_ = nullptr;
   bool masked_ = false;
   Affine map_;
@@ -443,15 +447,18 @@ Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryVie
   if (sphere) straight_geometry.scale = {1, 1, 1};
   auto straight = place_straight(even, straight_geometry, extent);
   if (!straight) return straight.error();
-  Elevations elevations(*straight, heights, extent);
   const bool one_height = !extent;
   const Shell shell = shell_of(*straight, even, geometry.scale[2], one_height);
   Lattice lattice = *straight;
+  std::vector<glm::dvec3> up;
+  if (sphere) {
+    up = directions_of(*columns);
+    lattice.around = columns_around(*columns, up, static_cast<std::size_t>(lattice.dims[0]));
+  }
+  Elevations elevations(*straight, heights, extent, lattice.around);
   auto places = std::make_shared<Places>();
   if (sphere) {
-    const std::vector<glm::dvec3> up = directions_of(*columns);
     *places = on_sphere(*straight, up, elevations, shell);
-    lattice.around = columns_around(*columns, up, static_cast<std::size_t>(lattice.dims[0]));
   } else {
     *places = on_map(*straight, even, columns ? &*columns : nullptr, elevations);
   }

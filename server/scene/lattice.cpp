@@ -112,18 +112,18 @@ std::optional<double> metres_per_unit(const Axis& axis) {
 
 // Factor of the edge along longitudes. A regional map is equirectangular with its true scale along
 // the latitude in the middle of the box, phi: a degree of longitude is cos(phi) times as wide as a
-// degree of latitude. A map around the globe, or over more than 90 degrees of latitude, of which no
-// latitude is representative, is the plate carree (factor 1). A section along one latitude has the
-// scale of that latitude.
+// degree of latitude. A map over three quarters of the globe or more, or over more than 90 degrees
+// of latitude, of which no latitude is representative, is the plate carree (factor 1). A section
+// along one latitude has the scale of that latitude.
 double longitude_share(const Axis& x, const Axis& y, const std::array<RawAxis, 3>& axes) {
-  constexpr double whole_circle = 360 - 1e-3;  // degrees; coordinates in single precision
+  constexpr double longitudes_max = 270;
   constexpr double latitudes_max = 90;
   if (x.kind != AxisKind::longitude || y.kind != AxisKind::latitude) return 1;
   if (axes[0].thin) return 1;
   const bool section = axes[1].thin;
   const double middle =
       section ? y.coordinates.front() : 0.5 * axes[1].extent[0] + 0.5 * axes[1].extent[1];
-  const bool whole = axes[0].raw_length() >= whole_circle || axes[1].raw_length() > latitudes_max;
+  const bool whole = axes[0].raw_length() >= longitudes_max || axes[1].raw_length() > latitudes_max;
   if ((whole && !section) || std::abs(middle) >= 90) return 1;
   return std::cos(middle * radians_per_degree);
 }

@@ -11,11 +11,22 @@ namespace windsplat::scene {
 
 // Replaces masked values (NaN) of a layer `width` samples wide: those beside others by the mean of
 // these, then those beside the replaced ones, and so on. Cells at the edge of a mask thus keep
-// their slope along the mask, and are level towards it.
-inline void extend_over_mask(std::vector<double>& layer, std::size_t width) {
+// their slope along the mask, and are level towards it. period: columns after which those of a row
+// repeat around a globe, at most `width`; 0: they do not.
+inline void extend_over_mask(std::vector<double>& layer, std::size_t width,
+                             std::size_t period = 0) {
   const auto around = [&](std::size_t n, const auto& visit) {
-    if (n % width > 0) visit(n - 1);
-    if (n % width + 1 < width) visit(n + 1);
+    const std::size_t row = n - n % width;
+    if (n > row) {
+      visit(n - 1);
+    } else if (period > 1) {
+      visit(row + period - 1);
+    }
+    if (n + 1 < row + width) {
+      visit(n + 1);
+    } else if (period > 1) {
+      visit(row + width - period);
+    }
     if (n >= width) visit(n - width);
     if (n + width < layer.size()) visit(n + width);
   };

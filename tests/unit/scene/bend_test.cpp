@@ -336,6 +336,24 @@ TEST(HeightField, MaskedColumnsContinueTheHeightsAtTheirCoast) {
   EXPECT_LT(place(lattice, 0, 0, 0).z, place(lattice, 1, 0, 0).z - 0.1);
 }
 
+// Only the last column is masked: around the globe its neighbours are the one before and the first.
+TEST(HeightField, MaskedColumnsContinueTheHeightsAcrossTheSeamOfAGlobe) {
+  auto dataset = terrain(globe(), "m", [](std::size_t n) {
+    const std::size_t column = n % 12;
+    if (column == 11) return std::nan("");
+    return 1000.0 * static_cast<double>(n / 84) + (column == 0 ? 900.0 : 300.0);
+  });
+  GeometryView geometry = with_heights();
+  geometry.mapping = GeometryMapping::sphere;
+  const auto placed = place_dataset(geometry, *dataset);
+  ASSERT_TRUE(placed) << placed.error().message;
+  const Lattice& lattice = (*placed)->lattice;
+  const auto height = [&](int column) { return glm::length(place(lattice, column, 3, 1)); };
+  // Rows above and below have the same mean, so that the first wave gives that of both neighbours.
+  EXPECT_NEAR(height(11), 0.5 * (height(0) + height(10)), tolerance);
+  EXPECT_GT(height(0), height(10) + 0.01);
+}
+
 TEST(HeightField, IsPlacedToScaleOnRequest) {
   auto dataset =
       terrain(globe(), "m", [](std::size_t n) { return 1000.0 * static_cast<double>(n / 84); });

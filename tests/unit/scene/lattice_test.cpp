@@ -154,6 +154,14 @@ TEST(Lattice, MapsAroundTheGlobeAndBeyondNinetyDegreesOfLatitudeArePlateCarree) 
   const auto ring = place_lattice(map_of(around, {55, 60, 65}), GeometryView{});
   ASSERT_TRUE(ring);
   EXPECT_NEAR(width_to_height(*ring), 360.0 / 15, 1e-12);
+  around.pop_back();
+  const auto open_ring = place_lattice(map_of(around, {55, 60, 65}), GeometryView{});
+  ASSERT_TRUE(open_ring);
+  EXPECT_NEAR(width_to_height(*open_ring), 350.0 / 15, 1e-12);
+  around.resize(26);
+  const auto part = place_lattice(map_of(around, {55, 60, 65}), GeometryView{});
+  ASSERT_TRUE(part);
+  EXPECT_NEAR(width_to_height(*part), 0.5 * 260.0 / 15, 1e-12);
   const auto tall = place_lattice(map_of({0, 5, 10}, {-10, 25, 60}), GeometryView{});
   ASSERT_TRUE(tall);
   EXPECT_NEAR(width_to_height(*tall), 15.0 / 105, 1e-14);
