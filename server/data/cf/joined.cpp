@@ -127,9 +127,8 @@ Result<bool> same_coordinates(const ArrayFile& first, int own, const ArrayFile& 
     return std::equal(a->begin(), a->end(), times->begin(), times->end(), [&](double x, double y) {
       return same_number(x, y) || std::abs(x - y) <= tolerance;
     });
-  } else if (from.units != to.units) {
-    return false;
   }
+  if (from.units != to.units) return false;
   return std::equal(a->begin(), a->end(), b->begin(), b->end(), same_place);
 }
 

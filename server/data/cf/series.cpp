@@ -131,6 +131,7 @@ void SeriesFile::keep_steps(const std::vector<std::size_t>& kept) {
   const std::size_t lost = steps_.size() - kept.size();
   if (lost == 0) return;
   std::vector<Step> steps;
+  steps.reserve(kept.size());
   for (const std::size_t step : kept) steps.push_back(steps_.at(step));
   steps_ = std::move(steps);
   contents_.dimensions.at(at(time_of_all_)).length = steps_.size();
