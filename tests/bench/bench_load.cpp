@@ -7,6 +7,7 @@
 //   bench_load [--program=windsplat] [--dims=320x160x19] [--steps=8] [--rounds=7] [--only=raw]
 //              [--markdown]
 #include <fcntl.h>
+#include <hdf5.h>
 #include <malloc.h>
 #include <netcdf.h>
 #include <unistd.h>
@@ -123,6 +124,93 @@ void write_raw(const std::string& folder, data::Source& source) {
                {"name": "cloud"}]})";
 }
 
+void require(bool fine, const char* what) {
+  if (!fine) bench::give_up(what);
+}
+
+// The datasets /VTKHDF/PointData/wind (step, z, y, x, component) and cloud (step, z, y, x).
+constexpr std::array<const char*, 2> hdf_paths{"/VTKHDF/PointData/wind", "/VTKHDF/PointData/cloud"};
+
+// An image of VTKHDF with steps.
+void write_vtkhdf(const std::string& path, data::Source& source) {
+  const auto dims = source.info().grid.dims();
+  const hsize_t steps = source.info().steps.size();
+  const std::size_t samples = source.info().grid.samples();
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t links = H5Pcreate(H5P_LINK_CREATE);
+  H5Pset_create_intermediate_group(links, 1);
+  const auto make = [&](const char* name, const std::vector<hsize_t>& lengths, hid_t type) {
+    const hid_t space = H5Screate_simple(static_cast<int>(lengths.size()), lengths.data(), nullptr);
+    const hid_t made = H5Dcreate2(file, name, type, space, links, H5P_DEFAULT, H5P_DEFAULT);
+    H5Sclose(space);
+    require(made >= 0, name);
+    return made;
+  };
+  const auto attribute = [&](const char* group, const char* name, const std::vector<double>& values,
+                             hid_t type) {
+    const hsize_t count = values.size();
+    const hid_t space = H5Screate_simple(1, &count, nullptr);
+    const hid_t made =
+        H5Acreate_by_name(file, group, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    require(H5Awrite(made, H5T_NATIVE_DOUBLE, values.data()) >= 0, name);
+    H5Aclose(made);
+    H5Sclose(space);
+  };
+  std::array<hsize_t, 5> start{};
+  std::array<hsize_t, 5> count{1, static_cast<hsize_t>(dims[2]), static_cast<hsize_t>(dims[1]),
+                               static_cast<hsize_t>(dims[0]), 3};
+  for (const std::size_t field : {0U, 1U}) {
+    std::vector<hsize_t> lengths(count.begin(), count.end() - static_cast<std::ptrdiff_t>(field));
+    lengths[0] = steps;
+    const hid_t made = make(hdf_paths.at(field), lengths, H5T_IEEE_F32LE);
+    const std::size_t components = field == 0 ? 3 : 1;
+    std::vector<float> values(samples * components);
+    for (std::size_t t = 0; t < steps; ++t) {
+      const auto volume = bench::value_or_give_up(source.read(field, t));
+      for (std::size_t n = 0; n < values.size(); ++n) {
+        values[n] = volume.component(static_cast<int>(n % components))[n / components];
+      }
+      start[0] = t;
+      const hid_t space = H5Dget_space(made);
+      H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+      const hid_t memory =
+          H5Screate_simple(static_cast<int>(lengths.size()), count.data(), nullptr);
+      require(H5Dwrite(made, H5T_NATIVE_FLOAT, memory, space, H5P_DEFAULT, values.data()) >= 0,
+              "a field cannot be written");
+      H5Sclose(memory);
+      H5Sclose(space);
+    }
+    H5Dclose(made);
+  }
+  const std::vector<double> times = [&] {
+    std::vector<double> out(steps);
+    for (std::size_t t = 0; t < steps; ++t) out[t] = static_cast<double>(t);
+    return out;
+  }();
+  const hid_t values = make("/VTKHDF/Steps/Values", {steps}, H5T_IEEE_F64LE);
+  H5Dwrite(values, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, times.data());
+  H5Dclose(values);
+  attribute("/VTKHDF/Steps", "NSteps", {static_cast<double>(steps)}, H5T_STD_I64LE);
+  attribute("/VTKHDF", "Version", {2, 0}, H5T_STD_I64LE);
+  attribute("/VTKHDF", "WholeExtent", {0, dims[0] - 1.0, 0, dims[1] - 1.0, 0, dims[2] - 1.0},
+            H5T_STD_I64LE);
+  attribute("/VTKHDF", "Origin", {0, 0, 0}, H5T_IEEE_F64LE);
+  attribute("/VTKHDF", "Spacing", {1, 1, 1}, H5T_IEEE_F64LE);
+  attribute("/VTKHDF", "Direction", {1, 0, 0, 0, 1, 0, 0, 0, 1}, H5T_IEEE_F64LE);
+  const std::string type = "ImageData";
+  const hid_t text = H5Tcopy(H5T_C_S1);
+  H5Tset_size(text, type.size());
+  const hid_t single = H5Screate(H5S_SCALAR);
+  const hid_t kind = H5Acreate_by_name(file, "/VTKHDF", "Type", text, single, H5P_DEFAULT,
+                                       H5P_DEFAULT, H5P_DEFAULT);
+  H5Awrite(kind, text, type.c_str());
+  H5Aclose(kind);
+  H5Sclose(single);
+  H5Tclose(text);
+  H5Pclose(links);
+  H5Fclose(file);
+}
+
 // Seconds of `work`: the minimum of the rounds after an untimed one.
 double least_seconds(int rounds, const std::function<void()>& work) {
   work();
@@ -173,6 +261,30 @@ void read_bare(const std::string& path, std::size_t steps, std::size_t samples) 
     }
   }
   ::close(file);
+}
+
+void read_bare_hdf5(const std::string& path, std::size_t steps, std::size_t samples) {
+  Kept kept;
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  for (std::size_t t = 0; t < steps; ++t) {
+    for (const std::size_t field : {0U, 1U}) {
+      const hid_t dataset = H5Dopen2(file, hdf_paths.at(field), H5P_DEFAULT);
+      const hid_t space = H5Dget_space(dataset);
+      std::array<hsize_t, 5> start{t};
+      std::array<hsize_t, 5> count{};
+      const int rank = H5Sget_simple_extent_dims(space, count.data(), nullptr);
+      count[0] = 1;
+      H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+      const hid_t memory = H5Screate_simple(rank, count.data(), nullptr);
+      require(H5Dread(dataset, H5T_NATIVE_FLOAT, memory, space, H5P_DEFAULT,
+                      take(kept, samples * (field == 0 ? 3 : 1))) >= 0,
+              "a field cannot be read");
+      H5Sclose(memory);
+      H5Sclose(space);
+      H5Dclose(dataset);
+    }
+  }
+  H5Fclose(file);
 }
 
 void read_all(data::Source& source) {
@@ -233,6 +345,12 @@ int main(int argc, char** argv) {
     write_netcdf(path, *source, kind.format, kind.deflate);
     table.push_back(
         measure(kind.name, path, options, [&] { read_bare_netcdf(path, steps, samples); }));
+  }
+  if (options.only.empty() || options.only == "VTKHDF") {
+    const std::string path = folder + "/file.vtkhdf";
+    write_vtkhdf(path, *source);
+    table.push_back(
+        measure("VTKHDF", path, options, [&] { read_bare_hdf5(path, steps, samples); }));
   }
   if (options.only.empty() || options.only == "raw") {
     write_raw(folder, *source);

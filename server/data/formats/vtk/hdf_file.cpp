@@ -7,6 +7,7 @@
 #include <functional>
 #include <numeric>
 #include <set>
+#include <type_traits>
 #include <utility>
 
 #include "server/base/check.hpp"
@@ -78,7 +79,8 @@ hid_t memory_type(bytes::Scalar type) {
 }
 
 // Reads slabs of whole chunks along the first dimension of a part, so that each chunk is decoded
-// once.
+// once. Slab: float or double.
+template <class Slab>
 class HdfStream final : public ArrayStream {
  public:
   explicit HdfStream(const StoredArray& array)
@@ -88,10 +90,28 @@ class HdfStream final : public ArrayStream {
     }
   }
 
-  Result<void> read(double* out, std::size_t count) override {
+  Result<void> read(double* out, std::size_t count) override { return read_as(out, count); }
+  Result<void> read(float* out, std::size_t count) override { return read_as(out, count); }
+
+ private:
+  template <class Out>
+  Result<void> read_as(Out* out, std::size_t count) {
     while (count > 0) {
       if (used_ == slab_.size()) {
-        if (auto done = next_slab(); !done) return done;
+        if constexpr (std::is_same_v<Out, Slab>) {
+          // A slab that is wanted as a whole needs no copy.
+          const std::uint64_t whole = rows_of_slab(count / row_) * row_;
+          if (whole > 0 && whole <= count) {
+            if (auto done = read_rows(whole / row_, out); !done) return done;
+            out += whole;
+            count -= static_cast<std::size_t>(whole);
+            continue;
+          }
+        }
+        const std::uint64_t rows = rows_of_slab(slab_values / row_);
+        slab_.resize(static_cast<std::size_t>(rows * row_));
+        used_ = 0;
+        if (auto done = read_rows(rows, slab_.data()); !done) return done;
       }
       const std::size_t part = std::min(count, slab_.size() - used_);
       std::copy_n(slab_.begin() + static_cast<std::ptrdiff_t>(used_), part, out);
@@ -102,38 +122,40 @@ class HdfStream final : public ArrayStream {
     return {};
   }
 
- private:
-  Result<void> next_slab() {
+  // From here to the end of a chunk, and about as many rows as wanted, in whole chunks.
+  [[nodiscard]] std::uint64_t rows_of_slab(std::uint64_t wanted) const {
     const std::size_t along = part_->along;
     const std::uint64_t end = part_->start[along] + part_->count[along];
     WINDSPLAT_CHECK(at_ < end);
-    // To the end of a chunk, and as many chunks as a slab holds.
-    std::uint64_t rows = std::max<std::uint64_t>(1, slab_values / row_);
+    std::uint64_t rows = std::max<std::uint64_t>(1, wanted);
     rows = std::max<std::uint64_t>(1, rows / part_->chunk) * part_->chunk - at_ % part_->chunk;
     rows = std::min(rows, std::max<std::uint64_t>(1, slab_values_max / row_));
-    rows = std::min(rows, end - at_);
+    return std::min(rows, end - at_);
+  }
+
+  Result<void> read_rows(std::uint64_t rows, Slab* out) {
+    const std::size_t along = part_->along;
     std::vector<std::size_t> start(part_->start.begin(), part_->start.end());
     std::vector<std::size_t> size(part_->count.begin(), part_->count.end());
     start[along] = static_cast<std::size_t>(at_);
     size[along] = static_cast<std::size_t>(rows);
-    slab_.resize(static_cast<std::size_t>(rows * row_));
-    used_ = 0;
     at_ += rows;
-    return part_->file->read(*part_, type_, start, size, slab_.data());
+    return part_->file->read(*part_, type_, start, size, out);
   }
 
   std::shared_ptr<const HdfPart> part_;
   bytes::Scalar type_;
   std::uint64_t at_;
   std::uint64_t row_ = 1;  // values for each item along the first dimension
-  std::vector<double> slab_;
+  std::vector<Slab> slab_;
   std::size_t used_ = 0;
 };
 
 }  // namespace
 
 std::unique_ptr<ArrayStream> hdf_stream(const StoredArray& array) {
-  return std::make_unique<HdfStream>(array);
+  if (array.type == bytes::Scalar::float32) return std::make_unique<HdfStream<float>>(array);
+  return std::make_unique<HdfStream<double>>(array);
 }
 
 bool HdfFile::is_vtkhdf(const InputFile& input) { return has_vtkhdf(input).value_or(false); }
@@ -314,9 +336,10 @@ Result<std::vector<double>> HdfFile::values(const std::string& path, std::uint64
   return done ? Result<std::vector<double>>(std::move(out)) : done.error();
 }
 
+template <class Out>
 Result<void> HdfFile::read(const HdfPart& part, bytes::Scalar type,
                            const std::vector<std::size_t>& start,
-                           const std::vector<std::size_t>& count, double* out) {
+                           const std::vector<std::size_t>& count, Out* out) {
   const auto fault = [&](const std::string& what) {
     return input_->fault("cannot be read: the dataset " + in_quotes(part.path) + " " + what);
   };
@@ -332,7 +355,7 @@ Result<void> HdfFile::read(const HdfPart& part, bytes::Scalar type,
                       H5Sclose);
   const std::size_t values =
       std::accumulate(count.begin(), count.end(), std::size_t{1}, std::multiplies<>());
-  const bool plain = type == bytes::Scalar::float64;
+  const bool plain = bytes::size_of(type) == sizeof(Out) && type >= bytes::Scalar::float32;
   std::vector<unsigned char> raw(plain ? 0 : values * bytes::size_of(type));
   void* into = plain ? static_cast<void*>(out) : static_cast<void*>(raw.data());
   const bool done =
@@ -348,5 +371,12 @@ Result<void> HdfFile::read(const HdfPart& part, bytes::Scalar type,
   examined.mask(block, out);
   return {};
 }
+
+template Result<void> HdfFile::read(const HdfPart& part, bytes::Scalar type,
+                                    const std::vector<std::size_t>& start,
+                                    const std::vector<std::size_t>& count, float* out);
+template Result<void> HdfFile::read(const HdfPart& part, bytes::Scalar type,
+                                    const std::vector<std::size_t>& start,
+                                    const std::vector<std::size_t>& count, double* out);
 
 }  // namespace windsplat::data::vtk

@@ -56,9 +56,11 @@ class HdfFile : public std::enable_shared_from_this<HdfFile> {
   Result<std::vector<double>> values(const std::string& path, std::uint64_t start,
                                      std::uint64_t count);
 
-  // Reads a block as numbers; unwritten parts are NaN. Errors: bad_data.
+  // Reads a block as numbers; unwritten parts are NaN. Out: double, or float for the type float32.
+  // Errors: bad_data.
+  template <class Out>
   Result<void> read(const HdfPart& part, bytes::Scalar type, const std::vector<std::size_t>& start,
-                    const std::vector<std::size_t>& count, double* out);
+                    const std::vector<std::size_t>& count, Out* out);
 
  private:
   explicit HdfFile(std::shared_ptr<const InputFile> input) : input_(std::move(input)) {}

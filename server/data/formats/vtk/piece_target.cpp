@@ -2,10 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "server/data/cf/time.hpp"
 
 namespace windsplat::data::vtk {
+
+namespace {
+
+constexpr std::size_t direct_values = std::size_t{1} << 22;  // read at once
+constexpr std::size_t copied_values = std::size_t{1} << 18;
+
+bool is_contiguous(const Target& target) {
+  return target.along[0] == 1 && target.along[1] == target.counts[0] &&
+         target.along[2] == target.counts[0] * target.counts[1];
+}
+
+}  // namespace
 
 Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
                  const std::array<std::size_t, 3>& world, const std::array<bool, 3>& turned) {
@@ -53,6 +66,37 @@ Result<void> SharedSamples::check(const InputFile& file, const std::string& fiel
   return file.fault("has pieces that overlap with different values of " + in_quotes(field) +
                     " (by up to " + cf::number_text(difference_) +
                     "), which no vtkGhostType marks as copies");
+}
+
+Result<void> read_plain(const std::shared_ptr<const InputFile>& file, const StoredArray& array,
+                        const Target& target, std::size_t samples, float* out,
+                        const std::function<void(std::size_t tuples)>& done) {
+  auto reader = ArrayReader::open(file, array);
+  if (!reader) return reader.error();
+  if (array.tuples == 0) return {};
+  const auto components = static_cast<std::size_t>(array.components);
+  const auto row = static_cast<std::size_t>(target.counts[0]);
+  const auto rows = static_cast<std::size_t>(target.counts[1] * target.counts[2]);
+  const bool direct = components == 1 && is_contiguous(target);
+  const std::size_t most =
+      std::max<std::size_t>(1, (direct ? direct_values : copied_values) / (row * components));
+  std::vector<float> block(direct ? 0 : std::min(most, rows) * row * components);
+  for (std::size_t first = 0; first < rows; first += most) {
+    const std::size_t count = std::min(most, rows - first);
+    float* into = direct ? out + target.origin + first * row : block.data();
+    if (auto read = reader->read(into, count * row * components); !read) return read;
+    const float* from = block.data();
+    for (std::size_t r = first; !direct && r < first + count; ++r) {
+      const auto j = static_cast<std::ptrdiff_t>(r) % target.counts[1];
+      const auto k = static_cast<std::ptrdiff_t>(r) / target.counts[1];
+      float* to = out + target.origin + j * target.along[1] + k * target.along[2];
+      for (std::size_t i = 0; i < row; ++i, to += target.along[0]) {
+        for (std::size_t c = 0; c < components; ++c) to[c * samples] = *from++;
+      }
+    }
+    done(count * row);
+  }
+  return file->check_unchanged();
 }
 
 }  // namespace windsplat::data::vtk

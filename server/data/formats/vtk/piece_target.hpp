@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "server/base/error.hpp"
 #include "server/data/files/input_file.hpp"
 #include "server/data/formats/vtk/snapshot.hpp"
+#include "server/data/formats/vtk/stored_array.hpp"
 
 namespace windsplat::data::vtk {
 
@@ -75,5 +78,12 @@ class SharedSamples {
 // whether it is reversed.
 Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
                  const std::array<std::size_t, 3>& world, const std::array<bool, 3>& turned);
+
+// Reads an array of a piece without hidden samples and overlaps: component c of a tuple goes to
+// out[c * samples + its sample], in whole rows; where samples follow one another like the tuples,
+// without a copy. done: called with the number of tuples after each part. Errors: bad_data.
+Result<void> read_plain(const std::shared_ptr<const InputFile>& file, const StoredArray& array,
+                        const Target& target, std::size_t samples, float* out,
+                        const std::function<void(std::size_t tuples)>& done);
 
 }  // namespace windsplat::data::vtk

@@ -332,10 +332,14 @@ class VtkSource final : public FileSource {
       if (auto read = reader->read(block.data(), count * components); !read) return read;
       for (std::size_t i = 0; i < count; ++i) take(done + i, block.data() + i * components);
       done += count;
-      tuples_done_ += count;
-      report_progress(static_cast<double>(tuples_done_) / static_cast<double>(tuples_all_));
+      report(count);
     }
     return file->check_unchanged();
+  }
+
+  void report(std::size_t tuples) {
+    tuples_done_ += tuples;
+    report_progress(static_cast<double>(tuples_done_) / static_cast<double>(tuples_all_));
   }
 
   // The array of a field in a piece; null where a block lacks it.
@@ -363,6 +367,9 @@ class VtkSource final : public FileSource {
     const auto ghosts = read_ghosts(*file, piece.*data());
     if (!ghosts) return ghosts.error();
     const auto components = static_cast<std::size_t>((*array)->components);
+    if (ghosts->empty() && !piece.overlaps) {
+      return read_plain(*file, **array, target, samples, out, [&](std::size_t n) { report(n); });
+    }
     TargetWalk walk(target);
     shared.begin_piece(piece.block, (*array)->type < bytes::Scalar::float32);
     return read_tuples(*file, **array, [&](std::uint64_t tuple, const double* values) {

@@ -89,6 +89,7 @@ class FileBytes {
 
 class FileStream final : public ArrayStream {
  public:
+  using ArrayStream::read;
   FileStream(std::shared_ptr<const InputFile> file, const StoredArray& array)
       : file_(std::move(file)),
         array_(array),
@@ -321,6 +322,19 @@ class FileStream final : public ArrayStream {
 };
 
 }  // namespace
+
+Result<void> ArrayStream::read(float* out, std::size_t count) {
+  constexpr std::size_t values_max = std::size_t{1} << 14;
+  std::vector<double> values(std::min(count, values_max));
+  while (count > 0) {
+    const std::size_t part = std::min(count, values.size());
+    if (auto done = read(values.data(), part); !done) return done;
+    out = std::transform(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(part), out,
+                         [](double value) { return static_cast<float>(value); });
+    count -= part;
+  }
+  return {};
+}
 
 Result<ArrayReader> ArrayReader::open(std::shared_ptr<const InputFile> file,
                                       const StoredArray& array) {

@@ -63,6 +63,8 @@ class ArrayStream {
   virtual ~ArrayStream() = default;
   // The next `count` values, which must exist. Errors: bad_data.
   virtual Result<void> read(double* out, std::size_t count) = 0;
+  // The same, rounded to float.
+  virtual Result<void> read(float* out, std::size_t count);
 };
 std::unique_ptr<ArrayStream> hdf_stream(const StoredArray& array);
 
@@ -73,6 +75,7 @@ class ArrayReader {
   static Result<ArrayReader> open(std::shared_ptr<const InputFile> file, const StoredArray& array);
   // Reads the next `count` values, which must exist. Errors: bad_data.
   Result<void> read(double* out, std::size_t count) { return stream_->read(out, count); }
+  Result<void> read(float* out, std::size_t count) { return stream_->read(out, count); }
 
  private:
   explicit ArrayReader(std::unique_ptr<ArrayStream> stream) : stream_(std::move(stream)) {}
