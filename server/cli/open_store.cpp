@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/data/cf/grid/crs_wkt.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/formats/grib/open.hpp"
 #include "server/data/loader/loader.hpp"
@@ -78,6 +79,9 @@ data::StoreOptions options_of(std::uint64_t memory_bytes, data::Storage storage,
   limits.memory_bytes =
       std::clamp(memory_bytes / 4, std::min(loader_bytes_min, memory_bytes / 2), loader_bytes_max);
   limits.library_folders = folders_of(data::grib::definitions_folder());
+  if (std::string folder = data::cf::projection_database_folder(); !folder.empty()) {
+    limits.library_folders.push_back(std::move(folder));
+  }
   limits.budget = options.budget;
   options.storage = storage;
   if (fetcher) let_fetch(limits, fetcher);

@@ -96,7 +96,21 @@ long open_named(const char* name, int flags) {
   return is_libraries(path) ? ask_for(path) : -EACCES;
 }
 
+// Whether a folder of a library is this one or lies below it.
+bool leads_to_libraries(std::string_view path) {
+  for (const std::string& folder : asking().folders) {
+    if (folder.starts_with(path) && folder[path.size()] == '/') return true;
+  }
+  return false;
+}
+
 long look_at(const char* name, struct stat* out) {
+  if (name != nullptr && *name != '\0' && leads_to_libraries(name)) {
+    // SQLite looks for links among the folders of a database.
+    *out = {};
+    out->st_mode = S_IFDIR | S_IRUSR | S_IXUSR;
+    return 0;
+  }
   const long opened = open_named(name, O_RDONLY);
   if (opened < 0) return opened;
   const Descriptor file(static_cast<int>(opened));

@@ -46,7 +46,7 @@ struct Limits {
   // Additional time of a call for files that are fetched.
   std::chrono::milliseconds fetch_time{0};
   // Absolute folders of library tables, whose files may also be read.
-  std::vector<std::string> library_folders{"/usr/share/eccodes/definitions"};
+  std::vector<std::string> library_folders{"/usr/share/eccodes/definitions", "/usr/share/proj"};
 };
 
 // Sets the executable of loaders, run as `program load`; call it once, before the first loader is

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -80,8 +81,24 @@ class Reader {
  public:
   explicit Reader(PJ_CONTEXT* context) : context_(context) {}
 
-  Result<GridMapping> read(const std::string& text) {
-    Object crs = held(proj_create_from_wkt(context_, text.c_str(), nullptr, nullptr, nullptr));
+  Result<GridMapping> read_text(const std::string& text) {
+    return read(held(proj_create_from_wkt(context_, text.c_str(), nullptr, nullptr, nullptr)));
+  }
+
+  Result<GridMapping> read_code(int code) {
+    source_ = "the EPSG code " + std::to_string(code);
+    const char* const path = proj_context_get_database_path(context_);
+    if (path == nullptr || *path == '\0') {
+      return fault("alone, and the database of PROJ is not installed");
+    }
+    PJ* const crs = proj_create_from_database(context_, "EPSG", std::to_string(code).c_str(),
+                                              PJ_CATEGORY_CRS, 0, nullptr);
+    if (crs == nullptr) return fault("which the database of PROJ does not have");
+    return read(held(crs));
+  }
+
+ private:
+  Result<GridMapping> read(Object crs) {
     for (int depth = 0; crs && depth < 4; ++depth) {
       const PJ_TYPE type = proj_get_type(crs.get());
       if (type == PJ_TYPE_BOUND_CRS) {
@@ -91,16 +108,16 @@ class Reader {
         crs = held(proj_crs_get_sub_crs(context_, crs.get(), 0));
       }
     }
-    if (!crs) return fault("has well-known text that PROJ does not understand");
+    if (!crs) return fault("that PROJ does not understand");
     const PJ_TYPE type = proj_get_type(crs.get());
     const bool is_geographic =
         type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
     if (!is_geographic && type != PJ_TYPE_PROJECTED_CRS) {
-      return fault("has well-known text of a system that is neither geographic nor projected");
+      return fault("of a system that is neither geographic nor projected");
     }
     if (is_geographic && proj_crs_is_derived(context_, crs.get()) != 0) {
       return fault(
-          "has well-known text of a derived geographic system, such as one with a "
+          "of a derived geographic system, such as one with a "
           "rotated pole, which is not read");
     }
     if (auto done = shape(crs.get()); !done) return done.error();
@@ -109,13 +126,14 @@ class Reader {
       return std::move(out_);
     }
     const Object conversion = held(proj_crs_get_coordoperation(context_, crs.get()));
-    if (!conversion) return fault("has well-known text without a conversion");
+    if (!conversion) return fault("without a conversion");
     if (auto done = convert(conversion.get()); !done) return done.error();
     return std::move(out_);
   }
 
- private:
-  static Error fault(const std::string& what) { return make_error(ErrorKind::bad_data, what); }
+  [[nodiscard]] Error fault(const std::string& what) const {
+    return make_error(ErrorKind::bad_data, "has " + source_ + ' ' + what);
+  }
 
   void set(const char* attribute, double value) { out_.numbers[attribute].push_back(value); }
 
@@ -125,7 +143,7 @@ class Reader {
     double inverse_flattening = 0;
     if (!ellipsoid || proj_ellipsoid_get_parameters(context_, ellipsoid.get(), &semi_major, nullptr,
                                                     nullptr, &inverse_flattening) == 0) {
-      return fault("has well-known text without an ellipsoid");
+      return fault("without an ellipsoid");
     }
     set("semi_major_axis", semi_major);
     if (inverse_flattening > 0) set("inverse_flattening", inverse_flattening);
@@ -164,20 +182,18 @@ class Reader {
     const auto* const known = std::find_if(methods.begin(), methods.end(),
                                            [&](const Method& one) { return one.epsg == method; });
     if (known == methods.end()) {
-      return fault("has well-known text of the unknown conversion " +
-                   in_quotes(std::string(method)));
+      return fault("of the unknown conversion " + in_quotes(std::string(method)));
     }
     out_.texts["grid_mapping_name"] = known->grid_mapping_name;
     for (const Parameter& wanted : known->parameters) {
       if (wanted.epsg.empty()) continue;
       const auto value = parameter(conversion, wanted.epsg);
       if (!value) {
-        return fault("has well-known text without the parameter " +
-                     in_quotes(std::string(wanted.epsg)));
+        return fault("without the parameter " + in_quotes(std::string(wanted.epsg)));
       }
       if (std::string_view(wanted.attribute).empty()) {
         if (*value == 1) continue;
-        return fault("has well-known text of a cone with a scale factor other than 1");
+        return fault("of a cone with a scale factor other than 1");
       }
       set(wanted.attribute, wanted.is_angle ? *value * 180 / std::numbers::pi : *value);
     }
@@ -209,6 +225,7 @@ class Reader {
   }
 
   PJ_CONTEXT* context_;
+  std::string source_ = "well-known text";  // for messages
   GridMapping out_;
 };
 
@@ -218,7 +235,31 @@ class Reader {
 Result<GridMapping> mapping_of_wkt(const std::string& text) {
   const wkt::Context context(context_without_files(), &proj_context_destroy);
   if (!context) return make_error(ErrorKind::out_of_memory, "cannot be read: no memory");
-  return wkt::Reader(context.get()).read(text);
+  return wkt::Reader(context.get()).read_text(text);
+}
+
+std::optional<int> epsg_code_of(const std::string& text) {
+  std::string_view digits = text;
+  for (const std::string_view prefix : {"EPSG:", "epsg:", "urn:ogc:def:crs:EPSG::"}) {
+    if (digits.starts_with(prefix)) digits.remove_prefix(prefix.size());
+  }
+  int code = 0;
+  const auto [end, fault] = std::from_chars(digits.data(), digits.data() + digits.size(), code);
+  const bool is_whole = fault == std::errc() && end == digits.data() + digits.size();
+  return is_whole && code > 0 ? std::optional(code) : std::nullopt;
+}
+
+Result<GridMapping> mapping_of_epsg(int code) {
+  const wkt::Context context(context_with_database(), &proj_context_destroy);
+  if (!context) return make_error(ErrorKind::out_of_memory, "cannot be read: no memory");
+  return wkt::Reader(context.get()).read_code(code);
+}
+
+std::string projection_database_folder() {
+  const wkt::Context context(context_with_database(), &proj_context_destroy);
+  const char* const path = context ? proj_context_get_database_path(context.get()) : nullptr;
+  const std::string file = path == nullptr ? "" : path;
+  return file.substr(0, file.find_last_of('/') == std::string::npos ? 0 : file.find_last_of('/'));
 }
 
 }  // namespace windsplat::data::cf

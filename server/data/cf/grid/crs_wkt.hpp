@@ -1,6 +1,8 @@
-// Well-known text of a coordinate reference system -> the attributes of a grid mapping.
+// Well-known text, or the EPSG code, of a coordinate reference system -> the attributes of a grid
+// mapping.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "server/base/error.hpp"
@@ -12,5 +14,15 @@ namespace windsplat::data::cf {
 // Known are the conversions that appendix F of CF has by the names of EPSG, and the pseudo-Mercator
 // of web maps; datum shifts are left out. Errors: bad_data with the reason as a predicate.
 Result<GridMapping> mapping_of_wkt(const std::string& text);
+
+// The number of "EPSG:3857", "urn:ogc:def:crs:EPSG::3857" or "3857"; nullopt for other texts.
+std::optional<int> epsg_code_of(const std::string& text);
+
+// The same as mapping_of_wkt() for a system of the EPSG dataset, from PROJ's database. Errors:
+// bad_data with the reason as a predicate, including a database that is not installed.
+Result<GridMapping> mapping_of_epsg(int code);
+
+// The folder of PROJ's database; empty if there is none.
+std::string projection_database_folder();
 
 }  // namespace windsplat::data::cf

@@ -64,9 +64,12 @@ class PositionFinder {
       : file_(file), axes_(axes), placement_(placement), info_(info) {
     const int x = axes[0];
     mapping_ = grid_mapping_of(file, variables, x < 0 ? "" : variable(x).name);
-    if (mapping_ < 0) return;
-    attributes_ = grid_mapping_at(file, mapping_);
-    if (attributes_.texts.count("grid_mapping_name") == 0) read_wkt();
+    if (mapping_ < 0) {
+      take_code_of(variables);
+    } else {
+      attributes_ = grid_mapping_at(file, mapping_);
+      if (attributes_.texts.count("grid_mapping_name") == 0) read_wkt();
+    }
     if (const auto name = attributes_.texts.find("grid_mapping_name");
         name != attributes_.texts.end()) {
       kind_ = lower(name->second);
@@ -112,17 +115,46 @@ class PositionFinder {
   }
   [[nodiscard]] std::string mapping_name() const { return in_quotes(variable(mapping_).name); }
 
-  // A mapping without attributes may have well-known text.
+  void take(Result<GridMapping> found) {
+    if (found) {
+      attributes_ = std::move(*found);
+    } else {
+      fault_ = found.error();
+    }
+  }
+
+  // A mapping without attributes may have well-known text, or an EPSG code.
   void read_wkt() {
     for (const char* name : {"crs_wkt", "spatial_ref"}) {
       const std::string text = file_.text_of(mapping_, name);
       if (text.empty()) continue;
-      auto found = mapping_of_wkt(text);
-      if (found) {
-        attributes_ = std::move(*found);
-      } else {
-        fault_ = found.error();
+      const auto code = epsg_code_of(text);
+      take(code ? mapping_of_epsg(*code) : mapping_of_wkt(text));
+      return;
+    }
+    if (const auto code = code_at(mapping_)) take(mapping_of_epsg(*code));
+  }
+
+  // The EPSG code of a variable, as text or as a number.
+  [[nodiscard]] std::optional<int> code_at(int v) const {
+    for (const char* name : {"epsg_code", "EPSG_code", "epsg", "EPSG", "crs"}) {
+      if (const auto code = epsg_code_of(file_.text_of(v, name))) return code;
+      const auto numbers = file_.numbers(v, name).values;
+      constexpr double code_max = 1e6;
+      if (numbers.size() == 1 && numbers[0] >= 1 && numbers[0] < code_max) {
+        return static_cast<int>(numbers[0]);
       }
+    }
+    return std::nullopt;
+  }
+
+  // Fields without a mapping may have a code themselves.
+  void take_code_of(const std::vector<int>& variables) {
+    for (const int v : variables) {
+      const auto code = code_at(v);
+      if (!code) continue;
+      mapping_ = v;
+      take(mapping_of_epsg(*code));
       return;
     }
   }

@@ -1,4 +1,5 @@
-// PROJ without files: what would need its database or configuration is not found.
+// PROJ without files: what would need its database or configuration is not found; and with its
+// database, for codes of EPSG alone.
 #pragma once
 
 #include <proj.h>
@@ -29,6 +30,16 @@ inline PJ_CONTEXT* context_without_files() {
   if (out == nullptr) return out;
   proj_log_func(out, nullptr, [](void*, int, const char*) {});
   proj_context_set_fileapi(out, &no_files, nullptr);
+  proj_context_set_enable_network(out, 0);
+  return out;
+}
+
+// PROJ as installed, without network. Only to read systems of the database: files of the user may
+// change how it computes.
+inline PJ_CONTEXT* context_with_database() {
+  PJ_CONTEXT* const out = proj_context_create();
+  if (out == nullptr) return out;
+  proj_log_func(out, nullptr, [](void*, int, const char*) {});
   proj_context_set_enable_network(out, 0);
   return out;
 }

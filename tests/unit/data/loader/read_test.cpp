@@ -55,6 +55,27 @@ TEST_F(Loader, Netcdf4FilesReadAsInThisProcess) {
   expect_same_as_here(path);
 }
 
+// SQLite opens the database by name, which the daemon does for the loader.
+TEST_F(Loader, SystemsOfTheDatabaseOfProjAreThoseOfThisProcess) {
+  const std::string path = folder_ / "epsg.nc";
+  {
+    NetcdfMaker file(path);
+    const int y = file.axis("y", {5.1e6, 5.2e6}, "m", "projection_y_coordinate");
+    const int x = file.axis("x", {4e5, 5e5}, "m", "projection_x_coordinate");
+    file.text(file.variable("f", NC_FLOAT, {y, x}, {1, 2, 3, 4}), "crs", "EPSG:32633");
+  }
+  expect_same_as_here(path);
+  const auto there = opened(path);
+  ASSERT_NE(there, nullptr);
+  ASSERT_NE(there->info().grid.columns, nullptr);
+  Limits without;
+  without.library_folders.clear();
+  const auto lost = opened(path, without);
+  ASSERT_NE(lost, nullptr);
+  ASSERT_FALSE(lost->info().notes.empty());
+  EXPECT_THAT(lost->info().notes[0], HasSubstr("the database of PROJ is not installed"));
+}
+
 // PROJ looks for files, none of which a loader can open.
 TEST_F(Loader, PositionsOfMapProjectionsAreThoseOfThisProcess) {
   for (const bool transverse : {false, true}) {
