@@ -317,12 +317,34 @@ write;
         yield Seed(f"grib {edition}", grid, {"g.grib": data})
 
 
+def list_seed(folder, tool, samples):
+    """Cells in a list, whose positions are messages of the file."""
+    x, y = seeds_mesh.scattered(110)
+    data = b""
+    for what, values in (("parameterCategory = 191; set parameterNumber = 2", x),
+                         ("parameterCategory = 191; set parameterNumber = 1", y),
+                         ("parameterCategory = 0; set parameterNumber = 0", range(110))):
+        (folder / "rules").write_text(f"""set gridType = "unstructured_grid";
+set numberOfGridInReference = 1; set discipline = 0; set {what}; set bitsPerValue = 16;
+set values = {{{",".join(f"{float(v):.5f}" for v in values)}}};
+write;
+""")
+        made = folder / "made.grib"
+        made.unlink(missing_ok=True)
+        subprocess.run([tool, "-o", made, folder / "rules", samples / "regular_ll_pl_grib2.tmpl"],
+                       check=True, capture_output=True)
+        data += made.read_bytes()
+    return Seed("grib 2", "unstructured_grid", {"g.grib": data})
+
+
 def grib_seeds(folder):
     samples = pathlib.Path("/usr/share/eccodes/samples")
     tool = shutil.which("grib_filter")
     for edition in (1, 2):
         if tool and samples.exists():
             yield from grid_seeds(folder, tool, samples, edition)
+            if edition == 2:
+                yield list_seed(folder, tool, samples)
         sample = samples / f"regular_ll_pl_grib{edition}.tmpl"
         packings = ["grid_simple"] + (["grid_ccsds", "grid_jpeg", "grid_ieee"] if edition == 2
                                       else ["grid_second_order"])

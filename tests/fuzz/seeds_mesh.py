@@ -97,5 +97,19 @@ def bounds():
         ("t", ["lev", "ncells"], DOUBLE, range(6), {"units": "K"})])
 
 
+def scattered(count):
+    """Longitudes and latitudes of positions across the date line, none in a row with others."""
+    return ([170 + 20 * (n * 0.6180339887 % 1) for n in range(count)],
+            [50 + 15 * (n * 0.7548776662 % 1) for n in range(count)])
+
+
+def positions():
+    x, y = scattered(110)
+    return classic({"ncol": 110, "lev": 2}, [
+        ("lon", ["ncol"], DOUBLE, x, EAST), ("lat", ["ncol"], DOUBLE, y, NORTH),
+        ("t", ["lev", "ncol"], DOUBLE, range(220), {"units": "K"})])
+
+
 def mesh_files():
-    return {"UGRID": ugrid(), "FVCOM": fvcom(), "MPAS": mpas(), "bounds": bounds()}
+    return {"UGRID": ugrid(), "FVCOM": fvcom(), "MPAS": mpas(), "bounds": bounds(),
+            "positions": positions()}

@@ -20,6 +20,10 @@ struct FileDimension {
   int first_face = 0;
   bool other = false;    // neither space nor time
   double spacing_m = 0;  // metres between samples without coordinates, in a plane; 0: not known
+  bool is_list = false;  // of cells of a mesh, as the reader knows
+  // The UUID of the horizontal grid that the entries of a list belong to: 32 hexadecimal digits in
+  // lower case; empty if unknown.
+  std::string grid_uuid = {};
 };
 
 struct FileVariable {

@@ -11,6 +11,7 @@
 #include "server/base/ascii.hpp"
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/grid/cell_lists.hpp"
 #include "server/data/cf/grid/curvilinear.hpp"
 #include "server/data/cf/selected/selected_file.hpp"
 #include "server/data/cf/series.hpp"
@@ -201,10 +202,13 @@ Result<int> JoinedFile::dimension_of(const ArrayFile& part, int dimension,
     const bool is_time = role.role == Role::time && known[d].role == Role::time;
     const bool alike = role.role != Role::unknown && role.role == known[d].role;
     if (!named && !(both && alike)) continue;
+    if (are_of_different_grids(found, wanted)) continue;
     if (found.length == wanted.length) {
       if (!both) {
-        if (named) return own;
-        continue;
+        if (!named) continue;
+        std::string& uuid = contents_.dimensions[d].grid_uuid;
+        if (uuid.empty()) uuid = wanted.grid_uuid;
+        return own;
       }
       const auto same =
           same_coordinates(*this, known[d].coordinate, part, role.coordinate, is_time);

@@ -334,10 +334,6 @@ DimensionRole classify(const FileContents& contents, int dimension) {
   return out;
 }
 
-std::string dimension_name(const FileContents& contents, int dimension) {
-  return contents.dimensions.at(static_cast<std::size_t>(dimension)).name;
-}
-
 // Assigns a dimension to a role; false if the role is already assigned.
 bool assign_role(Layout& layout, Role role, int dimension) {
   int& place = role == Role::time ? layout.time
@@ -404,11 +400,11 @@ Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& r
       unknown.push_back(dimension);
     } else if (role == Role::other) {
       if (length != 1) {
-        const bool is_list = roles.at(static_cast<std::size_t>(dimension)).is_list;
-        layout.problem = "its dimension '" + printable(dimension_name(contents, dimension)) +
-                         (is_list ? "' lists stations, or cells, edges or nodes of an "
-                                    "unstructured grid whose outlines are not in the file"
-                                  : "' is neither space nor time");
+        const FileDimension& self = contents.dimensions.at(static_cast<std::size_t>(dimension));
+        layout.problem =
+            roles.at(static_cast<std::size_t>(dimension)).is_list
+                ? problem_of_list(self)
+                : "its dimension '" + printable(self.name) + "' is neither space nor time";
         return layout;
       }
     } else if (length != 1 && !assign_role(layout, role, dimension)) {

@@ -63,9 +63,26 @@ std::vector<bool> find_cell_lists(const FileContents& contents) {
   }
   for (std::size_t d = 0; d < count; ++d) {
     const bool named = is_one_of(lower(contents.dimensions[d].name), usual_names);
-    found[d] = found[d] || named || (placed[d][0] && placed[d][1]);
+    found[d] =
+        found[d] || named || (placed[d][0] && placed[d][1]) || contents.dimensions[d].is_list;
   }
   return found;
+}
+
+bool are_of_different_grids(const FileDimension& a, const FileDimension& b) {
+  return !a.grid_uuid.empty() && !b.grid_uuid.empty() && a.grid_uuid != b.grid_uuid;
+}
+
+std::string problem_of_list(const FileDimension& list) {
+  std::string out = "its dimension " + in_quotes(list.name) +
+                    " lists stations, or cells, edges or nodes of an unstructured grid whose "
+                    "outlines are not in the file";
+  if (list.is_list) {
+    out += "; join it with the file of the horizontal grid";
+    if (!list.grid_uuid.empty()) out += " of UUID " + list.grid_uuid;
+    out += ", '{grid.nc,data.grib2}'";
+  }
+  return out;
 }
 
 }  // namespace windsplat::data::cf

@@ -19,6 +19,7 @@ struct MeshDimensions {
   std::vector<int> cells;
   std::vector<int> nodes;
   std::vector<int> edges;
+  std::vector<int> foreign;  // lists of cells of other grids
   [[nodiscard]] static bool has(const std::vector<int>& all, int d) {
     return std::find(all.begin(), all.end(), d) != all.end();
   }
@@ -37,9 +38,12 @@ MeshDimensions dimensions_of(const FileContents& contents, const Topology& topol
         std::to_array<std::string_view>({"ncells", "ncol", "cell", "cells", "ncol_d"});
     const bool is_list = lists[d] || is_one_of(lower(own.name), usual);
     const bool is_other = id != topology.cells && id != topology.nodes && id != topology.edges;
-    const bool counts_cells = own.length == mesh.cells();
+    const bool counts_cells = topology.cells >= 0 && own.length == mesh.cells();
     const bool counts_nodes = has_nodes && own.length == mesh.nodes();
-    const bool is_alias = is_other && is_list && counts_cells != counts_nodes;
+    const int listed = topology.cells >= 0 ? topology.cells : topology.nodes;
+    const bool is_foreign = are_of_different_grids(own, contents.dimensions[at(listed)]);
+    const bool is_alias = is_other && is_list && !is_foreign && counts_cells != counts_nodes;
+    if (own.is_list && is_other && !is_alias) out.foreign.push_back(id);
     if (id == topology.cells || (is_alias && counts_cells)) out.cells.push_back(id);
     if (id == topology.nodes || (is_alias && counts_nodes)) out.nodes.push_back(id);
     if (id == topology.edges) out.edges.push_back(id);
@@ -66,6 +70,8 @@ class ContentsMaker {
     add_lattice();
     if (auto done = add_levels(); !done) return done.error();
     add_variables();
+    if (auto fine = check_grid(); !fine) return fine.error();
+    tell_unknown_grid();
     add_heights();
     name_mesh_variables(contents_, topology_.convention);
     out_.cell_dimensions = dimensions_.cells;
@@ -190,6 +196,11 @@ class ContentsMaker {
       variable.unread = "on the edges of the mesh: values at cells and nodes only are drawn";
       return;
     }
+    if (count(dimensions_.foreign) > 0) {
+      variable.numeric = false;
+      variable.unread = problem_of_foreign(variable);
+      return;
+    }
     const bool at_cells = count(dimensions_.cells) == 1;
     if (!variable.numeric || count(dimensions_.cells) + count(dimensions_.nodes) != 1) return;
     own.location = at_cells ? MeshLocation::face : MeshLocation::node;
@@ -204,6 +215,53 @@ class ContentsMaker {
     variable.is_unsigned = false;
     variable.mesh.clear();
     variable.coordinates.clear();
+  }
+
+  [[nodiscard]] std::string problem_of_foreign(const FileVariable& variable) const {
+    const auto list = std::find_if(variable.dims.begin(), variable.dims.end(), [&](int d) {
+      return MeshDimensions::has(dimensions_.foreign, d);
+    });
+    const auto described = [&](int d) {
+      const FileDimension& one = file_.contents().dimensions.at(at(d));
+      return std::to_string(one.length) + " cells" +
+             (one.grid_uuid.empty() ? std::string() : " of the UUID " + one.grid_uuid);
+    };
+    return "on a horizontal grid of " + described(*list) + ", but the grid that is given has " +
+           described(topology_.cells >= 0 ? topology_.cells : topology_.nodes);
+  }
+
+  // That all fields which need a grid file lie on other grids than the mesh, if so.
+  [[nodiscard]] Result<void> check_grid() const {
+    std::string problem;
+    for (std::size_t v = 0; v < out_.parts.size(); ++v) {
+      const int base = out_.parts[v].base;
+      if (base < 0) continue;
+      const auto& dims = file_.contents().variables[at(base)].dims;
+      const bool is_listed = std::any_of(dims.begin(), dims.end(), [&](int d) {
+        return file_.contents().dimensions[at(d)].is_list;
+      });
+      if (is_listed && out_.parts[v].location) return {};
+      const FileVariable& one = contents_.variables[v];
+      const bool is_foreign = std::any_of(dims.begin(), dims.end(), [&](int d) {
+        return MeshDimensions::has(dimensions_.foreign, d);
+      });
+      if (problem.empty() && is_foreign) problem = in_quotes(one.name) + " is " + one.unread;
+    }
+    if (problem.empty()) return {};
+    return make_error(ErrorKind::bad_data, problem);
+  }
+
+  void tell_unknown_grid() {
+    const auto& dimensions = file_.contents().dimensions;
+    for (const int d : dimensions_.cells) {
+      const bool is_known = !dimensions.at(at(d)).grid_uuid.empty() &&
+                            !dimensions.at(at(topology_.cells)).grid_uuid.empty();
+      if (!dimensions.at(at(d)).is_list || is_known) continue;
+      contents_.notes.push_back(
+          "the horizontal grid is taken for that of the fields since it has as many cells: one of "
+          "the files has no uuidOfHGrid");
+      return;
+    }
   }
 
   void add_heights() {

@@ -12,6 +12,7 @@
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/mesh/centers.hpp"
+#include "server/data/cf/mesh/delaunay.hpp"
 #include "server/data/cf/mesh/topology.hpp"
 #include "server/data/cf/time.hpp"
 
@@ -57,6 +58,7 @@ class MeshReader {
     for (const int d : {from_.cells, from_.nodes}) {
       if (auto fine = check_length(d); !fine) return fine.error();
     }
+    if (from_.by_neighbours) return by_neighbours();
     auto mesh = from_.connectivity >= 0 ? by_numbers() : by_corners();
     if (!mesh) return mesh;
     if (auto fine = check_positions(*mesh); !fine) return fine.error();
@@ -268,6 +270,38 @@ class MeshReader {
     const FileVariable& longitude = variable(from_.corner_positions[0]);
     const double tolerance = longitude.type == "float32" ? 4e-5 : 1e-7;
     return mesh_of_corners(positions[0], positions[1], width, tolerance, longitude.name);
+  }
+
+  Result<Mesh> by_neighbours() {
+    const auto stored = file_.stored_bytes();
+    const std::size_t count = length(from_.nodes);
+    if (stored && count > opening_memory_bytes(*stored) / triangulation_bytes) {
+      return make_error(ErrorKind::bad_data,
+                        std::to_string(count) +
+                            " positions of cells without outlines are more than are triangulated "
+                            "for a file of this size: join it with the file of the grid");
+    }
+    std::array<std::vector<double>, 2> positions;
+    for (std::size_t a = 0; a < 2; ++a) {
+      auto values = angles(from_.node_positions.at(a), true);
+      if (!values) return values.error();
+      positions.at(a) = std::move(*values);
+    }
+    auto found = triangulate(std::move(positions[0]), std::move(positions[1]));
+    if (!found) return found.error();
+    const auto add = [](std::size_t number, const std::string& what) {
+      return number == 0 ? std::string() : "; " + std::to_string(number) + what;
+    };
+    notes_.push_back(
+        "the file has positions in " + in_quotes(variable(from_.node_positions[0]).name) + " and " +
+        in_quotes(variable(from_.node_positions[1]).name) +
+        " but no outlines of cells: values are interpolated between neighbouring positions, which "
+        "a Delaunay triangulation finds" +
+        add(found->gaps, " of its polygons are gaps, with an edge of more than " +
+                             number_text(gap_edges) + " times those around, and masked") +
+        add(found->repeated, " positions are those of others, whose values are drawn") +
+        add(found->missing, " positions are missing"));
+    return std::move(found->mesh);
   }
 
   [[nodiscard]] Result<void> check_positions(const Mesh& mesh) const {

@@ -8,6 +8,8 @@
 #include "server/base/ascii.hpp"
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/grid/cell_lists.hpp"
+#include "server/data/cf/grid/grid.hpp"
+#include "server/data/cf/mesh/delaunay.hpp"
 
 namespace windsplat::data::cf {
 
@@ -19,7 +21,8 @@ class TopologyFinder {
 
   std::optional<Topology> find() {
     for (auto finder : {&TopologyFinder::ugrid, &TopologyFinder::mpas, &TopologyFinder::fvcom,
-                        &TopologyFinder::fesom, &TopologyFinder::bounds, &TopologyFinder::scrip}) {
+                        &TopologyFinder::fesom, &TopologyFinder::bounds, &TopologyFinder::scrip,
+                        &TopologyFinder::centers}) {
       auto found = (this->*finder)();
       if (found) return found;
     }
@@ -238,6 +241,42 @@ class TopologyFinder {
       if (v >= 0) out.others.push_back(v);
     }
     return has_corners(out) ? Found(std::move(out)) : std::nullopt;
+  }
+
+  // Longitudes and latitudes of a list, and nothing about its cells.
+  Found centers() {
+    const std::vector<DimensionRole> roles = classify_dimensions(contents_);
+    Topology out;
+    for (std::size_t d = 0; d < roles.size(); ++d) {
+      const int list = static_cast<int>(d);
+      const std::size_t longest = out.nodes < 0 ? centers_min - 1 : length(out.nodes);
+      const bool is_of_edges =
+          lower(contents_.dimensions[d].name).find("edge") != std::string::npos;
+      if (!roles[d].is_list || is_of_edges || length(list) <= longest) continue;
+      std::array<int, 2> positions{-1, -1};
+      bool has_data = false;
+      for (std::size_t v = 0; v < contents_.variables.size(); ++v) {
+        const FileVariable& one = contents_.variables[v];
+        if (!one.numeric || std::count(one.dims.begin(), one.dims.end(), list) != 1) continue;
+        if (!one.mesh.empty() || lower(one.cf_role).ends_with("_connectivity")) return std::nullopt;
+        const int side = one.dims.size() == 1 ? side_of(one) : 0;
+        if (side == 0) {
+          has_data = true;
+        } else if (positions.at(side < 0 ? 0 : 1) < 0) {
+          positions.at(side < 0 ? 0 : 1) = static_cast<int>(v);
+        }
+      }
+      if (!has_data || positions[0] < 0 || positions[1] < 0) continue;
+      out.nodes = list;
+      out.node_positions = positions;
+    }
+    if (out.nodes < 0) return std::nullopt;
+    const auto shown = choose_grid(contents_, roles);
+    if (shown && shown->space[0] >= 0 && shown->space[1] >= 0) return std::nullopt;
+    out.convention = "positions of cells";
+    out.by_neighbours = true;
+    out.on_sphere = true;
+    return out;
   }
 
   [[nodiscard]] bool has_corners(const Topology& out) const {

@@ -30,13 +30,16 @@ struct Topology {
   std::array<int, 2> plane_positions{-1, -1};
   // ... or by positions of their corners
   std::array<int, 2> corner_positions{-1, -1};
+  // ... or, without either, by neighbourhood of the nodes: there are no cells with data.
+  bool by_neighbours = false;
   bool on_sphere = false;   // node_positions or corner_positions are angles
   bool is_radian = false;   // without units they are in radians
   std::vector<int> others;  // further variables that describe the mesh
 };
 
-// Known are UGRID 1.0 (2-D topologies), MPAS, FVCOM, FESOM, bounds of CF (ICON) and SCRIP. Empty if
-// there is none.
+// Known are UGRID 1.0 (2-D topologies), MPAS, FVCOM, FESOM, bounds of CF (ICON) and SCRIP. Without
+// any of them, and without variables on a lattice: the longest list of at least centers_min
+// positions. Empty if there is none.
 std::optional<Topology> find_topology(const ArrayFile& file);
 
 // Variables that hold the mesh itself.

@@ -133,23 +133,44 @@ void find_coordinates(const Message& message, Grid& grid) {
   }
 }
 
+constexpr std::string_view list_type = "unstructured_grid";
+
+// Template 3.101: the number of values is that of cells. ICON lists cells as 1, vertices as 2 and
+// edges as 3 of a grid; NEMO's points beside T have other numbers than 1 too.
+void find_list(const Message& message, Grid& grid) {
+  const long points = message.whole("numberOfDataPoints", -1);
+  const long list = message.whole("numberOfGridInReference", -1);
+  if (points < 1 || points > points_max) {
+    grid.problem = "on an unstructured grid without cells, or with too many";
+    return;
+  }
+  grid.is_list = true;
+  grid.columns = static_cast<std::size_t>(points);
+  grid.rows = 1;
+  grid.uuid = message.text("uuidOfHGrid");
+  constexpr std::size_t digits = 32;
+  const bool is_known = grid.uuid.size() == digits && grid.uuid != std::string(digits, '0') &&
+                        grid.uuid != std::string(digits, 'f');
+  if (!is_known) grid.uuid.clear();
+  if (list != 1) {
+    grid.problem = "at the points of the list " + std::to_string(list) +
+                   " of an unstructured grid, such as its vertices (2) and edges (3) in ICON: only "
+                   "values at cells (1) are drawn";
+  }
+}
+
 // Why grids of a type cannot be read; empty if they can.
 std::string why_unsupported(const std::string& type) {
   constexpr auto supported = std::to_array<std::string_view>(
-      {"regular_ll", "regular_gg", "rotated_ll", "rotated_gg", "reduced_gg", "reduced_rotated_gg",
-       "albers", "lambert", "lambert_azimuthal_equal_area", "mercator", "polar_stereographic",
-       "transverse_mercator"});
+      {list_type, "regular_ll", "regular_gg", "rotated_ll", "rotated_gg", "reduced_gg",
+       "reduced_rotated_gg", "albers", "lambert", "lambert_azimuthal_equal_area", "mercator",
+       "polar_stereographic", "transverse_mercator"});
   if (std::find(supported.begin(), supported.end(), type) != supported.end()) return {};
   std::string_view what;
   std::string_view advice = "interpolate it to longitudes and latitudes first";
   if (type == "sh") {
     what = " (spherical harmonics)";
     advice = "transform it first, for example with cdo sp2gp";
-  } else if (type == "unstructured_grid") {
-    what = " (cells in a list, whose positions are not in the file)";
-    advice =
-        "interpolate it to longitudes and latitudes first, for example with cdo remapcon and the "
-        "file of its grid";
   } else if (type == "space_view") {
     what = " (as seen from a satellite)";
   }
@@ -262,6 +283,10 @@ Result<Grid> read_grid(const std::vector<unsigned char>& bytes) {
   grid.type = message.text("gridType");
   grid.problem = why_unsupported(grid.type);
   if (!grid.problem.empty()) return grid;
+  if (grid.type == list_type) {
+    find_list(message, grid);
+    return grid;
+  }
   const long rows = message.whole(has_axes(grid) ? "Nj" : "Ny", -1);
   long columns = -1;
   long points = -1;

@@ -28,6 +28,9 @@ struct Grid {
                                          // `columns`; empty for other grids
   bool rotated = false;                  // longitudes and latitudes relate to a rotated pole
   cf::GridMapping mapping;               // of projected and rotated grids, as in CF
+  // Cells in a list (template 3.101), in one row of `columns`, whose positions are elsewhere.
+  bool is_list = false;
+  std::string uuid;  // of the horizontal grid: 32 hexadecimal digits
 };
 
 struct Header {

@@ -28,10 +28,10 @@ bool is_same(const Grid& a, const Grid& b) {
   };
   constexpr double tolerance_m = 100;  // about a thousandth of a degree
   return a.type == b.type && a.problem == b.problem && a.columns == b.columns && a.rows == b.rows &&
-         a.row_lengths == b.row_lengths && a.mapping.numbers == b.mapping.numbers &&
-         a.mapping.texts == b.mapping.texts && close(a.longitude, b.longitude) &&
-         close(a.latitude, b.latitude) && close(a.x, b.x, tolerance_m) &&
-         close(a.y, b.y, tolerance_m);
+         a.row_lengths == b.row_lengths && a.uuid == b.uuid &&
+         a.mapping.numbers == b.mapping.numbers && a.mapping.texts == b.mapping.texts &&
+         close(a.longitude, b.longitude) && close(a.latitude, b.latitude) &&
+         close(a.x, b.x, tolerance_m) && close(a.y, b.y, tolerance_m);
 }
 
 FileVariable latitude_axis(const char* standard_name) {
@@ -102,7 +102,7 @@ Result<void> File::add_message(std::size_t field, const std::vector<unsigned cha
     }
     auto names = read_names(message);
     if (!names) return input_->fault("has a message that " + names.error().message);
-    groups_.push_back({header, std::move(*names), *grid, {}, 0, false, {}, {}});
+    groups_.push_back({header, std::move(*names), *grid, {}, 0, false, false, {}, {}});
   }
   Group& group = groups_[known->second];
   const Place place{header.member, header.reference, header.hours, header.level};
@@ -145,8 +145,9 @@ Result<void> File::scan() {
 
 // If no field can be read, returns the reason instead of a missing field.
 Result<void> File::check_any_field() const {
-  for (const Content& held : held_) {
-    if (!held.numbers.empty()) return {};
+  if (std::any_of(contents_.variables.begin(), contents_.variables.end(),
+                  [](const FileVariable& one) { return one.numeric; })) {
+    return {};
   }
   if (groups_.empty()) {
     return input_->fault("has no field that can be read" +
@@ -159,11 +160,13 @@ Result<void> File::check_any_field() const {
 
 Result<void> File::add_variables() {
   merge_heights(groups_);
+  fix_constants();
   by_lead_time_ = tell_references(groups_);
   order(groups_);
   for (Group& group : groups_) omit_incomplete_members(group, contents_.notes);
   find_axes(groups_, contents_.notes);
   for (std::size_t g = 0; g < groups_.size(); ++g) add_field(g);
+  find_faces_of_layers();
   return add_hybrid_levels();
 }
 
@@ -195,7 +198,8 @@ int File::axis(const std::string& name, const std::vector<double>& values,
 // Latitude and longitude, or y and x of a map projection.
 std::vector<int> File::grid_dimensions(std::size_t g) {
   if (const auto known = grid_dims_.find(g); known != grid_dims_.end()) return known->second;
-  return grid_dims_[g] = grids_[g].projected ? add_plane(g) : add_axes(g);
+  const Grid& grid = grids_[g];
+  return grid_dims_[g] = grid.is_list ? add_list(g) : grid.projected ? add_plane(g) : add_axes(g);
 }
 
 std::vector<int> File::add_axes(std::size_t g) {
@@ -304,7 +308,8 @@ void File::add_field(std::size_t g) {
   held.group = static_cast<int>(g);
   if (variable.numeric) {
     for (const AxisIndex one : {member_axis, reference_axis, time_axis, level_axis_index}) {
-      if (one != time_axis && group.axes[one].size() < 2) continue;
+      const bool is_needed = one == time_axis ? !group.is_constant : group.axes[one].size() > 1;
+      if (!is_needed) continue;
       variable.dims.push_back(group_axis(group, one));
       held.axes.push_back(one);
     }
@@ -345,8 +350,8 @@ std::vector<std::size_t> File::chunk(int variable) const {
   const auto& dims = contents_.variables.at(static_cast<std::size_t>(variable)).dims;
   std::vector<std::size_t> out(dims.size(), 1);
   const Content& held = held_.at(static_cast<std::size_t>(variable));
-  if (held.group < 0 || dims.size() < 2) return out;
-  for (std::size_t d = dims.size() - 2; d < dims.size(); ++d) {
+  if (held.group < 0) return out;
+  for (std::size_t d = held.axes.size(); d < dims.size(); ++d) {
     out[d] = contents_.dimensions[static_cast<std::size_t>(dims[d])].length;
   }
   return out;
@@ -374,10 +379,11 @@ Result<void> File::read_block(int variable, const std::vector<std::size_t>& star
                               const std::vector<std::size_t>& count, Out* out) const {
   const Content& held = held_.at(static_cast<std::size_t>(variable));
   const auto& dims = contents_.variables[static_cast<std::size_t>(variable)].dims;
-  const std::size_t rank = dims.size();
   const std::size_t columns = contents_.dimensions[static_cast<std::size_t>(dims.back())].length;
-  const std::size_t rows = rank < 2 ? 1 : count[rank - 2];
-  const std::size_t first_row = rank < 2 ? 0 : start[rank - 2];
+  const std::size_t row_at = held.axes.size();
+  const bool has_rows = row_at + 2 == dims.size();
+  const std::size_t rows = has_rows ? count[row_at] : 1;
+  const std::size_t first_row = has_rows ? start[row_at] : 0;
   const auto copy_rows = [&](const auto* from) {
     for (std::size_t j = 0; j < rows; ++j) {
       const auto* row = from + (first_row + j) * columns + start.back();

@@ -55,6 +55,9 @@ class File final : public cf::ArrayFile {
   std::vector<int> grid_dimensions(std::size_t grid);
   std::vector<int> add_axes(std::size_t grid);
   std::vector<int> add_plane(std::size_t grid);
+  std::vector<int> add_list(std::size_t grid);
+  void fix_constants();
+  void find_faces_of_layers();
   void add_mapping(std::size_t grid);
   int axis(const std::string& name, const std::vector<double>& values, const FileVariable& like);
   int group_axis(const Group& group, AxisIndex axis_index);

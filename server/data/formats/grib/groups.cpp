@@ -37,7 +37,7 @@ void share_axis(std::vector<Group>& groups, std::size_t axis, std::size_t least,
     });
     for (const Group* group : list) {
       const auto& own = group->axes.at(axis);
-      if (own.size() < least) continue;
+      if (own.size() < least || (group->is_constant && axis == time_axis)) continue;
       const auto contains = [&](const Group* other) {
         const auto& all = other->axes.at(axis);
         return all.size() > own.size() &&
@@ -158,10 +158,11 @@ void find_axes(std::vector<Group>& groups, std::vector<std::string>& notes) {
       group.axes.at(axis) = coordinates(group, axis);
     }
     const auto& own = group.axes[reference_axis];
-    references.insert(own.begin(), own.end());
+    if (!group.is_constant) references.insert(own.begin(), own.end());
   }
   for (Group& group : groups) {
     auto& own = group.axes[reference_axis];
+    if (group.is_constant) continue;
     if (own.size() < references.size()) {
       notes.push_back(in_quotes(group.header.short_name) + " has " + std::to_string(own.size()) +
                       " of " + std::to_string(references.size()) +

@@ -26,6 +26,7 @@ struct Group {
   std::map<Place, std::size_t> fields;
   std::size_t repeated = 0;
   bool is_distinguished = false;  // others have the same name and kind of level on the same grid
+  bool is_constant = false;       // the same at all times; its times are 0
   std::string height;             // "10m" if there are winds of other heights; see merge_heights
   std::array<std::vector<double>, axis_count> axes;  // ascending; set by find_axes
 };

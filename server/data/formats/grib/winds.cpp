@@ -42,6 +42,7 @@ std::string component_name(std::string_view description) {
                                                     {"eastward_", eastward},
                                                     {"northward_", northward}});
   std::string text = snake(description);
+  if (text == "geometric_vertical_velocity") return "upward_air_velocity";
   for (const auto& [pattern, prefix] : patterns) {
     const std::size_t at = text.find(pattern);
     if (at == std::string::npos || (at > 0 && text[at - 1] != '_')) continue;

@@ -10,6 +10,7 @@
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/grid/cell_lists.hpp"
 #include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/grid/vertical.hpp"
 #include "server/data/formats/netcdf/bare.hpp"
@@ -45,6 +46,15 @@ const char* number_type_name(nc_type type) {
   const auto* at = std::find_if(number_types.begin(), number_types.end(),
                                 [type](const TypeName& known) { return known.type == type; });
   return at == number_types.end() ? nullptr : at->name;
+}
+
+// The digits of a UUID as ICON writes it, "bbbd5a09-8554-9924-3c7a-4aa4c9861920".
+std::string uuid_digits(const std::string& text) {
+  std::string out;
+  for (const char c : lower(text)) {
+    if ((c >= '0' && c <= '9') || (c >= 'a' && c <= 'f')) out += c;
+  }
+  return out.size() == 32 ? out : std::string();
 }
 
 // Unlimited dimensions of a group and those above it.
@@ -209,6 +219,13 @@ Result<void> File::scan_group(const std::string& path) {
   if (!classic_) {
     name_axes_of_meep(contents_);
     name_steps_of_bare_arrays(contents_);
+  }
+  if (const std::string uuid = uuid_digits(text({ncid_, NC_GLOBAL}, "uuidOfHGrid"));
+      !uuid.empty()) {
+    const std::vector<bool> lists = cf::find_cell_lists(contents_);
+    for (std::size_t d = 0; d < lists.size(); ++d) {
+      if (lists[d]) contents_.dimensions[d].grid_uuid = uuid;
+    }
   }
   return {};
 }

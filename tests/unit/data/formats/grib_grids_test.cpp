@@ -408,10 +408,6 @@ TEST_F(GribGrids, UnsupportedGridsAreRefusedWithAdvice) {
       testing::AllOf(HasSubstr("'sh'"), HasSubstr("spherical harmonics"), HasSubstr("cdo sp2gp")));
   EXPECT_THAT(fault(Maker("reduced_ll_sfc_grib1").bytes()),
               testing::AllOf(HasSubstr("'reduced_ll'"), HasSubstr("interpolate it")));
-  Maker cells("GRIB2");
-  cells.set("gridType", std::string("unstructured_grid"));
-  EXPECT_THAT(fault(cells.bytes()),
-              testing::AllOf(HasSubstr("'unstructured_grid'"), HasSubstr("cdo remapcon")));
 }
 
 #endif

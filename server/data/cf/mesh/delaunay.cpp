@@ -1,0 +1,298 @@
+// The vertices of the Voronoi diagram (Boost.Polygon) are the polygons.
+#include "server/data/cf/mesh/delaunay.hpp"
+
+#include <algorithm>
+#include <boost/polygon/voronoi.hpp>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <string>
+#include <utility>
+
+namespace windsplat::data::cf {
+
+namespace {
+
+using Direction = std::array<double, 3>;
+using ChartPoint = boost::polygon::point_data<std::int32_t>;
+
+constexpr double unit_degree = std::numbers::pi / 180;
+constexpr double chart_extent = 1 << 30;
+constexpr double fullness_min = 0.02;  // triangles of a lattice of 1 to 25
+
+Direction direction_of(double longitude, double latitude) {
+  const double from_axis = std::cos(latitude * unit_degree);
+  return {from_axis * std::cos(longitude * unit_degree),
+          from_axis * std::sin(longitude * unit_degree), std::sin(latitude * unit_degree)};
+}
+
+double dot(const Direction& a, const Direction& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+double distance(const Direction& a, const Direction& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
+
+Direction between(const Direction& a, const Direction& b) {
+  return {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+}
+
+Direction unit(const Direction& a) {
+  const double length = std::sqrt(dot(a, a));
+  return {a[0] / length, a[1] / length, a[2] / length};
+}
+
+Direction cross(const Direction& a, const Direction& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+class Triangulator {
+ public:
+  Result<Triangulation> make(std::vector<double> longitudes, std::vector<double> latitudes) {
+    if (auto fine = take_positions(longitudes, latitudes); !fine) return fine.error();
+    if (used_.size() >= centers_min) find_polygons();
+    if (used_.size() - out_.repeated < centers_min) {
+      return make_error(ErrorKind::bad_data, "cells without outlines have " +
+                                                 std::to_string(used_.size() - out_.repeated) +
+                                                 " different positions: at least " +
+                                                 std::to_string(centers_min) +
+                                                 " are needed to draw them by their centers");
+    }
+    if (auto fine = leave_out_gaps(); !fine) return fine.error();
+    Mesh& mesh = out_.mesh;
+    mesh.on_sphere = true;
+    // Positions that are missing are no corners.
+    for (std::size_t i = 0; i < longitudes.size(); ++i) {
+      if (std::isfinite(longitudes[i]) && std::isfinite(latitudes[i])) continue;
+      longitudes[i] = longitudes[used_.front()];
+      latitudes[i] = latitudes[used_.front()];
+    }
+    mesh.x = std::move(longitudes);
+    mesh.y = std::move(latitudes);
+    return std::move(out_);
+  }
+
+ private:
+  Result<void> take_positions(const std::vector<double>& longitudes,
+                              const std::vector<double>& latitudes) {
+    directions_.resize(longitudes.size());
+    for (std::size_t i = 0; i < longitudes.size(); ++i) {
+      if (!std::isfinite(longitudes[i]) || !std::isfinite(latitudes[i])) {
+        ++out_.missing;
+        continue;
+      }
+      if (!(std::abs(longitudes[i]) <= 1080 && std::abs(latitudes[i]) <= 90 + 1e-6)) {
+        return make_error(ErrorKind::bad_data, "entry " + std::to_string(i + 1) +
+                                                   " of a list of cells has a position " +
+                                                   "that is no longitude and latitude in degrees");
+      }
+      directions_[i] = direction_of(longitudes[i], latitudes[i]);
+      used_.push_back(static_cast<std::uint32_t>(i));
+    }
+    return {};
+  }
+
+  // Sets where the chart is projected from. Positions within 120 degrees of their mean leave room
+  // opposite to it.
+  void choose_chart() {
+    constexpr double room = -0.5;
+    Direction sum{};
+    for (const std::uint32_t i : used_) {
+      for (std::size_t a = 0; a < 3; ++a) sum.at(a) += directions_[i].at(a);
+    }
+    const double length = std::sqrt(dot(sum, sum));
+    if (length > 1e-3 * static_cast<double>(used_.size())) {
+      const Direction middle = unit(sum);
+      closed_ = std::any_of(used_.begin(), used_.end(),
+                            [&](std::uint32_t i) { return dot(directions_[i], middle) < room; });
+      from_ = {-middle[0], -middle[1], -middle[2]};
+    }
+    if (closed_) from_ = directions_[used_.front()];
+    const Direction aside = std::abs(from_[2]) < 0.9 ? Direction{0, 0, 1} : Direction{1, 0, 0};
+    first_ = unit(cross(from_, aside));
+    second_ = cross(from_, first_);
+  }
+
+  // Chart points of all positions except the one projected from; `sources` are their numbers.
+  std::vector<ChartPoint> chart_points(std::vector<std::uint32_t>& sources) {
+    std::vector<std::array<double, 2>> plane;
+    double extent = 0;
+    constexpr double same = 1e-9;  // radians
+    for (const std::uint32_t i : used_) {
+      const Direction& own = directions_[i];
+      const double apart = distance(own, from_);
+      if (closed_ && apart < same) {
+        out_.repeated += i == used_.front() ? 0 : 1;
+        continue;
+      }
+      const double below = apart * apart / 2;  // 1 - cos of the angle
+      plane.push_back({dot(own, first_) / below, dot(own, second_) / below});
+      extent = std::max({extent, std::abs(plane.back()[0]), std::abs(plane.back()[1])});
+      sources.push_back(i);
+    }
+    std::vector<ChartPoint> out;
+    out.reserve(plane.size());
+    for (const auto& [u, v] : plane) {
+      const auto whole = [&](double value) {
+        return static_cast<std::int32_t>(std::lround(value / extent * chart_extent));
+      };
+      out.emplace_back(whole(u), whole(v));
+    }
+    return out;
+  }
+
+  void find_polygons() {
+    choose_chart();
+    std::vector<std::uint32_t> sources;
+    const std::vector<ChartPoint> points = chart_points(sources);
+    if (points.size() < 3) {
+      out_.repeated = used_.size() - points.size();
+      return;
+    }
+    boost::polygon::voronoi_diagram<double> diagram;
+    boost::polygon::construct_voronoi(points.begin(), points.end(), &diagram);
+    out_.repeated += points.size() - diagram.num_cells();
+    Mesh& mesh = out_.mesh;
+    mesh.first.push_back(0);
+    const auto end_cell = [&] {
+      mesh.first.push_back(static_cast<std::uint32_t>(mesh.corners.size()));
+    };
+    for (const auto& vertex : diagram.vertices()) {
+      const auto* edge = vertex.incident_edge();
+      do {
+        mesh.corners.push_back(sources[edge->cell()->source_index()]);
+        edge = edge->rot_next();
+      } while (edge != vertex.incident_edge());
+      end_cell();
+    }
+    if (!closed_) return;
+    for (const auto& edge : diagram.edges()) {
+      // Positions at the rim of the chart are neighbours of the one it is projected from.
+      if (edge.vertex0() != nullptr || edge.vertex1() == nullptr) continue;
+      mesh.corners.insert(mesh.corners.end(), {used_.front(), sources[edge.cell()->source_index()],
+                                               sources[edge.twin()->cell()->source_index()]});
+      end_cell();
+    }
+  }
+
+  [[nodiscard]] float edge_length(std::size_t cell, std::uint32_t corner) const {
+    const Mesh& mesh = out_.mesh;
+    const std::uint32_t next = corner + 1 < mesh.first[cell + 1] ? corner + 1 : mesh.first[cell];
+    return static_cast<float>(
+        distance(directions_[mesh.corners[corner]], directions_[mesh.corners[next]]));
+  }
+
+  // The median over the polygons of their area in squares of their longest edge.
+  [[nodiscard]] double median_fullness() const {
+    const Mesh& mesh = out_.mesh;
+    std::vector<double> all;
+    for (std::size_t c = 0; c < mesh.cells(); ++c) {
+      const Direction& apex = directions_[mesh.corners[mesh.first[c]]];
+      Direction area{};
+      float longest = 0;
+      for (std::uint32_t i = mesh.first[c]; i < mesh.first[c + 1]; ++i) {
+        longest = std::max(longest, edge_length(c, i));
+        if (i + 1 == mesh.first[c + 1]) continue;
+        const Direction part = cross(between(apex, directions_[mesh.corners[i]]),
+                                     between(apex, directions_[mesh.corners[i + 1]]));
+        for (std::size_t a = 0; a < 3; ++a) area.at(a) += part.at(a) / 2;
+      }
+      const auto side = static_cast<double>(longest);
+      all.push_back(std::sqrt(dot(area, area)) / (side * side));
+    }
+    if (all.empty()) return 0;
+    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
+    std::nth_element(all.begin(), middle, all.end());
+    return *middle;
+  }
+
+  // The median length of the edges at every position.
+  [[nodiscard]] std::vector<float> median_edges() const {
+    const Mesh& mesh = out_.mesh;
+    std::vector<std::uint32_t> begin(directions_.size() + 1, 0);
+    for (const std::uint32_t node : mesh.corners) begin[node + 1] += 2;
+    for (std::size_t n = 0; n < directions_.size(); ++n) begin[n + 1] += begin[n];
+    std::vector<float> lengths(begin.back());
+    std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
+    for (std::size_t c = 0; c < mesh.cells(); ++c) {
+      float before = edge_length(c, mesh.first[c + 1] - 1);
+      for (std::uint32_t i = mesh.first[c]; i < mesh.first[c + 1]; ++i) {
+        const float after = edge_length(c, i);
+        lengths[next[mesh.corners[i]]++] = before;
+        lengths[next[mesh.corners[i]]++] = after;
+        before = after;
+      }
+    }
+    std::vector<float> out(directions_.size(), 0);
+    for (std::size_t n = 0; n < out.size(); ++n) {
+      const auto from = lengths.begin() + static_cast<std::ptrdiff_t>(begin[n]);
+      const auto to = lengths.begin() + static_cast<std::ptrdiff_t>(begin[n + 1]);
+      if (from == to) continue;
+      const auto middle = from + (to - from) / 2;
+      std::nth_element(from, middle, to);
+      out[n] = *middle;
+    }
+    return out;
+  }
+
+  // usual: the length of edges at each position.
+  void leave_out_beyond(const std::vector<float>& usual) {
+    Mesh& mesh = out_.mesh;
+    Mesh kept;
+    kept.first.push_back(0);
+    std::vector<float> allowed;
+    for (std::size_t c = 0; c < mesh.cells(); ++c) {
+      float longest = 0;
+      allowed.clear();
+      for (std::uint32_t i = mesh.first[c]; i < mesh.first[c + 1]; ++i) {
+        longest = std::max(longest, edge_length(c, i));
+        allowed.push_back(usual[mesh.corners[i]]);
+      }
+      const auto middle = allowed.begin() + static_cast<std::ptrdiff_t>(allowed.size() / 2);
+      std::nth_element(allowed.begin(), middle, allowed.end());
+      if (static_cast<double>(longest) > gap_edges * static_cast<double>(*middle)) {
+        ++out_.gaps;
+        continue;
+      }
+      kept.corners.insert(kept.corners.end(), mesh.corners.begin() + mesh.first[c],
+                          mesh.corners.begin() + mesh.first[c + 1]);
+      kept.first.push_back(static_cast<std::uint32_t>(kept.corners.size()));
+    }
+    mesh = std::move(kept);
+  }
+
+  Result<void> leave_out_gaps() {
+    if (!(median_fullness() >= fullness_min)) {
+      return make_error(ErrorKind::bad_data,
+                        "the positions of cells without outlines lie along lines, such as tracks: "
+                        "there is nothing to draw between them");
+    }
+    // Positions at the rim of a gap have edges across it, which count until they are left out.
+    constexpr int rounds_max = 8;
+    for (int round = 0; round < rounds_max; ++round) {
+      const std::size_t before = out_.gaps;
+      leave_out_beyond(median_edges());
+      if (out_.gaps == before) break;
+    }
+    if (out_.mesh.cells() > 0) return {};
+    return make_error(ErrorKind::bad_data,
+                      "the positions of cells without outlines have no neighbours");
+  }
+
+  Triangulation out_;
+  std::vector<Direction> directions_;  // unit vectors
+  std::vector<std::uint32_t> used_;    // positions that are given
+  bool closed_ = true;                 // the positions surround the globe
+  Direction from_{};                   // the chart is projected from here
+  Direction first_{};                  // its axes
+  Direction second_{};
+};
+
+}  // namespace
+
+Result<Triangulation> triangulate(std::vector<double> longitudes, std::vector<double> latitudes) {
+  return Triangulator().make(std::move(longitudes), std::move(latitudes));
+}
+
+}  // namespace windsplat::data::cf

@@ -1,0 +1,242 @@
+// Positions without outlines: their Delaunay polygons, and files drawn by them.
+#include "server/data/cf/mesh/delaunay.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "tests/unit/data/cf/mesh_maker.hpp"
+#include "tests/unit/data/dataset_probe.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+namespace windsplat::data::test::mesh {
+namespace {
+
+using testing::HasSubstr;
+using Direction = std::array<double, 3>;
+
+struct Places {
+  Table x;
+  Table y;
+};
+
+Direction direction(const Places& places, std::size_t n) {
+  const double from_axis = std::cos(places.y[n] * degree);
+  return {from_axis * std::cos(places.x[n] * degree), from_axis * std::sin(places.x[n] * degree),
+          std::sin(places.y[n] * degree)};
+}
+
+double triple(const Direction& a, const Direction& b, const Direction& c) {
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
+         a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+Direction from_to(const Direction& a, const Direction& b) {
+  return {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+}
+
+// Points of a Fibonacci spiral around the globe, all as far apart.
+Places spiral(std::size_t count) {
+  Places out;
+  for (std::size_t n = 0; n < count; ++n) {
+    const auto i = static_cast<double>(n);
+    out.x.push_back(std::remainder(i * 222.49223594996215, 360.0));
+    out.y.push_back(std::asin(1 - (2 * i + 1) / static_cast<double>(count)) / degree);
+  }
+  return out;
+}
+
+Places random_places(std::size_t count) {
+  Places out;
+  std::mt19937 random(7);
+  const auto part = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  for (std::size_t n = 0; n < count; ++n) {
+    out.x.push_back(170 + 30 * part());
+    out.y.push_back(60 + 20 * part());
+  }
+  return out;
+}
+
+// Whether no position lies in the circle around any polygon: none is beyond the plane through three
+// of its corners, as seen from the middle of the globe.
+void expect_empty_circles(const Places& places, const cf::Mesh& mesh) {
+  for (std::size_t c = 0; c < mesh.cells(); ++c) {
+    const auto corner = [&](std::size_t i) {
+      return direction(places, mesh.corners[mesh.first[c] + i]);
+    };
+    const Direction a = corner(0);
+    double side = triple(from_to(a, corner(1)), from_to(a, corner(2)), a);
+    for (std::size_t n = 0; n < places.x.size(); ++n) {
+      const double above =
+          triple(from_to(a, corner(1)), from_to(a, corner(2)), from_to(a, direction(places, n)));
+      ASSERT_LT(above * std::copysign(1.0, side), 1e-9) << c << ' ' << n;
+    }
+  }
+}
+
+std::size_t triangles_in(const cf::Mesh& mesh) { return mesh.corners.size() - 2 * mesh.cells(); }
+
+TEST(Delaunay, PolygonsOnTheGlobeHaveEmptyCirclesAndAreAllThereAre) {
+  for (const std::size_t count : {100U, 333U, 1000U}) {
+    const Places places = spiral(count);
+    const auto found = cf::triangulate(places.x, places.y);
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_EQ(found->gaps, 0U);
+    EXPECT_EQ(triangles_in(found->mesh), 2 * count - 4);  // Euler
+    expect_empty_circles(places, found->mesh);
+  }
+}
+
+TEST(Delaunay, PolygonsOfARegionHaveEmptyCirclesAndCoverIt) {
+  const Places places = random_places(400);
+  const auto found = cf::triangulate(places.x, places.y);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_GT(triangles_in(found->mesh) + found->gaps, 2 * 400U - 2 - 60);
+  EXPECT_LT(triangles_in(found->mesh) + found->gaps, 2 * 400U - 2);
+  EXPECT_LT(found->gaps, 40U);
+  expect_empty_circles(places, found->mesh);
+}
+
+TEST(Delaunay, RepeatedAndMissingPositionsAreNoCorners) {
+  Places places = spiral(300);
+  places.x[20] = std::numeric_limits<double>::quiet_NaN();
+  for (const std::size_t n : {0U, 150U}) {
+    places.x.push_back(places.x[n] + 360);
+    places.y.push_back(places.y[n]);
+  }
+  const auto found = cf::triangulate(places.x, places.y);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->missing, 1U);
+  EXPECT_EQ(found->repeated, 2U);
+  EXPECT_EQ(triangles_in(found->mesh), 2 * 299U - 4);
+  EXPECT_EQ(std::count(found->mesh.corners.begin(), found->mesh.corners.end(), 20U), 0);
+  EXPECT_EQ(found->mesh.nodes(), 302U);
+}
+
+TEST(Delaunay, PositionsAlongLinesFewOnesAndThoseOffTheGlobeAreRefused) {
+  Places track;
+  for (int n = 0; n < 400; ++n) {
+    track.x.push_back(10 + 0.01 * n + 1e-5 * (n * n % 7));
+    track.y.push_back(40 + 8 * std::sin(0.01 * n));
+  }
+  const auto lines = cf::triangulate(track.x, track.y);
+  ASSERT_FALSE(lines);
+  EXPECT_THAT(lines.error().message, HasSubstr("lie along lines"));
+
+  const auto same = cf::triangulate(Table(400, 5), Table(400, 6));
+  ASSERT_FALSE(same);
+  EXPECT_THAT(same.error().message, HasSubstr("1 different positions: at least 100"));
+
+  Places beyond = spiral(200);
+  beyond.y[9] = 91;
+  const auto off = cf::triangulate(beyond.x, beyond.y);
+  ASSERT_FALSE(off);
+  EXPECT_THAT(off.error().message, HasSubstr("entry 10 of a list of cells"));
+}
+
+class CentersOfCells : public testing::Test {
+ protected:
+  // A file of CAM-SE's shape: values on `ncol`, which a linear function of the position gives.
+  void write(const Places& places, const Table& values) {
+    NetcdfMaker file(folder_ / "c.nc");
+    const int column = file.dimension("ncol", places.x.size());
+    file.text(file.variable("lon", NC_DOUBLE, {column}, places.x), "units", "degrees_east");
+    file.text(file.variable("lat", NC_DOUBLE, {column}, places.y), "units", "degrees_north");
+    file.number(file.variable("T", NC_FLOAT, {column}, values), "_FillValue", NC_FLOAT, {-9});
+  }
+  static double linear(double x, double y) { return 100 + x - 2 * y; }
+  static Table linear_at(const Places& places) {
+    Table out;
+    for (std::size_t n = 0; n < places.x.size(); ++n) {
+      out.push_back(linear(places.x[n], places.y[n]));
+    }
+    return out;
+  }
+
+  Folder folder_;
+};
+
+TEST_F(CentersOfCells, LinearFunctionsAreExactAndGapsAndMissingValuesMasked) {
+  // Every tenth of a degree, shaken, with a hole of 2 x 2 degrees; one value is missing.
+  Places places;
+  std::mt19937 random(3);
+  for (int n = 0; n < 60 * 60; ++n) {
+    const double x = 20 + 0.1 * (n % 60) + 1e-11 * static_cast<double>(random());
+    const double y = 10 + 0.1 * (n / 60) + 1e-11 * static_cast<double>(random());
+    if (std::abs(x - 23) < 1 && std::abs(y - 13) < 1) continue;
+    places.x.push_back(x);
+    places.y.push_back(y);
+  }
+  Table values = linear_at(places);
+  values[65] = -9;  // at 20.5, 10.1
+  write(places, values);
+  const auto source = opened(folder_ / "c.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_TRUE(has_note(source->info(), "Delaunay triangulation"));
+  EXPECT_TRUE(has_note(source->info(), "rms error"));
+  const Volume volume = volume_of(*source, "T");
+  const auto& axes = source->info().grid.axes;
+  const std::size_t width = axes[0].coordinates.size();
+  std::size_t compared = 0;
+  for (std::size_t n = 0; n < volume.values.size(); ++n) {
+    const double x = axes[0].coordinates[n % width];
+    const double y = axes[1].coordinates[n / width];
+    const double from_hole = std::max(std::abs(x - 23), std::abs(y - 13));
+    const double from_missing = std::max(std::abs(x - 20.5), std::abs(y - 10.1));
+    if (from_hole < 0.6 || from_missing < 0.03) {
+      ASSERT_TRUE(std::isnan(volume.values[n])) << x << ' ' << y;
+    } else if (from_hole > 1.1 && from_missing > 0.2 && x > 20.1 && x < 25.8 && y > 10.1 &&
+               y < 15.8) {
+      ASSERT_NEAR(volume.values[n], linear(x, y), 1e-3) << x << ' ' << y;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 3000U);
+}
+
+TEST_F(CentersOfCells, AroundTheGlobeLeaveNoSampleMasked) {
+  const Places places = spiral(2000);
+  Table values;
+  for (const double y : places.y) values.push_back(std::sin(y * degree));
+  write(places, values);
+  const auto source = opened(folder_ / "c.nc");
+  ASSERT_NE(source, nullptr);
+  const Volume volume = volume_of(*source, "T");
+  const auto& axes = source->info().grid.axes;
+  const std::size_t width = axes[0].coordinates.size();
+  double worst = 0;
+  for (std::size_t n = 0; n < volume.values.size(); ++n) {
+    const double expected = std::sin(axes[1].coordinates[n / width] * degree);
+    worst = std::max(worst, std::abs(static_cast<double>(volume.values[n]) - expected));
+    ASSERT_FALSE(std::isnan(volume.values[n])) << n;
+  }
+  // The spacing is 0.08: a quadrilateral's diagonal squared over 8, and edges straight on the map.
+  EXPECT_LT(worst, 3e-3);
+}
+
+TEST_F(CentersOfCells, FewerThanAHundredAreRefusedAndNormalsOnEdgesToo) {
+  const Places few = spiral(99);
+  write(few, linear_at(few));
+  EXPECT_THAT(refusal(folder_ / "c.nc"), HasSubstr("lists stations"));
+
+  const Places many = spiral(500);
+  {
+    NetcdfMaker file(folder_ / "e.nc");
+    const int edge = file.dimension("nEdges", many.x.size());
+    file.text(file.variable("lonEdge", NC_DOUBLE, {edge}, many.x), "units", "degrees_east");
+    file.text(file.variable("latEdge", NC_DOUBLE, {edge}, many.y), "units", "degrees_north");
+    file.variable("u", NC_FLOAT, {edge}, linear_at(many));
+  }
+  EXPECT_THAT(refusal(folder_ / "e.nc"), HasSubstr("edges"));
+}
+
+}  // namespace
+}  // namespace windsplat::data::test::mesh
