@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "server/data/cf/time.hpp"
@@ -97,6 +98,16 @@ Result<void> read_plain(const std::shared_ptr<const InputFile>& file, const Stor
     done(count * row);
   }
   return file->check_unchanged();
+}
+
+void mask_uncovered(const Snapshot& snapshot, PieceData data, std::size_t values, float* out) {
+  const auto gives_all = [&](const Piece& piece) {
+    const auto& arrays = piece.*data;
+    return piece.extent == snapshot.whole && std::none_of(arrays.begin(), arrays.end(), is_ghost);
+  };
+  const bool is_covered = snapshot.pieces.size() == 1 && snapshot.blocks.size() < 2 &&
+                          gives_all(snapshot.pieces.front());
+  if (!is_covered) std::fill_n(out, values, std::numeric_limits<float>::quiet_NaN());
 }
 
 }  // namespace windsplat::data::vtk

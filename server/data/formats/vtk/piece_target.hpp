@@ -86,4 +86,8 @@ Result<void> read_plain(const std::shared_ptr<const InputFile>& file, const Stor
                         const Target& target, std::size_t samples, float* out,
                         const std::function<void(std::size_t tuples)>& done);
 
+// Masks `values` numbers of a grid before its pieces are read, unless a single piece without ghosts
+// gives all of them.
+void mask_uncovered(const Snapshot& snapshot, PieceData data, std::size_t values, float* out);
+
 }  // namespace windsplat::data::vtk

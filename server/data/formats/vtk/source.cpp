@@ -395,8 +395,7 @@ class VtkSource final : public FileSource {
     const std::size_t samples = info_.grid.samples();
     if (!(snapshot.whole == whole_))
       return file_->fault("has a grid that changed since it was opened");
-    std::fill_n(out, samples * info_.fields[field].components.size(),
-                std::numeric_limits<float>::quiet_NaN());
+    mask_uncovered(snapshot, data(), samples * info_.fields[field].components.size(), out);
     const unsigned mask = of_cells_ ? hidden_cell | refined_cell : hidden_point;
     SharedSamples shared(has_overlaps(snapshot) ? samples : 0);
     // The last first: where blocks overlap, the first one counts.
