@@ -34,9 +34,12 @@ Direction direction(const Places& places, std::size_t n) {
           std::sin(places.y[n] * degree)};
 }
 
-double triple(const Direction& a, const Direction& b, const Direction& c) {
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) +
-         a[2] * (b[0] * c[1] - b[1] * c[0]);
+double dot(const Direction& a, const Direction& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+Direction cross(const Direction& a, const Direction& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
 Direction from_to(const Direction& a, const Direction& b) {
@@ -73,11 +76,14 @@ void expect_empty_circles(const Places& places, const cf::Mesh& mesh) {
       return direction(places, mesh.corners[mesh.first[c] + i]);
     };
     const Direction a = corner(0);
-    double side = triple(from_to(a, corner(1)), from_to(a, corner(2)), a);
+    const Direction ab = from_to(a, corner(1));
+    const Direction ac = from_to(a, corner(2));
+    const Direction normal = cross(ab, ac);
+    const double outward = std::copysign(1 / std::sqrt(dot(normal, normal)), dot(normal, a));
+    const double tolerance = 1e-4 * std::max(dot(ab, ab), dot(ac, ac));
     for (std::size_t n = 0; n < places.x.size(); ++n) {
-      const double above =
-          triple(from_to(a, corner(1)), from_to(a, corner(2)), from_to(a, direction(places, n)));
-      ASSERT_LT(above * std::copysign(1.0, side), 1e-9) << c << ' ' << n;
+      const double above = dot(normal, from_to(a, direction(places, n))) * outward;
+      ASSERT_LT(above, tolerance) << c << ' ' << n;
     }
   }
 }
