@@ -5,8 +5,8 @@
 //
 // The same for generated scenes, whose names contain TEXT, with both methods:
 //
-//   bench_frame --scenes[=TEXT] [--rounds=N] [--side=N] [--no-naive] [--processor-time]
-//               [--markdown=FILE]
+//   bench_frame --scenes[=TEXT] [--content=lines|medium|both] [--rounds=N] [--side=N] [--no-naive]
+//               [--processor-time] [--markdown=FILE]
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -318,6 +318,7 @@ int run_scenes(int argc, char** argv, const std::string& only) {
   bench::SceneOptions options;
   if (only != "set") options.only = only;
   options.smoke = !bench::take_option(argc, argv, "--smoke").empty();
+  options.content = bench::take_option(argc, argv, "--content");
   options.naive = bench::take_option(argc, argv, "--no-naive").empty();
   options.processor_time = !bench::take_option(argc, argv, "--processor-time").empty();
   const std::string markdown = bench::take_option(argc, argv, "--markdown");

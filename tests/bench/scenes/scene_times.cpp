@@ -111,6 +111,7 @@ class SceneRows {
     }
     const auto dataset = scene.open(reduction);
     for (std::size_t c = 0; c < scene.contents.size(); ++c) {
+      if (!options_.content.empty() && options_.content != name_of(scene.contents[c])) continue;
       add(scene, *dataset, scene.contents[c], eighth[c]);
     }
   }

@@ -8,9 +8,10 @@
 namespace windsplat::bench {
 
 struct SceneOptions {
-  std::string only;  // scenes whose name contains it
-  int rounds = 5;    // frames of each kind; best and median are listed
-  int side = 256;    // samples along each side of the two large cubes
+  std::string only;     // scenes whose name contains it
+  std::string content;  // "lines", "medium" or "both"; empty: all
+  int rounds = 5;       // frames of each kind; best and median are listed
+  int side = 256;       // samples along each side of the two large cubes
   bool naive = true;
   bool processor_time = false;  // of all threads, on a machine that others use
   bool smoke = false;           // tiny pictures of a few samples
