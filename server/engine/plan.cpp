@@ -10,7 +10,6 @@
 #include "server/base/check.hpp"
 #include "server/engine/body.hpp"
 #include "server/engine/line_style.hpp"
-#include "server/engine/partial.hpp"
 
 namespace windsplat::engine {
 
@@ -292,10 +291,6 @@ double slab_depth_least(const Scene& scene) {
 void plan_slabs(const Scene& scene, RenderPlan& plan) {
   for (PassPlan& pass : plan.passes) pass.kernel.by_depth = 1;
   plan.slab_depth = std::max(slab_depth_asked(scene), slab_depth_least(scene));
-  if (!plan.slabs) return;
-  for (PassPlan& pass : plan.passes) {
-    if (!pass.scalars.empty()) pass.kernel.partial = partial_footprints().data();
-  }
 }
 
 void finish_pass(const Scene& scene, double depth_origin, int major, const SampleWays& ways,

@@ -51,6 +51,12 @@ class Splats {
   [[nodiscard]] std::size_t count() const { return of_.count; }
   [[nodiscard]] const SplatRecord& operator[](std::uint32_t at) const { return of_.records[at]; }
 
+  void prefetch(std::uint32_t at) const {
+    constexpr std::size_t line = 64;
+    const char* bytes = reinterpret_cast<const char*>(&of_.records[at]);
+    for (std::size_t n = 0; n < sizeof(SplatRecord); n += line) __builtin_prefetch(bytes + n);
+  }
+
   std::uint32_t add(const SplatRecord& record) {
     ++of_.count;
     if (of_.free.empty()) {
@@ -314,21 +320,25 @@ class SlabSweep {
   // Accumulates the splats that begin in this slab into it and the following ones.
   void gather() {
     splats_.take(index_, space_.here);
-    const std::int64_t farthest = index_ + slabs_ahead - 1;
-    for (const std::uint32_t at : space_.here) {
+    const Slab& now = slab_at(index_);
+    const float reach = slab_at(index_ + slabs_ahead - 1).back;
+    for (std::size_t n = 0; n < space_.here.size(); ++n) {
+      // The records are not in the order of the queue.
+      constexpr std::size_t ahead = 4;
+      if (n + ahead < space_.here.size()) splats_.prefetch(space_.here[n + ahead]);
+      const std::uint32_t at = space_.here[n];
       const SplatRecord& splat = splats_[at];
-      const std::int64_t first = slab_of(splat.first);
-      if (first > index_) {
-        splats_.await(at, first, index_);
+      if (splat.first >= now.back) {
+        splats_.await(at, std::max(slab_of(splat.first), index_ + 1), index_);
         continue;
       }
       table_.gather(plan_.camera, splat, slabs_, static_cast<int>(modulo(index_, slabs_ahead)),
                     tile_);
-      const std::int64_t last = slab_of(splat.last);
-      gathered_until_ = std::max(gathered_until_, std::min(last, farthest));
-      if (last > farthest) {
-        splats_.await(at, farthest + 1, index_);
+      if (splat.last >= reach) {
+        gathered_until_ = std::max(gathered_until_, index_ + slabs_ahead - 1);
+        splats_.await(at, index_ + slabs_ahead, index_);
       } else {
+        if (splat.last >= depth_of(gathered_until_ + 1)) gathered_until_ = slab_of(splat.last);
         splats_.remove(at);
       }
     }

@@ -7,7 +7,6 @@
 #include <memory>
 
 #include "server/engine/flush_denormals.hpp"
-#include "server/engine/partial.hpp"
 
 namespace windsplat::engine {
 
@@ -55,7 +54,6 @@ void open_tile(const RenderPlan& plan, const Bins& bins, const kernels::Table& t
   tile.height = std::min(plan.tile_pixels, plan.camera.height - tile.y);
   tile.blocks = space.blocks.data();
   tile.rays = space.rays.data();
-  tile.partial = plan.perspective_medium ? partial_footprints().data() : nullptr;
   tile.stop = plan.stop_transmittance;
   std::fill(std::begin(tile.open), std::end(tile.open), 0U);
   const int columns = blocks_along(tile.width);

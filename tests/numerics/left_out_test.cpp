@@ -55,7 +55,6 @@ TEST_P(EitherMethod, WithoutAScalarNoMediumIsPreparedOrComputed) {
   ASSERT_EQ(plan.passes.size(), 1U);
   EXPECT_EQ(plan.passes[0].kernel.has_medium, 0);
   EXPECT_EQ(plan.passes[0].kernel.medium.layers, 0);
-  EXPECT_EQ(plan.passes[0].kernel.partial, nullptr) << "only splats have footprints";
   EXPECT_TRUE(plan.passes[0].layers.empty());
   EXPECT_FALSE(plan.perspective_medium) << "only a medium has ray lengths";
   for (const auto compositing : {Compositing::simple, Compositing::cd_naive, Compositing::cd,

@@ -8,8 +8,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/engine/kernels/dispatch.hpp"
 #include "server/engine/kernels/frame_data.hpp"
-#include "server/engine/partial.hpp"
+#include "tests/numerics/partial_footprint.hpp"
 #include "tests/numerics/scenes.hpp"
 
 namespace windsplat::test {
@@ -49,21 +50,40 @@ Scene blobs(double density, int size, double azimuth, bool perspective) {
   return scene;
 }
 
-TEST(PartialFootprint, RisesMonotonicallyFromZeroToAll) {
-  const auto& table = engine::partial_footprints();
-  constexpr int columns = engine::kernels::partial_columns - 1;
-  constexpr auto one = static_cast<std::int32_t>(engine::kernels::partial_one);
-  ASSERT_EQ(table.size(), static_cast<std::size_t>(engine::kernels::partial_rows) * columns);
-  const auto here = [&](int r, int c) { return table[r * columns + c] & 0xffff; };
-  const auto next = [&](int r, int c) {
-    return static_cast<std::int32_t>(static_cast<std::uint32_t>(table[r * columns + c]) >> 16U);
-  };
-  for (int r = 0; r < engine::kernels::partial_rows; ++r) {
-    EXPECT_EQ(here(r, 0), 0);
-    EXPECT_EQ(next(r, columns - 1), one);
-    EXPECT_NEAR(here(r, columns / 2), 0.5 * one, 1);
-    for (int c = 0; c < columns; ++c) EXPECT_GE(next(r, c), here(r, c));
-    for (int c = 1; c < columns; ++c) EXPECT_EQ(next(r, c - 1), here(r, c));
+// F at a distance b of the ray from the centre, v of half a chord from its middle.
+float partial_of(const engine::kernels::Table& table, double b, double v) {
+  const auto r2 = static_cast<float>(b * b);
+  const auto at = static_cast<float>(v);
+  float before = -1;
+  table.partial(1, &r2, &at, &before);
+  return before;
+}
+
+TEST(PartialFootprint, IsTheIntegralOfTheKernel) {
+  for (const engine::kernels::Table* table : engine::kernels::usable_tables()) {
+    for (const double b : {0.0, 0.1, 0.25, 0.4, 0.479, 0.481, 0.6, 0.8, 1.0, 1.2, 1.3}) {
+      const double half_chord = std::sqrt(1.37 * 1.37 - b * b);
+      const double whole = partial_footprint(b, 9);
+      for (double v = -0.95; v < 1; v += 0.1) {
+        EXPECT_NEAR(partial_of(*table, b, v), partial_footprint(b, v * half_chord) / whole, 9e-4)
+            << table->name << b << v;
+      }
+    }
+  }
+}
+
+TEST(PartialFootprint, RisesFromZeroToAll) {
+  for (const engine::kernels::Table* table : engine::kernels::usable_tables()) {
+    for (double b = 0; b < 1.37; b += 0.01) {
+      EXPECT_EQ(partial_of(*table, b, -1), 0) << table->name << b;
+      EXPECT_EQ(partial_of(*table, b, 1), 1) << table->name << b;
+      float last = 0;
+      for (double v = -1; v <= 1; v += 0.01) {
+        const float here = partial_of(*table, b, v);
+        EXPECT_GT(here, last - 2e-7F) << table->name << b << v;
+        last = here;
+      }
+    }
   }
 }
 
@@ -99,6 +119,24 @@ TEST(Slab, HalvingTheThicknessQuartersTheError) {
       }
       last = error;
     }
+  }
+}
+
+// Slabs below and above the thickness from which partial footprints are coarse.
+TEST(Slab, CoarsePartialFootprintsDoNotAddToTheError) {
+  for (const bool perspective : {false, true}) {
+    Scene scene = blobs(6, 96, 0.4, perspective);
+    scene.method = Method::slab;
+    scene.slab_thickness = 0.0625;
+    const engine::Rendered truth = render(scene);
+    const auto error_at = [&](double thickness) {
+      scene.slab_thickness = thickness;
+      return rms(render(scene).image, truth.image);
+    };
+    // The order between two fine thicknesses continues to a coarse one.
+    const double fine = error_at(0.66);
+    const double order = std::log(fine / error_at(0.57)) / std::log(0.66 / 0.57);
+    EXPECT_LT(error_at(0.76), 1.03 * fine * std::pow(0.76 / 0.66, order));
   }
 }
 

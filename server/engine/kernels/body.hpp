@@ -30,6 +30,7 @@ const Table& WINDSPLAT_KERNEL_TABLE() {
                                copy_row,
                                count_open,
                                attenuate,
+                               partial,
                                jitter};
   return table;
 }

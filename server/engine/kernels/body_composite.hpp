@@ -288,7 +288,7 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
 
 template <bool Perspective, int Compositing, From Start>
 void splat_window(const Splat& splat, const Window& window, Tile& tile) {
-  const auto s = spread_from<Start>(splat, tile.partial);
+  const auto s = spread_from<Start>(splat);
   each_block<Perspective>(window, tile, [&](float x, float y, const float* ray, float* block) {
     return splat_block<Perspective, Compositing, Start>(s, x, y, ray, block);
   });
@@ -297,7 +297,7 @@ void splat_window(const Splat& splat, const Window& window, Tile& tile) {
 template <bool Perspective, int Compositing, int Style, From Start>
 void both_window(const Ribbon& ribbon, const Splat& splat, const Window& window, Tile& tile) {
   const RibbonLanes r = spread(ribbon);
-  const auto s = spread_from<Start>(splat, tile.partial);
+  const auto s = spread_from<Start>(splat);
   const Pixel depth = all<Pixel>(ribbon.depth);
   const Pixel depth_rise = all<Pixel>(ribbon.depth_rise);
   each_block<Perspective>(window, tile, [&](float x, float y, const float* ray, float* block) {

@@ -147,10 +147,9 @@ struct NearLanes {
   Three<Pixel> centre, ahead, right, down;
   Pixel d2_least, z, near, strength;
   Pixel color[3];
-  const std::int32_t* partial;
 };
 
-KERNEL_INLINE NearLanes spread_near(const Splat& s, const std::int32_t* partial) {
+KERNEL_INLINE NearLanes spread_near(const Splat& s) {
   const auto lanes = [](float v) { return all<Pixel>(v); };
   const auto three = [&](const float v[3]) {
     return Three<Pixel>{lanes(v[0]), lanes(v[1]), lanes(v[2])};
@@ -166,8 +165,7 @@ KERNEL_INLINE NearLanes spread_near(const Splat& s, const std::int32_t* partial)
           lanes(s.z),
           lanes(s.near),
           lanes(s.strength),
-          {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])},
-          partial};
+          {lanes(s.color[0]), lanes(s.color[1]), lanes(s.color[2])}};
 }
 
 // A splat along the rays of pixels; see Splats.
@@ -185,9 +183,9 @@ struct SplatLane {
 enum class From { eye, eye_inside, near_plane };
 
 template <From Start>
-KERNEL_INLINE auto spread_from(const Splat& s, const std::int32_t* partial) {
+KERNEL_INLINE auto spread_from(const Splat& s) {
   if constexpr (Start == From::near_plane) {
-    return spread_near(s, partial);
+    return spread_near(s);
   } else {
     return spread(s);
   }
@@ -225,10 +223,9 @@ KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixe
 }
 
 // The part of a splat before a view depth relative to its centre's.
-KERNEL_INLINE Pixel part_before(const std::int32_t* partial, const SplatLane& lane, Pixel depth) {
-  const Pixel half_chords = (depth - lane.behind) * (lane.cells / half_chord(lane.r2));
-  return partial_at(partial, partial_rows_at(lane.r2), clamped(half_chords, -1.0F, 1.0F)) *
-         all<Pixel>(1.0F / partial_one);
+KERNEL_INLINE Pixel part_before(const SplatLane& lane, Pixel depth) {
+  const Pixel half_chords = (depth - lane.behind) * (lane.cells * inverse_half_chord(lane.r2));
+  return partial_at(partial_terms_at(lane.r2), clamped(half_chords, -1.0F, 1.0F));
 }
 
 // From vectors, because the projected centre of a splat beside the eye is at infinity.
@@ -252,7 +249,7 @@ KERNEL_INLINE SplatLane splat_lane(const NearLanes& s, Pixel px, Pixel py, Pixel
   lane.tau = s.strength * footprint(lane.r2) * (inverse * ray);
   lane.cells = length2 * inverse;
   lane.behind = hn::MulSub(dot3(s.centre, d), inverse2, s.z);
-  lane.before = part_before(s.partial, lane, s.near - s.z);
+  lane.before = part_before(lane, s.near - s.z);
   return lane;
 }
 
@@ -271,9 +268,9 @@ KERNEL_INLINE Pixel fraction_before(const SplatLanes& /*s*/, const SplatLane& la
   return clamped(hn::MulAdd(depth - lane.behind, lane.cells, all<Pixel>(0.5F)), 0.0F, 1.0F);
 }
 
-KERNEL_INLINE Pixel fraction_before(const NearLanes& s, const SplatLane& lane, Pixel depth) {
+KERNEL_INLINE Pixel fraction_before(const NearLanes& /*s*/, const SplatLane& lane, Pixel depth) {
   const Pixel rest = hn::Max(all<Pixel>(1.0F) - lane.before, all<Pixel>(1e-6F));
-  return clamped((part_before(s.partial, lane, depth) - lane.before) / rest, 0.0F, 1.0F);
+  return clamped((part_before(lane, depth) - lane.before) / rest, 0.0F, 1.0F);
 }
 
 }  // namespace

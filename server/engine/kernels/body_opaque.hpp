@@ -256,33 +256,31 @@ struct DividingDepths {
 };
 
 template <bool Perspective, From Start>
-KERNEL_INLINE DividedSplat divided_from(const Splat& splat, const std::int32_t* partial,
-                                        const DividingDepths& at, Pixel px, Pixel py,
-                                        Pixel length) {
-  const auto s = spread_from<Start>(splat, partial);
+KERNEL_INLINE DividedSplat divided_from(const Splat& splat, const DividingDepths& at, Pixel px,
+                                        Pixel py, Pixel length) {
+  const auto s = spread_from<Start>(splat);
   const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
   return {depth_beyond<Start>(lane), fraction_before(s, lane, at.body),
           fraction_before(s, lane, at.line)};
 }
 
 template <bool Perspective>
-KERNEL_INLINE DividedSplat divided_splat(const DividedKernel& kernel, const std::int32_t* partial,
-                                         const DividingDepths& at, Pixel px, Pixel py,
-                                         Pixel length) {
+KERNEL_INLINE DividedSplat divided_splat(const DividedKernel& kernel, const DividingDepths& at,
+                                         Pixel px, Pixel py, Pixel length) {
   if constexpr (Perspective) {
     if (kernel.near != 0) {
-      return divided_from<true, From::near_plane>(*kernel.splat, partial, at, px, py, length);
+      return divided_from<true, From::near_plane>(*kernel.splat, at, px, py, length);
     }
   }
-  return divided_from<Perspective, From::eye>(*kernel.splat, partial, at, px, py, length);
+  return divided_from<Perspective, From::eye>(*kernel.splat, at, px, py, length);
 }
 
 // Composites the part of a kernel before the body, and separately, where pixels at the limb let
 // light through, the part behind it. The body divides a splat as a line does: as if it were
 // homogeneous over one cell or, if it may reach the near plane, exactly.
 template <bool Perspective, int Compositing>
-Light divided_block(const DividedKernel& kernel, const std::int32_t* partial, float x, float y,
-                    const float* ray, BodyBlock& body, float* block) {
+Light divided_block(const DividedKernel& kernel, float x, float y, const float* ray,
+                    BodyBlock& body, float* block) {
   const Channels to = channels_of(block);
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel one = all<Pixel>(1.0F);
@@ -299,7 +297,7 @@ Light divided_block(const DividedKernel& kernel, const std::int32_t* partial, fl
     Pixel color[3] = {zero, zero, zero};
     if (kernel.splat != nullptr) {
       const Pixel length = Perspective ? load<Pixel>(ray + l) : one;
-      splat = divided_splat<Perspective>(kernel, partial, {surface, line.depth}, px, py, length);
+      splat = divided_splat<Perspective>(kernel, {surface, line.depth}, px, py, length);
       for (int c = 0; c < 3; ++c) color[c] = all<Pixel>(kernel.splat->color[c]);
     }
     const auto before = hn::Lt(line.depth, surface);
@@ -337,8 +335,8 @@ Light divided_block(const DividedKernel& kernel, const std::int32_t* partial, fl
   return light;
 }
 
-using DividedFunction = Light (*)(const DividedKernel& kernel, const std::int32_t* partial, float x,
-                                  float y, const float* ray, BodyBlock& body, float* block);
+using DividedFunction = Light (*)(const DividedKernel& kernel, float x, float y, const float* ray,
+                                  BodyBlock& body, float* block);
 
 template <bool Perspective>
 inline DividedFunction divided_function(int compositing) {
@@ -371,7 +369,7 @@ void draw_divided(const DividedKernel& kernel, int compositing, int row, int col
     if ((lines >> static_cast<unsigned>(at) & 1U) == 0) here.line = nullptr;
     if ((splats >> static_cast<unsigned>(at) & 1U) == 0) here.splat = nullptr;
     const float* ray = here.splat != nullptr && Perspective ? rays_at(tile, r, c) : nullptr;
-    const Light light = draw(here, tile.partial, left_of(tile, c), top_of(tile, r), ray,
+    const Light light = draw(here, left_of(tile, c), top_of(tile, r), ray,
                              tile.body->blocks[r * tile_blocks + c], block_at(tile, r, c));
     note_light(light, r, std::uint32_t{1} << static_cast<unsigned>(c), tile);
   }

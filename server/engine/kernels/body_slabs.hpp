@@ -261,8 +261,6 @@ KERNEL_INLINE Pixel close_passage(const Passage& p, int l, float* block) {
   return left;
 }
 
-constexpr int block_vectors = block_pixels / pixel_lanes;
-
 // Whether the transmittance of every pixel is so low that everything behind can be skipped.
 inline bool is_dark(const float* transmittance, const Passage* p, float stop) {
   Light light;

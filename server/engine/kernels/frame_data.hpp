@@ -142,20 +142,16 @@ struct Pass {
   int has_medium;
   LineStyle line;
   Medium medium;
-  float cell_max[3];            // widest cell along each axis; curved: largest extent of a cell
-  int dims[3];                  // dimensions of the fields
-  int around;                   // scene::Lattice::around
-  const float* places;          // curved lattices: 3 per sample, world units; otherwise null
-  int compositing;              // scene::Compositing or compositing_or
-  int by_depth;                 // depths of kernel positions are required
-  const std::int32_t* partial;  // see partial.hpp; slab method only
+  float cell_max[3];    // widest cell along each axis; curved: largest extent of a cell
+  int dims[3];          // dimensions of the fields
+  int around;           // scene::Lattice::around
+  const float* places;  // curved lattices: 3 per sample, world units; otherwise null
+  int compositing;      // scene::Compositing or compositing_or
+  int by_depth;         // depths of kernel positions are required
 };
 
 // F(b^2, v): fraction of a splat's footprint in front of the point v half chords beyond the middle
 // of a ray that passes the centre at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
-constexpr int partial_rows = 33;
-constexpr int partial_columns = 65;
-constexpr float partial_one = 65535;  // table value of 1
 
 // A brick of 8 x 8 x 1 kernel positions, as ranges of the visit lists.
 struct Brick {
@@ -221,7 +217,6 @@ struct Tile {
   int width, height;  // pixels inside the picture
   float* blocks;
   const float* rays;
-  const std::int32_t* partial;      // see partial.hpp; for perspective media
   float stop;                       // a block is closed when no transmittance exceeds this
   std::uint32_t open[tile_blocks];  // bit set: the block is open
   int any_closed;

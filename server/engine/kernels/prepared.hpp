@@ -169,12 +169,12 @@ struct Splat {
 // A splat and a line as separate records for the sweep by depth. Depths are from the camera's depth
 // origin; rows and columns are blocks of the tile, both ends included.
 struct SplatRecord {
-  const std::int32_t* partial;
   float first, last;  // depths at which it begins and ends
   float middle;
   Splat splat;
   std::int16_t row_first, row_last, column_first, column_last;
-  std::int32_t near;  // it has the near form
+  std::uint32_t window_low, window_high;  // if it fits a window: its blocks, as in Footing
+  std::int32_t near;                      // it has the near form
 };
 
 struct RibbonRecord {

@@ -72,6 +72,9 @@ struct Table {
   // absorbed = -expm1(-tau) and transmitted = exp(-tau), tau in [0, inf], error about 1e-7.
   void (*attenuate)(int count, const float* tau, float* absorbed, float* transmitted);
 
+  // The fraction of a splat before a point: see body_partial.hpp; r2 in [0, t^2], v in [-1, 1].
+  void (*partial)(int count, const float* r2, const float* v, float* before);
+
   // Six random numbers in [0, 1) for the kernel at sample (i, j, k): the displacement of the kernel
   // along x, y, z, then that of the centre of its line (pcg3d, Jarzynski & Olano 2020).
   void (*jitter)(std::uint32_t seed, std::uint32_t epoch, int i, int j, int k, float* six);
