@@ -418,7 +418,10 @@ void close_block(const Closing& with, const float* gathered, int row, int column
   };
   open();
   Outcome outcome = Outcome::out_of_order;
-  if (with.body == nullptr) outcome = pass_in_order<Perspective, Compositing>(with, passage);
+  constexpr int in_order_max = 8;  // more lines are seldom in one order in every pixel
+  if (with.body == nullptr && with.count <= in_order_max) {
+    outcome = pass_in_order<Perspective, Compositing>(with, passage);
+  }
   if (outcome == Outcome::out_of_order) {
     open();
     outcome = pass_sorted<Perspective, Compositing>(with, passage);
