@@ -14,7 +14,10 @@ namespace windsplat::tasks {
 
 void Shares::come(std::uint64_t party) {
   Party& known = parties_[party];
-  if (!known.active) known.used_us = std::max(known.used_us, present_us_);
+  if (!known.active && known.used_us < present_us_) {
+    known.owed_us = std::max<std::int64_t>(0, known.owed_us - (present_us_ - known.used_us));
+    known.used_us = present_us_;
+  }
   known.active = true;
 }
 
@@ -27,9 +30,20 @@ void Shares::rest(std::uint64_t party) {
   if (all_rest) {
     for (const auto& [id, known] : parties_) present_us_ = std::max(present_us_, known.used_us);
   }
-  std::erase_if(parties_, [this](const auto& known) {
-    return !known.second.active && known.second.used_us <= present_us_;
+  std::erase_if(parties_, [this, all_rest](const auto& known) {
+    return !known.second.active &&
+           (all_rest || known.second.used_us + known.second.owed_us <= present_us_);
   });
+}
+
+void Shares::charge(std::uint64_t party, std::int64_t us) {
+  Party& known = parties_[party];
+  const std::int64_t at_once = parts_ > 1 && known.mean_us > 0 ? std::min(us, known.mean_us) : us;
+  known.owed_us += us - at_once;
+  const std::int64_t part = (known.owed_us + parts_ - 1) / parts_;
+  known.owed_us -= part;
+  known.used_us += at_once + part;
+  known.mean_us = known.mean_us > 0 ? known.mean_us + (us - known.mean_us) / parts_ : us;
 }
 
 void Shares::begin(std::uint64_t party) {
@@ -187,6 +201,14 @@ RenderQueue::Load RenderQueue::requests_before(const std::string& payer, double 
     counted.emplace_back(job.payer);
     return true;
   });
+}
+
+std::size_t RenderQueue::streams_waiting() const {
+  std::size_t count = 0;
+  for (const auto& [owner, jobs] : lines_[number_of(RenderKind::stream)].owners) {
+    count += jobs.size();
+  }
+  return count;
 }
 
 double RenderQueue::rest_ms(std::int64_t now_us) const {

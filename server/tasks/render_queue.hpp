@@ -36,22 +36,29 @@ struct RenderJob {
 
 // Usage of a shared resource by several parties. A party that becomes active again starts at the
 // virtual time of the party being served, so that idle time earns no credit (start-time fair
-// queueing: Goyal, Vin, Cheng 1997).
+// queueing: Goyal, Vin, Cheng 1997). What a charge exceeds the mean of the earlier ones by is paid
+// in parts, with each later charge one of `parts` of what is owed, so that one long job does not
+// keep a party waiting for as many turns.
 class Shares {
  public:
+  Shares() = default;
+  explicit Shares(std::int64_t parts) : parts_(parts) {}
   void come(std::uint64_t party);  // becomes active; cannot fail after expect()
   void expect(std::uint64_t party) { parties_[party]; }  // allocates ahead for come()
   void rest(std::uint64_t party);                        // becomes idle
   void begin(std::uint64_t party);
-  void charge(std::uint64_t party, std::int64_t us) { parties_[party].used_us += us; }
+  void charge(std::uint64_t party, std::int64_t us);
   [[nodiscard]] std::int64_t used_us(std::uint64_t party) const;
   [[nodiscard]] std::size_t known() const { return parties_.size(); }
 
  private:
   struct Party {
     std::int64_t used_us = 0;
+    std::int64_t owed_us = 0;  // charged, not yet paid
+    std::int64_t mean_us = 0;  // of recent charges; 0: none
     bool active = false;
   };
+  std::int64_t parts_ = 1;
   std::map<std::uint64_t, Party> parties_;  // idle parties are kept only while their usage is above
                                             // the virtual time
   std::int64_t present_us_ = 0;
@@ -88,6 +95,7 @@ class RenderQueue {
   // Jobs that run before a new one of the payer: one of each other payer, since payers take turns.
   // A job of unknown cost counts as `unknown_ms`.
   [[nodiscard]] Load requests_before(const std::string& payer, double unknown_ms) const;
+  [[nodiscard]] std::size_t streams_waiting() const;
   // Remaining estimated time of the running job.
   [[nodiscard]] double rest_ms(std::int64_t now_us) const;
   void cancel_all() const;  // waiting and running jobs
@@ -121,8 +129,8 @@ class RenderQueue {
   template <class Wanted>
   [[nodiscard]] Load sum(double unknown_ms, const Wanted& wanted) const;
 
-  std::array<Line, 3> lines_;  // per kind
-  Shares kinds_;               // streams against requests
+  std::array<Line, 3> lines_{{{{}, Shares(8)}, {}, {}}};  // per kind; streams pay in parts
+  Shares kinds_;                                          // streams against requests
   Jobs replaced_;
   std::optional<Running> running_;
   std::uint64_t arrivals_ = 0;

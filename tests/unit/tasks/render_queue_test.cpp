@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <utility>
 #include <vector>
@@ -50,6 +51,39 @@ TEST(RenderQueue, GivesOwnersEqualTimesNotEqualJobCounts) {
   EXPECT_NEAR(static_cast<double>(renderer.used_us[1]), static_cast<double>(renderer.used_us[2]),
               30'000);
   EXPECT_NEAR(renderer.jobs[2], 3 * renderer.jobs[1], 3);
+}
+
+// Of 48 sessions each draws one frame in a hundred that takes ten times as long. Each repays it
+// with its later frames instead of waiting ten rounds for the next one.
+TEST(RenderQueue, OneLongFrameDoesNotKeepItsSessionWaiting) {
+  RenderQueue queue;
+  std::int64_t now_us = 0;
+  constexpr std::uint64_t sessions = 48;
+  std::map<std::uint64_t, int> drawn;
+  std::map<std::uint64_t, std::int64_t> used_us;
+  std::vector<std::int64_t> waited;
+  const auto ask = [&](std::uint64_t owner) {
+    RenderJob job;
+    job.kind = RenderKind::stream;
+    job.owner = owner;
+    queue.push(std::move(job), now_us);
+  };
+  for (std::uint64_t owner = 1; owner <= sessions; ++owner) ask(owner);
+  for (int n = 0; n < 10'000; ++n) {
+    const auto next = queue.pop(now_us);
+    ASSERT_TRUE(next);
+    const std::uint64_t owner = next->job.owner;
+    const bool is_long = (++drawn[owner] + 7 * owner) % 100 == 0;
+    const std::int64_t took_us = is_long ? 30'000 : 3'000;
+    now_us += took_us;
+    used_us[owner] += took_us;
+    waited.push_back(now_us - next->since_us);
+    queue.done(took_us);
+    ask(owner);
+  }
+  std::sort(waited.begin(), waited.end());
+  EXPECT_LE(waited[waited.size() * 99 / 100], 2 * waited[waited.size() / 2]);
+  for (const auto& [owner, used] : used_us) EXPECT_NEAR(used, now_us / sessions, 200'000) << owner;
 }
 
 TEST(RenderQueue, SharesTimeEquallyBetweenStreamsAndRequests) {
