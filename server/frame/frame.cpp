@@ -89,8 +89,9 @@ Result<scene::CompletedView> at_setting(const scene::CompletedView& completed,
                                         const quality::Setting& setting) {
   return completed.coarsened(setting.coarser).with([&](protocol::View& view) {
     view = quality::at_setting(std::move(view), setting);
-    view.image.width = quality::edge_at(view.image.width, setting.half_level);
-    view.image.height = quality::edge_at(view.image.height, setting.half_level);
+    const quality::PictureSize size = quality::size_at(view, setting);
+    view.image.width = size.width;
+    view.image.height = size.height;
   });
 }
 
@@ -121,6 +122,18 @@ void put_in_strips(const engine::Image& picture, ThreadPool& pool, image::YccPic
     planes.put({0, y, picture.width, std::min(strip_rows, picture.height - y),
                 picture.rgba.data() + stride * static_cast<std::size_t>(y), stride});
   });
+}
+
+quality::Halvings halvings_of(const Prepared& prepared, const data::Dataset& dataset) {
+  quality::Halvings out{};
+  const quality::PictureSize asked{prepared.asked.width, prepared.asked.height};
+  for (std::size_t n = 0; n < out.size(); ++n) {
+    const quality::Setting smaller{protocol::MethodName::kernel, static_cast<int>(n)};
+    const int height = quality::size_at(asked, smaller).height;
+    const std::array<int, 3> level = scene::level_at(prepared.completed, height, dataset);
+    out[n] = static_cast<std::int8_t>(level[0] + level[1] + level[2]);
+  }
+  return out;
 }
 
 Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& pool,
@@ -231,6 +244,7 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.empty = why_empty(scene, drawn.view, drawn.work, transparent);
   drawn.view.image = prepared.asked;
   drawn.detail = scene::detail_shown(prepared.completed) * prepared.asked.height / drawn.height;
+  drawn.halvings = halvings_of(prepared, dataset);
   drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());
   const Clock::time_point measured_from = Clock::now();
   // Content is that of the view, not of coarser data.

@@ -20,6 +20,7 @@
 #include "server/image/ycc.hpp"
 #include "server/quality/content.hpp"
 #include "server/quality/setting.hpp"
+#include "server/quality/sizes.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/scene.hpp"
 
@@ -47,6 +48,7 @@ struct Frame {
   int height = 0;
   double detail = 0;                        // at the size of the view (scene::detail_shown)
   std::optional<quality::Content> content;  // if the encoding asks for it
+  quality::Halvings halvings{};             // of the data, by the size of the picture
   engine::WorkReport work;
   std::string empty;           // why the picture shows nothing of the data; empty if it shows some
   std::int64_t render_us = 0;  // time of scene and engine, including the tone mapping of JPEG tiles

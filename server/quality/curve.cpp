@@ -19,8 +19,9 @@ protocol::ForecastPoint point_at(const protocol::View& view, const Setting& sett
   protocol::ForecastPoint point;
   point.method = slab ? "slab" : "kernel";
   if (slab) point.slab_thickness = view.method.slab_thickness / setting.thinner;
-  point.width = edge_at(view.image.width, setting.half_level);
-  point.height = edge_at(view.image.height, setting.half_level);
+  const PictureSize size = size_at(view, setting);
+  point.width = size.width;
+  point.height = size.height;
   point.coarser = setting.coarser;
   point.ms = forecast.ms;
   point.timed = forecast.timed;

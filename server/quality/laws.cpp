@@ -40,7 +40,8 @@ double lost_between_pixels(const Content& content, const Setting& setting,
   const double cell = std::max(content.step_cell, 1e-30);
   const auto width = static_cast<double>(viewpoint.width);
   const double high = viewpoint.pixels_high;
-  const double few = edge_at(viewpoint.pixels_high, setting.half_level);
+  const PictureSize size = size_at({viewpoint.width, viewpoint.pixels_high}, setting);
+  const double few = size.height;
   const double merged = setting.coarser > 0 ? std::exp2(setting.coarser - 1) : 0;
   const double half_pixel = std::hypot(0.5 / (few * cell), merged);
   std::size_t k = 1;
@@ -52,7 +53,7 @@ double lost_between_pixels(const Content& content, const Setting& setting,
   const double slope =
       at < from ? 2 : (log_bend(k) - log_bend(k - 1)) / (to - from);  // smooth below
   const double bend = std::exp(log_bend(k - 1) + slope * (at - from));
-  const double other = edge_at(viewpoint.width, setting.half_level) / few / (width / high) - 1;
+  const double other = size.width / few / (width / high) - 1;
   const double aside = std::abs(other) * width / high / std::sqrt(12.0);  // RMS over the picture
   return std::hypot(0.5 * bend, content.incline * aside / cell);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace windsplat::quality {
 namespace {
@@ -32,8 +33,8 @@ double error_low(const Forecast& forecast) {
 }
 
 double pixels_at(const protocol::View& view, const Setting& setting) {
-  return static_cast<double>(edge_at(view.image.width, setting.half_level)) *
-         edge_at(view.image.height, setting.half_level);
+  const PictureSize size = size_at(view, setting);
+  return static_cast<double>(size.width) * size.height;
 }
 
 bool is_candidate(const Setting& setting, const protocol::View& view, const Aim& aim) {
@@ -41,24 +42,44 @@ bool is_candidate(const Setting& setting, const protocol::View& view, const Aim&
   return is_allowed(setting, view) && (any_finer || !is_finer(setting, view));
 }
 
+namespace {
+
+double pixels_of(const PictureSize& size) { return static_cast<double>(size.width) * size.height; }
+
+bool is_candidate(const Option& option, const Aim& aim, const protocol::View& view) {
+  return (aim.max_error && !aim.before_final) || !is_finer(option.setting, view);
+}
+
+}  // namespace
+
 Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim,
             double pixels_most) {
+  Sizes sizes;
+  const std::vector<Option> options = options_of(view, forecasts, std::nullopt, sizes);
+  Choice choice = pick(view, options, aim, pixels_most);
+  choice.setting = index_of(options[choice.setting].setting).value();
+  return choice;
+}
+
+Choice pick(const protocol::View& view, const std::vector<Option>& options, const Aim& aim,
+            double pixels_most, const std::optional<Near>& near) {
   const double budget =
       aim.budget_ms ? headroom * *aim.budget_ms : std::numeric_limits<double>::max();
-  const bool any_small = std::any_of(settings.begin(), settings.end(), [&](const auto& setting) {
-    return is_candidate(setting, view, aim) && pixels_at(view, setting) <= pixels_most;
+  const bool any_small = std::any_of(options.begin(), options.end(), [&](const auto& option) {
+    return is_candidate(option, aim, view) && pixels_of(option.size) <= pixels_most;
   });
   Candidate keeps_both;
   Candidate least_error;  // within the time budget
   Candidate fastest;
-  for (std::size_t i = 0; i < settings_count; ++i) {
-    const bool large = pixels_at(view, settings[i]) > pixels_most;
-    if (!is_candidate(settings[i], view, aim) || (any_small && large)) continue;
-    const double ms = forecasts[i].ms;
-    fastest.take(i, ms);
-    if (ms > budget) continue;
-    least_error.take(i, forecasts[i].error);
-    if (aim.max_error && error_bound(forecasts[i]) <= *aim.max_error) keeps_both.take(i, ms);
+  for (std::size_t i = 0; i < options.size(); ++i) {
+    const auto& [setting, forecast, size] = options[i];
+    if (!is_candidate(options[i], aim, view)) continue;
+    if (any_small && pixels_of(size) > pixels_most) continue;
+    if (near && sizes_apart(setting, near->from) > near->step) continue;
+    fastest.take(i, forecast.ms);
+    if (forecast.ms > budget) continue;
+    least_error.take(i, forecast.error);
+    if (aim.max_error && error_bound(forecast) <= *aim.max_error) keeps_both.take(i, forecast.ms);
   }
   if (keeps_both.found()) return {keeps_both.setting, true};
   if (least_error.found()) return {least_error.setting, true};

@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <vector>
 
 #include "protocol/view.hpp"
 #include "server/quality/setting.hpp"
+#include "server/quality/sizes.hpp"
 #include "server/quality/table.hpp"
 
 namespace windsplat::quality {
@@ -32,13 +34,22 @@ double error_low(const Forecast& forecast);
 double pixels_at(const protocol::View& view, const Setting& setting);
 
 struct Choice {
-  std::size_t setting = 0;
-  bool fits = false;  // within the budget; otherwise the fastest setting was chosen
+  std::size_t setting = 0;  // its index in the list of settings, or of options
+  bool fits = false;        // within the budget; otherwise the fastest setting was chosen
 };
 
 // Chooses among the candidates with at most `pixels_most` pixels, or among all if none is that
 // small.
 Choice pick(const protocol::View& view, const Forecasts& forecasts, const Aim& aim,
             double pixels_most = std::numeric_limits<double>::infinity());
+
+// Chooses among the options alike, of those that differ by at most `step` sixteenths from the size
+// of `from`, if it is given: an index of `options`, which are not empty.
+struct Near {
+  Setting from;
+  int step = 0;
+};
+Choice pick(const protocol::View& view, const std::vector<Option>& options, const Aim& aim,
+            double pixels_most, const std::optional<Near>& near = std::nullopt);
 
 }  // namespace windsplat::quality

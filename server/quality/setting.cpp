@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "protocol/limits.hpp"
 
@@ -15,10 +16,31 @@ static_assert(settings[first_slab] == Setting{protocol::MethodName::slab, 0, 0})
 
 }  // namespace
 
-int edge_at(int edge, int half_level) {
-  const int whole = edge >> (half_level / 2);
-  const int out = half_level % 2 == 0 ? whole : static_cast<int>(whole * std::sqrt(0.5));
-  return std::max(1, out);
+PictureSize size_at(const PictureSize& view, const Setting& setting) {
+  const int smaller = sixteenths_per_half_level * setting.half_level + setting.sixteenths;
+  if (smaller == 0) return view;
+  constexpr int rows_aside = 8;
+  constexpr double most_aside = 0.015;  // of the height
+  constexpr double weight = 20;         // of a difference in proportions against one in size
+  const double proportions = static_cast<double>(view.width) / view.height;
+  const double rows = std::max(1.0, view.height * std::exp2(-smaller / 16.0));
+  const double aside = std::clamp(most_aside * rows, 1.0, static_cast<double>(rows_aside));
+  const int last = std::min(view.height, static_cast<int>(std::ceil(rows + aside)));
+  PictureSize best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int height = std::max(1, static_cast<int>(rows - aside)); height <= last; ++height) {
+    const int width = std::max(1, static_cast<int>(std::lround(height * proportions)));
+    const double moved = std::abs(width / (height * proportions) - 1);
+    const double fault = weight * moved + std::abs(height / rows - 1);
+    if (fault >= least) continue;
+    least = fault;
+    best = {std::min(width, view.width), height};
+  }
+  return best;
+}
+
+PictureSize size_at(const protocol::View& view, const Setting& setting) {
+  return size_at(PictureSize{view.image.width, view.image.height}, setting);
 }
 
 protocol::View at_setting(protocol::View view, const Setting& setting) {
@@ -39,6 +61,10 @@ std::optional<std::size_t> index_of(const Setting& setting) {
 }
 
 bool is_allowed(const Setting& setting, const protocol::View& view) {
+  return is_allowed(setting, view, size_at(view, setting));
+}
+
+bool is_allowed(const Setting& setting, const protocol::View& view, const PictureSize& size) {
   if (view.method.name == protocol::MethodName::reference) return false;
   if (setting.method == protocol::MethodName::slab) {
     const bool asked =
@@ -47,8 +73,8 @@ bool is_allowed(const Setting& setting, const protocol::View& view) {
     if (!asked || thickness < protocol::limits::slab_thickness_min) return false;
   }
   if (setting.coarser > 0 && view.method.detail == protocol::Detail::full) return false;
-  const int shorter = std::min(view.image.width, view.image.height);
-  return setting.half_level == 0 || edge_at(shorter, setting.half_level) >= edge_min;
+  if (setting.half_level == 0 && setting.sixteenths == 0) return true;
+  return std::min(size.width, size.height) >= edge_min;
 }
 
 bool is_finer(const Setting& setting, const protocol::View& view) {

@@ -241,7 +241,7 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
   const Viewpoint viewpoint = filled(seen).viewpoint;
-  Entry entry{viewpoint, {}, {}, cause_of(how, viewpoint), 1};
+  Entry entry{viewpoint, {}, {}, false, cause_of(how, viewpoint), 1};
   entry.spread = spread_of(error_scatter(kind_, entry.cause));
   if (measured.error) {
     const double error = std::max(*measured.error, error_least);
@@ -259,6 +259,27 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   const auto oldest = std::find_if(entries.begin(), entries.end() - 1,
                                    [](const Entry& kept) { return !kept.log_ms; });
   entries.erase(oldest == entries.end() - 1 ? entries.begin() : oldest);
+}
+
+void Table::add_frame(std::size_t setting, const Viewpoint& viewpoint, double ms) {
+  constexpr double weight_of_new = 0.2;
+  ++frames_since_try_;
+  for (Entry& entry : entries_[setting]) {
+    if (!entry.log_ms || distance(entry.viewpoint, viewpoint) >= near) continue;
+    if (!entry.of_frames) return;
+    const double expected = expected_ms(kind_, settings[setting], entry.viewpoint).value;
+    *entry.log_ms += weight_of_new * (std::log(std::max(ms, ms_least) / expected) - *entry.log_ms);
+    return;
+  }
+  add(setting, viewpoint, {std::nullopt, ms});
+  entries_[setting].back().of_frames = true;
+}
+
+bool Table::begin_try() {
+  constexpr int frames_least = 100;
+  if (frames_since_try_ < frames_least) return false;
+  frames_since_try_ = 0;
+  return true;
 }
 
 Table::Sight Table::filled(const Viewpoint& viewpoint) const {

@@ -43,6 +43,9 @@ class Table {
   explicit Table(const Kind& kind) : kind_(kind) {}
 
   void add(std::size_t setting, const Viewpoint& viewpoint, const Measured& measured);
+  // The time of a frame, milliseconds of rendering. It is averaged with those of frames near to it
+  // and unused where a calibration run measured the setting.
+  void add_frame(std::size_t setting, const Viewpoint& viewpoint, double ms);
 
   // Forecasts of all settings. Times without measurements are estimated from those with.
   [[nodiscard]] Forecasts forecasts(const Viewpoint& viewpoint) const;
@@ -52,6 +55,9 @@ class Table {
   // is the kriging standard deviation. A viewpoint of unknown content has that of the nearest
   // measured one, or a typical one, and a wider spread.
   [[nodiscard]] Forecast forecast(std::size_t setting, const Viewpoint& viewpoint) const;
+
+  // Whether a session may try a setting of unknown time: once in many frames of all sessions.
+  bool begin_try();
 
   // Whether a calibration run at this viewpoint would add information; begin and end of one.
   [[nodiscard]] bool wants_study(const Viewpoint& viewpoint) const;
@@ -71,6 +77,7 @@ class Table {
     // Logarithms of measured over expected values.
     std::optional<double> log_error;
     std::optional<double> log_ms;
+    bool of_frames = false;  // log_ms is the mean of frames
     Cause cause = Cause::kernel;
     double spread = 1;  // standard deviation of log_error without measurements
   };
@@ -87,6 +94,7 @@ class Table {
   std::array<std::deque<Entry>, settings_count> entries_;
   std::deque<Viewpoint> studied_;
   bool studying_ = false;
+  int frames_since_try_ = 0;
   std::optional<double> encoding_error_;  // at quality 90 and a height of 1
 };
 

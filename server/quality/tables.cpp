@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "server/quality/sizes.hpp"
+
 namespace windsplat::quality {
 
 Table& Tables::table_of(const SceneSignature& signature) {
@@ -35,12 +37,14 @@ Forecasts Tables::forecasts(const SceneSignature& signature, const Viewpoint& vi
                           : Table(signature.kind).forecasts(viewpoint);
 }
 
-Forecast Tables::forecast(const SceneSignature& signature, std::size_t setting,
+Forecast Tables::forecast(const SceneSignature& signature, const Setting& setting,
                           const Viewpoint& viewpoint) {
   const std::lock_guard lock(mutex_);
   const Table* const known = signature.key.empty() ? nullptr : find(signature);
-  return known != nullptr ? known->forecast(setting, viewpoint)
-                          : prior(signature.kind, settings[setting], viewpoint);
+  return forecast_between(setting, [&](std::size_t i) {
+    return known != nullptr ? known->forecast(i, viewpoint)
+                            : prior(signature.kind, settings[i], viewpoint);
+  });
 }
 
 void Tables::add(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
@@ -48,6 +52,18 @@ void Tables::add(const SceneSignature& signature, std::size_t setting, const Vie
   if (signature.key.empty()) return;
   const std::lock_guard lock(mutex_);
   table_of(signature).add(setting, viewpoint, measured);
+}
+
+void Tables::add_frame(const SceneSignature& signature, std::size_t setting,
+                       const Viewpoint& viewpoint, double ms) {
+  if (signature.key.empty()) return;
+  const std::lock_guard lock(mutex_);
+  table_of(signature).add_frame(setting, viewpoint, ms);
+}
+
+bool Tables::begin_try(const SceneSignature& signature) {
+  const std::lock_guard lock(mutex_);
+  return find(signature) != nullptr && table_of(signature).begin_try();
 }
 
 bool Tables::begin_study(const SceneSignature& signature, const Viewpoint& viewpoint) {

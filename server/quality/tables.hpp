@@ -19,10 +19,17 @@ class Tables {
 
   // A signature without a key yields the prior of its kind, and nothing is stored for it.
   Forecasts forecasts(const SceneSignature& signature, const Viewpoint& viewpoint);
-  Forecast forecast(const SceneSignature& signature, std::size_t setting,
+  Forecast forecast(const SceneSignature& signature, const Setting& setting,
                     const Viewpoint& viewpoint);
   void add(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
            const Measured& measured);
+
+  // The time of a frame of a session, see Table::add_frame.
+  void add_frame(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
+                 double ms);
+
+  // See Table::begin_try; false without measurements.
+  bool begin_try(const SceneSignature& signature);
 
   // True if a calibration run at this viewpoint is due and none is in progress. The caller must
   // then run it and call end_study().

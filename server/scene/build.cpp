@@ -386,6 +386,13 @@ std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dat
   return level_for(outline.view, outline.camera, outline.lattice, 0, dataset);
 }
 
+std::array<int, 3> level_at(const CompletedView& completed, int height,
+                            const data::Dataset& dataset) {
+  Camera camera = completed.camera();
+  camera.height = height;
+  return level_for(completed.view(), camera, completed.lattice(), 0, dataset);
+}
+
 Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset) {
   const View& view = completed.view();
   const Lattice& lattice = completed.lattice();

@@ -25,6 +25,9 @@ double detail_shown(const CompletedView& completed);
 // the memory limit of the dataset.
 std::array<int, 3> level_of(const CompletedView& completed, const data::Dataset& dataset);
 std::array<int, 3> level_of(const ViewOutline& outline, const data::Dataset& dataset);
+// The same for a picture of another height, in pixels, of the view without additional halvings.
+std::array<int, 3> level_at(const CompletedView& completed, int height,
+                            const data::Dataset& dataset);
 
 // What a completed view needs of the dataset at any step, determined without loading.
 struct Needed {

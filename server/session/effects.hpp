@@ -11,6 +11,7 @@
 #include "protocol/messages.hpp"
 #include "protocol/view.hpp"
 #include "server/quality/setting.hpp"
+#include "server/quality/sizes.hpp"
 #include "server/quality/view_traits.hpp"
 
 namespace windsplat::session {
@@ -84,6 +85,7 @@ struct Drawn {
   std::string view_json;              // the completed view, canonical
   quality::SceneSignature signature;  // signature of the requested view, with its viewpoint
   quality::Viewpoint viewpoint;
+  quality::Halvings halvings{};  // of the data, by the size of the picture
   std::int64_t queue_us = 0;
   std::int64_t render_us = 0;
   std::int64_t measure_us = 0;  // time of the finer rendering

@@ -28,7 +28,7 @@ struct SessionState {
       : options(given),
         surroundings(std::move(around)),
         view(now),
-        quality(surroundings.forecasts) {}
+        quality(surroundings.forecasts, surroundings.waiting, surroundings.may_try) {}
 
   void send(protocol::ServerMessage message) { effects.emplace_back(SendText{std::move(message)}); }
   void refuse(const Error& error, std::optional<std::uint32_t> id,

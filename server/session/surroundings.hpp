@@ -33,11 +33,20 @@ using WhatIsRead = std::function<std::optional<Reading>(const std::string& datas
 using Forecaster =
     std::function<quality::Forecasts(const quality::SceneSignature&, const quality::Viewpoint&)>;
 
+// Recent time that frames of streams waited for the renderer.
+using Waiting = std::function<Micros()>;
+
+// Whether the session may draw a frame of the scene at a setting whose time is unknown although
+// frames wait for the renderer.
+using MayTry = std::function<bool(const quality::SceneSignature&)>;
+
 // Queries of a session to its environment. None may block.
 struct Surroundings {
   Check check;
   WhatIsRead what_is_read;  // may be empty
   Forecaster forecasts;     // empty: the prior
+  Waiting waiting = {};     // empty: unknown
+  MayTry may_try = {};      // empty: it may not
 };
 
 }  // namespace windsplat::session

@@ -24,8 +24,8 @@ void report_error(const frame::Frame& drawn, const Observation& observed,
     info.error_kind = "measured";
     if (index)
       tables.add(observed.signature, *index, observed.viewpoint, {drawn.error, std::nullopt});
-  } else if (index) {
-    info.error_value = tables.forecast(observed.signature, *index, observed.viewpoint).error;
+  } else if (quality::neighbours_of(setting)) {
+    info.error_value = tables.forecast(observed.signature, setting, observed.viewpoint).error;
     info.error_kind = "estimated";
   }
   if (encoding.format != frame::Format::jpeg) return;

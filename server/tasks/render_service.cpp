@@ -57,12 +57,36 @@ struct RenderService::State {
       wake.wait(lock, [this] { return stopping || !queue.empty(); });
       std::optional<RenderQueue::Next> next = queue.pop(options.now_us());
       if (!next) return;
+      const bool streams = next->job.kind == Kind::stream;
+      if (streams) note_wait(next->since_us);
       lock.unlock();
       const std::int64_t took_us = run(*next);
       next.reset();  // release what the job holds before locking
       lock.lock();
       queue.done(took_us);
+      if (streams) note_run(took_us);
     }
+  }
+
+  // Requires the mutex.
+  void note_wait(std::int64_t since_us) {
+    constexpr std::int64_t weight = 8;  // of the earlier ones, to 1
+    const std::int64_t now_us = options.now_us();
+    stream_wait_us = (wait_now_us() * (weight - 1) + now_us - since_us) / weight;
+    waited_at_us = now_us;
+  }
+  [[nodiscard]] std::int64_t wait_now_us() const {
+    constexpr std::int64_t life_us = 1'000'000;
+    return options.now_us() - waited_at_us < life_us ? stream_wait_us : 0;
+  }
+  [[nodiscard]] std::int64_t expected_wait_us() const {
+    return std::max(wait_now_us(),
+                    static_cast<std::int64_t>(queue.streams_waiting()) * stream_took_us);
+  }
+  // Requires the mutex.
+  void note_run(std::int64_t took_us) {
+    constexpr std::int64_t weight = 8;  // of the earlier ones, to 1
+    stream_took_us = (stream_took_us * (weight - 1) + took_us) / weight;
   }
 
   // Returns the run time. Catches all exceptions.
@@ -124,6 +148,10 @@ struct RenderService::State {
   RenderQueue queue;
   double pressure = 0;
   std::int64_t pressure_at_us = 0;
+  std::int64_t stream_wait_us = 0;
+  std::int64_t stream_took_us =
+      33'000;  // recent mean; until one was run, that of the default budget
+  std::int64_t waited_at_us = 0;
   bool stopping = false;
   std::thread thread;
 };
@@ -156,6 +184,11 @@ Result<void> RenderService::submit(Job job) {
   }
   state_->wake.notify_one();
   return {};
+}
+
+std::int64_t RenderService::stream_wait_us() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->expected_wait_us();
 }
 
 void RenderService::cancel_all() {

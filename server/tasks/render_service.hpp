@@ -43,6 +43,10 @@ class RenderService {
   // end().
   Result<void> submit(Job job);
 
+  // Time that a new job of a stream is expected to wait: that of recent ones, or, if more wait now,
+  // of those waiting. 0: none ran within the last second, and none waits. Any thread.
+  [[nodiscard]] std::int64_t stream_wait_us() const;
+
   // Raises the token of every waiting or running job.
   void cancel_all();
   // Cancels all jobs, runs the waiting ones, joins the thread; later jobs are refused.

@@ -28,7 +28,7 @@ frame::Encoding frame_encoding(const session::Encoding& wanted) {
 }
 
 Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
-                            data::Dataset& dataset, std::int64_t queue_us,
+                            data::Dataset& dataset, std::int64_t queue_us, Loading loading,
                             const CancelToken& cancel) {
   auto drawn = frame::produce(picture.frame, dataset, *backend.pool, cancel, backend.frames);
   if (!drawn) return drawn.error();
@@ -39,7 +39,14 @@ Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
                out.info);
   out.signature = std::move(observed.signature);
   out.viewpoint = observed.viewpoint;
+  out.halvings = drawn->halvings;
   out.view_json = protocol::encode_view(drawn->view);
+  if (!picture.frame.encoding.measure && loading == Loading::none) {
+    if (const auto listed = quality::index_of(picture.frame.setting)) {
+      backend.quality.add_frame(out.signature, *listed, out.viewpoint,
+                                1e-3 * static_cast<double>(drawn->render_us));
+    }
+  }
   out.payload = std::make_shared<const std::vector<std::uint8_t>>(std::move(drawn->bytes));
   out.queue_us = queue_us;
   out.render_us = drawn->render_us;
@@ -133,8 +140,9 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   drawing.draw = [&backend = backend_, ticket = effect.ticket, cancel, shared](
                      const PreparedPicture& picture, data::Dataset& resident, std::int64_t queue_us,
                      Loading loading) {
-    auto drawn = run_guarded<session::Drawn>(
-        "a frame", cancel, [&] { return draw(backend, picture, resident, queue_us, cancel); });
+    auto drawn = run_guarded<session::Drawn>("a frame", cancel, [&] {
+      return draw(backend, picture, resident, queue_us, loading, cancel);
+    });
     if (drawn) drawn->loaded = loading == Loading::allowed;
     (*shared)(ticket, std::move(drawn));
   };

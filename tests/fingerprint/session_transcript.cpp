@@ -124,8 +124,9 @@ class Transcript {
     out.signature.key = "style";
     out.view_json = "{}";
     out.render_us = render_us;
-    out.info.width = quality::edge_at(render_->view.image.width, render_->setting.half_level);
-    out.info.height = quality::edge_at(render_->view.image.height, render_->setting.half_level);
+    const quality::PictureSize size = quality::size_at(render_->view, render_->setting);
+    out.info.width = size.width;
+    out.info.height = size.height;
     if (render_->encoding.measure) {
       out.info.error_value = 1e-3;
       out.info.error_kind = "measured";

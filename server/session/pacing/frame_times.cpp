@@ -11,16 +11,37 @@ namespace {
 constexpr Micros correction_life_us = 4'000'000;
 constexpr double newest_weight = 0.5;
 constexpr double own_share = 0.3;
+constexpr double guessed_share = 0.5;  // of a setting whose time was a guess
+
+// A single frame may have been disturbed: what the one before it does not confirm counts little.
+double believed(double newest, double last) {
+  constexpr double most = 0.92;  // a factor of 2.5
+  constexpr double most_alone = 0.1;
+  const double both = std::min(std::abs(newest), std::abs(last));
+  const double confirmed = newest * last > 0 ? std::copysign(both, newest) : 0;
+  return std::clamp(confirmed + std::clamp(newest - confirmed, -most_alone, most_alone), -most,
+                    most);
+}
 
 }  // namespace
 
-quality::Forecasts FrameTimes::uncorrected(const protocol::View& view) const {
-  quality::SceneSignature signature = quality::signature_of(view);
+std::optional<quality::Kind> FrameTimes::kind_of_another(const protocol::View& view) const {
+  const quality::SceneSignature signature = quality::signature_of(view);
+  if (signature.key == drawn_key_) return std::nullopt;
+  return signature.kind;
+}
+
+quality::SceneSignature FrameTimes::signature_of(const protocol::View& view) const {
+  const auto another = kind_of_another(view);
+  return another ? quality::SceneSignature{{}, view.dataset, *another} : signature_;
+}
+
+quality::Forecasts FrameTimes::uncorrected(const protocol::View& view,
+                                           const std::optional<quality::Kind>& another) const {
+  quality::SceneSignature signature = signature_;
   quality::Viewpoint last = viewpoint_;
-  if (signature.key == drawn_key_) {
-    signature = signature_;
-  } else {
-    signature.key.clear();
+  if (another) {
+    signature = {{}, view.dataset, *another};
     last.content.reset();
   }
   const quality::Viewpoint viewpoint = quality::viewpoint_of(view, last);
@@ -33,7 +54,8 @@ bool FrameTimes::Correction::is_recent(Micros now) const {
 }
 
 FrameForecast FrameTimes::forecast(const protocol::View& view, Micros now) const {
-  FrameForecast out{uncorrected(view)};
+  const auto another = kind_of_another(view);
+  FrameForecast out{uncorrected(view, another)};
   const quality::Forecast& own = out.settings[quality::own_setting(view)];
   out.final_is_guessed = !final_factor_ && !own.timed;
   for (std::size_t i = 0; i < out.settings.size(); ++i) {
@@ -48,6 +70,8 @@ FrameForecast FrameTimes::forecast(const protocol::View& view, Micros now) const
   const bool slab = view.method.name == protocol::MethodName::slab;
   const double factor = final_factor_.value_or(slab ? 2.6 : 6.4);
   out.final_us = static_cast<Micros>(factor * std::round(1000 * own.ms));
+  const quality::PictureSize size{view.image.width, view.image.height};
+  if (size == drawn_size_ && !another) out.halvings = halvings_;
   return out;
 }
 
@@ -55,25 +79,53 @@ void FrameTimes::complete(const protocol::View& view, const Drawn& drawn) {
   drawn_key_ = quality::signature_of(view).key;
   signature_ = drawn.signature;
   viewpoint_ = drawn.viewpoint;
+  halvings_ = drawn.halvings;
+  drawn_size_ = {view.image.width, view.image.height};
 }
 
-bool FrameTimes::learn(std::size_t setting, Micros cost, const protocol::View& view, Micros now) {
-  const quality::Forecasts forecasts = uncorrected(view);
+bool FrameTimes::learn(const quality::Setting& setting, Micros cost, const protocol::View& view,
+                       Micros now) {
+  const quality::Forecasts forecasts = uncorrected(view, kind_of_another(view));
+  const double expected_ms = quality::forecast_between(setting, forecasts).ms;
   const double ratio =
-      std::log(static_cast<double>(std::max<Micros>(cost, 1)) / (1000 * forecasts[setting].ms));
+      std::log(static_cast<double>(std::max<Micros>(cost, 1)) / (1000 * expected_ms));
   // Corrections of guesses do not apply to calibrated times.
   const bool timed = std::any_of(forecasts.begin(), forecasts.end(),
                                  [](const quality::Forecast& known) { return known.timed; });
   const bool restarts = !measured_.any || measured_.timed != timed;
-  if (restarts) measured_ = {true, timed, ratio, {}};
-  Correction& own = measured_.own[setting];
-  const double before = own.is_recent(now) ? own.log_ratio : 0;
-  // Clamps the influence of a single disturbed frame.
-  constexpr double believed = 0.92;  // a factor of 2.5
-  const double beyond = std::clamp(ratio - measured_.log_ratio - before, -believed, believed);
+  if (restarts) measured_ = {true, timed, ratio, 0, {}};
+  // A size between two settings is forecast from both.
+  const auto neighbours = quality::neighbours_of(setting).value();
+  const std::size_t larger = neighbours[0];
+  const std::size_t smaller = neighbours[1];
+  const auto before = [&](std::size_t i) {
+    return measured_.own[i].is_recent(now) ? measured_.own[i].log_ratio : 0;
+  };
+  const double own_log_ms =
+      std::log(quality::forecast_between(setting,
+                                         [&](std::size_t i) {
+                                           quality::Forecast corrected = forecasts[i];
+                                           corrected.ms *= std::exp(before(i));
+                                           return corrected;
+                                         })
+                   .ms /
+               expected_ms);
+  const double newest = ratio - measured_.log_ratio - own_log_ms;
+  const double of_larger = before(larger);
+  const double of_smaller = before(smaller);
+  const auto is_known = [&](std::size_t i) {
+    return forecasts[i].timed || measured_.own[i].is_recent(now);
+  };
+  const bool known = is_known(larger) && is_known(smaller);
+  const double beyond = believed(newest, known ? measured_.beyond : newest);
+  measured_.beyond = newest;
+  const double weight = known ? newest_weight : 1;
+  const double share = known ? own_share : guessed_share;
   // Load of the machine and the view affect all settings alike.
-  measured_.log_ratio += (1 - own_share) * newest_weight * beyond;
-  own = {before + own_share * newest_weight * beyond, now};
+  measured_.log_ratio += (1 - share) * weight * beyond;
+  const double change = share * weight * beyond;
+  measured_.own[larger] = {of_larger + change, now};
+  measured_.own[smaller] = {of_smaller + change, now};
   return restarts;
 }
 
@@ -85,6 +137,7 @@ void FrameTimes::learn_final(Micros cost, const protocol::View& view, Micros now
 void FrameTimes::forget() {
   drawn_key_.clear();
   viewpoint_ = {};
+  drawn_size_ = {};
   measured_ = {};
   final_factor_.reset();
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "protocol/view.hpp"
+#include "server/quality/sizes.hpp"
 #include "server/quality/table.hpp"
 #include "server/session/effects.hpp"
 #include "server/session/surroundings.hpp"
@@ -20,6 +21,8 @@ struct FrameForecast {
   // The final frame, including the finer slab run that measures its error.
   Micros final_us = 0;
   bool final_is_guessed = false;  // neither calibrated nor measured
+  // Of the view drawn last; empty if this one has another picture size or scene.
+  std::optional<quality::Halvings> halvings = std::nullopt;
 };
 
 // A forecast's time is multiplied by the recent ratio of measured to forecast times, common to all
@@ -30,12 +33,17 @@ class FrameTimes {
 
   [[nodiscard]] FrameForecast forecast(const protocol::View& view, Micros now) const;
 
+  // Of the view drawn last, or, if this is another scene, without a key.
+  [[nodiscard]] quality::SceneSignature signature_of(const protocol::View& view) const;
+
   // The view was drawn: its scene signature is known after completion during drawing, before that
   // its method only.
   void complete(const protocol::View& view, const Drawn& drawn);
-  // A frame of the view at the setting took `cost`. True: the first one, or earlier times no longer
-  // apply, since they corrected guesses and this one a calibrated time, or vice versa.
-  bool learn(std::size_t setting, Micros cost, const protocol::View& view, Micros now);
+  // A frame of the view at the setting took `cost`. Of a setting whose time was a guess it is
+  // believed, of others as far as the frame before it confirms it. True: the first one, or earlier
+  // times no longer apply, since they corrected guesses and this one a calibrated time, or vice
+  // versa.
+  bool learn(const quality::Setting& setting, Micros cost, const protocol::View& view, Micros now);
   void learn_final(Micros cost, const protocol::View& view, Micros now);
   void forget();  // another dataset
 
@@ -50,15 +58,21 @@ class FrameTimes {
     bool any = false;
     bool timed = false;  // against calibrated times
     double log_ratio = 0;
+    double beyond = 0;  // of the last frame, over what was expected of it
     std::array<Correction, quality::settings_count> own{};
   };
 
-  [[nodiscard]] quality::Forecasts uncorrected(const protocol::View& view) const;
+  // nullopt: the view is of the scene drawn last.
+  [[nodiscard]] std::optional<quality::Kind> kind_of_another(const protocol::View& view) const;
+  [[nodiscard]] quality::Forecasts uncorrected(const protocol::View& view,
+                                               const std::optional<quality::Kind>& another) const;
 
   Forecaster forecaster_;
   std::string drawn_key_;              // key of the view drawn last, before completion
   quality::SceneSignature signature_;  // known after completion
   quality::Viewpoint viewpoint_;
+  quality::Halvings halvings_{};
+  quality::PictureSize drawn_size_;  // of the view
   Measured measured_;
   std::optional<double> final_factor_;  // time of the last final frame over that of its setting
 };

@@ -38,10 +38,16 @@ quality::Aim QualityControl::aim(const protocol::View& view) const {
   if (aim.budget_ms || aim.max_error) return aim;
   // When sessions compete for the renderer, shorten the frames of all of them to raise the rate:
   // for n similar sessions by the root of n.
-  const double waited = 1e-3 * queue_us_;
+  const double waited = 1e-3 * waited_us();
   aim.budget_ms = std::max(budget_ms_least,
                            budget_ms_default * budget_ms_default / (budget_ms_default + waited));
   return aim;
+}
+
+// A new session waits as long as the others do.
+double QualityControl::waited_us() const {
+  if (queue_us_) return *queue_us_;
+  return waiting_ ? static_cast<double>(waiting_()) : 0;
 }
 
 bool QualityControl::final_is_cheap(const protocol::View& view, Micros now) const {
@@ -57,8 +63,16 @@ FramePlan QualityControl::moving(const protocol::View& view, const Link& link, M
   const double pixels_most = least > 0 ? static_cast<double>(width) * height / std::pow(4.0, least)
                                        : std::numeric_limits<double>::infinity();
   if (!is_reference(view)) {
-    plan.setting = quality::settings[chooser_.choose(view, times_.forecast(view, now).settings,
-                                                     aim(view), pixels_most, now)];
+    if (view.quality != limits_) chooser_.forget();
+    limits_ = view.quality;
+    const quality::Aim limits = aim(view);
+    // While frames wait for the renderer, tries delay those of other sessions.
+    const auto may_try = [&] {
+      if (waited_us() <= static_cast<double>(budget)) return true;
+      return may_try_ && may_try_(times_.signature_of(view));
+    };
+    plan.setting =
+        chooser_.choose(view, times_.forecast(view, now), limits, pixels_most, may_try, now);
     moving_setting_ = plan.setting;
   }
   plan.encoding.quality = jpeg_.choose(quality::pixels_at(view, plan.setting), link, budget);
@@ -70,8 +84,11 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   constexpr Micros long_in_coming = 200'000;
   constexpr double better = 0.5;
   constexpr int usual = JpegRate::quality_usual;
-  const auto [known, cost, guessed] = times_.forecast(view, now);
-  if (guessed || cost <= long_in_coming || is_reference(view)) return std::nullopt;
+  const FrameForecast forecast = times_.forecast(view, now);
+  const quality::Forecasts& known = forecast.settings;
+  const Micros cost = forecast.final_us;
+  if (forecast.final_is_guessed || cost <= long_in_coming || is_reference(view))
+    return std::nullopt;
   const Micros budget = cost / 4;
   const auto next = quality::pick(view, known, {1e-3 * static_cast<double>(budget), {}, true});
   if (!next.fits || !(known[next.setting].error < better * shown_error)) return std::nullopt;
@@ -122,13 +139,13 @@ void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewS
   if (drawn.loaded) return;
   if (render.purpose == Purpose::moving) {
     constexpr double newest = 0.2;
-    queue_us_ += newest * (static_cast<double>(drawn.queue_us) - queue_us_);
+    queue_us_ = waited_us() + newest * (static_cast<double>(drawn.queue_us) - waited_us());
   }
   if (render.purpose == Purpose::final) {
     times_.learn_final(drawn.render_us + drawn.measure_us + drawn.encode_us, view, now);
-  } else if (const auto setting = quality::index_of(render.setting)) {
+  } else {
     const Micros cost = drawn.render_us + drawn.encode_us;
-    if (times_.learn(*setting, cost, view, now)) chooser_.restart();
+    if (times_.learn(render.setting, cost, view, now)) chooser_.restart();
   }
 }
 

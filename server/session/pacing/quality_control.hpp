@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <utility>
 
 #include "protocol/view.hpp"
 #include "server/quality/pick.hpp"
@@ -26,7 +27,8 @@ struct FramePlan {
 
 class QualityControl {
  public:
-  explicit QualityControl(Forecaster forecaster) : times_(std::move(forecaster)) {}
+  QualityControl(Forecaster forecaster, Waiting waiting, MayTry may_try)
+      : times_(std::move(forecaster)), waiting_(std::move(waiting)), may_try_(std::move(may_try)) {}
 
   [[nodiscard]] FramePlan moving(const protocol::View& view, const Link& link, Micros now);
   // Refinement before the final frame: at most half of `shown_error`, that of the frame displayed,
@@ -56,13 +58,17 @@ class QualityControl {
 
  private:
   [[nodiscard]] quality::Aim aim(const protocol::View& view) const;
+  [[nodiscard]] double waited_us() const;  // recently, by a moving frame for the renderer
   [[nodiscard]] quality::Setting final_setting(const protocol::View& view) const;
 
   FrameTimes times_;
+  Waiting waiting_;
+  MayTry may_try_;
   Chooser chooser_;
   JpegRate jpeg_;
   quality::Setting moving_setting_;  // the last one chosen
-  double queue_us_ = 0;              // recent waiting time of moving frames for the renderer
+  std::optional<double> queue_us_;   // recent waiting time of moving frames for the renderer
+  protocol::QualityView limits_;     // of the last moving frame
   int thinner_ = 0;                  // number of halvings of the final frame's slabs for maxError
   double thicker_error_ = 0;         // measured before the last halving
 };

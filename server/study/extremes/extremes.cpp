@@ -196,10 +196,9 @@ class Battery {
   static void report_error(const frame::Prepared& prepared, const data::Dataset& dataset,
                            const frame::Frame& drawn, CaseResult& result) {
     result.measured = drawn.error;
-    const auto forecast =
-        quality::Tables().forecast(quality::signature_of(prepared.completed.view()),
-                                   quality::index_of(prepared.setting).value(),
-                                   frame::viewpoint_of(prepared.completed, dataset));
+    const auto forecast = quality::Tables().forecast(
+        quality::signature_of(prepared.completed.view()), prepared.setting,
+        frame::viewpoint_of(prepared.completed, dataset));
     result.estimate = forecast.error;
     result.bound = quality::error_bound(forecast);
   }

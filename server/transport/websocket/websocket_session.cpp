@@ -54,6 +54,10 @@ session::Session new_session(const api::ServerOptions& server_options, tasks::Ba
        [&backend](const std::string& id) { return what_is_read(backend.catalogue, id); },
        [&backend](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
          return backend.quality.forecasts(signature, viewpoint);
+       },
+       [&backend] { return session::Micros{backend.renderer.stream_wait_us()}; },
+       [&backend](const quality::SceneSignature& signature) {
+         return backend.quality.begin_try(signature);
        }},
       now_us()};
 }

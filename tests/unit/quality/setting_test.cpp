@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "protocol/limits.hpp"
@@ -26,19 +27,41 @@ std::size_t index(const Setting& setting) {
   return at.value_or(0);
 }
 
-TEST(Edge, WholeLevelsHalveAndHalfLevelsHalveThePixels) {
-  EXPECT_EQ(edge_at(1280, 0), 1280);
-  EXPECT_EQ(edge_at(1280, 2), 640);
-  EXPECT_EQ(edge_at(1280, 6), 160);
+TEST(Size, WholeLevelsHalveAndHalfLevelsHalveThePixels) {
+  const PictureSize full{1280, 720};
+  const auto size = [&](int half_level) { return size_at(full, {MethodName::kernel, half_level}); };
+  EXPECT_EQ(size(0), full);
+  EXPECT_EQ(size(2), (PictureSize{640, 360}));
+  EXPECT_EQ(size(6), (PictureSize{160, 90}));
   for (const int half_level : {1, 3, 5}) {
     const double wanted = 1280 * std::pow(2.0, -0.5 * half_level);
-    EXPECT_NEAR(edge_at(1280, half_level), wanted, 1) << half_level;
+    EXPECT_NEAR(size(half_level).width, wanted, 0.02 * wanted) << half_level;
   }
-  EXPECT_EQ(edge_at(5, 8), 1);
-  EXPECT_EQ(edge_at(1, 31), 1);
+  EXPECT_EQ(size_at({5, 4}, {MethodName::kernel, 8}), (PictureSize{1, 1}));
+  EXPECT_EQ(size_at({1, 1}, {MethodName::kernel, 31}), (PictureSize{1, 1}));
 }
 
-TEST(Edge, WireLevelIsTheFinerWholeOne) {
+// Other proportions would move what is shown: by up to half a row of the smaller picture.
+TEST(Size, KeepsTheProportionsOfTheViewAndDecreases) {
+  for (const PictureSize full : {PictureSize{640, 480}, {1280, 720}, {1013, 677}, {300, 1201}}) {
+    PictureSize last = full;
+    for (int size = 1; size <= 32; ++size) {
+      const PictureSize now = size_at(full, {MethodName::kernel, size / 8, 0, 1, size % 8});
+      EXPECT_LE(now.height, last.height);
+      const double scale = std::exp2(-size / 16.0);
+      EXPECT_NEAR(now.height, scale * full.height, std::max(1.0, 0.016 * now.height)) << size;
+      const double moved = std::abs(static_cast<double>(now.width) * full.height /
+                                        (static_cast<double>(now.height) * full.width) -
+                                    1);
+      const int shorter = std::min(now.width, now.height);
+      EXPECT_LE(moved, shorter > 150 ? 1.2e-3 : 6e-3) << full.width << " " << size;
+      last = now;
+    }
+  }
+  EXPECT_EQ(size_at({640, 480}, {MethodName::kernel, 1, 0, 1, 4}), (PictureSize{380, 285}));
+}
+
+TEST(Size, WireLevelIsTheFinerWholeOne) {
   EXPECT_EQ(wire_level(0), 0);
   EXPECT_EQ(wire_level(1), 0);
   EXPECT_EQ(wire_level(2), 1);
@@ -95,7 +118,7 @@ TEST(Allowed, ReferenceHasNoAlternativesAndFullDetailNoAverages) {
 TEST(Allowed, NoPictureBelow64PixelsExceptTheRequestedOne) {
   EXPECT_TRUE(is_allowed({MethodName::kernel, 6, 0}, view_of(1024, 512)));
   EXPECT_FALSE(is_allowed({MethodName::kernel, 8, 0}, view_of(1024, 512)));
-  EXPECT_FALSE(is_allowed({MethodName::kernel, 6, 0}, view_of(1024, 511)));
+  EXPECT_FALSE(is_allowed({MethodName::kernel, 6, 0}, view_of(1024, 500)));
   const protocol::View tiny = view_of(40, 30);
   EXPECT_TRUE(is_allowed(settings[own_setting(tiny)], tiny));
   EXPECT_FALSE(is_allowed({MethodName::kernel, 1, 0}, tiny));

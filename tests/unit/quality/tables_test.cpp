@@ -21,8 +21,8 @@ double prior_of(std::size_t setting) { return prior(Kind{}, settings[setting], v
 TEST(Tables, ScenesAreIndependent) {
   Tables tables;
   tables.add(signature("a"), 0, viewpoint, {0.5 * prior_of(0), 3.0});
-  EXPECT_LT(tables.forecast(signature("a"), 0, viewpoint).error, 0.6 * prior_of(0));
-  EXPECT_EQ(tables.forecast(signature("b"), 0, viewpoint).error, prior_of(0));
+  EXPECT_LT(tables.forecast(signature("a"), settings[0], viewpoint).error, 0.6 * prior_of(0));
+  EXPECT_EQ(tables.forecast(signature("b"), settings[0], viewpoint).error, prior_of(0));
   EXPECT_TRUE(tables.forecasts(signature("a"), viewpoint)[0].timed);
   EXPECT_FALSE(tables.forecasts(signature("b"), viewpoint)[0].timed);
 }
@@ -30,7 +30,7 @@ TEST(Tables, ScenesAreIndependent) {
 TEST(Tables, SceneWithoutAKeyHasThePriorAndKeepsNothing) {
   Tables tables;
   tables.add(signature(""), 0, viewpoint, {0.5 * prior_of(0), 3.0});
-  EXPECT_EQ(tables.forecast(signature(""), 0, viewpoint).error, prior_of(0));
+  EXPECT_EQ(tables.forecast(signature(""), settings[0], viewpoint).error, prior_of(0));
   EXPECT_FALSE(tables.begin_study(signature(""), viewpoint));
   const double before = tables.encoding_error(signature(""), 90, true, viewpoint);
   tables.add_encoding(signature(""), 90, viewpoint, 10 * before);
@@ -40,7 +40,8 @@ TEST(Tables, SceneWithoutAKeyHasThePriorAndKeepsNothing) {
 TEST(Tables, LeastRecentlyUsedSceneIsForgotten) {
   Tables tables;
   const auto is_known = [&](int n) {
-    return tables.forecast(signature(std::to_string(n)), 0, viewpoint).error < 0.9 * prior_of(0);
+    return tables.forecast(signature(std::to_string(n)), settings[0], viewpoint).error <
+           0.9 * prior_of(0);
   };
   const int most = Tables::styles_max;
   for (int n = 0; n < most; ++n) {
@@ -57,7 +58,7 @@ TEST(Tables, LookupOfManyScenesForgetsNone) {
   Tables tables;
   tables.add(signature("own"), 0, viewpoint, {0.2 * prior_of(0), 3.0});
   for (std::size_t n = 0; n < 2 * Tables::styles_max; ++n) {
-    (void)tables.forecast(signature(std::to_string(n)), 0, viewpoint);
+    (void)tables.forecast(signature(std::to_string(n)), settings[0], viewpoint);
     (void)tables.forecasts(signature(std::to_string(n)), viewpoint);
     (void)tables.encoding_error(signature(std::to_string(n)), 90, true, viewpoint);
     tables.end_study(signature(std::to_string(n)), false);
@@ -71,8 +72,48 @@ TEST(Tables, ChangedDatasetKeepsTheScenesOfOthers) {
   tables.add(signature("a"), 0, viewpoint, {0.2 * prior_of(0), 3.0});
   tables.add(sea, 0, viewpoint, {0.2 * prior_of(0), 3.0});
   tables.forget("data");
-  EXPECT_FALSE(tables.forecast(signature("a"), 0, viewpoint).timed);
-  EXPECT_TRUE(tables.forecast(sea, 0, viewpoint).timed);
+  EXPECT_FALSE(tables.forecast(signature("a"), settings[0], viewpoint).timed);
+  EXPECT_TRUE(tables.forecast(sea, settings[0], viewpoint).timed);
+}
+
+// What one session has drawn, others need not try.
+TEST(Tables, TimesOfFramesAreSharedUntilACalibrationRunMeasuresThem) {
+  Tables tables;
+  tables.add_frame(signature("a"), 2, viewpoint, 4);
+  EXPECT_TRUE(tables.forecasts(signature("a"), viewpoint)[2].timed);
+  EXPECT_FALSE(tables.forecasts(signature("a"), viewpoint)[0].timed);
+  EXPECT_NEAR(tables.forecasts(signature("a"), viewpoint)[2].ms, 4, 0.2);
+  for (int n = 0; n < 40; ++n) tables.add_frame(signature("a"), 2, viewpoint, 8);
+  EXPECT_NEAR(tables.forecasts(signature("a"), viewpoint)[2].ms, 8, 0.4);
+  EXPECT_FALSE(tables.forecasts(signature("b"), viewpoint)[2].timed);
+  tables.add(signature("b"), 2, viewpoint, {0.01, 3});
+  for (int n = 0; n < 40; ++n) tables.add_frame(signature("b"), 2, viewpoint, 8);
+  EXPECT_NEAR(tables.forecasts(signature("b"), viewpoint)[2].ms, 3, 0.2);
+  tables.add_frame(signature(""), 2, viewpoint, 4);
+  EXPECT_FALSE(tables.forecasts(signature(""), viewpoint)[2].timed);
+}
+
+// Of many sessions that wait for the renderer one tries a setting, and the others learn its time.
+TEST(Tables, OneOfAHundredFramesMayBeATry) {
+  Tables tables;
+  EXPECT_FALSE(tables.begin_try(signature("a")));
+  int tries = 0;
+  for (int n = 0; n < 500; ++n) {
+    tables.add_frame(signature("a"), 2, viewpoint, 4);
+    for (int session = 0; session < 3; ++session) tries += tables.begin_try(signature("a")) ? 1 : 0;
+  }
+  EXPECT_EQ(tries, 5);
+}
+
+TEST(Tables, ErrorsBetweenTwoSettingsFollowFromBoth) {
+  Tables tables;
+  tables.add(signature("a"), 3, viewpoint, {0.02, 4.0});
+  tables.add(signature("a"), 4, viewpoint, {0.03, 2.0});
+  const Setting between{protocol::MethodName::kernel, 3, 0, 1, 4};
+  const Forecasts known = tables.forecasts(signature("a"), viewpoint);
+  const Forecast at = tables.forecast(signature("a"), between, viewpoint);
+  EXPECT_NEAR(at.error, std::sqrt(known[3].error * known[4].error), 1e-12);
+  EXPECT_NEAR(at.ms, std::sqrt(known[3].ms * known[4].ms), 1e-12);
 }
 
 TEST(Tables, OneOfManyCallersStartsTheCalibrationRun) {

@@ -46,7 +46,8 @@ class Driver {
              },
              [this](const quality::SceneSignature& signature, const quality::Viewpoint& viewpoint) {
                return calibrated.value_or(quality::Table(signature.kind).forecasts(viewpoint));
-             }},
+             },
+             [this] { return waiting; }},
             now_) {}
 
   // --- inputs -----------------------------------------------------------------------------------
@@ -144,6 +145,7 @@ class Driver {
   std::optional<Close> closed;
   bool write_at_once = true;
   int step_count = steps;
+  Micros waiting = 0;              // of the frames of other sessions
   Micros queue = 0;                // simulated time that a frame waits for the renderer
   std::optional<Reading> reading;  // of the dataset "wind"
   std::vector<Calibrate> calibrations;
@@ -173,8 +175,8 @@ class Driver {
       const int by = averaged ? 1 : done.setting.thinner * done.setting.thinner;
       out.info.error_value = *measured_error / by;
       out.info.error_kind = "measured";
-    } else if (const auto index = quality::index_of(done.setting); index && calibrated) {
-      out.info.error_value = (*calibrated)[*index].error;
+    } else if (calibrated) {
+      out.info.error_value = quality::forecast_between(done.setting, *calibrated).error;
       out.info.error_kind = "estimated";
     }
     out.info.tiles = 1;
@@ -182,8 +184,9 @@ class Driver {
     for (const double height : done.view.camera.eye.value_or(protocol::Vec3{})) {
       if (height >= beyond || (moving && height >= faint)) out.info.tiles = 0;
     }
-    out.info.width = quality::edge_at(done.view.image.width, done.setting.half_level);
-    out.info.height = quality::edge_at(done.view.image.height, done.setting.half_level);
+    const quality::PictureSize size = quality::size_at(done.view, done.setting);
+    out.info.width = size.width;
+    out.info.height = size.height;
     out.view_json = "{}";
     out.render_us = cost;
     out.queue_us = queue;

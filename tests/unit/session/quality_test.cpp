@@ -44,7 +44,7 @@ std::vector<quality::Setting> drag(Driver& driver, int count, std::uint32_t& rev
 std::function<Micros(const quality::Setting&)> costs(const quality::Forecasts& known,
                                                      double slower = 1) {
   return [known, slower](const quality::Setting& setting) {
-    return static_cast<Micros>(1000 * slower * known[quality::index_of(setting).value()].ms);
+    return static_cast<Micros>(1000 * slower * quality::forecast_between(setting, known).ms);
   };
 }
 
@@ -57,11 +57,11 @@ TEST(Setting, IsReportedInTheHeaderAndTheFinalFrameIsFull) {
   const auto moving = driver.frames.back().header;
   ASSERT_GT(drawn.back().half_level, 0);
   EXPECT_EQ(moving.level, drawn.back().half_level / 2);
-  EXPECT_EQ(moving.width, quality::edge_at(800, drawn.back().half_level));
+  EXPECT_EQ(moving.width, quality::size_at({800, 600}, drawn.back()).width);
   EXPECT_EQ(moving.flags, protocol::flag_error_estimated);
   EXPECT_FLOAT_EQ(
       moving.error,
-      static_cast<float>((*driver.calibrated)[quality::index_of(drawn.back()).value()].error));
+      static_cast<float>(quality::forecast_between(drawn.back(), *driver.calibrated).error));
   driver.measured_error = 3e-4;
   driver.settle(400 * ms);
   const auto final = driver.frames.back().header;
@@ -88,7 +88,7 @@ TEST(Setting, KeepsTheBudgetOnASlowedMachine) {
     }
     // Among the settings well within the budget none has a smaller error.
     const auto error = [&](const quality::Setting& setting) {
-      return (*driver.calibrated)[quality::index_of(setting).value()].error;
+      return quality::forecast_between(setting, *driver.calibrated).error;
     };
     for (const quality::Setting& setting : quality::settings) {
       if (!quality::is_allowed(setting, driver.render ? driver.render->view : View{})) continue;
@@ -118,7 +118,7 @@ TEST(Setting, KeepsAMinimumPictureSize) {
   std::uint32_t rev = 1;
   const auto drawn = drag(driver, 10, rev, [](const quality::Setting&) { return 5000 * ms; });
   for (const quality::Setting& setting : drawn) {
-    EXPECT_GE(quality::edge_at(200, setting.half_level), 64);
+    EXPECT_GE(quality::size_at({300, 200}, setting).height, 64);
   }
 }
 
@@ -169,6 +169,23 @@ TEST(Setting, FramesBecomeCheaperWhenManyWaitForTheRenderer) {
   }
   EXPECT_LE(own, 9 * ms) << "33 ms over the root of 16";
   EXPECT_GE(own, 4 * ms);
+}
+
+// Its first frame is as cheap as those of the sessions that have adapted to the wait.
+TEST(Setting, NewSessionStartsFromTheWaitOfTheOthers) {
+  const auto first = [](Micros waiting) {
+    Driver driver;
+    driver.waiting = waiting;
+    driver.calibrated = calibrated(100);
+    driver.patch(1, R"({"dataset":"wind"})");
+    driver.finish_render(10 * ms);
+    driver.ack(1);
+    driver.patch(2, azimuth(2));
+    return driver.render->setting;
+  };
+  const auto known = calibrated(100);
+  EXPECT_LE(quality::forecast_between(first(140 * ms), known).ms,
+            0.5 * quality::forecast_between(first(0), known).ms);
 }
 
 // --- refinement to the final frame ---------------------------------------------------------------

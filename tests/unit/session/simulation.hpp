@@ -53,8 +53,9 @@ class Renderer {
     Drawn drawn;
     drawn.info.method = "kernel";
     drawn.info.tiles = 1;
-    drawn.info.width = quality::edge_at(wanted.view.image.width, wanted.setting.half_level);
-    drawn.info.height = quality::edge_at(wanted.view.image.height, wanted.setting.half_level);
+    const quality::PictureSize size = quality::size_at(wanted.view, wanted.setting);
+    drawn.info.width = size.width;
+    drawn.info.height = size.height;
     drawn.view_json = std::string(1100, ' ');
     const double pixels = static_cast<double>(drawn.info.width) * drawn.info.height;
     drawn.render_us = static_cast<Micros>(static_cast<double>(full_us_) * pixels / (1280 * 720));
