@@ -179,6 +179,29 @@ TEST(Slab, LinesDoNotDependOnTheThickness) {
   }
 }
 
+// Long lines along the view, of which many meet a block within one slab.
+TEST(Slab, ManyLongLinesInASlabAreInOrder) {
+  for (const bool perspective : {false, true}) {
+    Scene scene = blobs(6, 48, 0, perspective);
+    scene.scalars.clear();
+    const glm::dvec3 along = scene.camera.forward;
+    const auto winds = make_volume(scene.lattice, 3, [&](int c, double x, double y, double z) {
+      return static_cast<float>(along[c] + 0.3 * std::sin(9 * x + 5 * y + 7 * z + 2 * c));
+    });
+    scene.vector = plain_lines(winds, {1, 1, 1});
+    scene.vector->length = 0.8;
+    scene.vector->span = 20;
+    scene.vector->opacity = 0.1;
+    scene.vector->color_by = scene::LineColor::world_z;
+    scene.vector->color = ramp_color(-0.6, 0.6, {1, 0, 0}, {0, 0.5F, 1});
+    scene.method = Method::slab;
+    scene.slab_thickness = 0.02;
+    const engine::Rendered expected = render(scene);
+    scene.slab_thickness = 4;
+    EXPECT_LT(rms(render(scene).image, expected.image), 2e-6) << perspective;
+  }
+}
+
 TEST(Slab, RotationByAMicroradianBarelyChangesAMedium) {
   for (const bool perspective : {false, true}) {
     for (int step = 0; step < 4; ++step) {

@@ -21,15 +21,6 @@ struct Passage {
   Pixel left;      // cd-naive: transmittance up to there
 };
 
-// A line at the pixels of a block; opacity 0 where a pixel does not meet it.
-struct BlockHit {
-  alignas(64) float x_line[block_pixels];  // through the slab, 0 to 1
-  alignas(64) float opacity[block_pixels];
-  alignas(64) float color[3][block_pixels];
-};
-constexpr int block_hits_max = 64;  // sorted together; exact if no line is displaced by more than
-                                    // half
-
 template <int Compositing>
 KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
   const Pixel zero = hn::Zero(PixelTag());
@@ -44,157 +35,6 @@ KERNEL_INLINE Passage open_passage(const float* gathered, int l) {
         load<Pixel>(gathered + static_cast<std::ptrdiff_t>(1 + c) * block_pixels + l) * inverse;
   }
   return p;
-}
-
-// A line at a vector of pixels within the slab.
-struct LaneHit {
-  MaskOf<Pixel> here;  // the line covers the pixel, in this slab
-  Pixel opacity;       // 0 elsewhere
-  Pixel depth;
-  Pixel f;
-};
-
-template <Depth Along, int Style>
-KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
-  const RibbonLanes r = spread(line.ribbon);
-  const Pixel zero = hn::Zero(PixelTag());
-  const Pixel w =
-      clamped(hn::MulAdd(px - r.x, r.wx, hn::MulAdd(py - r.y, r.wy, r.w0)), zero, all<Pixel>(1.0F));
-  const Pixel f = along_ribbon<Along>(r, w);
-  const Pixel depth =
-      hn::MulAdd(f, all<Pixel>(line.ribbon.depth_rise), all<Pixel>(line.ribbon.depth));
-  const auto inside =
-      hn::And(hn::Ge(depth, all<Pixel>(slab.front)), hn::Lt(depth, all<Pixel>(slab.back)));
-  // Early exit: most candidates pass the block in another slab.
-  if (hn::AllFalse(PixelTag(), inside)) return {inside, zero, depth, f};
-  const Pixel opacity = ribbon_lane<Along, Style>(r, px - r.x, py - r.y).opacity;
-  const auto here = hn::And(inside, hn::Gt(opacity, zero));
-  return {here, hn::IfThenElseZero(here, opacity), depth, f};
-}
-
-template <bool Perspective>
-KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, const Slab& slab, Pixel px, Pixel py) {
-  if (!Perspective) {
-    return line.moving != 0 ? hit_lanes<Depth::flat, style_moving>(line, slab, px, py)
-                            : hit_lanes<Depth::flat, style_head>(line, slab, px, py);
-  }
-  if (line.bent == 0) {
-    return line.moving != 0 ? hit_lanes<Depth::series, style_moving>(line, slab, px, py)
-                            : hit_lanes<Depth::series, style_head>(line, slab, px, py);
-  }
-  return line.moving != 0 ? hit_lanes<Depth::exact, style_moving>(line, slab, px, py)
-                          : hit_lanes<Depth::exact, style_head>(line, slab, px, py);
-}
-
-KERNEL_INLINE Pixel fraction_in(const Slab& slab, Pixel depth) {
-  const Pixel inverse = all<Pixel>(1.0F / (slab.back - slab.begin));
-  return clamped((depth - all<Pixel>(slab.begin)) * inverse, 0.0F, 1.0F);
-}
-
-// Returns whether any pixel meets the line.
-template <bool Perspective>
-KERNEL_INLINE bool hit_block(const RibbonRecord& line, const Slab& slab, float x, float y,
-                             BlockHit& m) {
-  bool any = false;
-  for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
-    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const LaneHit at = hit_lanes<Perspective>(line, slab, px, py);
-    any = any || !hn::AllFalse(PixelTag(), at.here);
-    store(fraction_in(slab, at.depth), m.x_line + l);
-    store(at.opacity, m.opacity + l);
-    for (int c = 0; c < 3; ++c) {
-      store(hn::MulAdd(at.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c])),
-            m.color[c] + l);
-    }
-  }
-  return any;
-}
-
-// The part of the slab before the body, by pixel: the medium of pixels that it covers entirely ends
-// there (body_limit), and x_line is relative to it. 1 for other pixels.
-struct BodyShare {
-  alignas(64) float before[block_pixels];
-};
-
-KERNEL_INLINE void open_share(const Slab& slab, const BodyBlock& body, BodyShare& share) {
-  for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const Pixel before = fraction_in(slab, body_limit(body, l));
-    store(hn::Max(before, all<Pixel>(1e-6F)), share.before + l);
-  }
-}
-
-inline void scale_hit(const BodyShare& share, BlockHit& m) {
-  for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    store(load<Pixel>(m.x_line + l) / load<Pixel>(share.before + l), m.x_line + l);
-  }
-}
-
-// The body as a line that covers its pixels, where it is in front of the end of the slab and still
-// waits for light; it no longer does then.
-inline void take_body(const Slab& slab, const float rgb[3], BodyBlock& body, BlockHit& m) {
-  const Pixel zero = hn::Zero(PixelTag());
-  const Pixel one = all<Pixel>(1.0F);
-  for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const Pixel depth = load<Pixel>(body.depth + l);
-    const Pixel opacity = load<Pixel>(body.opacity + l);
-    const auto here = hn::And(hn::Lt(depth, all<Pixel>(slab.back)), hn::Gt(opacity, zero));
-    // Behind the medium before it, or before everything in the slab.
-    const Pixel end = hn::IfThenElse(hn::Le(depth, all<Pixel>(slab.front)), hn::Neg(one), one);
-    const Pixel x_line = hn::IfThenElse(hn::Ge(opacity, one), end, fraction_in(slab, depth));
-    store(x_line, m.x_line + l);
-    // With the lines combined by `or` that are seen beside the body, where there are any.
-    const Pixel behind = load<Pixel>(body.behind + l);
-    const auto lined = hn::Lt(behind, one - opacity);
-    const Pixel all_opacity = hn::IfThenElse(lined, one - behind, opacity);
-    const Pixel inverse = one / hn::Max(all_opacity, all<Pixel>(1e-37F));
-    store(hn::IfThenElseZero(here, all_opacity), m.opacity + l);
-    for (int c = 0; c < 3; ++c) {
-      const Pixel own = load<Pixel>(body.shade + l) * all<Pixel>(rgb[c]);
-      const Pixel light = load<Pixel>(body.light[c] + l);
-      store(hn::IfThenElse(lined, hn::MulAdd(own, opacity, light) * inverse, own), m.color[c] + l);
-      store(hn::IfThenZeroElse(here, light), body.light[c] + l);
-    }
-    store(hn::IfThenZeroElse(here, opacity), body.opacity + l);
-    store(hn::IfThenElse(here, one, behind), body.behind + l);
-  }
-}
-
-// Whether any pixel of the block still waits for light of the body.
-inline bool awaits_body(const BodyBlock& body) {
-  for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const auto waits = hn::Gt(load<Pixel>(body.opacity + l), hn::Zero(PixelTag()));
-    if (!hn::AllFalse(PixelTag(), waits)) return true;
-  }
-  return false;
-}
-
-// Sorts two neighbours per pixel. Returns whether any pixel swapped them.
-KERNEL_INLINE bool put_in_order(BlockHit& first, BlockHit& second) {
-  bool swapped = false;
-  for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const auto wrong = hn::Gt(load<Pixel>(first.x_line + l), load<Pixel>(second.x_line + l));
-    if (hn::AllFalse(PixelTag(), wrong)) continue;
-    swapped = true;
-    const auto exchange = [&](float* a, float* b) {
-      const Pixel p = load<Pixel>(a + l);
-      const Pixel q = load<Pixel>(b + l);
-      store(hn::IfThenElse(wrong, q, p), a + l);
-      store(hn::IfThenElse(wrong, p, q), b + l);
-    };
-    exchange(first.x_line, second.x_line);
-    exchange(first.opacity, second.opacity);
-    for (int c = 0; c < 3; ++c) exchange(first.color[c], second.color[c]);
-  }
-  return swapped;
-}
-
-// Insertion sort front to back in every pixel. The input is nearly sorted, by depth at the centre
-// of the block.
-inline void sort_block_hits(BlockHit* m, int count) {
-  for (int n = 1; n < count; ++n) {
-    for (int k = n; k > 0 && put_in_order(m[k - 1], m[k]); --k) continue;
-  }
 }
 
 template <int Compositing>
@@ -332,7 +172,8 @@ template <bool Perspective, int Compositing>
 KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
   constexpr int between_checks = 16;
   Pixel farthest[block_vectors];
-  for (Pixel& depth : farthest) depth = all<Pixel>(with.slab.front);
+  const Between slab = {with.slab.front, with.slab.back};
+  for (Pixel& depth : farthest) depth = all<Pixel>(slab.front);
   for (int from = 0; from < with.count; from += between_checks) {
     const int to = from + between_checks < with.count ? from + between_checks : with.count;
     for (int v = 0, l = 0; v < block_vectors; ++v, l += pixel_lanes) {
@@ -342,7 +183,7 @@ KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
       Pixel far = farthest[v];
       for (int h = from; h < to; ++h) {
         const RibbonRecord& line = with.lines[with.met[h].line];
-        const LaneHit hit = hit_lanes<Perspective>(line, with.slab, px, py);
+        const LaneHit hit = hit_lanes<Perspective>(line, slab, px, py);
         if (hn::AllFalse(PixelTag(), hit.here)) continue;
         if (!hn::AllFalse(PixelTag(), hn::And(hit.here, hn::Lt(hit.depth, far)))) {
           return Outcome::out_of_order;
@@ -374,9 +215,9 @@ inline float farthest_x(const BlockHit& m) {
   return largest_of(most);
 }
 
-// The same after sorting the lines in every pixel.
+// The same in a part of the slab, after sorting the lines in every pixel.
 template <bool Perspective, int Compositing>
-Outcome pass_sorted(const Closing& with, Passage* passage) {
+Outcome pass_sorted(const Closing& with, Between part, Passage* passage) {
   BlockHit hits[block_hits_max];
   BodyShare share;
   int held = 0;
@@ -388,7 +229,7 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
       body = false;
     } else {
       const RibbonRecord& line = with.lines[with.met[h++].line];
-      if (!hit_block<Perspective>(line, with.slab, with.x, with.y, hits[held])) continue;
+      if (!hit_block<Perspective>(line, with.slab, part, with.x, with.y, hits[held])) continue;
       if (with.body != nullptr) scale_hit(share, hits[held]);
     }
     if (++held < block_hits_max) continue;
@@ -408,6 +249,24 @@ Outcome pass_sorted(const Closing& with, Passage* passage) {
   return Outcome::done;
 }
 
+// Part by part where lines may be too many to be sorted together.
+template <bool Perspective, int Compositing>
+Outcome pass_parts(const Closing& with, Passage* passage) {
+  constexpr int lines_of_part = block_hits_max / 2;
+  const bool many = with.count > block_hits_max && with.body == nullptr;
+  const int parts = many ? (with.count + lines_of_part - 1) / lines_of_part : 1;
+  const float length = (with.slab.back - with.slab.front) / static_cast<float>(parts);
+  Between part = {with.slab.front, with.slab.front};
+  for (int n = 1; n <= parts; ++n) {
+    part.front = part.back;
+    part.back = n == parts ? with.slab.back : with.slab.front + static_cast<float>(n) * length;
+    const Outcome outcome = pass_sorted<Perspective, Compositing>(with, part, passage);
+    if (outcome == Outcome::dark) return outcome;
+    if (n < parts && is_dark(with.transmittance, passage, with.stop)) return Outcome::dark;
+  }
+  return Outcome::done;
+}
+
 template <bool Perspective, int Compositing>
 void close_block(const Closing& with, const float* gathered, int row, int column, Tile& tile) {
   Passage passage[block_vectors];
@@ -424,7 +283,7 @@ void close_block(const Closing& with, const float* gathered, int row, int column
   }
   if (outcome == Outcome::out_of_order) {
     open();
-    outcome = pass_sorted<Perspective, Compositing>(with, passage);
+    outcome = pass_parts<Perspective, Compositing>(with, passage);
   }
   if (outcome == Outcome::dark) tile.any_closed = 1;  // lines behind were skipped
   float* block = block_at(tile, row, column);
