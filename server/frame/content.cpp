@@ -14,6 +14,7 @@
 #include "server/engine/reference/kernels.hpp"
 #include "server/frame/drawn_samples.hpp"
 #include "server/frame/light_changes.hpp"
+#include "server/frame/pixel_trials.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -120,6 +121,10 @@ class Sampling {
 
   [[nodiscard]] LightChanges light_changes(const std::vector<Seen>& seen) const {
     if (scene_.scalars.empty()) return {};
+    return frame::light_changes(samples_, rays_through(seen));
+  }
+
+  [[nodiscard]] std::vector<RayThrough> rays_through(const std::vector<Seen>& seen) const {
     std::vector<RayThrough> rays;
     rays.reserve(seen.size());
     for (const Seen& one : seen) {
@@ -127,7 +132,7 @@ class Sampling {
       each_bin(one, [&](int, double within) { area += within; });
       rays.push_back({one.index, each() * std::min(1.0, area / (one.wide * one.high))});
     }
-    return frame::light_changes(samples_, rays);
+    return rays;
   }
 
  private:
@@ -367,10 +372,16 @@ quality::Content content_of(const scene::Scene& scene) {
   out.finest_cell = finest.value();
   const LightChanges light = sampling.light_changes(seen);
   out.step = std::sqrt(light.step.sum);
-  for (std::size_t k = 0; k < out.bends.size(); ++k) out.bends[k] = std::sqrt(light.bends[k].sum);
-  out.incline = std::sqrt(light.incline.sum);
+  const auto roots = [](const auto& sums, auto& to) {
+    std::transform(sums.begin(), sums.end(), to.begin(),
+                   [](const Mean& one) { return std::sqrt(one.sum); });
+  };
+  roots(light.cell_bends, out.cell_bends);
+  roots(light.bends, out.bends);
+  roots(light.shifts, out.shifts);
   out.order = std::sqrt(light.order.sum);
   out.step_cell = light.cell.value();
+  out.trials = pixel_trials(scene, sampling.rays_through(seen));
   return out;
 }
 

@@ -21,24 +21,17 @@ namespace {
 
 namespace reference = engine::reference;
 
-constexpr std::uint32_t rays_most = 256;
-constexpr int reach = 4;  // cells of a layer on either side of a ray
+constexpr std::uint32_t bundles_most = 256;
+constexpr int steps_most = 64;       // of a ray through the lattice
+constexpr double dark_below = 1e-4;  // light from behind is left out
+constexpr int reach = 4;             // cells of a layer on either side of a ray that are kept
 constexpr int wide = 2 * reach + 1;
 
-// Rays of a bundle: one, then on both sides along the two axes across it, at each distance.
-constexpr std::size_t rays_count = 1 + 4 * quality::bends_count;
-struct Offset {
-  std::array<double, 2> cells{};
-};
-constexpr std::array<Offset, rays_count> offsets_of_bundle() {
-  std::array<Offset, rays_count> out{};
-  for (std::size_t n = 1; n < rays_count; ++n) {
-    const double distance = quality::bend_distances[(n - 1) / 4];
-    out[n].cells[(n - 1) / 2 % 2] = n % 2 == 1 ? distance : -distance;
-  }
-  return out;
-}
-constexpr std::array<Offset, rays_count> offsets = offsets_of_bundle();
+// Rays of a bundle: one, then on both sides of it, along the two axes across it at each distance in
+// cells, and along the two of the picture at each distance in it.
+constexpr std::size_t in_cells = 1;
+constexpr std::size_t in_picture = in_cells + 4 * quality::cells_apart.size();
+constexpr std::size_t rays_count = in_picture + 4 * quality::distances_count;
 
 // The weight of the splat of a cell at so many cells from its centre, squared.
 double splat_weight(double r2) {
@@ -50,7 +43,7 @@ double splat_weight(double r2) {
   return rest * rest / (t * (t - s) * reference::footprint_integral);
 }
 
-// A ray, followed in steps of `stride` cells of `axis`.
+// The first ray of a bundle, followed in steps of `stride` cells of `axis`.
 struct Ray {
   Index through{};
   std::array<double, 2> aside{};  // cells from the sample, along the two other axes
@@ -63,42 +56,86 @@ struct Ray {
   double scale = 1;   // heights of the picture per world unit
   double face = 0;    // area of a cell across the ray
   double cells = 1;   // that it passes
+  // Cells along each axis by which one height of the picture displaces it at the depth 1, to the
+  // right and downwards.
+  std::array<std::array<double, 3>, 2> displaced{};
 };
+
+// Another ray of its bundle: cells from the first one along the two axes, in the layer of the
+// sample and for each layer behind.
+struct Beside {
+  std::array<double, 2> cells{};
+  std::array<double, 2> turned{};
+  double length = 0;  // of a step
+};
+using Bundle = std::array<Beside, rays_count>;
+
+// A ray displaced by so many cells along each axis, at the depth 1 if the view is in perspective.
+Beside beside(const Ray& ray, const std::array<double, 3>& by, bool perspective) {
+  const double along = ray.rate[ray.axis] / ray.pace;
+  const double own = by[ray.axis];
+  // Layers passed for each unit of depth; a ray along the layers is not followed further.
+  const double turned = perspective ? std::max(0.2, 1 + own / along) * along : along;
+  Beside out;
+  out.length = ray.stride / (std::abs(turned) * ray.pace);
+  for (std::size_t n = 0; n < 2; ++n) {
+    const std::size_t a = (ray.axis + 1 + n) % 3;
+    const double rate = ray.rate[a] / ray.pace;
+    if (perspective) {
+      const double there = (rate + by[a]) / turned;
+      out.cells[n] = ray.depth * (by[a] - there * own);
+      out.turned[n] = there - rate / along;
+    } else {
+      out.cells[n] = by[a] - rate / along * own;
+    }
+  }
+  return out;
+}
+
+Bundle bundle_of(const Ray& ray, bool perspective) {
+  Bundle out;
+  for (std::size_t n = 0; n < rays_count; ++n) {
+    const double sign = n % 2 == 1 ? 1 : -1;
+    const std::size_t axis = (n - 1) / 2 % 2;
+    if (n >= in_picture) {
+      const double distance = sign * quality::distances[(n - in_picture) / 4];
+      std::array<double, 3> by = ray.displaced[axis];
+      for (double& cells : by) cells *= distance;
+      out[n] = beside(ray, by, perspective);
+    } else {
+      if (n > 0) out[n].cells[axis] = sign * quality::cells_apart[(n - in_cells) / 4];
+      out[n].length = ray.length;
+    }
+  }
+  return out;
+}
 
 // The media of the cells of a layer around a ray.
 class Layer {
  public:
   // The layer of `at`, around `centre` in cells along the axes `first` and `second`.
-  Layer(const DrawnSamples& samples, Index at, std::size_t first, std::size_t second,
-        const std::array<double, 2>& centre) {
-    const int i = static_cast<int>(std::lround(centre[0]));
-    const int j = static_cast<int>(std::lround(centre[1]));
-    from_ = {centre[0] - i, centre[1] - j};
-    for (int y = -reach; y <= reach; ++y) {
-      for (int x = -reach; x <= reach; ++x) {
-        if (std::abs(x) > 2 && std::abs(y) > 2) continue;  // no ray passes there
-        at[first] = i + x;
-        at[second] = j + y;
-        if (samples.contains(at)) cells_[number(x, y)] = samples.medium(at);
-        is_empty_ = is_empty_ && !(cells_[number(x, y)].extinction > 0);
-      }
+  Layer(const DrawnSamples& samples, const Index& at, std::size_t first, std::size_t second,
+        const std::array<double, 2>& centre)
+      : samples_(samples), at_(at), axes_{first, second} {
+    for (std::size_t a = 0; a < 2; ++a) {
+      middle_[a] = static_cast<int>(std::lround(centre[a]));
+      from_[a] = centre[a] - middle_[a];
     }
   }
-  [[nodiscard]] bool is_empty() const { return is_empty_; }
 
-  // What a ray at an offset in cells crosses.
-  [[nodiscard]] Medium at(const Offset& offset) const {
-    const double x = from_[0] + offset.cells[0];
-    const double y = from_[1] + offset.cells[1];
+  // What a ray at so many cells from the centre crosses.
+  Medium at(double cells, double cells_of_second) {
+    const double x = from_[0] + cells;
+    const double y = from_[1] + cells_of_second;
     constexpr double t = reference::footprint_t;
     const int right = static_cast<int>(std::floor(x + t));
     const int bottom = static_cast<int>(std::floor(y + t));
     Medium out;
     for (int j = static_cast<int>(std::ceil(y - t)); j <= bottom; ++j) {
       for (int i = static_cast<int>(std::ceil(x - t)); i <= right; ++i) {
-        const Medium& cell = cells_[number(i, j)];
-        if (!(cell.extinction > 0)) continue;
         const double share = splat_weight((x - i) * (x - i) + (y - j) * (y - j));
+        if (share <= 0) continue;
+        const Medium& cell = medium(i, j);
         out.extinction += share * cell.extinction;
         out.emission += share * cell.emission;
       }
@@ -107,13 +144,26 @@ class Layer {
   }
 
  private:
-  static std::size_t number(int x, int y) {
-    return static_cast<std::size_t>(y + reach) * std::size_t{wide} +
-           static_cast<std::size_t>(x + reach);
+  const Medium& medium(int i, int j) {
+    const bool keeps = std::abs(i) <= reach && std::abs(j) <= reach;
+    const std::size_t n = keeps ? static_cast<std::size_t>((j + reach) * wide + i + reach) : 0;
+    Medium& cell = keeps ? cells_[n] : other_;
+    if (keeps && known_[n]) return cell;
+    at_[axes_[0]] = middle_[0] + i;
+    at_[axes_[1]] = middle_[1] + j;
+    cell = samples_.contains(at_) ? samples_.medium(at_) : Medium();
+    if (keeps) known_[n] = true;
+    return cell;
   }
-  std::array<Medium, std::size_t{wide} * wide> cells_{};
+
+  const DrawnSamples& samples_;
+  Index at_;
+  std::array<std::size_t, 2> axes_;
+  std::array<int, 2> middle_{};
   std::array<double, 2> from_{};  // of the ray from the centre of the cell in the middle
-  bool is_empty_ = true;
+  std::array<Medium, std::size_t{wide} * wide> cells_;
+  std::array<bool, std::size_t{wide} * wide> known_{};
+  Medium other_;
 };
 
 struct Lights {
@@ -123,15 +173,22 @@ struct Lights {
   glm::dvec3 last_color{0, 0, 0};
   double last_absorbed = 0;
 
-  void pass(const Layer& layer, double length, int stride) {
+  // `behind`: layers from that of the sample.
+  void pass(Layer& layer, const Bundle& bundle, int behind, int stride) {
     for (std::size_t n = 0; n < rays_count; ++n) {
-      const Medium here = layer.at(offsets[n]);
+      if (transmitted[n] < dark_below) continue;
+      const Beside& ray = bundle[n];
+      const Medium here =
+          layer.at(ray.cells[0] + behind * ray.turned[0], ray.cells[1] + behind * ray.turned[1]);
       if (!(here.extinction > 0)) continue;
-      if (n == 0) change_order(here, length / stride, stride);
-      const double absorbed = -transmitted[n] * std::expm1(-here.extinction * length);
+      if (n == 0) change_order(here, ray.length / stride, stride);
+      const double absorbed = -transmitted[n] * std::expm1(-here.extinction * ray.length);
       light[n] += absorbed * glm::dvec4(here.color(), 1);
       transmitted[n] -= absorbed;
     }
+  }
+  [[nodiscard]] bool is_opaque() const {
+    return *std::max_element(transmitted.begin(), transmitted.end()) < dark_below;
   }
 
  private:
@@ -162,10 +219,10 @@ class Rays {
       rays.emplace_back(*ray, whole);
     }
     LightChanges out;
-    const double area = whole / rays_most;
+    const double area = whole / bundles_most;
     std::uint32_t taken = 0;
     for (auto& [ray, up_to] : rays) {
-      for (; taken < rays_most && (taken + 0.5) * area < up_to; ++taken) {
+      for (; taken < bundles_most && (taken + 0.5) * area < up_to; ++taken) {
         // Within the splat of the sample, at random.
         const auto random = pcg3d({taken, 31, 37});
         for (std::size_t a = 0; a < 2; ++a) {
@@ -182,19 +239,20 @@ class Rays {
     const Lights lights = lights_of(ray);
     const auto square = [](const glm::dvec4& v) { return glm::dot(v, v) / 4; };
     const auto& light = lights.light;
+    const auto bend = [&](std::size_t n) {
+      return square(light[n] + light[n + 1] - 2.0 * light[0]);
+    };
     double step = 0;
-    for (std::size_t k = 0; k < quality::bends_count; ++k) {
-      double bend = 0;
-      double incline = 0;
-      for (std::size_t n = 1 + 4 * k; n < 5 + 4 * k; n += 2) {
-        bend += 0.5 * square(light[n] + light[n + 1] - 2.0 * light[0]);
-        incline += 0.5 * square(light[n] - light[n + 1]);
-        if (quality::bend_distances[k] == 1) {
-          step += 0.25 * (square(light[n] - light[0]) + square(light[n + 1] - light[0]));
-        }
-      }
-      out.bends[k].add(bend, area);
-      if (k == 0) out.incline.add(incline / std::pow(2 * quality::bend_distances[0], 2), area);
+    for (std::size_t n = in_cells; n < in_cells + 4; ++n)
+      step += 0.25 * square(light[n] - light[0]);
+    for (std::size_t k = 0; k < quality::cells_apart.size(); ++k) {
+      const std::size_t n = in_cells + 4 * k;
+      out.cell_bends[k].add(0.5 * (bend(n) + bend(n + 2)), area);
+    }
+    for (std::size_t k = 0; k < quality::distances_count; ++k) {
+      const std::size_t n = in_picture + 4 * k;
+      out.bends[k].add(0.5 * (bend(n) + bend(n + 2)), area);
+      out.shifts[k].add(square(light[n] - light[n + 1]), area);
     }
     out.step.add(step, area);
     out.order.add(glm::dot(lights.order, lights.order), area);
@@ -218,10 +276,12 @@ class Rays {
       const double length2 = glm::dot(edge, edge);
       if (length2 == 0) continue;
       out.rate[a] = glm::dot(way, edge) / length2;
+      const double height = 2 * camera.half_height;
+      out.displaced[0][a] = height * glm::dot(glm::dvec3(camera.right), edge) / length2;
+      out.displaced[1][a] = -height * glm::dot(glm::dvec3(camera.up), edge) / length2;
       if (std::abs(out.rate[a]) > std::abs(out.rate[out.axis])) out.axis = a;
     }
     if (out.rate[out.axis] == 0) return std::nullopt;
-    constexpr int steps_most = 64;
     const int cells = samples_.high()[out.axis] - samples_.low()[out.axis];
     out.stride = (cells + steps_most - 1) / steps_most;
     out.length = out.stride / std::abs(out.rate[out.axis]);
@@ -253,17 +313,20 @@ class Rays {
     const std::size_t second = (ray.axis + 2) % 3;
     const int cells = samples_.high()[ray.axis] - samples_.low()[ray.axis];
     const bool ascends = ray.rate[ray.axis] > 0;
+    const Bundle bundle = bundle_of(ray, camera.perspective);
     Lights out;
     out.transmitted.fill(1);
     for (int n = 0; n < cells; n += ray.stride) {
       Index i = ray.through;
       i[ray.axis] = ascends ? samples_.low()[ray.axis] + n : samples_.high()[ray.axis] - 1 - n;
-      const double gone = (i[ray.axis] - ray.through[ray.axis]) / ray.rate[ray.axis];
+      const int behind = i[ray.axis] - ray.through[ray.axis];
+      const double gone = behind / ray.rate[ray.axis];
       if (camera.perspective && ray.depth + gone * ray.pace < camera.near) continue;
       const std::array<double, 2> centre{i[first] + gone * ray.rate[first] + ray.aside[0],
                                          i[second] + gone * ray.rate[second] + ray.aside[1]};
-      const Layer layer(samples_, i, first, second, centre);
-      if (!layer.is_empty()) out.pass(layer, ray.length, ray.stride);
+      Layer layer(samples_, i, first, second, centre);
+      out.pass(layer, bundle, behind, ray.stride);
+      if (out.is_opaque()) break;
     }
     return out;
   }

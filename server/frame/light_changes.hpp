@@ -9,12 +9,13 @@
 
 namespace windsplat::frame {
 
-// Integrals of squares over the picture, in squares of its height, and the width of the cells where
-// the light differs, in heights of the picture.
+// Quantities of quality::Content: integrals of squares over the picture, in squares of its height,
+// and the width of the cells where the light differs, in heights of the picture.
 struct LightChanges {
-  Mean step;                                     // from one cell to the next
-  std::array<Mean, quality::bends_count> bends;  // quality::Content::bends
-  Mean incline;                                  // for each cell of distance, from place to place
+  Mean step;  // from one cell to the next
+  std::array<Mean, quality::cells_apart.size()> cell_bends;
+  std::array<Mean, quality::distances_count> bends;
+  std::array<Mean, quality::distances_count> shifts;
   Mean order;
   Mean cell;
 };

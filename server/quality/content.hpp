@@ -3,12 +3,25 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 
 namespace windsplat::quality {
 
-// Distances across a ray at which the light of the medium is compared, in cells.
-inline constexpr std::size_t bends_count = 4;
-inline constexpr std::array<double, bends_count> bend_distances{0.125, 0.35, 1, 2};
+// Distances across a ray at which the light of the medium is compared, in cells and in heights of
+// the picture: those of half a pixel of pictures that are 64 to 1000 pixels high, and more.
+inline constexpr std::array<double, 2> cells_apart{1, 2};
+inline constexpr std::size_t distances_count = 5;
+inline constexpr std::array<double, distances_count> distances{1 / 2000.0, 1 / 800.0, 1 / 320.0,
+                                                               1 / 128.0, 1 / 40.0};
+using AtDistances = std::array<double, distances_count>;
+
+// Errors of some pixels of a view, composited from the kernels that their rays meet: RMS over the
+// picture of linear premultiplied RGBA.
+struct Trials {
+  double kernel = 0;  // of method `kernel`
+  double slab = 0;    // of slabs of one cell
+  double half = 0;    // of slabs of half a cell
+};
 
 // Lengths are in heights of the picture. Means are over what is visible, weighted by its light. The
 // defaults are medians over the generated family (docs/benchmarks/error.md).
@@ -26,20 +39,20 @@ struct Content {
   double finest_cell = 0.025;  // the narrowest edge of a cell
   // The light of the medium alone: root of the integral of squares over the picture.
   double step = 0.063;  // its difference from one cell to the next
-  // Its second difference at each of the distances.
-  std::array<double, bends_count> bends{2e-3, 0.013, 0.062, 0.14};
-  double incline = 0.07;     // its difference for each cell, over short distances
+  // Its second differences, and those between both sides, to the right and left.
+  std::array<double, cells_apart.size()> cell_bends{0.062, 0.14};
+  AtDistances bends{6.3e-5, 3.8e-4, 2.2e-3, 0.012, 0.068};
+  AtDistances shifts{2.8e-3, 7.1e-3, 0.0175, 0.042, 0.11};
   double order = 3.7e-3;     // its change if neighbouring cells changed places along the ray
   double step_cell = 0.025;  // width of the cells where it differs
+  std::optional<Trials> trials = std::nullopt;
 };
 
+// A quantity at any distance: powers of it between those known, beyond them constant, and below
+// them of an order, as where the light is smooth.
+double at_distance(const AtDistances& known, double distance, int order);
+
 // The same content `times` as large in the picture.
-inline Content scaled(Content content, double times) {
-  content.length *= times;
-  content.cell *= times;
-  content.finest_cell *= times;
-  content.step_cell *= times;
-  return content;
-}
+Content scaled(Content content, double times);
 
 }  // namespace windsplat::quality

@@ -15,9 +15,11 @@ double logarithm(double value, double least, double most = 1e30) {
   return std::log(std::clamp(value, least, most));
 }
 
+// Lines, a medium, both.
+std::size_t shown(const Kind& kind) { return kind.lines && kind.medium ? 2 : kind.medium ? 1 : 0; }
+
 const Law& law_of(const Kind& kind, Cause cause) {
-  const std::size_t content = kind.lines && kind.medium ? 2 : kind.medium ? 1 : 0;
-  return laws[3 * static_cast<std::size_t>(cause) + content];
+  return laws[3 * static_cast<std::size_t>(cause) + shown(kind)];
 }
 
 }  // namespace
@@ -35,27 +37,22 @@ namespace {
 
 // The light of the medium that a picture of fewer pixels has lost when it is shown at the full
 // size: what is between its pixels, and, since its size is whole pixels, what its proportions move.
-double lost_between_pixels(const Content& content, const Setting& setting,
-                           const Viewpoint& viewpoint) {
-  const double cell = std::max(content.step_cell, 1e-30);
-  const auto width = static_cast<double>(viewpoint.width);
+// Merged samples lose what is between them.
+double lost_light(const Content& content, const Setting& setting, const Viewpoint& viewpoint) {
   const double high = viewpoint.pixels_high;
+  const double shape = static_cast<double>(viewpoint.width) / high;
   const PictureSize size = size_at({viewpoint.width, viewpoint.pixels_high}, setting);
   const double few = size.height;
-  const double merged = setting.coarser > 0 ? std::exp2(setting.coarser - 1) : 0;
-  const double half_pixel = std::hypot(0.5 / (few * cell), merged);
-  std::size_t k = 1;
-  while (k + 1 < bends_count && bend_distances[k] < half_pixel) ++k;
-  const auto log_bend = [&](std::size_t i) { return logarithm(content.bends[i], 1e-6); };
-  const double from = std::log(bend_distances[k - 1]);
-  const double to = std::log(bend_distances[k]);
-  const double at = std::log(std::min(half_pixel, bend_distances.back()));
-  const double slope =
-      at < from ? 2 : (log_bend(k) - log_bend(k - 1)) / (to - from);  // smooth below
-  const double bend = std::exp(log_bend(k - 1) + slope * (at - from));
-  const double other = size.width / few / (width / high) - 1;
-  const double aside = std::abs(other) * width / high / std::sqrt(12.0);  // RMS over the picture
-  return std::hypot(0.5 * bend, content.incline * aside / cell);
+  const double other = size.width / few / shape - 1;
+  const double aside = std::abs(other) * shape / std::sqrt(12.0);  // RMS over the picture
+  const double moved = at_distance(content.shifts, 0.5 * aside, 1);
+  const double bend = at_distance(content.bends, 0.5 / few, 2);
+  double merged = 0;
+  if (setting.coarser > 0) {
+    const auto last = static_cast<int>(cells_apart.size()) - 1;
+    merged = content.cell_bends[static_cast<std::size_t>(std::min(setting.coarser - 1, last))];
+  }
+  return std::hypot(moved, 0.5 * bend, 0.5 * merged) / std::sqrt(shape);
 }
 
 }  // namespace
@@ -89,11 +86,11 @@ Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& 
     out[n + 1] = logarithm(content.cell_depth, 1e-5, 1e2);
     out[n + 2] = std::log(content.tint + 0.003);
     out[n + 3] = logarithm(content.step, 1e-5);
-    out[n + 4] = logarithm(content.bends[2], 1e-5);
-    out[n + 5] = logarithm(content.bends[3], 1e-5);
+    out[n + 4] = logarithm(content.cell_bends[0], 1e-5);
+    out[n + 5] = logarithm(content.cell_bends[1], 1e-5);
     out[n + 6] = logarithm(content.order, 1e-7);
     out[n + 7] = logarithm(content.step_cell * pixels, 0.1);
-    out[n + 8] = logarithm(lost_between_pixels(content, setting, viewpoint), 1e-6);
+    out[n + 8] = logarithm(lost_light(content, setting, viewpoint), 1e-6);
   }
   n += 9;
   if (kind.lines && kind.medium) out[n] = logarithm(content.line_depth, 1e-5, 1e2);
@@ -125,38 +122,44 @@ Terms terms_of(const Features& features) {
 double error_of_cause(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   const Cause cause = cause_of(setting, viewpoint);
   const Law& law = law_of(kind, cause);
+  if (cause == Cause::kernel || cause == Cause::slab) {
+    return std::exp(law.base) * tried_error(kind, setting, viewpoint);
+  }
   Features features = features_of(kind, setting, viewpoint);
   for (std::size_t i = 0; i < features_count; ++i) {
     features[i] = std::clamp(features[i], law.least[i], law.most[i]);
   }
   const Terms terms = terms_of(features);
-  double log_error = std::inner_product(terms.begin(), terms.end(), law.slope.begin(), law.base);
-  if (cause == Cause::slab && kind.medium) {
-    log_error += order_of_slabs * std::log(kind.thickness / setting.thinner);
-  }
-  return std::exp(std::min(log_error, 0.0));
-}
-
-// Of a picture of full size and every sample. Lines in a thin medium have the error of lines alone.
-double error_of_method(const Kind& kind, const Setting& whole, const Viewpoint& viewpoint) {
-  const double error = error_of_cause(kind, whole, viewpoint);
-  if (!kind.lines || !kind.medium || cause_of(whole, viewpoint) != Cause::kernel) return error;
-  Kind lines = kind;
-  lines.medium = false;
-  const double depth = viewpoint.content.value_or(Content()).depth;
-  return std::max(error, std::exp(-depth) * error_of_cause(lines, whole, viewpoint));
+  return std::exp(
+      std::min(std::inner_product(terms.begin(), terms.end(), law.slope.begin(), law.base), 0.0));
 }
 
 }  // namespace
+
+double tried_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
+  const bool known = viewpoint.content && viewpoint.content->trials;
+  const Trials& trials = known ? *viewpoint.content->trials : typical_trials[shown(kind)];
+  if (setting.method == protocol::MethodName::kernel) return trials.kernel;
+  const double thickness = kind.thickness / setting.thinner;
+  if (thickness >= 1) return trials.slab * thickness * thickness;  // of order 2
+  if (thickness <= 0.5) return trials.half * std::pow(2 * thickness, 2);
+  const double share = -std::log2(thickness);
+  return std::pow(trials.slab, 1 - share) * std::pow(trials.half, share);
+}
 
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   // A smaller picture and merged samples have the error of the method too. It is independent of
   // theirs for a medium; the laws of lines are fitted to the whole error.
   const Setting whole{setting.method, 0, 0, setting.thinner};
-  double error = error_of_method(kind, whole, viewpoint);
+  double error = error_of_cause(kind, whole, viewpoint);
   if (setting != whole) {
     const double power = kind.lines ? 4 : 2;
-    const double other = error_of_cause(kind, setting, viewpoint);
+    double other = error_of_cause(kind, setting, viewpoint);
+    if (setting.coarser > 0 && setting.half_level > 0) {
+      // No less than that of as many pixels of every sample.
+      const Setting every{setting.method, setting.half_level, 0, setting.thinner};
+      other = std::max(other, error_of_cause(kind, every, viewpoint));
+    }
     error = std::pow(std::pow(other, power) + std::pow(error, power), 1 / power);
   }
   return {std::clamp(std::hypot(error, kind.rule / setting.thinner, kind.stop), error_least, 1.0),

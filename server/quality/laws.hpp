@@ -28,7 +28,8 @@ inline constexpr std::size_t terms_count = features_count + 7;
 using Terms = std::array<double, terms_count>;
 
 // error = exp(base + sum of slopes times terms). The features are clamped to the range that was
-// fitted, so that the law is constant beyond it.
+// fitted, so that the law is constant beyond it. For kernels and slabs exp(base) is the factor of
+// the error of tried pixels.
 struct Law {
   double base = 0;
   Terms slope{};
@@ -53,11 +54,11 @@ Cause cause_of(const Setting& setting, const Viewpoint& viewpoint);
 // The scatter of the errors of one cause.
 const Scatter& error_scatter(const Kind& kind, Cause cause);
 
-Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
+// The error of the tried pixels with the method of a setting at full size and of every sample;
+// where the content of a view is unknown, that of a typical one.
+double tried_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 
-// The power of errors in the thickness of slabs, in cells, is not fitted: it is the order of the
-// method.
-inline constexpr double order_of_slabs = 2;
+Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 
 // Linear RMSE, and milliseconds of rendering on the machine on which the laws were fitted.
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);

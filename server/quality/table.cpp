@@ -19,10 +19,10 @@ constexpr std::size_t nearest_max = 8;
 // Correlations of the errors of settings by cause: order of kernels, fewer pixels, merged samples,
 // slabs (the residuals of the laws over the generated family).
 constexpr std::array<std::array<double, 4>, 4> correlations{{
-    {0.85, 0.25, 0.2, 0.5},
-    {0.25, 0.85, 0.5, 0.35},
-    {0.2, 0.5, 0.85, 0.15},
-    {0.5, 0.35, 0.15, 0.85},
+    {0.85, 0, 0, 0.15},
+    {0, 0.85, 0.5, 0},
+    {0, 0.5, 0.85, 0},
+    {0.15, 0, 0, 0.85},
 }};
 
 // Linear RMSE of a JPEG of quality 90, the median of the samples (docs/benchmarks/error.md).

@@ -103,7 +103,7 @@ Measurements read(const std::string& path) {
 // measurements, after that of a final frame and after a calibration run, both at the first
 // viewpoint of the scene; the 95 % bounds of the first and the last estimate; estimates and bounds
 // of a view whose content is unknown, without measurements and after that final frame; cause,
-// content, features.
+// content, error of tried pixels, features.
 void list(const Measurements& measurements) {
   const auto members = all_members();
   std::unique_ptr<data::Dataset> dataset;
@@ -142,6 +142,7 @@ void list(const Measurements& measurements) {
                   quality::error_bound(before), quality::error_bound(after), typical.error,
                   quality::error_bound(typical), moved.error, quality::error_bound(moved),
                   static_cast<int>(quality::cause_of(setting, viewpoint)), at[1] % 3);
+      std::printf(",%.4g", quality::tried_error(kind, setting, viewpoint));
       for (const double feature : quality::features_of(kind, setting, viewpoint)) {
         std::printf(",%.5g", feature);
       }

@@ -19,12 +19,14 @@ RIDGE = 30.0  # in units of one measurement of standardised features
 SAFETY = 0.05  # added to logarithms: estimates rather exceed errors
 CAUSES = ["kernel", "smaller", "merged", "slab"]
 CONTENTS = ["lines", "medium", "both"]
-THINNER = {24: 2, 25: 4}  # settings with thinner slabs
+SLAB_OWN = 18  # setting: slabs of the view's thickness
+THINNER = [24, 25]  # settings with thinner slabs
 # The scatter between viewpoints differs from scene to scene. This is the least factor (in steps of
 # 0.1) with which the 95 % bound holds for 95 % of the errors in 95 % of the scenes of the family,
 # after a calibration run at another viewpoint.
 WIDER = 1.8
-FEWEST = 30  # measurements of a group; with fewer its errors are those of single precision
+FEWEST = 30  # measurements of a group; with fewer the errors of tried pixels are taken as they are
+TRIED_CAUSES = [0, 3]  # kernels and slabs
 HALF_LEVEL, COARSER, SLAB = 0, 1, 2  # features
 HALF_LEVEL_MOST = 8  # those of large pictures are extrapolated
 LEAST_EXCESS = 0.3  # of the square of an error, with less it is that of the method
@@ -32,7 +34,7 @@ LEAST_EXCESS = 0.3  # of the square of an error, with less it is that of the met
 # Columns of the list.
 MEMBER, SCENE, VIEW, SETTING, ERROR, PRIOR, AFTER_FINAL, CALIBRATED = range(8)
 BOUND, CALIBRATED_BOUND, TYPICAL, TYPICAL_BOUND, MOVED, MOVED_BOUND = range(8, 14)
-CAUSE, CONTENT, FEATURES = range(14, 17)
+CAUSE, CONTENT, TRIED, FEATURES = range(14, 18)
 
 
 def terms(features):
@@ -65,13 +67,6 @@ class Fit:
         return self.base + terms(numpy.clip(features, *self.bounds)) @ self.slope
 
 
-def order_of_slabs(table):
-    """Logarithm of the square of the slabs' thickness, where that is the cause of errors."""
-    thickness = numpy.array([1 / THINNER.get(int(s), 1) for s in table[:, SETTING]])
-    applies = (table[:, CAUSE] == 3) & (table[:, CONTENT] > 0)
-    return numpy.where(applies, 2 * numpy.log(thickness), 0)
-
-
 def groups(table):
     for cause in range(len(CAUSES)):
         for content in range(len(CONTENTS)):
@@ -79,19 +74,36 @@ def groups(table):
             yield cause, content, rows
 
 
-def fitted(table, features, rows, family):
-    """The fit to rows of a family, or None if they are too few."""
-    rows = rows & family & (table[:, ERROR] > FITTED_ABOVE)
-    if rows.sum() < FEWEST:
-        return None
-    logs = numpy.log(table[rows, ERROR]) - order_of_slabs(table[rows])
-    return Fit(features[rows], logs)
+class Factor:
+    """log(error) = base + log(error of tried pixels)."""
+
+    def __init__(self, table):
+        judged = table[table[:, ERROR] > JUDGED_ABOVE]
+        self.base = 0.0
+        if len(judged) >= FEWEST:
+            self.base = SAFETY + numpy.median(numpy.log(judged[:, ERROR] / tried(judged)))
+
+
+def tried(table):
+    return numpy.maximum(table[:, TRIED], FLOOR)
+
+
+def estimates_of(cause, table, features, fitted_to, judged):
+    """Estimates of some rows by the law of a cause that is fitted to others."""
+    if cause in TRIED_CAUSES:
+        return numpy.exp(Factor(table[fitted_to]).base) * tried(table[judged])
+    return numpy.exp(fitted(table, features, fitted_to)(features[judged]))
+
+
+def fitted(table, features, rows):
+    rows = rows & (table[:, ERROR] > FITTED_ABOVE)
+    return Fit(features[rows], numpy.log(table[rows, ERROR]))
 
 
 def methods(table, features):
     """The row of the same view and method with every pixel and sample, for each row."""
     at_full = (features[:, HALF_LEVEL] == 0) & (features[:, COARSER] == 0)
-    at_full &= ~numpy.isin(table[:, SETTING], list(THINNER))
+    at_full &= ~numpy.isin(table[:, SETTING], THINNER)
     row_of = {(*table[i, :3], features[i, SLAB]): i for i in numpy.flatnonzero(at_full)}
     return numpy.array([row_of[(*table[i, :3], features[i, SLAB])] for i in range(len(table))])
 
@@ -111,14 +123,18 @@ def left_out(table, features):
     """Estimates of each member by laws fitted to the others."""
     known = to_fit(table, features)
     laws = numpy.full(len(table), FLOOR)
-    for _, _, rows in groups(table):
+    for cause, _, rows in groups(table):
         for member in numpy.unique(table[rows, MEMBER]):
             own = rows & (table[:, MEMBER] == member)
-            others = (table[:, MEMBER] < FAMILY) & (table[:, MEMBER] != member)
-            fit = fitted(known, features, rows, others)
-            if fit:
-                laws[own] = numpy.exp(fit(features[own]) + order_of_slabs(table[own]))
+            others = rows & (table[:, MEMBER] < FAMILY) & (table[:, MEMBER] != member)
+            laws[own] = estimates_of(cause, known, features, others, own)
     # expected_error of server/quality/laws.cpp
+    every = {(*table[i, :3], *features[i, [SLAB, HALF_LEVEL]]): i
+             for i in numpy.flatnonzero(features[:, COARSER] == 0)
+             if table[i, SETTING] not in THINNER}
+    for i in numpy.flatnonzero((features[:, COARSER] > 0) & (features[:, HALF_LEVEL] > 0)):
+        as_small = every.get((*table[i, :3], *features[i, [SLAB, HALF_LEVEL]]), i)
+        laws[i] = max(laws[i], laws[as_small])
     power = numpy.where(table[:, CONTENT] == 1, 2, 4)
     together = (laws ** power + laws[methods(table, features)] ** power) ** (1 / power)
     worse = features[:, HALF_LEVEL] + features[:, COARSER] > 0
@@ -213,18 +229,31 @@ def numbers(values):
     return ", ".join(f"{value:.4g}" for value in values)
 
 
+def typical_trials(table, content):
+    """Medians over the views of the family."""
+    rows = (table[:, MEMBER] < FAMILY) & (table[:, CONTENT] == content)
+    medians = [numpy.median(tried(table[rows & (table[:, SETTING] == setting)]))
+               for setting in (0, SLAB_OWN, THINNER[0])]
+    return f"{{{numbers(medians)}}}"
+
+
 def write(path, table, features, residual):
     family = table[:, MEMBER] < FAMILY
     known = to_fit(table, features)
+    typical = ", ".join(typical_trials(table, content) for content in range(len(CONTENTS)))
     lines = ["// Made by tests/bench/fit_estimates.py (docs/benchmarks/error.md); do not edit.",
              "#pragma once", "", "#include <array>", "", '#include "server/quality/laws.hpp"', "",
              "namespace windsplat::quality {", "",
+             "// Medians over the family: lines, a medium, both.",
+             f"inline constexpr std::array<Trials, 3> typical_trials{{{{{typical}}}}};", "",
              "// By cause, then lines, a medium, both.",
              "inline constexpr std::array<Law, 12> laws{{"]
     for cause, content, rows in groups(table):
-        fit = fitted(known, features, rows, family)
-        base, slope = (fit.base, fit.slope) if fit else (numpy.log(FLOOR), [0])
-        least, most = fit.bounds if fit else ([0], [0])
+        if cause in TRIED_CAUSES:
+            base, slope, least, most = Factor(table[rows & family]).base, [0], [0], [0]
+        else:
+            fit = fitted(known, features, rows & family)
+            base, slope, (least, most) = fit.base, fit.slope, fit.bounds
         signature, viewpoint, guessed = scatter(table, residual, rows)
         lines += [f"    // {CAUSES[cause]}, {CONTENTS[content]}",
                   f"    {{{base:.4g}, {{{numbers(slope)}}}, {{{numbers(least)}}}, "

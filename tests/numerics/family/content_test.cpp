@@ -61,12 +61,13 @@ TEST(Content, IsFiniteWhereLayersCoincide) {
   }
   scene.lattice.places = places;
   const quality::Content content = frame::content_of(scene);
-  for (const double value : {content.lines, content.shade, content.line_depth, content.depth,
-                             content.cell_depth, content.tint, content.cell, content.step,
-                             content.incline, content.order, content.step_cell}) {
+  for (const double value :
+       {content.lines, content.shade, content.line_depth, content.depth, content.cell_depth,
+        content.tint, content.cell, content.step, content.order, content.step_cell}) {
     EXPECT_TRUE(std::isfinite(value)) << value;
   }
   for (const double bend : content.bends) EXPECT_TRUE(std::isfinite(bend)) << bend;
+  for (const double shift : content.shifts) EXPECT_TRUE(std::isfinite(shift)) << shift;
   EXPECT_GT(content.step, 0);
 }
 
@@ -119,9 +120,60 @@ TEST(Content, TheRimOfAnOpaqueMediumIsSharperThanACell) {
   const auto sharpness = [&](double extinction) {
     scene.scalars.front().extinction = {{0, 0}, {1, extinction}};
     const quality::Content content = frame::content_of(scene);
-    return content.bends[0] / content.bends[2];
+    return content.bends[2] / content.bends[4];  // at a tenth of a cell and at 0.8
   };
   EXPECT_GT(sharpness(100), 5 * sharpness(1e-3));
+}
+
+// Root of the integral over a picture, in squares of its height, of squares of the second
+// differences at so many pixels along both axes.
+double bends_of(const engine::Image& image, int apart) {
+  double bends = 0;
+  const auto channel = [&](int x, int y, std::size_t c) {
+    return static_cast<double>(pixel(image, x, y)[c]);
+  };
+  for (int y = apart; y < image.height - apart; ++y) {
+    for (int x = apart; x < image.width - apart; ++x) {
+      for (std::size_t c = 0; c < 4; ++c) {
+        const double twice = 2 * channel(x, y, c);
+        const double beside = channel(x + apart, y, c) + channel(x - apart, y, c) - twice;
+        const double above = channel(x, y + apart, c) + channel(x, y - apart, c) - twice;
+        bends += (beside * beside + above * above) / 8;
+      }
+    }
+  }
+  return std::sqrt(bends) / image.height;
+}
+
+// An ocean seen along layers that are much thinner than its columns, jets seen from within, with
+// cells of 160 pixels before distant ones, and others: as in pictures drawn by the engine.
+TEST(Content, ChangesOfLightAreThoseOfThePictureAtDistancesInIt) {
+  auto members = family();
+  struct Seen {
+    std::size_t member;
+    std::uint32_t scene;
+    std::uint32_t viewpoint;
+  };
+  for (const Seen& seen : {Seen{19, 1, 2}, Seen{25, 1, 3}, Seen{17, 4, 0}, Seen{2, 1, 0}}) {
+    const FamilyMember& member = members[seen.member];
+    const auto dataset = formula_dataset(member.field, member.formula);
+    const auto number =
+        3 * (100 * static_cast<std::uint32_t>(seen.member) + seen.scene) + seen.scene % 3;
+    auto view = random_view(*dataset, number, seen.viewpoint, 640);
+    view.image.width = view.image.width * 400 / view.image.height;
+    view.image.height = 400;
+    const auto completed = scene::complete(view, *dataset).value();
+    scene::Scene scene = scene::build_scene(completed, *dataset).value();
+    const quality::Content content = frame::content_of(scene);
+    scene.method = scene::Method::slab;
+    const engine::Image drawn = render(scene, 2).image;
+    for (const std::size_t k : {3U, 4U}) {
+      const int apart = static_cast<int>(std::lround(400 * quality::distances[k]));
+      const double bend = bends_of(drawn, apart);
+      EXPECT_LT(std::abs(std::log(content.bends[k] / bend)), std::log(1.6))
+          << member.field.name << ' ' << k << ' ' << content.bends[k] << ' ' << bend;
+    }
+  }
 }
 
 // Lines along x and z in equal parts, as the components of the data are.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "server/quality/table.hpp"
@@ -84,8 +85,9 @@ TEST(Laws, ErrorsAreAtLeastThatOfSinglePrecision) {
   empty.content = Content{};
   empty.content->lines = empty.content->layers = empty.content->depth = 0;
   empty.content->cell_depth = empty.content->line_depth = 0;
-  empty.content->step = empty.content->incline = empty.content->order = 0;
+  empty.content->step = empty.content->order = 0;
   empty.content->bends.fill(0);
+  empty.content->shifts.fill(0);
   for (const Kind& kind : {both, media}) {
     for (const Setting& setting : settings) {
       EXPECT_GE(error_of(kind, setting, empty), error_least);
@@ -93,39 +95,51 @@ TEST(Laws, ErrorsAreAtLeastThatOfSinglePrecision) {
   }
 }
 
-// Lines that cover less of the picture have less error, and a medium whose light differs less from
-// cell to cell loses less in a smaller picture.
+// At full size and of every sample, but for the factor that is fitted.
+TEST(Laws, ErrorsOfMethodsAreThoseOfTriedPixels) {
+  Viewpoint seen{2, {}, 640, 480};
+  seen.content = Content{};
+  for (const Kind& kind : {both, media, Kind{true, false, 1.4, 1}}) {
+    const auto errors = [&](double kernel, double slab) {
+      seen.content->trials = Trials{kernel, slab, slab / 3};
+      return std::array{error_of(kind, {MethodName::kernel, 0, 0}, seen),
+                        error_of(kind, {MethodName::slab, 0, 0}, seen)};
+    };
+    const auto [kernel, slab] = errors(4e-3, 1e-3);
+    EXPECT_NEAR(kernel, 4e-3, 2e-3);
+    EXPECT_NEAR(slab, 1e-3, 5e-4);
+    EXPECT_NEAR(errors(8e-3, 1e-3)[0], 2 * kernel, 1e-12);
+    EXPECT_NEAR(errors(8e-3, 1e-3)[1], slab, 1e-12);
+    EXPECT_NEAR(errors(4e-3, 3e-3)[1], 3 * slab, 1e-12);
+    EXPECT_LE(errors(0, 0)[0], error_least);
+    errors(4e-3, 1e-3);
+    const auto thinner = [&](int by) {
+      return error_of(kind, {MethodName::slab, 0, 0, by}, seen) / errors(4e-3, 1e-3)[1];
+    };
+    EXPECT_NEAR(thinner(2), 1.0 / 3, 1e-9);
+    EXPECT_NEAR(thinner(4), 1.0 / 12, 1e-9);
+  }
+}
+
+// Lines that cover less of the picture lose less in a smaller one, and so does a medium whose light
+// differs less from cell to cell.
 TEST(Laws, ErrorsGrowWithTheirCauses) {
   Viewpoint seen{2, {}, 640, 480};
   seen.content = Content{};
+  seen.content->trials = Trials{1e-4, 1e-4, 1e-4};
   Viewpoint sparse = seen;
   sparse.content->lines /= 5;
-  sparse.content->layers /= 5;
   const Kind lines{true, false, 1.4, 1};
-  EXPECT_LT(error_of(lines, {MethodName::kernel, 0, 0}, sparse),
-            error_of(lines, {MethodName::kernel, 0, 0}, seen));
+  for (const Setting& setting :
+       {Setting{MethodName::kernel, 2, 0}, Setting{MethodName::kernel, 0, 1}}) {
+    EXPECT_LT(error_of(lines, setting, sparse), error_of(lines, setting, seen));
+  }
   Viewpoint smooth = seen;
   smooth.content->step /= 5;
-  smooth.content->incline /= 5;
   for (double& bend : smooth.content->bends) bend /= 5;
+  for (double& shift : smooth.content->shifts) shift /= 5;
   EXPECT_LT(error_of(media, {MethodName::kernel, 2, 0}, smooth),
             error_of(media, {MethodName::kernel, 2, 0}, seen));
-  Viewpoint plain = seen;  // of one colour: the order of its samples makes no difference
-  plain.content->tint /= 5;
-  plain.content->order /= 5;
-  EXPECT_LT(error_of(media, {MethodName::kernel, 0, 0}, plain),
-            error_of(media, {MethodName::kernel, 0, 0}, seen));
-}
-
-// Lines in a medium that is hardly there have the error of lines alone.
-TEST(Laws, AThinMediumLeavesTheErrorOfLines) {
-  Viewpoint seen{2, {}, 640, 480};
-  seen.content = Content{};
-  seen.content->depth = seen.content->cell_depth = seen.content->line_depth = 1e-9;
-  seen.content->step = seen.content->incline = seen.content->order = 1e-10;
-  seen.content->bends.fill(1e-10);
-  const Setting kernel{MethodName::kernel, 0, 0};
-  EXPECT_GE(error_of(both, kernel, seen), 0.999 * error_of({true, false, 1.4, 1}, kernel, seen));
 }
 
 // A size of whole pixels changes the proportions, which moves what is seen.
@@ -133,10 +147,40 @@ TEST(Laws, APictureOfOtherProportionsHasAGreaterError) {
   const Setting half{MethodName::kernel, 2, 0};
   Viewpoint even{2, {}, 640, 320};
   even.content = Content{};
-  even.content->bends = {1e-5, 1e-4, 1e-3, 4e-3};  // smooth, but inclined
+  // Smooth, but inclined.
+  even.content->bends = {1e-6, 6e-6, 4e-5, 2e-4, 2e-3};
+  even.content->shifts = {1e-3, 2.5e-3, 6e-3, 1.6e-2, 5e-2};
+  even.content->trials = Trials{1e-5, 1e-5, 1e-5};
   Viewpoint odd = even;
   odd.width = 641;
   EXPECT_GT(error_of(media, half, odd), 1.2 * error_of(media, half, even));
+}
+
+// Below the least distance light is taken to be smooth, beyond the greatest it has no structure.
+TEST(Content, PowersOfTheDistanceAreKeptBetweenDistances) {
+  AtDistances known{};
+  for (std::size_t k = 0; k < distances_count; ++k) known[k] = std::pow(distances[k], 1.3);
+  for (const double distance : {1 / 2000.0, 1 / 1000.0, 1 / 333.0, 1 / 60.0, 1 / 40.0}) {
+    EXPECT_NEAR(at_distance(known, distance, 2) / std::pow(distance, 1.3), 1, 1e-9) << distance;
+  }
+  EXPECT_NEAR(at_distance(known, 1 / 8000.0, 2), known.front() / 16, 1e-12);
+  EXPECT_NEAR(at_distance(known, 1 / 8000.0, 1), known.front() / 4, 1e-12);
+  EXPECT_EQ(at_distance(known, 0, 2), 0);
+  EXPECT_NEAR(at_distance(known, 1, 2) / known.back(), 1, 1e-9);
+}
+
+TEST(Content, SeenTwiceAsLargeChangesAtTwiceTheDistance) {
+  Content content;
+  for (std::size_t k = 0; k < distances_count; ++k) {
+    content.bends[k] = std::pow(distances[k], 1.3);
+    content.shifts[k] = std::pow(distances[k], 0.7);
+  }
+  const Content large = scaled(content, 2);
+  EXPECT_DOUBLE_EQ(large.cell, 2 * content.cell);
+  for (std::size_t k = 1; k < distances_count; ++k) {
+    EXPECT_NEAR(large.bends[k] / std::pow(distances[k] / 2, 1.3), 1, 1e-9);
+    EXPECT_NEAR(large.shifts[k] / std::pow(distances[k] / 2, 0.7), 1, 1e-9);
+  }
 }
 
 TEST(Laws, IncompleteViewsHavePositiveFiniteErrors) {

@@ -1,0 +1,233 @@
+// Places in the picture -> rays -> differences of their light.
+#include "server/frame/pixel_trials.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+
+#include "server/base/pcg3d.hpp"
+#include "server/frame/ray_kernels.hpp"
+#include "server/frame/ray_light.hpp"
+
+namespace windsplat::frame {
+namespace {
+
+namespace reference = engine::reference;
+
+// Places over the picture, of which some are tried, evenly at any time: until the standard error of
+// the mean square is this share of it, which is half as much of the error, or they are too many.
+constexpr std::uint32_t places_bits = 10;
+constexpr std::uint32_t places_count = 1U << places_bits;
+constexpr int tried_least = 64;
+constexpr double told_share = 0.35;
+// Errors that are surely less than the least one that is reported need not be known.
+constexpr int tried_for_none = 256;
+constexpr double none_below = 1e-10;
+// A measure of the time.
+constexpr int drawn_most = 512;
+constexpr double layers_most = 65536;
+
+struct Place {
+  Index near{};         // a sample beside the ray
+  double x = 0, y = 0;  // corner of a pixel
+  bool inside = false;  // the picture
+};
+
+// The places in an order in which the first ones, however many, are spread evenly.
+std::uint32_t nth_place(std::uint32_t n) {
+  std::uint32_t out = 0;
+  for (std::uint32_t bit = 0; bit < places_bits; ++bit)
+    out |= (n >> bit & 1U) << (places_bits - 1 - bit);
+  return out;
+}
+
+// Places spread evenly over the part of a picture where the lattice is.
+class Places {
+ public:
+  explicit Places(const RayKernels& kernels) : view_(kernels.view()), samples_(kernels.samples()) {}
+
+  struct Spread {
+    std::vector<Place> places;
+    double area = 0;  // square pixels
+  };
+  [[nodiscard]] Spread spread(const std::vector<RayThrough>& through) const {
+    struct Candidate {
+      Index sample{};
+      Vec at{};
+      double pixels = 0;  // per world unit
+      double up_to = 0;   // sum of areas
+    };
+    std::vector<Candidate> candidates;
+    Spread out;
+    for (const RayThrough& one : through) {
+      const Vec at = reference::to_camera(view_, from_eye(one.sample));
+      if (view_.perspective && at[2] <= view_.near) continue;
+      const double pixels = 1 / (view_.pixel * (view_.perspective ? at[2] : 1));
+      out.area += one.stands_for * face(one.sample) * pixels * pixels;
+      candidates.push_back({one.sample, at, pixels, out.area});
+    }
+    for (const Candidate& one : candidates) {
+      while (out.places.size() < places_count) {
+        const auto taken = static_cast<std::uint32_t>(out.places.size());
+        if ((taken + 0.5) * out.area >= one.up_to * places_count) break;
+        // Near the sample, at random.
+        const auto random = pcg3d({taken, 41, 43});
+        const double wide = 1.4 * one.pixels * std::cbrt(volume(one.sample));
+        const auto near = [&](double at, std::uint32_t bits) {
+          return at * one.pixels + wide * (bits / 4294967296.0 - 0.5);
+        };
+        const double x = view_.half_width + near(one.at[0], random[0]);
+        const double y = view_.half_height + near(one.at[1], random[1]);
+        const bool inside =
+            x >= 0 && y >= 0 && x <= 2 * view_.half_width && y <= 2 * view_.half_height;
+        out.places.push_back({one.sample, std::floor(x), std::floor(y), inside});
+      }
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] Vec from_eye(const Index& i) const {
+    const glm::dvec3 place = samples_.place(i);
+    return reference::plus({place.x, place.y, place.z}, -1, view_.eye);
+  }
+  [[nodiscard]] double volume(const Index& i) const {
+    return samples_.edge(i, 0) * samples_.edge(i, 1) * samples_.edge(i, 2);
+  }
+  // The volume of a cell over the length of the ray in the lattice, world units.
+  [[nodiscard]] double face(const Index& i) const {
+    Vec way = view_.forward;
+    double from = -1e300;
+    if (view_.perspective) {
+      way = from_eye(i);
+      from = -reference::length(way);
+      way = reference::scaled(way, -1 / from);
+    }
+    double to = 1e300;
+    double steepest = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double rate = way[a] / std::max(samples_.edge(i, a), 1e-30);
+      if (std::abs(rate) < 1e-12) continue;
+      steepest = std::max(steepest, std::abs(rate));
+      const double low = (samples_.low()[a] - 0.5 - i[a]) / rate;
+      const double high = (samples_.high()[a] - 0.5 - i[a]) / rate;
+      from = std::max(from, std::min(low, high));
+      to = std::min(to, std::max(low, high));
+    }
+    return volume(i) / std::max(1 / steepest, to - from);
+  }
+
+  const reference::View& view_;
+  const DrawnSamples& samples_;
+};
+
+// Mean squares of differences at places.
+class MeanSquare {
+ public:
+  void add(double square) {
+    ++count_;
+    sum_ += square;
+    squares_ += square * square;
+  }
+  [[nodiscard]] double mean() const { return count_ > 0 ? sum_ / count_ : 0; }
+  [[nodiscard]] double standard_error() const {
+    if (count_ < 2) return mean();
+    return std::sqrt(std::max(0.0, squares_ / count_ - mean() * mean()) / (count_ - 1));
+  }
+  [[nodiscard]] bool is_told() const {
+    if (count_ < tried_least) return false;
+    if (standard_error() < told_share * mean()) return true;
+    return count_ >= tried_for_none && mean() + 3 * standard_error() < none_below;
+  }
+
+ private:
+  int count_ = 0;
+  double sum_ = 0;
+  double squares_ = 0;
+};
+
+struct Squares {
+  double kernel = 0;
+  double slab = 0;
+  double half = 0;
+};
+
+class PixelTrials {
+ public:
+  explicit PixelTrials(const scene::Scene& scene) : scene_(scene), kernels_(scene), light_(scene) {}
+
+  // Few places may have most of the error, and sooner too few than too many of them are met: the
+  // standard error is added.
+  quality::Trials run(const std::vector<RayThrough>& through) {
+    const Places::Spread spread = Places(kernels_).spread(through);
+    const std::vector<Place>& places = spread.places;
+    MeanSquare kernel;
+    MeanSquare slab;
+    MeanSquare half;
+    int drawn = 0;
+    for (std::uint32_t n = 0; n < places_count && !places.empty(); ++n) {
+      if (kernel.is_told() && (scene_.scalars.empty() || slab.is_told())) break;
+      if (drawn == drawn_most || kernels_.layers_passed() > layers_most) break;
+      const Place& place = places[nth_place(n) % places.size()];
+      Squares here;
+      if (place.inside && kernels_.meets(place.near, ray(place.x + 0.5, place.y + 0.5))) {
+        here = differences(place);
+        ++drawn;
+      }
+      kernel.add(here.kernel);
+      slab.add(here.slab);
+      half.add(here.half);
+    }
+    const double pixels = static_cast<double>(scene_.camera.width) * scene_.camera.height;
+    const auto error = [&](const MeanSquare& of) {
+      return std::sqrt(spread.area / pixels * (of.mean() + of.standard_error()));
+    };
+    // By depth in quarters of a slab, a method of order 2 lacks a sixteenth and a quarter.
+    return {error(kernel), error(slab) * 16 / 15, error(half) * 4 / 3};
+  }
+
+ private:
+  [[nodiscard]] PictureRay ray(double x, double y) const {
+    return picture_ray(kernels_.view(), x, y);
+  }
+
+  // Pixels of a block at a place: errors of lines are in few of them, those of a medium in many.
+  Squares differences(const Place& place) {
+    constexpr int edge = 4;
+    rays_.clear();
+    for (int n = 0; n < edge * edge; ++n) {
+      const int column = n % edge;
+      const int row = n / edge;
+      const bool taken = scene_.scalars.empty() || (2 * column + 1) % 5 == row;
+      if (taken) rays_.push_back(ray(place.x + column - 1.5, place.y + row - 1.5));
+    }
+    const double wide = scene_.vector ? scene_.vector->r2 : 0;
+    const RayKernelList& found = kernels_.around(place.near, rays_, wide);
+    const auto count = static_cast<double>(rays_.size());
+    Squares out;
+    for (const PictureRay& one : rays_) {
+      const Light drawn = light_.by_kernels(found, one);
+      const RayLight::ByDepth by_depth = light_.by_depth(found, one);
+      out.kernel += square_difference(drawn, by_depth.exact) / count;
+      out.slab += square_difference(by_depth.slabs, by_depth.exact) / count;
+      out.half += square_difference(by_depth.halves, by_depth.exact) / count;
+    }
+    return out;
+  }
+
+  const scene::Scene& scene_;
+  RayKernels kernels_;
+  RayLight light_;
+  std::vector<PictureRay> rays_;
+};
+
+}  // namespace
+
+quality::Trials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough>& through) {
+  return PixelTrials(scene).run(through);
+}
+
+}  // namespace windsplat::frame
