@@ -24,10 +24,11 @@ struct Faces {
   float depth[slabs_ahead + 1];  // their faces, front to back
   Slab* slab[slabs_ahead];
   bool begins, ends;  // all of the splat lies behind the first face, before the last
-  bool thin;          // the slabs are thinner than its cell
+  bool fine;          // the slabs are thinner than its cell, or the near plane cuts it
 };
 
-// Slabs of at least about 3/4 cells along the rays use the coarse partial footprints.
+// Slabs of at least about 3/4 cells along the rays use the coarse partial footprints, unless the
+// near plane or the body cuts the splat: what is cut off is not in another slab.
 constexpr float coarse_cells2 = 0.5F;
 
 // The squared length of a ray in cells per unit of view depth, near the centre of the splat.
@@ -73,7 +74,7 @@ struct SplatRays {
 };
 
 template <bool Perspective, From Start, class Lanes>
-KERNEL_INLINE void find_rays(const Lanes& s, bool thin, const Tile& tile, SplatRays& rays) {
+KERNEL_INLINE void find_rays(const Lanes& s, bool fine, const Tile& tile, SplatRays& rays) {
   for (int b = 0; b < rays.count; ++b) {
     const int row = rays.row[b];
     const int column = rays.column[b];
@@ -87,7 +88,7 @@ KERNEL_INLINE void find_rays(const Lanes& s, bool thin, const Tile& tile, SplatR
       store(lane.tau, rays.tau + at);
       store(lane.behind, rays.behind + at);
       store(lane.cells * inverse_half_chord(lane.r2), rays.scale + at);
-      if (thin) {
+      if (fine) {
         const PartialTerms terms = partial_terms_at(lane.r2);
         for (int k = 0; k < partial_terms; ++k) store(terms.q[k], rays.term[k] + at);
       } else {
@@ -98,13 +99,13 @@ KERNEL_INLINE void find_rays(const Lanes& s, bool thin, const Tile& tile, SplatR
 }
 
 // The fraction of the splat before a face, for the vector of pixels `at`.
-template <bool Thin, bool Limited>
+template <bool Fine, bool Limited>
 KERNEL_INLINE Pixel fraction_at(const SplatRays& rays, float face, int at) {
   Pixel depth = all<Pixel>(face);
   if (Limited) depth = hn::Min(depth, load<Pixel>(rays.limit + at));
   const Pixel half_chords =
       clamped((depth - load<Pixel>(rays.behind + at)) * load<Pixel>(rays.scale + at), -1.0F, 1.0F);
-  if (!Thin) return partial_coarse_at(load<Pixel>(rays.term[0] + at), half_chords);
+  if (!Fine) return partial_coarse_at(load<Pixel>(rays.term[0] + at), half_chords);
   PartialTerms terms;
   for (int k = 0; k < partial_terms; ++k) terms.q[k] = load<Pixel>(rays.term[k] + at);
   return partial_at(terms, half_chords);
@@ -112,14 +113,14 @@ KERNEL_INLINE Pixel fraction_at(const SplatRays& rays, float face, int at) {
 
 // Finds the optical depths between the last face and the one at `face`; whole: the splat ends
 // before it. Returns which blocks have any.
-template <bool Thin, bool Limited>
+template <bool Fine, bool Limited>
 KERNEL_INLINE std::uint32_t find_parts(SplatRays& rays, float face, bool whole) {
   std::uint32_t found = 0;
   for (int b = 0; b < rays.count; ++b) {
     Pixel most = hn::Zero(PixelTag());
     for (int l = 0; l < block_pixels; l += pixel_lanes) {
       const int at = b * block_pixels + l;
-      const Pixel after = whole ? all<Pixel>(1.0F) : fraction_at<Thin, Limited>(rays, face, at);
+      const Pixel after = whole ? all<Pixel>(1.0F) : fraction_at<Fine, Limited>(rays, face, at);
       // Rounded, it may fall.
       const Pixel fraction = hn::Max(after - load<Pixel>(rays.before + at), hn::Zero(PixelTag()));
       const Pixel part = load<Pixel>(rays.tau + at) * fraction;
@@ -135,17 +136,17 @@ KERNEL_INLINE std::uint32_t find_parts(SplatRays& rays, float face, bool whole) 
 
 // Adds the parts of the splat in each slab to the blocks of `rays`. Returns the number of blocks
 // of slabs changed. Limited: without the part behind the body.
-template <bool Thin, bool Limited, class Lanes>
+template <bool Fine, bool Limited, class Lanes>
 KERNEL_INLINE int gather_rays(const Lanes& s, const Faces& faces, SplatRays& rays) {
   int changed = 0;
   for (int at = 0; at < rays.count * block_pixels; at += pixel_lanes) {
     store(
-        faces.begins ? hn::Zero(PixelTag()) : fraction_at<Thin, Limited>(rays, faces.depth[0], at),
+        faces.begins ? hn::Zero(PixelTag()) : fraction_at<Fine, Limited>(rays, faces.depth[0], at),
         rays.before + at);
   }
   for (int n = 0; n < faces.count; ++n) {
     const bool whole = n + 1 == faces.count && faces.ends && !Limited;
-    std::uint32_t found = find_parts<Thin, Limited>(rays, faces.depth[n + 1], whole);
+    std::uint32_t found = find_parts<Fine, Limited>(rays, faces.depth[n + 1], whole);
     changed += __builtin_popcount(found);
     for (; found != 0; found &= found - 1U) {
       const int b = __builtin_ctz(found);
@@ -168,7 +169,6 @@ KERNEL_INLINE int gather_rays(const Lanes& s, const Faces& faces, SplatRays& ray
 template <bool Perspective, From Start, bool Body, class Lanes>
 KERNEL_INLINE void gather_blocks(const Lanes& s, const SplatRecord& record, const Faces& faces,
                                  SplatRays& rays, Tile& tile) {
-  find_rays<Perspective, Start>(s, faces.thin, tile, rays);
   bool limited = false;
   if (Body) {
     for (int b = 0; b < rays.count; ++b) {
@@ -181,13 +181,14 @@ KERNEL_INLINE void gather_blocks(const Lanes& s, const SplatRecord& record, cons
       limited = limited || here;
     }
   }
+  const bool fine = faces.fine || limited;
+  find_rays<Perspective, Start>(s, fine, tile, rays);
   int changed = 0;
   if (limited) {
-    changed = faces.thin ? gather_rays<true, true>(s, faces, rays)
-                         : gather_rays<false, true>(s, faces, rays);
+    changed = gather_rays<true, true>(s, faces, rays);
   } else {
-    changed = faces.thin ? gather_rays<true, false>(s, faces, rays)
-                         : gather_rays<false, false>(s, faces, rays);
+    changed =
+        fine ? gather_rays<true, false>(s, faces, rays) : gather_rays<false, false>(s, faces, rays);
   }
   tile.counters.pixel_updates += std::int64_t{changed} * block_pixels;
   rays.count = 0;
@@ -212,7 +213,8 @@ void gather_on(const Camera& camera, const SplatRecord& record, Slab* slabs, int
   }
   if (faces.count == 0 || record.last - record.middle <= faces.depth[0]) return;
   const float thickness = slabs[0].back - slabs[0].front;
-  faces.thin = thickness * thickness * cells2_of<Start>(record.splat) < coarse_cells2;
+  faces.fine = thickness * thickness * cells2_of<Start>(record.splat) < coarse_cells2 ||
+               (Perspective && near > record.first);
   faces.begins = faces.depth[0] <= record.first - record.middle;
   faces.ends = faces.depth[faces.count] >= record.last - record.middle;
   const std::uint32_t columns = range_mask({record.column_first, record.column_last});
