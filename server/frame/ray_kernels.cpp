@@ -17,6 +17,8 @@ using reference::plus;
 constexpr double half_diagonal = 0.87;
 // What a ray sees through is less than this where a picture is taken to be opaque.
 constexpr double opaque_below = 1e-3;
+// Kernels of a bundle, 408 bytes each; those behind so many are left out by every method alike.
+constexpr std::size_t kernels_most = 8192;
 constexpr std::size_t probes_most = 4;  // rays of a bundle of which this is known
 
 double footprint_at(double r) {
@@ -244,6 +246,7 @@ const std::vector<const RayKernel*>& RayKernels::around(const Index& near,
     int behind = 0;  // layers since all became opaque
     for (const Place& place : path_) {
       add_layer(group, place, bundle);
+      if (found_.size() >= kernels_most) break;
       const double most = *std::max_element(bundle.passed.begin(), bundle.passed.end());
       if (most < opaque_below && ++behind > bundle.cells) break;
     }
