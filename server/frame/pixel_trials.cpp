@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 
 #include "server/base/pcg3d.hpp"
 #include "server/frame/ray_kernels.hpp"
@@ -26,9 +27,9 @@ constexpr double told_share = 0.35;
 // Errors that are surely less than the least one that is reported need not be known.
 constexpr int tried_for_none = 256;
 constexpr double none_below = 1e-10;
-// A measure of the time.
+// Measures of the time: places, and positions visited with kernels met by each ray.
 constexpr int drawn_most = 512;
-constexpr double layers_most = 65536;
+constexpr double work_most = 4e6;
 
 struct Place {
   Index near{};         // a sample beside the ray
@@ -132,6 +133,7 @@ class MeanSquare {
     sum_ += square;
     squares_ += square * square;
   }
+  [[nodiscard]] int count() const { return count_; }
   [[nodiscard]] double mean() const { return count_ > 0 ? sum_ / count_ : 0; }
   [[nodiscard]] double standard_error() const {
     if (count_ < 2) return mean();
@@ -161,7 +163,8 @@ class PixelTrials {
 
   // Few places may have most of the error, and sooner too few than too many of them are met: the
   // standard error is added.
-  quality::Trials run(const std::vector<RayThrough>& through) {
+  // Nothing if too few places can be tried for their work.
+  std::optional<quality::Trials> run(const std::vector<RayThrough>& through) {
     const Places::Spread spread = Places(kernels_).spread(through);
     const std::vector<Place>& places = spread.places;
     MeanSquare kernel;
@@ -170,23 +173,27 @@ class PixelTrials {
     int drawn = 0;
     for (std::uint32_t n = 0; n < places_count && !places.empty(); ++n) {
       if (kernel.is_told() && (scene_.scalars.empty() || slab.is_told())) break;
-      if (drawn == drawn_most || kernels_.layers_passed() > layers_most) break;
+      if (drawn == drawn_most || kernels_.visited() + met_ > work_most) break;
       const Place& place = places[nth_place(n) % places.size()];
       Squares here;
       if (place.inside && kernels_.meets(place.near, ray(place.x + 0.5, place.y + 0.5))) {
-        here = differences(place);
+        const auto differences = differences_at(place);
+        if (!differences) continue;
+        here = *differences;
         ++drawn;
       }
       kernel.add(here.kernel);
       slab.add(here.slab);
       half.add(here.half);
     }
+    const bool told = kernel.count() >= tried_least && (kernel.is_told() || kernel.mean() > 0);
+    if (!places.empty() && !told) return std::nullopt;
     const double pixels = static_cast<double>(scene_.camera.width) * scene_.camera.height;
     const auto error = [&](const MeanSquare& of) {
       return std::sqrt(spread.area / pixels * (of.mean() + of.standard_error()));
     };
     // By depth in quarters of a slab, a method of order 2 lacks a sixteenth and a quarter.
-    return {error(kernel), error(slab) * 16 / 15, error(half) * 4 / 3};
+    return quality::Trials{error(kernel), error(slab) * 16 / 15, error(half) * 4 / 3};
   }
 
  private:
@@ -195,7 +202,8 @@ class PixelTrials {
   }
 
   // Pixels of a block at a place: errors of lines are in few of them, those of a medium in many.
-  Squares differences(const Place& place) {
+  // Nothing if they meet too many kernels or slabs.
+  std::optional<Squares> differences_at(const Place& place) {
     constexpr int edge = 4;
     rays_.clear();
     for (int n = 0; n < edge * edge; ++n) {
@@ -205,12 +213,16 @@ class PixelTrials {
       if (taken) rays_.push_back(ray(place.x + column - 1.5, place.y + row - 1.5));
     }
     const double wide = scene_.vector ? scene_.vector->r2 : 0;
-    const RayKernelList& found = kernels_.around(place.near, rays_, wide);
+    const RayKernelList* const around = kernels_.around(place.near, rays_, wide);
+    if (around == nullptr) return std::nullopt;
+    const RayKernelList& found = *around;
     const auto count = static_cast<double>(rays_.size());
+    met_ += count * static_cast<double>(found.size());
     Squares out;
     for (const PictureRay& one : rays_) {
       const Light drawn = light_.by_kernels(found, one);
       const RayLight::ByDepth by_depth = light_.by_depth(found, one);
+      if (!by_depth.known) return std::nullopt;
       out.kernel += square_difference(drawn, by_depth.exact) / count;
       out.slab += square_difference(by_depth.slabs, by_depth.exact) / count;
       out.half += square_difference(by_depth.halves, by_depth.exact) / count;
@@ -222,11 +234,13 @@ class PixelTrials {
   RayKernels kernels_;
   RayLight light_;
   std::vector<PictureRay> rays_;
+  double met_ = 0;  // kernels by each ray
 };
 
 }  // namespace
 
-quality::Trials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough>& through) {
+std::optional<quality::Trials> pixel_trials(const scene::Scene& scene,
+                                            const std::vector<RayThrough>& through) {
   return PixelTrials(scene).run(through);
 }
 

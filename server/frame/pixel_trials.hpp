@@ -2,6 +2,7 @@
 // against the exact order by depth.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "server/frame/light_changes.hpp"
@@ -11,6 +12,7 @@
 namespace windsplat::frame {
 
 // `through`: samples that the picture shows.
-quality::Trials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough>& through);
+std::optional<quality::Trials> pixel_trials(const scene::Scene& scene,
+                                            const std::vector<RayThrough>& through);
 
 }  // namespace windsplat::frame

@@ -19,6 +19,8 @@ constexpr double half_diagonal = 0.87;
 constexpr double opaque_below = 1e-3;
 // Kernels of a bundle, 408 bytes each; those behind so many are left out by every method alike.
 constexpr std::size_t kernels_most = 8192;
+// Positions of one layer that are visited for a bundle.
+constexpr double positions_most = 16384;
 constexpr std::size_t probes_most = 4;  // rays of a bundle of which this is known
 
 double footprint_at(double r) {
@@ -152,7 +154,8 @@ void RayKernels::find_path(const Group& group, const Index& near, const PictureR
       path_.push_back(*place);
     }
   }
-  layers_passed_ += static_cast<double>(path_.size());
+  constexpr double as_positions = 4;  // the time of a layer
+  visited_ += as_positions * static_cast<double>(path_.size());
   std::sort(path_.begin(), path_.end(),
             [](const Place& a, const Place& b) { return a.depth < b.depth; });
 }
@@ -199,7 +202,7 @@ bool RayKernels::meets(const Index& near, const PictureRay& ray) {
   return false;
 }
 
-bool RayKernels::is_drawn_beside(const Group& group, const Place& place) const {
+bool RayKernels::is_drawn_beside(const Group& group, const Place& place) {
   constexpr double cells_most = 3;
   double reach = 1;
   if (group.lines != nullptr) {
@@ -208,6 +211,7 @@ bool RayKernels::is_drawn_beside(const Group& group, const Place& place) const {
   }
   Index low = place.at;
   Index high = place.at;
+  visited_ += 1;
   for (std::size_t a = 0; a < 3; ++a) {
     if (a == place.axis) continue;
     if (std::abs(place.offset[a]) > reach) return false;  // beside the lattice
@@ -226,7 +230,7 @@ bool RayKernels::is_drawn_beside(const Group& group, const Place& place) const {
   return false;
 }
 
-const std::vector<const RayKernel*>& RayKernels::around(const Index& near,
+const std::vector<const RayKernel*>* RayKernels::around(const Index& near,
                                                         const std::vector<PictureRay>& rays,
                                                         double wide) {
   found_.clear();
@@ -245,7 +249,7 @@ const std::vector<const RayKernel*>& RayKernels::around(const Index& near,
     bundle.passed.assign(std::min(rays.size(), probes_most), 1);
     int behind = 0;  // layers since all became opaque
     for (const Place& place : path_) {
-      add_layer(group, place, bundle);
+      if (!add_layer(group, place, bundle)) return nullptr;
       if (found_.size() >= kernels_most) break;
       const double most = *std::max_element(bundle.passed.begin(), bundle.passed.end());
       if (most < opaque_below && ++behind > bundle.cells) break;
@@ -255,53 +259,74 @@ const std::vector<const RayKernel*>& RayKernels::around(const Index& near,
   for (const RayKernel& kernel : found_) ordered_.push_back(&kernel);
   std::sort(ordered_.begin(), ordered_.end(),
             [](const RayKernel* a, const RayKernel* b) { return a->key < b->key; });
-  return ordered_;
+  return &ordered_;
 }
 
-void RayKernels::add_layer(const Group& group, const Place& place, Bundle& bundle) {
+bool RayKernels::add_layer(const Group& group, const Place& place, Bundle& bundle) {
   const double pixel = view_.pixel * (view_.perspective ? std::max(place.depth, view_.near) : 1);
-  const Vec& d = place.direction;
-  const double d2 = dot(d, d);
+  // Of kernels whose centre is beside the ray, in cells along an axis whose cells are `edge` wide.
+  const auto reach_by = [&](double edge) {
+    double own = group.layers->media.empty() ? 0 : reference::footprint_t;
+    if (group.lines != nullptr) {
+      const double moved =
+          half_diagonal * (group.lines->jitter_center + group.lines->jitter_stride);
+      const double half =
+          std::min(0.5 * group.lines->length / edge, half_diagonal * group.lines->span);
+      own = std::max(own, half + moved + bundle.wide * pixel / edge);
+    }
+    return own + bundle.apart * pixel / edge;
+  };
   double narrowest = 1e300;
   for (std::size_t a = 0; a < 3; ++a) {
     if (group.count(a) > 1) narrowest = std::min(narrowest, place.edges[a]);
   }
   if (narrowest > 1e299) narrowest = place.edges[place.axis];
-  // Of kernels whose centre is beside the ray, cells.
-  double reach = group.layers->media.empty() ? 0 : reference::footprint_t;
-  if (group.lines != nullptr) {
-    const double moved = half_diagonal * (group.lines->jitter_center + group.lines->jitter_stride);
-    const double half =
-        std::min(0.5 * group.lines->length / narrowest, half_diagonal * group.lines->span);
-    reach = std::max(reach, half + moved + bundle.wide * pixel / narrowest);
+  bundle.cells = std::max(bundle.cells, reach_by(narrowest));
+  // In units of the reach along each axis.
+  Vec reach{};
+  Vec d{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    reach[a] = reach_by(group.count(a) > 1 ? place.edges[a] : narrowest);
+    d[a] = place.direction[a] / reach[a];
   }
-  reach += bundle.apart * pixel / narrowest;
-  bundle.cells = std::max(bundle.cells, reach);
+  const double d2 = dot(d, d);
   const double slant = std::sqrt(d2) / std::abs(d[place.axis]);
   Index low = place.at;
   Index high = place.at;
+  double positions = 1;
   for (std::size_t a = 0; a < 3; ++a) {
     if (a == place.axis) continue;
     const double middle = place.at[a] + place.offset[a];
-    low[a] = static_cast<int>(std::max(0.0, std::ceil(middle - reach * slant)));
-    high[a] = static_cast<int>(std::min(group.count(a) - 1.0, std::floor(middle + reach * slant)));
+    const double most = group.count(a) - 1.0;
+    const double from = std::clamp(std::ceil(middle - reach[a] * slant), 0.0, most + 1);
+    const double to = std::clamp(std::floor(middle + reach[a] * slant), -1.0, most);
+    positions *= std::max(0.0, to - from + 1);
+    if (!(positions <= positions_most)) return false;
+    low[a] = static_cast<int>(from);
+    high[a] = static_cast<int>(to);
   }
+  visited_ += positions;
+  const double cells2 = dot(place.direction, place.direction);
   Index i{};
   for (i[2] = low[2]; i[2] <= high[2]; ++i[2]) {
     for (i[1] = low[1]; i[1] <= high[1]; ++i[1]) {
       for (i[0] = low[0]; i[0] <= high[0]; ++i[0]) {
         Vec off{};
-        for (std::size_t a = 0; a < 3; ++a) off[a] = i[a] - place.at[a] - place.offset[a];
-        off[place.axis] = 0;
-        const double along = dot(off, d);
-        const double away2 = dot(off, off) - along * along / d2;
-        if (away2 <= reach * reach) {
-          add(group, i, place, std::sqrt(std::max(away2, 0.0)) - bundle.apart * pixel / narrowest,
-              bundle);
+        Vec scaled{};
+        for (std::size_t a = 0; a < 3; ++a) {
+          if (a != place.axis) off[a] = i[a] - place.at[a] - place.offset[a];
+          scaled[a] = off[a] / reach[a];
         }
+        const double along = dot(scaled, d);
+        if (dot(scaled, scaled) - along * along / d2 > 1) continue;
+        const double passed = dot(off, place.direction);
+        const double away2 = dot(off, off) - passed * passed / cells2;
+        add(group, i, place, std::sqrt(std::max(away2, 0.0)) - bundle.apart * pixel / narrowest,
+            bundle);
       }
     }
   }
+  return true;
 }
 
 void RayKernels::add(const Group& group, const Index& i, const Place& place, double away,

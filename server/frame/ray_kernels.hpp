@@ -47,15 +47,15 @@ class RayKernels {
 
   [[nodiscard]] const engine::reference::View& view() const { return view_; }
   [[nodiscard]] const DrawnSamples& samples() const { return samples_; }
-  // Layers of cells so far, of all rays: a measure of the time.
-  [[nodiscard]] double layers_passed() const { return layers_passed_; }
+  // Kernel positions visited so far, a measure of the time.
+  [[nodiscard]] double visited() const { return visited_; }
 
   // Whether anything is drawn beside the cells that a ray near a sample passes.
   [[nodiscard]] bool meets(const Index& near, const PictureRay& ray);
   // What the first ray, which is near a sample, and all between it and the others may meet, in the
-  // order of method `kernel`. Lines are taken to be at least `wide` pixels to either side.
-  // Valid until the next call.
-  const std::vector<const RayKernel*>& around(const Index& near,
+  // order of method `kernel`. Lines are taken to be at least `wide` pixels to either side. Null if
+  // they are too many to visit. Valid until the next call.
+  const std::vector<const RayKernel*>* around(const Index& near,
                                               const std::vector<PictureRay>& rays, double wide);
 
  private:
@@ -91,9 +91,10 @@ class RayKernels {
                                                            const Index& i) const;
   [[nodiscard]] std::optional<Place> place_at(const Group& group, std::size_t axis, int layer,
                                               Vec guess, const PictureRay& ray) const;
-  [[nodiscard]] bool is_drawn_beside(const Group& group, const Place& place) const;
+  [[nodiscard]] bool is_drawn_beside(const Group& group, const Place& place);
   void find_path(const Group& group, const Index& near, const PictureRay& ray);
-  void add_layer(const Group& group, const Place& place, Bundle& bundle);
+  // False: too many positions.
+  [[nodiscard]] bool add_layer(const Group& group, const Place& place, Bundle& bundle);
   void add(const Group& group, const Index& i, const Place& place, double away, Bundle& bundle);
   void pass(const RayKernel& kernel, Bundle& bundle) const;
   [[nodiscard]] Medium medium(const Group& group, const Index& i) const;
@@ -109,7 +110,7 @@ class RayKernels {
   std::vector<Place> path_;
   std::vector<RayKernel> found_;
   std::vector<const RayKernel*> ordered_;
-  double layers_passed_ = 0;
+  double visited_ = 0;
 };
 
 }  // namespace windsplat::frame

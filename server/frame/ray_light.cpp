@@ -140,7 +140,8 @@ RayLight::ByDepth RayLight::by_depth(const RayKernelList& kernels, const Picture
   const double first = std::floor((from - anchor_) / slab_);
   const double slabs = std::floor((to - anchor_) / slab_) + 1 - first;
   constexpr double slabs_most = 4096;
-  if (!(slabs > 0 && slabs < slabs_most)) return out;
+  out.known = slabs < slabs_most;
+  if (!(slabs > 0) || !out.known) return out;
   const double start = anchor_ + first * slab_;
   const double step = slab_ / pieces_of_slab;
   pieces_.assign(pieces_of_slab * static_cast<std::size_t>(slabs), {});

@@ -24,8 +24,9 @@ class RayLight {
   [[nodiscard]] Light by_kernels(const RayKernelList& kernels, const PictureRay& ray) const;
   struct ByDepth {
     Light exact;
-    Light slabs;   // of one cell
-    Light halves;  // slabs of half a cell
+    Light slabs;        // of one cell
+    Light halves;       // slabs of half a cell
+    bool known = true;  // false: of too many slabs
   };
   ByDepth by_depth(const RayKernelList& kernels, const PictureRay& ray);
 

@@ -23,7 +23,7 @@ namespace windsplat::data::cf {
 namespace {
 
 // Degrees of the columns of a part: longitudes and latitudes of rows of `width` columns.
-struct Positions {
+struct GridOfPart {
   std::array<int, 2> dimensions{-1, -1};  // of rows and of columns, in the part
   std::vector<double> longitude;
   std::vector<double> latitude;
@@ -31,9 +31,9 @@ struct Positions {
 };
 
 // The 2-D positions of a file; empty unless it has exactly one pair of them.
-Result<std::optional<Positions>> positions_in(const ArrayFile& file) {
+Result<std::optional<GridOfPart>> positions_in(const ArrayFile& file) {
   const FileContents& contents = file.contents();
-  std::optional<Positions> found;
+  std::optional<GridOfPart> found;
   for (const FileVariable& variable : contents.variables) {
     if (!variable.numeric || variable.dims.size() != 2 || !is_position(variable)) continue;
     const std::array<int, 2> dims{variable.dims[0], variable.dims[1]};
@@ -41,8 +41,8 @@ Result<std::optional<Positions>> positions_in(const ArrayFile& file) {
     const int longitude = position_on(contents, dims[0], dims[1], true);
     const int latitude = position_on(contents, dims[0], dims[1], false);
     if (longitude < 0 || latitude < 0) continue;
-    if (found) return std::optional<Positions>();
-    found = Positions{dims, {}, {}, contents.dimensions.at(at(dims[1])).length};
+    if (found) return std::optional<GridOfPart>();
+    found = GridOfPart{dims, {}, {}, contents.dimensions.at(at(dims[1])).length};
     for (const int v : {longitude, latitude}) {
       auto values = unpacked_degrees(file, v);
       if (!values) return values.error();
@@ -54,7 +54,7 @@ Result<std::optional<Positions>> positions_in(const ArrayFile& file) {
 
 // How far the positions `b` lie from `a`, in cells along rows and columns: the mean over the
 // samples with neighbours, from the nearest combination of the steps to both.
-std::optional<std::array<double, 2>> offset_between(const Positions& a, const Positions& b) {
+std::optional<std::array<double, 2>> offset_between(const GridOfPart& a, const GridOfPart& b) {
   const std::size_t width = a.width;
   const std::size_t height = a.longitude.size() / std::max<std::size_t>(width, 1);
   if (b.width != width || b.longitude.size() != a.longitude.size() || width < 2 || height < 2) {
@@ -66,7 +66,7 @@ std::optional<std::array<double, 2>> offset_between(const Positions& a, const Po
     for (std::size_t i = 0; i + 1 < width; ++i) {
       const std::size_t n = j * width + i;
       const double shrink = std::cos(a.latitude[n] * 0.017453292519943295);
-      const auto step = [&](const Positions& to, std::size_t m) {
+      const auto step = [&](const GridOfPart& to, std::size_t m) {
         return std::array<double, 2>{
             std::remainder(to.longitude[m] - a.longitude[n], 360.0) * shrink,
             to.latitude[m] - a.latitude[n]};

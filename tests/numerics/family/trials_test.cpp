@@ -43,7 +43,7 @@ void each_pixel(const scene::Scene& scene, const Visit& visit) {
     if (x < 0 || y < 0 || x >= scene.camera.width || y >= scene.camera.height) continue;
     const frame::PictureRay ray = frame::picture_ray(view, x + 0.5, y + 0.5);
     const double wide = scene.vector ? scene.vector->r2 : 0;
-    visit(static_cast<int>(x), static_cast<int>(y), ray, kernels.around(i, {ray}, wide));
+    visit(static_cast<int>(x), static_cast<int>(y), ray, *kernels.around(i, {ray}, wide));
   }
 }
 
