@@ -24,8 +24,8 @@ PictureSize size_at(const PictureSize& view, const Setting& setting) {
   constexpr double weight = 20;         // of a difference in proportions against one in size
   const double proportions = static_cast<double>(view.width) / view.height;
   const double rows = std::max(1.0, view.height * std::exp2(-smaller / 16.0));
-  const double least_aside = rows >= rows_aside ? 1 : 0;
-  const double aside = std::clamp(most_aside * rows, least_aside, static_cast<double>(rows_aside));
+  const double aside =
+      rows < rows_aside ? 0 : std::clamp(most_aside * rows, 1.0, static_cast<double>(rows_aside));
   const int last = std::min(view.height, static_cast<int>(std::ceil(rows + aside)));
   PictureSize best;
   double least = std::numeric_limits<double>::infinity();
