@@ -6,9 +6,9 @@
 
 namespace windsplat::frame {
 
-// The same for the same scene. Takes a few milliseconds: at most 4096 samples with their
-// neighbours, spread evenly over the drawn lattice, are projected onto a coarse grid of the picture
-// and composited in order of depth. The body is ignored.
+// The same for the same scene. At most 4096 samples with their neighbours, spread evenly over the
+// drawn lattice, are projected onto a coarse grid of the picture and composited in order of depth,
+// without the body; then pixels are tried (pixel_trials). Takes some 50 ms, with bounded work.
 quality::Content content_of(const scene::Scene& scene);
 
 }  // namespace windsplat::frame

@@ -240,7 +240,8 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   };
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
-  const Viewpoint viewpoint = filled(seen).viewpoint;
+  // Content that is guessed must not pass for known.
+  const Viewpoint viewpoint = measured.error ? filled(seen).viewpoint : seen;
   Entry entry{viewpoint, {}, {}, false, cause_of(how, viewpoint), 1};
   entry.spread = spread_of(error_scatter(kind_, entry.cause));
   if (measured.error) {
@@ -255,10 +256,14 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   std::deque<Entry>& entries = entries_[setting];
   entries.push_back(entry);
   if (entries.size() <= measurements_max) return;
-  // Times come from calibration runs only, so entries without one are removed first.
-  const auto oldest = std::find_if(entries.begin(), entries.end() - 1,
-                                   [](const Entry& kept) { return !kept.log_ms; });
-  entries.erase(oldest == entries.end() - 1 ? entries.begin() : oldest);
+  // Times of frames are removed first, then errors without a time.
+  const auto last = entries.end() - 1;
+  auto oldest =
+      std::find_if(entries.begin(), last, [](const Entry& kept) { return kept.of_frames; });
+  if (oldest == last) {
+    oldest = std::find_if(entries.begin(), last, [](const Entry& kept) { return !kept.log_ms; });
+  }
+  entries.erase(oldest == last ? entries.begin() : oldest);
 }
 
 void Table::add_frame(std::size_t setting, const Viewpoint& viewpoint, double ms) {

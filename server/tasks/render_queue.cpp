@@ -36,13 +36,14 @@ void Shares::rest(std::uint64_t party) {
   });
 }
 
-void Shares::charge(std::uint64_t party, std::int64_t us) {
+void Shares::charge(std::uint64_t party, std::int64_t us, bool whole) {
   Party& known = parties_[party];
   const std::int64_t at_once = parts_ > 1 && known.mean_us > 0 ? std::min(us, known.mean_us) : us;
   known.owed_us += us - at_once;
   const std::int64_t part = (known.owed_us + parts_ - 1) / parts_;
   known.owed_us -= part;
   known.used_us += at_once + part;
+  if (!whole) return;
   known.mean_us = known.mean_us > 0 ? known.mean_us + (us - known.mean_us) / parts_ : us;
 }
 
@@ -165,7 +166,7 @@ void RenderQueue::done(std::int64_t took_us) {
   running_.reset();
   if (!ran.charged) return;
   Line& line = line_of(ran.kind);
-  line.shares.charge(ran.owner, took_us);
+  line.shares.charge(ran.owner, took_us, !ran.cancel.cancelled());
   if (line.owners.count(ran.owner) == 0) line.shares.rest(ran.owner);
   if (ran.kind == RenderKind::background) return;
   kinds_.charge(number_of(ran.kind), took_us);

@@ -36,9 +36,9 @@ struct RenderJob {
 
 // Usage of a shared resource by several parties. A party that becomes active again starts at the
 // virtual time of the party being served, so that idle time earns no credit (start-time fair
-// queueing: Goyal, Vin, Cheng 1997). What a charge exceeds the mean of the earlier ones by is paid
-// in parts, with each later charge one of `parts` of what is owed, so that one long job does not
-// keep a party waiting for as many turns.
+// queueing: Goyal, Vin, Cheng 1997). The excess of a charge over the mean of the earlier ones is
+// paid in parts, with each later charge one of `parts` of what is owed, so that one long job does
+// not keep a party waiting for as many turns.
 class Shares {
  public:
   Shares() = default;
@@ -47,7 +47,8 @@ class Shares {
   void expect(std::uint64_t party) { parties_[party]; }  // allocates ahead for come()
   void rest(std::uint64_t party);                        // becomes idle
   void begin(std::uint64_t party);
-  void charge(std::uint64_t party, std::int64_t us);
+  // whole: not cancelled, so that it counts in the mean.
+  void charge(std::uint64_t party, std::int64_t us, bool whole = true);
   [[nodiscard]] std::int64_t used_us(std::uint64_t party) const;
   [[nodiscard]] std::size_t known() const { return parties_.size(); }
 

@@ -58,13 +58,14 @@ struct RenderService::State {
       std::optional<RenderQueue::Next> next = queue.pop(options.now_us());
       if (!next) return;
       const bool streams = next->job.kind == Kind::stream;
-      if (streams) note_wait(next->since_us);
+      if (streams && !next->job.cancel.cancelled()) note_wait(next->since_us);
       lock.unlock();
       const std::int64_t took_us = run(*next);
+      const bool whole = !next->job.cancel.cancelled();
       next.reset();  // release what the job holds before locking
       lock.lock();
       queue.done(took_us);
-      if (streams) note_run(took_us);
+      if (streams && whole) note_run(took_us);
     }
   }
 

@@ -27,7 +27,7 @@ struct Faces {
   bool fine;          // the slabs are thinner than its cell, or the near plane cuts it
 };
 
-// Slabs of at least about 3/4 cells along the rays use the coarse partial footprints, unless the
+// Slabs of at least 0.7 cells along the rays use the coarse partial footprints, unless the
 // near plane or the body cuts the splat: what is cut off is not in another slab.
 constexpr float coarse_cells2 = 0.5F;
 

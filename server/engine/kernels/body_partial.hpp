@@ -70,7 +70,7 @@ KERNEL_INLINE Pixel partial_at(const PartialTerms& terms, Pixel v) {
 }
 
 // The same with q = q0 + q1 b^2 alone, for slabs of about a cell or more: there the error,
-// 9e-3 at most and 3.6e-3 RMS, is a hundredth of what a homogeneous slab displaces.
+// 9e-3 at most and 4e-3 RMS, is a hundredth of what a homogeneous slab displaces.
 constexpr float partial_coarse[2] = {0.127539F, -0.139941F};
 
 KERNEL_INLINE Pixel partial_coarse_term_at(Pixel r2) {

@@ -170,39 +170,28 @@ enum class Outcome { done, dark, out_of_order };
 // in some pixel, returns out_of_order and the passage is invalid.
 template <bool Perspective, int Compositing>
 KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
-  constexpr int between_checks = 16;
-  Pixel farthest[block_vectors];
   const Between slab = {with.slab.front, with.slab.back};
-  for (Pixel& depth : farthest) depth = all<Pixel>(slab.front);
-  for (int from = 0; from < with.count; from += between_checks) {
-    const int to = from + between_checks < with.count ? from + between_checks : with.count;
-    for (int v = 0, l = 0; v < block_vectors; ++v, l += pixel_lanes) {
-      const Pixel px = all<Pixel>(with.x) + load<Pixel>(lane_x + l);
-      const Pixel py = all<Pixel>(with.y) + load<Pixel>(lane_y + l);
-      Passage p = passage[v];
-      Pixel far = farthest[v];
-      for (int h = from; h < to; ++h) {
-        const RibbonRecord& line = with.lines[with.met[h].line];
-        const LaneHit hit = hit_lanes<Perspective>(line, slab, px, py);
-        if (hn::AllFalse(PixelTag(), hit.here)) continue;
-        if (!hn::AllFalse(PixelTag(), hn::And(hit.here, hn::Lt(hit.depth, far)))) {
-          return Outcome::out_of_order;
-        }
-        far = hn::IfThenElse(hit.here, hit.depth, far);
-        Pixel color[3];
-        for (int c = 0; c < 3; ++c) {
-          color[c] =
-              hn::MulAdd(hit.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c]));
-        }
-        pass_line<Compositing>(hit.opacity, fraction_in(with.slab, hit.depth), color, p);
+  for (int v = 0, l = 0; v < block_vectors; ++v, l += pixel_lanes) {
+    const Pixel px = all<Pixel>(with.x) + load<Pixel>(lane_x + l);
+    const Pixel py = all<Pixel>(with.y) + load<Pixel>(lane_y + l);
+    Passage p = passage[v];
+    Pixel far = all<Pixel>(slab.front);
+    for (int h = 0; h < with.count; ++h) {
+      const RibbonRecord& line = with.lines[with.met[h].line];
+      const LaneHit hit = hit_lanes<Perspective>(line, slab, px, py);
+      if (hn::AllFalse(PixelTag(), hit.here)) continue;
+      if (!hn::AllFalse(PixelTag(), hn::And(hit.here, hn::Lt(hit.depth, far)))) {
+        return Outcome::out_of_order;
       }
-      farthest[v] = far;
-      passage[v] = p;
+      far = hn::IfThenElse(hit.here, hit.depth, far);
+      Pixel color[3];
+      for (int c = 0; c < 3; ++c) {
+        color[c] =
+            hn::MulAdd(hit.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c]));
+      }
+      pass_line<Compositing>(hit.opacity, fraction_in(with.slab, hit.depth), color, p);
     }
-    if (to == with.count || !is_dark(with.transmittance, passage, with.stop)) continue;
-    Pixel most = farthest[0];
-    for (const Pixel& depth : farthest) most = hn::Max(most, depth);
-    if (rest_is_behind(with, to, largest_of(most))) return Outcome::dark;
+    passage[v] = p;
   }
   return Outcome::done;
 }
@@ -228,7 +217,9 @@ Outcome pass_sorted(const Closing& with, Between part, Passage* passage) {
       take_body(with.slab, with.body_rgb, *with.body, hits[held]);
       body = false;
     } else {
-      const RibbonRecord& line = with.lines[with.met[h++].line];
+      const MetLine& met = with.met[h++];
+      if (met.first >= part.back || 2 * met.depth - met.first < part.front) continue;
+      const RibbonRecord& line = with.lines[met.line];
       if (!hit_block<Perspective>(line, with.slab, part, with.x, with.y, hits[held])) continue;
       if (with.body != nullptr) scale_hit(share, hits[held]);
     }

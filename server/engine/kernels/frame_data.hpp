@@ -150,9 +150,6 @@ struct Pass {
   int by_depth;         // depths of kernel positions are required
 };
 
-// F(b^2, v): fraction of a splat's footprint in front of the point v half chords beyond the middle
-// of a ray that passes the centre at b strides. Rows: b^2 from 0 to t^2; columns: v from -1 to 1.
-
 // A brick of 8 x 8 x 1 kernel positions, as ranges of the visit lists.
 struct Brick {
   std::int32_t sheet;  // index in the major axis' visit list
