@@ -93,14 +93,6 @@ Error cannot_join(const ArrayFile& part, const ArrayFile& first, const std::stri
                                              in_quotes(first.origin()) + ": " + what);
 }
 
-// Which files of a series are damaged, as its note says; empty if none is.
-std::string damage_of(const ArrayFile& series) {
-  for (const std::string& note : series.contents().notes) {
-    if (note.find(damaged_files_mark) != std::string::npos) return "; " + note;
-  }
-  return {};
-}
-
 int add_dimension(FileContents& contents, FileDimension dimension) {
   const std::string wanted = dimension.name;
   for (int n = 2; std::any_of(contents.dimensions.begin(), contents.dimensions.end(),
@@ -112,25 +104,45 @@ int add_dimension(FileContents& contents, FileDimension dimension) {
   return static_cast<int>(contents.dimensions.size()) - 1;
 }
 
-// Whether two coordinates, `own` of the first file and `other` of the part, have the same values.
-Result<bool> same_coordinates(const ArrayFile& first, int own, const ArrayFile& part, int other,
-                              bool is_time) {
+// Whether two coordinates are the same, and how far equal times lie apart beyond the rounding of
+// doubles.
+struct Comparison {
+  bool same = false;
+  double apart = 0;
+};
+
+// Compares `own` of the first file and `other` of the part.
+Result<Comparison> compared(const ArrayFile& first, int own, const ArrayFile& part, int other,
+                            bool is_time) {
   auto a = unpacked_values(first, own);
   if (!a) return a.error();
   auto b = unpacked_values(part, other);
   if (!b) return b.error();
   const FileVariable& to = first.contents().variables.at(at(own));
   const FileVariable& from = part.contents().variables.at(at(other));
-  if (is_time) {
-    const auto times = convert_times(*b, {from.units, from.calendar}, {to.units, to.calendar});
-    if (!times) return false;
-    const double tolerance = time_tolerance(*a);
-    return std::equal(a->begin(), a->end(), times->begin(), times->end(), [&](double x, double y) {
-      return same_number(x, y) || std::abs(x - y) <= tolerance;
-    });
+  if (!is_time) {
+    return Comparison{from.units == to.units &&
+                          std::equal(a->begin(), a->end(), b->begin(), b->end(), same_place),
+                      0};
   }
-  if (from.units != to.units) return false;
-  return std::equal(a->begin(), a->end(), b->begin(), b->end(), same_place);
+  const auto kept = times_in(*a, to, to);
+  const auto times = times_in(*b, from, to);
+  if (!kept || !times || kept->values.size() != times->values.size()) return Comparison{};
+  const double tolerance = time_tolerance(*kept, *times);
+  double apart = 0;
+  for (std::size_t n = 0; n < times->values.size(); ++n) {
+    const double x = kept->values[n];
+    const double y = times->values[n];
+    if (same_number(x, y)) continue;
+    if (!(std::abs(x - y) <= tolerance)) return Comparison{};
+    apart = std::max(apart, std::abs(x - y));
+  }
+  return Comparison{true, apart > kept->exact + times->exact ? apart : 0};
+}
+
+// A UUID that is known, in the words of an error.
+std::string grid_text(const FileDimension& list) {
+  return std::to_string(list.length) + " cells of the UUID " + list.grid_uuid;
 }
 
 }  // namespace
@@ -171,7 +183,8 @@ Result<void> JoinedFile::add(const ArrayFile& part) {
     if (auto placed = place_faces(part, dimensions); !placed) return placed;
   }
   for (std::size_t v = 0; v < added.variables.size(); ++v) {
-    add_variable(part, static_cast<int>(v), dimensions);
+    auto done = add_variable(part, static_cast<int>(v), dimensions);
+    if (!done) return done;
   }
   contents_.left_out.insert(contents_.left_out.end(), added.left_out.begin(), added.left_out.end());
   for (const DimensionChoice& choice : added.choices) {
@@ -206,14 +219,20 @@ Result<int> JoinedFile::dimension_of(const ArrayFile& part, int dimension,
     if (found.length == wanted.length) {
       if (!both) {
         if (!named) continue;
-        std::string& uuid = contents_.dimensions[d].grid_uuid;
-        if (uuid.empty()) uuid = wanted.grid_uuid;
+        merge_lists(contents_.dimensions[d], wanted);
         return own;
       }
-      const auto same =
-          same_coordinates(*this, known[d].coordinate, part, role.coordinate, is_time);
+      const auto same = compared(*this, known[d].coordinate, part, role.coordinate, is_time);
       if (!same) return same.error();
-      if (*same) return own;
+      if (same->apart > 0) {
+        contents_.notes.push_back(
+            "the times of " + in_quotes(part.origin()) + " differ by up to " +
+            number_text(same->apart) + " (" +
+            contents_.variables.at(at(known[d].coordinate)).units + ") from those of " +
+            in_quotes(parts_.front()->origin()) +
+            ", which are shown: they are taken for the same within the rounding of 32-bit floats");
+      }
+      if (same->same) return own;
     }
     if (is_time) {
       return cannot_join(part, *parts_.front(),
@@ -225,6 +244,20 @@ Result<int> JoinedFile::dimension_of(const ArrayFile& part, int dimension,
   FileDimension added = wanted;
   added.centers = -1;  // an index of the part's dimensions
   return add_dimension(contents_, std::move(added));
+}
+
+// Takes for one the lists of cells of equal names and lengths.
+void JoinedFile::merge_lists(FileDimension& own, const FileDimension& added) {
+  const bool is_one_unknown = own.grid_uuid.empty() != added.grid_uuid.empty();
+  own.is_list = own.is_list || added.is_list;
+  if (own.grid_uuid.empty()) own.grid_uuid = added.grid_uuid;
+  if (!own.is_list || !is_one_unknown) return;
+  const std::string note =
+      "the horizontal grid is taken for that of the fields since it has as many cells: one of the "
+      "files has no uuidOfHGrid";
+  if (std::count(contents_.notes.begin(), contents_.notes.end(), note) == 0) {
+    contents_.notes.push_back(note);
+  }
 }
 
 // Gives dimensions of their own to a part whose columns lie half a cell beside those of the others.
@@ -255,21 +288,36 @@ Result<void> JoinedFile::place_faces(const ArrayFile& part, std::vector<int>& di
   return {};
 }
 
-void JoinedFile::add_variable(const ArrayFile& part, int variable,
-                              const std::vector<int>& dimensions) {
+Result<void> JoinedFile::add_variable(const ArrayFile& part, int variable,
+                                      const std::vector<int>& dimensions) {
   FileVariable added = part.contents().variables.at(at(variable));
-  if (variable_named(contents_, added.name) >= 0) {
+  const int present = variable_named(contents_, added.name);
+  if (present >= 0) {
+    bool is_listed = false;
+    for (const int d : added.dims) {
+      const FileDimension& list = part.contents().dimensions.at(at(d));
+      is_listed = is_listed || list.is_list;
+      for (const int own : contents_.variables[at(present)].dims) {
+        const FileDimension& other = contents_.dimensions.at(at(own));
+        if (!are_of_different_grids(list, other)) continue;
+        return cannot_join(part, *parts_.front(),
+                           in_quotes(added.name) + " is on a horizontal grid of " +
+                               grid_text(list) + ", in another file on one of " + grid_text(other));
+      }
+    }
     // Coordinates are repeated in every file.
-    if (added.dims.size() > 2 && !is_position(added)) {
+    const std::size_t repeated = is_listed && side_of(added) == 0 ? 1 : 2;
+    if (added.dims.size() > repeated && !is_position(added)) {
       contents_.left_out.push_back({added.name, "in several files: that of " +
                                                     in_quotes(parts_.front()->origin()) +
                                                     " or of the next one that has it is used"});
     }
-    return;
+    return {};
   }
   for (int& d : added.dims) d = dimensions.at(at(d));
   contents_.variables.push_back(std::move(added));
   places_.push_back({&part, variable});
+  return {};
 }
 
 Numbers JoinedFile::numbers(int variable, const char* attribute) const {

@@ -18,7 +18,7 @@ class JoinedFile final : public ArrayFile {
   // they have the same coordinates, whatever their names, or the same name and length and no
   // coordinates. Where 2-D longitudes and latitudes of two parts lie half a cell apart, the later
   // part is on faces (FileDimension::centers). Errors: bad_data, naming the part, if its times or
-  // positions do not fit.
+  // positions do not fit, or a variable of the same name is on a horizontal grid of another UUID.
   static Result<std::unique_ptr<JoinedFile>> open(std::string name, std::string origin,
                                                   std::vector<std::unique_ptr<ArrayFile>> parts);
 
@@ -52,7 +52,9 @@ class JoinedFile final : public ArrayFile {
   Result<int> dimension_of(const ArrayFile& part, int dimension, const DimensionRole& role,
                            const std::vector<DimensionRole>& known);
   Result<void> place_faces(const ArrayFile& part, std::vector<int>& dimensions);
-  void add_variable(const ArrayFile& part, int variable, const std::vector<int>& dimensions);
+  Result<void> add_variable(const ArrayFile& part, int variable,
+                            const std::vector<int>& dimensions);
+  void merge_lists(FileDimension& own, const FileDimension& added);
   [[nodiscard]] const Place& place_of(int variable) const { return places_.at(at(variable)); }
 
   std::string name_;

@@ -53,14 +53,19 @@ std::vector<std::string> dimension_names(const FileContents& contents, int varia
 // Whether a file holds variables along a time, but no step, as a model writes it when it starts.
 bool has_no_step(const FileContents& contents) {
   const std::vector<DimensionRole> roles = classify_dimensions(contents);
-  return std::any_of(
-      contents.variables.begin(), contents.variables.end(), [&](const FileVariable& variable) {
-        return variable.dims.size() > 1 &&
-               std::any_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
-                 const FileDimension& one = contents.dimensions.at(at(d));
-                 return one.length == 0 && (one.unlimited || roles.at(at(d)).role == Role::time);
-               });
-      });
+  const bool has_time = std::any_of(
+      roles.begin(), roles.end(), [](const DimensionRole& one) { return one.role == Role::time; });
+  bool is_empty = false;
+  for (const FileVariable& variable : contents.variables) {
+    if (!variable.numeric || variable.dims.size() < 2) continue;
+    for (const int d : variable.dims) {
+      const FileDimension& one = contents.dimensions.at(at(d));
+      if (has_time ? roles.at(at(d)).role != Role::time : !one.unlimited) continue;
+      if (one.length > 0) return false;
+      is_empty = true;
+    }
+  }
+  return is_empty;
 }
 
 Error misfit(const ArrayFile& file, const ArrayFile& first, const std::string& what) {
@@ -80,6 +85,13 @@ std::string damaged_files_note(const std::vector<Error>& damaged, std::size_t me
   }
   if (damaged.size() > listed_max) text += "; ...";
   return text;
+}
+
+std::string damage_of(const ArrayFile& series) {
+  for (const std::string& note : series.contents().notes) {
+    if (note.find(damaged_files_mark) != std::string::npos) return "; " + note;
+  }
+  return {};
 }
 
 Result<std::unique_ptr<SeriesFile>> SeriesFile::open(std::string name, std::size_t members,
@@ -117,7 +129,10 @@ std::string SeriesFile::identity() const {
 }
 
 const FileVariable* SeriesFile::time_coordinate() const {
-  return time_coordinate_ < 0 ? nullptr : &first_->contents().variables[at(time_coordinate_)];
+  for (std::size_t v = 0; v < variables_.size(); ++v) {
+    if (variables_[v].in_first == time_coordinate_) return &contents_.variables[v];
+  }
+  return nullptr;
 }
 
 std::vector<double> SeriesFile::times() const {
@@ -137,8 +152,7 @@ void SeriesFile::keep_steps(const std::vector<std::size_t>& kept) {
   contents_.dimensions.at(at(time_of_all_)).length = steps_.size();
   contents_.notes.push_back(in_quotes(origin()) + ": " + std::to_string(lost) +
                             (lost == 1 ? " step is" : " steps are") +
-                            " left out, since files of other parts with the same times cannot be "
-                            "read");
+                            " left out, which other parts do not have");
 }
 
 Result<void> SeriesFile::begin() {
@@ -192,7 +206,7 @@ Result<void> SeriesFile::add(std::size_t index, std::unique_ptr<ArrayFile> opene
     first_ = std::move(opened);
     if (auto begun = begin(); !begun) return begun;
   }
-  members_.push_back({index, file.identity(), {}});
+  members_.push_back({index, file.identity(), {}, false});
   if (!is_first) {
     if (auto fine = check_space(file); !fine) return fine;
     if (auto fine = check_values(file); !fine) return fine;
@@ -330,6 +344,7 @@ Result<void> SeriesFile::add_times(std::size_t member, const ArrayFile& file) {
   const int other = variable_named(file.contents(), coordinate.name);
   if (other < 0) return misfit(file, *first_, "it has no " + in_quotes(coordinate.name));
   const FileVariable& found = file.contents().variables[at(other)];
+  members_[member].has_single_times = found.type == "float32";
   auto values = found.numeric && values_of(file.contents(), other) == records
                     ? unpacked_values(file, other)
                     : std::vector<double>();
@@ -389,6 +404,9 @@ void SeriesFile::finish() {
   contents_.choices = own.choices;
   contents_.notes.insert(contents_.notes.begin(), own.notes.begin(), own.notes.end());
   contents_.left_out.insert(contents_.left_out.begin(), own.left_out.begin(), own.left_out.end());
+  const bool has_single_times =
+      std::any_of(members_.begin(), members_.end(),
+                  [](const Member& member) { return member.has_single_times; });
   for (std::size_t v = 0; v < own.variables.size(); ++v) {
     FileVariable variable = own.variables[v];
     if (!dropped_[v].empty()) {
@@ -397,7 +415,7 @@ void SeriesFile::finish() {
     }
     const bool is_time = static_cast<int>(v) == time_coordinate_;
     if (as_values_[v] || is_time) {
-      variable.type = is_time ? "float64" : "float32";
+      variable.type = is_time && !has_single_times ? "float64" : "float32";
       variable.packed = false;
       variable.is_unsigned = false;
     }
@@ -417,7 +435,8 @@ void SeriesFile::finish() {
   } else {
     add_time_dimension();
   }
-  contents_.notes.push_back(std::to_string(members_.size()) + " files joined along time");
+  contents_.notes.push_back(std::to_string(members_.size()) +
+                            (members_.size() == 1 ? " file" : " files") + " joined along time");
 }
 
 // Adds a time dimension for members that are single steps.

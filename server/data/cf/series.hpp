@@ -21,6 +21,8 @@ inline constexpr const char* damaged_files_mark =
 // For users: that files of a series cannot be read, with the reasons, which name them. members: of
 // the series.
 std::string damaged_files_note(const std::vector<Error>& damaged, std::size_t members);
+// "; " and the note on the damaged files of a series; empty if none is damaged.
+std::string damage_of(const ArrayFile& series);
 
 // All members are opened once to read their times; afterwards at most `open_max` are open at a
 // time. Steps are sorted by time across epochs; of steps with equal times, that of the later file
@@ -42,7 +44,8 @@ class SeriesFile final : public ArrayFile {
   [[nodiscard]] std::string identity() const override;
 
   [[nodiscard]] bool has_damaged_files() const { return has_damaged_files_; }
-  // The variable whose values times() are in its unit; null if steps are numbered.
+  // The variable whose values times() are in its unit, float32 if some file stores them so; null if
+  // steps are numbered.
   [[nodiscard]] const FileVariable* time_coordinate() const;
   [[nodiscard]] std::vector<double> times() const;  // ascending
   // Leaves out all steps but these, which ascend, with a note.
@@ -64,7 +67,8 @@ class SeriesFile final : public ArrayFile {
   struct Member {
     std::size_t index = 0;  // for open_member_
     std::string identity;
-    std::vector<int> variables;  // index of each variable of the first member; empty: identical
+    std::vector<int> variables;     // index of each variable of the first member; empty: identical
+    bool has_single_times = false;  // stored as 32-bit floats
   };
   struct Step {
     std::size_t member = 0;

@@ -6,12 +6,14 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/common_steps.hpp"
+#include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/joined.hpp"
 #include "server/data/cf/mesh/meshed_file.hpp"
 #include "server/data/cf/selected/selected_file.hpp"
@@ -177,16 +179,44 @@ struct Part {
   std::vector<std::string> members;
 };
 
+bool has_time(const FileContents& contents) {
+  const auto roles = cf::classify_dimensions(contents);
+  return std::any_of(roles.begin(), roles.end(),
+                     [](const cf::DimensionRole& one) { return one.role == cf::Role::time; });
+}
+
+// Leaves out of all parts the steps of damaged files; a single file with steps becomes a series for
+// that. single: per part its file, empty for a series.
+Result<void> keep_common_steps(const std::shared_ptr<Files>& files,
+                               const std::vector<std::string>& single,
+                               std::vector<std::unique_ptr<cf::ArrayFile>>& parts) {
+  const bool damaged = std::any_of(parts.begin(), parts.end(),
+                                   [](const auto& part) { return !cf::damage_of(*part).empty(); });
+  if (!damaged) return {};
+  std::vector<cf::SeriesFile*> series;
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    if (!single[n].empty() && has_time(parts[n]->contents())) {
+      auto file = open_along_time(files, {single[n]}, single[n]);
+      if (!file) return file.error();
+      parts[n] = std::move(*file);
+    }
+    if (auto* const one = dynamic_cast<cf::SeriesFile*>(parts[n].get())) series.push_back(one);
+  }
+  return cf::keep_common_steps(series);
+}
+
 // Parts with different variables are joined. `origin` names them in messages.
 ArraysResult open_parts(const std::shared_ptr<Files>& files, std::vector<Part> parts,
                         const std::string& origin) {
   std::vector<std::unique_ptr<cf::ArrayFile>> opened;
+  std::vector<std::string> single;  // per part: its file, if it is not a series
   const bool joins = parts.size() > 1;
   for (Part& part : parts) {
     if (part.members.empty()) {
       return make_error(ErrorKind::not_found, in_quotes(part.pattern) + ": no file matches");
     }
     const bool one = part.members.size() == 1 && (joins || part.members.front() == part.pattern);
+    single.push_back(one ? part.members.front() : "");
     auto file = one ? open_arrays(files, part.members.front())
                     : open_along_time(files, std::move(part.members), part.pattern);
     if (!file) return file.error();
@@ -194,11 +224,7 @@ ArraysResult open_parts(const std::shared_ptr<Files>& files, std::vector<Part> p
     opened.push_back(std::move(*file));
   }
   if (!joins) return std::move(opened.front());
-  std::vector<cf::SeriesFile*> series;
-  for (const auto& part : opened) {
-    if (auto* const one = dynamic_cast<cf::SeriesFile*>(part.get())) series.push_back(one);
-  }
-  cf::keep_common_steps(series);
+  if (auto common = keep_common_steps(files, single, opened); !common) return common.error();
   auto joined = cf::JoinedFile::open(files->location().stem, origin, std::move(opened));
   if (!joined) return joined.error();
   (*joined)->set_stored_bytes(files->opened_bytes());

@@ -69,6 +69,17 @@ std::vector<bool> find_cell_lists(const FileContents& contents) {
   return found;
 }
 
+std::string known_grid_uuid(const std::string& text) {
+  constexpr std::size_t digits = 32;
+  std::string out;
+  for (const char c : lower(text)) {
+    if ((c >= '0' && c <= '9') || (c >= 'a' && c <= 'f')) out += c;
+  }
+  const bool is_known =
+      out.size() == digits && out != std::string(digits, '0') && out != std::string(digits, 'f');
+  return is_known ? out : std::string();
+}
+
 bool are_of_different_grids(const FileDimension& a, const FileDimension& b) {
   return !a.grid_uuid.empty() && !b.grid_uuid.empty() && a.grid_uuid != b.grid_uuid;
 }

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <utility>
 
+#include "server/data/cf/grid/cell_lists.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/formats/grib/levels.hpp"
 #include "server/data/formats/grib/message.hpp"
@@ -147,11 +148,7 @@ void find_list(const Message& message, Grid& grid) {
   grid.is_list = true;
   grid.columns = static_cast<std::size_t>(points);
   grid.rows = 1;
-  grid.uuid = message.text("uuidOfHGrid");
-  constexpr std::size_t digits = 32;
-  const bool is_known = grid.uuid.size() == digits && grid.uuid != std::string(digits, '0') &&
-                        grid.uuid != std::string(digits, 'f');
-  if (!is_known) grid.uuid.clear();
+  grid.uuid = cf::known_grid_uuid(message.text("uuidOfHGrid"));
   if (list != 1) {
     grid.problem = "at the points of the list " + std::to_string(list) +
                    " of an unstructured grid, such as its vertices (2) and edges (3) in ICON: only "

@@ -48,15 +48,6 @@ const char* number_type_name(nc_type type) {
   return at == number_types.end() ? nullptr : at->name;
 }
 
-// The digits of a UUID as ICON writes it, "bbbd5a09-8554-9924-3c7a-4aa4c9861920".
-std::string uuid_digits(const std::string& text) {
-  std::string out;
-  for (const char c : lower(text)) {
-    if ((c >= '0' && c <= '9') || (c >= 'a' && c <= 'f')) out += c;
-  }
-  return out.size() == 32 ? out : std::string();
-}
-
 // Unlimited dimensions of a group and those above it.
 bool unlimited_above(int group, std::vector<int>& out) {
   for (int at = group, depth = 0; depth < depth_max; ++depth) {
@@ -220,7 +211,7 @@ Result<void> File::scan_group(const std::string& path) {
     name_axes_of_meep(contents_);
     name_steps_of_bare_arrays(contents_);
   }
-  if (const std::string uuid = uuid_digits(text({ncid_, NC_GLOBAL}, "uuidOfHGrid"));
+  if (const std::string uuid = cf::known_grid_uuid(text({ncid_, NC_GLOBAL}, "uuidOfHGrid"));
       !uuid.empty()) {
     const std::vector<bool> lists = cf::find_cell_lists(contents_);
     for (std::size_t d = 0; d < lists.size(); ++d) {

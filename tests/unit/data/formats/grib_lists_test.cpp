@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -63,10 +64,11 @@ std::string message(long category, long number, const Surfaces& levels, const Ta
 constexpr long layer_type = 150;
 
 // A grid file of ICON with the cells of mesh_maker.hpp.
-void write_grid(const std::string& path, const std::string& uuid) {
+void write_grid(const std::string& path, const std::string& uuid,
+                const std::string& dimension = "cell") {
   NetcdfMaker file(path);
   if (!uuid.empty()) file.text(NC_GLOBAL, "uuidOfHGrid", uuid);
-  const int cell = file.dimension("cell", mesh::cells);
+  const int cell = file.dimension(dimension, mesh::cells);
   const int corner = file.dimension("nv", 4);
   for (const bool is_x : {true, false}) {
     const std::string name = is_x ? "clon" : "clat";
@@ -174,6 +176,46 @@ TEST_F(GribLists, WithoutAUuidInTheGridFileAreTakenByTheNumberOfCells) {
   const auto source = opened(folder_ / "{grid.nc,a.grib}");
   ASSERT_NE(source, nullptr);
   EXPECT_TRUE(has_note(source->info(), "one of the files has no uuidOfHGrid"));
+}
+
+TEST_F(GribLists, AreTakenByTheNumberOfCellsWhateverTheNameOfTheDimension) {
+  const Table values = at_cells(east);
+  write_bytes(folder_ / "a.grib",
+              message(0, 0, {1}, values) + message(0, 1, {1}, Table(mesh::cells, 5), 0x0c));
+  for (const char* uuid : {"", "00000000-0000-0000-0000-000000000000"}) {
+    for (const char* dimension : {"cell", "ncells"}) {
+      write_grid(folder_ / "grid.nc", uuid, dimension);
+      write_bytes(folder_ / "b.grib", message(0, 0, {1}, values));
+      const auto alone = opened(folder_ / "{grid.nc,b.grib}");
+      ASSERT_NE(alone, nullptr) << dimension;
+      EXPECT_TRUE(has_note(alone->info(), "one of the files has no uuidOfHGrid")) << dimension;
+    }
+    const auto source = opened(folder_ / "{grid.nc,a.grib}");
+    ASSERT_NE(source, nullptr);
+    EXPECT_NE(source->info().find("t"), nullptr);
+    EXPECT_EQ(source->info().find("vtmp"), nullptr) << "its grid is another one than that of t";
+  }
+}
+
+TEST_F(GribLists, FieldsInTwoFilesAreListedAndThoseOfOtherGridsRefused) {
+  write_grid(folder_ / "grid.nc", own_uuid_text);
+  write_bytes(folder_ / "a.grib", message(0, 0, {1}, at_cells(east)));
+  write_bytes(folder_ / "b.grib", message(0, 0, {1}, at_cells(north)));
+  write_bytes(folder_ / "c.grib", message(0, 0, {1}, at_cells(north), 0x0c));
+  {
+    const auto source = opened(folder_ / "{grid.nc,a.grib,b.grib}");
+    ASSERT_NE(source, nullptr);
+    const auto& left = source->info().left_out;
+    EXPECT_TRUE(std::any_of(left.begin(), left.end(), [](const LeftOut& one) {
+      return one.name == "t" && one.reason.find("in several files") != std::string::npos;
+    }));
+  }
+  for (const char* uuid : {own_uuid_text, ""}) {
+    write_grid(folder_ / "grid.nc", uuid, "ncells");
+    EXPECT_THAT(refusal(folder_ / "{grid.nc,a.grib,c.grib}"),
+                AllOf(HasSubstr("'t' is on a horizontal grid of 24 cells of the UUID 0c0c0c0c"),
+                      HasSubstr("in another file on one of 24 cells of the UUID 0b0b0b0b")));
+  }
 }
 
 TEST_F(GribLists, WithoutPositionsAskForTheFileOfTheirGrid) {
