@@ -15,10 +15,13 @@ namespace {
 
 using Direction = std::array<double, 3>;
 using ChartPoint = boost::polygon::point_data<std::int32_t>;
+using Diagram = boost::polygon::voronoi_diagram<double>;
 
 constexpr double unit_degree = std::numbers::pi / 180;
 constexpr double chart_extent = 1 << 30;
-constexpr double fullness_min = 0.02;  // triangles of a lattice of 1 to 25
+constexpr double same_position = 1e-8;  // radians: 6 cm on the Earth
+constexpr double merged_max = 1e-6;     // radians: 6 m; in a chart
+constexpr double fullness_min = 0.02;   // triangles of a lattice of 1 to 25
 
 Direction direction_of(double longitude, double latitude) {
   const double from_axis = std::cos(latitude * unit_degree);
@@ -38,6 +41,8 @@ Direction between(const Direction& a, const Direction& b) {
   return {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
 }
 
+Direction opposite(const Direction& a) { return {-a[0], -a[1], -a[2]}; }
+
 Direction unit(const Direction& a) {
   const double length = std::sqrt(dot(a, a));
   return {a[0] / length, a[1] / length, a[2] / length};
@@ -51,13 +56,16 @@ class Triangulator {
  public:
   Result<Triangulation> make(std::vector<double> longitudes, std::vector<double> latitudes) {
     if (auto fine = take_positions(longitudes, latitudes); !fine) return fine.error();
-    if (used_.size() >= centers_min) find_polygons();
-    if (used_.size() - out_.repeated < centers_min) {
-      return make_error(ErrorKind::bad_data, "cells without outlines have " +
-                                                 std::to_string(used_.size() - out_.repeated) +
-                                                 " different positions: at least " +
-                                                 std::to_string(centers_min) +
-                                                 " are needed to draw them by their centers");
+    const std::size_t given = used_.size();
+    merge_repeated();
+    if (used_.size() >= centers_min) {
+      if (auto done = find_polygons(); !done) return done.error();
+    }
+    if (given - out_.repeated < centers_min) {
+      return make_error(ErrorKind::bad_data,
+                        "cells without outlines have " + std::to_string(given - out_.repeated) +
+                            " different positions: at least " + std::to_string(centers_min) +
+                            " are needed to draw them by their centers");
     }
     if (auto fine = leave_out_gaps(); !fine) return fine.error();
     Mesh& mesh = out_.mesh;
@@ -93,9 +101,31 @@ class Triangulator {
     return {};
   }
 
-  // Sets where the chart is projected from. Positions within 120 degrees of their mean leave room
-  // opposite to it.
-  void choose_chart() {
+  // Leaves the first of equal positions. Those on both sides of a rounding stay, which is harmless.
+  void merge_repeated() {
+    using Place = std::array<std::int32_t, 3>;
+    std::vector<std::pair<Place, std::uint32_t>> places;
+    places.reserve(used_.size());
+    for (const std::uint32_t i : used_) {
+      Place place{};
+      for (std::size_t a = 0; a < 3; ++a) {
+        place.at(a) = static_cast<std::int32_t>(std::lround(directions_[i].at(a) / same_position));
+      }
+      places.emplace_back(place, i);
+    }
+    std::sort(places.begin(), places.end());
+    const auto end =
+        std::unique(places.begin(), places.end(),
+                    [](const auto& one, const auto& two) { return one.first == two.first; });
+    out_.repeated = static_cast<std::size_t>(places.end() - end);
+    used_.clear();
+    for (auto at = places.begin(); at != end; ++at) used_.push_back(at->second);
+    std::sort(used_.begin(), used_.end());
+  }
+
+  // Positions within 120 degrees of their mean leave room opposite to it. Others surround the
+  // globe: then the direction of some hundred that is farthest from them, as is its opposite.
+  Direction choose_origin() {
     constexpr double room = -0.5;
     Direction sum{};
     for (const std::uint32_t i : used_) {
@@ -106,74 +136,115 @@ class Triangulator {
       const Direction middle = unit(sum);
       closed_ = std::any_of(used_.begin(), used_.end(),
                             [&](std::uint32_t i) { return dot(directions_[i], middle) < room; });
-      from_ = {-middle[0], -middle[1], -middle[2]};
+      if (!closed_) return opposite(middle);
     }
-    if (closed_) from_ = directions_[used_.front()];
-    const Direction aside = std::abs(from_[2]) < 0.9 ? Direction{0, 0, 1} : Direction{1, 0, 0};
-    first_ = unit(cross(from_, aside));
-    second_ = cross(from_, first_);
+    constexpr int tried = 128;
+    Direction best{};
+    double nearest = 2;
+    for (int n = 0; n < tried; ++n) {
+      // A spiral around the globe, off its axis.
+      const Direction one = unit(direction_of(222.49223594996215 * n + 1.234567,
+                                              std::asin((n + 0.5) / tried) / unit_degree));
+      double near = 0;
+      for (const std::uint32_t i : used_) near = std::max(near, std::abs(dot(directions_[i], one)));
+      if (near >= nearest) continue;
+      nearest = near;
+      best = one;
+    }
+    return best;
   }
 
-  // Chart points of all positions except the one projected from; `sources` are their numbers.
-  std::vector<ChartPoint> chart_points(std::vector<std::uint32_t>& sources) {
+  struct Chart {
+    std::vector<ChartPoint> points;
+    std::vector<std::uint32_t> sources;  // positions
+  };
+
+  // The chart of `positions` projected from `origin`. Equal points are one.
+  Result<Chart> chart_of(const std::vector<std::uint32_t>& positions, const Direction& origin) {
+    const Direction aside = std::abs(origin[2]) < 0.9 ? Direction{0, 0, 1} : Direction{1, 0, 0};
+    const Direction first = unit(cross(origin, aside));
+    const Direction second = cross(origin, first);
     std::vector<std::array<double, 2>> plane;
-    double extent = 0;
-    constexpr double same = 1e-9;  // radians
-    for (const std::uint32_t i : used_) {
+    double extent = 1e-9;
+    for (const std::uint32_t i : positions) {
       const Direction& own = directions_[i];
-      const double apart = distance(own, from_);
-      if (closed_ && apart < same) {
-        out_.repeated += i == used_.front() ? 0 : 1;
-        continue;
-      }
+      const double apart = distance(own, origin);
       const double below = apart * apart / 2;  // 1 - cos of the angle
-      plane.push_back({dot(own, first_) / below, dot(own, second_) / below});
+      plane.push_back({dot(own, first) / below, dot(own, second) / below});
       extent = std::max({extent, std::abs(plane.back()[0]), std::abs(plane.back()[1])});
-      sources.push_back(i);
     }
-    std::vector<ChartPoint> out;
-    out.reserve(plane.size());
-    for (const auto& [u, v] : plane) {
+    using Placed = std::pair<std::array<std::int32_t, 2>, std::uint32_t>;
+    std::vector<Placed> placed;
+    placed.reserve(positions.size());
+    for (std::size_t n = 0; n < positions.size(); ++n) {
       const auto whole = [&](double value) {
         return static_cast<std::int32_t>(std::lround(value / extent * chart_extent));
       };
-      out.emplace_back(whole(u), whole(v));
+      placed.push_back({{whole(plane[n][0]), whole(plane[n][1])}, positions[n]});
+    }
+    std::sort(placed.begin(), placed.end());
+    Chart out;
+    for (const auto& [point, i] : placed) {
+      const ChartPoint own(point[0], point[1]);
+      if (out.points.empty() || !(own == out.points.back())) {
+        out.points.push_back(own);
+        out.sources.push_back(i);
+        continue;
+      }
+      ++out_.repeated;
+      if (distance(directions_[i], directions_[out.sources.back()]) <= merged_max) continue;
+      return make_error(ErrorKind::bad_data,
+                        "entries " + std::to_string(out.sources.back() + 1) + " and " +
+                            std::to_string(i + 1) +
+                            " of a list of cells cannot be told apart where all are triangulated: "
+                            "the positions are too close together for how far they spread");
     }
     return out;
   }
 
-  void find_polygons() {
-    choose_chart();
-    std::vector<std::uint32_t> sources;
-    const std::vector<ChartPoint> points = chart_points(sources);
-    if (points.size() < 3) {
-      out_.repeated = used_.size() - points.size();
-      return;
-    }
-    boost::polygon::voronoi_diagram<double> diagram;
-    boost::polygon::construct_voronoi(points.begin(), points.end(), &diagram);
-    out_.repeated += points.size() - diagram.num_cells();
+  void add_polygon(const Diagram::vertex_type& vertex, const Chart& chart) {
     Mesh& mesh = out_.mesh;
-    mesh.first.push_back(0);
-    const auto end_cell = [&] {
-      mesh.first.push_back(static_cast<std::uint32_t>(mesh.corners.size()));
-    };
-    for (const auto& vertex : diagram.vertices()) {
-      const auto* edge = vertex.incident_edge();
-      do {
-        mesh.corners.push_back(sources[edge->cell()->source_index()]);
-        edge = edge->rot_next();
-      } while (edge != vertex.incident_edge());
-      end_cell();
-    }
-    if (!closed_) return;
+    const auto* edge = vertex.incident_edge();
+    do {
+      mesh.corners.push_back(chart.sources[edge->cell()->source_index()]);
+      edge = edge->rot_next();
+    } while (edge != vertex.incident_edge());
+    mesh.first.push_back(static_cast<std::uint32_t>(mesh.corners.size()));
+  }
+
+  Result<void> find_polygons() {
+    const Direction origin = choose_origin();
+    const auto chart = chart_of(used_, origin);
+    if (!chart) return chart.error();
+    if (chart->points.size() < centers_min) return {};
+    Diagram diagram;
+    boost::polygon::construct_voronoi(chart->points.begin(), chart->points.end(), &diagram);
+    out_.mesh.first.push_back(0);
+    for (const auto& vertex : diagram.vertices()) add_polygon(vertex, *chart);
+    if (!closed_) return {};
+    std::vector<std::uint32_t> rim;
     for (const auto& edge : diagram.edges()) {
-      // Positions at the rim of the chart are neighbours of the one it is projected from.
-      if (edge.vertex0() != nullptr || edge.vertex1() == nullptr) continue;
-      mesh.corners.insert(mesh.corners.end(), {used_.front(), sources[edge.cell()->source_index()],
-                                               sources[edge.twin()->cell()->source_index()]});
-      end_cell();
+      if (!edge.is_infinite()) continue;
+      rim.push_back(chart->sources[edge.cell()->source_index()]);
+      rim.push_back(chart->sources[edge.twin()->cell()->source_index()]);
     }
+    std::sort(rim.begin(), rim.end());
+    rim.erase(std::unique(rim.begin(), rim.end()), rim.end());
+    return close(rim, origin);
+  }
+
+  // Polygons whose circles contain the origin of the chart: their corners are at its rim.
+  Result<void> close(const std::vector<std::uint32_t>& rim, const Direction& origin) {
+    const auto chart = chart_of(rim, opposite(origin));
+    if (!chart) return chart.error();
+    Diagram diagram;
+    boost::polygon::construct_voronoi(chart->points.begin(), chart->points.end(), &diagram);
+    for (const auto& vertex : diagram.vertices()) {
+      const ChartPoint& corner = chart->points[vertex.incident_edge()->cell()->source_index()];
+      const double radius = std::hypot(vertex.x() - corner.x(), vertex.y() - corner.y());
+      if (std::hypot(vertex.x(), vertex.y()) < radius) add_polygon(vertex, *chart);
+    }
+    return {};
   }
 
   [[nodiscard]] float edge_length(std::size_t cell, std::uint32_t corner) const {
@@ -282,11 +353,8 @@ class Triangulator {
 
   Triangulation out_;
   std::vector<Direction> directions_;  // unit vectors
-  std::vector<std::uint32_t> used_;    // positions that are given
+  std::vector<std::uint32_t> used_;    // given positions that differ
   bool closed_ = true;                 // the positions surround the globe
-  Direction from_{};                   // the chart is projected from here
-  Direction first_{};                  // its axes
-  Direction second_{};
 };
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/mesh/centers.hpp"
 #include "server/data/cf/mesh/delaunay.hpp"
+#include "server/data/cf/mesh/position_checks.hpp"
 #include "server/data/cf/mesh/topology.hpp"
 #include "server/data/cf/time.hpp"
 
@@ -273,6 +274,7 @@ class MeshReader {
   }
 
   Result<Mesh> by_neighbours() {
+    if (auto fine = check_one_time(file_, from_.nodes); !fine) return fine.error();
     const auto stored = file_.stored_bytes();
     const std::size_t count = length(from_.nodes);
     if (stored && count > opening_memory_bytes(*stored) / triangulation_bytes) {
@@ -286,6 +288,12 @@ class MeshReader {
       auto values = angles(from_.node_positions.at(a), true);
       if (!values) return values.error();
       positions.at(a) = std::move(*values);
+    }
+    if (are_radians(positions)) {
+      return make_error(ErrorKind::bad_data,
+                        "the positions in " + in_quotes(variable(from_.node_positions[0]).name) +
+                            " and " + in_quotes(variable(from_.node_positions[1]).name) +
+                            " fill the range of radians, but their units are degrees");
     }
     auto found = triangulate(std::move(positions[0]), std::move(positions[1]));
     if (!found) return found.error();

@@ -127,6 +127,46 @@ TEST(Delaunay, RepeatedAndMissingPositionsAreNoCorners) {
   EXPECT_EQ(found->mesh.nodes(), 302U);
 }
 
+TEST(Delaunay, ClosePositionsAnywhereLoseNoOthers) {
+  // In degrees: a repeat, 0.2 m, 1 m and 1 km; all positions are such pairs in the last case.
+  for (const double apart : {1e-7, 2e-6, 1e-5, 1e-2}) {
+    Places places = spiral(3000);
+    places.x.insert(places.x.begin(), places.x[0]);
+    places.y.insert(places.y.begin(), places.y[0] - apart);
+    const auto found = cf::triangulate(places.x, places.y);
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_LE(found->repeated, apart < 1e-5 ? 1U : 0U) << apart;
+    EXPECT_EQ(triangles_in(found->mesh) + found->gaps, 2 * (3001 - found->repeated) - 4) << apart;
+  }
+  Places pairs = spiral(500);
+  for (std::size_t n = 0; n < 500; ++n) {
+    pairs.x.push_back(pairs.x[n]);
+    pairs.y.push_back(pairs.y[n] + (pairs.y[n] > 0 ? -1e-4 : 1e-4));
+  }
+  const auto found = cf::triangulate(pairs.x, pairs.y);
+  if (found) EXPECT_EQ(found->repeated, 0U);
+}
+
+TEST(Delaunay, ClustersOppositeToEachOtherAreBothWhole) {
+  Places places;
+  std::mt19937 random(5);
+  for (int n = 0; n < 4000; ++n) {
+    const auto part = [&] { return static_cast<double>(random()) / 4294967296.0; };
+    places.x.push_back((n % 2 == 0 ? 0 : 180) + 5 * part());
+    places.y.push_back((n % 2 == 0 ? 1 : -1) * 5 * part());
+  }
+  const auto found = cf::triangulate(places.x, places.y);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->repeated, 0U);
+  EXPECT_GT(triangles_in(found->mesh), 7500U);
+}
+
+TEST(Delaunay, LongitudesOfAPoleAreOnePosition) {
+  const auto found = cf::triangulate(random_places(400).x, Table(400, 90));
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().message, HasSubstr("1 different positions: at least 100"));
+}
+
 TEST(Delaunay, PositionsAlongLinesFewOnesAndThoseOffTheGlobeAreRefused) {
   Places track;
   for (int n = 0; n < 400; ++n) {
@@ -226,6 +266,35 @@ TEST_F(CentersOfCells, AroundTheGlobeLeaveNoSampleMasked) {
   }
   // The spacing is 0.08: a quadrilateral's diagonal squared over 8, and edges straight on the map.
   EXPECT_LT(worst, 3e-3);
+}
+
+TEST_F(CentersOfCells, AtDifferentTimesOrInRadiansAreRefused) {
+  const Places places = spiral(500);
+  const auto with_times = [&](const Table& times) {
+    write(places, linear_at(places));
+    int id = -1;
+    int column = -1;
+    int time = -1;
+    EXPECT_EQ(nc_open((folder_ / "c.nc").c_str(), NC_WRITE, &id), NC_NOERR);
+    nc_redef(id);
+    nc_inq_dimid(id, "ncol", &column);
+    nc_def_var(id, "moment", NC_DOUBLE, 1, &column, &time);
+    const std::string units = "hours since 2000-01-01";
+    nc_put_att_text(id, time, "units", units.size(), units.c_str());
+    nc_enddef(id);
+    nc_put_var_double(id, time, times.data());
+    EXPECT_EQ(nc_close(id), NC_NOERR);
+  };
+  with_times(counting(500));
+  EXPECT_THAT(refusal(folder_ / "c.nc"), HasSubstr("'moment' tells them apart"));
+  with_times(Table(500, 3));
+  EXPECT_NE(opened(folder_ / "c.nc"), nullptr);
+
+  Places radians = places;
+  for (double& x : radians.x) x *= degree;
+  for (double& y : radians.y) y *= degree;
+  write(radians, linear_at(radians));
+  EXPECT_THAT(refusal(folder_ / "c.nc"), HasSubstr("fill the range of radians"));
 }
 
 TEST_F(CentersOfCells, FewerThanAHundredAreRefusedAndNormalsOnEdgesToo) {

@@ -1,0 +1,55 @@
+#include "server/data/cf/mesh/position_checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <numbers>
+#include <string>
+
+#include "server/base/ascii.hpp"
+#include "server/data/cf/coordinates.hpp"
+
+namespace windsplat::data::cf {
+
+Result<void> check_one_time(const ArrayFile& file, int list) {
+  const auto& all = file.contents().variables;
+  for (std::size_t v = 0; v < all.size(); ++v) {
+    const FileVariable& one = all[v];
+    if (one.dims != std::vector{list}) continue;
+    const std::string role = lower(one.cf_role);
+    bool differs = role == "trajectory_id" || role == "profile_id";
+    if (!differs && one.numeric && lower(one.units).find(" since ") != std::string::npos) {
+      auto values = unpacked_values(file, static_cast<int>(v));
+      if (!values) return values.error();
+      std::erase_if(*values, [](double time) { return !std::isfinite(time); });
+      differs = std::adjacent_find(values->begin(), values->end(), std::not_equal_to<>()) !=
+                values->end();
+    }
+    if (!differs) continue;
+    return make_error(ErrorKind::bad_data,
+                      "the positions without outlines are those of trajectories or profiles: " +
+                          in_quotes(one.name) + " tells them apart, and they are not one instant");
+  }
+  return {};
+}
+
+bool are_radians(const std::array<std::vector<double>, 2>& positions) {
+  constexpr double close = 0.97;
+  std::array<double, 2> least{1e9, 1e9};
+  std::array<double, 2> most{-1e9, -1e9};
+  for (std::size_t a = 0; a < 2; ++a) {
+    for (const double value : positions.at(a)) {
+      least.at(a) = std::min(least.at(a), value);
+      most.at(a) = std::max(most.at(a), value);
+    }
+  }
+  const auto spans = [&](std::size_t a, double whole) {
+    const double span = most.at(a) - least.at(a);
+    return span > close * whole && span < whole + 1e-5;
+  };
+  constexpr double half_turn = std::numbers::pi;
+  return spans(0, 2 * half_turn) && spans(1, half_turn) && most[1] < half_turn / 2 + 1e-5;
+}
+
+}  // namespace windsplat::data::cf

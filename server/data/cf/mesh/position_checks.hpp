@@ -1,0 +1,20 @@
+// Lists of positions that are no cells of one picture.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/data/cf/array_file.hpp"
+
+namespace windsplat::data::cf {
+
+// Positions at different times are no picture of one: tracks of ships, profiles of floats. list: a
+// dimension. Errors: bad_data if different times lie along it, or a cf_role trajectory_id or
+// profile_id (CF 1.11, 9.5); those of reading.
+Result<void> check_one_time(const ArrayFile& file, int list);
+
+// Whether longitudes and latitudes said to be in degrees fill those of a globe in radians.
+bool are_radians(const std::array<std::vector<double>, 2>& positions);
+
+}  // namespace windsplat::data::cf
