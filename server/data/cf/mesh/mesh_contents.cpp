@@ -42,10 +42,15 @@ MeshDimensions dimensions_of(const FileContents& contents, const Topology& topol
     const bool counts_nodes = has_nodes && own.length == mesh.nodes();
     const int listed = topology.cells >= 0 ? topology.cells : topology.nodes;
     const bool is_foreign = are_of_different_grids(own, contents.dimensions[at(listed)]);
-    const bool is_alias = is_other && is_list && !is_foreign && counts_cells != counts_nodes;
-    if (own.is_list && is_other && !is_alias) out.foreign.push_back(id);
-    if (id == topology.cells || (is_alias && counts_cells)) out.cells.push_back(id);
-    if (id == topology.nodes || (is_alias && counts_nodes)) out.nodes.push_back(id);
+    // Lists of GRIB are cells by definition.
+    const bool may_be_nodes = own.is_list ? topology.by_neighbours : !counts_cells;
+    const bool may_be_cells = own.is_list || !counts_nodes;
+    const bool is_alias = is_other && is_list && !is_foreign;
+    const bool as_cells = is_alias && counts_cells && may_be_cells;
+    const bool as_nodes = is_alias && counts_nodes && may_be_nodes;
+    if (own.is_list && is_other && !as_cells && !as_nodes) out.foreign.push_back(id);
+    if (id == topology.cells || as_cells) out.cells.push_back(id);
+    if (id == topology.nodes || as_nodes) out.nodes.push_back(id);
     if (id == topology.edges) out.edges.push_back(id);
   }
   return out;
