@@ -273,10 +273,34 @@ class HeightFinder {
     return -1;
   }
 
+  // 1: heights, -1: depths, 0: neither.
+  [[nodiscard]] static int direction_of_name(const std::string& standard_name) {
+    const std::string& name = standard_name;
+    if (name == "depth" || name.starts_with("depth_below_")) return -1;
+    return name == "height" || name == "altitude" || name == "geopotential_height" ||
+                   name.starts_with("height_above_")
+               ? 1
+               : 0;
+  }
+
+  // The same of an auxiliary coordinate, by `positive`, its standard name, otherwise its name and
+  // description; 0 for thicknesses, too.
+  [[nodiscard]] static int direction_of_levels(const FileVariable& one) {
+    const std::string text = lower(one.name + ' ' + one.long_name + ' ' + one.standard_name);
+    const auto says = [&](const char* word) { return text.find(word) != std::string::npos; };
+    if (says("thick") || says("bounds") || says("bnds")) return 0;
+    const std::string positive = lower(one.positive);
+    if (positive == "up" || positive == "down") return positive == "up" ? 1 : -1;
+    if (const int known = direction_of_name(one.standard_name); known != 0) return known;
+    const bool is_depth = says("depth");
+    const bool is_height = says("height") || says("altitude");
+    return is_depth == is_height ? 0 : is_depth ? -1 : 1;
+  }
+
   // An auxiliary coordinate of the levels in units of length: a height or depth by its standard
   // name, level_height of the Unified Model, or one that variables name, that of most of them; -1
   // if there is none.
-  [[nodiscard]] int find_auxiliary() const {
+  [[nodiscard]] int find_auxiliary() {
     const FileContents& contents = file_.contents();
     int best = -1;
     std::ptrdiff_t most = -1;
@@ -284,17 +308,21 @@ class HeightFinder {
       const FileVariable& one = contents.variables[v];
       const int self = static_cast<int>(v);
       if (self == coordinate_ || !is_on_levels(self) || !metres_in(one.units)) continue;
-      const std::string& name = one.standard_name;
-      const bool named = name == "height" || name == "altitude" || name == "depth" ||
-                         name == "geopotential_height" || name.starts_with("height_above_") ||
-                         name.starts_with("depth_below_") || one.long_name == "level_height" ||
-                         one.name.starts_with("level_height");
+      const bool named = direction_of_name(one.standard_name) != 0 ||
+                         one.long_name == "level_height" || one.name.starts_with("level_height");
       const auto users = std::count_if(
           contents.variables.begin(), contents.variables.end(), [&](const FileVariable& user) {
             const std::string words = ' ' + user.coordinates + ' ';
             return words.find(' ' + one.name + ' ') != std::string::npos &&
                    std::count(user.dims.begin(), user.dims.end(), grid_.space[2]) > 0;
           });
+      if (direction_of_levels(one) == 0) {
+        if (users > 0) {
+          info_.notes.push_back("the levels are not placed by " + in_quotes(one.name) +
+                                ": it does not say that it is a height or a depth");
+        }
+        continue;
+      }
       if ((named || users > 0) && users > most) {
         best = self;
         most = users;
@@ -310,7 +338,10 @@ class HeightFinder {
     auto values = unpacked_values(file_, found);
     if (!values) return values.error();
     if (grid_.turned[2]) std::reverse(values->begin(), values->end());
-    const bool down = lower(from.positive) == "down" || from.standard_name.starts_with("depth");
+    const bool below_zero =
+        std::all_of(values->begin(), values->end(), [](double z) { return z <= 0; });
+    const bool is_turned = from.positive.empty() && direction_of_levels(from) < 0 && below_zero;
+    const bool down = direction_of_levels(from) < 0 && !is_turned;
     const auto goes_up = [&] {
       const auto wrong = [down](double a, double b) { return down ? !(b < a) : !(b > a); };
       return std::adjacent_find(values->begin(), values->end(), wrong) == values->end();
@@ -330,7 +361,8 @@ class HeightFinder {
     axis.kind = down ? AxisKind::depth : AxisKind::height;
     axis.standard_name = from.standard_name;
     axis.units = from.units;
-    info_.notes.push_back("levels are placed by " + in_quotes(from.name));
+    info_.notes.push_back("levels are placed by " + in_quotes(from.name) +
+                          (is_turned ? ", whose depths below 0 are interpreted as heights" : ""));
     forget_left_out({from.name, axis.name});
     return {};
   }

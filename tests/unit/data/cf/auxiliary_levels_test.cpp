@@ -77,6 +77,58 @@ TEST(AuxiliaryLevels, DepthsRunDown) {
   EXPECT_EQ(volume_of(*source, "t").values[0], 250 + 2 * columns);
 }
 
+struct Auxiliary {
+  std::string name;
+  std::string long_name;
+  std::string standard_name;
+  std::vector<double> values{5, 50, 500, 5000};
+};
+
+// Levels numbered from the surface of the sea, and a coordinate of theirs in metres.
+void write_auxiliary(const std::string& path, const Auxiliary& one) {
+  NetcdfMaker file(path);
+  const int z = file.axis("lev", {1, 2, 3, 4}, "");
+  file.text(file.variable_id("lev"), "axis", "Z");
+  const int v = file.variable(one.name, NC_DOUBLE, {z}, one.values);
+  file.text(v, "units", "m");
+  if (!one.long_name.empty()) file.text(v, "long_name", one.long_name);
+  if (!one.standard_name.empty()) file.text(v, "standard_name", one.standard_name);
+  const int y = file.axis("latitude", {50, 51}, "degrees_north");
+  const int x = file.axis("longitude", {0, 1, 2}, "degrees_east");
+  const int t = file.variable("t", NC_FLOAT, {z, y, x}, counting(columns * 4, 250));
+  file.text(t, "units", "K");
+  file.text(t, "coordinates", one.name);
+}
+
+TEST(AuxiliaryLevels, DepthsByNameOrDescriptionAreNoHeights) {
+  const Folder folder;
+  for (const Auxiliary& one :
+       {Auxiliary{"depth", "", ""}, Auxiliary{"z_t", "depth from surface to midpoint of layer", ""},
+        Auxiliary{"soil_depth", "", ""}, Auxiliary{"zt", "", "depth"}}) {
+    write_auxiliary(folder / "d.nc", one);
+    const auto source = opened(folder / "d.nc");
+    EXPECT_EQ(source->info().grid.axes[2].kind, AxisKind::depth) << one.name;
+    EXPECT_THAT(source->info().grid.axes[2].coordinates, ElementsAre(5000, 500, 50, 5)) << one.name;
+    EXPECT_EQ(volume_of(*source, "t").values[0], 250 + 3 * columns) << one.name;
+  }
+  write_auxiliary(folder / "n.nc", {"depth", "", "depth", {-5, -50, -500, -5000}});
+  const auto source = opened(folder / "n.nc");
+  EXPECT_EQ(source->info().grid.axes[2].kind, AxisKind::height);
+  EXPECT_THAT(source->info().grid.axes[2].coordinates, ElementsAre(-5000, -500, -50, -5));
+}
+
+TEST(AuxiliaryLevels, ThicknessesAndLengthsWithoutADirectionPlaceNoLevels) {
+  const Folder folder;
+  for (const Auxiliary& one :
+       {Auxiliary{"thick", "layer thickness", ""}, Auxiliary{"dz", "", "cell_thickness"},
+        Auxiliary{"zz", "", ""}, Auxiliary{"depth_bnds", "", ""}}) {
+    write_auxiliary(folder / "t.nc", one);
+    const auto source = opened(folder / "t.nc");
+    EXPECT_EQ(source->info().grid.axes[2].kind, AxisKind::level) << one.name;
+    EXPECT_TRUE(has_note(source->info(), "the levels are not placed by '" + one.name + "'"));
+  }
+}
+
 TEST(AuxiliaryLevels, ThatAreNoPlacesAreNoted) {
   const Folder folder;
   write_levels(folder / "odd.nc", {{1, 2, 3, 4}, {20, 80, 80, 900}});
