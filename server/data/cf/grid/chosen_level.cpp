@@ -1,6 +1,7 @@
 // The coordinate of a chosen level has lost its dimension: it becomes an axis of length 1 again.
 #include "server/data/cf/grid/chosen_level.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -69,12 +70,18 @@ Result<std::optional<ChosenLevel>> find_chosen_level(const ArrayFile& file,
   return std::optional(std::move(out));
 }
 
-Result<std::optional<Axis>> find_chosen_latitude(const ArrayFile& file) {
+Result<std::optional<Axis>> find_chosen_latitude(const ArrayFile& file,
+                                                 const std::vector<int>& shown) {
   std::optional<Axis> found;
   const FileContents& contents = file.contents();
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
     const FileVariable& variable = contents.variables[v];
     if (!variable.numeric || !variable.dims.empty()) continue;
+    const bool is_named = std::any_of(shown.begin(), shown.end(), [&](int field) {
+      const std::string words = ' ' + contents.variables[at(field)].coordinates + ' ';
+      return words.find(' ' + variable.name + ' ') != std::string::npos;
+    });
+    if (!is_named && !variable.in_use) continue;
     const FileContents one = on_one_entry(variable);
     const DimensionRole role = classify_dimensions(one).front();
     if (role.role != Role::y || role.kind != AxisKind::latitude) continue;

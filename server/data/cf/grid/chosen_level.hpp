@@ -25,7 +25,9 @@ Result<std::optional<ChosenLevel>> find_chosen_level(const ArrayFile& file,
                                                      AxisKind horizontal);
 
 // The axis of one latitude along which a section of longitudes runs: a coordinate without
-// dimensions, as one that was chosen; nullopt if there is none, or several that differ.
-Result<std::optional<Axis>> find_chosen_latitude(const ArrayFile& file);
+// dimensions that was chosen or that one of `shown` names in `coordinates`; nullopt if there is
+// none, or several that differ.
+Result<std::optional<Axis>> find_chosen_latitude(const ArrayFile& file,
+                                                 const std::vector<int>& shown);
 
 }  // namespace windsplat::data::cf
