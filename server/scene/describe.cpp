@@ -77,6 +77,16 @@ Result<void> add_range(data::Dataset& dataset, std::size_t steps,
   return {};
 }
 
+// A further note is on vectors that are not shown.
+void add_bounded(const std::vector<std::string>& unread, std::vector<std::string>& notes) {
+  const std::size_t room = data::notes_max - 1 - std::min(notes.size(), data::notes_max - 2);
+  const std::size_t listed = unread.size() <= room ? unread.size() : room - 1;
+  notes.insert(notes.end(), unread.begin(), unread.begin() + static_cast<std::ptrdiff_t>(listed));
+  if (listed == unread.size()) return;
+  notes.push_back("the ranges of " + std::to_string(unread.size() - listed) +
+                  " more fields are not known");
+}
+
 }  // namespace
 
 void add_seen_ranges(const data::Dataset& dataset, protocol::DatasetDescription& description) {
@@ -156,7 +166,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
     out.choices.push_back({choice.name, choice.length, choice.values, choice.chosen});
   }
   out.notes = info.notes;
-  out.notes.insert(out.notes.end(), unread.begin(), unread.end());
+  add_bounded(unread, out.notes);
   for (const data::TimeStep& step : info.steps) out.steps.push_back({step.value, step.text});
   out.time_units = info.time_units;
   out.resident_bytes = dataset.resident_bytes();

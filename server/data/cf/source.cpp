@@ -41,7 +41,6 @@ namespace windsplat::data::cf {
 namespace {
 
 constexpr std::size_t axis_max = std::size_t{1} << 24;
-constexpr std::size_t notes_max = 200;
 
 class ArraySource final : public FileSource {
  public:
@@ -59,6 +58,7 @@ class ArraySource final : public FileSource {
     }
     info_.left_out = std::move(choice_.left_out);
     info_.notes = file_->contents().notes;
+    const std::size_t notes_of_file = info_.notes.size();
     if (!choice_.note.empty()) info_.notes.push_back(choice_.note);
     info_.choices = file_->contents().choices;
     if (auto done = find_axes(); !done) {
@@ -87,7 +87,7 @@ class ArraySource final : public FileSource {
     tell_absent_components();
     tell_valid_values();
     tell_unwritten();
-    bound_notes();
+    bound_notes(notes_of_file, info_.notes);
     const std::filesystem::path name(file_->name());
     info_.id = name.stem().native();
     info_.source = file_->origin();
@@ -242,7 +242,7 @@ class ArraySource final : public FileSource {
 
   Result<void> find_latitude() {
     if (info_.grid.axes[0].kind != AxisKind::longitude) return {};
-    auto latitude = find_chosen_latitude(*file_);
+    auto latitude = find_chosen_latitude(*file_, choice_.variables);
     if (!latitude) return latitude.error();
     if (*latitude) info_.grid.axes[1] = std::move(**latitude);
     return {};
@@ -337,13 +337,6 @@ class ArraySource final : public FileSource {
   [[nodiscard]] bool is_ocean_level(int coordinate) const {
     return coordinate >= 0 &&
            file_->contents().variables.at(at(coordinate)).standard_name.starts_with("ocean_");
-  }
-
-  void bound_notes() {
-    if (info_.notes.size() <= notes_max) return;
-    const std::size_t more = info_.notes.size() - notes_max + 1;
-    info_.notes.resize(notes_max - 1);
-    info_.notes.push_back(std::to_string(more) + " more notes");
   }
 
   void tell_valid_values() {

@@ -44,4 +44,14 @@ std::string absence_text(const DatasetInfo& info, const std::string& name) {
          " to the file's name (&field= behind other entries)";
 }
 
+void bound_notes(std::size_t notes_of_file, std::vector<std::string>& notes) {
+  if (notes.size() <= notes_of_data_max) return;
+  const std::size_t more = notes.size() - notes_of_data_max + 1;
+  const std::size_t of_file = std::min(more, notes_of_file);
+  const auto end = notes.begin() + static_cast<std::ptrdiff_t>(notes_of_file);
+  notes.erase(end - static_cast<std::ptrdiff_t>(of_file), end);
+  notes.resize(notes_of_data_max - 1);
+  notes.push_back(std::to_string(more) + " more notes");
+}
+
 }  // namespace windsplat::data

@@ -101,6 +101,13 @@ struct DatasetInfo {
   [[nodiscard]] const FieldInfo* first(FieldKind kind) const;          // null if there is none
 };
 
+inline constexpr std::size_t notes_max = 200;          // of a description
+inline constexpr std::size_t notes_of_data_max = 150;  // of DatasetInfo
+
+// Leaves at most notes_of_data_max, and counts those left out in the last one: the last of the
+// first `notes_of_file`, which the file gives rise to, before the later ones on how it is shown.
+void bound_notes(std::size_t notes_of_file, std::vector<std::string>& notes);
+
 // What the file has under a name that is no field of the dataset, for the end of a message, with
 // how to show it; empty if it has nothing.
 std::string absence_text(const DatasetInfo& info, const std::string& name);

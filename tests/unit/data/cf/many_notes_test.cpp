@@ -2,12 +2,25 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
+#include "server/data/model/dataset_info.hpp"
 #include "tests/unit/data/dataset_probe.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"
 
 namespace windsplat::data::test {
 namespace {
+
+TEST(ManyNotes, ThoseOnHowDataAreShownStay) {
+  std::vector<std::string> notes;
+  for (int n = 0; n < 300; ++n) notes.push_back("of the file " + std::to_string(n));
+  notes.emplace_back("levels are placed by 'z'");
+  bound_notes(300, notes);
+  ASSERT_EQ(notes.size(), notes_of_data_max);
+  EXPECT_EQ(notes[147], "of the file 147");
+  EXPECT_EQ(notes[148], "levels are placed by 'z'");
+  EXPECT_EQ(notes[149], "152 more notes");
+}
 
 TEST(ManyNotes, AreBoundedAndCounted) {
   constexpr int vectors = 300;
