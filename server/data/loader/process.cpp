@@ -21,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/data/cf/grid/crs_wkt.hpp"
 #include "server/data/loader/confine.hpp"
 
 namespace windsplat::data::loader {
@@ -61,9 +62,12 @@ Result<int> null_device() {
   return device.number();
 }
 
-// Libraries must not search for files by variables of the user's environment.
+// Libraries must not search for files by variables of the user's environment: PROJ_DATA is the
+// folder that was found and may be read.
 std::vector<std::string> environment_of_loader() {
   std::vector<std::string> out{"HDF5_USE_FILE_LOCKING=FALSE"};
+  static const std::string database = cf::projection_database_folder();
+  if (!database.empty()) out.push_back("PROJ_DATA=" + database);
   for (const char* name : {"ASAN_OPTIONS", "UBSAN_OPTIONS", "TSAN_OPTIONS", "LSAN_OPTIONS"}) {
     const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): no thread sets any
     if (value != nullptr) {

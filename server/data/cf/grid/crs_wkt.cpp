@@ -5,10 +5,12 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <numbers>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "server/base/ascii.hpp"
@@ -250,16 +252,26 @@ std::optional<int> epsg_code_of(const std::string& text) {
 }
 
 Result<GridMapping> mapping_of_epsg(int code) {
-  const wkt::Context context(context_with_database(), &proj_context_destroy);
+  const std::string folder = projection_database_folder();
+  const wkt::Context context(context_with_database(folder), &proj_context_destroy);
   if (!context) return make_error(ErrorKind::out_of_memory, "cannot be read: no memory");
   return wkt::Reader(context.get()).read_code(code);
 }
 
 std::string projection_database_folder() {
-  const wkt::Context context(context_with_database(), &proj_context_destroy);
-  const char* const path = context ? proj_context_get_database_path(context.get()) : nullptr;
-  const std::string file = path == nullptr ? "" : path;
-  return file.substr(0, file.find_last_of('/') == std::string::npos ? 0 : file.find_last_of('/'));
+  // PROJ's own search, by its variables, then the folder of the distribution.
+  for (const char* folder : {"", "/usr/share/proj"}) {
+    const wkt::Context context(context_with_database(folder), &proj_context_destroy);
+    if (!context) continue;
+    const wkt::Object known = wkt::held(
+        proj_create_from_database(context.get(), "EPSG", "4326", PJ_CATEGORY_CRS, 0, nullptr));
+    const char* const path = known ? proj_context_get_database_path(context.get()) : nullptr;
+    if (path == nullptr) continue;
+    std::error_code fault;
+    const auto file = std::filesystem::absolute(path, fault);
+    if (!fault) return file.parent_path().string();
+  }
+  return {};
 }
 
 }  // namespace windsplat::data::cf

@@ -5,6 +5,7 @@
 #include <proj.h>
 
 #include <cstddef>
+#include <string>
 
 namespace windsplat::data::cf {
 
@@ -35,12 +36,15 @@ inline PJ_CONTEXT* context_without_files() {
 }
 
 // PROJ as installed, without network. Only to read systems of the database: files of the user may
-// change how it computes.
-inline PJ_CONTEXT* context_with_database() {
+// change how it computes. folder: of the database; empty: PROJ searches for it.
+inline PJ_CONTEXT* context_with_database(const std::string& folder) {
   PJ_CONTEXT* const out = proj_context_create();
   if (out == nullptr) return out;
   proj_log_func(out, nullptr, [](void*, int, const char*) {});
   proj_context_set_enable_network(out, 0);
+  if (folder.empty()) return out;
+  const std::string file = folder + "/proj.db";
+  proj_context_set_database_path(out, file.c_str(), nullptr, nullptr);
   return out;
 }
 
