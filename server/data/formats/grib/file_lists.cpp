@@ -41,12 +41,17 @@ void File::fix_constants() {
     if ((!is_position && !is_height_of_levels(group.header)) || !has_one_time(group)) continue;
     group.is_constant = true;
     std::map<Place, std::size_t> fields;
+    std::size_t unused = 0;
     for (const auto& [place, field] : group.fields) {
       Place at = place;
       at[reference_axis] = 0;
       at[time_axis] = 0;
       if (is_position) at[level_axis_index] = 0;
-      fields.emplace(at, field);
+      unused += fields.emplace(at, field).second ? 0 : 1;
+    }
+    if (unused > 0) {
+      contents_.notes.push_back(in_quotes(name) + " is given at " + std::to_string(unused + 1) +
+                                " levels: the positions of the first are used");
     }
     group.fields = std::move(fields);
     if (is_position) {
