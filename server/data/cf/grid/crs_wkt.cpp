@@ -5,13 +5,17 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <sstream>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/grid/proj_context.hpp"
@@ -259,17 +263,24 @@ Result<GridMapping> mapping_of_epsg(int code) {
 }
 
 std::string projection_database_folder() {
-  // PROJ's own search, by its variables, then the folder of the distribution.
-  for (const char* folder : {"", "/usr/share/proj"}) {
-    const wkt::Context context(context_with_database(folder), &proj_context_destroy);
-    if (!context) continue;
-    const wkt::Object known = wkt::held(
-        proj_create_from_database(context.get(), "EPSG", "4326", PJ_CATEGORY_CRS, 0, nullptr));
-    const char* const path = known ? proj_context_get_database_path(context.get()) : nullptr;
-    if (path == nullptr) continue;
+  // Without PROJ, which would take megabytes in a process that needs nothing else of it.
+  std::vector<std::string> folders;
+  const auto add = [&](const char* name, const char* within) {
+    const char* const value = std::getenv(name);
+    if (value == nullptr) return;
+    std::istringstream parts{value};
+    for (std::string folder; std::getline(parts, folder, ':');) {
+      if (!folder.empty()) folders.push_back(folder + within);
+    }
+  };
+  add("PROJ_DATA", "");
+  add("PROJ_LIB", "");
+  add("HOME", "/.local/share/proj");
+  folders.emplace_back("/usr/share/proj");
+  for (const std::string& folder : folders) {
     std::error_code fault;
-    const auto file = std::filesystem::absolute(path, fault);
-    if (!fault) return file.parent_path().string();
+    const auto whole = std::filesystem::absolute(folder, fault);
+    if (!fault && std::filesystem::is_regular_file(whole / "proj.db", fault)) return whole.string();
   }
   return {};
 }

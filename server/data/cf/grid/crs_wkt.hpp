@@ -22,8 +22,8 @@ std::optional<int> epsg_code_of(const std::string& text);
 // bad_data with the reason as a predicate, including a database that is not installed.
 Result<GridMapping> mapping_of_epsg(int code);
 
-// The absolute folder of PROJ's database: where PROJ finds one it can read (PROJ_DATA), otherwise
-// /usr/share/proj; empty if there is none.
+// The absolute folder of PROJ's database proj.db: the first of those of PROJ_DATA and PROJ_LIB, the
+// user's and /usr/share/proj that has one; empty if there is none.
 std::string projection_database_folder();
 
 }  // namespace windsplat::data::cf

@@ -35,7 +35,7 @@ Result<void> check_one_time(const ArrayFile& file, int list) {
 }
 
 bool are_radians(const std::array<std::vector<double>, 2>& positions) {
-  constexpr double close = 0.97;
+  constexpr double close = 0.95;
   std::array<double, 2> least{1e9, 1e9};
   std::array<double, 2> most{-1e9, -1e9};
   for (std::size_t a = 0; a < 2; ++a) {

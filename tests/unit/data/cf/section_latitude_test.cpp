@@ -25,7 +25,9 @@ TEST(SectionLatitude, IsAScalarThatTheFieldNamesAndNoOther) {
     const auto source = opened(folder / "s.nc");
     const Axis& axis = source->info().grid.axes[1];
     EXPECT_EQ(axis.kind == AxisKind::latitude, is_named);
-    if (is_named) EXPECT_EQ(axis.coordinates, std::vector<double>{80});
+    if (is_named) {
+      EXPECT_EQ(axis.coordinates, std::vector<double>{80});
+    }
   }
 }
 
