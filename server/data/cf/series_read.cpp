@@ -61,7 +61,8 @@ void SeriesFile::forget_chunks(int variable) const {
   first_->forget_chunks(way.in_first);
   for (const Opened& opened : opened_) {
     const auto& indices = members_[opened.member].variables;
-    opened.file->forget_chunks(indices.empty() ? way.in_first : indices[at(way.in_first)]);
+    const int id = indices.empty() ? way.in_first : indices[at(way.in_first)];
+    if (id >= 0) opened.file->forget_chunks(id);  // fields without time may be in the first alone
   }
 }
 

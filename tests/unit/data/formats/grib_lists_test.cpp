@@ -159,6 +159,27 @@ TEST_F(GribLists, AreDrawnOnTheCellsOfAGridFileWithTheirLayersAndHeights) {
   }
 }
 
+TEST_F(GribLists, HeightsInTheFirstFileOfASeriesHoldForAll) {
+  write_grid(folder_ / "grid.nc", own_uuid_text);
+  std::string bytes = icon_file(0);
+  for (const long k : {1L, 2L, 3L}) {
+    bytes += message(3, 6, {k, 101}, Table(mesh::cells, 100.0 * static_cast<double>(9 - k * k)));
+  }
+  write_bytes(folder_ / "a0.grib", bytes);
+  write_bytes(folder_ / "a6.grib", icon_file(6));
+  const auto source = opened(folder_ / "{grid.nc,a*.grib}");
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  for (const std::size_t step : {0U, 1U}) {
+    EXPECT_FALSE(volume_of(*source, "wind", step).values.empty());
+    const Volume heights = volume_of(*source, "h", step);
+    ASSERT_FALSE(heights.values.empty());
+    EXPECT_NEAR(heights.range[0], 250, 1e-3);
+    EXPECT_NEAR(heights.range[1], 650, 1e-3);
+  }
+  EXPECT_EQ(source->info().grid.axes[2].coordinates, (Table{250, 650}));
+}
+
 TEST_F(GribLists, AreRefusedBesideAGridOfAnotherUuidOrNumberOfCells) {
   EXPECT_THAT(fault_beside_grid(icon_file(), "0c0b0b0b-0b0b-0b0b-0b0b-0b0b0b0b0b0b"),
               AllOf(HasSubstr("'u' is on a horizontal grid of 24 cells of the UUID "
