@@ -153,7 +153,7 @@ KERNEL_INLINE int gather_rays(const Lanes& s, const Faces& faces, SplatRays& ray
       float* block = touch(*faces.slab[n], rays.row[b], rays.column[b]);
       for (int l = 0; l < block_pixels; l += pixel_lanes) {
         float* gathered = block + l;
-        const Pixel part = load<Pixel>(rays.part + b * block_pixels + l);
+        const Pixel part = load<Pixel>(&rays.part[b * block_pixels + l]);
         add_to(gathered, part);
         for (int c = 0; c < 3; ++c) {
           add_product(gathered + static_cast<std::ptrdiff_t>(1 + c) * block_pixels, part,
@@ -176,7 +176,7 @@ KERNEL_INLINE void gather_blocks(const Lanes& s, const SplatRecord& record, cons
       const BodyBlock& body = tile.body->blocks[rays.row[b] * tile_blocks + rays.column[b]];
       for (int l = 0; l < block_pixels; l += pixel_lanes) {
         const Pixel depth = here ? body_limit(body, l) : all<Pixel>(body_nowhere);
-        store(depth - all<Pixel>(record.middle), rays.limit + b * block_pixels + l);
+        store(depth - all<Pixel>(record.middle), &rays.limit[b * block_pixels + l]);
       }
       limited = limited || here;
     }
