@@ -129,10 +129,19 @@ TEST(AuxiliaryLevels, ThicknessesAndLengthsWithoutADirectionPlaceNoLevels) {
   }
 }
 
+TEST(AuxiliaryLevels, OfOtherUnitsThanLengthsPlaceNoLevels) {
+  const Folder folder;
+  write_levels(folder / "k.nc", {{1, 2, 3, 4}, {20, 80, 200, 900}, "K"});
+  const auto source = opened(folder / "k.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().grid.axes[2].kind, AxisKind::level);
+}
+
 TEST(AuxiliaryLevels, ThatAreNoPlacesAreNoted) {
   const Folder folder;
   write_levels(folder / "odd.nc", {{1, 2, 3, 4}, {20, 80, 80, 900}});
   const auto source = opened(folder / "odd.nc");
+  ASSERT_NE(source, nullptr);
   EXPECT_EQ(source->info().grid.axes[2].kind, AxisKind::level);
   EXPECT_TRUE(has_note(source->info(), "the levels are not placed by 'level_height'"));
 }

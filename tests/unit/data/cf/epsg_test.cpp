@@ -2,7 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/data/cf/grid/crs_wkt.hpp"
@@ -85,6 +90,56 @@ TEST(EpsgCodes, AreNumbersWithOrWithoutAPrefix) {
   for (const char* text : {"", "EPSG:", "EPSG:3857+5714", "WGS84", "-1", "99999999999", "0"}) {
     EXPECT_EQ(cf::epsg_code_of(text), std::nullopt) << text;
   }
+}
+
+// Variables of the environment, restored at the end of a test.
+class Environment {
+ public:
+  explicit Environment(const std::vector<std::pair<const char*, std::string>>& values) {
+    for (const auto& [name, value] : values) {
+      const char* const old = std::getenv(name);  // NOLINT(concurrency-mt-unsafe)
+      before_.emplace_back(name, old == nullptr ? std::nullopt : std::optional<std::string>(old));
+      set(name, value);
+    }
+  }
+  ~Environment() {
+    for (const auto& [name, value] : before_) set(name, value);
+  }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  static void set(const char* name, const std::optional<std::string>& value) {
+    if (value) {
+      ::setenv(name, value->c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+    } else {
+      ::unsetenv(name);  // NOLINT(concurrency-mt-unsafe)
+    }
+  }
+
+  std::vector<std::pair<const char*, std::optional<std::string>>> before_;
+};
+
+TEST(EpsgCodes, TheDatabaseIsInTheFirstFolderOfTheEnvironmentThatHasOne) {
+  const Folder folder;
+  for (const char* name : {"first", "second", "home/.local/share/proj"}) {
+    std::filesystem::create_directories(folder / name);
+    write_bytes(folder / (name + std::string("/proj.db")), "a database");
+  }
+  const std::string none = folder / "none";
+  const std::string first = folder / "first";
+  const std::string second = folder / "second";
+  const std::string home = folder / "home";
+  const auto found = [](const std::string& data, const std::string& lib, const std::string& at) {
+    const Environment environment({{"PROJ_DATA", data}, {"PROJ_LIB", lib}, {"HOME", at}});
+    return cf::projection_database_folder();
+  };
+  EXPECT_EQ(found(first, second, home), first);
+  EXPECT_EQ(found(none + "::" + second + ":" + first, "", home), second);
+  EXPECT_EQ(found(none, second, home), second);
+  EXPECT_EQ(found("", "", home), home + "/.local/share/proj");
+  EXPECT_EQ(found(std::filesystem::relative(first).string(), second, home),
+            std::filesystem::absolute(std::filesystem::relative(first)).string());
 }
 
 }  // namespace

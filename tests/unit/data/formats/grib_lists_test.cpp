@@ -239,6 +239,35 @@ TEST_F(GribLists, FieldsInTwoFilesAreListedAndThoseOfOtherGridsRefused) {
   }
 }
 
+// A list of cells may have as many entries as the mesh has nodes.
+TEST_F(GribLists, AreNotDrawnAtTheNodesOfAMesh) {
+  {
+    NetcdfMaker file(folder_ / "grid.nc");
+    const int face = file.dimension("face", mesh::cells);
+    const int node = file.dimension("node", mesh::nodes);
+    const int mesh = file.variable("mesh", NC_INT, {});
+    file.text(mesh, "cf_role", "mesh_topology");
+    file.number(mesh, "topology_dimension", NC_INT, {2});
+    file.text(mesh, "node_coordinates", "x y");
+    file.text(mesh, "face_node_connectivity", "corners");
+    const int corners =
+        file.variable("corners", NC_INT, {face, file.dimension("four", 4)}, mesh::corners(0));
+    file.number(corners, "start_index", NC_INT, {0});
+    const Table x = mesh::at_nodes([](double a, double) { return a; });
+    const Table y = mesh::at_nodes([](double, double b) { return b; });
+    file.text(file.variable("x", NC_DOUBLE, {node}, x), "units", "degrees_east");
+    file.text(file.variable("y", NC_DOUBLE, {node}, y), "units", "degrees_north");
+  }
+  write_bytes(folder_ / "a.grib", message(0, 0, {1}, mesh::at_nodes(east)));
+  EXPECT_THAT(refusal(folder_ / "{grid.nc,a.grib}"),
+              AllOf(HasSubstr("'t' is on a horizontal grid of 35 cells"),
+                    HasSubstr("the grid that is given has 24 cells")));
+  write_bytes(folder_ / "b.grib", message(0, 0, {1}, at_cells(east)));
+  const auto source = opened(folder_ / "{grid.nc,b.grib}");
+  ASSERT_NE(source, nullptr);
+  mesh::expect_function(*source, "t", east, 1);
+}
+
 TEST_F(GribLists, WithoutPositionsAskForTheFileOfTheirGrid) {
   EXPECT_THAT(fault(icon_file()), AllOf(HasSubstr("outlines are not in the file"),
                                         HasSubstr("of UUID 0b0b0b0b0b0b0b0b0b0b0b0b0b0b0b0b"),
@@ -273,6 +302,16 @@ TEST_F(GribLists, AreDrawnAtTheLongitudesAndLatitudesOfTheirFile) {
     ASSERT_NEAR(volume.values[n],
                 axes[0].coordinates[n % width] - 2 * axes[1].coordinates[n / width], 1e-3);
   }
+  EXPECT_FALSE(has_note(source->info(), "the positions of the first are used"));
+  // Positions at further levels are not used.
+  const Table others(side * side, 3);
+  const std::string more = message(191, 2, {1}, others) + message(191, 1, {1}, others);
+  const auto leveled = open(places + more + message(0, 0, {1, layer_type}, values));
+  ASSERT_NE(leveled, nullptr);
+  EXPECT_TRUE(has_note(leveled->info(),
+                       "'tlon' is given at 2 levels: the positions of the first are used"));
+  EXPECT_NEAR(leveled->info().grid.axes[0].coordinates.front(), 20, 0.5);
+  EXPECT_EQ(leveled->info().grid.axes[2].coordinates.size(), 1U);
   // The positions belong to a grid of another UUID.
   EXPECT_THAT(fault(places + message(0, 0, {1, layer_type}, values, 0x0c)),
               HasSubstr("horizontal grid"));
