@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/base/ascii.hpp"
+#include "server/data/cf/edges/edge_variables.hpp"
 #include "server/data/cf/grid/cell_lists.hpp"
 
 namespace windsplat::data::cf {
@@ -51,9 +52,21 @@ MeshDimensions dimensions_of(const FileContents& contents, const Topology& topol
     if (own.is_list && is_other && !as_cells && !as_nodes) out.foreign.push_back(id);
     if (id == topology.cells || as_cells) out.cells.push_back(id);
     if (id == topology.nodes || as_nodes) out.nodes.push_back(id);
-    if (id == topology.edges) out.edges.push_back(id);
+    const bool counts_edges =
+        topology.edges >= 0 && own.length == contents.dimensions[at(topology.edges)].length;
+    // ICON's files number their lists: ncells_2.
+    const bool may_be_edges = lists[d] || lower(own.name).starts_with("ncells_");
+    const bool as_edges =
+        is_other && may_be_edges && !own.is_list && counts_edges && !as_cells && !as_nodes;
+    if (id == topology.edges || as_edges) out.edges.push_back(id);
   }
   return out;
+}
+
+// Dimensions of a variable that are among the lists.
+std::ptrdiff_t lists_among(const FileVariable& variable, const std::vector<int>& lists) {
+  return std::count_if(variable.dims.begin(), variable.dims.end(),
+                       [&](int d) { return MeshDimensions::has(lists, d); });
 }
 
 class ContentsMaker {
@@ -69,12 +82,19 @@ class ContentsMaker {
         parts_of_mesh_(variables_of(topology)) {
     contents_ = file.contents();
     contents_.variables.clear();
+    out_.edges = find_edge_tables(file, topology);
+    const EdgeTables& edges = out_.edges;
+    for (const int v : {edges.nodes, edges.of_cells, edges.middles[0], edges.middles[1],
+                        edges.angle, edges.normals[0], edges.normals[1]}) {
+      if (v >= 0) parts_of_mesh_.push_back(v);
+    }
   }
 
   Result<MeshContents> make() {
     add_lattice();
     if (auto done = add_levels(); !done) return done.error();
     add_variables();
+    edge_notes_.tell(contents_.notes);
     if (auto fine = check_grid(); !fine) return fine.error();
     tell_unknown_grid();
     add_heights();
@@ -185,31 +205,67 @@ class ContentsMaker {
       }
       MeshPart own;
       own.base = id;
+      if (variable.numeric && lists_among(variable, dimensions_.edges) == 1) {
+        add_on_edges(std::move(variable), std::move(own));
+        continue;
+      }
       place(variable, own);
       contents_.variables.push_back(std::move(variable));
       out_.parts.push_back(std::move(own));
     }
   }
 
-  void place(FileVariable& variable, MeshPart& own) const {
-    const auto count = [&](const std::vector<int>& lists) {
-      return std::count_if(variable.dims.begin(), variable.dims.end(),
-                           [&](int d) { return MeshDimensions::has(lists, d); });
-    };
-    if (count(dimensions_.edges) > 0) {
+  void add_on_edges(FileVariable variable, MeshPart own) {
+    const EdgeUse use =
+        use_of_edges(variable, file_.contents(), dimensions_.cells, topology_, out_.edges);
+    if (!use.reason.empty()) {
       variable.numeric = false;
-      variable.unread = "on the edges of the mesh: values at cells and nodes only are drawn";
+      variable.unread = use.reason;
+      contents_.variables.push_back(std::move(variable));
+      out_.parts.push_back(std::move(own));
       return;
     }
-    if (count(dimensions_.foreign) > 0) {
+    edge_notes_.add(variable.name, use.is_normal);
+    const auto add = [&](FileVariable one, EdgePart part) {
+      MeshPart placed = own;
+      placed.edges = part;
+      resample(one, placed, dimensions_.edges, MeshLocation::face);
+      contents_.variables.push_back(std::move(one));
+      out_.parts.push_back(std::move(placed));
+    };
+    if (!use.is_normal) {
+      add(std::move(variable), EdgePart::mean);
+      return;
+    }
+    const auto components = components_of_normal(variable, file_.contents(), on_sphere_);
+    add(components[0], EdgePart::east);
+    add(components[1], EdgePart::north);
+  }
+
+  void place(FileVariable& variable, MeshPart& own) const {
+    if (lists_among(variable, dimensions_.edges) > 0) {
+      variable.numeric = false;
+      if (variable.unread.empty()) variable.unread = "a table of edges of the mesh";
+      return;
+    }
+    if (lists_among(variable, dimensions_.foreign) > 0) {
       variable.numeric = false;
       variable.unread = problem_of_foreign(variable);
       return;
     }
-    const bool at_cells = count(dimensions_.cells) == 1;
-    if (!variable.numeric || count(dimensions_.cells) + count(dimensions_.nodes) != 1) return;
-    own.location = at_cells ? MeshLocation::face : MeshLocation::node;
-    const std::vector<int>& lists = at_cells ? dimensions_.cells : dimensions_.nodes;
+    const auto on_cells = lists_among(variable, dimensions_.cells);
+    if (!variable.numeric || on_cells + lists_among(variable, dimensions_.nodes) != 1) return;
+    if (on_cells == 1) {
+      resample(variable, own, dimensions_.cells, MeshLocation::face);
+    } else {
+      resample(variable, own, dimensions_.nodes, MeshLocation::node);
+    }
+  }
+
+  // lists: one of them is a dimension of the variable, in whose place y and x follow.
+  void resample(FileVariable& variable, MeshPart& own, const std::vector<int>& lists,
+                MeshLocation location) const {
+    own.location = location;
     const auto list = std::find_if(variable.dims.begin(), variable.dims.end(),
                                    [&](int d) { return MeshDimensions::has(lists, d); });
     own.list = static_cast<std::size_t>(list - variable.dims.begin());
@@ -295,7 +351,8 @@ class ContentsMaker {
   MeshContents out_;
   FileContents& contents_;
   MeshDimensions dimensions_;
-  std::vector<int> parts_of_mesh_;     // variables of the file
+  std::vector<int> parts_of_mesh_;  // variables of the file
+  EdgeNotes edge_notes_;
   std::vector<std::string> replaced_;  // variables in whose place there are other coordinates
 };
 

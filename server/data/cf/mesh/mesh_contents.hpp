@@ -7,6 +7,7 @@
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
+#include "server/data/cf/edges/edges.hpp"
 #include "server/data/cf/mesh/lattice.hpp"
 #include "server/data/cf/mesh/mesh.hpp"
 #include "server/data/cf/mesh/models.hpp"
@@ -19,13 +20,15 @@ namespace windsplat::data::cf {
 struct MeshPart {
   int base = -1;                         // variable of the file; -1: `values`, or heights
   std::optional<MeshLocation> location;  // set: resampled
+  std::optional<EdgePart> edges;         // set: from values on edges, by way of the cells
   std::size_t list = 0;                  // position of the list among the base's dimensions
   std::vector<double> values;            // of a coordinate that is not in the file
 };
 
 struct MeshContents {
   FileContents contents;
-  std::vector<MeshPart> parts;       // parallel to contents.variables
+  std::vector<MeshPart> parts;  // parallel to contents.variables
+  EdgeTables edges;
   SigmaHeights heights;              // of the part at nodes without a base
   std::vector<int> cell_dimensions;  // dimensions of the file that list the cells
 

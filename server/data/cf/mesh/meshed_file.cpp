@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/data/bytes/decode_limits.hpp"
+#include "server/data/cf/edges/edges.hpp"
 #include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/mesh/centers.hpp"
 #include "server/data/cf/mesh/mesh_contents.hpp"
@@ -27,8 +28,12 @@ using Indices = std::vector<std::size_t>;
 
 class MeshedFile final : public ArrayFile {
  public:
-  MeshedFile(std::unique_ptr<ArrayFile> base, MeshGrid grid, MeshContents shown)
-      : base_(std::move(base)), grid_(std::move(grid)), shown_(std::move(shown)), layers_(*base_) {
+  MeshedFile(std::unique_ptr<ArrayFile> base, Topology topology, MeshGrid grid, MeshContents shown)
+      : base_(std::move(base)),
+        grid_(std::move(grid)),
+        shown_(std::move(shown)),
+        layers_(*base_),
+        edges_(std::move(topology), shown_.edges) {
     if (const auto bytes = base_->stored_bytes()) set_stored_bytes(*bytes);
   }
 
@@ -126,6 +131,9 @@ class MeshedFile final : public ArrayFile {
     const MeshPart& own = part(variable);
     held_.variable = -1;
     auto values = own.base < 0 ? height_layer(index) : layers_.read({own.base, own.list}, index);
+    if (values && own.edges) {
+      values = edges_.at_cells(*base_, grid_.mesh(), *own.edges, *values);
+    }
     if (!values) return values.error();
     held_.samples.resize(grid_.lattice().samples());
     grid_.weights(*own.location).gather(*values, held_.samples.data());
@@ -162,6 +170,7 @@ class MeshedFile final : public ArrayFile {
   mutable MeshGrid grid_;
   MeshContents shown_;
   mutable SourceLayers layers_;
+  mutable EdgeValues edges_;
   mutable Held held_;
   mutable std::vector<float> computed_;
 };
@@ -196,8 +205,8 @@ Result<std::unique_ptr<ArrayFile>> meshed(std::unique_ptr<ArrayFile> file) {
   }
   auto& all = shown->contents.notes;
   all.insert(all.end(), notes.begin(), notes.end());
-  return std::unique_ptr<ArrayFile>(
-      std::make_unique<MeshedFile>(std::move(file), std::move(*grid), std::move(*shown)));
+  return std::unique_ptr<ArrayFile>(std::make_unique<MeshedFile>(
+      std::move(file), *topology, std::move(*grid), std::move(*shown)));
 }
 
 }  // namespace windsplat::data::cf

@@ -223,6 +223,8 @@ class TopologyFinder {
         out.is_radian = out.is_radian || is_radian(one.units);
         out.others.push_back(static_cast<int>(v));
       }
+      // ICON's grid files name the edges so.
+      if (numeric("edge_of_cell", 2) >= 0) out.edges = dimension_named(contents_, "edge");
       if (has_corners(out)) return out;
     }
     return std::nullopt;
