@@ -245,6 +245,65 @@ def write_mpas(path):
     return read
 
 
+def in_space(lon, lat):
+    """Unit vectors of a position, of east and of north there."""
+    lon, lat = np.radians(lon), np.radians(lat)
+    return (np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]),
+            np.array([-np.sin(lon), np.cos(lon), 0 * lon]),
+            np.array([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)]))
+
+
+def write_mpas_edges(path):
+    """MPAS with normal winds and a scalar on the edges, which have nodes and angles in any order,
+    and without vectors at the cells."""
+    nz = 4
+    cells, x, y = hexagons(9, 8, (350, 380), (30, 55))
+    polygons = Polygons(cells, x, y)
+    sides = [list(zip(c, c[1:] + c[:1])) for c in cells]
+    nodes = sorted({(min(s), max(s)) for cell in sides for s in cell}, key=lambda s: s[1] % 7)
+    edge_of = {s: e for e, s in enumerate(nodes)}
+    ends = np.array(nodes)
+    middles = sum(in_space(x[n], y[n])[0] for n in ends.T)
+    middles /= np.linalg.norm(middles, axis=0)
+    lon = np.degrees(np.arctan2(middles[1], middles[0]))
+    east, north = in_space(lon, np.degrees(np.arcsin(middles[2])))[1:]
+    angle = noise(len(nodes), low=0, high=6.28).astype(float)  # the model's, whatever the outlines
+    normals = east * np.cos(angle) + north * np.sin(angle)
+    file = netCDF4.Dataset(path, "w", format="NETCDF4")
+    for name, size in {"Time": None, "nCells": len(cells), "nVertices": len(x), "nVertLevels": nz,
+                       "maxEdges": 6, "nEdges": len(nodes), "TWO": 2}.items():
+        file.createDimension(name, size)
+    put(file, "nEdgesOnCell", ("nCells",), np.full(len(cells), 6, np.int32))
+    put(file, "verticesOnCell", ("nCells", "maxEdges"), np.array(cells, np.int32) + 1)
+    put(file, "verticesOnEdge", ("nEdges", "TWO"), ends.astype(np.int32) + 1)
+    put(file, "angleEdge", ("nEdges",), angle, long_name="angle of the normal from the east")
+    put(file, "lonVertex", ("nVertices",), np.radians(x % 360))
+    put(file, "latVertex", ("nVertices",), np.radians(y))
+    dims = ("Time", "nEdges", "nVertLevels")
+    u = put(file, "u", dims, noise(2, len(nodes), nz), units="m s^{-1}")
+    rho = put(file, "rho_edge", dims, noise(2, len(nodes), nz), units="kg m^{-3}")
+    file.close()
+    vectors = np.zeros((2, 2, nz, len(cells)))  # component, step, level, cell
+    means = np.zeros((2, nz, len(cells)))
+    for cell, own in enumerate(sides):
+        center = polygons.centroid(cell)
+        edges = [edge_of[min(s), max(s)] for s in own]
+        a = np.array([[polygons.near(x[i], center[0]) - center[0], y[i] - center[1]]
+                      for i in cells[cell]])
+        b = np.roll(a, -1, axis=0)
+        weights = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        axes = np.array(in_space(*center)[1:])
+        rows = np.sqrt(weights)[:, None] * (axes @ normals[:, edges]).T
+        for t in range(2):
+            right = np.sqrt(weights)[:, None] * u[t, edges]
+            vectors[:, t, :, cell] = np.linalg.lstsq(rows, right, rcond=None)[0]
+            means[t, :, cell] = weights @ rho[t, edges] / weights.sum()
+    fields = {"u_eastward": vectors[0], "u_northward": vectors[1], "rho_edge": means}
+    return on_mesh(polygons, np.arange(nz), fields, None, {"wind": ["u_eastward", "u_northward"]},
+                   {"u_eastward": "m s-1", "u_northward": "m s-1", "rho_edge": "kg m^{-3}",
+                    "x": "degrees_east", "y": "degrees_north"})
+
+
 def write_icon(path):
     """Triangles by clon_vertices in radians, on pressure levels from the top."""
     nx, ny, nz = 11, 9, 4

@@ -54,6 +54,7 @@ READ = {"wrfout_d01.nc": staggered.write_wrf,
         "ugrid_plane.nc": meshes.write_ugrid_plane,
         "fvcom_tide.nc": meshes.write_fvcom,
         "mpas_history.nc": meshes.write_mpas,
+        "mpas_edges.nc": meshes.write_mpas_edges,
         "icon_atm.nc": meshes.write_icon,
         "{scrip,cam}.nc": meshes.write_cam,
         "{fesom.mesh.diag,uvt.fesom.1958}.nc": meshes.write_fesom}

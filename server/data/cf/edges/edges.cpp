@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "server/data/bytes/decode_limits.hpp"
 #include "server/data/cf/coordinates.hpp"
 
 namespace windsplat::data::cf {
@@ -23,6 +24,13 @@ class EdgeReader {
 
   Result<MeshEdges> read() {
     out_.count = file_.contents().dimensions.at(at(topology_.edges)).length;
+    const auto stored = file_.stored_bytes();
+    if (stored && out_.count > entries_max(*stored)) {
+      return make_error(ErrorKind::bad_data, "the mesh has " + std::to_string(out_.count) +
+                                                 " edges: at most " +
+                                                 std::to_string(entries_max(*stored)) +
+                                                 " are supported in a file of this size");
+    }
     out_.of_sides.assign(mesh_.corners.size(), no_mesh_edge);
     auto done = tables_.nodes >= 0 ? by_nodes() : by_cells();
     if (done && tables_.have_normals()) done = read_normals();
