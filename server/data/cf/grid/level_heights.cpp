@@ -13,6 +13,7 @@
 #include "server/base/ascii.hpp"
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/grid/vertical.hpp"
+#include "server/data/cf/level_direction.hpp"
 #include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {
@@ -175,16 +176,32 @@ class HeightFinder {
     return variable(v).numeric && variable(v).dims == std::vector{grid_.space[2]};
   }
 
-  // The coordinate of the levels, or an auxiliary one that has a formula where it has none: files
-  // of the Unified Model number their levels.
+  // Variables along the levels whose `coordinates` name an auxiliary coordinate.
+  [[nodiscard]] std::ptrdiff_t users_of(const FileVariable& one) const {
+    const auto& all = file_.contents().variables;
+    return std::count_if(all.begin(), all.end(), [&](const FileVariable& user) {
+      const std::string words = ' ' + user.coordinates + ' ';
+      return words.find(' ' + one.name + ' ') != std::string::npos &&
+             std::count(user.dims.begin(), user.dims.end(), grid_.space[2]) > 0;
+    });
+  }
+
+  // The coordinate of the levels, or an auxiliary one that has a formula where it has none, that of
+  // most variables: files of the Unified Model number their levels.
   [[nodiscard]] int with_formula() const {
     const auto has = [&](int v) { return !file_.text_of(v, "formula_terms").empty(); };
     if ((coordinate_ >= 0 && has(coordinate_)) || !is_bare()) return coordinate_;
+    int best = coordinate_;
+    std::ptrdiff_t most = -1;
     for (std::size_t v = 0; v < file_.contents().variables.size(); ++v) {
       const int one = static_cast<int>(v);
-      if (is_on_levels(one) && !variable(one).standard_name.empty() && has(one)) return one;
+      if (!is_on_levels(one) || variable(one).standard_name.empty() || !has(one)) continue;
+      if (const auto users = users_of(variable(one)); users > most) {
+        best = one;
+        most = users;
+      }
     }
-    return coordinate_;
+    return best;
   }
 
   Result<std::optional<ParametricLevels>> find_parametric() {
@@ -273,30 +290,6 @@ class HeightFinder {
     return -1;
   }
 
-  // 1: heights, -1: depths, 0: neither.
-  [[nodiscard]] static int direction_of_name(const std::string& standard_name) {
-    const std::string& name = standard_name;
-    if (name == "depth" || name.starts_with("depth_below_")) return -1;
-    return name == "height" || name == "altitude" || name == "geopotential_height" ||
-                   name.starts_with("height_above_")
-               ? 1
-               : 0;
-  }
-
-  // The same of an auxiliary coordinate, by `positive`, its standard name, otherwise its name and
-  // description; 0 for thicknesses, too.
-  [[nodiscard]] static int direction_of_levels(const FileVariable& one) {
-    const std::string text = lower(one.name + ' ' + one.long_name + ' ' + one.standard_name);
-    const auto says = [&](const char* word) { return text.find(word) != std::string::npos; };
-    if (says("thick") || says("bounds") || says("bnds")) return 0;
-    const std::string positive = lower(one.positive);
-    if (positive == "up" || positive == "down") return positive == "up" ? 1 : -1;
-    if (const int known = direction_of_name(one.standard_name); known != 0) return known;
-    const bool is_depth = says("depth");
-    const bool is_height = says("height") || says("altitude");
-    return is_depth == is_height ? 0 : is_depth ? -1 : 1;
-  }
-
   // An auxiliary coordinate of the levels in units of length: a height or depth by its standard
   // name, level_height of the Unified Model, or one that variables name, that of most of them; -1
   // if there is none.
@@ -310,12 +303,7 @@ class HeightFinder {
       if (self == coordinate_ || !is_on_levels(self) || !metres_in(one.units)) continue;
       const bool named = direction_of_name(one.standard_name) != 0 ||
                          one.long_name == "level_height" || one.name.starts_with("level_height");
-      const auto users = std::count_if(
-          contents.variables.begin(), contents.variables.end(), [&](const FileVariable& user) {
-            const std::string words = ' ' + user.coordinates + ' ';
-            return words.find(' ' + one.name + ' ') != std::string::npos &&
-                   std::count(user.dims.begin(), user.dims.end(), grid_.space[2]) > 0;
-          });
+      const auto users = users_of(one);
       if (direction_of_levels(one) == 0) {
         if (users > 0) {
           info_.notes.push_back("the levels are not placed by " + in_quotes(one.name) +
@@ -444,9 +432,10 @@ class HeightFinder {
     axis.kind = AxisKind::height;
     axis.standard_name = "altitude";
     axis.units = "m";
-    info_.notes.emplace_back(
-        "levels are placed at their mean heights at the first step; the field \"height\" has the "
-        "height of every sample (geometry.heightField)");
+    const std::string field = heights.parametric ? "height" : variable(heights.variable).name;
+    info_.notes.push_back("levels are placed at their mean heights at the first step; the field " +
+                          in_quotes(field) +
+                          " has the height of every sample (geometry.heightField)");
     forget_left_out({axis.name});
     for (LeftOut& left : info_.left_out) {
       if (!heights.parametric) break;

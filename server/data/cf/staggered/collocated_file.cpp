@@ -12,6 +12,7 @@
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/packing.hpp"
 #include "server/data/cf/staggered/models.hpp"
+#include "server/data/cf/staggered/shared_levels.hpp"
 #include "server/data/cf/staggered/staggering.hpp"
 #include "server/data/cf/units.hpp"
 
@@ -45,10 +46,11 @@ Span span_of(const Stagger& stagger, std::size_t start, std::size_t count, std::
   return {start, count, static_cast<std::size_t>(low), static_cast<std::size_t>(high - low + 1)};
 }
 
-double mean(double a, double b, bool walls) {
-  if (std::isnan(a)) return walls ? b / 2 : b;  // NaN if both are masked
-  if (std::isnan(b)) return walls ? a / 2 : a;
-  return (a + b) / 2;
+// upper: weight of b.
+double mean(double a, double b, double upper, bool walls) {
+  if (std::isnan(a)) return walls ? upper * b : b;  // NaN if both are masked
+  if (std::isnan(b)) return walls ? (1 - upper) * a : a;
+  return (1 - upper) * a + upper * b;
 }
 
 // Averages a block along one dimension: `outer` times span.read_count times `inner` values.
@@ -67,7 +69,8 @@ std::vector<double> averaged(const std::vector<double>& block, const Span& span,
           from + std::clamp<std::ptrdiff_t>(low, 0, faces - 1) * static_cast<std::ptrdiff_t>(inner);
       const double* b = from + std::clamp<std::ptrdiff_t>(low + 1, 0, faces - 1) *
                                    static_cast<std::ptrdiff_t>(inner);
-      for (std::size_t i = 0; i < inner; ++i) to[c * inner + i] = mean(a[i], b[i], walls);
+      const double upper = stagger.upper.empty() ? 0.5 : stagger.upper.at(span.start + c);
+      for (std::size_t i = 0; i < inner; ++i) to[c * inner + i] = mean(a[i], b[i], upper, walls);
     }
   }
   return out;
@@ -83,14 +86,20 @@ bool is_position_of_each_step(const FileContents& contents, const std::vector<Di
 
 class CollocatedFile final : public ArrayFile {
  public:
-  // staggers: by dimension; levels: by variable.
+  // staggers: by dimension.
   CollocatedFile(std::unique_ptr<ArrayFile> base, const std::vector<Stagger>& staggers,
-                 const std::vector<Stagger>& levels)
+                 const SharedLevels& levels)
       : base_(std::move(base)), contents_(base_->contents()) {
     const std::vector<DimensionRole> roles = classify_dimensions(contents_);
     std::string names;
     for (FileVariable& variable : contents_.variables) {
-      ways_.push_back(way_of(variable, staggers, levels.at(ways_.size())));
+      const std::string& unread = levels.unread.at(ways_.size());
+      if (!unread.empty()) {
+        variable.unread = unread;
+        variable.numeric = false;
+        variable.coordinates.clear();
+      }
+      ways_.push_back(way_of(variable, staggers, levels.staggers.at(ways_.size())));
       ways_.back().first_step = is_position_of_each_step(contents_, roles, variable);
       const Way& way = ways_.back();
       if (!way.is_changed()) continue;
@@ -287,8 +296,11 @@ Result<std::unique_ptr<ArrayFile>> collocated(std::unique_ptr<ArrayFile> file) {
   const auto levels = find_shared_levels(*file);
   if (!levels) return levels.error();
   const auto is_staggered = [](const Stagger& one) { return one.centers >= 0; };
-  const bool staggered = std::any_of(staggers->begin(), staggers->end(), is_staggered) ||
-                         std::any_of(levels->begin(), levels->end(), is_staggered);
+  const bool staggered =
+      std::any_of(staggers->begin(), staggers->end(), is_staggered) ||
+      std::any_of(levels->staggers.begin(), levels->staggers.end(), is_staggered) ||
+      std::any_of(levels->unread.begin(), levels->unread.end(),
+                  [](const std::string& reason) { return !reason.empty(); });
   if (!staggered && !has_positions_of_each_step(file->contents())) return file;
   return std::unique_ptr<ArrayFile>(
       std::make_unique<CollocatedFile>(std::move(file), *staggers, *levels));

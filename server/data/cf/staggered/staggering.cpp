@@ -14,36 +14,16 @@
 #include "server/data/cf/fields/fields.hpp"
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/grid/longitudes.hpp"
+#include "server/data/cf/staggered/interleaved.hpp"
 
 namespace windsplat::data::cf {
 
 namespace {
 
-// Longer dimensions are not compared by their coordinates.
-constexpr std::size_t compared_length_max = 100'000;
-
 class StaggerFinder {
  public:
   explicit StaggerFinder(const ArrayFile& file)
       : file_(file), contents_(file.contents()), found_(contents_.dimensions.size()) {}
-
-  // See find_shared_levels().
-  [[nodiscard]] Result<std::vector<Stagger>> shared_levels() const {
-    std::vector<Stagger> out(contents_.variables.size());
-    for (std::size_t d = 0; d < found_.size(); ++d) {
-      std::vector<Heights> all = heights_on(static_cast<int>(d));
-      if (all.size() != 2 || contents_.dimensions[d].length > compared_length_max) continue;
-      if (all[0].users.size() < all[1].users.size()) std::swap(all[0], all[1]);
-      const auto centers = unpacked_values(file_, all[0].variable);
-      if (!centers) return centers.error();
-      const auto faces = unpacked_values(file_, all[1].variable);
-      if (!faces) return faces.error();
-      const auto first = interleaved(*faces, *centers);
-      if (!first) continue;
-      for (const int user : all[1].users) out[at(user)] = {static_cast<int>(d), false, *first};
-    }
-    return out;
-  }
 
   Result<std::vector<Stagger>> find() {
     by_reader();
@@ -203,9 +183,9 @@ class StaggerFinder {
     const auto mid = unpacked_values(file_, at_centers);
     if (!mid) return mid.error();
     if (high->size() != length(faces) || mid->size() != length(faces)) return {};
-    for (std::size_t i = 1; i < mid->size(); ++i) {
-      if (!is_middle((*mid)[i], (*high)[i - 1], (*high)[i])) return {};
-    }
+    if (mid->empty()) return {};
+    const std::vector<double> upper_mid(mid->begin() + 1, mid->end());
+    if (interleaved(*high, upper_mid, Interleaving::near_middle) != 0) return {};
     add(faces, centers, false, -1);
     return {};
   }
@@ -218,49 +198,6 @@ class StaggerFinder {
                                   std::count(variable.dims.begin(), variable.dims.end(),
                                              dimension) > 0;
                          });
-  }
-
-  // Whether a center is near the middle of two faces. A mean of values elsewhere would be that of
-  // another place: levels of two instruments also interleave.
-  [[nodiscard]] static bool is_middle(double center, double below, double above) {
-    constexpr double tolerance = 0.2;  // of the cell, for stretched grids
-    return above > below && std::abs(center - (below + above) / 2) <= tolerance * (above - below);
-  }
-
-  // Whether a center with one face lies beyond it by at most one and a half cells.
-  [[nodiscard]] static bool is_near_end(double center, const std::vector<double>& faces,
-                                        bool is_first) {
-    constexpr double cells_max = 1.5;
-    const std::size_t last = faces.size() - 1;
-    const double cell = is_first ? faces[1] - faces[0] : faces[last] - faces[last - 1];
-    const double beyond = is_first ? faces[0] - center : center - faces[last];
-    return beyond > 0 && beyond <= cells_max * cell;
-  }
-
-  // The first face of the first center, if every center lies amid two faces. Both ascending.
-  [[nodiscard]] static std::optional<std::ptrdiff_t> interleaved(
-      const std::vector<double>& faces, const std::vector<double>& centers) {
-    const auto between = [&](std::ptrdiff_t first) {
-      const auto count = static_cast<std::ptrdiff_t>(faces.size());
-      for (std::ptrdiff_t i = 0; i < static_cast<std::ptrdiff_t>(centers.size()); ++i) {
-        const double center = centers[static_cast<std::size_t>(i)];
-        const std::ptrdiff_t low = i + first;
-        const bool has_both = low >= 0 && low + 1 < count;
-        const bool fits = has_both ? is_middle(center, faces[static_cast<std::size_t>(low)],
-                                               faces[static_cast<std::size_t>(low + 1)])
-                                   : is_near_end(center, faces, low < 0);
-        if (!fits) return false;
-      }
-      return true;
-    };
-    if (faces.size() < 3 || centers.size() < 3) return std::nullopt;
-    const bool above = faces.front() < centers.front();
-    const std::ptrdiff_t first = above ? 0 : -1;
-    const auto difference =
-        static_cast<std::ptrdiff_t>(faces.size()) - static_cast<std::ptrdiff_t>(centers.size());
-    const bool fits =
-        above ? difference == 0 || difference == 1 : difference == 0 || difference == -1;
-    return fits && between(first) ? std::optional(first) : std::nullopt;
   }
 
   [[nodiscard]] bool has_velocity(int dimension) const {
@@ -283,31 +220,17 @@ class StaggerFinder {
   };
 
   // Heights of the Unified Model's levels (level_height, as iris writes it): the numbers of its
-  // levels do not tell that winds lie between those of temperature.
-  struct Heights {
-    int variable = -1;
-    std::vector<int> users;  // variables along the dimension whose `coordinates` name it
-  };
-  [[nodiscard]] std::vector<Heights> heights_on(int dimension) const {
-    std::vector<Heights> out;
-    for (std::size_t v = 0; v < contents_.variables.size(); ++v) {
-      const FileVariable& variable = contents_.variables[v];
-      const bool named =
-          variable.long_name == "level_height" || variable.name.starts_with("level_height");
-      if (!named || !variable.numeric || variable.dims != std::vector<int>{dimension}) continue;
-      out.push_back({static_cast<int>(v), {}});
-      if (out.size() > 2) break;  // not understood
-      for (std::size_t u = 0; u < contents_.variables.size(); ++u) {
-        const FileVariable& user = contents_.variables[u];
-        if (user.dims.size() < 2 || std::count(user.dims.begin(), user.dims.end(), dimension) == 0)
-          continue;
-        std::istringstream words(user.coordinates);
-        for (std::string word; words >> word;) {
-          if (word == variable.name) out.back().users.push_back(static_cast<int>(u));
-        }
-      }
-    }
-    return out;
+  // levels do not tell that winds lie between those of temperature. -1: there are none.
+  [[nodiscard]] int heights_on(int dimension) const {
+    const auto found = std::find_if(
+        contents_.variables.begin(), contents_.variables.end(), [&](const FileVariable& one) {
+          const bool named =
+              one.long_name == "level_height" || one.name.starts_with("level_height");
+          return named && one.numeric && one.dims == std::vector<int>{dimension};
+        });
+    return found == contents_.variables.end()
+               ? -1
+               : static_cast<int>(found - contents_.variables.begin());
   }
 
   // Dimensions with coordinates that no name has explained, those of most variables first.
@@ -323,13 +246,12 @@ class StaggerFinder {
           contents_.dimensions[d].length > compared_length_max) {
         continue;
       }
-      const auto heights =
-          role.role == Role::z ? heights_on(line.dimension) : std::vector<Heights>();
-      line.by_height = !heights.empty();
+      const int heights = role.role == Role::z ? heights_on(line.dimension) : -1;
+      line.by_height = heights >= 0;
       const bool is_longitude = role.kind == AxisKind::longitude;
-      auto values = is_longitude ? unpacked_degrees(file_, role.coordinate)
-                                 : unpacked_values(file_, line.by_height ? heights.front().variable
-                                                                         : role.coordinate);
+      auto values = is_longitude
+                        ? unpacked_degrees(file_, role.coordinate)
+                        : unpacked_values(file_, line.by_height ? heights : role.coordinate);
       if (!values) return values.error();
       line.values = std::move(*values);
       if (is_longitude) continue_over_seam(line.values);
@@ -361,10 +283,14 @@ class StaggerFinder {
                              has_velocity(faces.dimension);
         if (!is_sure) continue;
         const bool are_longitudes = faces.kind == AxisKind::longitude;
-        const auto first =
-            interleaved(are_longitudes ? turned_near(faces.values, centers.values) : faces.values,
-                        centers.values);
-        if (first) add(faces.dimension, centers.dimension, false, *first);
+        const auto first = interleaved(
+            are_longitudes ? turned_near(faces.values, centers.values) : faces.values,
+            centers.values, centers.by_height ? Interleaving::between : Interleaving::near_middle);
+        if (!first) continue;
+        add(faces.dimension, centers.dimension, false, *first);
+        if (centers.by_height && found_[at(faces.dimension)].centers == centers.dimension) {
+          found_[at(faces.dimension)].upper = upper_weights(faces.values, centers.values, *first);
+        }
       }
     }
     return {};
@@ -387,10 +313,6 @@ class StaggerFinder {
 
 Result<std::vector<Stagger>> find_staggering(const ArrayFile& file) {
   return StaggerFinder(file).find();
-}
-
-Result<std::vector<Stagger>> find_shared_levels(const ArrayFile& file) {
-  return StaggerFinder(file).shared_levels();
 }
 
 }  // namespace windsplat::data::cf

@@ -15,19 +15,15 @@ struct Stagger {
   int centers = -1;          // dimension of the centers; -1: the dimension is not staggered
   bool aligned = false;      // sample i lies at center i: the dimension only has another name
   std::ptrdiff_t first = 0;  // otherwise center i lies between samples i + first and i + first + 1
+  std::vector<double> upper = {};  // weights of the latter at each center; empty: all 1/2
 };
 
 // One entry per dimension of the file. Evidence in this order: what the reader
 // knows (FileDimension::centers), SGRID metadata (sgrid.github.io,
 // version 0.3: cf_role = grid_topology), names of dimensions of WRF, ROMS and PALM, 1-D coordinates
-// (of the Unified Model's levels their heights) of which each lies amid two of another dimension.
+// of which each lies amid two of another dimension; of the Unified Model's levels their heights,
+// with the weights of linear interpolation.
 // Errors: bad_data if coordinates cannot be read.
 Result<std::vector<Stagger>> find_staggering(const ArrayFile& file);
-
-// One entry per variable of the file. Winds of the Unified Model may share the dimension of the
-// levels of other variables, since these have the same numbers, and lie between them by the heights
-// (level_height) that their `coordinates` name. Such a variable is staggered along that dimension
-// (centers), relative to the heights that most variables name. Errors: bad_data.
-Result<std::vector<Stagger>> find_shared_levels(const ArrayFile& file);
 
 }  // namespace windsplat::data::cf

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -155,6 +156,105 @@ TEST(AuxiliaryLevels, AFormulaGivesTheHeightOfEverySample) {
   const auto source = opened(folder / "hills.nc");
   EXPECT_THAT(source->info().grid.axes[2].coordinates,
               ElementsAre(20 + 250, 80 + 225, 200 + 125, 900));
+}
+
+// Levels of the Unified Model: theta levels with uneven spacing, rho levels in their middles, both
+// with the same numbers. Every field is its own height, so that it equals the axis where it is
+// placed truly.
+struct Shared {
+  std::vector<double> theta{5, 21.5, 45, 75, 111.5};
+  std::vector<double> rho{2.5, 13.25, 33.25, 60, 93.25};
+  std::vector<std::string> at_theta{"air_temperature", "specific_humidity", "cloud"};
+  std::vector<std::string> at_rho{"x_wind", "y_wind"};
+  std::vector<std::string> nowhere;  // without `coordinates`
+  bool rho_first = false;
+  bool falls = false;
+};
+
+void write_shared(const std::string& path, const Shared& one) {
+  NetcdfMaker file(path);
+  const std::size_t levels = one.theta.size();
+  const int z = file.axis("model_level_number", counting(levels, 1), "1", "model_level_number");
+  const auto put_heights = [&](const std::string& name, std::vector<double> values) {
+    if (one.falls) std::reverse(values.begin(), values.end());
+    const int height = file.variable(name, NC_DOUBLE, {z}, values);
+    file.text(height, "units", "m");
+    file.text(height, "positive", "up");
+    file.text(height, "long_name", "level_height");
+  };
+  if (one.rho_first) put_heights("level_height_0", one.rho);
+  put_heights("level_height", one.theta);
+  if (!one.rho_first) put_heights("level_height_0", one.rho);
+  const int y = file.axis("latitude", {50, 51}, "degrees_north");
+  const int x = file.axis("longitude", {0, 1, 2}, "degrees_east");
+  const auto put = [&](const std::string& name, const std::vector<double>& heights,
+                       const std::string& coordinates) {
+    std::vector<double> values;
+    for (std::size_t k = 0; k < levels; ++k) {
+      values.insert(values.end(), columns, heights[one.falls ? levels - 1 - k : k]);
+    }
+    const int v = file.variable(name, NC_FLOAT, {z, y, x}, values);
+    file.text(v, "units", name.ends_with("wind") ? "m s-1" : "1");
+    if (name.ends_with("wind")) file.text(v, "standard_name", name);
+    if (!coordinates.empty()) file.text(v, "coordinates", coordinates);
+  };
+  for (const std::string& name : one.at_theta) put(name, one.theta, "level_height sigma");
+  for (const std::string& name : one.at_rho) put(name, one.rho, "level_height_0 sigma_0");
+  for (const std::string& name : one.nowhere) put(name, one.theta, "");
+}
+
+// Whether a field that is its own height equals the axis at all levels that it surrounds.
+void expect_placed(Source& source, const std::string& name, std::size_t first, std::size_t end) {
+  const std::vector<double>& z = source.info().grid.axes[2].coordinates;
+  const Volume volume = volume_of(source, name);
+  for (std::size_t k = first; k < end; ++k) {
+    EXPECT_NEAR(volume.values[k * columns], z.at(k), 1e-5 * z.at(k)) << name << " level " << k;
+  }
+}
+
+TEST(SharedLevels, WindsBetweenUnevenLevelsAreInterpolatedToTheirHeights) {
+  const Folder folder;
+  for (const bool falls : {false, true}) {
+    Shared levels;
+    levels.falls = falls;
+    write_shared(folder / "ukv.nc", levels);
+    const auto source = opened(folder / "ukv.nc");
+    EXPECT_THAT(source->info().grid.axes[2].coordinates, ElementsAre(5, 21.5, 45, 75, 111.5));
+    expect_placed(*source, "air_temperature", 0, 5);
+    expect_placed(*source, "x_wind", 0, 4);  // its highest level lies below the last
+    EXPECT_TRUE(has_note(source->info(), "averaged to the centers of its cells: 'x_wind'"));
+  }
+}
+
+TEST(SharedLevels, TheHeightsOfMostVariablesAreTheAxis) {
+  const Folder folder;
+  for (const bool rho_first : {false, true}) {
+    Shared levels;
+    levels.at_rho = {"x_wind", "y_wind", "air_pressure", "air_density"};
+    levels.rho_first = rho_first;
+    write_shared(folder / "rho.nc", levels);
+    const auto source = opened(folder / "rho.nc");
+    EXPECT_THAT(source->info().grid.axes[2].coordinates, ElementsAre(2.5, 13.25, 33.25, 60, 93.25));
+    expect_placed(*source, "x_wind", 0, 5);
+    expect_placed(*source, "air_temperature", 1, 5);  // its lowest level lies above the first
+  }
+}
+
+TEST(SharedLevels, VariablesAtHeightsThatAreNotBetweenAreLeftOut) {
+  const Folder folder;
+  Shared levels;
+  levels.rho = {12, 50, 100, 150, 200};
+  levels.nowhere = {"soot"};
+  write_shared(folder / "odd.nc", levels);
+  const auto source = opened(folder / "odd.nc");
+  EXPECT_EQ(source->info().find("x_wind"), nullptr);
+  EXPECT_EQ(reason_of(source->info(), "x_wind"),
+            "at the heights 'level_height_0', which do not lie between those of other variables on "
+            "its levels ('level_height')");
+  EXPECT_EQ(reason_of(source->info(), "soot"),
+            "on levels that have several heights, of which it names none");
+  EXPECT_TRUE(has_note(source->info(), "x_wind")) << "an absent wind is noted";
+  expect_placed(*source, "air_temperature", 0, 5);
 }
 
 }  // namespace
