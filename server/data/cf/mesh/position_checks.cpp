@@ -52,4 +52,25 @@ bool are_radians(const std::array<std::vector<double>, 2>& positions) {
   return spans(0, 2 * half_turn) && spans(1, half_turn) && most[1] < half_turn / 2 + 1e-5;
 }
 
+Result<void> check_units(const FileContents& contents, const std::array<int, 2>& variables,
+                         const std::array<std::vector<double>, 2>& positions) {
+  const auto& all = contents.variables;
+  const std::array limits{2 * std::numbers::pi, std::numbers::pi / 2};
+  for (std::size_t a = 0; a < 2; ++a) {
+    const FileVariable& one = all.at(at(variables.at(a)));
+    const bool has_units = std::any_of(all.begin(), all.end(), [&](const FileVariable& other) {
+      return !other.units.empty() && (&other == &one || other.bounds == one.name);
+    });
+    const bool is_degrees =
+        std::any_of(positions.at(a).begin(), positions.at(a).end(),
+                    [&](double value) { return std::abs(value) > limits.at(a) + 1e-5; });
+    if (has_units || is_degrees) return {};
+  }
+  return make_error(ErrorKind::bad_data,
+                    "the positions in " + in_quotes(all.at(at(variables[0])).name) + " and " +
+                        in_quotes(all.at(at(variables[1])).name) +
+                        " have no units and could be degrees or radians: they need the attribute "
+                        "'units', such as degrees_east and degrees_north, or radian");
+}
+
 }  // namespace windsplat::data::cf

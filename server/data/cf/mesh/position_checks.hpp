@@ -17,4 +17,10 @@ Result<void> check_one_time(const ArrayFile& file, int list);
 // Whether longitudes and latitudes said to be in degrees fill those of a globe in radians.
 bool are_radians(const std::array<std::vector<double>, 2>& positions);
 
+// Longitudes and latitudes without units are degrees unless all could be radians, too, which is not
+// guessed. variables: of the longitudes and latitudes, or their bounds, which have the units of
+// their coordinate (CF 1.11, 7.1). Errors: bad_data.
+Result<void> check_units(const FileContents& contents, const std::array<int, 2>& variables,
+                         const std::array<std::vector<double>, 2>& positions);
+
 }  // namespace windsplat::data::cf
