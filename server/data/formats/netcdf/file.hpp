@@ -78,6 +78,7 @@ class File final : public cf::ArrayFile {
   Result<void> scan_group(const std::string& path);
   Result<void> scan_dimensions(int group);
   void set_spacing_of_wrf(int group);
+  void find_dates_of_wrf();
   Result<void> scan_variables(int group, bool above);
   Result<void> scan_variable(const Place& place, bool above);
   [[nodiscard]] bool has_field() const;
@@ -88,6 +89,7 @@ class File final : public cf::ArrayFile {
   void forget_others(int variable, std::size_t bytes) const;
   template <class T, class Get>
   Result<void> read_block(int variable, const Block& block, T* out, const Get& get) const;
+  Result<void> read_dates(const Block& block, double* out) const;
   [[nodiscard]] Error fault(const std::string& what) const { return input_->fault(what); }
 
   std::shared_ptr<const InputFile> input_;
@@ -100,6 +102,7 @@ class File final : public cf::ArrayFile {
   Handle hdf5_;                                    // in addition to that of the netCDF library
   std::map<std::string, DatasetStorage> storage_;  // HDF5 datasets, keyed by path
   std::vector<std::string> paths_;                 // parallel to contents_.variables
+  int dates_ = -1;  // variable of characters that is read as seconds (dates.hpp)
   // Under the LibraryLock: absent chunks by object, and the variables whose chunks the library
   // caches with their cache sizes, most recently read first.
   mutable std::map<haddr_t, AbsentChunks> absent_;

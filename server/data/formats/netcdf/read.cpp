@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/base/ascii.hpp"
 #include "server/data/bytes/decode_limits.hpp"
+#include "server/data/formats/netcdf/dates.hpp"
 #include "server/data/formats/netcdf/file.hpp"
 
 namespace windsplat::data::netcdf {
@@ -28,6 +30,7 @@ const std::size_t* place(const std::vector<std::size_t>& lengths) {
 
 std::vector<std::size_t> File::chunk(int variable) const {
   const std::size_t rank = contents_.variables.at(static_cast<std::size_t>(variable)).dims.size();
+  if (variable == dates_) return {1};
   std::vector<std::size_t> lengths(rank, 1);
   const LibraryLock lock;
   const auto [group, id] = place_of(variable);
@@ -139,8 +142,27 @@ Result<void> File::read_block(int variable, const Block& block, T* out, const Ge
   return {};
 }
 
+// Characters of unwritten chunks are no date. block: of the dimension of time.
+Result<void> File::read_dates(const Block& block, double* out) const {
+  const std::vector<std::size_t> start{block.start.at(0), 0};
+  const std::vector<std::size_t> count{block.count.at(0), date_length};
+  std::string text(count[0] * date_length, ' ');
+  std::vector<double> absent(text.size(), 0);
+  auto done = read_block(dates_, {start, count}, absent.data(), [&] {
+    const auto [group, id] = place_of(dates_);
+    return nc_get_vara_text(group, id, place(start), place(count), text.data());
+  });
+  if (!done) return done;
+  for (std::size_t i = 0; i < count[0]; ++i) {
+    const double masked = absent[i * date_length];
+    out[i] = masked + seconds_of_date(std::string_view(text).substr(i * date_length, date_length));
+  }
+  return {};
+}
+
 Result<void> File::read(int variable, const std::vector<std::size_t>& start,
                         const std::vector<std::size_t>& count, double* out) const {
+  if (variable == dates_) return read_dates({start, count}, out);
   return read_block(variable, {start, count}, out, [&] {
     const auto [group, id] = place_of(variable);
     return nc_get_vara_double(group, id, place(start), place(count), out);

@@ -14,6 +14,7 @@
 #include "server/data/cf/grid/grid.hpp"
 #include "server/data/cf/grid/vertical.hpp"
 #include "server/data/formats/netcdf/bare.hpp"
+#include "server/data/formats/netcdf/dates.hpp"
 #include "server/data/formats/netcdf/file.hpp"
 #include "server/data/formats/netcdf/meep.hpp"
 
@@ -207,6 +208,7 @@ Result<void> File::scan_group(const std::string& path) {
     }
     if (nc_inq_grp_parent(at, &at) != NC_NOERR) break;
   }
+  find_dates_of_wrf();
   if (!classic_) {
     name_axes_of_meep(contents_);
     name_steps_of_bare_arrays(contents_);
@@ -266,6 +268,17 @@ void File::set_spacing_of_wrf(int group) {
       contents_.dimensions[static_cast<std::size_t>(dimension)].spacing_m = metres;
     }
   }
+}
+
+// Only characters: strings (NC_STRING) are not read.
+void File::find_dates_of_wrf() {
+  dates_ = -1;
+  const int found = cf::variable_named(contents_, "Times");
+  nc_type type = NC_NAT;
+  if (found < 0) return;
+  const Place place = place_of(found);
+  if (nc_inq_vartype(place.group, place.id, &type) != NC_NOERR || type != NC_CHAR) return;
+  dates_ = name_dates_of_wrf(contents_);
 }
 
 Result<void> File::scan_variables(int group, bool above) {

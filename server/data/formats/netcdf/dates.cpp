@@ -1,0 +1,85 @@
+// Characters of a file -> times in seconds.
+#include "server/data/formats/netcdf/dates.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "server/base/ascii.hpp"
+#include "server/data/cf/array_file.hpp"
+
+namespace windsplat::data::netcdf {
+
+namespace {
+
+std::optional<int> number_in(std::string_view text) {
+  int out = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, fault] = std::from_chars(text.data(), end, out);
+  if (fault != std::errc() || rest != end || text.front() == '-') return std::nullopt;
+  return out;
+}
+
+bool has_numeric_time(const FileContents& contents, int dimension) {
+  const std::string& name = contents.dimensions[cf::at(dimension)].name;
+  return std::any_of(contents.variables.begin(), contents.variables.end(),
+                     [&](const FileVariable& one) {
+                       return one.numeric && one.dims == std::vector{dimension} &&
+                              (one.name == name || one.standard_name == "time" ||
+                               lower(one.units).find(" since ") != std::string::npos);
+                     });
+}
+
+}  // namespace
+
+double seconds_of_date(std::string_view text) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  constexpr std::string_view form = "dddd-dd-dd_dd:dd:dd";
+  if (text.size() < form.size()) return none;
+  for (std::size_t i = 0; i < form.size(); ++i) {
+    const bool fits = form[i] == 'd'   ? text[i] >= '0' && text[i] <= '9'
+                      : form[i] == '_' ? text[i] == '_' || text[i] == 'T' || text[i] == ' '
+                                       : text[i] == form[i];
+    if (!fits) return none;
+  }
+  std::array<int, 6> parts{};
+  constexpr std::array<std::size_t, 6> starts{0, 5, 8, 11, 14, 17};
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const auto part = number_in(text.substr(starts[i], i == 0 ? 4 : 2));
+    if (!part) return none;
+    parts[i] = *part;
+  }
+  const auto [year, month, day, hour, minute, second] = parts;
+  const std::chrono::year_month_day date{std::chrono::year(year),
+                                         std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (!date.ok() || hour > 24 || minute > 59 || second > 60) return none;
+  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
+  return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second;
+}
+
+int name_dates_of_wrf(FileContents& contents) {
+  const int found = cf::variable_named(contents, "Times");
+  if (found < 0) return -1;
+  FileVariable& dates = contents.variables[cf::at(found)];
+  if (dates.type != "text" || !dates.unread.empty() || dates.dims.size() != 2) return -1;
+  const int time = dates.dims[0];
+  const std::size_t width = contents.dimensions[cf::at(dates.dims[1])].length;
+  if (lower(contents.dimensions[cf::at(time)].name) != "time" || width < date_length ||
+      has_numeric_time(contents, time)) {
+    return -1;
+  }
+  dates.type = "float64";
+  dates.numeric = true;
+  dates.dims = {time};
+  dates.standard_name = "time";
+  dates.units = date_units;
+  contents.notes.push_back("times are read from the text of 'Times'");
+  return found;
+}
+
+}  // namespace windsplat::data::netcdf

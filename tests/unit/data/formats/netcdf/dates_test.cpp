@@ -1,0 +1,88 @@
+// The text variable Times of WRF as the times of steps.
+#include "server/data/formats/netcdf/dates.hpp"
+
+#include <gtest/gtest.h>
+#include <netcdf.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/unit/data/dataset_probe.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+namespace windsplat::data::test {
+namespace {
+
+// One field at the dates; with XTIME if minutes are given.
+void write_dates(const std::string& path, const std::vector<std::string>& dates, int mode,
+                 const std::vector<double>& minutes = {}) {
+  NetcdfMaker file(path, mode);
+  const int time = file.dimension("Time", dates.size());
+  const int width = file.dimension("DateStrLen", 19);
+  const int y = file.axis("y", {0, 1, 2}, "m");
+  const int x = file.axis("x", {0, 1}, "m");
+  const int text = file.variable("Times", NC_CHAR, {time, width});
+  file.variable("T", NC_FLOAT, {time, y, x}, counting(6 * dates.size()));
+  if (!minutes.empty()) {
+    file.text(file.variable("XTIME", NC_FLOAT, {time}, minutes), "units",
+              "minutes since 2000-01-01 00:00:00");
+  }
+  nc_enddef(file.id());
+  std::string all;
+  for (const std::string& date : dates) all += date;
+  EXPECT_EQ(nc_put_var_text(file.id(), text, all.data()), NC_NOERR);
+}
+
+std::vector<std::string> times_of(const std::string& path) {
+  std::vector<std::string> out;
+  const auto source = opened(path);
+  if (source == nullptr) return out;
+  for (const TimeStep& step : source->info().steps) out.push_back(step.text);
+  return out;
+}
+
+TEST(WrfDates, TimesOfStepsAreReadFromTheText) {
+  const Folder folder;
+  for (const int mode : {NC_NETCDF4, NC_64BIT_OFFSET}) {
+    write_dates(folder / "wrfout.nc", {"2004-02-28_21:00:00", "2004-02-29_00:30:00"}, mode);
+    EXPECT_EQ(times_of(folder / "wrfout.nc"),
+              (std::vector<std::string>{"2004-02-28T21:00:00Z", "2004-02-29T00:30:00Z"}));
+  }
+}
+
+TEST(WrfDates, NumericTimesHavePrecedence) {
+  const Folder folder;
+  write_dates(folder / "x.nc", {"2004-02-28_21:00:00", "2004-02-29_00:30:00"}, NC_NETCDF4, {0, 60});
+  EXPECT_EQ(times_of(folder / "x.nc"),
+            (std::vector<std::string>{"2000-01-01T00:00:00Z", "2000-01-01T01:00:00Z"}));
+}
+
+TEST(WrfDates, FilesOfASeriesAreInTheOrderOfTheirDates) {
+  const Folder folder;
+  write_dates(folder / "s_1.nc", {"2004-03-01_00:00:00"}, NC_NETCDF4);
+  write_dates(folder / "s_2.nc", {"2004-02-29_00:00:00"}, NC_NETCDF4);
+  EXPECT_EQ(times_of(folder / "s_*.nc"),
+            (std::vector<std::string>{"2004-02-29T00:00:00Z", "2004-03-01T00:00:00Z"}));
+}
+
+TEST(WrfDates, TextThatIsNoDateNumbersTheStepsWithAReason) {
+  const Folder folder;
+  write_dates(folder / "bad.nc", {"2004-02-28_21:00:00", "2003-02-29_00:00:00"}, NC_NETCDF4);
+  EXPECT_EQ(times_of(folder / "bad.nc"), (std::vector<std::string>{"0", "1"}));
+  EXPECT_EQ(reason_of(opened(folder / "bad.nc")->info(), "Time"),
+            "time has missing values: steps are numbered");
+}
+
+TEST(WrfDates, SecondsCountFrom1970) {
+  EXPECT_EQ(netcdf::seconds_of_date("1970-01-01_00:00:00"), 0);
+  EXPECT_EQ(netcdf::seconds_of_date("2000-03-01_12:00:01"), 951912001);
+  EXPECT_EQ(netcdf::seconds_of_date("1969-12-31_23:59:59"), -1);
+  for (const char* text : {"", "2000-03-01", "2000-13-01_00:00:00", "2001-02-29_00:00:00",
+                           "2000-03-01_25:00:00", "2000-03-0a_00:00:00", "-200-03-01_00:00:00"}) {
+    EXPECT_TRUE(std::isnan(netcdf::seconds_of_date(text))) << text;
+  }
+}
+
+}  // namespace
+}  // namespace windsplat::data::test
