@@ -69,12 +69,15 @@ bool is_body(const data::FieldInfo& field) {
 }
 
 // Index of the kind of a field; kinds().size() if none matches. Other quantities of clouds and of
-// sea water, such as temperature, height or velocity, are excluded.
+// sea water, such as temperature, height or velocity, are excluded, and what lies on the ground,
+// such as liquid_water_content_of_surface_snow.
 std::size_t kind_of(const data::FieldInfo& field) {
   const std::string name = lower(field.name);
   std::string text = name + " " + lower(field.standard_name) + " " + lower(field.long_name);
   for (const char* other :
-       {"temperature", "pressure", "altitude", "height", "flux", "speed", "velocity"}) {
+       {"temperature", "pressure", "altitude", "height", "flux", "speed", "velocity",
+        "surface_snow", "surface snow", "snow_layer", "snow layer", "snow_depth", "snow depth",
+        "snowpack", "canopy", "land_ice", "land ice", "sea_ice", "sea ice"}) {
     if (text.find(other) != std::string::npos) return kinds().size();
   }
   for (const std::string_view sea : {"sea_water", "sea water"}) {

@@ -404,6 +404,26 @@ TEST(Defaults, CloudWaterIsAMediumByItsUsualNames) {
   EXPECT_EQ(default_scalars(info), std::vector<std::string>{"cc"});
 }
 
+TEST(Defaults, WaterOnTheGroundIsNoCloud) {
+  data::DatasetInfo info;
+  info.grid = atmosphere_grid();
+  for (const char* name : {"liquid_water_content_of_surface_snow",
+                           "Liquid Water Content of Snow Layer", "canopy liquid water content",
+                           "ice water content of sea ice", "liquid_water_content_of_soil_layer"}) {
+    data::FieldInfo ground = scalar_info("x1", "kg m-2");
+    ground.long_name = name;
+    info.fields = {wind_info(), ground, scalar_info("clw", "kg kg-1")};
+    EXPECT_EQ(default_scalars(info), std::vector<std::string>{"clw"}) << name;
+  }
+  data::FieldInfo snow = scalar_info("lwsnl", "kg m-2");
+  snow.standard_name = "liquid_water_content_of_surface_snow";
+  info.fields = {wind_info(), snow};
+  EXPECT_TRUE(default_scalars(info).empty());
+  snow.standard_name = "mass_fraction_of_snow_in_air";
+  info.fields = {wind_info(), snow};
+  EXPECT_EQ(default_scalars(info), std::vector<std::string>{"lwsnl"}) << "falling snow is a medium";
+}
+
 TEST(Defaults, AMapShowsItsFirstFieldAndIsOpaqueEverywhere) {
   data::Grid grid = atmosphere_grid();
   grid.axes[2].coordinates = {0};
