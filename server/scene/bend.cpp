@@ -20,7 +20,7 @@ using data::AxisKind;
 using protocol::GeometryMapping;
 using protocol::VerticalPlacement;
 
-constexpr double shell_share = 0.15;  // fraction of the inner radius
+constexpr double shell_share = 0.15;
 
 Error no_heights(const std::string& detail) {
   return make_error_at(ErrorKind::invalid, "/geometry/heightField", detail);
@@ -238,17 +238,28 @@ void settle(Lattice& lattice, std::vector<std::array<float, 3>>& places) {
   lattice.box_max = 0.5 * scale * edge;
 }
 
-// Radii of a shell of outer radius 1, by relative height.
+// Radii of a shell of outer radius 1.
 struct Shell {
-  double inner = 1;
+  double inner = 1;  // radius(share) is by relative height
   [[nodiscard]] double radius(double share) const { return inner + share * (1.0 - inner); }
 };
 
-// A single level has the thickness of the distance between its columns, at most that of a full
-// shell.
-Shell shell_of(const Lattice& straight, const data::Grid& even, double vertical_scale,
-               bool one_height) {
-  Shell shell{1.0 / (1.0 + shell_share * vertical_scale)};
+// The longer edge of a region in radii where it is widest, at most 1; by its axes in degrees.
+double extent_on_globe(const data::Grid& even) {
+  const auto span = [&even](std::size_t a) {
+    const std::vector<double>& at = even.axes[a].coordinates;
+    if (at.size() < 2) return 0.0;
+    return (at.back() - at.front()) / (1 - 1.0 / static_cast<double>(at.size()));
+  };
+  const auto& at = even.axes[1].coordinates;
+  const double nearest = std::max({at.front(), -at.back(), 0.0});  // latitude, to the equator
+  const double degrees = std::max(span(0) * std::cos(nearest * radians_per_degree), span(1));
+  return degrees > 0 ? std::min(degrees * radians_per_degree, 1.0) : 1.0;
+}
+
+// A single level is as thick as its columns are apart, at most as a full shell.
+Shell shell_of(const Lattice& straight, const data::Grid& even, double scale, bool one_height) {
+  Shell shell{1.0 / (1.0 + shell_share * extent_on_globe(even) * scale)};
   if (straight.dims[2] > 1 || !one_height) return shell;
   for (std::size_t a = 0; a < 2; ++a) {
     const std::vector<double>& at = even.axes[a].coordinates;
@@ -289,7 +300,7 @@ bool meet(const std::vector<glm::dvec3>& up, std::size_t width, std::size_t last
   return true;
 }
 
-// Whether the columns of a row reach around more than half the globe.
+// Whether a row reaches around more than half the globe.
 bool turn(const data::Columns& columns, std::size_t width) {
   const std::vector<double>& at = columns.longitude;
   for (std::size_t row = 0; row < at.size(); row += width) {

@@ -81,6 +81,24 @@ TEST(Sphere, PolesAndEquatorAreInPlace) {
   }
 }
 
+// A region is as thick as on a flat map, 0.15 of its longer edge: 10 degrees of latitude. That of a
+// globe, or of a region wider than the radius, is 0.15 of the radius.
+TEST(Sphere, ARegionIsNoTower) {
+  const auto thickness = [](const std::vector<double>& longitudes,
+                            const std::vector<double>& latitudes) {
+    data::Grid grid = globe();
+    grid.axes[0].coordinates = longitudes;
+    grid.axes[1].coordinates = latitudes;
+    const auto lattice = place_lattice(grid, mapped(GeometryMapping::sphere));
+    return lattice ? 1 / lattice->inner_radius - 1 : -1;
+  };
+  EXPECT_NEAR(thickness(steps(5, 1, 10), steps(45.5, 1, 10)), 0.15 * 10 * degree, 1e-9);
+  EXPECT_NEAR(thickness(steps(0, 10, 4), steps(30, 5, 2)),
+              0.15 * 40 * degree * std::cos(30 * degree), 1e-9);
+  EXPECT_NEAR(thickness(steps(0, 10, 9), steps(-5, 5, 3)), 0.15, 1e-9);
+  EXPECT_NEAR(thickness(steps(-170, 30, 12), steps(-90, 30, 7)), 0.15, 1e-9);
+}
+
 TEST(Sphere, RectilinearLatticeHasTheMeanCellsOfTheCurvedOne) {
   const auto lattice = place_lattice(globe(), mapped(GeometryMapping::sphere));
   ASSERT_TRUE(lattice);
