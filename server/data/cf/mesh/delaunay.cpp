@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <numbers>
 #include <string>
+#include <unordered_map>
 #include <utility>
+#include <vector>
 
 namespace windsplat::data::cf {
 
@@ -22,6 +24,7 @@ constexpr double chart_extent = 1 << 30;
 constexpr double same_position = 1e-8;  // radians: 6 cm on the Earth
 constexpr double merged_max = 1e-6;     // radians: 6 m; in a chart
 constexpr double fullness_min = 0.02;   // triangles of a lattice of 1 to 25
+constexpr double near_share = 1e-3;     // of the mean spacing
 
 Direction direction_of(double longitude, double latitude) {
   const double from_axis = std::cos(latitude * unit_degree);
@@ -61,11 +64,10 @@ class Triangulator {
     if (used_.size() >= centers_min) {
       if (auto done = find_polygons(); !done) return done.error();
     }
-    if (given - out_.repeated < centers_min) {
-      return make_error(ErrorKind::bad_data,
-                        "cells without outlines have " + std::to_string(given - out_.repeated) +
-                            " different positions: at least " + std::to_string(centers_min) +
-                            " are needed to draw them by their centers");
+    if (given - out_.repeated < centers_min) return too_few(given - out_.repeated);
+    if (median_fullness() < fullness_min && merge_near()) {
+      if (used_.size() < centers_min) return too_few(used_.size());
+      if (auto done = find_polygons(); !done) return done.error();
     }
     if (auto fine = leave_out_gaps(); !fine) return fine.error();
     Mesh& mesh = out_.mesh;
@@ -118,9 +120,69 @@ class Triangulator {
         std::unique(places.begin(), places.end(),
                     [](const auto& one, const auto& two) { return one.first == two.first; });
     out_.repeated = static_cast<std::size_t>(places.end() - end);
+    repeated_ = out_.repeated;
     used_.clear();
     for (auto at = places.begin(); at != end; ++at) used_.push_back(at->second);
     std::sort(used_.begin(), used_.end());
+  }
+
+  static Error too_few(std::size_t different) {
+    return make_error(ErrorKind::bad_data,
+                      "a list of cells without outlines has " + std::to_string(different) +
+                          " different positions: at least " + std::to_string(centers_min) +
+                          " are needed to draw them");
+  }
+
+  // The mean distance of positions if they filled the polygons evenly, as a chord.
+  [[nodiscard]] double mean_spacing() const {
+    const Mesh& mesh = out_.mesh;
+    double all = 0;
+    for (std::size_t c = 0; c < mesh.cells(); ++c) all += area_of(c);
+    return std::sqrt(all / static_cast<double>(used_.size()));
+  }
+
+  // Sites that are listed twice with slightly different positions make slivers of all triangles.
+  // Leaves the first of positions within near_share of the mean spacing of each other, and no
+  // polygons; false if there are none such. A cube of that size holds a bounded number of those
+  // left, so that each is compared with few.
+  bool merge_near() {
+    const double apart = near_share * mean_spacing();
+    if (!(apart > 2 * same_position)) return false;
+    std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cubes;
+    const auto cube_of = [&](const Direction& d, std::size_t a, int step) {
+      constexpr double from_zero = 2;  // directions are of unit length
+      return static_cast<std::uint64_t>((d.at(a) + from_zero) / apart + step);
+    };
+    const auto key_at = [&](const Direction& d, int x, int y, int z) {
+      constexpr std::uint64_t bits = 21;
+      constexpr std::uint64_t mask = (std::uint64_t{1} << bits) - 1;
+      return (cube_of(d, 0, x) & mask) << (2 * bits) | (cube_of(d, 1, y) & mask) << bits |
+             (cube_of(d, 2, z) & mask);
+    };
+    const auto is_near = [&](std::uint32_t i) {
+      const Direction& own = directions_[i];
+      for (int n = 0; n < 27; ++n) {
+        const auto found = cubes.find(key_at(own, n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1));
+        if (found == cubes.end()) continue;
+        for (const std::uint32_t other : found->second) {
+          if (distance(directions_[other], own) <= apart) return true;
+        }
+      }
+      return false;
+    };
+    std::vector<std::uint32_t> left;
+    for (const std::uint32_t i : used_) {
+      if (is_near(i)) continue;
+      cubes[key_at(directions_[i], 0, 0, 0)].push_back(i);
+      left.push_back(i);
+    }
+    if (left.size() == used_.size()) return false;
+    out_.mesh = Mesh();
+    out_.near = used_.size() - left.size();
+    out_.near_degrees = apart / unit_degree;
+    out_.repeated = repeated_;
+    used_ = std::move(left);
+    return true;
   }
 
   // Positions within 120 degrees of their mean leave room opposite to it. Others surround the
@@ -254,23 +316,29 @@ class Triangulator {
         distance(directions_[mesh.corners[corner]], directions_[mesh.corners[next]]));
   }
 
+  [[nodiscard]] double area_of(std::size_t cell) const {
+    const Mesh& mesh = out_.mesh;
+    const Direction& apex = directions_[mesh.corners[mesh.first[cell]]];
+    Direction area{};
+    for (std::uint32_t i = mesh.first[cell]; i + 1 < mesh.first[cell + 1]; ++i) {
+      const Direction part = cross(between(apex, directions_[mesh.corners[i]]),
+                                   between(apex, directions_[mesh.corners[i + 1]]));
+      for (std::size_t a = 0; a < 3; ++a) area.at(a) += part.at(a) / 2;
+    }
+    return std::sqrt(dot(area, area));
+  }
+
   // The median over the polygons of their area in squares of their longest edge.
   [[nodiscard]] double median_fullness() const {
     const Mesh& mesh = out_.mesh;
     std::vector<double> all;
     for (std::size_t c = 0; c < mesh.cells(); ++c) {
-      const Direction& apex = directions_[mesh.corners[mesh.first[c]]];
-      Direction area{};
       float longest = 0;
       for (std::uint32_t i = mesh.first[c]; i < mesh.first[c + 1]; ++i) {
         longest = std::max(longest, edge_length(c, i));
-        if (i + 1 == mesh.first[c + 1]) continue;
-        const Direction part = cross(between(apex, directions_[mesh.corners[i]]),
-                                     between(apex, directions_[mesh.corners[i + 1]]));
-        for (std::size_t a = 0; a < 3; ++a) area.at(a) += part.at(a) / 2;
       }
       const auto side = static_cast<double>(longest);
-      all.push_back(std::sqrt(dot(area, area)) / (side * side));
+      all.push_back(area_of(c) / (side * side));
     }
     if (all.empty()) return 0;
     const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
@@ -354,6 +422,7 @@ class Triangulator {
   Triangulation out_;
   std::vector<Direction> directions_;  // unit vectors
   std::vector<std::uint32_t> used_;    // given positions that differ
+  std::size_t repeated_ = 0;           // equal ones
   bool closed_ = true;                 // the positions surround the globe
 };
 

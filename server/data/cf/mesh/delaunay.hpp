@@ -17,20 +17,23 @@ inline constexpr double gap_edges = 4;
 inline constexpr std::size_t triangulation_bytes = 512;
 
 struct Triangulation {
-  Mesh mesh;                // node i is position i; others than corners have no value
+  Mesh mesh;             // node i is position i; others than corners have no value
+  std::size_t near = 0;  // positions close to another one, which made slivers of the polygons
+  double near_degrees = 0;
+  // Positions of another one, to 1e-8 radians or a part in 2^31 of a chart.
+  std::size_t repeated = 0;
   std::size_t missing = 0;  // positions without longitude or latitude
-  std::size_t repeated =
-      0;                 // positions of another one, to 1e-8 radians or a part in 2^31 of a chart
-  std::size_t gaps = 0;  // polygons left out
+  std::size_t gaps = 0;     // polygons left out
 };
 
 // The Delaunay polygons of positions on the sphere, in degrees: those of a stereographic chart,
 // since it maps circles to circles. If the positions surround the globe it is projected from a gap
 // between them, and a second one from the opposite has the polygons around that gap. Four or more
-// corners lie on a circle. Errors: bad_data for a value that is no longitude or latitude, and if
-// fewer than centers_min positions differ, if positions more than 1e-6 radians apart fall together
-// in a chart, if they lie along lines (half of the polygons have less area than 0.02 squares of
-// their longest edge) or if none are left.
+// corners lie on a circle. If most polygons are slivers, positions closer to each other than a
+// thousandth of the mean spacing are one, that of the first. Errors: bad_data for a value that is
+// no longitude or latitude, and if fewer than centers_min positions differ, if positions more than
+// 1e-6 radians apart fall together in a chart, if they lie along lines (half of the polygons have
+// less area than 0.02 squares of their longest edge) or if none are left.
 Result<Triangulation> triangulate(std::vector<double> longitudes, std::vector<double> latitudes);
 
 }  // namespace windsplat::data::cf

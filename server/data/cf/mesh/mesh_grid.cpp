@@ -39,22 +39,25 @@ MeshWeights& MeshGrid::weights(MeshLocation location) {
   return *made;
 }
 
-std::vector<std::string> MeshGrid::notes(const std::string& convention, MeshLocation most) {
+std::vector<std::string> MeshGrid::notes(const std::string& convention, MeshLocation most,
+                                         bool by_positions) {
   std::vector<std::string> out;
   const std::string unit = mesh_->on_sphere ? " degrees" : "";
   std::string text =
       convention + ": a mesh of " + std::to_string(mesh_->cells()) +
-      " cells is resampled onto a lattice of " + std::to_string(lattice_.x.count) + " x " +
-      std::to_string(lattice_.y.count) + ", " + three_digits(lattice_.x.spacing) + " x " +
-      three_digits(lattice_.y.spacing) + unit + " apart, with a median cell size of " +
-      three_digits(lattice_.median_size) + unit + "; " +
-      percent(static_cast<double>(cells_.hit) / static_cast<double>(mesh_->cells())) +
-      " of the cells contain a sample";
+      (by_positions ? " polygons" : " cells") + " is resampled onto a lattice of " +
+      std::to_string(lattice_.x.count) + " x " + std::to_string(lattice_.y.count) + ", " +
+      three_digits(lattice_.x.spacing) + " x " + three_digits(lattice_.y.spacing) + unit +
+      " apart, with a median cell size of " + three_digits(lattice_.median_size) + unit + "; " +
+      percent(static_cast<double>(cells_.hit) / static_cast<double>(mesh_->cells())) + " of the " +
+      (by_positions ? "polygons" : "cells") + " contain a sample";
   const double error = error_of_wave(*mesh_, lattice_, weights(most), most);
   if (std::isfinite(error)) {
     text += "; waves " + three_digits(test_wave_cells) + " cells long at its " +
-            (most == MeshLocation::face ? "cells" : "nodes") + " are drawn with an rms error of " +
-            percent(error);
+            (most == MeshLocation::face ? "cells"
+             : by_positions             ? "positions"
+                                        : "nodes") +
+            " are drawn with an rms error of " + percent(error);
   }
   out.push_back(std::move(text));
   if (lattice_.is_coarse) {

@@ -31,7 +31,9 @@ class MeshGrid {
   MeshWeights& weights(MeshLocation location);
 
   // For users: sizes of mesh and lattice, and the error of resampling values at `most`.
-  [[nodiscard]] std::vector<std::string> notes(const std::string& convention, MeshLocation most);
+  // by_positions: the nodes are positions without outlines.
+  [[nodiscard]] std::vector<std::string> notes(const std::string& convention, MeshLocation most,
+                                               bool by_positions);
 
  private:
   std::unique_ptr<Mesh> mesh_;  // the weights refer to it

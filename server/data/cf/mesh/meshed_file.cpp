@@ -200,7 +200,8 @@ Result<std::unique_ptr<ArrayFile>> meshed(std::unique_ptr<ArrayFile> file) {
   if (!shown) return named(shown.error());
   const auto fits = check_centers(*file, shown->cell_dimensions, grid->mesh());
   if (!fits) return named(fits.error());
-  for (std::string& note : grid->notes(topology->convention, shown->most())) {
+  for (std::string& note :
+       grid->notes(topology->convention, shown->most(), topology->by_neighbours)) {
     notes.push_back(std::move(note));
   }
   auto& all = shown->contents.notes;

@@ -238,6 +238,9 @@ class MeshReader {
         positions.at(a) = std::move(*values);
       }
     }
+    if (mesh.on_sphere) {
+      if (auto fine = check_angles(from_.node_positions, positions); !fine) return fine.error();
+    }
     if (positions[0].size() != length(from_.nodes) || positions[1].size() != positions[0].size()) {
       return make_error(ErrorKind::bad_data, "the nodes of the mesh lack positions");
     }
@@ -257,6 +260,13 @@ class MeshReader {
     return values;
   }
 
+  // Positions without units that are not radians by the convention of the mesh.
+  [[nodiscard]] Result<void> check_angles(
+      const std::array<int, 2>& variables,
+      const std::array<std::vector<double>, 2>& positions) const {
+    return from_.is_radian ? Result<void>() : check_units(file_.contents(), variables, positions);
+  }
+
   Result<Mesh> by_corners() {
     std::array<std::vector<double>, 2> positions;
     std::size_t width = 0;
@@ -268,6 +278,7 @@ class MeshReader {
       if (!values) return values.error();
       positions.at(a) = std::move(*values);
     }
+    if (auto fine = check_angles(from_.corner_positions, positions); !fine) return fine.error();
     const FileVariable& longitude = variable(from_.corner_positions[0]);
     const double tolerance = longitude.type == "float32" ? 4e-5 : 1e-7;
     return mesh_of_corners(positions[0], positions[1], width, tolerance, longitude.name);
@@ -289,6 +300,7 @@ class MeshReader {
       if (!values) return values.error();
       positions.at(a) = std::move(*values);
     }
+    if (auto fine = check_angles(from_.node_positions, positions); !fine) return fine.error();
     if (are_radians(positions)) {
       return make_error(ErrorKind::bad_data,
                         "the positions in " + in_quotes(variable(from_.node_positions[0]).name) +
@@ -308,6 +320,8 @@ class MeshReader {
         add(found->gaps, " of its polygons are gaps, with an edge of more than " +
                              number_text(gap_edges) + " times those around, and masked") +
         add(found->repeated, " positions are those of others, whose values are drawn") +
+        add(found->near, " positions are within " + number_text(found->near_degrees) +
+                             " degrees of others, whose values are drawn") +
         add(found->missing, " positions are missing"));
     return std::move(found->mesh);
   }

@@ -11,6 +11,7 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "tests/unit/data/cf/mesh_maker.hpp"
@@ -370,6 +371,76 @@ TEST_F(CentersOfCells, FewerThanAHundredAreRefusedAndNormalsOnEdgesToo) {
     file.variable("u", NC_FLOAT, {edge}, linear_at(many));
   }
   EXPECT_THAT(refusal(folder_ / "e.nc"), HasSubstr("edges"));
+}
+
+// Sites that are listed twice, 1e-4 degrees apart, are drawn as if listed once: the triangles are
+// those of the first list, not slivers that look like tracks.
+TEST(Delaunay, SitesListedTwiceWithClosePositionsAreOne) {
+  const Places once = random_places(500);
+  Places twice = once;
+  for (std::size_t n = 0; n < 500; ++n) {
+    twice.x.push_back(once.x[n] + 1e-4);
+    twice.y.push_back(once.y[n] - 1e-4);
+  }
+  const auto single = cf::triangulate(once.x, once.y);
+  ASSERT_TRUE(single) << single.error().message;
+  const auto found = cf::triangulate(twice.x, twice.y);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->near, 500U);
+  EXPECT_LT(found->near_degrees, 0.01);
+  EXPECT_EQ(found->repeated, 0U);
+  EXPECT_EQ(found->mesh.cells(), single->mesh.cells());
+  EXPECT_EQ(found->mesh.corners, single->mesh.corners);
+}
+
+TEST(Delaunay, TracksStayRefusedHoweverCloseTheirPositions) {
+  Places track;
+  for (std::size_t n = 0; n < 3000; ++n) {
+    const auto along = static_cast<double>(n);
+    track.x.push_back(10 + 1e-3 * along + 1e-7 * along * along);
+    track.y.push_back(50 + 2e-3 * along);
+  }
+  const auto found = cf::triangulate(track.x, track.y);
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().message, HasSubstr("along lines"));
+}
+
+// A list of cells around 10 degrees east and 50 north, in the given units.
+void write_cells(const std::string& path, const std::string& units, double scale) {
+  constexpr std::size_t count = 200;
+  NetcdfMaker file(path);
+  const int cells = file.dimension("ncells", count);
+  const Places around = spiral(count);
+  std::vector<double> east;
+  std::vector<double> north;
+  for (std::size_t n = 0; n < count; ++n) {
+    east.push_back(scale * (10 + around.x[n] / 90));
+    north.push_back(scale * (50 + around.y[n] / 90));
+  }
+  for (const auto& [name, standard, values] :
+       {std::tuple("tlon", "longitude", east), std::tuple("tlat", "latitude", north)}) {
+    const int v = file.variable(name, NC_DOUBLE, {cells}, values);
+    file.text(v, "standard_name", standard);
+    if (!units.empty()) file.text(v, "units", units);
+  }
+  const int z = file.axis("height", {10, 20}, "m", "height");
+  const int t = file.variable("t", NC_FLOAT, {z, cells}, counting(2 * count));
+  file.text(t, "coordinates", "tlat tlon");
+}
+
+TEST(Delaunay, RadiansOfARegionAreDegreesByTheirUnitsOnly) {
+  const Folder folder;
+  write_cells(folder / "r.nc", "radian", degree);
+  const auto source = opened(folder / "r.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_NEAR(source->info().grid.axes[0].coordinates.front(), 8, 0.3);
+  EXPECT_NEAR(source->info().grid.axes[1].coordinates.back(), 51, 0.3);
+  write_cells(folder / "d.nc", "", 1);
+  EXPECT_NE(opened(folder / "d.nc"), nullptr) << "50 and more are no radians";
+  write_cells(folder / "n.nc", "", degree);
+  EXPECT_THAT(refusal(folder / "n.nc"),
+              HasSubstr("the positions in 'tlon' and 'tlat' have no units and could be degrees or "
+                        "radians"));
 }
 
 }  // namespace
