@@ -122,7 +122,9 @@ Result<void> nearest_column(const Grid& grid, const std::array<std::optional<dou
                       static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]));
   if (!at[0]) return absent(0);
   if (!at[1]) return absent(1);
-  if (std::abs(*at[1]) > 90) return outside(1, *at[1], "latitudes must be from -90 to 90 degrees");
+  if (std::abs(*at[1]) > 90)
+    return outside(1, *at[1],
+                   "x and y are longitude and latitude here, which must be from -90 to 90 degrees");
   double least = std::numeric_limits<double>::infinity();
   std::size_t nearest = 0;
   for (std::size_t i = 0; i < columns.latitude.size(); ++i) {

@@ -166,7 +166,9 @@ TEST(NearestSample, OutsideTheColumnsIsRefusedWithTheirBox) {
   const std::string refused = refusal(grid, {0, 78, 850});
   EXPECT_THAT(refused, HasSubstr("latitudes 76.5"));
   EXPECT_THAT(refused, HasSubstr("to 89.29"));
-  refusal(grid, {0, 91, 850});
+  EXPECT_THAT(refusal(grid, {400000, 5000000, 850}),
+              HasSubstr("x and y are longitude and latitude"))
+      << "metres of a map";
   refusal(grid, {std::nullopt, 85, 850});
 }
 
