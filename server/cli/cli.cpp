@@ -58,7 +58,9 @@ std::string unknown_argument(const CLI::App& app) {
     std::error_code ignored;
     const bool is_file = std::filesystem::exists(word, ignored);
     return "'" + printable(word) + "' is an unexpected argument of '" + command.get_name() + "'" +
-           (is_file ? "; a pattern of files must be in quotes" : "");
+           (is_file ? "; a pattern of files must be in quotes, as must a list, such as "
+                      "'{a,b}.nc'"
+                    : "");
   }
   const std::string word = first->substr(0, std::min<std::size_t>(first->find('='), 64));
   std::string nearest;

@@ -56,6 +56,30 @@ bool comes_before(std::string_view a, std::string_view b) {
   return i == a.size();
 }
 
+namespace {
+
+// What the alternatives of the first list in braces have in common, or else the first of them: the
+// folders and extensions of `{a/x_1.nc,b/x_2.nc}` apart, x.
+std::string name_of_list(const std::string& pattern) {
+  const std::size_t open = pattern.find('{');
+  const std::size_t close = pattern.find('}', open);
+  if (open == std::string::npos || close == std::string::npos) return {};
+  std::vector<std::string> names;
+  for (std::size_t at = open + 1; at <= close;) {
+    const std::size_t end = std::min(pattern.find(',', at), close);
+    names.push_back(fs::path(pattern.substr(at, end - at)).stem().native());
+    at = end + 1;
+  }
+  std::string common = names.front();
+  for (const std::string& name : names) {
+    const auto [end, other] = std::mismatch(common.begin(), common.end(), name.begin(), name.end());
+    common.erase(end, common.end());
+  }
+  return common.empty() ? names.front() : common;
+}
+
+}  // namespace
+
 std::string stem_of_pattern(const std::string& pattern) {
   std::string stem = fs::path(pattern).stem().native();
   std::string out;
@@ -67,9 +91,15 @@ std::string stem_of_pattern(const std::string& pattern) {
       out += stem[i];
     }
   }
-  while (!out.empty() && (out.back() == '_' || out.back() == '-' || out.back() == '.')) {
-    out.pop_back();
-  }
+  const auto trim = [&out] {
+    constexpr const char* separators = "_-.";
+    out.erase(0, std::min(out.find_first_not_of(separators), out.size()));
+    out.erase(out.find_last_not_of(separators) + 1);
+  };
+  trim();
+  if (out.empty()) out = name_of_list(pattern);
+  std::erase_if(out, [](char c) { return c == '*' || c == '?' || c == '[' || c == ']'; });
+  trim();
   return out.empty() ? "series" : out;
 }
 

@@ -109,16 +109,25 @@ bool set_authority(std::string_view authority, Url& out) {
 // Of a THREDDS server; others are recognised by the scheme dods only.
 bool is_service(const Url& url) { return url.path.find("/dodsC/") != std::string::npos; }
 
-// Whether a URL is an answer about a dataset of a service, or a page about it.
-bool is_answer_of_service(const Url& url, bool service) {
-  const auto has_ending = [&](const auto& endings) {
-    return std::any_of(endings.begin(), endings.end(),
-                       [&](std::string_view ending) { return url.path.ends_with(ending); });
-  };
+// The ending of a URL that is an answer about a dataset of a service, or a page about it; empty if
+// it is none. The page of a file is one of a service: x.nc.html.
+std::string_view ending_of_answer(std::string_view path, bool service) {
   constexpr auto answers =
       std::to_array<std::string_view>({".dods", ".dds", ".das", ".dmr", ".dap"});
   constexpr auto pages = std::to_array<std::string_view>({".html", ".info", ".ascii", ".asc"});
-  return has_ending(answers) || (service && has_ending(pages));
+  constexpr auto files = std::to_array<std::string_view>(
+      {".nc", ".nc4", ".cdf", ".h5", ".hdf", ".hdf5", ".grb", ".grb2", ".grib", ".grib2"});
+  for (const std::string_view ending : answers) {
+    if (path.ends_with(ending)) return ending;
+  }
+  for (const std::string_view ending : pages) {
+    if (!path.ends_with(ending)) continue;
+    const std::string_view named = path.substr(0, path.size() - ending.size());
+    const bool is_of_file = std::any_of(
+        files.begin(), files.end(), [&](std::string_view file) { return named.ends_with(file); });
+    if (service || is_of_file) return ending;
+  }
+  return {};
 }
 
 // A page of THREDDS that lists datasets, or describes one.
@@ -195,7 +204,9 @@ Result<Url> parse_url(std::string_view text) {
   if (mark == std::string_view::npos) return refused_url(text, "is not a URL");
   out.scheme = lower(text.substr(0, mark));
   if (out.scheme != "https" && out.scheme != "http" && out.scheme != "s3") {
-    return refused_url(text, "is a URL with a scheme other than https, http and s3");
+    return refused_url(text,
+                       "is a URL of a scheme that is not supported: files are read by https, "
+                       "http, s3 and dods (a dataset of an OPeNDAP service)");
   }
   const std::string_view rest = text.substr(mark + 3);
   const std::size_t slash = std::min(rest.find('/'), rest.size());
@@ -252,10 +263,12 @@ Result<Location> locate_url(const std::string& text) {
                        "is a page of a catalogue: give the address of a dataset on it, of OPENDAP "
                        "(with /dodsC/, without .html) or HTTPServer (with /fileServer/)");
   }
-  if (is_answer_of_service(*url, out.service)) {
+  if (const auto ending = ending_of_answer(url->path, out.service); !ending.empty()) {
     return refused_url(text,
-                       "is an answer of an OPeNDAP service: give the URL of the dataset, without "
-                       "this ending, as dods://HOST/PATH");
+                       "is a page or an answer of an OPeNDAP service: give the URL without "
+                       "this ending (" +
+                           std::string(ending) + ')' +
+                           (out.service ? "" : ", and as dods://HOST/PATH"));
   }
   const std::string_view path = url->path;
   if (path.find_first_of("*{") != std::string_view::npos) {

@@ -110,6 +110,15 @@ TEST_F(LocateBeneath, PatternInTheLastPartIsASeriesInNaturalOrder) {
   EXPECT_FALSE(located("runs/x*.pvd").companions) << "a collection is a series itself";
 }
 
+TEST_F(LocateBeneath, AListIsNamedAfterWhatItsFilesHaveInCommonOrTheFirst) {
+  for (const auto& [pattern, stem] :
+       {std::pair("{ua,va}_hist.nc", "hist"), std::pair("{run_1,run_2}.nc", "run"),
+        std::pair("{wrf_a.nc,wrf_b.nc}", "wrf"), std::pair("{ua,va}.nc", "ua"),
+        std::pair("{ua_*.nc,va_*.nc}", "ua"), std::pair("*.nc", "series")}) {
+    EXPECT_EQ(stem_of_pattern(pattern), stem) << pattern;
+  }
+}
+
 TEST_F(LocateBeneath, GroupIsNamedAfterTheFile) {
   const Location found = located("a.nc#/sub/deep");
   EXPECT_EQ(found.inside, "sub/deep");

@@ -97,6 +97,19 @@ TEST(UrlLocation, PatternsAndServicesAreRefusedByName) {
     EXPECT_THAT(locate_url(page).error().message, HasSubstr("is a page of a catalogue")) << page;
   }
   EXPECT_TRUE(locate_url("https://h/x.html"));
+  // The dataset of /dodsC/ needs no other scheme; that of another service does.
+  EXPECT_THAT(locate_url("https://h/thredds/dodsC/x.nc.html").error().message,
+              AllOf(HasSubstr("without this ending (.html)"), Not(HasSubstr("dods:"))));
+  EXPECT_THAT(locate_url("https://h/opendap/x.nc.html").error().message,
+              HasSubstr("without this ending (.html), and as dods://HOST/PATH"));
+}
+
+TEST(UrlLocation, OtherSchemesAreToldWhichAreSupported) {
+  for (const char* text : {"ftp://h/x.nc", "gopher://h/x.nc", "file:///x.nc"}) {
+    EXPECT_THAT(locate_url(text).error().message,
+                HasSubstr("https, http, s3 and dods (a dataset of an OPeNDAP service)"))
+        << text;
+  }
 }
 
 TEST(UrlLocation, ServicesHaveASchemeOrTheirPathOnThredds) {
