@@ -212,7 +212,9 @@ class ArraySource final : public FileSource {
       placement_.length.at(a) = info_.grid.axes.at(a).coordinates.size();
     }
     follows_other_axes_ = bearing->is_curvilinear;
-    return bearing->is_curvilinear ? Result<void>() : find_projection();
+    if (!bearing->is_curvilinear) return find_projection();
+    if (info_.grid.columns) forget_positions(*file_, roles_, choice_, info_.left_out);
+    return {};
   }
 
   // The positions of axes with 1-D coordinates.

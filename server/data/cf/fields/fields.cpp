@@ -169,7 +169,7 @@ class FieldFinder {
 
   void tell(std::string note) {
     constexpr std::size_t told_max = 40;
-    if (std::find(notes_.begin(), notes_.end(), note) != notes_.end()) return;
+    if (!told_notes_.insert(note).second) return;
     if (told_++ < told_max) {
       notes_.push_back(std::move(note));
     } else {
@@ -369,6 +369,7 @@ class FieldFinder {
   std::vector<std::string>& notes_;
   Candidates candidates_;
   FieldNames names_;
+  std::unordered_set<std::string> told_notes_;
   std::size_t told_ = 0;
   std::size_t untold_ = 0;
   std::vector<FieldPlan> plans_;

@@ -201,6 +201,19 @@ Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const
                     {grid.turned[0], grid.turned[1]});
 }
 
+void forget_positions(const ArrayFile& file, const std::vector<DimensionRole>& roles,
+                      const GridChoice& choice, std::vector<LeftOut>& left_out) {
+  const FileContents& contents = file.contents();
+  for (const bool longitude : {true, false}) {
+    const int v = position_on(contents, choice.space[0], choice.space[1], longitude);
+    const std::size_t d = at(choice.space[longitude ? 0 : 1]);
+    std::erase_if(left_out, [&](const LeftOut& left) {
+      return (v >= 0 && left.name == contents.variables[at(v)].name) ||
+             (roles.at(d).coordinate < 0 && left.name == contents.dimensions[d].name);
+    });
+  }
+}
+
 int grid_mapping_of(const ArrayFile& file, const std::vector<int>& variables,
                     const std::string& coordinate) {
   for (const int v : variables) {

@@ -29,6 +29,11 @@ struct Bearing {
 Result<Bearing> find_bearing(const ArrayFile& file, const std::vector<DimensionRole>& roles,
                              GridChoice& choice);
 
+// Removes 2-D positions that place the rows and columns of a choice from what is left out, and its
+// dimensions, which are not placed by index.
+void forget_positions(const ArrayFile& file, const std::vector<DimensionRole>& roles,
+                      const GridChoice& choice, std::vector<LeftOut>& left_out);
+
 // The columns of a grid whose axes have 1-D coordinates (metres of a projection, degrees of a
 // rotated pole). Null if 2-D longitudes or latitudes are absent or incomplete.
 Result<std::shared_ptr<const Columns>> find_columns(const ArrayFile& file, const Placement& grid);

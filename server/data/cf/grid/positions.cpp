@@ -113,7 +113,10 @@ class PositionFinder {
   [[nodiscard]] const FileVariable& variable(int v) const {
     return file_.contents().variables.at(at(v));
   }
-  [[nodiscard]] std::string mapping_name() const { return in_quotes(variable(mapping_).name); }
+  // A field with a code of its own is no mapping itself.
+  [[nodiscard]] std::string mapping_name() const {
+    return (is_of_field_ ? "of " : "") + in_quotes(variable(mapping_).name);
+  }
 
   void take(Result<GridMapping> found) {
     if (found) {
@@ -154,6 +157,7 @@ class PositionFinder {
       const auto code = code_at(v);
       if (!code) continue;
       mapping_ = v;
+      is_of_field_ = true;
       take(mapping_of_epsg(*code));
       return;
     }
@@ -281,6 +285,7 @@ class PositionFinder {
   int mapping_ = -1;
   GridMapping attributes_;
   std::optional<Error> fault_;  // of well-known text
+  bool is_of_field_ = false;    // mapping_ is a field
   std::string kind_;            // grid_mapping_name
 };
 

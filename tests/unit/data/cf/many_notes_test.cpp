@@ -37,6 +37,7 @@ TEST(ManyNotes, AreBoundedAndCounted) {
   }
   const auto source = opened(folder / "a.nc");
   EXPECT_LE(source->info().notes.size(), 200U);
+  // One note for each pair, of which 40 are told.
   EXPECT_TRUE(has_note(source->info(), "260 more notes on components of vectors"));
   EXPECT_NE(source->info().find("wind_vector_299"), nullptr) << "all 300 vectors are there";
   EXPECT_EQ(source->info().find("wind_vector_300"), nullptr);

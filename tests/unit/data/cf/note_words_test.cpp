@@ -1,0 +1,71 @@
+// Notes and lists of omissions name what the file has, and do not contradict each other.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "server/data/model/dataset_info.hpp"
+#include "tests/unit/data/dataset_probe.hpp"
+#include "tests/unit/data/netcdf_maker.hpp"
+
+namespace windsplat::data::test {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(NoteWords, HeightsOfSamplesAreNamedAsInTheFile) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "icon.nc");
+    const int z = file.axis("lev", {1, 2, 3}, "");
+    file.text(file.variable_id("lev"), "axis", "Z");
+    const int y = file.axis("lat", {50, 51}, "degrees_north");
+    const int x = file.axis("lon", {0, 1, 2}, "degrees_east");
+    const int heights = file.variable("z_mc", NC_FLOAT, {z, y, x}, counting(18, 100));
+    file.text(heights, "units", "m");
+    file.text(heights, "standard_name", "altitude");
+    file.text(file.variable("t", NC_FLOAT, {z, y, x}, counting(18)), "units", "K");
+  }
+  const auto source = opened(folder / "icon.nc");
+  EXPECT_TRUE(has_note(source->info(), "the field 'z_mc' has the height of every sample"));
+  EXPECT_FALSE(has_note(source->info(), "\"height\""));
+}
+
+TEST(NoteWords, PositionsInUseAreNotOmitted) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "wrf.nc");
+    const int t = file.dimension("Time", 1);
+    const int y = file.dimension("south_north", 2);
+    const int x = file.dimension("west_east", 3);
+    file.text(file.variable("XLONG", NC_FLOAT, {t, y, x}, {10, 11, 12, 10, 11, 12}), "units",
+              "degree_east");
+    file.text(file.variable("XLAT", NC_FLOAT, {t, y, x}, {50, 50, 50, 51, 51, 51}), "units",
+              "degree_north");
+    file.text(file.variable("T2", NC_FLOAT, {t, y, x}, counting(6)), "units", "K");
+  }
+  const auto source = opened(folder / "wrf.nc");
+  ASSERT_NE(source->info().grid.columns, nullptr);
+  for (const char* name : {"XLAT", "XLONG", "south_north", "west_east"}) {
+    EXPECT_EQ(reason_of(source->info(), name), "") << name;
+  }
+  EXPECT_TRUE(has_note(source->info(), "'XLAT' is given for every step"));
+}
+
+TEST(NoteWords, AFieldWithACodeIsNoMapProjection) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "code.nc");
+    const int y = file.axis("y", {5000000, 5001000}, "m", "projection_y_coordinate");
+    const int x = file.axis("x", {400000, 401000, 402000}, "m", "projection_x_coordinate");
+    const int ua = file.variable("ua", NC_FLOAT, {y, x}, counting(6));
+    file.text(ua, "units", "m s-1");
+    file.text(ua, "epsg_code", "EPSG:32633");
+  }
+  const auto source = opened(folder / "code.nc");
+  EXPECT_TRUE(has_note(source->info(), "the map projection of 'ua' "));
+}
+
+}  // namespace
+}  // namespace windsplat::data::test
