@@ -101,6 +101,15 @@ bool is_uneven(const std::vector<double>& coordinates) {
   return false;
 }
 
+// Whether longitudes of an even axis go around the globe, and it can be shown so.
+bool is_whole_globe(const protocol::DatasetDescription& dataset) {
+  const std::vector<double>& at = dataset.axes[0].coordinates;
+  const bool may_be = std::count(dataset.mappings.begin(), dataset.mappings.end(), "sphere") > 0;
+  if (!may_be || dataset.axes[0].kind != "longitude" || at.size() < 3) return false;
+  const double span = std::abs(at.back() - at.front());
+  return span + 1.5 * span / static_cast<double>(at.size() - 1) >= 360;
+}
+
 std::string grid_text(const protocol::DatasetDescription& dataset) {
   constexpr std::array<const char*, 3> letters{"x", "y", "z"};
   std::vector<Row> rows;
@@ -126,6 +135,9 @@ std::string grid_text(const protocol::DatasetDescription& dataset) {
     world += "\nheights are drawn ";
     const bool to_scale = std::abs(*times - 1) < 0.005;
     world += to_scale ? "to scale" : short_number(*times) + " times as high as to scale";
+  }
+  if (is_whole_globe(dataset)) {
+    world += "\nthe longitudes go around: /geometry/mapping=sphere draws a globe, flat a map";
   }
   return "axes (first .. last)\n" + table(rows) + world + '\n';
 }
