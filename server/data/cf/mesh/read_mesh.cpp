@@ -1,7 +1,9 @@
 // Numbers or positions of corners -> checked polygons.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <string>
@@ -48,6 +50,12 @@ Result<void> check_width(std::size_t width, const std::string& name) {
   return make_error(ErrorKind::bad_data, in_quotes(name) + " has " + std::to_string(width) +
                                              " corners for a cell: supported are 3 to " +
                                              std::to_string(mesh_corners_max));
+}
+
+std::string two_digits(double value) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.2g", value);
+  return text.data();
 }
 
 class MeshReader {
@@ -320,7 +328,7 @@ class MeshReader {
         add(found->gaps, " of its polygons are gaps, with an edge of more than " +
                              number_text(gap_edges) + " times those around, and masked") +
         add(found->repeated, " positions are those of others, whose values are drawn") +
-        add(found->near, " positions are within " + number_text(found->near_degrees) +
+        add(found->near, " positions are within " + two_digits(found->near_degrees) +
                              " degrees of others, whose values are drawn") +
         add(found->missing, " positions are missing"));
     return std::move(found->mesh);
