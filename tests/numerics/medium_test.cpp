@@ -31,31 +31,51 @@ TEST(Footprint, IntegralOverThePlane) {
   EXPECT_NEAR(sum, footprint_integral, 1e-9);
 }
 
+// Compares every pixel of one_splat(rho, spacing, ...) with the formula.
+void expect_footprint(const scene::Scene& scene, double rho, const std::array<double, 3>& spacing) {
+  const engine::Image image = render(scene).image;
+  const auto& camera = scene.camera;
+  const double size = 2 * camera.half_height / camera.height;
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const double X = (x + 0.5 - 31.5) * size;
+      const double Y = (31.5 - (y + 0.5)) * size;
+      glm::dvec3 ray = camera.forward;
+      glm::dvec3 from = camera.eye;
+      (camera.perspective ? ray : from) += X * camera.right + Y * camera.up;
+      ray = glm::normalize(ray);
+      const glm::dvec3 cell{spacing[0], spacing[1], spacing[2]};
+      const glm::dvec3 d = ray / cell;
+      const glm::dvec3 o = -from / cell;
+      const double r = glm::length(glm::cross(o, d)) / glm::length(d);
+      const double tau = rho * footprint(r) / (footprint_integral * glm::length(d));
+      const double alpha = -std::expm1(-tau);
+      ASSERT_NEAR(pixel(image, x, y)[3], alpha, 2e-6) << x << " " << y;
+      ASSERT_NEAR(pixel(image, x, y)[1], 0.5 * alpha, 1e-6);
+    }
+  }
+}
+
 TEST(Splat, AbsorbsByItsFootprintInAnisotropicCells) {
   const std::array<double, 3> spacing{0.4, 0.7, 0.25};
   for (const bool perspective : {false, true}) {
-    const double rho = 3;
-    const scene::Scene scene = one_splat(rho, spacing, {0.4, 1, -0.6}, perspective);
-    const engine::Image image = render(scene).image;
-    const auto& camera = scene.camera;
-    const double size = 2 * camera.half_height / camera.height;
-    for (int y = 0; y < camera.height; ++y) {
-      for (int x = 0; x < camera.width; ++x) {
-        const double X = (x + 0.5 - 31.5) * size;
-        const double Y = (31.5 - (y + 0.5)) * size;
-        glm::dvec3 ray = camera.forward;
-        glm::dvec3 from = camera.eye;
-        (perspective ? ray : from) += X * camera.right + Y * camera.up;
-        ray = glm::normalize(ray);
-        const glm::dvec3 cell{spacing[0], spacing[1], spacing[2]};
-        const glm::dvec3 d = ray / cell;
-        const glm::dvec3 o = -from / cell;
-        const double r = glm::length(glm::cross(o, d)) / glm::length(d);
-        const double tau = rho * footprint(r) / (footprint_integral * glm::length(d));
-        const double alpha = -std::expm1(-tau);
-        ASSERT_NEAR(pixel(image, x, y)[3], alpha, 2e-6) << x << " " << y;
-        ASSERT_NEAR(pixel(image, x, y)[1], 0.5 * alpha, 1e-6);
-      }
+    expect_footprint(one_splat(3, spacing, {0.4, 1, -0.6}, perspective), 3, spacing);
+  }
+}
+
+// Cells from a fraction of a pixel to some pixels, of which some are so flat that rays to
+// neighbouring pixels cross them at very different angles.
+TEST(Splat, AbsorbsByItsFootprintInFlatAndDistantCells) {
+  for (const std::array<double, 3>& spacing :
+       {std::array{0.4, 0.4, 0.003}, std::array{0.2, 0.2, 0.05}, std::array{0.01, 0.3, 0.3},
+        std::array{0.1, 0.1, 0.1}, std::array{0.01, 0.01, 0.01}}) {
+    for (const glm::dvec3& forward :
+         {glm::dvec3{0, 1, 0}, glm::dvec3{0.4, 1, -0.05}, glm::dvec3{0.4, 1, -0.6}}) {
+      SCOPED_TRACE(testing::Message() << spacing[0] << " " << spacing[1] << " " << spacing[2]
+                                      << ", " << forward.x << " " << forward.y << " " << forward.z);
+      scene::Scene scene = one_splat(3, spacing, forward, true);
+      scene.scalars[0].min_optical_depth = 0;
+      expect_footprint(scene, 3, spacing);
     }
   }
 }

@@ -124,24 +124,56 @@ inline std::uint64_t open_window(const Tile& tile, int row, int column) {
   return open;
 }
 
-// Calls add(left, top, ray, block) for each block of a window; add returns its Light.
-template <bool Perspective, class Add>
-KERNEL_INLINE void each_block(const Window& window, Tile& tile, const Add& add) {
-  for (std::uint64_t blocks = window.blocks; blocks != 0; blocks &= blocks - 1U) {
-    const int at = __builtin_ctzll(blocks);
-    const int row = window.row + at / window_side;
-    const int column = window.column + at % window_side;
-    const float* ray = Perspective ? rays_at(tile, row, column) : nullptr;
-    const Light light =
-        add(left_of(tile, column), top_of(tile, row), ray, block_at(tile, row, column));
-    note_light(light, row, 1U << static_cast<unsigned>(column), tile);
-  }
-}
-
-// Pixels from a point of the picture to a block's corner.
+// Pixels from a point of the picture to the corner of a block or window.
 struct BlockPixels {
   Pixel x, y;
 };
+
+KERNEL_INLINE BlockPixels corner_of(const Window& window, const Tile& tile) {
+  return {all<Pixel>(left_of(tile, window.column)), all<Pixel>(top_of(tile, window.row))};
+}
+
+// The blocks of a window by their bits: from its corner in pixels, and indices in the tile.
+struct WindowOffsets {
+  float x[window_side * window_side];
+  float y[window_side * window_side];
+  std::int32_t block[window_side * window_side];
+};
+
+constexpr WindowOffsets window_offsets() {
+  WindowOffsets offsets = {};
+  for (int b = 0; b < window_side * window_side; ++b) {
+    const int row = b / window_side;
+    const int column = b % window_side;
+    offsets.x[b] = static_cast<float>(column * block_side);
+    offsets.y[b] = static_cast<float>(row * block_side);
+    offsets.block[b] = row * tile_blocks + column;
+  }
+  return offsets;
+}
+
+constexpr WindowOffsets offsets_in_window = window_offsets();
+
+// Calls add(offset, ray, block) for each block of a window; offset: pixels from the corner of the
+// window. add returns the Light of the block.
+template <bool Perspective, class Add>
+KERNEL_INLINE void each_block(const Window& window, Tile& tile, const Add& add) {
+  float* const first = block_at(tile, window.row, window.column);
+  const float* const rays = Perspective ? rays_at(tile, window.row, window.column) : nullptr;
+  const float stop = tile.stop;
+  for (std::uint64_t blocks = window.blocks; blocks != 0; blocks &= blocks - 1U) {
+    const int at = __builtin_ctzll(blocks);
+    const std::ptrdiff_t block = offsets_in_window.block[at];
+    const float* ray = Perspective ? &rays[block * block_pixels] : nullptr;
+    const Light light =
+        add({all<Pixel>(offsets_in_window.x[at]), all<Pixel>(offsets_in_window.y[at])}, ray,
+            &first[block * block_floats]);
+    if (!light.above(stop)) {
+      mark_closed(window.row + at / window_side,
+                  1U << static_cast<unsigned>(window.column + at % window_side), tile);
+    }
+  }
+}
 
 // Combines a line with the others by `or`: the largest opacity and the largest premultiplied light
 // of each channel. `open`: transmittance without lines. Returns the transmittance.
@@ -156,14 +188,16 @@ KERNEL_INLINE Pixel add_or(Pixel opacity, const Pixel color[3], Pixel open, cons
   return left;
 }
 
+// corner: from the line to the corner of the window, offset: from there to the block, in pixels.
 template <Depth Along, int Style>
 KERNEL_INLINE Light or_block(const RibbonLanes& r, const BlockPixels& corner,
-                             float* HWY_RESTRICT block) {
+                             const BlockPixels& offset, float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const RibbonLane lane = ribbon_lane<Along, Style>(r, corner.x + load<Pixel>(lane_x + l),
-                                                      corner.y + load<Pixel>(lane_y + l));
+    const RibbonLane lane =
+        ribbon_lane<Along, Style>(r, corner.x + load<Pixel>(lane_x + l) + offset.x,
+                                  corner.y + load<Pixel>(lane_y + l) + offset.y);
     Pixel color[3];
     for (int c = 0; c < 3; ++c) color[c] = hn::MulAdd(lane.f, r.rise[c], r.tail[c]);
     light.see(add_or(lane.opacity, color, all<Pixel>(1.0F), to, l));
@@ -173,12 +207,13 @@ KERNEL_INLINE Light or_block(const RibbonLanes& r, const BlockPixels& corner,
 
 template <Depth Along, int Style>
 KERNEL_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
-                               float* HWY_RESTRICT block) {
+                               const BlockPixels& offset, float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const RibbonLane lane = ribbon_lane<Along, Style>(r, corner.x + load<Pixel>(lane_x + l),
-                                                      corner.y + load<Pixel>(lane_y + l));
+    const RibbonLane lane =
+        ribbon_lane<Along, Style>(r, corner.x + load<Pixel>(lane_x + l) + offset.x,
+                                  corner.y + load<Pixel>(lane_y + l) + offset.y);
     const Pixel t = load<Pixel>(to.transmittance + l);
     const Pixel a = t * lane.opacity;
     for (int c = 0; c < 3; ++c) {
@@ -194,17 +229,27 @@ KERNEL_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
 }
 
 // Lanes: SplatLanes or, from the near plane, NearLanes.
+template <From Start, class Lanes>
+KERNEL_INLINE SplatPixels splat_pixels(const Lanes& s, const BlockPixels& corner,
+                                       const BlockPixels& offset, int l) {
+  // Added in this order, the first sum is that of the whole window.
+  const Pixel x = load<Pixel>(lane_x + l);
+  const Pixel y = load<Pixel>(lane_y + l);
+  return pixels_from<Start>(s, corner.x, corner.y).moved(x, y).moved(offset.x, offset.y);
+}
+
+// corner: the corner of the window, offset: from there to the block, in pixels.
 template <bool Perspective, int Compositing, From Start, class Lanes>
-KERNEL_INLINE Light splat_block(const Lanes& s, float x, float y, const float* HWY_RESTRICT ray,
+KERNEL_INLINE Light splat_block(const Lanes& s, const BlockPixels& corner,
+                                const BlockPixels& offset, const float* HWY_RESTRICT ray,
                                 float* HWY_RESTRICT block) {
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
-    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
+    const SplatPixels pixels = splat_pixels<Start>(s, corner, offset, l);
     const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
-    const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
-    const Attenuation<Pixel> medium = attenuation_by<Compositing>(depth_beyond<Start>(lane));
+    const Pixel tau = splat_depth<Perspective, Start>(s, pixels, length);
+    const Attenuation<Pixel> medium = attenuation_by<Compositing>(tau);
     const Pixel t = load<Pixel>(to.transmittance + l);
     const Pixel a = t * medium.absorbed;
     for (int c = 0; c < 3; ++c) add_product(to.rgb[c] + l, a, s.color[c]);
@@ -261,17 +306,19 @@ KERNEL_INLINE Pixel add_cell(const CellLight& cell, Pixel t, const Channels& to,
 
 template <bool Perspective, int Compositing, int Style, From Start, class Lanes>
 KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_rise, const Lanes& s,
-                               float x, float y, const float* HWY_RESTRICT ray,
-                               float* HWY_RESTRICT block) {
+                               const BlockPixels& corner, const BlockPixels& offset,
+                               const float* HWY_RESTRICT ray, float* HWY_RESTRICT block) {
   constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
   const Channels to = channels_of(block);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
-    const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
-    const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const RibbonLane line = ribbon_lane<along, Style>(r, px - r.x, py - r.y);
+    const Pixel to_line_x = corner.x - r.x + load<Pixel>(lane_x + l);
+    const Pixel to_line_y = corner.y - r.y + load<Pixel>(lane_y + l);
+    const RibbonLane line =
+        ribbon_lane<along, Style>(r, to_line_x + offset.x, to_line_y + offset.y);
+    const SplatPixels pixels = splat_pixels<Start>(s, corner, offset, l);
     const Pixel length = Perspective ? load<Pixel>(ray + l) : all<Pixel>(1.0F);
-    const SplatLane lane = splat_lane<Perspective, Start>(s, px, py, length);
+    const SplatLane lane = splat_lane<Perspective, Start>(s, pixels, length);
     const Pixel tau = depth_beyond<Start>(lane);
     const Attenuation<Pixel> medium = attenuation_by<Compositing>(tau);
     const Pixel x_line = fraction_before(s, lane, hn::MulAdd(line.f, depth_rise, depth));
@@ -289,9 +336,11 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
 template <bool Perspective, int Compositing, From Start>
 void splat_window(const Splat& splat, const Window& window, Tile& tile) {
   const auto s = spread_from<Start>(splat);
-  each_block<Perspective>(window, tile, [&](float x, float y, const float* ray, float* block) {
-    return splat_block<Perspective, Compositing, Start>(s, x, y, ray, block);
-  });
+  const BlockPixels corner = corner_of(window, tile);
+  each_block<Perspective>(
+      window, tile, [&](const BlockPixels& offset, const float* ray, float* block) {
+        return splat_block<Perspective, Compositing, Start>(s, corner, offset, ray, block);
+      });
 }
 
 template <bool Perspective, int Compositing, int Style, From Start>
@@ -300,32 +349,48 @@ void both_window(const Ribbon& ribbon, const Splat& splat, const Window& window,
   const auto s = spread_from<Start>(splat);
   const Pixel depth = all<Pixel>(ribbon.depth);
   const Pixel depth_rise = all<Pixel>(ribbon.depth_rise);
-  each_block<Perspective>(window, tile, [&](float x, float y, const float* ray, float* block) {
-    return both_block<Perspective, Compositing, Style, Start>(r, depth, depth_rise, s, x, y, ray,
-                                                              block);
-  });
+  const BlockPixels corner = corner_of(window, tile);
+  each_block<Perspective>(window, tile,
+                          [&](const BlockPixels& offset, const float* ray, float* block) {
+                            return both_block<Perspective, Compositing, Style, Start>(
+                                r, depth, depth_rise, s, corner, offset, ray, block);
+                          });
 }
 
 template <bool Perspective, int Style>
 void line_window(const Ribbon& ribbon, const Window& window, Tile& tile) {
   const RibbonLanes r = spread(ribbon);
-  each_block<false>(window, tile, [&](float x, float y, const float* /*ray*/, float* block) {
-    constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
-    return line_block<along, Style>(r, {all<Pixel>(x) - r.x, all<Pixel>(y) - r.y}, block);
-  });
+  const BlockPixels corner = corner_of(window, tile);
+  each_block<false>(
+      window, tile, [&](const BlockPixels& offset, const float* /*ray*/, float* block) {
+        constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
+        return line_block<along, Style>(r, {corner.x - r.x, corner.y - r.y}, offset, block);
+      });
 }
 
 template <bool Perspective, int Style>
 void or_window(const Ribbon& ribbon, const Window& window, Tile& tile) {
   const RibbonLanes r = spread(ribbon);
-  each_block<false>(window, tile, [&](float x, float y, const float* /*ray*/, float* block) {
-    constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
-    return or_block<along, Style>(r, {all<Pixel>(x) - r.x, all<Pixel>(y) - r.y}, block);
+  const BlockPixels corner = corner_of(window, tile);
+  each_block<false>(
+      window, tile, [&](const BlockPixels& offset, const float* /*ray*/, float* block) {
+        constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
+        return or_block<along, Style>(r, {corner.x - r.x, corner.y - r.y}, offset, block);
+      });
+}
+
+template <int Compositing>
+void afar_window(const Prepared& p, int l, const Window& window, Tile& tile) {
+  const AfarLanes s = spread_afar(p.splats, p.densities.color[l], l);
+  const BlockPixels corner = corner_of(window, tile);
+  each_block<true>(window, tile, [&](const BlockPixels& offset, const float* ray, float* block) {
+    return splat_block<true, Compositing, From::afar>(s, corner, offset, ray, block);
   });
 }
 
 using LineFunction = void (*)(const Ribbon& r, const Window& window, Tile& tile);
 using SplatFunction = void (*)(const Splat& s, const Window& window, Tile& tile);
+using AfarFunction = void (*)(const Prepared& p, int l, const Window& window, Tile& tile);
 using BothFunction = void (*)(const Ribbon& r, const Splat& s, const Window& window, Tile& tile);
 
 constexpr int from_count = 3;
@@ -336,6 +401,7 @@ struct Compositor {
   LineFunction line;
   SplatFunction splat[from_count];
   BothFunction both[from_count];
+  AfarFunction afar;       // splats alone, perspective only
   int splat_exponentials;  // number of exponentials per pixel
   int both_exponentials;
 };
@@ -357,6 +423,7 @@ inline Compositor compositor_with() {
           {both_window<Perspective, Compositing, Style, From::eye>,
            both_window<Perspective, Compositing, Style, inside>,
            both_window<Perspective, Compositing, Style, near>},
+          afar_window<Compositing>,
           splat,
           Compositing == compositing_analytic ? 2 : splat};
 }

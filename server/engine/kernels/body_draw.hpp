@@ -11,25 +11,6 @@
 namespace windsplat::engine::kernels {
 namespace {
 
-// Offsets of the blocks of a window from its corner, in pixels.
-struct WindowOffsets {
-  float x[window_side * window_side];
-  float y[window_side * window_side];
-};
-
-constexpr WindowOffsets window_offsets() {
-  WindowOffsets offsets = {};
-  for (int b = 0; b < window_side * window_side; ++b) {
-    const int row = b / window_side;
-    const int column = b % window_side;
-    offsets.x[b] = static_cast<float>(column * block_side);
-    offsets.y[b] = static_cast<float>(row * block_side);
-  }
-  return offsets;
-}
-
-constexpr WindowOffsets offsets_in_window = window_offsets();
-
 // Joins the two halves of a window as stored in Footing.
 inline std::uint64_t joined(std::uint32_t high, std::uint32_t low) {
   return static_cast<std::uint64_t>(high) << 32U | low;
@@ -48,15 +29,14 @@ KERNEL_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int 
   float* corner = block_at(tile, row, column);
   for (; left != 0; left &= left - 1U) {
     const int at = __builtin_ctzll(left);
-    const int down = at / window_side;
-    const int across = at % window_side;
+    const std::ptrdiff_t block = offsets_in_window.block[at];
     const Light light = line_block<Along, Style>(
-        lanes,
-        {from_line.x + all<Pixel>(offsets_in_window.x[at]),
-         from_line.y + all<Pixel>(offsets_in_window.y[at])},
-        corner + static_cast<std::ptrdiff_t>(down * tile_blocks + across) * block_floats);
+        lanes, from_line,
+        {all<Pixel>(offsets_in_window.x[at]), all<Pixel>(offsets_in_window.y[at])},
+        &corner[block * block_floats]);
     if (!light.above(tile.stop)) {
-      mark_closed(row + down, 1U << static_cast<unsigned>(column + across), tile);
+      mark_closed(row + at / window_side, 1U << static_cast<unsigned>(column + at % window_side),
+                  tile);
     }
   }
   return blocks;
@@ -66,6 +46,7 @@ KERNEL_INLINE int draw_windowed(const RibbonLanes& lanes, const Footing& f, int 
 template <Depth Along, int Style>
 int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
   int blocks = 0;
+  const BlockPixels none = {hn::Zero(PixelTag()), hn::Zero(PixelTag())};
   for (int row = f.line_first[l], k = 0; row <= f.line_last[l]; ++row, ++k) {
     std::uint32_t left = f.line_columns[k][l] & tile.open[row];
     blocks += __builtin_popcount(left);
@@ -75,8 +56,8 @@ int draw_ribbon(const RibbonLanes& lanes, const Footing& f, int l, Tile& tile) {
       left ^= bit;
       const BlockPixels from_line = {all<Pixel>(left_of(tile, column)) - lanes.x,
                                      all<Pixel>(top_of(tile, row)) - lanes.y};
-      note_light(line_block<Along, Style>(lanes, from_line, block_at(tile, row, column)), row, bit,
-                 tile);
+      note_light(line_block<Along, Style>(lanes, from_line, none, block_at(tile, row, column)), row,
+                 bit, tile);
     }
   }
   return blocks;
@@ -222,9 +203,26 @@ KERNEL_INLINE void each_window(const Footing& f, int l, bool lined, bool splatte
   }
 }
 
+// Draws a splat from afar that is within a window.
+inline void draw_afar(const Prepared& p, const Compositor& with, int l, Tile& tile) {
+  const Footing& f = p.footing;
+  const int row = f.row_first[l];
+  const int column = f.column_first[l];
+  std::uint64_t blocks = joined(f.splat_high[l], f.splat_low[l]);
+  if (tile.any_closed != 0) blocks &= open_window(tile, row, column);
+  if (blocks == 0) return;
+  with.afar(p, l, {row, column, blocks}, tile);
+  const std::int64_t pixels = std::int64_t{__builtin_popcountll(blocks)} * block_pixels;
+  tile.counters.pixel_updates += pixels;
+  tile.counters.exponentials += pixels * with.splat_exponentials;
+}
+
 template <bool Perspective>
 void draw_kernel(const Prepared& p, const Compositor& with, int l, Tile& tile) {
   const bool lined = has(p.positions.lines, l);
+  if (Perspective && !lined && has(p.splats.afar, l) && within_window(splat_box(p.footing, l))) {
+    return draw_afar(p, with, l, tile);
+  }
   KernelDrawing kernel = {
       with, tile, splat_at<Perspective>(p, l), {}, static_cast<int>(from_of<Perspective>(p, l))};
   if (lined) kernel.ribbon = ribbon_at(p.pass->line, p.ribbons, l);

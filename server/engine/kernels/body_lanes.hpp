@@ -179,8 +179,34 @@ struct SplatLane {
 
 // Start of the rays. `eye`: the splat lies beyond the near plane. `eye_inside`: the same, and its
 // centre lies in the picture, so that (ex, ey) is (x, y). `near_plane`: the splat may reach the
-// near plane; the part before it is removed.
-enum class From { eye, eye_inside, near_plane };
+// near plane; the part before it is removed. `afar`: as `eye_inside`, with AfarLanes.
+enum class From { eye, eye_inside, near_plane, afar };
+
+// Constants of a splat seen from afar (Splats::afar), broadcast to all lanes: the form and |d|^2 -
+// d0 over d0, and the strength over |d| at the centre.
+struct AfarLanes {
+  Pixel x, y, xx, xy, yy, dx, dy, dxx, dxy, dyy;
+  Pixel strength;
+  Pixel color[3];
+};
+
+KERNEL_INLINE AfarLanes spread_afar(const Splats& s, const float* color, int l) {
+  const Pixel inverse = all<Pixel>(s.inverse[l]);
+  const Pixel inverse2 = inverse * inverse;
+  const auto over = [&](const float* v) { return all<Pixel>(v[l]) * inverse2; };
+  return {all<Pixel>(s.x[l]),
+          all<Pixel>(s.y[l]),
+          over(s.xx),
+          over(s.xy),
+          over(s.yy),
+          over(s.dx),
+          over(s.dy),
+          over(s.dxx),
+          over(s.dxy),
+          over(s.dyy),
+          all<Pixel>(s.strength[l]) * inverse,
+          {all<Pixel>(color[0]), all<Pixel>(color[1]), all<Pixel>(color[2])}};
+}
 
 template <From Start>
 KERNEL_INLINE auto spread_from(const Splat& s) {
@@ -191,18 +217,86 @@ KERNEL_INLINE auto spread_from(const Splat& s) {
   }
 }
 
-template <bool Perspective, From Start>
-KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixel ray) {
-  static_assert(Start != From::near_plane, "such splats have the near form");
-  const Pixel zero = hn::Zero(PixelTag());
+// Pixels from the two points of a splat to those of a vector: (dx, dy) from its projected centre,
+// (ex, ey) from the point of the picture near it.
+struct SplatPixels {
+  Pixel dx, dy, ex, ey;
+
+  KERNEL_INLINE SplatPixels moved(Pixel x, Pixel y) const {
+    return {dx + x, dy + y, ex + x, ey + y};
+  }
+};
+
+template <From Start>
+KERNEL_INLINE SplatPixels pixels_from(const SplatLanes& s, Pixel px, Pixel py) {
   const Pixel dx = px - s.x;
   const Pixel dy = py - s.y;
-  // The quadratic form is non-negative, but its rounded sum may be negative.
-  const Pixel slope = hn::MulAdd(s.xx, dx, s.xy * dy);
-  const Pixel top = hn::Max(hn::MulAdd(slope, dx, s.yy * dy * dy), zero);
+  if (Start == From::eye_inside) return {dx, dy, dx, dy};
+  return {dx, dy, px - s.ex, py - s.ey};
+}
+
+template <From Start>
+KERNEL_INLINE SplatPixels pixels_from(const AfarLanes& s, Pixel px, Pixel py) {
+  const Pixel dx = px - s.x;
+  const Pixel dy = py - s.y;
+  return {dx, dy, dx, dy};
+}
+
+template <From Start>
+KERNEL_INLINE SplatPixels pixels_from(const NearLanes& s, Pixel px, Pixel py) {
+  const Pixel zero = hn::Zero(PixelTag());
+  return {px - s.x, py - s.y, zero, zero};
+}
+
+// xx dx^2 + xy dx dy + yy dy^2, which is not negative, but its rounded sum may be.
+template <class Lanes>
+KERNEL_INLINE Pixel quadratic_at(const Lanes& s, const SplatPixels& p) {
+  const Pixel slope = hn::MulAdd(s.xx, p.dx, s.xy * p.dy);
+  return hn::Max(hn::MulAdd(slope, p.dx, s.yy * p.dy * p.dy), hn::Zero(PixelTag()));
+}
+
+// The optical depth of a whole splat, which lies beyond the near plane.
+template <bool Perspective, From Start>
+KERNEL_INLINE Pixel splat_depth(const SplatLanes& s, const SplatPixels& p, Pixel ray) {
+  static_assert(Start != From::near_plane, "such splats have the near form");
+  const Pixel top = quadratic_at(s, p);
+  const Pixel root = hn::Sqrt(top);
+  if (!Perspective) return s.strength * footprint(root, top);
+  const Pixel ex = Start == From::eye_inside ? p.dx : p.ex;
+  const Pixel ey = Start == From::eye_inside ? p.dy : p.ey;
+  const Pixel across = hn::MulAdd(s.dxx, ex, hn::MulAdd(s.dxy, ey, s.dx));
+  const Pixel along = hn::MulAdd(s.dyy, ey, s.dy);
+  const Pixel length2 = hn::Max(hn::MulAdd(across, ex, hn::MulAdd(along, ey, s.d0)), s.d2_least);
+  const Pixel inverse = inverse_root(length2);
+  const Pixel r = root * inverse;  // neither root waits for the other
+  return footprint(r, r * r) * (inverse * (s.strength * ray));
+}
+
+// The same from afar: (1 + q)^(-1/2) by four terms, whose error is below q^4 / 3.
+template <bool Perspective, From Start>
+KERNEL_INLINE Pixel splat_depth(const AfarLanes& s, const SplatPixels& p, Pixel ray) {
+  static_assert(Perspective && Start == From::afar, "only such splats have these lanes");
+  const Pixel root = hn::Sqrt(quadratic_at(s, p));
+  const Pixel across = hn::MulAdd(s.dxx, p.dx, hn::MulAdd(s.dxy, p.dy, s.dx));
+  const Pixel along = hn::MulAdd(s.dyy, p.dy, s.dy);
+  const Pixel q = hn::MulAdd(across, p.dx, along * p.dy);
+  const Pixel bend =
+      hn::MulAdd(hn::NegMulAdd(q, all<Pixel>(0.3125F), all<Pixel>(0.375F)), q, all<Pixel>(-0.5F));
+  const Pixel inverse = hn::MulAdd(bend, q, all<Pixel>(1.0F));
+  const Pixel r = root * inverse;
+  return footprint(r, r * r) * (inverse * (s.strength * ray));
+}
+
+template <bool Perspective, From Start>
+KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, const SplatPixels& p, Pixel ray) {
+  static_assert(Start != From::near_plane, "such splats have the near form");
+  const Pixel zero = hn::Zero(PixelTag());
+  const Pixel dx = p.dx;
+  const Pixel dy = p.dy;
+  const Pixel top = quadratic_at(s, p);
   if constexpr (Perspective) {
-    const Pixel ex = Start == From::eye_inside ? dx : px - s.ex;
-    const Pixel ey = Start == From::eye_inside ? dy : py - s.ey;
+    const Pixel ex = Start == From::eye_inside ? dx : p.ex;
+    const Pixel ey = Start == From::eye_inside ? dy : p.ey;
     const Pixel across = hn::MulAdd(s.dxx, ex, s.dxy * ey);
     const Pixel along = s.dyy * ey;
     const Pixel bent = hn::MulAdd(across, ex, along * ey);
@@ -210,15 +304,16 @@ KERNEL_INLINE SplatLane splat_lane(const SplatLanes& s, Pixel px, Pixel py, Pixe
         hn::Max(hn::MulAdd(s.dx + across, ex, hn::MulAdd(s.dy + along, ey, s.d0)), s.d2_least);
     const Pixel inverse = inverse_root(length2);
     const Pixel inverse2 = inverse * inverse;
-    const Pixel r2 = top * inverse2;
-    const Pixel tau = s.strength * footprint(r2) * (inverse * ray);
+    const Pixel r = hn::Sqrt(top) * inverse;  // neither root waits for the other
+    const Pixel r2 = r * r;
+    const Pixel tau = s.strength * footprint(r, r2) * (inverse * ray);
     const Pixel cells = length2 * inverse;
     const Pixel behind =
         hn::NegMulAdd(s.z, bent, hn::MulAdd(s.bx, ex, hn::MulAdd(s.by, ey, s.b0))) * inverse2;
     return {r2, tau, cells, behind, zero};
   } else {
     const Pixel behind = hn::MulAdd(s.bx, dx, s.by * dy);
-    return {top, s.strength * footprint(top), hn::Sqrt(s.d0), behind, zero};
+    return {top, s.strength * footprint(hn::Sqrt(top), top), hn::Sqrt(s.d0), behind, zero};
   }
 }
 
@@ -230,10 +325,10 @@ KERNEL_INLINE Pixel part_before(const SplatLane& lane, Pixel depth) {
 
 // From vectors, because the projected centre of a splat beside the eye is at infinity.
 template <bool Perspective, From Start>
-KERNEL_INLINE SplatLane splat_lane(const NearLanes& s, Pixel px, Pixel py, Pixel ray) {
+KERNEL_INLINE SplatLane splat_lane(const NearLanes& s, const SplatPixels& p, Pixel ray) {
   static_assert(Perspective && Start == From::near_plane, "only such splats have the near form");
-  const Pixel right = px - s.x;
-  const Pixel down = py - s.y;
+  const Pixel right = p.dx;
+  const Pixel down = p.dy;
   const auto along = [&](Pixel ahead, Pixel by_right, Pixel by_down) {
     return hn::MulAdd(right, by_right, hn::MulAdd(down, by_down, ahead));
   };
@@ -246,11 +341,17 @@ KERNEL_INLINE SplatLane splat_lane(const NearLanes& s, Pixel px, Pixel py, Pixel
   const Pixel inverse2 = inverse * inverse;
   SplatLane lane;
   lane.r2 = dot3(normal, normal) * inverse2;
-  lane.tau = s.strength * footprint(lane.r2) * (inverse * ray);
+  lane.tau = s.strength * footprint(hn::Sqrt(lane.r2), lane.r2) * (inverse * ray);
   lane.cells = length2 * inverse;
   lane.behind = hn::MulSub(dot3(s.centre, d), inverse2, s.z);
   lane.before = part_before(lane, s.near - s.z);
   return lane;
+}
+
+// The same at pixels of the picture.
+template <bool Perspective, From Start, class Lanes>
+KERNEL_INLINE SplatLane splat_lane(const Lanes& s, Pixel px, Pixel py, Pixel ray) {
+  return splat_lane<Perspective, Start>(s, pixels_from<Start>(s, px, py), ray);
 }
 
 // Optical depth of the part of a splat beyond the near plane.
@@ -261,6 +362,11 @@ KERNEL_INLINE Pixel depth_beyond(const SplatLane& lane) {
   } else {
     return lane.tau * (all<Pixel>(1.0F) - lane.before);
   }
+}
+
+template <bool Perspective, From Start>
+KERNEL_INLINE Pixel splat_depth(const NearLanes& s, const SplatPixels& p, Pixel ray) {
+  return depth_beyond<Start>(splat_lane<Perspective, Start>(s, p, ray));
 }
 
 // The fraction of that part in front of a surface whose depth relative to the centre is `depth`.

@@ -25,12 +25,12 @@ struct Attenuation {
 // -expm1(-t) for |t| <= ln2 / 2 (2.5e-8 relative).
 template <class V>
 KERNEL_INLINE V short_absorbed(V t) {
-  V p = all<V>(1.3926550429e-3F);
-  p = hn::NegMulAdd(p, t, all<V>(8.3634724672e-3F));
-  p = hn::NegMulAdd(p, t, all<V>(4.1666552403e-2F));
-  p = hn::NegMulAdd(p, t, all<V>(1.6666575217e-1F));
-  p = hn::NegMulAdd(p, t, all<V>(0.5F));
-  return hn::NegMulAdd(t, t * p, t);
+  // Pairs of terms, so that the operations depend on each other in a shorter chain.
+  const V t2 = t * t;
+  const V low = hn::NegMulAdd(all<V>(1.6666575217e-1F), t, all<V>(0.5F));
+  const V middle = hn::NegMulAdd(all<V>(8.3634724672e-3F), t, all<V>(4.1666552403e-2F));
+  const V high = hn::MulAdd(all<V>(1.3926550429e-3F), t2, middle);
+  return hn::NegMulAdd(t2, hn::MulAdd(high, t2, low), t);
 }
 
 // tau = n ln2 + r, |r| <= ln2 / 2. For n = 0 there is no cancellation, so tau = 1e-30 absorbs
@@ -62,12 +62,13 @@ constexpr float footprint_t = static_cast<float>(footprint_radius);
 constexpr float footprint_integral = 1.4476982547F;
 
 template <class V>
-KERNEL_INLINE V footprint(V r2) {
-  const V r = hn::Sqrt(r2);
+KERNEL_INLINE V footprint(V r, V r2) {
   const V inner = hn::NegMulAdd(r2, all<V>(1.0F / (footprint_s * footprint_t)), all<V>(1.0F));
-  const V rest = hn::Max(all<V>(footprint_t) - r, hn::Zero(TagOf<V>()));
-  const V outer = rest * rest * all<V>(1.0F / (footprint_t * (footprint_t - footprint_s)));
-  return hn::IfThenElse(hn::Lt(r, all<V>(footprint_s)), inner, outer);
+  // The root of 1 / (t (t - s)).
+  constexpr float scale = 0.905617306F;
+  const V rest =
+      hn::Max(hn::NegMulAdd(r, all<V>(scale), all<V>(scale * footprint_t)), hn::Zero(TagOf<V>()));
+  return hn::IfThenElse(hn::Lt(r, all<V>(footprint_s)), inner, rest * rest);
 }
 
 // pcg3d (Jarzynski & Olano 2020), scalar or per lane.

@@ -160,7 +160,7 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
                    Prepared& out) {
   BrickMaker<Lines, Medium, Perspective, Curved> maker(camera, pass, tile, out);
   KernelPositions& positions = out.positions;
-  positions.lines = positions.splats = out.splats.near = out.footing.windowed = 0;
+  positions.lines = positions.splats = out.splats.near = out.splats.afar = out.footing.windowed = 0;
   out.pass = &pass;
   out.near = camera.near;
   out.middle_x = camera.half_width_px;

@@ -130,12 +130,20 @@ KERNEL_INLINE void store_squares(const RaySquares& r, int l, Splats& s) {
   store(r.least, s.d2_least + l);
 }
 
+// The splats whose |d|^2 varies little in every block that their box may touch; see Splats::afar.
+// Outside of its silhouette a flat cell may be crossed at quite another angle, where the series
+// diverges.
+KERNEL_INLINE MaskOf<Kernel> is_afar(const RaySquares& rays, Kernel w, Kernel h) {
+  const Kernel block = all<Kernel>(block_side);
+  return hn::Lt(rays.most(w + block, h + block), all<Kernel>(1.0F + afar_most) * rays.d0);
+}
+
 // The outline of splats whose projected centres are (px, py). Within the ellipse the form is at
 // most t^2 times the largest |d|^2 of the box.
 KERNEL_INLINE Outline perspective_outline(const Camera& camera, const KernelPositions& positions,
                                           int l, const Facing& f, const Form& form,
                                           const RaySquares& rays, Kernel px, Kernel py,
-                                          MaskOf<Kernel> inside) {
+                                          MaskOf<Kernel> inside, Splats& s) {
   const Kernel z = load<Kernel>(positions.z + l);
   const auto span = [&](const float* at, Kernel s11, Kernel s13, float half) {
     const Extent e = silhouette(load<Kernel>(at + l), z, s11, s13, f.s33);
@@ -147,6 +155,8 @@ KERNEL_INLINE Outline perspective_outline(const Camera& camera, const KernelPosi
   const Extent along = span(positions.y, f.s22, f.s23, camera.half_height_px);
   const Kernel w = hn::Max(px - across.low, across.high - px);
   const Kernel h = hn::Max(py - along.low, along.high - py);
+  const std::uint64_t afar = bits_of<Kernel>(hn::And(inside, is_afar(rays, w, h)));
+  s.afar |= afar << static_cast<unsigned>(l);
   Oval oval = oval_of(form, all<Kernel>(oval_limit) * rays.most(w, h));
   oval.x = px;
   oval.y = py;
@@ -213,6 +223,7 @@ KERNEL_INLINE Outline perspective_splats(const Camera& camera, const KernelPosit
                            dot3(f.down, f.down),
                            inverse_of(cells.edges2())};
   store_squares(rays, l, s);
+  store(inverse_root(hn::Max(rays.d0, rays.least)), s.inverse + l);
   store(px, s.x + l);
   store(py, s.y + l);
   store(ex, s.ex + l);
@@ -223,10 +234,11 @@ KERNEL_INLINE Outline perspective_splats(const Camera& camera, const KernelPosit
   const Kernel half_depth = hn::Sqrt(f.s33);
   store(half_depth, s.half_depth + l);
   store(rho * all<Kernel>(1.0F / footprint_integral), s.strength + l);
-  Outline outline = perspective_outline(camera, positions, l, f, form, rays, px, py, inside);
+  Outline outline = perspective_outline(camera, positions, l, f, form, rays, px, py, inside, s);
   const std::uint64_t near = bits_of<Kernel>(reach_near(camera, z, half_depth));
   if (near != 0) {
     s.near |= near << static_cast<unsigned>(l);
+    s.afar &= ~s.near;
     store_three(o, out.near_splats.centre, l);
     store_three(forward, out.near_splats.ahead, l);
     store_three(f.right, out.near_splats.right, l);

@@ -47,6 +47,8 @@ struct Densities {
   float color[brick_kernels][color_floats];
 };
 
+constexpr float afar_most = 0.05F;
+
 // With p = (px, py) the pixel minus the projected centre and e = (ex, ey) the pixel minus a point
 // of the picture near it, the ray through the pixel is d in cells per unit of view depth, and
 //   perspective   r^2 = (xx px^2 + xy px py + yy py^2) / |d|^2
@@ -60,6 +62,10 @@ struct Densities {
 // beside or behind the eye, have the form of NearSplats instead.
 struct Splats {
   std::uint64_t near;  // bit l set: splat l may reach the near plane; see NearSplats
+  // Bit set: it lies beyond the near plane, its centre is in the picture, and in the blocks of its
+  // box |d|^2 differs from d0 by less than afar_most of it.
+  std::uint64_t afar;
+  alignas(64) float inverse[brick_kernels];              // 1 / |d| at the centre
   alignas(64) float x[brick_kernels], y[brick_kernels];  // projected centre, pixels
   alignas(64) float ex[brick_kernels],
       ey[brick_kernels];  // the point of the picture near it, pixels
