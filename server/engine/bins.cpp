@@ -69,15 +69,11 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
 }
 
 void set_blocks(const Rectangle& r, const kernels::Camera& camera, Brick& brick) {
-  const auto block = [](double pixel, int size) {
-    const int last = (size - 1) / kernels::block_side;
-    return static_cast<std::int16_t>(
-        std::clamp(static_cast<int>(pixel) / kernels::block_side, 0, last));
-  };
-  brick.block_x = block(r.x0, camera.width);
-  brick.block_x_last = block(r.x1, camera.width);
-  brick.block_y = block(r.y0, camera.height);
-  brick.block_y_last = block(r.y1, camera.height);
+  const BlockRange blocks = block_range(r, camera);
+  brick.block_x = blocks.x;
+  brick.block_x_last = blocks.x_last;
+  brick.block_y = blocks.y;
+  brick.block_y_last = blocks.y_last;
 }
 
 // Selects the bricks that a frame draws.
@@ -96,14 +92,14 @@ class Binner {
     order_sheets();
   }
 
-  // Counts the regions of a row along u whose bricks need no individual test: blank and entirely
-  // visible, or entirely invisible.
+  // Counts the regions of a row along u whose bricks need no individual test: entirely visible
+  // without anything to draw, or entirely invisible.
   [[nodiscard]] std::size_t rows() const {
     std::size_t sum = 0;
     for (std::size_t p = 0; p < plan_.passes.size(); ++p) sum += rows_of(p);
     return sum;
   }
-  void count_regions(std::size_t row, BrickCounts& counts);
+  void count_regions(std::size_t row, RegionRow& out);
 
   void add_sheet(const SheetKey& key, SheetBricks& out);
 
@@ -113,6 +109,9 @@ class Binner {
   void add_brick(const PassPlan& pass, PassBins& shared, const Brick& brick, SheetBricks& out);
   void read_summary(const PassPlan& pass, const PassBins& shared, const Brick& brick,
                     KeptSummary& kept);
+  // Reads the summaries of a region until a brick has something to draw. Returns whether none has,
+  // with what tolerances left out of all.
+  bool draws_nothing(const PassBins& shared, const LatticeRange& region, LeftOut& left_out);
   [[nodiscard]] std::size_t rows_of(std::size_t p) const {
     if (plan_.passes[p].kernel.places != nullptr) return 0;
     const PassSummaries& kept = *space_.passes[p].kept;
@@ -167,7 +166,29 @@ void Binner::order_sheets() {
   });
 }
 
-void Binner::count_regions(std::size_t row, BrickCounts& counts) {
+// Whether a region is counted as a whole depends on its contents and place alone, not on what
+// earlier frames read, so that every frame has the same bound.
+bool Binner::draws_nothing(const PassBins& shared, const LatticeRange& region, LeftOut& left_out) {
+  const Pass& pass = shared.pass;
+  Brick brick{};
+  brick.u_first = region.first[pass.u];
+  brick.u_count = region.count[pass.u];
+  brick.v_first = region.first[pass.v];
+  brick.v_count = region.count[pass.v];
+  const int first = region.first[pass.major];
+  for (int layer = first; layer < first + region.count[pass.major]; ++layer) {
+    KeptSummary& kept = shared.kept->bricks[shared.kept->brick(
+        layer, brick.v_first / kernels::brick_side, brick.u_first / kernels::brick_side)];
+    brick.sheet = layer;
+    if (!kept.known()) kept = summarise(table_, pass, brick);
+    if (kept.holds_any()) return false;
+    left_out.add(kept);
+  }
+  return true;
+}
+
+void Binner::count_regions(std::size_t row, RegionRow& out) {
+  BrickCounts& counts = out.counts;
   std::size_t p = 0;
   for (; row >= rows_of(p); ++p) row -= rows_of(p);
   const PassPlan& pass = plan_.passes[p];
@@ -177,28 +198,36 @@ void Binner::count_regions(std::size_t row, BrickCounts& counts) {
   const int layer = static_cast<int>(row / kept.v_bricks);
   const int v = static_cast<int>(row % kept.v_bricks);
   Box box;
-  std::int64_t across = 1;
+  LatticeRange bounds;
   const auto extend = [&](int a, int brick) {
     const int first = brick * kernels::brick_side;
     const int last = std::min(first + kernels::brick_side, kernel.axis[a].count);
     box.low[a] = pass.axis[a].position[first];
     box.high[a] = pass.axis[a].position[last - 1];
-    return last - first;
+    bounds.first[a] = first;
+    bounds.count[a] = last - first;
   };
-  across *= extend(kernel.major, layer);
-  across *= extend(kernel.v, v);
+  extend(kernel.major, layer);
+  extend(kernel.v, v);
   for (int u = 0; u < kept.u_bricks; ++u) {
-    const std::int64_t positions = across * extend(kernel.u, u);
+    extend(kernel.u, u);
+    const std::int64_t positions = bounds.positions();
     const std::size_t region = kept.region(layer * kernels::brick_side, v, u);
     const bool blank = kept.blank_regions[region] != 0 || kept.find_blank(layer, v, u);
     const Projected found = project_(pass, box, shared.reach);
     const bool unseen = found.seen.empty();
-    if (!unseen && !(blank && found.whole)) continue;
+    LeftOut left_out;
+    const bool empty = blank || (!unseen && found.whole && draws_nothing(shared, bounds, left_out));
+    if (!unseen && !(empty && found.whole)) continue;
     shared.done[region] = 1;
     counts.samples += positions;
     if (unseen) {
       counts.culled += positions;
       continue;
+    }
+    if (left_out.lines > 0 || left_out.medium > 0) {
+      add_left_out(plan_, pass, widest_cells(kernel, bounds), left_out, found, counts.left_out,
+                   out.left_out);
     }
     if (kernel.has_lines != 0) counts.without_line += positions;
     if (kernel.has_medium != 0) counts.without_splat += positions;
@@ -214,6 +243,19 @@ Brick in_lattice(const PassPlan& pass, const Brick& brick) {
   in_lattice.u_first = brick_start(pass.axis[kernel.u].visit[brick.u_first]);
   in_lattice.v_first = brick_start(pass.axis[kernel.v].visit[brick.v_first]);
   return in_lattice;
+}
+
+LatticeRange range_of(const PassPlan& pass, const Brick& brick) {
+  const Brick own = in_lattice(pass, brick);
+  LatticeRange region;
+  const auto set = [&](int a, int first, int count) {
+    region.first[a] = first;
+    region.count[a] = count;
+  };
+  set(pass.kernel.major, own.sheet, 1);
+  set(pass.kernel.u, own.u_first, own.u_count);
+  set(pass.kernel.v, own.v_first, own.v_count);
+  return region;
 }
 
 KeptSummary& summary_at(const PassPlan& pass, PassBins& shared, const Brick& brick) {
@@ -264,12 +306,10 @@ void Binner::add_brick(const PassPlan& pass, PassBins& shared, const Brick& from
     }
     if (!kept.known()) read_summary(pass, shared, brick, kept);
     if (kept.left_out_any()) {
-      const double alphas = left_out_alphas(plan_, pass, brick, kept, most.depth_first);
-      set_blocks(most.seen, plan_.camera, brick);
-      out.left_out.push_back(
-          {brick.block_x, brick.block_x_last, brick.block_y, brick.block_y_last});
-      const std::int64_t pixels = pixels_in(out.left_out.back(), plan_.camera);
-      out.counts.left_out += std::min(alphas, static_cast<double>(pixels));
+      LeftOut left_out;
+      left_out.add(kept);
+      const auto edges = widest_cells(pass.kernel, range_of(pass, brick));
+      add_left_out(plan_, pass, edges, left_out, most, out.counts.left_out, out.left_out);
     }
     if (!known && kept.holds_any())
       found = project_(pass, box, reach_of(pass.kernel, shared, kept));
@@ -404,8 +444,12 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   bins.load.assign(static_cast<std::size_t>(bins.tiles_x) * bins.tiles_y, 0);
   Binner binner(plan, table, space);
   binner.begin();
-  space.rows.assign(binner.rows(), BrickCounts());
-  pool.run(space.rows.size(), [&](std::size_t row, unsigned) {
+  const std::size_t rows = binner.rows();
+  if (space.rows.size() < rows) space.rows.resize(rows);
+  pool.run(rows, [&](std::size_t row, unsigned) {
+    space.rows[row].counts = {};
+    space.rows[row].left_out.clear();
+    const FlushDenormals flush;
     if (!cancel.cancelled()) binner.count_regions(row, space.rows[row]);
   });
   const std::size_t sheets = space.sheets.size();
@@ -418,7 +462,10 @@ const Bins& make_bins(const RenderPlan& plan, const kernels::Table& table, Threa
   if (cancel.cancelled()) return bins;
   BrickCounts sum;
   space.touched.begin(plan.camera);
-  for (const BrickCounts& row : space.rows) sum += row;
+  for (std::size_t row = 0; row < rows; ++row) {
+    sum += space.rows[row].counts;
+    for (const BlockRange& range : space.rows[row].left_out) space.touched.add(range);
+  }
   for (std::size_t i = 0; i < sheets && !cancel.cancelled(); ++i) {
     const SheetBricks& sheet = space.found[i];
     bins.bricks.insert(bins.bricks.end(), sheet.bricks.begin(), sheet.bricks.end());

@@ -39,6 +39,12 @@ struct BrickCounts {
   BrickCounts& operator+=(const BrickCounts& other);
 };
 
+// The regions of a row along u that are counted as a whole.
+struct RegionRow {
+  BrickCounts counts;
+  std::vector<BlockRange> left_out;  // as in SheetBricks
+};
+
 // Bricks of one sheet of one pass.
 struct SheetBricks {
   std::vector<kernels::Brick> bricks;
@@ -75,7 +81,7 @@ struct BinSpace {
   std::vector<SheetKey> sheets;
   std::vector<SheetBricks> found;  // per sheet
   TouchedBlocks touched;           // by what tolerances skipped
-  std::vector<BrickCounts> rows;   // counts of the regions counted as a whole, per row
+  std::vector<RegionRow> rows;     // of every pass
   struct DepthKey {
     float depth;
     std::uint32_t brick;

@@ -11,7 +11,6 @@
 namespace windsplat::engine {
 namespace {
 
-using kernels::Brick;
 using kernels::Pass;
 
 // Pixels per world unit at a view depth, clamped to the near plane.
@@ -20,17 +19,10 @@ double scale_at(const kernels::Camera& camera, double depth) {
   return camera.inverse_pixel / std::max<double>(depth, camera.near);
 }
 
-// Upper bound on the area that thin splats of a brick cover at `scale` pixels
-// per world unit, as a multiple of that at a scale of 0: the largest of the
-// three terms of splat_cover of the kernels, divided by the third. Uses the
-// widest cells of the brick.
-double splat_cover(const Pass& pass, const Brick& brick, double scale) {
-  std::array<double, 3> edge{};
-  const auto widest = [&](int a, int first, int count) {
-    for (int i = first; i < first + count; ++i) {
-      edge[a] = std::max<double>(edge[a], pass.axis[a].cell[pass.axis[a].visit[i]]);
-    }
-  };
+// Upper bound on the area that thin splats cover at `scale` pixels per world unit, as a multiple of
+// that at a scale of 0: the largest of the three terms of splat_cover of the kernels, divided by
+// the third.
+double splat_cover(const Pass& pass, std::array<double, 3> edge, double scale) {
   if (pass.places != nullptr) {
     for (int a = 0; a < 3; ++a) edge[a] = pass.cell_max[a];
     const double section = std::hypot(edge[1] * edge[2], edge[2] * edge[0], edge[0] * edge[1]);
@@ -38,9 +30,6 @@ double splat_cover(const Pass& pass, const Brick& brick, double scale) {
     return std::max(
         {edge[0] * edge[1] * edge[2] / chord * scale * scale, section / chord * scale, 1.0});
   }
-  widest(pass.major, brick.sheet, 1);
-  widest(pass.u, brick.u_first, brick.u_count);
-  widest(pass.v, brick.v_first, brick.v_count);
   std::sort(edge.begin(), edge.end());
   return std::max({edge[0] * edge[1] * scale * scale, edge[1] * scale, 1.0});
 }
@@ -54,12 +43,22 @@ std::int64_t pixels_along(int first, int last, int size) {
 
 }  // namespace
 
+std::array<double, 3> widest_cells(const Pass& pass, const LatticeRange& range) {
+  std::array<double, 3> edges{};
+  for (int a = 0; a < 3; ++a) {
+    for (int i = range.first[a]; i < range.first[a] + range.count[a]; ++i) {
+      edges[a] = std::max<double>(edges[a], pass.axis[a].cell[i]);
+    }
+  }
+  return edges;
+}
+
 // A line covers its length times r1 + r2 and two half discs, a splat its extinction times its
 // volume. All are assumed at the nearest depth. The sampling factors bound the ratio of the sum
 // over pixels to the area, over all positions and rotations, for shapes and line ramps no narrower
 // than a pixel.
-double left_out_alphas(const RenderPlan& plan, const PassPlan& pass, const Brick& brick,
-                       const KeptSummary& summary, double depth) {
+double left_out_alphas(const RenderPlan& plan, const PassPlan& pass,
+                       const std::array<double, 3>& edges, const LeftOut& left_out, double depth) {
   constexpr double line_sampling = 1.2;
   constexpr double splat_sampling = 1.03;
   const kernels::Camera& camera = plan.camera;
@@ -74,16 +73,33 @@ double left_out_alphas(const RenderPlan& plan, const PassPlan& pass, const Brick
   const double r1 = line.r1;
   const double r2 = std::max<double>(line.r2, r1 + 1);
   const double discs = std::numbers::pi * (r1 * r1 + r1 * r2 + r2 * r2) / 3;
-  const double length = line.length * static_cast<double>(summary.weak_parts) * scale * oblique;
-  const double covered = line_sampling * (length * (r1 + r2) + summary.weak_lines * discs);
-  const double cover = summary.thin_medium > 0 ? splat_cover(pass.kernel, brick, scale) : 0;
-  return line.opacity * covered +
-         splat_sampling * static_cast<double>(summary.thin_medium) * cover * oblique;
+  const double length = line.length * left_out.parts * scale * oblique;
+  const double covered = line_sampling * (length * (r1 + r2) + left_out.lines * discs);
+  const double cover = left_out.medium > 0 ? splat_cover(pass.kernel, edges, scale) : 0;
+  return line.opacity * covered + splat_sampling * left_out.medium * cover * oblique;
 }
 
 std::int64_t pixels_in(const BlockRange& range, const kernels::Camera& camera) {
   return pixels_along(range.x, range.x_last, camera.width) *
          pixels_along(range.y, range.y_last, camera.height);
+}
+
+BlockRange block_range(const Rectangle& rectangle, const kernels::Camera& camera) {
+  const auto block = [](double pixel, int size) {
+    const int last = (size - 1) / kernels::block_side;
+    return static_cast<std::int16_t>(
+        std::clamp(static_cast<int>(pixel) / kernels::block_side, 0, last));
+  };
+  return {block(rectangle.x0, camera.width), block(rectangle.x1, camera.width),
+          block(rectangle.y0, camera.height), block(rectangle.y1, camera.height)};
+}
+
+void add_left_out(const RenderPlan& plan, const PassPlan& pass, const std::array<double, 3>& edges,
+                  const LeftOut& left_out, const Projected& found, double& sum,
+                  std::vector<BlockRange>& ranges) {
+  const double alphas = left_out_alphas(plan, pass, edges, left_out, found.depth_first);
+  ranges.push_back(block_range(found.seen, plan.camera));
+  sum += std::min(alphas, static_cast<double>(pixels_in(ranges.back(), plan.camera)));
 }
 
 void TouchedBlocks::begin(const kernels::Camera& camera) {
