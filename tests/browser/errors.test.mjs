@@ -13,7 +13,11 @@ import {
   watchFrames,
 } from "./support.mjs";
 
-const { withPage } = sharedDaemon({ page: { initScript: watchFrames, unfolded: ["Quality"] } });
+// The built-in samples, whose errors depend on the size of the picture.
+const { withPage } = sharedDaemon({
+  args: [],
+  page: { initScript: watchFrames, unfolded: ["Quality"] },
+});
 
 const lastFrame = (page) => page.evaluate(() => window.frameHeaders.at(-1));
 

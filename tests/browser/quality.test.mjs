@@ -16,6 +16,7 @@ import {
 } from "./support.mjs";
 
 const { withPage } = sharedDaemon({
+  args: [], // the built-in samples, which take longer than small budgets
   page: { initScript: [watchFrames, watchPatches], unfolded: ["Quality"] },
 });
 

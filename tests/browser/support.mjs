@@ -1,8 +1,8 @@
 // Shared parts of the browser tests: the daemon, the browser, and a page whose errors are
 // collected.
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
-import { mkdirSync } from "node:fs";
+import { execFileSync, spawn } from "node:child_process";
+import { existsSync, mkdirSync, renameSync } from "node:fs";
 import { createServer } from "node:net";
 import { dirname, join } from "node:path";
 import { after, before } from "node:test";
@@ -24,6 +24,21 @@ export function freePort() {
       server.close(() => resolve(port));
     });
   });
+}
+
+// The samples that tests share unless they name datasets, the climate with half of the rows,
+// columns and levels: the daemon draws and calibrates it in a fraction of the time. Its file has
+// the name of the sample, so that the dataset has its id.
+function smallSamples() {
+  const folder = join(root, "build", "browser-data");
+  const climate = join(folder, "climate.nc");
+  if (!existsSync(climate)) {
+    mkdirSync(folder, { recursive: true });
+    const unfinished = join(folder, `climate-${process.pid}.nc`); // test files run concurrently
+    execFileSync(program, ["synth", "climate", "--dims", "160x80x10", "-o", unfinished]);
+    renameSync(unfinished, climate);
+  }
+  return ["tornado", climate, "efield"];
 }
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
@@ -110,15 +125,15 @@ export async function openPage(browser, url, { initScript, prepare, ...options }
 }
 
 // One browser and one daemon for all tests of a file. `args` are the daemon's arguments, usually
-// its datasets; `page` holds the default page options of the file. Browser and daemon are started
-// when the tests run, not before.
-export function sharedDaemon({ basePath = "/", args = [], page: usual = {} } = {}) {
+// its datasets (default: small samples); `page` holds the default page options of the file. Browser
+// and daemon are started when the tests run, not before.
+export function sharedDaemon({ basePath = "/", args, page: usual = {} } = {}) {
   const shared = { withPage };
   before(async () => {
     shared.browser = await launch();
     // stored before start() so that a daemon that fails to start is stopped too
     shared.daemon = new Daemon(await freePort(), basePath);
-    await shared.daemon.start(...args);
+    await shared.daemon.start(...(args ?? smallSamples()));
   });
   after(async () => {
     await shared.browser?.close();
