@@ -77,13 +77,13 @@ endif()
 
 # HTTP and WebSocket edge cases against a daemon. Sanitizers retain freed memory, so memory growth
 # is not checked there, and their leak detection does not work under strace. Of the sizes at
-# boundaries they test a sample.
+# boundaries they test a sample, on a small dataset.
 set(edge_options)
 set(boundary_options)
 set(attack_options)
 if(WINDSPLAT_SANITIZE)
   set(edge_options --growth-kib=0)
-  set(boundary_options --count=1200)
+  set(boundary_options --count=1200 --edge=20)
   set(attack_options --strace=no)
 endif()
 function(windsplat_edge_test name script)

@@ -4,6 +4,7 @@ import argparse
 import collections
 import json
 import pathlib
+import subprocess
 import sys
 import tempfile
 import threading
@@ -36,6 +37,8 @@ def parser_of(description):
     parser.add_argument("--token-file", help="file of the token that the daemon requires")
     parser.add_argument("--serve-option", action="append", default=[], metavar="OPTION",
                         help="option for the started daemon; repeatable")
+    parser.add_argument("--edge", type=int, default=0, metavar="N",
+                        help="serve a tornado of N^3 samples instead of the built-in one")
     parser.add_argument("--only", default="", help="prefix of the ids of cases to run")
     parser.add_argument("--growth-kib", type=int, default=KIB,
                         help="permitted growth of resident memory in a group; 0: not checked")
@@ -56,7 +59,13 @@ class Watched:
             return
         self.log = tempfile.NamedTemporaryFile("w+", prefix="windsplat-edge-", suffix=".log")
         given = [f"--token-file={options.token_file}"] if options.token_file else []
-        self.daemon = Daemon(options.program, "tornado", *given, *options.serve_option,
+        dataset = "tornado"
+        if options.edge:  # a file of that name has the same id
+            self.folder = tempfile.TemporaryDirectory(prefix="windsplat-edge-")
+            dataset = f"{self.folder.name}/tornado.nc"
+            subprocess.run([options.program, "synth", "tornado", "--dims",
+                            "x".join(3 * [str(options.edge)]), "-o", dataset], check=True)
+        self.daemon = Daemon(options.program, dataset, *given, *options.serve_option,
                              errors=self.log,
                              target=lambda url: Target.of_url(url, options.ca, options.token_file))
         self.child, self.target = self.daemon.child, self.daemon.target
