@@ -8,6 +8,16 @@
 
 namespace windsplat::data::cf {
 
+namespace {
+
+std::string unwritten_text(const Unwritten& missing) {
+  if (missing.is_all && missing.chunks == missing.looked_at) return "all of it";
+  return std::to_string(missing.chunks) + (missing.is_all ? " of " : " of the first ") +
+         std::to_string(missing.looked_at) + " chunks";
+}
+
+}  // namespace
+
 int variable_named(const FileContents& contents, std::string_view name) {
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
     if (contents.variables[v].name == name) return static_cast<int>(v);
@@ -57,6 +67,25 @@ Result<void> ArrayFile::charge(int variable, double bytes) const {
       "to open it, more than " + std::to_string(most) +
           " bytes must be decoded, the limit for a file of " + std::to_string(*stored_bytes_) +
           " bytes: " + in_quotes(contents().variables.at(at(variable)).name) + " is too large");
+}
+
+std::string unwritten_note(const ArrayFile& file, const std::vector<int>& variables) {
+  constexpr std::size_t listed_max = 20;
+  constexpr std::size_t chunks_of_one = 4096;
+  std::size_t left = 4 * chunks_of_one;
+  std::string text;
+  std::size_t count = 0;
+  for (const int v : variables) {
+    const Unwritten missing = file.unwritten(v, std::min(left, chunks_of_one));
+    left -= std::min(left, missing.looked_at);
+    if (missing.chunks == 0 || ++count > listed_max) continue;
+    text += text.empty() ? "" : ", ";
+    text +=
+        in_quotes(file.contents().variables.at(at(v)).name) + " (" + unwritten_text(missing) + ')';
+  }
+  if (count == 0) return {};
+  if (count > listed_max) text += " and " + std::to_string(count - listed_max) + " more";
+  return "chunks that were never written are masked: " + text;
 }
 
 double decoded_bytes(const ArrayFile& file, int variable, const std::vector<std::size_t>& start,

@@ -93,6 +93,9 @@ class ArrayFile {
   mutable std::set<int> charged_;
 };
 
+// Which of the variables have chunks that were never written, as a note; empty: none is known.
+std::string unwritten_note(const ArrayFile& file, const std::vector<int>& variables);
+
 // Bytes decoded to read a block, in whole chunks of at least chunk_cost_bytes() each.
 double decoded_bytes(const ArrayFile& file, int variable, const std::vector<std::size_t>& start,
                      const std::vector<std::size_t>& count);

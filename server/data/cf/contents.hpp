@@ -52,6 +52,7 @@ struct FileVariable {
   bool packed = false;       // has scale_factor or add_offset
   bool is_unsigned = false;  // _Unsigned = "true" on a signed integer type
   bool preferred = false;    // its grid is shown, whatever others the file has
+  bool layers_apart = true;  // some of its layers are read at the cost of their share of all
   bool in_use = false;       // a coordinate that named an entry or gave the times: not omitted
   std::string level;  // the coordinate of the vertical dimension of which one entry was chosen
 };

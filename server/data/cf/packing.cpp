@@ -47,6 +47,47 @@ std::string short_text(double value) {
   return {out.data(), end.ptr};
 }
 
+// Number of values tested together; if one is masked, they are repeated one by one.
+constexpr std::size_t values_at_once = 1024;
+// As many as a compiler can keep in vector lanes, each with its own partial result.
+constexpr std::size_t lanes = 16;
+
+// Whether no value is masked, or NaN.
+bool are_valid(const FloatMask& mask, const float* values, std::size_t count) {
+  std::array<int, lanes> masked{};
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    for (std::size_t l = 0; l < lanes; ++l) {
+      const float value = values[i + l];
+      masked[l] |= (value >= mask.valid_min ? 0 : 1) | (value <= mask.valid_max ? 0 : 1);
+    }
+  }
+  for (; i < count; ++i) {
+    masked[0] |= values[i] >= mask.valid_min && values[i] <= mask.valid_max ? 0 : 1;
+  }
+  for (const float missing : mask.missing) {
+    for (i = 0; i + lanes <= count; i += lanes) {
+      for (std::size_t l = 0; l < lanes; ++l) masked[l] |= values[i + l] == missing ? 1 : 0;
+    }
+    for (; i < count; ++i) masked[0] |= values[i] == missing ? 1 : 0;
+  }
+  return std::all_of(masked.begin(), masked.end(), [](int any) { return any == 0; });
+}
+
+void apply_to_each(const FloatMask& mask, float* values, std::size_t count) {
+  constexpr float masked_value = std::numeric_limits<float>::quiet_NaN();
+  for (const float missing : mask.missing) {
+    for (std::size_t i = 0; i < count; ++i) {
+      values[i] = values[i] == missing ? masked_value : values[i];
+    }
+  }
+  // NaN compares false and stays NaN.
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool valid = values[i] >= mask.valid_min && values[i] <= mask.valid_max;
+    values[i] = valid ? values[i] : masked_value;
+  }
+}
+
 }  // namespace
 
 Packing packing_of(const ArrayFile& file, int variable) {
@@ -126,6 +167,21 @@ std::string valid_text(const Packing& packing) {
   return std::isfinite(high) ? "up to " + short_text(high) : std::string();
 }
 
+std::string valid_values_note(const ArrayFile& file, const std::vector<int>& variables) {
+  constexpr std::size_t listed_max = 20;
+  std::string text;
+  std::size_t count = 0;
+  for (const int v : variables) {
+    const std::string valid = valid_text(packing_of(file, v));
+    if (valid.empty() || ++count > listed_max) continue;
+    text += text.empty() ? "" : ", ";
+    text += in_quotes(file.contents().variables.at(at(v)).name) + " (" + valid + ')';
+  }
+  if (count == 0) return {};
+  if (count > listed_max) text += " and " + std::to_string(count - listed_max) + " more";
+  return "values outside the valid range of the file are masked: " + text;
+}
+
 double unpack_double(const Packing& packing, double stored) {
   constexpr double masked_value = std::numeric_limits<double>::quiet_NaN();
   if (stored < 0) {
@@ -176,16 +232,9 @@ std::optional<FloatMask> float_mask(const Packing& packing) {
 }
 
 void apply(const FloatMask& mask, float* values, std::size_t count) {
-  constexpr float masked_value = std::numeric_limits<float>::quiet_NaN();
-  for (const float missing : mask.missing) {
-    for (std::size_t i = 0; i < count; ++i) {
-      values[i] = values[i] == missing ? masked_value : values[i];
-    }
-  }
-  // NaN compares false and stays NaN.
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool valid = values[i] >= mask.valid_min && values[i] <= mask.valid_max;
-    values[i] = valid ? values[i] : masked_value;
+  for (std::size_t from = 0; from < count; from += values_at_once) {
+    const std::size_t some = std::min(values_at_once, count - from);
+    if (!are_valid(mask, values + from, some)) apply_to_each(mask, values + from, some);
   }
 }
 

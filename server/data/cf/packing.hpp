@@ -31,6 +31,9 @@ Packing packing_of(const ArrayFile& file, int variable);
 // "-150 to 5000", "from 0", "up to 1": the valid values, unpacked; empty if all are.
 std::string valid_text(const Packing& packing);
 
+// Which of the variables have valid values, as a note; empty: none.
+std::string valid_values_note(const ArrayFile& file, const std::vector<int>& variables);
+
 // value = stored * scale + offset; NaN if missing, invalid, or beyond float32.
 float unpack(const Packing& packing, double stored);
 // The same in double, for coordinates.

@@ -219,6 +219,40 @@ Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<
 
 }  // namespace
 
+std::vector<Levels> level_parts(const ArrayFile& file, const Placement& grid, int variable,
+                                std::size_t levels_max) {
+  // Decoded bytes of a layer of chunks that every reader keeps between reads.
+  constexpr double kept_bytes = 64 << 20;
+  if (grid.space[2] < 0) return {{0, 1}};
+  const FileVariable& about = file.contents().variables.at(at(variable));
+  const auto place = std::find(about.dims.begin(), about.dims.end(), grid.space[2]);
+  const auto is_across = [&](int id) { return id == grid.space[0] || id == grid.space[1]; };
+  if (!about.layers_apart || place == about.dims.end() ||
+      std::any_of(about.dims.begin(), place, is_across)) {
+    return {};
+  }
+  const std::vector<std::size_t> chunk = file.chunk(variable);
+  double chunks_bytes = sizeof(double);
+  for (std::size_t d = 0; d < chunk.size(); ++d) {
+    const std::size_t along =
+        is_across(about.dims[d]) ? file.contents().dimensions.at(at(about.dims[d])).length : 1;
+    chunks_bytes *= static_cast<double>(std::max(chunk[d], along));
+  }
+  const std::size_t deep = chunk[static_cast<std::size_t>(place - about.dims.begin())];
+  const bool in_chunks = deep <= levels_max;
+  if (!in_chunks && chunks_bytes > kept_bytes) return {};
+  const std::size_t all = grid.length[2];
+  const std::size_t most = in_chunks ? levels_max - levels_max % deep : levels_max;
+  std::vector<Levels> out;
+  for (std::size_t from = 0; from < all;) {
+    std::size_t count = std::min(most, all - from);
+    if (!in_chunks) count = std::min(count, deep - from % deep);
+    out.push_back({grid.turned[2] ? all - from - count : from, count});
+    from += count;
+  }
+  return out;
+}
+
 void multiply(double factor, std::size_t count, float* values) {
   if (factor == 1) return;
   for (std::size_t n = 0; n < count; ++n) {

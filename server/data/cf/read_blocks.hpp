@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
@@ -31,6 +32,12 @@ struct Levels {
 Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
                            std::size_t step, const Levels& levels, float* out,
                            const Progress& tell);
+
+// The parts in which all levels of a variable can be read one after the other, in the order of the
+// file, at no greater cost than together: of at most `levels_max` levels, and of whole chunks or of
+// chunks that the file keeps between reads. Empty: there are none.
+std::vector<Levels> level_parts(const ArrayFile& file, const Placement& grid, int variable,
+                                std::size_t levels_max);
 
 // Converts values to another unit.
 void multiply(double factor, std::size_t count, float* values);

@@ -85,8 +85,10 @@ class ArraySource final : public FileSource {
       return named(make_error(ErrorKind::bad_data, "every field exceeds the limit of 16 GiB"));
     }
     tell_absent_components();
-    tell_valid_values();
-    tell_unwritten();
+    for (std::string note : {valid_values_note(*file_, choice_.variables),
+                             unwritten_note(*file_, choice_.variables)}) {
+      if (!note.empty()) info_.notes.push_back(std::move(note));
+    }
     bound_notes(notes_of_file, info_.notes);
     const std::filesystem::path name(file_->name());
     info_.id = name.stem().native();
@@ -128,8 +130,40 @@ class ArraySource final : public FileSource {
       rotate(*bearing_, placement_.length[2], out, out + samples);
     }
     if (plan.follows_rows) follow_axes(out, out + samples);
-    if (!outside_.empty()) mask_outside(out, info_.fields[field].components.size());
+    mask_outside(out, placement_.length[2] * info_.fields[field].components.size());
     return {};
+  }
+
+  Result<bool> fill_in_parts(std::size_t field, std::size_t step, PartTaker& taker) override {
+    WINDSPLAT_CHECK(field < plans_.size() && step < info_.steps.size());
+    const Plan& plan = plans_[field];
+    if (plan.derived >= 0 || plan.rotated || plan.follows_rows) return false;
+    std::vector<std::vector<Levels>> parts;
+    for (const int v : plan.variables) {
+      parts.push_back(level_parts(*file_, placement_, v, taker.layers_max()));
+      if (parts.back().empty()) return false;
+    }
+    const auto all = static_cast<double>(parts.size() * placement_.length[2]);
+    std::size_t done = 0;
+    for (std::size_t c = 0; c < parts.size(); ++c) {
+      for (const Levels& levels : parts[c]) {
+        const auto tell = [&](double part) {
+          report_progress((static_cast<double>(done) + part * static_cast<double>(levels.count)) /
+                          all);
+        };
+        float* const out = taker.room();
+        if (auto read =
+                read_variable(*file_, placement_, plan.variables[c], step, levels, out, tell);
+            !read) {
+          return read.error();
+        }
+        multiply(plan.factors[c], levels.count * placement_.layer(), out);
+        mask_outside(out, levels.count);
+        taker.take({c, levels.first, levels.count});
+        done += levels.count;
+      }
+    }
+    return true;
   }
 
  private:
@@ -341,45 +375,6 @@ class ArraySource final : public FileSource {
            file_->contents().variables.at(at(coordinate)).standard_name.starts_with("ocean_");
   }
 
-  void tell_valid_values() {
-    constexpr std::size_t listed_max = 20;
-    std::string text;
-    std::size_t count = 0;
-    for (const int v : choice_.variables) {
-      const std::string valid = valid_text(packing_of(*file_, v));
-      if (valid.empty() || ++count > listed_max) continue;
-      text += text.empty() ? "" : ", ";
-      text += in_quotes(variable_name(v)) + " (" + valid + ')';
-    }
-    if (count == 0) return;
-    if (count > listed_max) text += " and " + std::to_string(count - listed_max) + " more";
-    info_.notes.push_back("values outside the valid range of the file are masked: " + text);
-  }
-
-  void tell_unwritten() {
-    constexpr std::size_t listed_max = 20;
-    constexpr std::size_t chunks_of_one = 4096;
-    std::size_t left = 4 * chunks_of_one;
-    std::string text;
-    std::size_t count = 0;
-    for (const int v : choice_.variables) {
-      const Unwritten missing = file_->unwritten(v, std::min(left, chunks_of_one));
-      left -= std::min(left, missing.looked_at);
-      if (missing.chunks == 0 || ++count > listed_max) continue;
-      text += text.empty() ? "" : ", ";
-      text += in_quotes(variable_name(v)) + " (" + unwritten_text(missing) + ')';
-    }
-    if (count == 0) return;
-    if (count > listed_max) text += " and " + std::to_string(count - listed_max) + " more";
-    info_.notes.push_back("chunks that were never written are masked: " + text);
-  }
-
-  static std::string unwritten_text(const Unwritten& missing) {
-    if (missing.is_all && missing.chunks == missing.looked_at) return "all of it";
-    return std::to_string(missing.chunks) + (missing.is_all ? " of " : " of the first ") +
-           std::to_string(missing.looked_at) + " chunks";
-  }
-
   void add_field(FieldInfo info, Plan plan) {
     if (info_.grid.samples() * info.components.size() * sizeof(float) > volume_bytes_max) {
       info_.left_out.push_back({info.name, "more than 16 GiB a step"});
@@ -438,8 +433,7 @@ class ArraySource final : public FileSource {
   }
 
   // A part of the picture of a satellite that does not show the Earth has no position.
-  void mask_outside(float* values, std::size_t components) const {
-    const std::size_t layers = placement_.length[2] * components;
+  void mask_outside(float* values, std::size_t layers) const {
     for (std::size_t n = 0; n < outside_.size(); ++n) {
       if (!outside_[n]) continue;
       for (std::size_t k = 0; k < layers; ++k) {

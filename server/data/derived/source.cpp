@@ -66,6 +66,13 @@ class DerivedSource final : public FileSource {
     return of_air ? fill_air(rule, step, out) : fill_of_vector(rule, step, out);
   }
 
+  Result<bool> fill_in_parts(std::size_t field, std::size_t step, PartTaker& taker) override {
+    WINDSPLAT_CHECK(field < info_.fields.size() && step < info_.steps.size());
+    begin();
+    if (field >= own_ || file_ == nullptr) return false;
+    return file_->fill_in_parts(field, step, taker);
+  }
+
  private:
   void begin() {
     done_ = 0;

@@ -19,6 +19,7 @@
 
 #include "server/data/loader/by_parts.hpp"
 #include "server/data/loader/channel.hpp"
+#include "server/data/loader/window.hpp"
 
 namespace windsplat::data::loader {
 
@@ -67,11 +68,13 @@ long ask_for(std::string_view path) {
   }
   Descriptor came;
   Frame frame;
-  if (receive_bytes(socket, reinterpret_cast<char*>(&frame), sizeof frame, &came, {}) !=
-          Fate::done ||
-      frame.bytes != 0) {
-    ::_exit(1);  // the channel to the daemon is out of sync
-  }
+  do {
+    if (receive_bytes(socket, reinterpret_cast<char*>(&frame), sizeof frame, &came, {}) !=
+            Fate::done ||
+        frame.bytes != 0) {
+      ::_exit(1);  // the channel to the daemon is out of sync
+    }
+  } while (is_of_window(frame));
   return came ? came.give() : -ENOENT;
 }
 

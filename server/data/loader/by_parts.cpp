@@ -16,6 +16,7 @@
 
 #include "server/data/files/files.hpp"
 #include "server/data/loader/channel.hpp"
+#include "server/data/loader/window.hpp"
 
 namespace windsplat::data::loader {
 
@@ -60,10 +61,12 @@ bool ensure(OpenParts& parts, std::uint64_t offset, std::uint64_t count) {
     ::_exit(1);
   }
   Frame frame;
-  if (receive_bytes(socket, reinterpret_cast<char*>(&frame), sizeof frame, nullptr, {}) !=
-      Fate::done) {
-    ::_exit(1);
-  }
+  do {
+    if (receive_bytes(socket, reinterpret_cast<char*>(&frame), sizeof frame, nullptr, {}) !=
+        Fate::done) {
+      ::_exit(1);
+    }
+  } while (is_of_window(frame));
   if (frame.kind == static_cast<std::uint32_t>(Kind::no) && frame.bytes == 0) return false;
   std::array<std::uint64_t, 2> extent{};
   if (frame.kind != static_cast<std::uint32_t>(Kind::extent) || frame.bytes != sizeof extent ||

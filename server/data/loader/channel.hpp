@@ -16,7 +16,7 @@ namespace windsplat::data::loader {
 enum class Kind : std::uint32_t {
   // daemon -> loader: what to do
   open = 1,  // settings and location -> opened or failed
-  read,      // field, step; with the memory to fill -> filled or failed
+  read,      // field, step; with the memory to fill -> filled, whole or failed
   // daemon -> loader: answers to requests of the loader
   descriptor,  // answer: success, with a descriptor; of a file in parts its number and state
   names,
@@ -36,6 +36,10 @@ enum class Kind : std::uint32_t {
   ask_bytes,    // loader -> daemon: number of parts, offset, count -> extent, or no without payload
   extent,       // daemon -> loader: bytes that are present
   close_parts,  // loader -> daemon: number of parts; no answer
+  // of volumes that are passed in parts
+  part,   // loader -> daemon: component, layers and half of the window -> taken, in order
+  taken,  // daemon -> loader: that half may be overwritten
+  whole,  // loader -> daemon: answer to read: the field cannot be read in parts
 };
 
 using Clock = std::chrono::steady_clock;

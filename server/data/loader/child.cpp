@@ -23,6 +23,7 @@
 #include "server/data/loader/messages.hpp"
 #include "server/data/loader/process.hpp"
 #include "server/data/loader/transfer.hpp"
+#include "server/data/loader/window.hpp"
 #include "server/data/open/open.hpp"
 
 namespace windsplat::data::loader {
@@ -41,10 +42,12 @@ void say(Kind kind, std::string_view payload) {
 }
 
 void hear(Message& out) {
-  if (receive_message(socket_of_loader, out, answer_bytes_max, Descriptors::taken, {}) !=
-      Fate::done) {
-    leave();
-  }
+  do {
+    if (receive_message(socket_of_loader, out, answer_bytes_max, Descriptors::taken, {}) !=
+        Fate::done) {
+      leave();
+    }
+  } while (is_of_window({static_cast<std::uint32_t>(out.kind), 0, out.payload.size()}));
 }
 
 // Files opened by the daemon: sends requests, receives descriptors.
@@ -112,21 +115,41 @@ auto guarded(const Work& work) -> decltype(work()) {
   }
 }
 
-Result<void> fill(FileSource& source, std::size_t field, std::size_t step, const Mapping& memory) {
+// What a message asks for.
+struct Wanted {
+  std::size_t field = 0;
+  std::size_t step = 0;
+  std::size_t window_layers = 0;  // in parts through a window with halves of so many; 0: as a whole
+  bool is_fresh = false;          // the memory has not been written to yet
+};
+
+// false: it cannot be read in parts.
+Result<bool> fill(FileSource& source, const Wanted& wanted, const Mapping& memory) {
   const DatasetInfo& info = source.info();
-  if (field >= info.fields.size() || step >= info.steps.size()) {
+  if (wanted.field >= info.fields.size() || wanted.step >= info.steps.size()) {
     return make_error(ErrorKind::internal, "no such field or step");
   }
-  const std::size_t components = info.fields[field].components.size();
+  const std::size_t components = info.fields[wanted.field].components.size();
   const std::size_t samples = info.grid.samples();
-  if (samples * components > memory.floats()) {
+  const std::size_t layer = samples / info.grid.axes[2].coordinates.size();
+  const std::size_t floats =
+      wanted.window_layers > 0 ? 2 * layer * wanted.window_layers : samples * components;
+  if (wanted.window_layers > samples || floats > memory.floats()) {
     return make_error(ErrorKind::internal, "the memory of a volume has the wrong size");
   }
-  std::fill_n(memory.data(), samples * components, 0.0F);  // overwrites numbers of the previous
-                                                           // volume
-  if (auto done = source.fill(field, step, memory.data()); !done) return done;
+  if (wanted.window_layers > 0) {
+    Window window(socket_of_loader, memory.data(), layer, wanted.window_layers);
+    auto done = guarded([&] { return source.fill_in_parts(wanted.field, wanted.step, window); });
+    window.finish();
+    return done;
+  }
+  // Overwrites numbers of the previous volume.
+  if (!wanted.is_fresh) std::fill_n(memory.data(), floats, 0.0F);
+  if (auto done = source.fill(wanted.field, wanted.step, memory.data()); !done) {
+    return done.error();
+  }
   mask_volume(memory.data(), samples, static_cast<int>(components));
-  return {};
+  return true;
 }
 
 // Libraries allocate and free chunk-sized buffers at every read. Returning them to the system each
@@ -172,24 +195,30 @@ class Loader {
 
   void read(Message& message) {
     Reader in(message.payload);
-    const auto field = in.number<std::uint64_t>();
-    const auto step = in.number<std::uint64_t>();
+    Wanted wanted;
+    wanted.field = static_cast<std::size_t>(in.number<std::uint64_t>());
+    wanted.step = static_cast<std::size_t>(in.number<std::uint64_t>());
     const bool keeps_memory = in.number<std::uint64_t>() != 0;
+    wanted.window_layers = static_cast<std::size_t>(in.number<std::uint64_t>());
     if (!source_ || !in.complete()) leave();
     told_ = Clock::now();
-    const auto done = guarded([&]() -> Result<void> {
+    const auto done = guarded([&]() -> Result<bool> {
       if (message.descriptor) {
         memory_ = Mapping();
         auto mapped = Mapping::of(message.descriptor, true);
         message.descriptor.reset();
         if (!mapped) return mapped.error();
         memory_ = std::move(*mapped);
+        wanted.is_fresh = true;
       }
-      return fill(*source_, static_cast<std::size_t>(field), static_cast<std::size_t>(step),
-                  memory_);
+      return fill(*source_, wanted, memory_);
     });
     if (!keeps_memory) memory_ = Mapping();
-    say(done ? Kind::filled : Kind::failed, done ? std::string() : encode_error(done.error()));
+    if (!done) {
+      say(Kind::failed, encode_error(done.error()));
+    } else {
+      say(*done ? Kind::filled : Kind::whole, {});
+    }
   }
 
  private:

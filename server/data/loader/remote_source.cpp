@@ -1,9 +1,12 @@
 // A dataset read by a loader, which is started on demand; volumes come back in shared memory.
+#include <chrono>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/data/loader/arriving_volume.hpp"
 #include "server/data/loader/bytes.hpp"
 #include "server/data/loader/loader.hpp"
 #include "server/data/loader/running_loader.hpp"
@@ -11,6 +14,43 @@
 #include "server/data/model/digest.hpp"
 
 namespace windsplat::data::loader {
+
+namespace {
+
+constexpr const char* invalid_numbers = "did not mask all invalid numbers";
+
+std::size_t values_of(const Volume& volume) {
+  return volume.samples() * static_cast<std::size_t>(volume.components);
+}
+
+Error wrong(const DatasetInfo& info, const std::string& how, const RunningLoader::Call& what) {
+  return make_error(ErrorKind::bad_data,
+                    "the loader of " + in_quotes(info.source) + ' ' + how + " while " + what.doing);
+}
+
+// Asks for a field at a step, in parts through a window with halves of so many layers (0: as a
+// whole), whose memory is kept for the next volume or not.
+RunningLoader::Call call_for(const DatasetInfo& info, std::size_t field, std::size_t step,
+                             std::size_t window_layers, bool is_kept) {
+  Writer out;
+  out.number(static_cast<std::uint64_t>(field));
+  out.number(static_cast<std::uint64_t>(step));
+  out.number(static_cast<std::uint64_t>(is_kept ? 1 : 0));
+  out.number(static_cast<std::uint64_t>(window_layers));
+  RunningLoader::Call what;
+  what.kind = Kind::read;
+  what.payload = out.take();
+  what.answer = Kind::filled;
+  what.doing = "reading " + in_quotes(info.fields[field].name);
+  return what;
+}
+
+// The time of a call that reads so many bytes.
+std::chrono::milliseconds time_to_read(const Limits& limits, std::uint64_t bytes) {
+  return limits.read_time + std::chrono::milliseconds(bytes * 1000 / limits.read_bytes_per_second);
+}
+
+}  // namespace
 
 struct RemoteSource::State {
   State(Location where, Limits most)
@@ -28,18 +68,13 @@ struct RemoteSource::State {
   std::string digest;  // digest of the info as received
   RunningLoader loader;
   std::optional<Transfer> transfer;  // as mapped by the loader
+  std::set<std::size_t> wholes;      // fields that cannot be read in parts
   // Memory of a transfer that is reused; otherwise it belongs to the volume that is being read.
   Reservation transfer_memory;
   std::mutex mutex;  // guards the next three members
   bool under_way = false;
   bool cancelled = false;
   std::optional<CancelToken> opening;  // while it is opened
-
-  // Starts a loader, which opens the dataset; returns the encoded info.
-  Result<std::string> start() {
-    release();
-    return loader.open();
-  }
 
   [[nodiscard]] bool is_cancelled() {
     const std::lock_guard lock(mutex);
@@ -71,7 +106,8 @@ struct RemoteSource::State {
   // Ensures a running loader with the same files open as initially.
   Result<void> be_ready() {
     if (loader.process().runs()) return {};
-    auto encoded = start();
+    drop_transfer();
+    auto encoded = loader.open();
     if (!encoded) return encoded.error();
     if (digest_of(*encoded) == digest) return {};
     release();
@@ -105,26 +141,64 @@ struct RemoteSource::State {
     Volume volume;
     volume.dims = info.grid.dims();
     volume.components = static_cast<int>(about.components.size());
-    const std::size_t floats = volume.samples() * about.components.size();
-    const std::uint64_t bytes = floats * sizeof(float);
-    const bool is_new = !transfer || transfer->floats() < floats;
+    const WindowSize window = window_size(volume);
+    if (window.layers > 0 && wholes.count(field) == 0 && is_there(window)) {
+      auto done = read_in_parts(field, step, window, volume);
+      if (!done) return done.error();
+      if (*done) return volume;
+      wholes.insert(field);
+    }
+    if (auto done = read_whole(field, step, volume); !done) return done.error();
+    return volume;
+  }
+
+  // Whether the transfer memory can be used as a window, now or once it is made.
+  bool is_there(const WindowSize& window) {
+    if (transfer && transfer->is_kept() && transfer->floats() >= window.floats()) return true;
+    drop_transfer();
+    return is_worth_keeping(window.floats() * sizeof(float));
+  }
+
+  // false: the field can only be read as a whole.
+  Result<bool> read_in_parts(std::size_t field, std::size_t step, const WindowSize& window,
+                             Volume& volume) {
+    const bool is_new = !transfer;
     if (is_new) {
-      drop_transfer();
-      auto made = Transfer::make(floats, is_worth_keeping(bytes));
+      auto made = Transfer::make(window.floats(), true);
       if (!made) return made.error();
       transfer = std::move(*made);
     }
-    Writer request;
-    request.number(static_cast<std::uint64_t>(field));
-    request.number(static_cast<std::uint64_t>(step));
-    request.number(static_cast<std::uint64_t>(transfer->is_kept() ? 1 : 0));
-    RunningLoader::Call what{Kind::read,
-                             request.bytes(),
-                             is_new ? transfer->descriptor() : -1,
-                             Kind::filled,
-                             "reading " + in_quotes(about.name),
-                             limits.read_time};
-    what.time += std::chrono::milliseconds(bytes * 1000 / limits.read_bytes_per_second);
+    RunningLoader::Call what = call_for(info, field, step, window.layers, true);
+    what.time = time_to_read(limits, values_of(volume) * sizeof(float));
+    if (is_new) what.descriptor = transfer->descriptor();
+    ArrivingVolume arriving(volume, window, transfer->values());
+    what.take = [&](const std::string& payload) { return arriving.take(payload); };
+    const auto done = loader.call(what);
+    if (!done) {
+      // The loader has ended, or may or may not have mapped the memory.
+      if (loader.is_released() || is_new) drop_transfer();
+      return done.error();
+    }
+    if (!loader.count_memory()) release();
+    if (done->kind == Kind::whole) return false;
+    const bool is_complete = arriving.is_complete();
+    if (is_complete && arriving.finish()) return true;
+    release();
+    return wrong(info, is_complete ? invalid_numbers : "sent an incomplete volume", what);
+  }
+
+  Result<void> read_whole(std::size_t field, std::size_t step, Volume& volume) {
+    const std::size_t floats = values_of(volume);
+    const bool is_new = !transfer || transfer->floats() < floats;
+    if (is_new) {
+      drop_transfer();
+      auto made = Transfer::make(floats, is_worth_keeping(floats * sizeof(float)));
+      if (!made) return made.error();
+      transfer = std::move(*made);
+    }
+    RunningLoader::Call what = call_for(info, field, step, 0, transfer->is_kept());
+    what.time = time_to_read(limits, floats * sizeof(float));
+    if (is_new) what.descriptor = transfer->descriptor();
     if (auto done = loader.call(what); !done) {
       if (loader.is_released()) drop_transfer();  // has ended
       // Pages written by the loader are freed with the loader unless the transfer is reused.
@@ -139,13 +213,9 @@ struct RemoteSource::State {
       if (!is_over) release();
     }
     if (!loader.count_memory()) release();
-    if (!measure_volume(volume)) {
-      release();
-      return make_error(ErrorKind::bad_data, "the loader of " + in_quotes(info.source) +
-                                                 " did not mask all invalid numbers while " +
-                                                 what.doing);
-    }
-    return volume;
+    if (measure_volume(volume)) return {};
+    release();
+    return wrong(info, invalid_numbers, what);
   }
 };
 
@@ -180,7 +250,7 @@ Result<std::unique_ptr<RemoteSource>> open(Location location, Limits limits,
                                            const CancelToken& cancel) {
   auto state = std::make_unique<RemoteSource::State>(std::move(location), std::move(limits));
   state->set_opening(cancel);
-  auto encoded = state->start();
+  auto encoded = state->loader.open();
   state->set_opening({});
   if (!encoded) return encoded.error();
   if (!state->loader.count_memory()) state->release();  // after its answer it can be restarted

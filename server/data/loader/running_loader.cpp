@@ -66,6 +66,12 @@ Result<Message> checked(Files& files, Message heard) {
   return heard;
 }
 
+std::string opening_limit(const Files& files, std::uint64_t memory_bytes) {
+  const std::uint64_t bytes = std::min(opening_memory_bytes(files.opened_bytes()), memory_bytes);
+  return "; the limit on memory for opening files of " + std::to_string(files.opened_bytes()) +
+         " bytes is " + megabytes(bytes);
+}
+
 }  // namespace
 
 void set_program(std::string path) {
@@ -78,6 +84,7 @@ struct RunningLoader::Patience {
   Clock::time_point end;
   Clock::time_point moved = Clock::now();  // time of the last message or progress of the loader
   Clock::time_point looked = Clock::now();
+  Clock::time_point count_at{};  // when its memory is counted next
   std::chrono::nanoseconds cpu{};
   std::chrono::nanoseconds extra{};  // by which `end` may still be postponed
   std::chrono::nanoseconds postponed{};
@@ -124,7 +131,9 @@ Result<std::string> RunningLoader::open() {
   if (!answer) {
     Error error = answer.error();
     // Without files, the loader has already exited because of lack of memory.
-    if (files_ && error.kind == ErrorKind::out_of_memory) error.message += opening_limit();
+    if (files_ && error.kind == ErrorKind::out_of_memory) {
+      error.message += opening_limit(*files_, limits_.memory_bytes);
+    }
     release();
     return error;
   }
@@ -154,9 +163,11 @@ Result<Message> RunningLoader::call(const Call& what) {
                              next_deadline(patience));
     }
     if (fate != Fate::done) break;
-    if (heard.kind == what.answer || heard.kind == Kind::failed)
-      return checked(*files_, std::move(heard));
+    const bool is_answer = heard.kind == what.answer || heard.kind == Kind::failed ||
+                           (heard.kind == Kind::whole && what.take);
+    if (is_answer) return checked(*files_, std::move(heard));
     fate = heard.kind == Kind::progress          ? hear_progress(heard.payload)
+           : heard.kind == Kind::part            ? hear_part(heard.payload, what, patience)
            : ++questions > 2 * limits_.opens_max ? Fate::broken
                                                  : answer(heard, what.kind, patience);
     patience.moved = Clock::now();
@@ -187,17 +198,13 @@ Result<Fate> RunningLoader::wait(Patience& patience) {
     if (limits_.cancelled && limits_.cancelled()) {
       return make_error(ErrorKind::cancelled, "it was cancelled");
     }
-    if (auto room = count_memory(); !room) return room.error();
+    if (now >= patience.count_at) {
+      patience.count_at = now + look_every;
+      if (auto room = count_memory(); !room) return room.error();
+    }
     const Fate fate = wait_for_message(process_.socket(), std::min(end, now + look_every));
     if (fate != Fate::late) return fate;
   }
-}
-
-std::string RunningLoader::opening_limit() const {
-  const std::uint64_t bytes =
-      std::min(opening_memory_bytes(files_->opened_bytes()), limits_.memory_bytes);
-  return "; the limit on memory for opening files of " + std::to_string(files_->opened_bytes()) +
-         " bytes is " + megabytes(bytes);
 }
 
 Result<void> RunningLoader::count_memory() {
@@ -210,6 +217,12 @@ Fate RunningLoader::hear_progress(const std::string& payload) const {
   if (!in.complete() || !(done >= 0 && done <= 1)) return Fate::broken;
   if (progress_) progress_(done);
   return Fate::done;
+}
+
+Fate RunningLoader::hear_part(const std::string& payload, const Call& what,
+                              const Patience& patience) {
+  if (!what.take || !what.take(payload)) return Fate::broken;
+  return send_message(process_.socket(), Kind::taken, {}, -1, next_deadline(patience));
 }
 
 // Answers a question of the loader during a call of that kind.

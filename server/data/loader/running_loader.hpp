@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -26,6 +27,8 @@ class RunningLoader {
     Kind answer = Kind::opened;
     std::string doing;  // "opening it", "reading 'u'"
     std::chrono::milliseconds time{};
+    // Takes the part of a volume that a message describes. False: it violates the protocol.
+    std::function<bool(const std::string& payload)> take{};
   };
 
   RunningLoader(Location location, const Limits& limits);
@@ -50,11 +53,11 @@ class RunningLoader {
   [[nodiscard]] Deadline next_deadline(const Patience& patience) const;
   Result<Fate> wait(Patience& patience);
   Fate hear_progress(const std::string& payload) const;
+  Fate hear_part(const std::string& payload, const Call& what, const Patience& patience);
   Fate answer(const Message& question, Kind during, Patience& patience);
   Error crowded_out(const Error& error, const Call& what);
   Error ended(Fate fate, const Call& what, const Patience& patience);
   [[nodiscard]] std::string loader_text() const;
-  [[nodiscard]] std::string opening_limit() const;
 
   const Location location_;
   const Limits& limits_;

@@ -44,6 +44,8 @@ class Transfer {
   [[nodiscard]] int descriptor() const { return memory_.number(); }
   [[nodiscard]] std::size_t floats() const { return mapping_.floats(); }
   [[nodiscard]] bool is_kept() const { return kept_; }
+  // As the loader may change them at any time.
+  [[nodiscard]] const float* values() const { return mapping_.data(); }
 
   // Copies the first floats, so that later writes by a loader have no effect. Memory that is not
   // reused is freed during the copy, so that a volume is never in memory twice.

@@ -43,6 +43,25 @@ class Source {
   Progress progress_;
 };
 
+// Some layers (samples of one z) of one component of a volume.
+struct VolumePart {
+  std::size_t component = 0;
+  std::size_t first = 0;  // the lowest layer
+  std::size_t layers = 0;
+};
+
+// Takes a volume part by part while it is read.
+class PartTaker {
+ public:
+  virtual ~PartTaker() = default;
+  // The most layers of a part; at least one.
+  [[nodiscard]] virtual std::size_t layers_max() const = 0;
+  // Memory for the values of the next part, which contains any numbers.
+  virtual float* room() = 0;
+  // Takes the values in room(), x fastest, then y, then z. Masked samples are NaN.
+  virtual void take(const VolumePart& part) = 0;
+};
+
 // A source that reads files. It fills memory of the caller, so that a separate process can read
 // into shared memory.
 class FileSource : public Source {
@@ -50,6 +69,12 @@ class FileSource : public Source {
   // Reads all components of a field at a step, as consecutive arrays, into `out`, which contains
   // zeros. Masked samples become NaN; infinite values are masked later (finish_volume()).
   virtual Result<void> fill(std::size_t field, std::size_t step, float* out) = 0;
+  // Gives the values of fill() in parts, each layer of each component once, in any order. False:
+  // the field has to be read as a whole, by fill(); no part was taken.
+  virtual Result<bool> fill_in_parts(std::size_t /*field*/, std::size_t /*step*/,
+                                     PartTaker& /*taker*/) {
+    return false;
+  }
   // fill(), then finish_volume().
   Result<Volume> read(std::size_t field, std::size_t step) override;
 };

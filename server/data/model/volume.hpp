@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "server/data/model/sample_buffer.hpp"
 
@@ -41,13 +42,35 @@ struct Volume {
   [[nodiscard]] std::size_t bytes() const { return values.size() * sizeof(float); }
 };
 
+// Range and number of masked samples of a volume whose samples come in parts.
+class VolumeMeasure {
+ public:
+  // Samples [from, to), each once.
+  void add(const Volume& volume, std::size_t from, std::size_t to);
+  // Sets range and masked. False if values are infinite, or NaN in some components only.
+  [[nodiscard]] bool finish(Volume& volume) const;
+
+ private:
+  void add_block(const Volume& volume, std::size_t from, std::size_t to);
+  void add_vectors(const Volume& volume, std::size_t from, std::size_t to);
+  void add_one_by_one(const Volume& volume, std::size_t from, std::size_t to);
+
+  // Of the values of a scalar, or the squared lengths of a vector.
+  double low_ = std::numeric_limits<double>::infinity();
+  double high_ = -std::numeric_limits<double>::infinity();
+  std::int64_t masked_ = 0;
+  bool sound_ = true;  // every sample is finite, or NaN in all components
+};
+
 // Counts masked samples, makes the mask of a vector common to its components, and sets the range.
 // Readers and samples call it last. Infinite values are masked too.
 void finish_volume(Volume& volume);
 // The two parts of finish_volume(). The first sets samples that are not finite to NaN in all
 // components; `values` as in Volume.
 void mask_volume(float* values, std::size_t samples, int components);
-// The second sets range and masked. False if values are infinite, or NaN in some components only.
+// The same for samples [from, to) of a volume.
+void mask_samples(Volume& volume, std::size_t from, std::size_t to);
+// The second, as VolumeMeasure of the whole.
 [[nodiscard]] bool measure_volume(Volume& volume);
 
 // Magnitude of a sample, computed in double, where squares of floats cannot overflow; clamped to

@@ -274,6 +274,7 @@ class ContentsMaker {
     variable.type = "float32";
     variable.packed = false;
     variable.is_unsigned = false;
+    variable.layers_apart = false;
     variable.mesh.clear();
     variable.coordinates.clear();
   }

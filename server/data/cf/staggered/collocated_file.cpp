@@ -106,7 +106,10 @@ class CollocatedFile final : public ArrayFile {
       if (!way.first_step) {
         names += (names.empty() ? "" : ", ") + in_quotes(variable.name);
         for (std::size_t d = 0; d < variable.dims.size(); ++d) {
-          if (way.staggers[d].centers >= 0) variable.dims[d] = way.staggers[d].centers;
+          if (way.staggers[d].centers < 0) continue;
+          variable.dims[d] = way.staggers[d].centers;
+          // The faces between two parts would be read twice.
+          if (d + 2 < variable.dims.size()) variable.layers_apart = false;
         }
         variable.coordinates.clear();
       } else {

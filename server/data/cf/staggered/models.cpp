@@ -111,6 +111,7 @@ std::vector<ComputedVariable> variables_of_wrf(const FileContents& contents) {
     variable.standard_name = formula.standard_name;
     variable.long_name = formula.long_name;
     variable.units = formula.units;
+    variable.layers_apart = contents.variables[at(computed.inputs[0])].layers_apart;
     computed.value = formula.value;
     out.push_back(std::move(computed));
   }

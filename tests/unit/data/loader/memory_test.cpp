@@ -63,7 +63,7 @@ TEST_F(Loader, VolumeIsTheSameWhenTransferMemoryIsNotKept) {
   Limits limits;
   const auto keeps = opened(path, limits);
   // More than an eighth of this.
-  limits.budget = std::make_shared<Budget>(std::uint64_t{32} << 20);
+  limits.budget = std::make_shared<Budget>(std::uint64_t{24} << 20);
   const auto keeps_not = opened(path, limits);
   ASSERT_TRUE(keeps && keeps_not);
   const std::uint64_t before = limits.budget->counts().bytes;
