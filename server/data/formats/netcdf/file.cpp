@@ -183,7 +183,9 @@ Result<void> File::open_library() {
     if (!storage) return storage.error();
     storage_ = std::move(*storage);
   }
-  const int status = nc_open(input_->library_path().c_str(), NC_NOWRITE, &ncid_);
+  // Of classic files the library reads so many bytes at a time (8 KiB by default).
+  std::size_t buffer_bytes = std::size_t{64} << 10;
+  const int status = nc__open(input_->library_path().c_str(), NC_NOWRITE, &buffer_bytes, &ncid_);
   if (status != NC_NOERR) {
     ncid_ = -1;
     return fault(std::string("cannot be read as netCDF: it is truncated or damaged (") +
