@@ -33,7 +33,7 @@ windsplat_bench(bench_estimates ${naive_dir}/trial_fields.cpp ${naive_dir}/famil
 windsplat_bench(bench_pool)
 windsplat_bench(bench_picture)
 windsplat_bench(bench_load)
-target_link_libraries(bench_load PRIVATE PkgConfig::NETCDF)
+target_link_libraries(bench_load PRIVATE PkgConfig::NETCDF PkgConfig::ZSTD PkgConfig::BLOSC)
 
 # windsplat_smoke(<name> <command...>)
 function(windsplat_smoke name)

@@ -1,15 +1,19 @@
 // Speed of reading the volumes of a dataset: with the bare library or bare reads, with the reader
 // in this process, and with a loader process (which also transfers and validates them). Files are
 // written and read once before, so that they are in the page cache; each read uses memory that is
-// new to the process, as resident volumes do. Milliseconds per step of all fields, the minimum of
-// the rounds, and ratios to the bare read.
+// new to the process, as resident volumes do. Milliseconds per step of one scalar, and of a vector
+// and a scalar (four components), the minimum of the rounds; ratios to the bare read; processor
+// milliseconds of the bare read and of the reader in a loader with this process.
 //
 //   bench_load [--program=windsplat] [--dims=320x160x19] [--steps=8] [--rounds=7] [--only=raw]
 //              [--markdown]
+//
+// Run by `taskset -c 0` for the times on one processor.
 #include <fcntl.h>
 #include <hdf5.h>
 #include <malloc.h>
 #include <netcdf.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +27,7 @@
 #include <string>
 #include <vector>
 
+#include "files/zarr_store.hpp"
 #include "server/data/formats/netcdf/writer.hpp"
 #include "server/data/loader/loader.hpp"
 #include "server/data/model/dataset_info.hpp"
@@ -211,16 +216,54 @@ void write_vtkhdf(const std::string& path, data::Source& source) {
   H5Fclose(file);
 }
 
-// Seconds of `work`: the minimum of the rounds after an untimed one.
-double least_seconds(int rounds, const std::function<void()>& work) {
+// What a round reads of each step: "cloud", or "wind" and "cloud".
+using Fields = std::vector<std::string>;
+
+bool has_wind(const Fields& fields) { return fields.size() > 1; }
+
+// The variables of netCDF and Zarr files.
+std::vector<std::string> variables_of(const Fields& fields) {
+  if (has_wind(fields)) return {"u", "v", "w", "cloud"};
+  return {"cloud"};
+}
+
+// Seconds of processor time of this process, and of another with its id.
+double processor_seconds(pid_t other) {
+  rusage own{};
+  ::getrusage(RUSAGE_SELF, &own);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  double out = seconds(own.ru_utime) + seconds(own.ru_stime);
+  clockid_t clock{};
+  timespec used{};
+  if (other > 0 && ::clock_getcpuclockid(other, &clock) == 0 &&
+      ::clock_gettime(clock, &used) == 0) {
+    out += static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+  }
+  return out;
+}
+
+struct Least {
+  double seconds = 1e30;
+  double processor_seconds = 1e30;
+};
+
+// The minima of the rounds after an untimed one. `loader`: the id of a process that takes part.
+Least least(
+    int rounds, const std::function<void()>& work,
+    const std::function<pid_t()>& loader = [] { return pid_t{-1}; }) {
   work();
-  double least = 1e30;
+  Least out;
   for (int r = 0; r < rounds; ++r) {
+    const double used = processor_seconds(loader());
     const auto start = Clock::now();
     work();
-    least = std::min(least, std::chrono::duration<double>(Clock::now() - start).count());
+    out.seconds =
+        std::min(out.seconds, std::chrono::duration<double>(Clock::now() - start).count());
+    out.processor_seconds = std::min(out.processor_seconds, processor_seconds(loader()) - used);
   }
-  return least;
+  return out;
 }
 
 // Volumes are kept for a round, as in a program that uses them.
@@ -231,16 +274,17 @@ float* take(Kept& kept, std::size_t floats) {
   return kept.back().get();
 }
 
-void read_bare_netcdf(const std::string& path, std::size_t steps, std::size_t samples) {
+void read_bare_netcdf(const std::string& path, std::size_t steps, std::size_t samples,
+                      const Fields& fields) {
   Kept kept;
   int ncid = 0;
   check(nc_open(path.c_str(), NC_NOWRITE, &ncid));
   std::array<int, 4> dims{};
   std::array<std::size_t, 4> count{1};
   for (std::size_t t = 0; t < steps; ++t) {
-    for (const char* name : {"u", "v", "w", "cloud"}) {
+    for (const std::string& name : variables_of(fields)) {
       int variable = 0;
-      check(nc_inq_varid(ncid, name, &variable));
+      check(nc_inq_varid(ncid, name.c_str(), &variable));
       check(nc_inq_vardimid(ncid, variable, dims.data()));
       for (std::size_t d = 1; d < 4; ++d) check(nc_inq_dimlen(ncid, dims.at(d), &count.at(d)));
       const std::array<std::size_t, 4> start{t, 0, 0, 0};
@@ -250,11 +294,13 @@ void read_bare_netcdf(const std::string& path, std::size_t steps, std::size_t sa
   check(nc_close(ncid));
 }
 
-void read_bare(const std::string& path, std::size_t steps, std::size_t samples) {
+void read_bare(const std::string& path, std::size_t steps, std::size_t samples,
+               const Fields& fields) {
   Kept kept;
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   const auto bytes = static_cast<ssize_t>(samples * sizeof(float));
   for (std::size_t i = 0; i < 4 * steps; ++i) {
+    if (i % 4 < 3 && !has_wind(fields)) continue;
     const auto at = static_cast<off_t>(i) * bytes;
     if (::pread(file, take(kept, samples), static_cast<std::size_t>(bytes), at) != bytes) {
       bench::give_up("a file is shorter than when it was written");
@@ -263,11 +309,13 @@ void read_bare(const std::string& path, std::size_t steps, std::size_t samples) 
   ::close(file);
 }
 
-void read_bare_hdf5(const std::string& path, std::size_t steps, std::size_t samples) {
+void read_bare_hdf5(const std::string& path, std::size_t steps, std::size_t samples,
+                    const Fields& fields) {
   Kept kept;
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   for (std::size_t t = 0; t < steps; ++t) {
     for (const std::size_t field : {0U, 1U}) {
+      if (field == 0 && !has_wind(fields)) continue;
       const hid_t dataset = H5Dopen2(file, hdf_paths.at(field), H5P_DEFAULT);
       const hid_t space = H5Dget_space(dataset);
       std::array<hsize_t, 5> start{t};
@@ -287,10 +335,10 @@ void read_bare_hdf5(const std::string& path, std::size_t steps, std::size_t samp
   H5Fclose(file);
 }
 
-void read_all(data::Source& source) {
+void read_all(data::Source& source, const Fields& fields) {
   std::vector<data::Volume> kept;
   for (std::size_t t = 0; t < source.info().steps.size(); ++t) {
-    for (const char* name : {"wind", "cloud"}) {
+    for (const std::string& name : fields) {
       const data::FieldInfo* field = source.info().find(name);
       if (field == nullptr) bench::give_up("a field is missing");
       const auto index = static_cast<std::size_t>(field - source.info().fields.data());
@@ -299,22 +347,35 @@ void read_all(data::Source& source) {
   }
 }
 
-bench::Row measure(const std::string& name, const std::string& path, const Options& options,
-                   const std::function<void()>& bare) {
-  // Call first: HDF5 would share unpacked chunks of an earlier opening of the file.
-  const double plain = least_seconds(options.rounds, bare);
+using Bare = std::function<void(const Fields&)>;
+
+// Rows of one kind of file.
+void measure(bench::Table& table, const std::string& name, const std::string& path,
+             const Options& options, const Bare& bare) {
+  const std::array<Fields, 2> rows{Fields{"cloud"}, Fields{"wind", "cloud"}};
+  std::vector<Least> plain;
+  // Called first: HDF5 would share unpacked chunks of an earlier opening of the file.
+  for (const Fields& fields : rows) {
+    plain.push_back(least(options.rounds, [&] { bare(fields); }));
+  }
   const auto here = bench::value_or_give_up(data::open_file(path));
   const auto apart =
       bench::value_or_give_up(data::loader::open(bench::value_or_give_up(data::locate(path))));
-  const double ours = least_seconds(options.rounds, [&] { read_all(*here); });
-  const double loader = least_seconds(options.rounds, [&] { read_all(*apart); });
-  const double each = 1000.0 / options.steps;
-  return {name,
-          bench::number("%.2f", each * plain),
-          bench::number("%.2f", each * ours),
-          bench::number("%.2f", ours / plain),
-          bench::number("%.2f", each * loader),
-          bench::number("%.2f", loader / plain)};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Fields& fields = rows.at(i);
+    const Least ours = least(options.rounds, [&] { read_all(*here, fields); });
+    const Least loader = least(
+        options.rounds, [&] { read_all(*apart, fields); }, [&] { return apart->process(); });
+    const double each = 1000.0 / options.steps;
+    table.push_back({name, has_wind(fields) ? "4" : "1",
+                     bench::number("%.2f", each * plain[i].seconds),
+                     bench::number("%.2f", each * ours.seconds),
+                     bench::number("%.2f", ours.seconds / plain[i].seconds),
+                     bench::number("%.2f", each * loader.seconds),
+                     bench::number("%.2f", loader.seconds / plain[i].seconds),
+                     bench::number("%.2f", each * plain[i].processor_seconds),
+                     bench::number("%.2f", each * loader.processor_seconds)});
+  }
 }
 
 }  // namespace
@@ -331,7 +392,11 @@ int main(int argc, char** argv) {
   const std::size_t samples = source->info().grid.samples();
   const auto steps = static_cast<std::size_t>(options.steps);
 
-  bench::Table table{{"file", "bare ms", "reader ms", "ratio", "loader ms", "ratio"}};
+  bench::Table table{{"file", "components", "bare ms", "reader ms", "ratio", "loader ms", "ratio",
+                      "bare cpu", "loader cpu"}};
+  const auto is_wanted = [&](const std::string& name) {
+    return options.only.empty() || options.only == name;
+  };
   struct Kind {
     const char* name;
     int format;
@@ -340,22 +405,36 @@ int main(int argc, char** argv) {
   for (const Kind kind :
        {Kind{"netCDF-4", NC_NETCDF4, 0}, Kind{"netCDF-4, deflated", NC_NETCDF4, 1},
         Kind{"netCDF CDF-5", NC_64BIT_DATA, 0}}) {
-    if (!options.only.empty() && options.only != kind.name) continue;
+    if (!is_wanted(kind.name)) continue;
     const std::string path = folder + "/file.nc";
     write_netcdf(path, *source, kind.format, kind.deflate);
-    table.push_back(
-        measure(kind.name, path, options, [&] { read_bare_netcdf(path, steps, samples); }));
+    measure(table, kind.name, path, options,
+            [&](const Fields& fields) { read_bare_netcdf(path, steps, samples, fields); });
   }
-  if (options.only.empty() || options.only == "VTKHDF") {
+  for (const bool by_blosc : {false, true}) {
+    const std::string kind = by_blosc ? "Zarr, blosc (lz4)" : "Zarr, zstd";
+    if (!is_wanted(kind)) continue;
+    const std::string path = folder + "/store.zarr";
+    bench::write_zarr(path, *source, by_blosc);
+    measure(table, kind, path, options, [&](const Fields& fields) {
+      Kept kept;
+      for (std::size_t t = 0; t < steps; ++t) {
+        for (const std::string& name : variables_of(fields)) {
+          bench::read_zarr(path + '/' + name, options.dims, t, by_blosc, take(kept, samples));
+        }
+      }
+    });
+  }
+  if (is_wanted("VTKHDF")) {
     const std::string path = folder + "/file.vtkhdf";
     write_vtkhdf(path, *source);
-    table.push_back(
-        measure("VTKHDF", path, options, [&] { read_bare_hdf5(path, steps, samples); }));
+    measure(table, "VTKHDF", path, options,
+            [&](const Fields& fields) { read_bare_hdf5(path, steps, samples, fields); });
   }
-  if (options.only.empty() || options.only == "raw") {
+  if (is_wanted("raw")) {
     write_raw(folder, *source);
-    table.push_back(measure("raw", folder + "/raw.json", options,
-                            [&] { read_bare(folder + "/raw.bin", steps, samples); }));
+    measure(table, "raw", folder + "/raw.json", options,
+            [&](const Fields& fields) { read_bare(folder + "/raw.bin", steps, samples, fields); });
   }
   std::filesystem::remove_all(folder);
   std::printf("%zu samples, 4 components, %d steps: %.1f MB per step\n\n%s", samples, options.steps,
