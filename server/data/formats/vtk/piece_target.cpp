@@ -100,14 +100,46 @@ Result<void> read_plain(const std::shared_ptr<const InputFile>& file, const Stor
   return file->check_unchanged();
 }
 
+bool is_one_piece(const Snapshot& snapshot, PieceData data) {
+  if (snapshot.pieces.size() != 1 || snapshot.blocks.size() > 1) return false;
+  const Piece& piece = snapshot.pieces.front();
+  const auto& arrays = piece.*data;
+  return piece.extent == snapshot.whole && std::none_of(arrays.begin(), arrays.end(), is_ghost);
+}
+
+Result<bool> read_in_parts(const std::shared_ptr<const InputFile>& file, const StoredArray& array,
+                           const Target& target, PartTaker& taker,
+                           const std::function<void(std::size_t tuples)>& done) {
+  const auto layer = static_cast<std::size_t>(target.counts[0] * target.counts[1]);
+  const auto layers = static_cast<std::size_t>(target.counts[2]);
+  const auto components = static_cast<std::size_t>(array.components);
+  if (!is_contiguous(target) || array.tuples != layer * layers) return false;
+  auto reader = ArrayReader::open(file, array);
+  if (!reader) return reader.error();
+  // Tuples of several components pass through memory of as many values as a part.
+  const std::size_t most = std::max<std::size_t>(1, taker.layers_max() / components);
+  std::vector<float> block(components == 1 ? 0 : std::min(most, layers) * layer * components);
+  for (std::size_t first = 0; first < layers; first += most) {
+    const std::size_t count = std::min(most, layers - first);
+    const std::size_t tuples = count * layer;
+    float* const into = components == 1 ? taker.room() : block.data();
+    if (auto read = reader->read(into, tuples * components); !read) return read.error();
+    for (std::size_t c = 0; c < components; ++c) {
+      float* const room = components == 1 ? into : taker.room();
+      for (std::size_t i = 0; i < tuples && components > 1; ++i) {
+        room[i] = block[i * components + c];
+      }
+      taker.take({c, first, count});
+    }
+    done(tuples);
+  }
+  if (auto same = file->check_unchanged(); !same) return same.error();
+  return true;
+}
+
 void mask_uncovered(const Snapshot& snapshot, PieceData data, std::size_t values, float* out) {
-  const auto gives_all = [&](const Piece& piece) {
-    const auto& arrays = piece.*data;
-    return piece.extent == snapshot.whole && std::none_of(arrays.begin(), arrays.end(), is_ghost);
-  };
-  const bool is_covered = snapshot.pieces.size() == 1 && snapshot.blocks.size() < 2 &&
-                          gives_all(snapshot.pieces.front());
-  if (!is_covered) std::fill_n(out, values, std::numeric_limits<float>::quiet_NaN());
+  if (is_one_piece(snapshot, data)) return;
+  std::fill_n(out, values, std::numeric_limits<float>::quiet_NaN());
 }
 
 }  // namespace windsplat::data::vtk

@@ -1,6 +1,7 @@
 // Maps the tuples of a piece to sample indices of the whole grid.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include "server/data/files/input_file.hpp"
 #include "server/data/formats/vtk/snapshot.hpp"
 #include "server/data/formats/vtk/stored_array.hpp"
+#include "server/data/model/source.hpp"
 
 namespace windsplat::data::vtk {
 
@@ -85,6 +87,35 @@ Target target_of(const Extent& whole, const Extent& piece, bool of_cells,
 Result<void> read_plain(const std::shared_ptr<const InputFile>& file, const StoredArray& array,
                         const Target& target, std::size_t samples, float* out,
                         const std::function<void(std::size_t tuples)>& done);
+
+// Whether a single piece without ghosts gives all values of a grid.
+bool is_one_piece(const Snapshot& snapshot, PieceData data);
+
+// read_plain() of such a piece, in parts. False: samples do not follow one another like the tuples;
+// nothing was taken.
+Result<bool> read_in_parts(const std::shared_ptr<const InputFile>& file, const StoredArray& array,
+                           const Target& target, PartTaker& taker,
+                           const std::function<void(std::size_t tuples)>& done);
+
+// Calls take(number of the tuple, its components as doubles) for the tuples of an array, and
+// done(number of tuples) after each part. Errors: bad_data.
+template <class Take, class Done>
+Result<void> read_tuples(const std::shared_ptr<const InputFile>& file, const StoredArray& array,
+                         const Take& take, const Done& done) {
+  constexpr std::uint64_t tuples_at_once = std::uint64_t{1} << 15;
+  auto reader = ArrayReader::open(file, array);
+  if (!reader) return reader.error();
+  const auto components = static_cast<std::size_t>(array.components);
+  std::vector<double> block(std::min(array.tuples, tuples_at_once) * components);
+  for (std::uint64_t first = 0; first < array.tuples;) {
+    const auto count = static_cast<std::size_t>(std::min(array.tuples - first, tuples_at_once));
+    if (auto read = reader->read(block.data(), count * components); !read) return read;
+    for (std::size_t i = 0; i < count; ++i) take(first + i, block.data() + i * components);
+    first += count;
+    done(count);
+  }
+  return file->check_unchanged();
+}
 
 // Masks `values` numbers of a grid before its pieces are read, unless a single piece without ghosts
 // gives all of them.

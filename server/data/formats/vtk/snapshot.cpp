@@ -203,6 +203,13 @@ const StoredArray* find_array(const std::vector<StoredArray>& arrays, const std:
   return at == arrays.end() ? nullptr : &*at;
 }
 
+const StoredArray* first_of(const Snapshot& snapshot, PieceData data, const std::string& name) {
+  for (const Piece& piece : snapshot.pieces) {
+    if (const StoredArray* array = find_array(piece.*data, name)) return array;
+  }
+  return nullptr;
+}
+
 bool is_ghost(const StoredArray& array) {
   return array.name == ghost_name || array.name == ghost_levels_name;
 }

@@ -128,10 +128,14 @@ bool has_overlaps(const Snapshot& snapshot);
 // "0 7 0 5 0 3", as in files.
 std::string text_of(const Extent& extent);
 
+using PieceData = std::vector<StoredArray> Piece::*;  // point or cell data
+
+// The array of that name in the first piece that has one; null if none has.
+const StoredArray* first_of(const Snapshot& snapshot, PieceData data, const std::string& name);
+
 const StoredArray* find_array(const std::vector<StoredArray>& arrays, const std::string& name);
 bool is_ghost(const StoredArray& array);
 
-using PieceData = std::vector<StoredArray> Piece::*;  // point or cell data
 // The arrays of all pieces in the order of the files, without those of ghosts.
 std::vector<std::string> array_names(const Snapshot& snapshot, PieceData data);
 void erase_array(Snapshot& snapshot, PieceData data, const std::string& name);

@@ -31,15 +31,7 @@ using FilePtr = std::shared_ptr<const InputFile>;
 
 constexpr std::size_t steps_max = 100'000;
 constexpr std::size_t files_max = 200'000;  // of all steps
-constexpr std::size_t block_tuples = std::size_t{1} << 15;
 constexpr std::array<const char*, 3> axis_names{"x", "y", "z"};
-
-const StoredArray* first_of(const Snapshot& snapshot, PieceData data, const std::string& name) {
-  for (const Piece& piece : snapshot.pieces) {
-    if (const StoredArray* array = find_array(piece.*data, name)) return array;
-  }
-  return nullptr;
-}
 
 bool is_field(const StoredArray& array) { return !is_ghost(array) && array.components <= 3; }
 
@@ -95,19 +87,43 @@ class VtkSource final : public FileSource {
 
   Result<void> fill(std::size_t field, std::size_t step, float* out) override {
     WINDSPLAT_CHECK(field < info_.fields.size() && step < steps_.size());
-    const std::string identity = steps_[step].identity;
-    const auto snapshot = open_step(step);
+    const auto snapshot = open_again(step);
     if (!snapshot) return snapshot.error();
-    if (steps_[step].identity != identity) {
-      return file_->fault("has changed since it was opened; open it again");
-    }
-    count_tuples(*snapshot);
     auto done =
         mesh_ ? fill_resampled(*snapshot, field, step, out) : fill_regular(*snapshot, field, out);
     return done ? file_->check_unchanged() : done;
   }
 
+  Result<bool> fill_in_parts(std::size_t field, std::size_t step, PartTaker& taker) override {
+    WINDSPLAT_CHECK(field < info_.fields.size() && step < steps_.size());
+    if (mesh_) return false;
+    const auto snapshot = open_again(step);
+    if (!snapshot) return snapshot.error();
+    if (!is_one_piece(*snapshot, data()) || !(snapshot->whole == whole_)) return false;
+    const Piece& piece = snapshot->pieces.front();
+    const auto array = array_of(*snapshot, piece, field);
+    if (!array || *array == nullptr) return array ? Result<bool>(false) : array.error();
+    const auto file = piece.file.open(*files_);
+    if (!file) return file.error();
+    const Target target = target_of(whole_, piece.extent, of_cells_, grid_.world, grid_.turned);
+    auto done = read_in_parts(*file, **array, target, taker, [&](std::size_t n) { report(n); });
+    const auto same = done ? file_->check_unchanged() : Result<void>();
+    return same ? done : Result<bool>(same.error());
+  }
+
  private:
+  // A step whose files are those that were opened first.
+  Result<Snapshot> open_again(std::size_t step) {
+    const std::string identity = steps_[step].identity;
+    auto snapshot = open_step(step);
+    if (!snapshot) return snapshot;
+    if (steps_[step].identity != identity) {
+      return file_->fault("has changed since it was opened; open it again");
+    }
+    count_tuples(*snapshot);
+    return snapshot;
+  }
+
   // Reads the headers of a step, sets file_ to its main file and records its identity.
   Result<Snapshot> open_step(std::size_t step) {
     auto out = reader_.read(steps_[step]);
@@ -319,24 +335,6 @@ class VtkSource final : public FileSource {
     }
   }
 
-  // Calls take(number, values) for each tuple of an array, in order.
-  template <class Take>
-  Result<void> read_tuples(const FilePtr& file, const StoredArray& array, const Take& take) {
-    auto reader = ArrayReader::open(file, array);
-    if (!reader) return reader.error();
-    const auto components = static_cast<std::size_t>(array.components);
-    std::vector<double> block(std::min<std::uint64_t>(array.tuples, block_tuples) * components);
-    for (std::uint64_t done = 0; done < array.tuples;) {
-      const auto count =
-          static_cast<std::size_t>(std::min<std::uint64_t>(array.tuples - done, block_tuples));
-      if (auto read = reader->read(block.data(), count * components); !read) return read;
-      for (std::size_t i = 0; i < count; ++i) take(done + i, block.data() + i * components);
-      done += count;
-      report(count);
-    }
-    return file->check_unchanged();
-  }
-
   void report(std::size_t tuples) {
     tuples_done_ += tuples;
     report_progress(static_cast<double>(tuples_done_) / static_cast<double>(tuples_all_));
@@ -372,7 +370,7 @@ class VtkSource final : public FileSource {
     }
     TargetWalk walk(target);
     shared.begin_piece(piece.block, (*array)->type < bytes::Scalar::float32);
-    return read_tuples(*file, **array, [&](std::uint64_t tuple, const double* values) {
+    const auto take = [&](std::uint64_t tuple, const double* values) {
       const std::size_t at = walk.next();
       const double ghost = ghosts->empty() ? 0 : (*ghosts)[tuple];
       const bool is_copy = has_bit(ghost, duplicate);
@@ -381,7 +379,8 @@ class VtkSource final : public FileSource {
       for (std::size_t c = 0; c < components; ++c) {
         out[at + c * samples] = static_cast<float>(values[c]);
       }
-    });
+    };
+    return read_tuples(*file, **array, take, [&](std::size_t n) { report(n); });
   }
 
   void count_tuples(const Snapshot& snapshot) {
@@ -430,11 +429,12 @@ class VtkSource final : public FileSource {
       if (*array != nullptr) {
         const auto file = piece.file.open(*files_);
         if (!file) return file.error();
-        auto done = read_tuples(*file, **array, [&](std::uint64_t tuple, const double* from) {
+        const auto take = [&](std::uint64_t tuple, const double* from) {
           for (std::size_t c = 0; c < components; ++c) {
             values[base + tuple + c * count] = static_cast<float>(from[c]);
           }
-        });
+        };
+        auto done = read_tuples(*file, **array, take, [&](std::size_t n) { report(n); });
         if (!done) return done.error();
       }
       base += tuples;

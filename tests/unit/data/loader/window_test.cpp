@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <fstream>
 #include <limits>
 #include <memory>
 #include <string>
@@ -75,6 +78,10 @@ class Window : public Loader {
   void expect_same_as_here(const LargeFile& file) {
     const std::string path = folder_ / "large.nc";
     file.write(path);
+    expect_same_as_here(path);
+  }
+
+  static void expect_same_as_here(const std::string& path) {
     const auto apart = opened(path);
     auto here = open_file(path);
     ASSERT_TRUE(apart && here);
@@ -107,7 +114,30 @@ TEST_F(Window, ChunksSmallerAndLargerThanTheWindowReadAsInThisProcess) {
   expect_same_as_here({NC_NETCDF4, falling(40), {40, 128, 256}});
 }
 
-// Half of the layers of the field are of chunks too large to be kept.
+// The components of a tuple are neighbours in the file.
+TEST_F(Window, ImageOfVtkReadsAsInThisProcess) {
+  const std::string path = folder_ / "image.vtk";
+  std::ofstream file(path, std::ios::binary);
+  const std::size_t samples = 20 * layer;
+  file << "# vtk DataFile Version 3.0\nimage\nBINARY\nDATASET STRUCTURED_POINTS\n"
+       << "DIMENSIONS 256 256 20\nORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA " << samples << '\n';
+  const auto numbers = [&](std::size_t count) {
+    std::string bytes;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto bits = std::bit_cast<std::uint32_t>(0.5F * static_cast<float>(i % 70001));
+      for (const unsigned shift : {24U, 16U, 8U, 0U}) bytes += static_cast<char>(bits >> shift);
+    }
+    file << bytes << '\n';
+  };
+  file << "VECTORS wind float\n";
+  numbers(3 * samples);
+  file << "SCALARS T float 1\nLOOKUP_TABLE default\n";
+  numbers(samples);
+  file.close();
+  expect_same_as_here(path);
+}
+
+// Chunks of all layers exceed what is kept of them.
 TEST_F(Window, ChunksTooLargeToBeKeptAreReadTogether) {
   const std::string path = folder_ / "deep.nc";
   LargeFile{NC_NETCDF4, falling(130), {130, 256, 256}}.write(path);
