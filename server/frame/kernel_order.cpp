@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <numeric>
+#include <vector>
+
+#include "server/engine/plan.hpp"
 
 namespace windsplat::frame {
 
@@ -12,32 +13,20 @@ KernelOrder::KernelOrder(const scene::Scene& scene, const engine::reference::Lay
                          int number)
     : scene_(scene), layers_(layers), number_(number), inside_(scene.camera.perspective) {
   const scene::Camera& camera = scene.camera;
-  double most = -1;
+  const scene::Lattice& lattice = scene.lattice;
   for (std::size_t a = 0; a < 3; ++a) {
-    const auto along = static_cast<glm::length_t>(a);
-    const auto& positions = scene.lattice.positions[a];
-    const auto& axis = layers.axis[a];
-    const auto place = [&](std::size_t i) {
-      return positions[static_cast<std::size_t>(axis[i].sample)];
-    };
-    if (camera.perspective) {
-      for (std::size_t i = 1; i < axis.size(); ++i) {
-        if (camera.eye[along] >= (place(i - 1) + place(i)) / 2) eye_[a] = static_cast<int>(i);
-      }
-    } else if (camera.forward[along] < 0) {
-      eye_[a] = static_cast<int>(axis.size()) - 1;
+    std::vector<double> places;
+    for (const auto& position : layers.axis[a]) {
+      places.push_back(lattice.positions[a][static_cast<std::size_t>(position.sample)]);
     }
-    inside_ = inside_ && camera.eye[along] >= scene.lattice.box_min[along] &&
-              camera.eye[along] <= scene.lattice.box_max[along];
-    const auto& spacing = scene.lattice.spacing[a];
-    const double mean =
-        std::accumulate(spacing.begin(), spacing.end(), 0.0) / static_cast<double>(spacing.size());
-    const double crossed = std::abs(camera.forward[along]) / mean;
-    if (crossed > most * (1 + 1e-12)) {
-      most = crossed;
-      major_ = a;
-    }
+    eye_[a] = engine::eye_index(camera, static_cast<int>(a), places);
+    const double at = camera.eye[static_cast<glm::length_t>(a)];
+    inside_ = inside_ && at >= lattice.box_min[static_cast<glm::length_t>(a)] &&
+              at <= lattice.box_max[static_cast<glm::length_t>(a)];
   }
+  const int major = engine::major_axis(camera, lattice);
+  major_ = static_cast<std::size_t>(major);
+  eye_sample_ = engine::eye_index(camera, major, lattice.positions[major_]);
 }
 
 // Bricks of eight outward from that of the eye, upper side first, and positions likewise in each.
@@ -53,8 +42,7 @@ OrderKey KernelOrder::key(const std::array<int, 3>& index,
                           const engine::reference::KernelPosition& position) const {
   if (scene_.lattice.places) return {position.centre[2]};
   const auto& axis = layers_.axis[major_];
-  const auto sample = [&](int i) { return axis[static_cast<std::size_t>(i)].sample; };
-  const int ahead = sample(index[major_]) - sample(eye_[major_]);
+  const int ahead = axis[static_cast<std::size_t>(index[major_])].sample - eye_sample_;
   const double distance = std::abs(ahead);
   const bool upward = scene_.camera.forward[static_cast<glm::length_t>(major_)] >= 0;
   const bool in_front = upward ? ahead >= 0 : ahead <= 0;

@@ -32,6 +32,7 @@ class KernelOrder {
   const engine::reference::LayerGroup& layers_;
   int number_ = 0;
   std::array<int, 3> eye_{};  // the kernel position whose cell contains the eye
+  int eye_sample_ = 0;        // of all samples along the major axis, the one whose cell contains it
   std::size_t major_ = 0;
   bool inside_ = false;
 };

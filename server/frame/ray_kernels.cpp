@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 
+#include "server/engine/reference/profile.hpp"
+
 namespace windsplat::frame {
 namespace {
 
@@ -21,7 +23,8 @@ constexpr double opaque_below = 1e-3;
 constexpr std::size_t kernels_most = 8192;
 // Positions of one layer that are visited for a bundle.
 constexpr double positions_most = 16384;
-constexpr std::size_t probes_most = 4;  // rays of a bundle of which this is known
+constexpr double bundle_positions_most = 5e5;  // of all layers together
+constexpr std::size_t probes_most = 4;         // rays of a bundle of which this is known
 
 double footprint_at(double r) {
   constexpr double s = reference::footprint_s;
@@ -67,6 +70,26 @@ SplatOnRay splat_on_ray(const reference::Splat& splat, const PictureRay& ray) {
   out.rho = splat.rho * ray.length / reference::footprint_integral;
   out.tau = out.rho * footprint_at(std::sqrt(out.least2)) / std::sqrt(out.cells2);
   return out;
+}
+
+double half_extent(const SplatOnRay& on) {
+  constexpr double t2 = reference::footprint_t * reference::footprint_t;
+  return std::sqrt(std::max(0.0, t2 - on.least2) / on.cells2);
+}
+
+double part_before(const SplatOnRay& on, double depth) {
+  constexpr int steps = 32;
+  static const reference::Profile profile;
+  const double half = half_extent(on);
+  if (on.tau <= 0 || depth <= on.middle - half) return 0;
+  if (depth >= on.middle + half) return 1;
+  const double step = (depth - on.middle + half) / steps;
+  double sum = 0;
+  for (int n = 0; n < steps; ++n) {
+    const double z = (n + 0.5) * step - half;
+    sum += profile(on.least2 + on.cells2 * z * z);
+  }
+  return std::min(1.0, on.rho * sum * step / on.tau);
 }
 
 RayKernels::RayKernels(const scene::Scene& scene)
@@ -234,6 +257,7 @@ const std::vector<const RayKernel*>* RayKernels::around(const Index& near,
                                                         const std::vector<PictureRay>& rays,
                                                         double wide) {
   found_.clear();
+  const double before = visited_;
   Bundle bundle;
   bundle.rays = &rays;
   bundle.wide = wide;
@@ -250,6 +274,7 @@ const std::vector<const RayKernel*>* RayKernels::around(const Index& near,
     int behind = 0;  // layers since all became opaque
     for (const Place& place : path_) {
       if (!add_layer(group, place, bundle)) return nullptr;
+      if (visited_ - before > bundle_positions_most) return nullptr;
       if (found_.size() >= kernels_most) break;
       const double most = *std::max_element(bundle.passed.begin(), bundle.passed.end());
       if (most < opaque_below && ++behind > bundle.cells) break;
@@ -356,6 +381,10 @@ void RayKernels::add(const Group& group, const Index& i, const Place& place, dou
   if (here.extinction > 0 && reference::lies_beyond_near(view_, at)) {
     const glm::dvec3 color = here.color();
     kernel.splat = {at.from_eye, at.inverse, here.extinction, {color.x, color.y, color.z}};
+    Vec along{};
+    for (std::size_t a = 0; a < 3; ++a) along[a] = dot(view_.forward, at.edge[a]);
+    const double depth = reference::footprint_t * reference::length(along);
+    kernel.near = view_.perspective && at.centre[2] - 2 * depth < view_.near;
   }
   if (!kernel.line && kernel.splat.rho <= 0) return;
   kernel.key = group.order.key(i, at);
@@ -368,7 +397,11 @@ void RayKernels::pass(const RayKernel& kernel, Bundle& bundle) const {
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t at = count > 1 ? n * (bundle.rays->size() - 1) / (count - 1) : 0;
     const PictureRay& ray = (*bundle.rays)[at];
-    if (kernel.splat.rho > 0) bundle.passed[n] *= std::exp(-splat_on_ray(kernel.splat, ray).tau);
+    if (kernel.splat.rho > 0) {
+      const SplatOnRay on = splat_on_ray(kernel.splat, ray);
+      const double unseen = view_.perspective ? part_before(on, view_.near) : 0;
+      bundle.passed[n] *= std::exp(-on.tau * (1 - unseen));
+    }
     if (kernel.line) {
       bundle.passed[n] *= 1 - reference::hit_ribbon(*kernel.line, ray.x, ray.y).opacity;
     }

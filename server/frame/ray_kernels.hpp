@@ -32,10 +32,15 @@ struct SplatOnRay {
   double tau = 0;     // optical depth
 };
 SplatOnRay splat_on_ray(const engine::reference::Splat& splat, const PictureRay& ray);
+// Half of its extent in view depth; 0: the ray passes beside it.
+double half_extent(const SplatOnRay& on);
+// The part of its optical depth that lies before a view depth.
+double part_before(const SplatOnRay& on, double depth);
 
 struct RayKernel {
   OrderKey key{};
   engine::reference::Splat splat;  // rho 0: none
+  bool near = false;               // the splat lies within twice its depth of the near plane
   std::optional<engine::reference::Ribbon> line;
   engine::reference::ScreenBox box;  // of the line
 };

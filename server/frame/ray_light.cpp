@@ -81,12 +81,17 @@ Light RayLight::by_kernels(const RayKernelList& kernels, const PictureRay& ray) 
     auto line = hit(kernel, ray);
     if (line.depth > ground.depth) line.opacity = 0;
     if (on.tau <= 0 && line.opacity <= 0) continue;
-    const double cells = std::sqrt(on.cells2);
-    const double hidden = std::clamp(0.5 + (near_ - on.middle) * cells, 0.0, 1.0);
     reference::Cell cell;
-    cell.tau = on.tau * (1 - hidden);
-    cell.x = std::clamp(0.5 + (line.depth - on.middle) * cells, 0.0, 1.0);
-    if (hidden > 0 && hidden < 1) cell.x = std::max(0.0, cell.x - hidden) / (1 - hidden);
+    cell.tau = on.tau;
+    cell.x = std::clamp(0.5 + (line.depth - on.middle) * std::sqrt(on.cells2), 0.0, 1.0);
+    // Splats that may reach the near plane are divided as they are, others as if homogeneous.
+    if (on.tau > 0 && kernel.near) {
+      const double unseen = part_before(on, near_);
+      cell.tau *= 1 - unseen;
+      if (unseen < 1) {
+        cell.x = std::clamp((part_before(on, line.depth) - unseen) / (1 - unseen), 0.0, 1.0);
+      }
+    }
     cell.opacity = line.opacity;
     cell.medium = kernel.splat.color;
     cell.line = line.color;
@@ -110,9 +115,7 @@ void RayLight::meet(const RayKernelList& kernels, const PictureRay& ray) {
     if (kernel.splat.rho <= 0) continue;
     const SplatOnRay on = splat_on_ray(kernel.splat, ray);
     if (on.tau <= 0 || on.middle > ground.depth) continue;
-    constexpr double t2 = reference::footprint_t * reference::footprint_t;
-    const double half = std::sqrt((t2 - on.least2) / on.cells2);
-    stretches_.push_back({on, kernel.splat.color, half});
+    stretches_.push_back({on, kernel.splat.color, half_extent(on)});
   }
   std::sort(surfaces_.begin(), surfaces_.end(),
             [](const auto& a, const auto& b) { return a.depth < b.depth; });
@@ -151,8 +154,12 @@ RayLight::ByDepth RayLight::by_depth(const RayKernelList& kernels, const Picture
     if (end <= 0) continue;
     const auto last = std::min(pieces_.size() - 1, static_cast<std::size_t>(end / step));
     for (auto k = static_cast<std::size_t>(std::max(begin, 0.0) / step); k <= last; ++k) {
-      const double z = start + (static_cast<double>(k) + 0.5) * step - one.on.middle;
-      const double tau = one.on.rho * profile()(one.on.least2 + one.on.cells2 * z * z) * step;
+      // Of a piece that the near plane cuts the part beyond it.
+      const double far = start + static_cast<double>(k + 1) * step;
+      const double length = std::min(step, far - near_);
+      if (length <= 0) continue;
+      const double z = far - 0.5 * length - one.on.middle;
+      const double tau = one.on.rho * profile()(one.on.least2 + one.on.cells2 * z * z) * length;
       for (std::size_t c = 0; c < 3; ++c) pieces_[k][c] += tau * one.color[c];
       pieces_[k][3] += tau;
     }
@@ -177,9 +184,11 @@ RayLight::ByDepth RayLight::by_depth(const RayKernelList& kernels, const Picture
   return out;
 }
 
-// A homogeneous piece and the lines in it.
-void RayLight::pass(const Piece& piece, double from, double length, std::size_t& next,
+// A homogeneous piece, beyond the near plane, and the lines in it.
+void RayLight::pass(const Piece& piece, double begin, double whole, std::size_t& next,
                     Light& to) const {
+  const double from = std::max(begin, near_);
+  const double length = std::max(begin + whole - from, 0.0);
   const double tau = piece[3];
   double passed = 0;
   const auto absorb = [&](double until) {
@@ -191,7 +200,7 @@ void RayLight::pass(const Piece& piece, double from, double length, std::size_t&
     passed = until;
   };
   for (; next < surfaces_.size() && surfaces_[next].depth < from + length; ++next) {
-    absorb(std::clamp((surfaces_[next].depth - from) / length, passed, 1.0));
+    absorb(std::clamp((surfaces_[next].depth - from) / std::max(length, 1e-30), passed, 1.0));
     reference::cross_surface(surfaces_[next], to);
   }
   absorb(1);

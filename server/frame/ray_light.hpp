@@ -40,7 +40,7 @@ class RayLight {
   using Piece = std::array<double, 4>;
   [[nodiscard]] engine::reference::Surface body(const PictureRay& ray) const;
   void meet(const RayKernelList& kernels, const PictureRay& ray);
-  void pass(const Piece& piece, double from, double length, std::size_t& next, Light& to) const;
+  void pass(const Piece& piece, double begin, double whole, std::size_t& next, Light& to) const;
 
   const scene::Scene& scene_;
   engine::reference::View view_;
