@@ -62,8 +62,8 @@ struct Part {
 
 class Sampling {
  public:
-  explicit Sampling(const scene::Scene& scene)
-      : scene_(scene), view_(reference::make_view(scene.camera)), samples_(scene) {
+  Sampling(const scene::Scene& scene, const CancelToken& cancel)
+      : scene_(scene), cancel_(cancel), view_(reference::make_view(scene.camera)), samples_(scene) {
     for (std::size_t a = 0; a < 3; ++a) {
       merged_ *= std::exp2(scene.level[a]);
       finer_[a] = std::exp2(-scene.level[a]);
@@ -77,7 +77,7 @@ class Sampling {
     std::vector<Seen> out;
     const std::int64_t taken = std::min(samples_.count(), samples_max);
     out.reserve(static_cast<std::size_t>(taken));
-    for (std::int64_t n = 0; n < taken; ++n) {
+    for (std::int64_t n = 0; n < taken && !cancel_.cancelled(); ++n) {
       std::int64_t at = n;
       if (taken < samples_.count()) {
         const double within = pcg3d({static_cast<std::uint32_t>(n), 17, 29})[0] / 4294967296.0;
@@ -121,7 +121,7 @@ class Sampling {
 
   [[nodiscard]] LightChanges light_changes(const std::vector<Seen>& seen) const {
     if (scene_.scalars.empty()) return {};
-    return frame::light_changes(samples_, rays_through(seen));
+    return frame::light_changes(samples_, rays_through(seen), cancel_);
   }
 
   [[nodiscard]] std::vector<RayThrough> rays_through(const std::vector<Seen>& seen) const {
@@ -312,6 +312,7 @@ class Sampling {
   [[nodiscard]] double layer_opacity() const { return scene_.vector->opacity / merged_; }
 
   const scene::Scene& scene_;
+  const CancelToken& cancel_;
   const reference::View view_;
   const DrawnSamples samples_;
   double merged_ = 1;
@@ -321,9 +322,10 @@ class Sampling {
 
 }  // namespace
 
-quality::Content content_of(const scene::Scene& scene) {
-  const Sampling sampling(scene);
+std::optional<quality::Content> content_of(const scene::Scene& scene, const CancelToken& cancel) {
+  const Sampling sampling(scene, cancel);
   const std::vector<Seen> seen = sampling.seen();
+  if (cancel.cancelled()) return std::nullopt;
   const std::vector<Part> parts = sampling.parts(seen);
   double line_squares = 0;
   Mean layers, length, line_depth, shade, gaps;
@@ -381,7 +383,8 @@ quality::Content content_of(const scene::Scene& scene) {
   roots(light.shifts, out.shifts);
   out.order = std::sqrt(light.order.sum);
   out.step_cell = light.cell.value();
-  out.trials = pixel_trials(scene, sampling.rays_through(seen));
+  out.trials = pixel_trials(scene, sampling.rays_through(seen), cancel).trials;
+  if (cancel.cancelled()) return std::nullopt;
   return out;
 }
 

@@ -168,6 +168,14 @@ Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& po
   return work;
 }
 
+// Content is that of the view, not of coarser data.
+bool needs_content(const Prepared& prepared, const Frame& drawn) {
+  const Encoding& encoding = prepared.encoding;
+  const bool wanted = encoding.describe || (encoding.measure && !drawn.error);
+  return wanted && prepared.setting.coarser == 0 &&
+         prepared.scene.method != scene::Method::reference;
+}
+
 bool is_transparent(const engine::Image& picture) {
   for (std::size_t at = 3; at < picture.rgba.size(); at += 4) {
     if (picture.rgba[at] > 0) return false;
@@ -247,18 +255,17 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.halvings = halvings_of(prepared, dataset);
   drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());
   const Clock::time_point measured_from = Clock::now();
-  // Content is that of the view, not of coarser data.
-  const bool described = prepared.encoding.measure || prepared.encoding.describe;
-  if (prepared.content) {
-    drawn.content = prepared.content;
-  } else if (described && prepared.setting.coarser == 0 &&
-             scene.method != scene::Method::reference) {
-    drawn.content = content_of(scene);
-  }
   if (is_measured(prepared)) {
     auto error = measured_error(prepared, dataset, pool, cancel, workspace);
     if (!error) return given_up(error.error(), workspace);
     drawn.error = *error;
+  }
+  drawn.content = prepared.content;
+  if (!drawn.content && needs_content(prepared, drawn)) {
+    drawn.content = content_of(scene, cancel);
+    if (!drawn.content) {
+      return given_up(make_error(ErrorKind::cancelled, "description cancelled"), workspace);
+    }
   }
   drawn.measure_us = microseconds(measured_from, Clock::now());
   return {};

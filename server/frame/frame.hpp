@@ -36,8 +36,9 @@ struct Encoding {
   // Whether the error of the picture is measured by a second, finer rendering, and that of a JPEG
   // by decoding it.
   bool measure = false;
-  // Whether what the view shows is described, which its estimated errors follow from. Frames with a
-  // measured error always have their content.
+  // Whether what the view shows is described, which its estimated errors follow from. It takes some
+  // 50 ms, so pictures with a measured error, which do not need it, are described only if this is
+  // set. One of which the error should be measured and cannot be is described in any case.
   bool describe = false;
 };
 
@@ -47,7 +48,7 @@ struct Frame {
   int width = 0;        // rendered width
   int height = 0;
   double detail = 0;                        // at the size of the view (scene::detail_shown)
-  std::optional<quality::Content> content;  // if the encoding asks for it
+  std::optional<quality::Content> content;  // if it was described
   quality::Halvings halvings{};             // of the data, by the size of the picture
   engine::WorkReport work;
   std::string empty;           // why the picture shows nothing of the data; empty if it shows some

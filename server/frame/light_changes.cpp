@@ -208,7 +208,8 @@ class Rays {
   explicit Rays(const DrawnSamples& samples) : samples_(samples) {}
 
   // Rays evenly over the picture: samples are taken by the area for which they stand.
-  [[nodiscard]] LightChanges changes(const std::vector<RayThrough>& through) const {
+  [[nodiscard]] LightChanges changes(const std::vector<RayThrough>& through,
+                                     const CancelToken& cancel) const {
     std::vector<std::pair<Ray, double>> rays;
     rays.reserve(through.size());
     double whole = 0;
@@ -223,6 +224,7 @@ class Rays {
     std::uint32_t taken = 0;
     for (auto& [ray, up_to] : rays) {
       for (; taken < bundles_most && (taken + 0.5) * area < up_to; ++taken) {
+        if (cancel.cancelled()) return out;
         // Within the splat of the sample, at random.
         const auto random = pcg3d({taken, 31, 37});
         for (std::size_t a = 0; a < 2; ++a) {
@@ -336,8 +338,9 @@ class Rays {
 
 }  // namespace
 
-LightChanges light_changes(const DrawnSamples& samples, const std::vector<RayThrough>& through) {
-  return Rays(samples).changes(through);
+LightChanges light_changes(const DrawnSamples& samples, const std::vector<RayThrough>& through,
+                           const CancelToken& cancel) {
+  return Rays(samples).changes(through, cancel);
 }
 
 }  // namespace windsplat::frame

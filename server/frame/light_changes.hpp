@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/frame/drawn_samples.hpp"
 #include "server/quality/content.hpp"
 
@@ -25,6 +26,8 @@ struct RayThrough {
   Index sample{};
   double stands_for = 1;
 };
-LightChanges light_changes(const DrawnSamples& samples, const std::vector<RayThrough>& through);
+// Incomplete if cancelled.
+LightChanges light_changes(const DrawnSamples& samples, const std::vector<RayThrough>& through,
+                           const CancelToken& cancel);
 
 }  // namespace windsplat::frame

@@ -169,13 +169,15 @@ class CalibrationRun {
  public:
   CalibrationRun(scene::CompletedView completed, data::Dataset& dataset, ThreadPool& pool,
                  const CancelToken& cancel, Workspace& workspace,
-                 const std::function<void(const CalibrationSample&)>& report)
+                 const std::function<void(const CalibrationSample&)>& report,
+                 const std::optional<quality::Content>& content)
       : completed_(std::move(completed)),
         dataset_(dataset),
         pool_(pool),
         cancel_(cancel),
         workspace_(workspace),
-        report_(report) {}
+        report_(report),
+        content_(content) {}
 
   Result<void> run() {
     workspace_.space.image() = {};  // a picture that was drawn before
@@ -203,7 +205,9 @@ class CalibrationRun {
   Result<void> draw_truth() {
     const auto own = scene::build_scene(completed_, dataset_);
     if (!own) return own.error();
-    viewpoint_ = viewpoint_of(completed_, &*own);
+    viewpoint_ = viewpoint_of(completed_, content_ ? nullptr : &*own, cancel_);
+    if (content_) viewpoint_.content = content_;
+    if (cancel_.cancelled()) return make_error(ErrorKind::cancelled, "calibration cancelled");
     const std::array<int, 3> own_level = own->level;
     const double half = reference_thickness(completed_);
     bool told = false;
@@ -330,6 +334,7 @@ class CalibrationRun {
   const CancelToken& cancel_;
   Workspace& workspace_;
   const std::function<void(const CalibrationSample&)>& report_;
+  const std::optional<quality::Content> content_;  // if known
   quality::Viewpoint viewpoint_;
   Truth truth_;
   std::vector<double> ms_;
@@ -352,18 +357,19 @@ Result<scene::CompletedView> calibrated(const scene::CompletedView& completed) {
 
 }  // namespace
 
-quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const scene::Scene* scene) {
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const scene::Scene* scene,
+                                const CancelToken& cancel) {
   quality::Viewpoint viewpoint = quality::viewpoint_of(completed.view());
   viewpoint.detail = scene::detail_shown(completed);
-  if (scene != nullptr) viewpoint.content = content_of(*scene);
+  if (scene != nullptr) viewpoint.content = content_of(*scene, cancel);
   return viewpoint;
 }
 
-quality::Viewpoint viewpoint_of(const scene::CompletedView& completed,
-                                const data::Dataset& dataset) {
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const data::Dataset& dataset,
+                                const CancelToken& cancel) {
   data::Dataset resident = dataset.resident_only();
   const auto scene = scene::build_scene(completed, resident);
-  return viewpoint_of(completed, scene ? &*scene : nullptr);
+  return viewpoint_of(completed, scene ? &*scene : nullptr, cancel);
 }
 
 bool is_measured(const Prepared& prepared) {
@@ -427,10 +433,15 @@ Result<void> load_for_calibration(const scene::CompletedView& completed, data::D
 
 Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,
                        ThreadPool& pool, const CancelToken& cancel, Workspace& workspace,
-                       const std::function<void(const CalibrationSample&)>& report) {
+                       const std::function<void(const CalibrationSample&)>& report,
+                       const std::optional<quality::Content>& content) {
   const auto sized = calibrated(completed);
   if (!sized) return sized.error();
-  return CalibrationRun(*sized, dataset, pool, cancel, workspace, report).run();
+  // A smaller picture may show data of another level.
+  const bool own_size = sized->view().image.height == completed.view().image.height;
+  return CalibrationRun(*sized, dataset, pool, cancel, workspace, report,
+                        own_size ? content : std::nullopt)
+      .run();
 }
 
 }  // namespace windsplat::frame

@@ -19,11 +19,13 @@ namespace windsplat::frame {
 // from the level of the picture.
 inline constexpr double truth_samples_max = 32.0 * 1024 * 1024;
 
-// The viewpoint of a completed view with its scene as asked for; null: its content is unknown.
-quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const scene::Scene* scene);
+// The viewpoint of a completed view with its scene as asked for; its content is unknown if there is
+// no scene or if cancelled.
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const scene::Scene* scene,
+                                const CancelToken& cancel = {});
 // Builds the scene if its data are resident.
-quality::Viewpoint viewpoint_of(const scene::CompletedView& completed,
-                                const data::Dataset& dataset);
+quality::Viewpoint viewpoint_of(const scene::CompletedView& completed, const data::Dataset& dataset,
+                                const CancelToken& cancel = {});
 
 // Whether the frame will be measured: only pictures of full size, up to retained_pixels.
 bool is_measured(const Prepared& prepared);
@@ -44,7 +46,8 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
 // most half and a quarter of a cell; where these would be more slabs than the engine draws, only
 // times are measured. Reports each result when it is known, in no particular order. Pictures of
 // more than retained_pixels are calibrated at a smaller size, that of `viewpoint`. Times are those
-// of drawing only. Errors: cancelled; not_resident; those of scenes.
+// of drawing only. `content`: of the view, if it is known. Errors: cancelled; not_resident; those
+// of scenes.
 struct CalibrationSample {
   std::size_t setting = 0;
   quality::Viewpoint viewpoint;
@@ -66,6 +69,7 @@ Result<void> load_for_calibration(const scene::CompletedView& completed, data::D
                                   const CancelToken& cancel);
 Result<void> calibrate(const scene::CompletedView& completed, data::Dataset& dataset,
                        ThreadPool& pool, const CancelToken& cancel, Workspace& workspace,
-                       const std::function<void(const CalibrationSample&)>& report);
+                       const std::function<void(const CalibrationSample&)>& report,
+                       const std::optional<quality::Content>& content = {});
 
 }  // namespace windsplat::frame

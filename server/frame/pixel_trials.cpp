@@ -27,9 +27,6 @@ constexpr double told_share = 0.35;
 // Errors that are surely less than the least one that is reported need not be known.
 constexpr int tried_for_none = 256;
 constexpr double none_below = 1e-10;
-// Measures of the time: places, and positions visited with kernels met by each ray.
-constexpr int drawn_most = 512;
-constexpr double work_most = 4e6;
 
 struct Place {
   Index near{};         // a sample beside the ray
@@ -157,46 +154,51 @@ struct Squares {
   double half = 0;
 };
 
-class PixelTrials {
+class TryingPixels {
  public:
-  explicit PixelTrials(const scene::Scene& scene) : scene_(scene), kernels_(scene), light_(scene) {}
+  TryingPixels(const scene::Scene& scene, const CancelToken& cancel)
+      : scene_(scene), cancel_(cancel), kernels_(scene), light_(scene) {}
 
   // Few places may have most of the error, and sooner too few than too many of them are met: the
   // standard error is added.
   // Nothing if too few places can be tried for their work.
-  std::optional<quality::Trials> run(const std::vector<RayThrough>& through) {
+  PixelTrials run(const std::vector<RayThrough>& through) {
     const Places::Spread spread = Places(kernels_).spread(through);
     const std::vector<Place>& places = spread.places;
     MeanSquare kernel;
     MeanSquare slab;
     MeanSquare half;
-    int drawn = 0;
+    PixelTrials out;
     for (std::uint32_t n = 0; n < places_count && !places.empty(); ++n) {
       if (kernel.is_told() && (scene_.scalars.empty() || slab.is_told())) break;
-      if (drawn == drawn_most || kernels_.visited() + met_ > work_most) break;
+      if (cancel_.cancelled()) return {};
+      if (out.places == trial_places_most || work() > trial_work_most) break;
       const Place& place = places[nth_place(n) % places.size()];
       Squares here;
       if (place.inside && kernels_.meets(place.near, ray(place.x + 0.5, place.y + 0.5))) {
         const auto differences = differences_at(place);
         if (!differences) continue;
         here = *differences;
-        ++drawn;
+        ++out.places;
       }
       kernel.add(here.kernel);
       slab.add(here.slab);
       half.add(here.half);
     }
+    out.work = work();
     const bool told = kernel.count() >= tried_least && (kernel.is_told() || kernel.mean() > 0);
-    if (!places.empty() && !told) return std::nullopt;
+    if (!places.empty() && !told) return out;
     const double pixels = static_cast<double>(scene_.camera.width) * scene_.camera.height;
     const auto error = [&](const MeanSquare& of) {
       return std::sqrt(spread.area / pixels * (of.mean() + of.standard_error()));
     };
     // By depth in quarters of a slab, a method of order 2 lacks a sixteenth and a quarter.
-    return quality::Trials{error(kernel), error(slab) * 16 / 15, error(half) * 4 / 3};
+    out.trials = {error(kernel), error(slab) * 16 / 15, error(half) * 4 / 3};
+    return out;
   }
 
  private:
+  [[nodiscard]] double work() const { return kernels_.visited() + met_; }
   [[nodiscard]] PictureRay ray(double x, double y) const {
     return picture_ray(kernels_.view(), x, y);
   }
@@ -231,6 +233,7 @@ class PixelTrials {
   }
 
   const scene::Scene& scene_;
+  const CancelToken& cancel_;
   RayKernels kernels_;
   RayLight light_;
   std::vector<PictureRay> rays_;
@@ -239,9 +242,9 @@ class PixelTrials {
 
 }  // namespace
 
-std::optional<quality::Trials> pixel_trials(const scene::Scene& scene,
-                                            const std::vector<RayThrough>& through) {
-  return PixelTrials(scene).run(through);
+PixelTrials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough>& through,
+                         const CancelToken& cancel) {
+  return TryingPixels(scene, cancel).run(through);
 }
 
 }  // namespace windsplat::frame

@@ -14,7 +14,8 @@ namespace windsplat::quality {
 namespace {
 
 constexpr double ms_least = 1e-3;
-constexpr double near = 0.5;  // distance below which a calibration run adds no information
+constexpr double near = 0.5;   // distance below which a calibration run adds no information
+constexpr double same = 1e-6;  // distance of a viewpoint from itself, at most
 constexpr std::size_t nearest_max = 8;
 // Correlations of the errors of settings by cause: order of kernels, fewer pixels, merged samples,
 // slabs (the residuals of the laws over the generated family).
@@ -240,9 +241,8 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   };
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
-  // Content that is guessed must not pass for known.
   const Viewpoint viewpoint = measured.error ? filled(seen).viewpoint : seen;
-  Entry entry{viewpoint, {}, {}, false, cause_of(how, viewpoint), 1};
+  Entry entry{viewpoint, {}, {}, false, !seen.content, cause_of(how, viewpoint), 1};
   entry.spread = spread_of(error_scatter(kind_, entry.cause));
   if (measured.error) {
     const double error = std::max(*measured.error, error_least);
@@ -280,6 +280,26 @@ void Table::add_frame(std::size_t setting, const Viewpoint& viewpoint, double ms
   entries_[setting].back().of_frames = true;
 }
 
+void Table::describe(const Viewpoint& viewpoint) {
+  if (!viewpoint.content) return;
+  const auto is_same = [&](const Viewpoint& other) { return distance(other, viewpoint) < same; };
+  described_.erase(std::remove_if(described_.begin(), described_.end(), is_same), described_.end());
+  described_.push_back(viewpoint);
+  if (described_.size() > descriptions_max) described_.pop_front();
+  for (std::size_t i = 0; i < settings_count; ++i) {
+    for (Entry& entry : entries_[i]) {
+      if (!entry.guessed || !entry.log_error || !is_same(entry.viewpoint)) continue;
+      const auto log_expected = [&] {
+        return std::log(expected_error(kind_, settings[i], entry.viewpoint).value);
+      };
+      const double log_measured = *entry.log_error + log_expected();
+      entry.viewpoint.content = viewpoint.content;
+      entry.log_error = log_measured - log_expected();
+      entry.guessed = false;
+    }
+  }
+}
+
 bool Table::begin_try() {
   constexpr int frames_least = 100;
   if (frames_since_try_ < frames_least) return false;
@@ -287,21 +307,29 @@ bool Table::begin_try() {
   return true;
 }
 
-Table::Sight Table::filled(const Viewpoint& viewpoint) const {
-  if (viewpoint.content) return {viewpoint, 0};
+const Viewpoint* Table::nearest_known(const Viewpoint& viewpoint) const {
   const Viewpoint* nearest = nullptr;
   double apart = 0;
+  const auto compare = [&](const Viewpoint& known) {
+    const double its = distance(known, viewpoint);
+    if (nearest != nullptr && its >= apart) return;
+    nearest = &known;
+    apart = its;
+  };
+  for (const Viewpoint& described : described_) compare(described);
   for (const std::deque<Entry>& entries : entries_) {
     for (const Entry& entry : entries) {
-      if (!entry.viewpoint.content) continue;
-      const double its = distance(entry.viewpoint, viewpoint);
-      if (nearest != nullptr && its >= apart) continue;
-      nearest = &entry.viewpoint;
-      apart = its;
+      if (!entry.guessed) compare(entry.viewpoint);
     }
   }
+  return nearest;
+}
+
+Table::Sight Table::filled(const Viewpoint& viewpoint) const {
+  if (viewpoint.content) return {viewpoint, 0};
+  const Viewpoint* const nearest = nearest_known(viewpoint);
   if (nearest == nullptr) return {viewpoint, 1};
-  Sight out{viewpoint, -std::expm1(-apart)};
+  Sight out{viewpoint, -std::expm1(-distance(*nearest, viewpoint))};
   out.viewpoint.content = scaled(*nearest->content, nearest->height / viewpoint.height);
   return out;
 }

@@ -39,6 +39,7 @@ class Table {
  public:
   static constexpr std::size_t measurements_max = 24;  // per setting
   static constexpr std::size_t studies_max = 16;
+  static constexpr std::size_t descriptions_max = 16;
 
   explicit Table(const Kind& kind) : kind_(kind) {}
 
@@ -47,13 +48,17 @@ class Table {
   // and unused where a calibration run measured the setting.
   void add_frame(std::size_t setting, const Viewpoint& viewpoint, double ms);
 
+  // What is seen from a viewpoint became known. Measurements made there before count against what
+  // is expected of this content.
+  void describe(const Viewpoint& viewpoint);
+
   // Forecasts of all settings. Times without measurements are estimated from those with.
   [[nodiscard]] Forecasts forecasts(const Viewpoint& viewpoint) const;
   // The prior corrected by measurements: simple kriging of the logarithms of measured over expected
   // values. Errors correlate with those of other settings too, most if they have the same cause,
   // and more so the nearer the viewpoints are; a constant part belongs to the signature. The spread
-  // is the kriging standard deviation. A viewpoint of unknown content has that of the nearest
-  // measured one, or a typical one, and a wider spread.
+  // is the kriging standard deviation. A viewpoint of unknown content has that of the nearest known
+  // one, or a typical one, and a wider spread.
   [[nodiscard]] Forecast forecast(std::size_t setting, const Viewpoint& viewpoint) const;
 
   // Whether a session may try a setting of unknown time: once in many frames of all sessions.
@@ -78,21 +83,24 @@ class Table {
     std::optional<double> log_error;
     std::optional<double> log_ms;
     bool of_frames = false;  // log_ms is the mean of frames
+    bool guessed = false;    // the content is typical or that of another viewpoint
     Cause cause = Cause::kernel;
     double spread = 1;  // standard deviation of log_error without measurements
   };
-  // The viewpoint with the content of the nearest measured one, if its own is unknown.
+  // The viewpoint with the content of the nearest known one, if its own is unknown.
   struct Sight {
     Viewpoint viewpoint;
     double guessed = 0;  // share of the variance of unknown content
   };
   [[nodiscard]] Sight filled(const Viewpoint& viewpoint) const;
+  [[nodiscard]] const Viewpoint* nearest_known(const Viewpoint& viewpoint) const;
   [[nodiscard]] Forecast forecast_at(std::size_t setting, const Sight& sight,
                                      NearErrors& errors) const;
 
   Kind kind_;
   std::array<std::deque<Entry>, settings_count> entries_;
   std::deque<Viewpoint> studied_;
+  std::deque<Viewpoint> described_;
   bool studying_ = false;
   int frames_since_try_ = 0;
   std::optional<double> encoding_error_;  // at quality 90 and a height of 1

@@ -54,6 +54,12 @@ void Tables::add(const SceneSignature& signature, std::size_t setting, const Vie
   table_of(signature).add(setting, viewpoint, measured);
 }
 
+void Tables::describe(const SceneSignature& signature, const Viewpoint& viewpoint) {
+  if (signature.key.empty()) return;
+  const std::lock_guard lock(mutex_);
+  table_of(signature).describe(viewpoint);
+}
+
 void Tables::add_frame(const SceneSignature& signature, std::size_t setting,
                        const Viewpoint& viewpoint, double ms) {
   if (signature.key.empty()) return;

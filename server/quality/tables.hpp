@@ -24,6 +24,9 @@ class Tables {
   void add(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
            const Measured& measured);
 
+  // See Table::describe.
+  void describe(const SceneSignature& signature, const Viewpoint& viewpoint);
+
   // The time of a frame of a session, see Table::add_frame.
   void add_frame(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
                  double ms);

@@ -2,6 +2,7 @@
 #include "server/tasks/calibration_job.hpp"
 
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "server/frame/measure.hpp"
@@ -13,8 +14,12 @@ namespace {
 // An entry in the tables that marks a running calibration; removed by its destructor.
 class Study {
  public:
-  Study(Backend& backend, scene::CompletedView completed, quality::SceneSignature signature)
-      : backend_(backend), completed_(std::move(completed)), signature_(std::move(signature)) {}
+  Study(Backend& backend, scene::CompletedView completed, quality::SceneSignature signature,
+        const std::optional<quality::Content>& content)
+      : backend_(backend),
+        completed_(std::move(completed)),
+        signature_(std::move(signature)),
+        content_(content) {}
   ~Study() {
     backend_.quality.end_study(signature_, complete_);
     backend_.metrics.background_done(!complete_);
@@ -36,7 +41,8 @@ class Study {
       const auto room =
           backend_.catalogue.store().reserve(frame::calibration_bytes(completed_.view().image));
       if (!room) return room.error();  // other users occupy the memory
-      return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep);
+      return frame::calibrate(completed_, dataset, *backend_.pool, stop, backend_.frames, keep,
+                              content_);
     });
     complete_ = static_cast<bool>(run);
     if (!run) {
@@ -49,16 +55,19 @@ class Study {
   Backend& backend_;
   scene::CompletedView completed_;
   quality::SceneSignature signature_;
+  std::optional<quality::Content> content_;
   bool complete_ = false;
 };
 
 std::shared_ptr<Study> begin(Backend& backend, const scene::CompletedView& completed,
-                             const data::Dataset& dataset) {
-  if (!frame::is_worth_calibrating(completed.view())) return nullptr;
+                             const data::Dataset& dataset, const CancelToken& unwanted) {
   quality::SceneSignature signature = quality::signature_of(completed.view());
-  if (!backend.quality.begin_study(signature, frame::viewpoint_of(completed, dataset)))
-    return nullptr;
-  return std::make_shared<Study>(backend, completed, std::move(signature));
+  const quality::Viewpoint viewpoint = frame::viewpoint_of(completed, dataset, unwanted);
+  if (unwanted.cancelled()) return nullptr;
+  backend.quality.describe(signature, viewpoint);
+  if (!frame::is_worth_calibrating(completed.view())) return nullptr;
+  if (!backend.quality.begin_study(signature, viewpoint)) return nullptr;
+  return std::make_shared<Study>(backend, completed, std::move(signature), viewpoint.content);
 }
 
 }  // namespace
@@ -74,7 +83,7 @@ void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::V
       data::Dataset prefetching = dataset->prefetching();
       const auto completed = completion->of(view, prefetching);
       if (!completed) return completed.error();
-      study = begin(backend, *completed, prefetching);
+      study = begin(backend, *completed, prefetching, unwanted);
       if (!study) return make_error(ErrorKind::not_found, "no settings to calibrate");
       return study->load(prefetching, unwanted);
     });

@@ -1,4 +1,5 @@
-// Measures time and error of each setting for a view at rest and stores them in the tables.
+// Describes a view at rest, measures time and error of each setting for it, and stores both in the
+// tables.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +12,10 @@
 
 namespace windsplat::tasks {
 
-// Prepares the levels of coarser settings on a thread that may block, then draws every
-// setting while the renderer is idle. Does nothing if the tables cover the scene near this
-// viewpoint, the picture is small, or `unwanted` is raised. Never evicts data of prefetch requests.
+// On a thread that may block, computes what the view shows from its resident data, and prepares the
+// levels of coarser settings; then draws every setting while the renderer is idle. Nothing is drawn
+// if the tables cover the scene near this viewpoint or the picture is small. Ends once `unwanted`
+// is raised, even within the description. Never evicts data of prefetch requests.
 void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,
                         const std::shared_ptr<ViewCompletion>& completion,
                         const CancelToken& unwanted);

@@ -82,6 +82,75 @@ TEST(Viewer, CompletesAViewOnceForAllThatIsDrawnOfIt) {
   EXPECT_EQ(scene::completions() - before, 2U) << "another view";
 }
 
+// What a view shows is computed after its final frame. The picture is too small to be calibrated.
+class Descriptions : public testing::Test {
+ protected:
+  // Draws the final frame and keeps what is known of its view.
+  void draw_final() {
+    std::promise<session::Drawn> told;
+    session::Encoding final;
+    final.measure = true;
+    viewer_.start(session::StartRender{1, view_, {protocol::MethodName::slab, 0}, final},
+                  [&](std::uint64_t /*ticket*/, Result<session::Drawn> drawn) {
+                    EXPECT_TRUE(drawn) << (drawn ? "" : drawn.error().message);
+                    told.set_value(drawn ? std::move(*drawn) : session::Drawn());
+                  });
+    drawn_ = told.get_future().get();
+    viewer_.done(1);
+  }
+  // Where the content is unknown, estimates of smaller pictures are less certain.
+  double spread() {
+    quality::Viewpoint unknown = drawn_.viewpoint;
+    unknown.content.reset();
+    return parts_.backend.quality.forecasts(drawn_.signature, unknown)[2].spread;
+  }
+  std::future<void> loads_done() {
+    const auto done = std::make_shared<std::promise<void>>();
+    EXPECT_TRUE(parts_.backend.loads.submit(
+        {{}, [done] { done->set_value(); }, true, dataset_->shared_info()}));
+    return done->get_future();
+  }
+
+  std::shared_ptr<data::Store> store_ = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  std::shared_ptr<data::Dataset> dataset_ = store_->add(small_file()).value();
+  transport::ServerParts parts_{{}, store_, std::make_shared<ThreadPool>(2)};
+  tasks::Viewer viewer_{parts_.backend, 1, "192.0.2.1"};
+  protocol::View view_ = view_of_small(60, 48);
+  session::Drawn drawn_;
+};
+
+TEST_F(Descriptions, FollowTheFinalFrame) {
+  draw_final();
+  EXPECT_EQ(drawn_.info.error_kind, "measured");
+  EXPECT_FALSE(drawn_.viewpoint.content);
+  const double before = spread();
+  viewer_.start(session::Calibrate{view_});
+  loads_done().wait();
+  EXPECT_LT(spread(), 0.99 * before);
+}
+
+TEST_F(Descriptions, OfAnOldViewEndWhenANewOneArrives) {
+  draw_final();
+  const double before = spread();
+  std::promise<void> held;
+  std::promise<void> holding;
+  ASSERT_TRUE(parts_.backend.loads.submit({{},
+                                           [&] {
+                                             holding.set_value();
+                                             held.get_future().wait();
+                                           },
+                                           true,
+                                           dataset_->shared_info()}));
+  holding.get_future().wait();
+  viewer_.start(session::Calibrate{view_});
+  protocol::View next = view_;
+  next.camera.eye = protocol::Vec3{3, -3, 2};
+  EXPECT_FALSE(prepared(viewer_, 2, next));
+  held.set_value();
+  loads_done().wait();
+  EXPECT_EQ(spread(), before);
+}
+
 // The data of one and a half steps fit: every frame waits until the previous ones are drawn.
 TEST(Viewer, SessionsAtDifferentStepsGetFramesWhenOneStepFits) {
   constexpr std::uint64_t sample_bytes = 4 * sizeof(float);  // a wind and a cloud

@@ -25,7 +25,7 @@ TEST(Content, FollowsExtinctionAndNotTheSizeOfThePicture) {
   protocol::View view = random_view(*dataset, 31, 0);
   const auto content = [&] {
     const auto completed = scene::complete(view, *dataset).value();
-    return frame::content_of(scene::build_scene(completed, *dataset).value());
+    return frame::content_of(scene::build_scene(completed, *dataset).value()).value();
   };
   for (auto& point : *view.scalars->front().extinction) point[1] *= 1e-4;
   const quality::Content thin = content();
@@ -60,7 +60,7 @@ TEST(Content, IsFiniteWhereLayersCoincide) {
     places->push_back({at(0, n % nx), at(1, n / nx % ny), at(2, joined ? k / 2 * 2 : k)});
   }
   scene.lattice.places = places;
-  const quality::Content content = frame::content_of(scene);
+  const quality::Content content = frame::content_of(scene).value();
   for (const double value :
        {content.lines, content.shade, content.line_depth, content.depth, content.cell_depth,
         content.tint, content.cell, content.step, content.order, content.step_cell}) {
@@ -81,9 +81,9 @@ TEST(Content, AValueAtAStepIsAsDenseAsItIsDrawn) {
   scene::ScalarLayer& layer = scene.scalars.front();
   layer.field = make_volume(scene.lattice, 1, [](int, double, double, double) { return 1.0F; });
   layer.extinction = {{1, 0}, {1, 10}};
-  const quality::Content at_step = frame::content_of(scene);
+  const quality::Content at_step = frame::content_of(scene).value();
   layer.extinction = {{0, 10}, {2, 10}};
-  const quality::Content dense = frame::content_of(scene);
+  const quality::Content dense = frame::content_of(scene).value();
   EXPECT_GT(dense.cell_depth, 0);
   EXPECT_DOUBLE_EQ(at_step.cell_depth, dense.cell_depth);
   EXPECT_DOUBLE_EQ(at_step.depth, dense.depth);
@@ -102,7 +102,7 @@ TEST(Content, TheLightOfAMediumIsThatOfAnyNumberOfCellsAlongARay) {
     });
     scene.scalars.push_back(medium(field, {1, 1, 1}));
     const double picture = 120.0 / 90.0;  // its area in squares of its height
-    EXPECT_NEAR(frame::content_of(scene).step / (per_column * std::sqrt(0.5 * picture)), 1, 0.1)
+    EXPECT_NEAR(frame::content_of(scene)->step / (per_column * std::sqrt(0.5 * picture)), 1, 0.1)
         << cells;
   }
 }
@@ -119,7 +119,7 @@ TEST(Content, TheRimOfAnOpaqueMediumIsSharperThanACell) {
   scene.scalars.push_back(medium(field, {1, 1, 1}));
   const auto sharpness = [&](double extinction) {
     scene.scalars.front().extinction = {{0, 0}, {1, extinction}};
-    const quality::Content content = frame::content_of(scene);
+    const quality::Content content = frame::content_of(scene).value();
     return content.bends[2] / content.bends[4];  // at a tenth of a cell and at 0.8
   };
   EXPECT_GT(sharpness(100), 5 * sharpness(1e-3));
@@ -164,7 +164,7 @@ TEST(Content, ChangesOfLightAreThoseOfThePictureAtDistancesInIt) {
     view.image.height = 400;
     const auto completed = scene::complete(view, *dataset).value();
     scene::Scene scene = scene::build_scene(completed, *dataset).value();
-    const quality::Content content = frame::content_of(scene);
+    const quality::Content content = frame::content_of(scene).value();
     scene.method = scene::Method::slab;
     const engine::Image drawn = render(scene, 2).image;
     for (const std::size_t k : {3U, 4U}) {
@@ -196,13 +196,13 @@ TEST(Content, LinesAreSeenInTheDirectionInWhichTheyAreDrawn) {
   const double whole = 2.0 / 8;  // heights of the picture
   for (const auto& forward : {along_x, along_z}) {
     scene::Scene scene = scene_of_lines(forward);
-    EXPECT_NEAR(frame::content_of(scene).length, whole * std::sqrt(0.5), 1e-6);
+    EXPECT_NEAR(frame::content_of(scene)->length, whole * std::sqrt(0.5), 1e-6);
     scene.vector->scale = {1, 1, 0};
-    EXPECT_NEAR(frame::content_of(scene).length, forward.x != 0 ? 0 : whole, 1e-6) << "scaled";
+    EXPECT_NEAR(frame::content_of(scene)->length, forward.x != 0 ? 0 : whole, 1e-6) << "scaled";
     scene.vector->scale = {1, 1, 1};
     scene.vector->rate_x.assign(6, 0);
     scene.vector->rate_z.assign(6, 1);
-    EXPECT_NEAR(frame::content_of(scene).length, forward.x != 0 ? whole : 0, 1e-6) << "by rates";
+    EXPECT_NEAR(frame::content_of(scene)->length, forward.x != 0 ? whole : 0, 1e-6) << "by rates";
   }
 }
 
@@ -214,10 +214,10 @@ TEST(Content, LinesInTheFirstLayerOfAnOpaqueMediumAreSeen) {
       make_volume(scene.lattice, 1, [](int, double, double, double) { return 1.0F; });
   scene.scalars.push_back(medium(field, {1, 1, 1}));
   scene.scalars.front().extinction = {{0, 1e3}, {2, 1e3}};
-  const double dense = frame::content_of(scene).lines;
+  const double dense = frame::content_of(scene)->lines;
   scene.scalars.front().extinction = {{0, 1e12}, {2, 1e12}};
   EXPECT_GT(dense, 0.01);
-  EXPECT_NEAR(frame::content_of(scene).lines / dense, 1, 0.05);
+  EXPECT_NEAR(frame::content_of(scene)->lines / dense, 1, 0.05);
 }
 
 // Cells turned by 45 degrees about y, so that x of the data is along x + z.
@@ -234,7 +234,7 @@ TEST(Content, LinesFollowTurnedCells) {
     }
   }
   scene.lattice.places = places;
-  EXPECT_NEAR(frame::content_of(scene).length, 0, 1e-6);
+  EXPECT_NEAR(frame::content_of(scene)->length, 0, 1e-6);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
+#include <utility>
 #include <vector>
 
 #include "server/base/thread_pool.hpp"
@@ -31,8 +33,8 @@ void each_pixel(const scene::Scene& scene, const Visit& visit) {
   frame::RayKernels kernels(scene);
   const auto& view = kernels.view();
   const auto& dims = scene.lattice.dims;
-  for (int n = 0; n < 150; ++n) {
-    const frame::Index i{(7 * n + 3) % dims[0], (5 * n + 1) % dims[1], (3 * n) % dims[2]};
+  for (int n = 0; n < 300; ++n) {
+    const frame::Index i{(7 * n + 3) % dims[0], (11 * n / 20 + 1) % dims[1], (3 * n / 7) % dims[2]};
     const glm::dvec3 place = kernels.samples().place(i);
     const auto at = engine::reference::to_camera(
         view, engine::reference::plus({place.x, place.y, place.z}, -1, view.eye));
@@ -73,6 +75,15 @@ std::vector<scene::Scene> scenes() {
   out.back().scalars.clear();
   out.push_back(out[0]);
   out.back().vector.reset();
+  // From within, layers of different strides alternate by their distance from the eye.
+  for (const auto& [lines, medium] : {std::pair{1, 3}, std::pair{3, 2}, std::pair{1, 1}}) {
+    out.push_back(out[0]);
+    out.back().vector->stride = lines;
+    out.back().scalars[0].stride = medium;
+    const glm::dvec3 forward = glm::normalize(glm::dvec3(0.3, 1, -0.2));
+    out.back().camera =
+        look(glm::dvec3(0.13, -0.21, 0.07) + forward, forward, 1, 55, 45, true, 0.6);
+  }
   return out;
 }
 
@@ -84,7 +95,7 @@ TEST(RayLight, OfKernelsEqualsTheNaiveRenderer) {
     each_pixel(scene, [&](int x, int y, const auto& ray, const auto& kernels) {
       const frame::Light one = light.by_kernels(kernels, ray);
       const double off = std::sqrt(frame::square_difference(one, light_at(picture, x, y)));
-      EXPECT_LT(off, 1.5 * left_out) << x << ' ' << y;
+      EXPECT_LT(off, 1.5 * left_out) << scene.camera.eye.x << ' ' << x << ' ' << y;
       ++compared;
     });
     EXPECT_GT(compared, 50);
@@ -168,7 +179,7 @@ TEST(PixelTrials, FindErrorsThatFewPixelsHave) {
     const auto view = random_view(*dataset, number, seen.viewpoint, 640);
     const auto completed = scene::complete(view, *dataset).value();
     scene::Scene scene = scene::build_scene(completed, *dataset).value();
-    const double tried = frame::content_of(scene).trials->kernel;
+    const double tried = frame::content_of(scene)->trials->kernel;
     scene.method = scene::Method::slab;
     scene.slab_thickness = 0.25;
     const engine::Image truth = render(scene, 2).image;

@@ -202,6 +202,19 @@ TEST_F(Measure, EveryFormatOfAPictureReportsTheSameError) {
   EXPECT_GT(jpeg.jpeg_error.value(), 0);
 }
 
+// A description would delay the picture, and its error is known without.
+TEST_F(Measure, OnlyPicturesWithoutAMeasuredErrorAreDescribed) {
+  const Frame measured = drawn(protocol::MethodName::slab, Format::jpeg);
+  EXPECT_TRUE(measured.error);
+  EXPECT_FALSE(measured.content);
+  view.geometry.scale = {1e3, 1e3, 1e-3};
+  view.camera.eye.reset();
+  view = completed().view();
+  const Frame too_flat = drawn(protocol::MethodName::slab, Format::jpeg);
+  EXPECT_FALSE(too_flat.error);
+  EXPECT_TRUE(too_flat.content);
+}
+
 TEST_F(Measure, OnlyFullSizePicturesAreMeasured) {
   Encoding encoding;
   encoding.measure = true;
@@ -313,6 +326,15 @@ TEST_F(Measure, ViewUsesAveragesWhereItsDetailIsBelowOne) {
   EXPECT_LT(averaged, 36);
   view.method.detail = protocol::Detail::full;
   EXPECT_EQ(scene::detail_shown(completed()), 0);
+}
+
+TEST_F(Measure, CalibrationRunWithKnownContentReportsIt) {
+  quality::Content known;
+  known.lines = 0.123;
+  const auto done = calibrate(
+      completed(), *dataset, pool, cancel, workspace,
+      [&](const CalibrationSample& one) { EXPECT_EQ(one.viewpoint.content->lines, 0.123); }, known);
+  EXPECT_TRUE(done);
 }
 
 TEST_F(Measure, CancelledCalibrationRunStops) {

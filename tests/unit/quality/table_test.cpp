@@ -97,6 +97,47 @@ TEST(Table, UnknownContentIsThatOfTheNearestMeasurement) {
   EXPECT_NEAR(told / prior_of(half, nearer), 1, 1e-9);
 }
 
+// A picture is measured before its view is described.
+TEST(Table, DescribedLaterEqualsMeasuredWithItsContent) {
+  Viewpoint seen = sight_at(0);
+  seen.content = Content{};
+  seen.content->lines *= 2;
+  seen.content->cell *= 3;
+  Viewpoint unknown = seen;
+  unknown.content.reset();
+  Table at_once(kind);
+  at_once.add(half, seen, {0.02, {}});
+  Table later(kind);
+  later.add(half, unknown, {0.02, {}});
+  EXPECT_GT(later.forecast(half, unknown).spread, at_once.forecast(half, unknown).spread)
+      << "typical content is less certain";
+  later.describe(seen);
+  for (const double steps : {0.0, 1.0}) {
+    Viewpoint other = sight_at(steps);
+    other.content.reset();
+    for (const std::size_t setting : {half, merged, kernel}) {
+      const Forecast expected = at_once.forecast(setting, other);
+      const Forecast told = later.forecast(setting, other);
+      EXPECT_NEAR(told.error / expected.error, 1, 1e-9) << setting;
+      EXPECT_NEAR(told.spread, expected.spread, 1e-9) << setting;
+    }
+  }
+}
+
+// A measurement of unknown content is compared with a guess, which must not pass for known.
+TEST(Table, GuessedContentOfAMeasurementStaysAGuess) {
+  Table table(kind);
+  Viewpoint unknown = sight_at(0);
+  unknown.content.reset();
+  table.describe(sight_at(2));
+  const double before = table.forecast(merged, unknown).spread;
+  EXPECT_GT(before, table.forecast(merged, sight_at(0)).spread);
+  table.add(kernel, unknown, {0.01, {}});
+  const double known = table.forecast(merged, sight_at(0)).spread;
+  EXPECT_NEAR(table.forecast(merged, unknown).spread / before, 1, 0.05);
+  EXPECT_GT(table.forecast(merged, unknown).spread, 1.02 * known);
+}
+
 // A typical content is least certain, and that of another viewpoint the less the farther it is.
 TEST(Table, GuessedContentWidensTheSpread) {
   const auto unknown_at = [](double steps) {
