@@ -71,23 +71,65 @@ class Places {
       while (out.places.size() < places_count) {
         const auto taken = static_cast<std::uint32_t>(out.places.size());
         if ((taken + 0.5) * out.area >= one.up_to * places_count) break;
-        // Near the sample, at random.
-        const auto random = pcg3d({taken, 41, 43});
-        const double wide = 1.4 * one.pixels * std::cbrt(volume(one.sample));
-        const auto near = [&](double at, std::uint32_t bits) {
-          return at * one.pixels + wide * (bits / 4294967296.0 - 0.5);
-        };
-        const double x = view_.half_width + near(one.at[0], random[0]);
-        const double y = view_.half_height + near(one.at[1], random[1]);
-        const bool inside =
-            x >= 0 && y >= 0 && x <= 2 * view_.half_width && y <= 2 * view_.half_height;
-        out.places.push_back({one.sample, std::floor(x), std::floor(y), inside});
+        out.places.push_back(place_near(one.sample, one.at, one.pixels, taken));
       }
     }
     return out;
   }
 
  private:
+  // At random within the cell of a sample and 0.2 cells around, and within the picture if it may
+  // be: the area for which samples stand is that in the picture, and cells may be larger than it.
+  [[nodiscard]] Place place_near(const Index& i, const Vec& at, double pixels,
+                                 std::uint32_t taken) const {
+    constexpr std::uint32_t tries_most = 16;
+    constexpr double wide = 1.4;  // cells
+    std::array<std::array<double, 3>, 2>
+        across{};  // pixels, along the picture's axes, of each edge
+    std::array<double, 2> half{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const Vec edge = edge_of(i, a);
+      across[0][a] = wide * pixels * reference::dot(edge, view_.right);
+      across[1][a] = wide * pixels * reference::dot(edge, view_.down);
+      for (std::size_t b = 0; b < 2; ++b) half[b] += 0.5 * std::abs(across[b][a]);
+    }
+    const std::array<double, 2> size{2 * view_.half_width, 2 * view_.half_height};
+    const std::array<double, 2> middle{view_.half_width + at[0] * pixels,
+                                       view_.half_height + at[1] * pixels};
+    const auto is_inside = [&](double x, double y) {
+      return x >= 0 && y >= 0 && x < size[0] && y < size[1];
+    };
+    const auto share = [](std::uint32_t bits) { return bits / 4294967296.0; };
+    for (std::uint32_t n = 0; n < tries_most; ++n) {
+      const auto random = pcg3d({taken, 41, 43 + n});
+      std::array<double, 2> to = middle;
+      for (std::size_t a = 0; a < 3; ++a) {
+        for (std::size_t b = 0; b < 2; ++b) to[b] += (share(random[a]) - 0.5) * across[b][a];
+      }
+      if (is_inside(to[0], to[1])) return {i, std::floor(to[0]), std::floor(to[1]), true};
+    }
+    const auto random = pcg3d({taken, 41, 43 + tries_most});
+    std::array<double, 2> to{};
+    for (std::size_t b = 0; b < 2; ++b) {
+      const double low = std::max(0.0, middle[b] - half[b]);
+      const double high = std::min(size[b], middle[b] + half[b]);
+      to[b] = low + share(random[b]) * (high - low);
+    }
+    return {i, std::floor(to[0]), std::floor(to[1]), is_inside(to[0], to[1])};
+  }
+  // World units; of the last sample that from the one before.
+  [[nodiscard]] Vec edge_of(const Index& i, std::size_t a) const {
+    Vec edge{};
+    if (!samples_.scene().lattice.places) {
+      edge[a] = samples_.edge(i, a);
+      return edge;
+    }
+    const auto next = samples_.neighbour(i, a, 1);
+    const auto last = samples_.neighbour(i, a, -1);
+    if (!next && !last) return edge;
+    const glm::dvec3 way = samples_.place(next ? *next : i) - samples_.place(next ? i : *last);
+    return {way.x, way.y, way.z};
+  }
   [[nodiscard]] Vec from_eye(const Index& i) const {
     const glm::dvec3 place = samples_.place(i);
     return reference::plus({place.x, place.y, place.z}, -1, view_.eye);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
 
@@ -18,8 +19,10 @@ namespace reference = engine::reference;
 
 constexpr int pieces_of_slab = 4;
 
-// The mean cell along the view, of the coarsest medium (engine/plan).
+// The mean cell along the view, of the coarsest medium, or the least depth of a slab: of the
+// diagonal of the box (engine/plan).
 double slab_depth(const scene::Scene& scene) {
+  constexpr double slabs_max = 16384;
   int stride = scene.scalars.empty() && scene.vector ? scene.vector->stride : 1;
   for (const scene::ScalarLayer& layer : scene.scalars) stride = std::max(stride, layer.stride);
   double cells2 = 0;
@@ -32,7 +35,8 @@ double slab_depth(const scene::Scene& scene) {
     cells2 +=
         std::pow(scene.camera.forward[static_cast<glm::length_t>(a)] * count / together / whole, 2);
   }
-  return 1 / std::sqrt(cells2);
+  const double least = glm::length(scene.lattice.box_max - scene.lattice.box_min) / slabs_max;
+  return std::max(1 / std::sqrt(cells2), least);
 }
 
 const reference::Profile& profile() {
