@@ -15,8 +15,8 @@
 
 namespace windsplat::frame {
 
-// References are drawn from every sample of data with up to this many samples, and for larger data
-// from the level of the picture.
+// References are drawn from every sample of data with up to this many samples, if these are
+// resident; else from the level of the picture, and the errors do not contain those of merging.
 inline constexpr double truth_samples_max = 32.0 * 1024 * 1024;
 
 // The viewpoint of a completed view with its scene as asked for; its content is unknown if there is

@@ -33,7 +33,7 @@ void each_pixel(const scene::Scene& scene, const Visit& visit) {
   frame::RayKernels kernels(scene);
   const auto& view = kernels.view();
   const auto& dims = scene.lattice.dims;
-  for (int n = 0; n < 300; ++n) {
+  for (int n = 0; n < 400; ++n) {
     const frame::Index i{(7 * n + 3) % dims[0], (11 * n / 20 + 1) % dims[1], (3 * n / 7) % dims[2]};
     const glm::dvec3 place = kernels.samples().place(i);
     const auto at = engine::reference::to_camera(
