@@ -140,15 +140,6 @@ std::vector<Way> ways_of(const ArrayFile& file, const Placement& grid, int varia
   return ways;
 }
 
-// Whether the decoded chunks also contain other steps or levels, which are likely to be read next.
-bool hold_other_parts(const ArrayFile& file, const Placement& grid, int variable,
-                      const Levels& levels, const std::vector<std::size_t>& chunk) {
-  const auto& dims = file.contents().variables.at(static_cast<std::size_t>(variable)).dims;
-  const auto time = std::find(dims.begin(), dims.end(), grid.time);
-  return (time != dims.end() && chunk[static_cast<std::size_t>(time - dims.begin())] > 1) ||
-         levels.first + levels.count < grid.length[2];
-}
-
 // One block of a variable.
 struct Walk {
   std::vector<std::size_t> start;
@@ -221,8 +212,10 @@ Result<void> read_blocks(const ArrayFile& file, int variable, const std::vector<
 
 std::vector<Levels> level_parts(const ArrayFile& file, const Placement& grid, int variable,
                                 std::size_t levels_max) {
-  // Decoded bytes of a layer of chunks that every reader keeps between reads.
+  // Decoded bytes of a layer of chunks that every reader keeps between reads, and their number
+  // (netcdf::File::keep_chunks()); each part costs some time for each of them.
   constexpr double kept_bytes = 64 << 20;
+  constexpr double kept_chunks = 1000;
   if (grid.space[2] < 0) return {{0, 1}};
   const FileVariable& about = file.contents().variables.at(at(variable));
   const auto place = std::find(about.dims.begin(), about.dims.end(), grid.space[2]);
@@ -232,15 +225,19 @@ std::vector<Levels> level_parts(const ArrayFile& file, const Placement& grid, in
     return {};
   }
   const std::vector<std::size_t> chunk = file.chunk(variable);
-  double chunks_bytes = sizeof(double);
+  double chunks = 1;
+  double chunks_bytes = sizeof(double);  // chunks at the edges are whole too
   for (std::size_t d = 0; d < chunk.size(); ++d) {
-    const std::size_t along =
-        is_across(about.dims[d]) ? file.contents().dimensions.at(at(about.dims[d])).length : 1;
-    chunks_bytes *= static_cast<double>(std::max(chunk[d], along));
+    chunks_bytes *= static_cast<double>(chunk[d]);
+    if (!is_across(about.dims[d])) continue;
+    const std::size_t length = file.contents().dimensions.at(at(about.dims[d])).length;
+    const auto along = static_cast<double>((length + chunk[d] - 1) / chunk[d]);
+    chunks *= along;
+    chunks_bytes *= along;
   }
   const std::size_t deep = chunk[static_cast<std::size_t>(place - about.dims.begin())];
   const bool in_chunks = deep <= levels_max;
-  if (!in_chunks && chunks_bytes > kept_bytes) return {};
+  if (!in_chunks && (chunks > kept_chunks || chunks_bytes > kept_bytes)) return {};
   const std::size_t all = grid.length[2];
   const std::size_t most = in_chunks ? levels_max - levels_max % deep : levels_max;
   std::vector<Levels> out;
@@ -274,20 +271,30 @@ double decoded_step_bytes(const ArrayFile& file, const Placement& grid, int vari
   return std::max(decoded_bytes(file, variable, start, count), volume);
 }
 
-Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
-                           std::size_t step, const Levels& levels, float* out,
-                           const Progress& tell) {
+Result<void> read_levels(const ArrayFile& file, const Placement& grid, int variable,
+                         std::size_t step, const Levels& levels, float* out, const Progress& tell) {
   std::ptrdiff_t origin = 0;
   const std::vector<Way> ways = ways_of(file, grid, variable, step, levels, origin);
   const Packing packing = packing_of(file, variable);
   const auto mask = float_mask(packing);
   const auto& type = file.contents().variables.at(static_cast<std::size_t>(variable)).type;
-  auto done = type == "float32" && mask
-                  ? read_blocks<float>(file, variable, ways, origin, *mask, out, tell)
-                  : read_blocks<double>(file, variable, ways, origin, packing, out, tell);
-  if (done && !hold_other_parts(file, grid, variable, levels, file.chunk(variable))) {
-    file.forget_chunks(variable);
-  }
+  return type == "float32" && mask
+             ? read_blocks<float>(file, variable, ways, origin, *mask, out, tell)
+             : read_blocks<double>(file, variable, ways, origin, packing, out, tell);
+}
+
+void forget_step(const ArrayFile& file, const Placement& grid, int variable) {
+  const auto& dims = file.contents().variables.at(at(variable)).dims;
+  const auto time = std::find(dims.begin(), dims.end(), grid.time);
+  const auto place = static_cast<std::size_t>(time - dims.begin());
+  if (time == dims.end() || file.chunk(variable)[place] == 1) file.forget_chunks(variable);
+}
+
+Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
+                           std::size_t step, const Levels& levels, float* out,
+                           const Progress& tell) {
+  auto done = read_levels(file, grid, variable, step, levels, out, tell);
+  if (done && levels.first + levels.count >= grid.length[2]) forget_step(file, grid, variable);
   return done;
 }
 

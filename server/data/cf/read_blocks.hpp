@@ -29,13 +29,20 @@ struct Levels {
 
 // Unpacked values of those levels of a variable, NaN where masked; `out` has levels.count layers,
 // one for a variable without levels. Calls `tell` with the fraction done. Errors: bad_data.
+Result<void> read_levels(const ArrayFile& file, const Placement& grid, int variable,
+                         std::size_t step, const Levels& levels, float* out, const Progress& tell);
+// Frees the chunks that the file keeps of a variable, unless they contain other steps, which are
+// likely to be read next. For use after all levels of a step have been read.
+void forget_step(const ArrayFile& file, const Placement& grid, int variable);
+// read_levels(), then forget_step() if the highest level was read: for all levels at once, or from
+// the lowest to the highest.
 Result<void> read_variable(const ArrayFile& file, const Placement& grid, int variable,
                            std::size_t step, const Levels& levels, float* out,
                            const Progress& tell);
 
 // The parts in which all levels of a variable can be read one after the other, in the order of the
 // file, at no greater cost than together: of at most `levels_max` levels, and of whole chunks or of
-// chunks that the file keeps between reads. Empty: there are none.
+// chunks that the file keeps between reads, which are few. Empty: there are none.
 std::vector<Levels> level_parts(const ArrayFile& file, const Placement& grid, int variable,
                                 std::size_t levels_max);
 

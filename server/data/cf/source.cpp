@@ -152,8 +152,7 @@ class ArraySource final : public FileSource {
                           all);
         };
         float* const out = taker.room();
-        if (auto read =
-                read_variable(*file_, placement_, plan.variables[c], step, levels, out, tell);
+        if (auto read = read_levels(*file_, placement_, plan.variables[c], step, levels, out, tell);
             !read) {
           return read.error();
         }
@@ -162,6 +161,7 @@ class ArraySource final : public FileSource {
         taker.take({c, levels.first, levels.count});
         done += levels.count;
       }
+      forget_step(*file_, placement_, plan.variables[c]);
     }
     return true;
   }

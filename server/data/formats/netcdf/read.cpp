@@ -19,6 +19,10 @@ namespace {
 // Limit on the caches of all variables together, but at least one chunk; resident.cpp accounts for
 // it.
 constexpr double kept_bytes_max = 128 << 20;
+// HDF5 numbers chunks by a power of two along each dimension, and chunks whose numbers are equal
+// modulo the slots (a prime) replace each other. A layer of 1000 chunks (cf::level_parts()) has
+// numbers below 4000.
+constexpr std::size_t slots_min = 4133;
 
 // A scalar has no extent, but the library requires a valid pointer.
 const std::size_t* place(const std::vector<std::size_t>& lengths) {
@@ -89,7 +93,7 @@ void File::keep_chunks(int variable, const Block& block) const {
   float preemption = 0;
   if (nc_get_var_chunk_cache(group, id, &size, &slots, &preemption) != NC_NOERR) return;
   if (storage.filtered && size < wanted) {
-    nc_set_var_chunk_cache(group, id, wanted, slots, preemption);
+    nc_set_var_chunk_cache(group, id, wanted, std::max(slots, slots_min), preemption);
     size = wanted;
   }
   forget_others(variable, size);
