@@ -58,9 +58,7 @@ ArrivingVolume::ArrivingVolume(Volume& volume, const WindowSize& size, const flo
     : volume_(volume),
       size_(size),
       window_(window),
-      arrived_(static_cast<std::size_t>(volume.dims[2])) {
-  volume.values = Samples(volume.samples() * static_cast<std::size_t>(volume.components));
-}
+      arrived_(static_cast<std::size_t>(volume.dims[2])) {}
 
 bool ArrivingVolume::take(const std::string& payload) {
   Reader in(payload);

@@ -24,8 +24,7 @@ WindowSize window_size(const Volume& volume);
 
 class ArrivingVolume {
  public:
-  // Sets volume.values to zeros of its size. `window`: floats of both halves, which the loader may
-  // write at any time.
+  // volume.values: zeros. `window`: floats of both halves, which the loader may write at any time.
   ArrivingVolume(Volume& volume, const WindowSize& size, const float* window);
 
   // Takes the part that a message describes. False: it is malformed, or came before.

@@ -105,10 +105,13 @@ struct RemoteSource::State {
 
   // Ensures a running loader with the same files open as initially.
   Result<void> be_ready() {
-    if (loader.process().runs()) return {};
+    const Error is_over = make_error(ErrorKind::cancelled, "reading was cancelled");
+    if (loader.process().runs()) return is_cancelled() ? Result<void>(is_over) : Result<void>();
     drop_transfer();
     auto encoded = loader.open();
     if (!encoded) return encoded.error();
+    // cancel() could not end a loader that was just being started.
+    if (is_cancelled()) return is_over;
     if (digest_of(*encoded) == digest) return {};
     release();
     return make_error(ErrorKind::bad_data,
@@ -135,8 +138,6 @@ struct RemoteSource::State {
 
   Result<Volume> read(std::size_t field, std::size_t step) {
     if (auto ready = be_ready(); !ready) return ready.error();
-    // cancel() could not end a loader that was just being started.
-    if (is_cancelled()) return make_error(ErrorKind::cancelled, "reading was cancelled");
     const FieldInfo& about = info.fields[field];
     Volume volume;
     volume.dims = info.grid.dims();
@@ -147,6 +148,8 @@ struct RemoteSource::State {
       if (!done) return done.error();
       if (*done) return volume;
       wholes.insert(field);
+      // The loader's memory may have exceeded the limit meanwhile.
+      if (auto ready = be_ready(); !ready) return ready.error();
     }
     if (auto done = read_whole(field, step, volume); !done) return done.error();
     return volume;
@@ -159,9 +162,11 @@ struct RemoteSource::State {
     return is_worth_keeping(window.floats() * sizeof(float));
   }
 
-  // false: the field can only be read as a whole.
+  // false: the field can only be read as a whole; the volume has no values.
   Result<bool> read_in_parts(std::size_t field, std::size_t step, const WindowSize& window,
                              Volume& volume) {
+    // First, as it may fail: later, the loader has memory that is not known here, or the reverse.
+    volume.values = Samples(values_of(volume));
     const bool is_new = !transfer;
     if (is_new) {
       auto made = Transfer::make(window.floats(), true);
@@ -180,7 +185,10 @@ struct RemoteSource::State {
       return done.error();
     }
     if (!loader.count_memory()) release();
-    if (done->kind == Kind::whole) return false;
+    if (done->kind == Kind::whole) {
+      volume.values = {};
+      return false;
+    }
     const bool is_complete = arriving.is_complete();
     if (is_complete && arriving.finish()) return true;
     release();

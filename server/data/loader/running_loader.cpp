@@ -150,6 +150,7 @@ Result<Message> RunningLoader::call(const Call& what) {
   Fate fate = send_message(process_.socket(), what.kind, what.payload, what.descriptor,
                            next_deadline(patience));
   std::size_t questions = 0;
+  bool has_parts = false;
   while (fate == Fate::done) {
     Message heard;
     const std::size_t bytes_max = what.answer == Kind::opened
@@ -164,8 +165,9 @@ Result<Message> RunningLoader::call(const Call& what) {
     }
     if (fate != Fate::done) break;
     const bool is_answer = heard.kind == what.answer || heard.kind == Kind::failed ||
-                           (heard.kind == Kind::whole && what.take);
+                           (heard.kind == Kind::whole && what.take && !has_parts);
     if (is_answer) return checked(*files_, std::move(heard));
+    has_parts = has_parts || heard.kind == Kind::part;
     fate = heard.kind == Kind::progress          ? hear_progress(heard.payload)
            : heard.kind == Kind::part            ? hear_part(heard.payload, what, patience)
            : ++questions > 2 * limits_.opens_max ? Fate::broken

@@ -8,14 +8,17 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "server/data/loader/arriving_volume.hpp"
 #include "server/data/loader/loader.hpp"
 #include "server/data/open/open.hpp"
+#include "server/data/resident/budget.hpp"
 #include "tests/unit/data/loader/faulty_loader.hpp"
 #include "tests/unit/data/loader/loader_fixture.hpp"
 
@@ -162,6 +165,28 @@ TEST_F(Window, ProgressRisesToOne) {
   for (const double done : told) EXPECT_LE(done, 1);
 }
 
+TEST(WindowSize, VolumesBeyondTwoHalvesHaveAWindow) {
+  const auto layers = [](std::array<int, 3> dims, int components) {
+    Volume volume;
+    volume.dims = dims;
+    volume.components = components;
+    return window_size(volume).layers;
+  };
+  EXPECT_EQ(layers({256, 256, 16}, 1), 0U);
+  EXPECT_EQ(layers({256, 256, 17}, 1), layers_of_half);
+  EXPECT_EQ(layers({256, 256, 8}, 2), 0U);
+  EXPECT_EQ(layers({256, 256, 9}, 2), layers_of_half);
+  // A layer that is larger than 2 MiB.
+  EXPECT_EQ(layers({1024, 1024, 2}, 1), 0U);
+  EXPECT_EQ(layers({1024, 1024, 3}, 1), 1U);
+  EXPECT_EQ(layers({2048, 2048, 3}, 1), 1U);
+  EXPECT_EQ(layers({2048, 2049, 3}, 1), 0U);
+}
+
+TEST_F(Window, OneLayerBeyondTheWindowReadsAsInThisProcess) {
+  expect_same_as_here({NC_64BIT_DATA, falling(17), {}});
+}
+
 // Scripts that are asked for a field of 20 layers of 256 x 256 samples.
 class FaultyParts : public FaultyLoader {
  protected:
@@ -257,6 +282,37 @@ TEST_F(FaultyParts, InvalidNumbersOfAComponentMaskTheVector) {
 TEST_F(FaultyParts, PartsOfAWholeVolumeAreRefused) {
   send_parts("send('whole')\nreceive()\npart(0, 0, 8, 0)\n");
   expect_violation();
+}
+
+TEST_F(FaultyParts, WholeVolumesAfterPartsAreRefused) {
+  send_parts("part(0, 0, 8, 0)\nsend('whole')\nreceive()\nsend('filled')\n");
+  expect_violation();
+}
+
+// The memory limit ends the loader once it has answered that it needs the memory of a whole volume.
+TEST_F(FaultyParts, EndedLoaderIsStartedAgainForAWholeVolume) {
+  const std::string second = folder_ / "second";
+  send_parts("if not os.path.exists('" + second + "'):\n" + "    open('" + second +
+             "', 'w').close()\n"
+             "    send('progress', struct.pack('<d', 0.5))\n"
+             "    grown = b'x' * (8 << 20)\n"
+             "    send('whole')\n"
+             "    receive()\n");
+  auto volume = Result<Volume>(make_error(ErrorKind::out_of_memory, "not read"));
+  // Its memory may be counted before it answers, which is an error.
+  for (int tries = 0; tries < 20; ++tries) {
+    std::filesystem::remove(second);
+    limits_.budget = std::make_shared<Budget>(std::uint64_t{256} << 20);
+    const auto source = opened();
+    ASSERT_TRUE(source) << source.error().message;
+    Reservation others(limits_.budget);
+    (*source)->on_progress([&](double) { EXPECT_TRUE(others.resize(limits_.budget->room())); });
+    volume = (*source)->read(0, 0);
+    EXPECT_TRUE(std::filesystem::exists(second));
+    if (volume || volume.error().kind != ErrorKind::out_of_memory) break;
+  }
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->values.size(), 20 * layer);
 }
 
 TEST_F(FaultyParts, LaterChangesOfTheWindowHaveNoEffect) {
