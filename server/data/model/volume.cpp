@@ -156,6 +156,7 @@ bool VolumeMeasure::finish(Volume& volume) const {
     const bool scalar = volume.components == 1;
     volume.range[0] = scalar ? static_cast<float>(low_) : length_of(low_);
     volume.range[1] = scalar ? static_cast<float>(high_) : length_of(high_);
+    for (float& bound : volume.range) bound += 0.0F;  // -0 becomes 0, in any order of samples
   }
   return sound_;
 }

@@ -55,6 +55,13 @@ TEST(Histogram, RampFillsItsBinsEvenly) {
   EXPECT_EQ(h.below + h.above + h.masked, 0);
 }
 
+TEST(Histogram, RangeHasNoNegativeZeroInAnyOrderOfSamples) {
+  for (const float first : {0.0F, -0.0F}) {
+    const Volume volume = volume_of({first, -first});
+    EXPECT_FALSE(std::signbit(volume.range[0]) || std::signbit(volume.range[1]));
+  }
+}
+
 TEST(Histogram, DefaultRangeIsThatOfTheVolumeIncludingItsUpperEdge) {
   const Histogram h = made(ramp(5), {.bins = 2});
   EXPECT_THAT(*h.range, ElementsAre(0, 4));
