@@ -234,8 +234,12 @@ class TryingPixels {
     const auto error = [&](const MeanSquare& of) {
       return std::sqrt(spread.area / pixels * (of.mean() + of.standard_error()));
     };
-    // By depth in quarters of a slab, a method of order 2 lacks a sixteenth and a quarter.
-    out.trials = {error(kernel), error(slab) * 16 / 15, error(half) * 4 / 3};
+    // In n pieces of a slab a method of order 2 lacks 1 / n^2 of its error: of quarters a
+    // sixteenth, of two pieces of half a slab a quarter.
+    const auto of_pieces = [](double n) { return n * n / (n * n - 1); };
+    const double n = light_.pieces_of_slab();
+    out.trials = {error(kernel), error(slab) * of_pieces(n), error(half) * of_pieces(0.5 * n),
+                  light_.thinnest()};
     return out;
   }
 

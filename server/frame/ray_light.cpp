@@ -17,12 +17,10 @@ namespace {
 
 namespace reference = engine::reference;
 
-constexpr int pieces_of_slab = 4;
+constexpr double pieces_of_cell = 4;
 
-// The mean cell along the view, of the coarsest medium, or the least depth of a slab: of the
-// diagonal of the box (engine/plan).
-double slab_depth(const scene::Scene& scene) {
-  constexpr double slabs_max = 16384;
+// The mean cell along the view, of the coarsest medium.
+double cell_depth(const scene::Scene& scene) {
   int stride = scene.scalars.empty() && scene.vector ? scene.vector->stride : 1;
   for (const scene::ScalarLayer& layer : scene.scalars) stride = std::max(stride, layer.stride);
   double cells2 = 0;
@@ -35,8 +33,13 @@ double slab_depth(const scene::Scene& scene) {
     cells2 +=
         std::pow(scene.camera.forward[static_cast<glm::length_t>(a)] * count / together / whole, 2);
   }
-  const double least = glm::length(scene.lattice.box_max - scene.lattice.box_min) / slabs_max;
-  return std::max(1 / std::sqrt(cells2), least);
+  return 1 / std::sqrt(cells2);
+}
+
+// Of a slab: of the diagonal of the box (engine/plan).
+double least_depth(const scene::Scene& scene) {
+  constexpr double slabs_max = 16384;
+  return glm::length(scene.lattice.box_max - scene.lattice.box_min) / slabs_max;
 }
 
 const reference::Profile& profile() {
@@ -60,7 +63,13 @@ double square_difference(const Light& a, const Light& b) {
 }
 
 RayLight::RayLight(const scene::Scene& scene)
-    : scene_(scene), view_(reference::make_view(scene.camera)), slab_(slab_depth(scene)) {
+    : scene_(scene), view_(reference::make_view(scene.camera)) {
+  const double cell = cell_depth(scene);
+  const double least = least_depth(scene);
+  constexpr double cells_most = 1e9;
+  thinnest_ = std::min(least / cell, cells_most);
+  slab_ = std::max(cell, least);
+  pieces_of_slab_ = pieces_of_cell * std::max(1.0, std::ceil(thinnest_));
   near_ = view_.perspective ? view_.near : std::numeric_limits<double>::lowest();
   anchor_ = -reference::dot(view_.forward, view_.eye);
 }
@@ -128,64 +137,70 @@ void RayLight::meet(const RayKernelList& kernels, const PictureRay& ray) {
 RayLight::ByDepth RayLight::by_depth(const RayKernelList& kernels, const PictureRay& ray) {
   meet(kernels, ray);
   ByDepth out;
-  if (stretches_.empty()) {
-    for (const auto& surface : surfaces_) reference::cross_surface(surface, out.exact);
-    out.slabs = out.halves = out.exact;
-    return out;
-  }
   double from = 1e300;
   double to = -1e300;
-  for (const auto& surface : surfaces_) {
-    from = std::min(from, surface.depth);
-    to = std::max(to, surface.depth);
-  }
   for (const Stretch& one : stretches_) {
     from = std::min(from, one.on.middle - one.half);
     to = std::max(to, one.on.middle + one.half);
   }
   from = std::max(from, near_);
-  const double first = std::floor((from - anchor_) / slab_);
-  const double slabs = std::floor((to - anchor_) / slab_) + 1 - first;
-  constexpr double slabs_most = 4096;
-  out.known = slabs < slabs_most;
-  if (!(slabs > 0) || !out.known) return out;
-  const double start = anchor_ + first * slab_;
-  const double step = slab_ / pieces_of_slab;
-  pieces_.assign(pieces_of_slab * static_cast<std::size_t>(slabs), {});
-  for (const Stretch& one : stretches_) {
-    const double begin = std::max(one.on.middle - one.half, near_) - start;
-    const double end = one.on.middle + one.half - start;
-    if (end <= 0) continue;
-    const auto last = std::min(pieces_.size() - 1, static_cast<std::size_t>(end / step));
-    for (auto k = static_cast<std::size_t>(std::max(begin, 0.0) / step); k <= last; ++k) {
-      // Of a piece that the near plane cuts the part beyond it.
-      const double far = start + static_cast<double>(k + 1) * step;
-      const double length = std::min(step, far - near_);
-      if (length <= 0) continue;
-      const double z = far - 0.5 * length - one.on.middle;
-      const double tau = one.on.rho * profile()(one.on.least2 + one.on.cells2 * z * z) * length;
-      for (std::size_t c = 0; c < 3; ++c) pieces_[k][c] += tau * one.color[c];
-      pieces_[k][3] += tau;
-    }
+  if (!(to >= from)) {
+    for (const auto& surface : surfaces_) reference::cross_surface(surface, out.exact);
+    out.slabs = out.halves = out.exact;
+    return out;
   }
-  std::size_t next_exact = 0;
-  std::size_t next_half = 0;
-  std::size_t next_slab = 0;
-  const auto place = [&](std::size_t piece) { return start + static_cast<double>(piece) * step; };
-  for (std::size_t k = 0; k < pieces_.size(); k += pieces_of_slab) {
-    Piece whole{};
-    for (std::size_t h = k; h < k + pieces_of_slab; h += 2) {
-      Piece half{};
-      for (std::size_t p = h; p < h + 2; ++p) {
-        for (std::size_t c = 0; c < 4; ++c) half[c] += pieces_[p][c];
-        pass(pieces_[p], place(p), step, next_exact, out.exact);
-      }
-      for (std::size_t c = 0; c < 4; ++c) whole[c] += half[c];
-      pass(half, place(h), 2 * step, next_half, out.halves);
-    }
-    pass(whole, place(k), slab_, next_slab, out.slabs);
-  }
+  // Of the slabs only pieces where there is a medium: cells may be much thinner than a slab.
+  constexpr double pieces_most = 16384;
+  const double step = slab_ / pieces_of_slab_;
+  const double start = anchor_ + std::floor((from - anchor_) / slab_) * slab_;
+  const double first = std::floor((from - start) / step);
+  const double count = std::floor((to - start) / step) + 1 - first;
+  out.known = count < pieces_most;
+  if (!out.known) return out;
+  pieces_.assign(static_cast<std::size_t>(count), {});
+  const Division division{start, step, static_cast<std::size_t>(first)};
+  for (const Stretch& one : stretches_) divide(one, division);
+  const auto whole = static_cast<std::size_t>(pieces_of_slab_);
+  pass_in(division, 1, out.exact);
+  pass_in(division, whole / 2, out.halves);
+  pass_in(division, whole, out.slabs);
   return out;
+}
+
+// Its light in each piece.
+void RayLight::divide(const Stretch& one, const Division& by) {
+  const double begin = std::max(one.on.middle - one.half, near_) - by.start;
+  const double end = one.on.middle + one.half - by.start;
+  if (end <= 0) return;
+  const auto last =
+      std::min(by.first + pieces_.size() - 1, static_cast<std::size_t>(end / by.step));
+  const auto next = static_cast<std::size_t>(std::max(begin, 0.0) / by.step);
+  for (std::size_t k = std::max(by.first, next); k <= last; ++k) {
+    // Of a piece that the near plane cuts the part beyond it.
+    const double far = by.start + static_cast<double>(k + 1) * by.step;
+    const double length = std::min(by.step, far - near_);
+    if (length <= 0) continue;
+    const double z = far - 0.5 * length - one.on.middle;
+    const double tau = one.on.rho * profile()(one.on.least2 + one.on.cells2 * z * z) * length;
+    Piece& piece = pieces_[k - by.first];
+    for (std::size_t c = 0; c < 3; ++c) piece[c] += tau * one.color[c];
+    piece[3] += tau;
+  }
+}
+
+// Every `together` pieces as one.
+void RayLight::pass_in(const Division& by, std::size_t together, Light& to) const {
+  std::size_t next = 0;
+  const std::size_t end = by.first + pieces_.size();
+  for (std::size_t k = by.first / together * together; k < end; k += together) {
+    Piece sum{};
+    for (std::size_t p = std::max(k, by.first); p < std::min(k + together, end); ++p) {
+      for (std::size_t c = 0; c < 4; ++c) sum[c] += pieces_[p - by.first][c];
+    }
+    const double begin = by.start + static_cast<double>(k) * by.step;
+    pass(sum, begin, static_cast<double>(together) * by.step, next, to);
+  }
+  for (; next < surfaces_.size(); ++next) reference::cross_surface(surfaces_[next], to);
 }
 
 // A homogeneous piece, beyond the near plane, and the lines in it.

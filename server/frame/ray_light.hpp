@@ -1,6 +1,8 @@
 // The light of a ray through kernels: in the order of method `kernel`, and by depth.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <vector>
 
 #include "server/engine/reference/ray.hpp"
@@ -24,11 +26,16 @@ class RayLight {
   [[nodiscard]] Light by_kernels(const RayKernelList& kernels, const PictureRay& ray) const;
   struct ByDepth {
     Light exact;
-    Light slabs;        // of one cell
-    Light halves;       // slabs of half a cell
-    bool known = true;  // false: of too many slabs
+    Light slabs;        // of one cell, or of the least depth if cells are thinner
+    Light halves;       // half as thick as these
+    bool known = true;  // false: of too many pieces
   };
+  // `exact`: in pieces of a quarter of a cell.
   ByDepth by_depth(const RayKernelList& kernels, const PictureRay& ray);
+  // The least depth of a slab, in cells.
+  [[nodiscard]] double thinnest() const { return thinnest_; }
+  // Pieces of a slab.
+  [[nodiscard]] double pieces_of_slab() const { return pieces_of_slab_; }
 
  private:
   struct Stretch {
@@ -38,14 +45,24 @@ class RayLight {
   };
   // Optical depth times colour, and optical depth.
   using Piece = std::array<double, 4>;
+  // Pieces from number `first` on, counted from where a slab starts.
+  struct Division {
+    double start = 0;  // view depth
+    double step = 0;
+    std::size_t first = 0;
+  };
   [[nodiscard]] engine::reference::Surface body(const PictureRay& ray) const;
   void meet(const RayKernelList& kernels, const PictureRay& ray);
+  void divide(const Stretch& one, const Division& by);
+  void pass_in(const Division& by, std::size_t together, Light& to) const;
   void pass(const Piece& piece, double begin, double whole, std::size_t& next, Light& to) const;
 
   const scene::Scene& scene_;
   engine::reference::View view_;
   double near_ = 0;
-  double slab_ = 1;    // depth of a slab of one cell
+  double slab_ = 1;  // depth of a slab of one cell, or the least one
+  double thinnest_ = 0;
+  double pieces_of_slab_ = 4;
   double anchor_ = 0;  // view depth of the middle of the volume
   std::vector<Stretch> stretches_;
   std::vector<engine::reference::Surface> surfaces_;

@@ -19,8 +19,9 @@ using AtDistances = std::array<double, distances_count>;
 // picture of linear premultiplied RGBA.
 struct Trials {
   double kernel = 0;  // of method `kernel`
-  double slab = 0;    // of slabs of one cell
-  double half = 0;    // of slabs of half a cell
+  double slab = 0;    // of slabs of one cell, or of the least depth if cells are thinner
+  double half = 0;    // of slabs of half a cell, of no meaning if slabs are at least one cell thick
+  double thinnest = 0;  // the least depth of a slab, cells
 };
 
 // Lengths are in heights of the picture. Means are over what is visible, weighted by its light. The

@@ -140,8 +140,10 @@ double tried_error(const Kind& kind, const Setting& setting, const Viewpoint& vi
   const bool known = viewpoint.content && viewpoint.content->trials;
   const Trials& trials = known ? *viewpoint.content->trials : typical_trials[shown(kind)];
   if (setting.method == protocol::MethodName::kernel) return trials.kernel;
-  const double thickness = kind.thickness / setting.thinner;
-  if (thickness >= 1) return trials.slab * thickness * thickness;  // of order 2
+  // Thinner slabs than the least ones are drawn as these.
+  const double thickness = std::max(kind.thickness / setting.thinner, trials.thinnest);
+  const double tried = std::max(1.0, trials.thinnest);
+  if (thickness >= tried) return trials.slab * std::pow(thickness / tried, 2);  // of order 2
   if (thickness <= 0.5) return trials.half * std::pow(2 * thickness, 2);
   const double share = -std::log2(thickness);
   return std::pow(trials.slab, 1 - share) * std::pow(trials.half, share);

@@ -17,7 +17,9 @@
 #include "server/frame/pixel_trials.hpp"
 #include "server/frame/ray_kernels.hpp"
 #include "server/frame/ray_light.hpp"
+#include "server/quality/laws.hpp"
 #include "server/quality/setting.hpp"
+#include "server/quality/view_traits.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "tests/numerics/family/family.hpp"
@@ -188,6 +190,55 @@ TEST(PixelTrials, FindErrorsThatFewPixelsHave) {
     const double error = frame::difference_of(drawn.rgba, truth.rgba).rmse;
     EXPECT_GT(error, 1e-3);
     EXPECT_LT(std::abs(std::log(tried / error)), std::log(2)) << member.field.name << error;
+  }
+}
+
+// Cells of an optical depth of about 0.25 across, seen at a slant.
+scene::Scene flat_cells(double flatness) {
+  scene::Scene scene = cloudy_scene(4, 24);
+  scene.lattice = even_lattice({4, 4, 4}, {0.5, 0.5, 0.5 / flatness});
+  const auto wave = [&](int c, double x, double y, double z) {
+    return static_cast<float>(1 + 0.5 * std::sin(3 * x + c) * std::cos(2 * y - 3 * z * flatness));
+  };
+  scene.vector =
+      plain_lines(make_volume(scene.lattice, 3,
+                              [&](int c, double x, double y, double z) {
+                                return wave(c, x, y, z) / static_cast<float>(c == 2 ? flatness : 1);
+                              }),
+                  {0.9F, 0.5F, 0.1F});
+  scene.vector->length = 0.3;
+  const auto extinction = [&](int c, double x, double y, double z) {
+    return static_cast<float>(0.5 * flatness) * wave(c, x, y, z);
+  };
+  scene.scalars = {medium(make_volume(scene.lattice, 1, extinction), {0.5F, 0.6F, 0.9F})};
+  scene.scalars[0].color =
+      ramp_color(0.2 * flatness, 0.8 * flatness, {0.9F, 0.2F, 0.1F}, {0.2F, 0.5F, 1.0F});
+  return scene;
+}
+
+// Slabs have a least depth: from a flatness of some 1e4 on, all layers of these cells lie in one.
+TEST(PixelTrials, ResolveCellsMuchFlatterThanSlabs) {
+  ThreadPool pool(2);
+  for (const double flatness : {1.0, 1e3, 1e4, 1e5, 1e6, 1e7}) {
+    for (const double thickness : {1.0, 0.25}) {
+      scene::Scene scene = flat_cells(flatness);
+      const auto truth = engine::reference::render(scene, pool, {}, {1e-6}).value();
+      const auto content = frame::content_of(scene);
+      ASSERT_TRUE(content && content->trials) << flatness;
+      quality::Viewpoint seen;
+      seen.content = content;
+      const auto check = [&](protocol::MethodName method, double least) {
+        const double tried = quality::tried_error({true, true, 1, thickness}, {method, 0, 0}, seen);
+        const double error = frame::difference_of(render(scene, 2).image.rgba, truth.rgba).rmse;
+        EXPECT_GT(error, least) << flatness;
+        EXPECT_LT(std::abs(std::log(tried / error)), std::log(2))
+            << flatness << ' ' << thickness << ' ' << tried << ' ' << error;
+      };
+      check(protocol::MethodName::kernel, 1e-3);
+      scene.method = scene::Method::slab;
+      scene.slab_thickness = thickness;
+      check(protocol::MethodName::slab, flatness > 1e4 ? 1e-3 : 1e-5);
+    }
   }
 }
 

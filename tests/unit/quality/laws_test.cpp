@@ -121,6 +121,21 @@ TEST(Laws, ErrorsOfMethodsAreThoseOfTriedPixels) {
   }
 }
 
+// Slabs that would be thinner than the least ones are drawn as these.
+TEST(Laws, SlabsBelowTheLeastDepthHaveItsError) {
+  Viewpoint seen{2, {}, 640, 480};
+  seen.content = Content{};
+  const auto tried = [&](double thinnest, double thickness, int thinner) {
+    seen.content->trials = Trials{4e-3, 1e-3, 4e-4, thinnest};
+    return tried_error({true, true, 1, thickness}, {MethodName::slab, 0, 0, thinner}, seen);
+  };
+  for (const double thickness : {0.25, 1.0, 4.0}) EXPECT_NEAR(tried(4, thickness, 1), 1e-3, 1e-12);
+  EXPECT_NEAR(tried(4, 8, 1), 4e-3, 1e-12);
+  EXPECT_NEAR(tried(4, 8, 4), 1e-3, 1e-12);
+  for (const int thinner : {2, 4}) EXPECT_NEAR(tried(0.5, 1, thinner), 4e-4, 1e-12);
+  EXPECT_NEAR(tried(0.1, 1, 4), 1e-4, 1e-12);
+}
+
 // Lines that cover less of the picture lose less in a smaller one, and so does a medium whose light
 // differs less from cell to cell.
 TEST(Laws, ErrorsGrowWithTheirCauses) {
