@@ -34,6 +34,16 @@ bool is_normal_component(const FileVariable& one, const Topology& topology) {
   return is_mpas || is_icon || lower(one.standard_name) == "normal_velocity";
 }
 
+// Models of the ocean: MPAS-Ocean, and levels that are depths.
+bool is_in_water(const FileVariable& normal, const FileContents& contents) {
+  return variable_named(contents, "layerThickness") >= 0 ||
+         variable_named(contents, "refBottomDepth") >= 0 ||
+         lower(normal.name) == "normalvelocity" ||
+         std::any_of(normal.dims.begin(), normal.dims.end(), [&](int d) {
+           return lower(contents.dimensions.at(at(d)).name).starts_with("depth");
+         });
+}
+
 // The first component of a vector at the cells; -1 if there is none.
 int vector_at_cells(const FileContents& contents, const std::vector<int>& cells) {
   for (std::size_t v = 0; v < contents.variables.size(); ++v) {
@@ -76,9 +86,12 @@ std::string problem_of_scalar(const FileVariable& one) {
 
 }  // namespace
 
-void EdgeNotes::add(const std::string& name, bool is_normal) {
-  std::string& told = is_normal ? normals_ : means_;
-  told += (told.empty() ? "" : ", ") + in_quotes(name);
+void EdgeNotes::add(const std::string& name, const EdgeUse& use) {
+  const auto append = [&](std::string& told) {
+    told += (told.empty() ? "" : ", ") + in_quotes(name);
+  };
+  append(use.is_normal ? normals_ : means_);
+  if (use.missing == MissingNormal::wall) append(walls_);
 }
 
 void EdgeNotes::tell(std::vector<std::string>& notes) const {
@@ -88,6 +101,10 @@ void EdgeNotes::tell(std::vector<std::string>& notes) const {
   if (!normals_.empty()) {
     notes.push_back("normal to the edges of the mesh: " + normals_ +
                     "; drawn are the vectors at the cells whose components are nearest to these");
+  }
+  if (!walls_.empty()) {
+    notes.push_back("missing components count as 0, the flow through a coast or the bottom: " +
+                    walls_);
   }
 }
 
@@ -100,6 +117,7 @@ EdgeUse use_of_edges(const FileVariable& variable, const FileContents& contents,
     out.reason = place + "which cells they belong to is not in the file";
   } else if (is_normal_component(variable, topology)) {
     out.is_normal = true;
+    if (is_in_water(variable, contents)) out.missing = MissingNormal::wall;
     const int vector = vector_at_cells(contents, cells);
     if (vector >= 0) {
       out.reason = place + "the file has vectors at the cells, with the component " +
@@ -116,12 +134,7 @@ EdgeUse use_of_edges(const FileVariable& variable, const FileContents& contents,
 
 std::array<FileVariable, 2> components_of_normal(const FileVariable& normal,
                                                  const FileContents& contents, bool on_sphere) {
-  const bool in_water = variable_named(contents, "layerThickness") >= 0 ||
-                        variable_named(contents, "refBottomDepth") >= 0 ||
-                        lower(normal.name) == "normalvelocity" ||
-                        std::any_of(normal.dims.begin(), normal.dims.end(), [&](int d) {
-                          return lower(contents.dimensions.at(at(d)).name).starts_with("depth");
-                        });
+  const bool in_water = is_in_water(normal, contents);
   std::array<FileVariable, 2> out{normal, normal};
   for (const bool is_first : {true, false}) {
     FileVariable& one = out.at(is_first ? 0 : 1);

@@ -14,12 +14,14 @@ namespace windsplat::data::cf {
 struct EdgeUse {
   std::string reason;      // why it is left out; empty if it is drawn
   bool is_normal = false;  // a component along the normals of the edges, of which vectors are made
+  MissingNormal missing = MissingNormal::unknown;
 };
 
 // Scalars are drawn if nothing suggests that their sign or size depends on the direction of an
 // edge: floating-point numbers with a unit that is no angle and no rate, whose names and
 // descriptions speak of no flow. Normal components are velocities that MPAS, MPAS-Ocean and ICON
-// name so, in files that give the normals and have no vector at the cells.
+// name so, in files that give the normals and have no vector at the cells. In water a missing one
+// is a wall.
 // contents: of the file; cells: its dimensions that list the cells.
 EdgeUse use_of_edges(const FileVariable& variable, const FileContents& contents,
                      const std::vector<int>& cells, const Topology& topology,
@@ -33,12 +35,13 @@ std::array<FileVariable, 2> components_of_normal(const FileVariable& normal,
 // Says which variables on edges are drawn, and how.
 class EdgeNotes {
  public:
-  void add(const std::string& name, bool is_normal);
+  void add(const std::string& name, const EdgeUse& use);
   void tell(std::vector<std::string>& notes) const;
 
  private:
   std::string means_;
   std::string normals_;
+  std::string walls_;
 };
 
 }  // namespace windsplat::data::cf

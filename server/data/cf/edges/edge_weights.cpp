@@ -104,6 +104,42 @@ bool fit_linear(std::vector<Seen>& sides) {
   return true;
 }
 
+// The value of a side, NaN if missing, along its normal (x, y).
+struct GivenNormal {
+  double weight = 0;
+  double x = 0;
+  double y = 0;
+  double value = 0;
+};
+
+// The constant vector by least squares: NaN if every side is missing, or if the normals of those
+// that are given are within some 20 degrees of one line, where errors grow more than threefold.
+PlanePoint fitted_vector(const std::vector<GivenNormal>& sides, MissingNormal missing) {
+  const PlanePoint unknown{unknown_weight, unknown_weight};
+  if (std::all_of(sides.begin(), sides.end(),
+                  [](const GivenNormal& side) { return std::isnan(side.value); })) {
+    return unknown;
+  }
+  double xx = 0;
+  double xy = 0;
+  double yy = 0;
+  PlanePoint right{};
+  for (const auto& [weight, x, y, given] : sides) {
+    if (std::isnan(given) && missing == MissingNormal::unknown) continue;
+    const double value = std::isnan(given) ? 0 : given;
+    xx += weight * x * x;
+    xy += weight * x * y;
+    yy += weight * y * y;
+    right[0] += weight * x * value;
+    right[1] += weight * y * value;
+  }
+  const double determinant = xx * yy - xy * xy;
+  constexpr double flat = 0.03;  // sin(20 degrees)^2 / 4, for two sides of equal weights
+  if (!(determinant > flat * (xx + yy) * (xx + yy))) return unknown;
+  return {(yy * right[0] - xy * right[1]) / determinant,
+          (xx * right[1] - xy * right[0]) / determinant};
+}
+
 }  // namespace
 
 struct EdgeWeights::Maker {
@@ -200,6 +236,10 @@ struct EdgeWeights::Maker {
       out.east_.push_back(static_cast<float>(side.to_east));
       out.north_.push_back(static_cast<float>(side.to_north));
     }
+    for (std::size_t n = 0; n < own && has_normals; ++n) {
+      const auto& [x, y] = sides[n].normal;
+      out.normals_.push_back({static_cast<float>(x), static_cast<float>(y)});
+    }
     out.sides_.push_back(static_cast<std::uint8_t>(own));
     out.first_.push_back(static_cast<std::uint32_t>(out.edges_.size()));
   }
@@ -219,23 +259,52 @@ EdgeWeights::EdgeWeights(const Mesh& mesh, const MeshEdges& edges) {
   Maker(mesh, edges, *this).make();
 }
 
-void EdgeWeights::gather(EdgePart part, const float* values, float* out) const {
-  const bool is_mean = part == EdgePart::mean;
-  const std::vector<float>& weights = is_mean ? mean_ : part == EdgePart::east ? east_ : north_;
+void EdgeWeights::gather(EdgePart part, MissingNormal missing, const float* values,
+                         float* out) const {
+  if (part == EdgePart::mean) {
+    gather_means(values, out);
+    return;
+  }
+  const std::vector<float>& weights = part == EdgePart::east ? east_ : north_;
+  std::vector<GivenNormal> given;
+  std::size_t own = 0;  // in `normals_`
   for (std::size_t c = 0; c < sides_.size(); ++c) {
     const std::uint32_t begin = first_[c];
-    const std::uint32_t end = is_mean ? begin + sides_[c] : first_[c + 1];
+    double sum = 0;
+    bool is_whole = true;
+    for (std::uint32_t i = begin; i < first_[c + 1] && is_whole; ++i) {
+      const auto value = static_cast<double>(values[edges_[i]]);
+      is_whole = !std::isnan(value);
+      sum += static_cast<double>(weights[i]) * value;
+    }
+    if (!is_whole) {
+      given.clear();
+      for (std::uint32_t n = 0; n < sides_[c]; ++n) {
+        const auto& [x, y] = normals_[own + n];
+        given.push_back({static_cast<double>(mean_[begin + n]), static_cast<double>(x),
+                         static_cast<double>(y), static_cast<double>(values[edges_[begin + n]])});
+      }
+      const PlanePoint vector = fitted_vector(given, missing);
+      sum = vector[part == EdgePart::east ? 0 : 1];
+    }
+    out[c] = static_cast<float>(sides_[c] == 0 ? unknown_weight : sum);
+    own += sides_[c];
+  }
+}
+
+void EdgeWeights::gather_means(const float* values, float* out) const {
+  for (std::size_t c = 0; c < sides_.size(); ++c) {
     double sum = 0;
     double weight = 0;
     bool is_masked = true;
-    for (std::uint32_t i = begin; i < end; ++i) {
+    for (std::uint32_t i = first_[c]; i < first_[c] + sides_[c]; ++i) {
       const auto value = static_cast<double>(values[edges_[i]]);
       if (std::isnan(value)) continue;
-      is_masked = is_masked && i >= begin + sides_[c];
-      sum += static_cast<double>(weights[i]) * value;
-      weight += static_cast<double>(weights[i]);
+      is_masked = false;
+      sum += static_cast<double>(mean_[i]) * value;
+      weight += static_cast<double>(mean_[i]);
     }
-    out[c] = static_cast<float>(is_masked ? unknown_weight : is_mean ? sum / weight : sum);
+    out[c] = static_cast<float>(is_masked ? unknown_weight : sum / weight);
   }
 }
 

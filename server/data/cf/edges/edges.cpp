@@ -244,14 +244,14 @@ EdgeTables find_edge_tables(const ArrayFile& file, const Topology& topology) {
 }
 
 Result<const float*> EdgeValues::at_cells(const ArrayFile& file, const Mesh& mesh, EdgePart part,
-                                          const float* values) {
+                                          MissingNormal missing, const float* values) {
   if (!weights_) {
     const auto edges = read_edges(file, tables_, topology_, mesh);
     if (!edges) return edges.error();
     weights_.emplace(mesh, *edges);
   }
   cells_.resize(mesh.cells());
-  weights_->gather(part, values, cells_.data());
+  weights_->gather(part, missing, values, cells_.data());
   return cells_.data();
 }
 

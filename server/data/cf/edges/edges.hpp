@@ -60,6 +60,12 @@ std::array<MeshEdges::Vector, 2> axes_at(const MeshEdges::Vector& place, bool on
 
 enum class EdgePart { mean, east, north };
 
+// What a missing component along the normal of an edge says.
+enum class MissingNormal {
+  unknown,  // nothing
+  wall,     // no flow through the edge, as at the coasts and the bottom of an ocean
+};
+
 // Weights of the edges of each cell.
 //  - Scalars: the mean of the values at the middles of the sides, weighted by the areas of the
 //    triangles between the centroid and the sides, which makes linear functions exact at the
@@ -71,18 +77,21 @@ enum class EdgePart { mean, east, north };
 //    2000). Constant vectors are exact; the error is of second order in the cell size in cells that
 //    are symmetric, otherwise of first order. Triangles, in which that error alternates, take a
 //    linear function by least squares from their sides and those of their neighbours, so that
-//    linear fields are exact, where these determine it. A missing component is a wall, and counts
-//    as 0.
+//    linear fields are exact, where these determine it. Where any of these edges is missing, the
+//    constant vector is fitted to the cell's own sides without those that are missing, or with 0
+//    there if they are walls; cells whose sides do not determine it are masked.
 // A cell all of whose sides are missing is masked.
 class EdgeWeights {
  public:
   EdgeWeights(const Mesh& mesh, const MeshEdges& edges);
 
   // values: one per edge, NaN where missing; out: one per cell. East and north need normals.
-  void gather(EdgePart part, const float* values, float* out) const;
+  void gather(EdgePart part, MissingNormal missing, const float* values, float* out) const;
 
  private:
   struct Maker;
+
+  void gather_means(const float* values, float* out) const;
 
   std::vector<std::uint32_t> first_;  // of each cell in `edges_`, and the end of the last
   std::vector<std::uint8_t> sides_;   // how many of a cell's edges are its own, which come first
@@ -90,6 +99,8 @@ class EdgeWeights {
   std::vector<float> mean_;  // of the own edges alone; 0 for others
   std::vector<float> east_;  // empty without normals
   std::vector<float> north_;
+  // of the own edges alone, cell after cell, along the axes at the cell; empty without normals
+  std::vector<std::array<float, 2>> normals_;
 };
 
 // The values at the cells of one file's variables on edges. Tables are read, and weights computed,
@@ -102,7 +113,7 @@ class EdgeValues {
   // values: one per edge; the result has one per cell, valid until the next call. Errors: those of
   // read_edges().
   Result<const float*> at_cells(const ArrayFile& file, const Mesh& mesh, EdgePart part,
-                                const float* values);
+                                MissingNormal missing, const float* values);
 
  private:
   Topology topology_;

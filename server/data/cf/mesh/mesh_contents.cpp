@@ -225,7 +225,8 @@ class ContentsMaker {
       out_.parts.push_back(std::move(own));
       return;
     }
-    edge_notes_.add(variable.name, use.is_normal);
+    edge_notes_.add(variable.name, use);
+    own.missing = use.missing;
     const auto add = [&](FileVariable one, EdgePart part) {
       MeshPart placed = own;
       placed.edges = part;

@@ -18,11 +18,12 @@ namespace windsplat::data::cf {
 
 // Where the values of a variable come from.
 struct MeshPart {
-  int base = -1;                         // variable of the file; -1: `values`, or heights
-  std::optional<MeshLocation> location;  // set: resampled
-  std::optional<EdgePart> edges;         // set: from values on edges, by way of the cells
-  std::size_t list = 0;                  // position of the list among the base's dimensions
-  std::vector<double> values;            // of a coordinate that is not in the file
+  int base = -1;                                   // variable of the file; -1: `values`, or heights
+  std::optional<MeshLocation> location;            // set: resampled
+  std::optional<EdgePart> edges;                   // set: from values on edges, by way of the cells
+  MissingNormal missing = MissingNormal::unknown;  // of those values
+  std::size_t list = 0;        // position of the list among the base's dimensions
+  std::vector<double> values;  // of a coordinate that is not in the file
 };
 
 struct MeshContents {

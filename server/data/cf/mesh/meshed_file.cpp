@@ -132,7 +132,7 @@ class MeshedFile final : public ArrayFile {
     held_.variable = -1;
     auto values = own.base < 0 ? height_layer(index) : layers_.read({own.base, own.list}, index);
     if (values && own.edges) {
-      values = edges_.at_cells(*base_, grid_.mesh(), *own.edges, *values);
+      values = edges_.at_cells(*base_, grid_.mesh(), *own.edges, own.missing, *values);
     }
     if (!values) return values.error();
     held_.samples.resize(grid_.lattice().samples());

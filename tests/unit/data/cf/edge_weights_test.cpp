@@ -61,8 +61,8 @@ Errors errors_of(const Sides& sides, const Flow& flow, bool inner_only) {
   const cf::EdgeWeights weights(sides.mesh, sides.edges());
   std::array<std::vector<float>, 2> drawn;
   for (auto& one : drawn) one.resize(sides.mesh.cells());
-  weights.gather(cf::EdgePart::east, given.data(), drawn[0].data());
-  weights.gather(cf::EdgePart::north, given.data(), drawn[1].data());
+  weights.gather(cf::EdgePart::east, cf::MissingNormal::unknown, given.data(), drawn[0].data());
+  weights.gather(cf::EdgePart::north, cf::MissingNormal::unknown, given.data(), drawn[1].data());
   Errors out;
   double squares = 0;
   std::size_t compared = 0;
@@ -123,7 +123,8 @@ TEST(EdgeWeights, MeansOfLinearScalarsAreExactAtCentroids) {
       given.push_back(static_cast<float>(2 * edges.middles[e][0] - 3 * edges.middles[e][1]));
     }
     std::vector<float> drawn(sides.mesh.cells());
-    cf::EdgeWeights(sides.mesh, edges).gather(cf::EdgePart::mean, given.data(), drawn.data());
+    cf::EdgeWeights(sides.mesh, edges)
+        .gather(cf::EdgePart::mean, cf::MissingNormal::unknown, given.data(), drawn.data());
     for (std::size_t c = 0; c < drawn.size(); ++c) {
       const auto [x, y] = sides.centroid(c);
       ASSERT_NEAR(drawn[c], 2 * x - 3 * y, 1e-5);
@@ -131,22 +132,61 @@ TEST(EdgeWeights, MeansOfLinearScalarsAreExactAtCentroids) {
   }
 }
 
-TEST(EdgeWeights, MissingComponentsAreWallsAndCellsWithoutAnyAreMasked) {
+// Vectors at the cells along one axis.
+std::vector<float> drawn_of(const Sides& sides, const std::vector<float>& given, cf::EdgePart part,
+                            cf::MissingNormal missing) {
+  std::vector<float> out(sides.mesh.cells());
+  cf::EdgeWeights(sides.mesh, sides.edges()).gather(part, missing, given.data(), out.data());
+  return out;
+}
+
+TEST(EdgeWeights, MissingComponentsOfAirAreLeftOutAndConstantVectorsStayExact) {
+  for (const Shape shape : {Shape::quads, Shape::triangles}) {
+    const Sides sides = meshed(12, shape, 0.2);
+    std::vector<float> given = sides.normals_of(constant);
+    for (std::size_t e = 0; e < given.size(); e += 7) {
+      given[e] = std::numeric_limits<float>::quiet_NaN();
+    }
+    const auto east = drawn_of(sides, given, cf::EdgePart::east, cf::MissingNormal::unknown);
+    const auto north = drawn_of(sides, given, cf::EdgePart::north, cf::MissingNormal::unknown);
+    std::size_t compared = 0;
+    for (std::size_t c = 0; c < east.size(); ++c) {
+      if (std::isnan(east[c])) continue;
+      ASSERT_NEAR(east[c], 3, 1e-4) << c;
+      ASSERT_NEAR(north[c], -7, 1e-4) << c;
+      ++compared;
+    }
+    EXPECT_GT(compared, east.size() * 9 / 10);
+  }
+}
+
+TEST(EdgeWeights, SidesOfOneDirectionDetermineNoVector) {
+  const Sides sides = meshed(3, Shape::quads, 0.01);
+  std::vector<float> given = sides.normals_of(constant);
+  for (const std::size_t side : {1U, 3U}) {
+    given[sides.of_corners[side]] = std::numeric_limits<float>::quiet_NaN();
+  }
+  const auto air = drawn_of(sides, given, cf::EdgePart::north, cf::MissingNormal::unknown);
+  EXPECT_TRUE(std::isnan(air[0]));
+  EXPECT_NEAR(air[8], -7, 1e-4);
+  const auto water = drawn_of(sides, given, cf::EdgePart::north, cf::MissingNormal::wall);
+  EXPECT_NEAR(water[0], -7, 0.3);
+}
+
+TEST(EdgeWeights, MissingComponentsOfWaterAreWallsAndCellsWithoutAnyAreMasked) {
   const Sides sides = meshed(3, Shape::quads, 0);
-  const cf::EdgeWeights weights(sides.mesh, sides.edges());
   std::vector<float> given = sides.normals_of(constant);
   std::vector<float> scalars(given.size(), 6);
-  const auto missing = [&](std::size_t cell, std::size_t side) {
+  const auto lose = [&](std::size_t cell, std::size_t side) {
     const std::uint32_t edge = sides.of_corners[4 * cell + side];
     given[edge] = std::numeric_limits<float>::quiet_NaN();
     scalars[edge] = given[edge];
   };
-  missing(0, 3);  // the left side of the first cell
-  for (std::size_t side = 0; side < 4; ++side) missing(8, side);
-  std::vector<float> east(9);
-  std::vector<float> mean(9);
-  weights.gather(cf::EdgePart::east, given.data(), east.data());
-  weights.gather(cf::EdgePart::mean, scalars.data(), mean.data());
+  lose(0, 3);  // the left side of the first cell
+  for (std::size_t side = 0; side < 4; ++side) lose(8, side);
+  const auto wall = cf::MissingNormal::wall;
+  const auto east = drawn_of(sides, given, cf::EdgePart::east, wall);
+  const auto mean = drawn_of(sides, scalars, cf::EdgePart::mean, wall);
   EXPECT_NEAR(east[0], 1.5, 1e-5);
   EXPECT_NEAR(east[4], 3, 1e-5);
   EXPECT_NEAR(mean[0], 6, 1e-5);
@@ -162,8 +202,7 @@ TEST(EdgeWeights, TrianglesWithoutValuesAtTheirOwnSidesAreMasked) {
   for (std::size_t side = 0; side < 3; ++side) {
     given[sides.of_corners[3 * inner + side]] = std::numeric_limits<float>::quiet_NaN();
   }
-  std::vector<float> east(sides.mesh.cells());
-  cf::EdgeWeights(sides.mesh, sides.edges()).gather(cf::EdgePart::east, given.data(), east.data());
+  const auto east = drawn_of(sides, given, cf::EdgePart::east, cf::MissingNormal::unknown);
   EXPECT_TRUE(std::isnan(east[inner]));
   EXPECT_EQ(std::count_if(east.begin(), east.end(), [](float u) { return std::isnan(u); }), 1);
 }
