@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <string_view>
 #include <vector>
 
@@ -44,42 +45,93 @@ bool is_in_water(const FileVariable& normal, const FileContents& contents) {
          });
 }
 
-// The first component of a vector at the cells; -1 if there is none.
-int vector_at_cells(const FileContents& contents, const std::vector<int>& cells) {
-  for (std::size_t v = 0; v < contents.variables.size(); ++v) {
-    const FileVariable& one = contents.variables[v];
-    const bool is_there = std::any_of(one.dims.begin(), one.dims.end(), [&](int d) {
-      return std::count(cells.begin(), cells.end(), d) > 0;
-    });
-    constexpr auto usual =
-        std::to_array<std::string_view>({"ureconstructzonal", "velocityzonal", "u", "ucx"});
-    const bool is_eastward = one.standard_name.starts_with("eastward_") &&
-                             has_any_part(one.standard_name, {"wind", "velocity"});
-    if (is_there && one.numeric && is_speed_on_mesh(one) &&
-        (is_eastward || is_one_of(lower(one.name), usual))) {
+// Dimensions of a variable beside those that list cells or edges.
+std::vector<int> other_dims(const FileVariable& one, const std::vector<int>& lists) {
+  std::vector<int> out;
+  std::copy_if(one.dims.begin(), one.dims.end(), std::back_inserter(out),
+               [&](int d) { return std::count(lists.begin(), lists.end(), d) == 0; });
+  return out;
+}
+
+// Whether these are the first and the second component of one vector, by their names.
+bool are_partners(const FileVariable& first, const FileVariable& second) {
+  constexpr std::string_view eastward = "eastward_";
+  if (first.standard_name.starts_with(eastward) &&
+      has_any_part(first.standard_name, {"wind", "velocity"})) {
+    return second.standard_name == "northward_" + first.standard_name.substr(eastward.size());
+  }
+  constexpr auto usual = std::to_array<std::array<std::string_view, 2>>(
+      {{"ureconstructzonal", "ureconstructmeridional"},
+       {"velocityzonal", "velocitymeridional"},
+       {"u", "v"},
+       {"ucx", "ucy"}});
+  return std::any_of(usual.begin(), usual.end(), [&](const auto& names) {
+    return lower(first.name) == names[0] && lower(second.name) == names[1];
+  });
+}
+
+// The first component of a vector at the cells, of the times and levels of the normal component;
+// -1 if there is none.
+int vector_at_cells(const FileVariable& normal, const FileContents& contents,
+                    const ListsOfMesh& lists) {
+  const std::vector<int> wanted = other_dims(normal, lists.edges);
+  const auto fits = [&](const FileVariable& one) {
+    return one.numeric && is_speed_on_mesh(one) && one.dims.size() == wanted.size() + 1 &&
+           other_dims(one, lists.cells) == wanted;
+  };
+  const std::vector<FileVariable>& all = contents.variables;
+  for (std::size_t v = 0; v < all.size(); ++v) {
+    if (fits(all[v]) && std::any_of(all.begin(), all.end(), [&](const FileVariable& other) {
+          return fits(other) && are_partners(all[v], other);
+        })) {
       return static_cast<int>(v);
     }
   }
   return -1;
 }
 
-// Why values may depend on the direction of an edge or have no mean; empty if they do not.
+// Whether a name, description or unit says that values have a size but no direction.
+bool is_quantity_without_direction(const FileVariable& one) {
+  const std::string units = lower(one.units);
+  const std::string text = text_about(one);
+  constexpr auto of_temperature = std::to_array<std::string_view>(
+      {"k", "kelvin", "c", "celsius", "degc", "deg_c", "degree_c", "degrees_c", "degree_celsius",
+       "degrees_celsius", "degf", "deg_f", "fahrenheit"});
+  constexpr auto of_shares =
+      std::to_array<std::string_view>({"%", "percent", "kg kg-1", "kg/kg", "kg kg^-1", "kg kg^{-1}",
+                                       "kg kg**-1", "g kg-1", "g/kg", "psu"});
+  if (is_one_of(units, of_temperature) || is_one_of(units, of_shares)) return true;
+  if (metres_in(units)) {
+    return has_any_part(text, {"depth", "thickness", "height", "altitude", "elevation"});
+  }
+  if (pascals_in(units)) return has_any_part(text, {"pressure"});
+  return has_any_part(text, {"temperature", "salinity", "density", "humidity", "mixing ratio",
+                             "mixing_ratio", "fraction", "concentration", "percent", "tracer"});
+}
+
+// Why values are not known to be without a direction, or have no mean; empty if neither.
 std::string problem_of_scalar(const FileVariable& one) {
   const std::string units = lower(one.units);
   if (!one.type.starts_with("float") && !one.packed) return "whole numbers have no mean";
   if (units.empty()) return "without a unit, they may be components along each edge or its normal";
   const bool is_angle = units.starts_with("rad") || units.starts_with("deg");
   const bool is_temperature =
-      has_any_part(units, {"celsius", "degc", "deg_c", "degf", "fahrenheit"});
+      has_any_part(units, {"celsius", "degc", "deg_c", "degree_c", "degrees_c", "degf", "deg_f"});
   if (is_angle && !is_temperature) return "angles have no mean";
-  const bool is_rate = has_any_part(
-      units, {"s-1", "/s", "s^-1", "s^{-1}", "s**-1", "s-2", "s^{-2}", "/day", "day-1", "knot"});
-  const bool is_of_flow =
-      has_any_part(text_about(one), {"normal", "tangential", "component", "velocity", "flux",
-                                     "discharge", "momentum", "transport", "gradient", "stress",
-                                     "direction", "orientation", "wind", "current"});
-  if (is_rate || is_of_flow) {
+  const bool is_rate = has_any_part(units, {"s-1", "/s", "s^-1", "s^{-1}", "s**-1", "s-2", "s^{-2}",
+                                            "s^-2", "s**-2", "/day", "day-1", "/h", "h-1", "knot"});
+  const bool has_direction = has_any_part(
+      text_about(one),
+      {"normal",     "tangential", "component",    "velocity", "flux",      "discharge",
+       "momentum",   "transport",  "gradient",     "stress",   "direction", "orientation",
+       "wind",       "current",    "displacement", "slope",    "tendency",  "difference",
+       "derivative", "shear",      "advection"});
+  if (is_rate || has_direction) {
     return "they may be components along each edge or its normal, which have no mean";
+  }
+  if (!is_quantity_without_direction(one)) {
+    return "they may be components along each edge or its normal: neither names nor units say "
+           "that they have no direction, as temperatures, depths and concentrations";
   }
   return {};
 }
@@ -109,8 +161,7 @@ void EdgeNotes::tell(std::vector<std::string>& notes) const {
 }
 
 EdgeUse use_of_edges(const FileVariable& variable, const FileContents& contents,
-                     const std::vector<int>& cells, const Topology& topology,
-                     const EdgeTables& tables) {
+                     const ListsOfMesh& lists, const Topology& topology, const EdgeTables& tables) {
   const std::string place = "on the edges of the mesh: ";
   EdgeUse out;
   if (!tables.are_known()) {
@@ -118,7 +169,7 @@ EdgeUse use_of_edges(const FileVariable& variable, const FileContents& contents,
   } else if (is_normal_component(variable, topology)) {
     out.is_normal = true;
     if (is_in_water(variable, contents)) out.missing = MissingNormal::wall;
-    const int vector = vector_at_cells(contents, cells);
+    const int vector = vector_at_cells(variable, contents, lists);
     if (vector >= 0) {
       out.reason = place + "the file has vectors at the cells, with the component " +
                    in_quotes(contents.variables[at(vector)].name);

@@ -17,15 +17,20 @@ struct EdgeUse {
   MissingNormal missing = MissingNormal::unknown;
 };
 
-// Scalars are drawn if nothing suggests that their sign or size depends on the direction of an
-// edge: floating-point numbers with a unit that is no angle and no rate, whose names and
-// descriptions speak of no flow. Normal components are velocities that MPAS, MPAS-Ocean and ICON
-// name so, in files that give the normals and have no vector at the cells. In water a missing one
-// is a wall.
-// contents: of the file; cells: its dimensions that list the cells.
+// Dimensions of a file that list the cells and the edges of its mesh.
+struct ListsOfMesh {
+  std::vector<int> cells;
+  std::vector<int> edges;
+};
+
+// Scalars are drawn if their names, descriptions or units say that they are temperatures, salinity,
+// depths, thicknesses, heights, pressures, densities, humidity, mixing ratios, fractions,
+// concentrations or tracers, and none that they are a rate, an angle or a flow: others may be
+// components, whose sign depends on the direction of the edge. Normal components are velocities
+// that MPAS, MPAS-Ocean and ICON name so, in files that give the normals and have no vector of the
+// same times and levels at the cells. In water a missing one is a wall. contents: of the file.
 EdgeUse use_of_edges(const FileVariable& variable, const FileContents& contents,
-                     const std::vector<int>& cells, const Topology& topology,
-                     const EdgeTables& tables);
+                     const ListsOfMesh& lists, const Topology& topology, const EdgeTables& tables);
 
 // The components of the vectors at the cells, along east and north or x and y: named after the
 // normal component, with standard names of winds or of currents.

@@ -229,6 +229,7 @@ EdgeTables find_edge_tables(const ArrayFile& file, const Topology& topology) {
   } else if (topology.convention == "MPAS") {
     out.nodes = on("verticesOnEdge", 2);
     out.angle = on("angleEdge", 1);
+    out.middles = {on("lonEdge", 1), on("latEdge", 1)};
   } else if (topology.convention == "CF bounds") {
     const int v = variable_named(contents, "edge_of_cell");
     const bool fits = v >= 0 && contents.variables[at(v)].numeric &&

@@ -21,7 +21,7 @@ namespace windsplat::data::cf {
 struct EdgeTables {
   int nodes = -1;
   int of_cells = -1;
-  std::array<int, 2> middles{-1, -1};  // longitudes and latitudes, beside of_cells
+  std::array<int, 2> middles{-1, -1};  // longitudes and latitudes; read beside of_cells alone
   // The direction in which a normal component is positive: its angle from the east, in radians
   // (MPAS), or its parts along east and north (ICON).
   int angle = -1;

@@ -216,8 +216,8 @@ class ContentsMaker {
   }
 
   void add_on_edges(FileVariable variable, MeshPart own) {
-    const EdgeUse use =
-        use_of_edges(variable, file_.contents(), dimensions_.cells, topology_, out_.edges);
+    const EdgeUse use = use_of_edges(variable, file_.contents(),
+                                     {dimensions_.cells, dimensions_.edges}, topology_, out_.edges);
     if (!use.reason.empty()) {
       variable.numeric = false;
       variable.unread = use.reason;
