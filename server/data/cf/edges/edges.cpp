@@ -9,6 +9,7 @@
 
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/time.hpp"
 
 namespace windsplat::data::cf {
 
@@ -43,7 +44,8 @@ class EdgeReader {
     return file_.contents().variables.at(at(v));
   }
 
-  // Numbers from 0 of a table of `rows` and something else, row after row; -1 where missing.
+  // Numbers from 0 of a table of `rows` and something else, row after row; -1 where missing or
+  // negative.
   [[nodiscard]] Result<std::vector<std::int64_t>> numbers(int v, int rows, std::size_t most,
                                                           std::size_t& width) const {
     const std::vector<int>& dims = variable(v).dims;
@@ -61,12 +63,14 @@ class EdgeReader {
     std::vector<std::int64_t> out(values->size(), -1);
     for (std::size_t n = 0; n < out.size(); ++n) {
       const double own = (*values)[turned ? n % width * count + n / width : n] - start;
-      if (std::isnan(own) || own == -1) continue;
+      const bool is_absent = own == -1 || (own < 0 && own + start < 0);
+      if (std::isnan(own) || is_absent) continue;
       if (!(own >= 0 && own < static_cast<double>(most)) || own != std::floor(own)) {
-        return make_error(ErrorKind::bad_data, in_quotes(variable(v).name) + ": entry " +
-                                                   std::to_string(n / width + 1) +
-                                                   " has a number beyond 0 to " +
-                                                   std::to_string(most - 1) + " after start_index");
+        return make_error(ErrorKind::bad_data,
+                          in_quotes(variable(v).name) + ": entry " + std::to_string(n / width + 1) +
+                              " has the number " + number_text(own + start) + ", beyond " +
+                              number_text(start) + " to " +
+                              number_text(static_cast<double>(most) - 1 + start));
       }
       out[n] = static_cast<std::int64_t>(own);
     }

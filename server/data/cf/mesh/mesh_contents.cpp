@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -75,6 +76,7 @@ class ContentsMaker {
                 const MeshLattice& lattice)
       : file_(file),
         topology_(topology),
+        mesh_(mesh),
         on_sphere_(mesh.on_sphere),
         lattice_(lattice),
         contents_(out_.contents),
@@ -218,9 +220,10 @@ class ContentsMaker {
   void add_on_edges(FileVariable variable, MeshPart own) {
     const EdgeUse use = use_of_edges(variable, file_.contents(),
                                      {dimensions_.cells, dimensions_.edges}, topology_, out_.edges);
-    if (!use.reason.empty()) {
+    const std::string reason = use.reason.empty() ? fault_of_edges() : use.reason;
+    if (!reason.empty()) {
       variable.numeric = false;
-      variable.unread = use.reason;
+      variable.unread = reason;
       contents_.variables.push_back(std::move(variable));
       out_.parts.push_back(std::move(own));
       return;
@@ -241,6 +244,16 @@ class ContentsMaker {
     const auto components = components_of_normal(variable, file_.contents(), on_sphere_);
     add(components[0], EdgePart::east);
     add(components[1], EdgePart::north);
+  }
+
+  // What is wrong with the tables of edges; empty if nothing is. They are read once for it, so that
+  // a fault leaves out the values on edges when the file is opened, and nothing else.
+  const std::string& fault_of_edges() {
+    if (!edge_fault_) {
+      const auto read = read_edges(file_, out_.edges, topology_, mesh_);
+      edge_fault_ = read ? std::string() : "on the edges of the mesh: " + read.error().message;
+    }
+    return *edge_fault_;
   }
 
   void place(FileVariable& variable, MeshPart& own) const {
@@ -348,6 +361,7 @@ class ContentsMaker {
 
   const ArrayFile& file_;
   const Topology& topology_;
+  const Mesh& mesh_;
   bool on_sphere_;
   const MeshLattice& lattice_;
   MeshContents out_;
@@ -355,6 +369,7 @@ class ContentsMaker {
   MeshDimensions dimensions_;
   std::vector<int> parts_of_mesh_;  // variables of the file
   EdgeNotes edge_notes_;
+  std::optional<std::string> edge_fault_;
   std::vector<std::string> replaced_;  // variables in whose place there are other coordinates
 };
 
