@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "server/base/ascii.hpp"
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/time.hpp"
@@ -163,7 +164,16 @@ class EdgeReader {
     if (tables_.angle >= 0) {
       auto angles = unpacked_values(file_, tables_.angle);
       if (!angles) return angles.error();
-      for (const double angle : *angles) {
+      const bool in_degrees = lower(variable(tables_.angle).units).starts_with("deg");
+      constexpr double circle = 2 * std::numbers::pi;
+      for (std::size_t e = 0; e < angles->size(); ++e) {
+        const double angle = (*angles)[e] * (in_degrees ? circle / 360 : 1);
+        if (!in_degrees && std::abs(angle) > circle + 1e-5) {
+          return make_error(ErrorKind::bad_data,
+                            in_quotes(variable(tables_.angle).name) + ": edge " +
+                                std::to_string(e + 1) + " has the angle " + number_text(angle) +
+                                ", more than a circle of 2 pi, and no unit of degrees");
+        }
         parts[0].push_back(std::cos(angle));
         parts[1].push_back(std::sin(angle));
       }

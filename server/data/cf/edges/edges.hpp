@@ -23,7 +23,7 @@ struct EdgeTables {
   int of_cells = -1;
   std::array<int, 2> middles{-1, -1};  // longitudes and latitudes; read beside of_cells alone
   // The direction in which a normal component is positive: its angle from the east, in radians
-  // (MPAS), or its parts along east and north (ICON).
+  // unless its unit is degrees (MPAS), or its parts along east and north (ICON).
   int angle = -1;
   std::array<int, 2> normals{-1, -1};
 
@@ -47,7 +47,8 @@ struct MeshEdges {
   std::vector<Vector> normals;  // of length 1; empty if they are not known
 };
 
-// Errors: bad_data, naming the variable: numbers that do not exist; edges of which most are no
+// Errors: bad_data, naming the variable: numbers that do not exist; angles
+// beyond a circle; edges of which most are no
 // sides of cells.
 Result<MeshEdges> read_edges(const ArrayFile& file, const EdgeTables& tables,
                              const Topology& topology, const Mesh& mesh);
