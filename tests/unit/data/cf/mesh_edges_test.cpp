@@ -38,6 +38,11 @@ double component(const Sides& sides, std::size_t edge) {
 struct MpasParts {
   bool angles = true;
   bool vectors_at_cells = false;
+  bool lone_component = false;  // one component at the cells
+  bool near_surface = false;    // a vector at the cells on one level
+  double end = 1;               // factor of an entry of verticesOnEdge
+  double per_radian = 1;        // the numbers of the angles
+  const char* angle_units = "";
 };
 
 void write_mpas_edges(const std::string& path, const MpasParts& parts) {
@@ -65,16 +70,42 @@ void write_mpas_edges(const std::string& path, const MpasParts& parts) {
     angles.push_back(angle_of(sides, e));
     u.insert(u.end(), {component(sides, e), 2 * component(sides, e)});
   }
+  ends[8] *= parts.end;
+  for (double& angle : angles) angle *= parts.per_radian;
   file.variable("verticesOnEdge", NC_INT, {edge, file.dimension("TWO", 2)}, ends);
-  if (parts.angles) file.variable("angleEdge", NC_DOUBLE, {edge}, angles);
+  if (parts.angles) {
+    const int v = file.variable("angleEdge", NC_DOUBLE, {edge}, angles);
+    file.text(v, "units", parts.angle_units);
+  }
+  file.variable("lonEdge", NC_DOUBLE, {edge}, Table(count, 0.5));
+  file.variable("latEdge", NC_DOUBLE, {edge}, Table(count, 0.5));
   file.text(file.variable("u", NC_FLOAT, {time, edge, level}, u), "units", "m s^{-1}");
   const Table flat(2 * cells, 1);
   file.text(file.variable("theta", NC_FLOAT, {time, cell, level}, flat), "units", "K");
   file.text(file.variable("w", NC_FLOAT, {time, cell, level}, flat), "units", "m s^{-1}");
-  if (!parts.vectors_at_cells) return;
+  for (const bool is_east : {true, false}) {
+    if (!parts.near_surface) break;
+    const int v = file.variable(is_east ? "u10" : "v10", NC_FLOAT, {time, cell}, Table(cells, 1));
+    file.text(v, "units", "m s-1");
+    file.text(v, "standard_name", is_east ? "eastward_wind" : "northward_wind");
+  }
   for (const char* name : {"uReconstructZonal", "uReconstructMeridional"}) {
+    if (!parts.vectors_at_cells && (!parts.lone_component || name[12] != 'Z')) continue;
     file.text(file.variable(name, NC_FLOAT, {time, cell, level}, flat), "units", "m s^{-1}");
   }
+}
+
+// Expects the flow of component() at the cells.
+void expect_flow(const Volume& wind, double tolerance) {
+  std::size_t compared = 0;
+  for (std::size_t n = 0; n < wind.samples(); ++n) {
+    if (std::isnan(wind.component(0)[n])) continue;
+    const double level = n < wind.samples() / 2 ? 1 : 2;
+    ASSERT_NEAR(wind.component(0)[n], u_east * level, tolerance * level);
+    ASSERT_NEAR(wind.component(1)[n], v_north * level, tolerance * level);
+    ++compared;
+  }
+  EXPECT_GT(compared, 500U);
 }
 
 TEST(MeshEdges, NormalWindsOfMpasBecomeVectorsAtTheCells) {
@@ -83,30 +114,65 @@ TEST(MeshEdges, NormalWindsOfMpasBecomeVectorsAtTheCells) {
   const auto source = opened(folder / "m.nc");
   ASSERT_NE(source, nullptr);
   EXPECT_TRUE(has_note(source->info(), "normal to the edges of the mesh: 'u'"));
+  EXPECT_FALSE(has_note(source->info(), "missing components count as 0"));
   const Volume wind = volume_of(*source, "wind");
   ASSERT_EQ(wind.components, 3);
-  std::size_t compared = 0;
-  for (std::size_t n = 0; n < wind.samples(); ++n) {
-    if (std::isnan(wind.component(0)[n])) continue;
-    const double level = n < wind.samples() / 2 ? 1 : 2;
-    // The sides of a cell are not quite parallel: meridians converge.
-    ASSERT_NEAR(wind.component(0)[n], u_east * level, 0.02 * level);
-    ASSERT_NEAR(wind.component(1)[n], v_north * level, 0.02 * level);
-    ASSERT_NEAR(wind.component(2)[n], 1, 1e-5);
-    ++compared;
+  // The sides of a cell are not quite parallel: meridians converge.
+  expect_flow(wind, 0.02);
+  EXPECT_NEAR(wind.range[1], std::sqrt(4 * (100 + 16) + 1.0), 0.05);
+  for (const auto& left : source->info().left_out) {
+    EXPECT_TRUE(left.name != "lonEdge" && left.name != "latEdge") << left.reason;
   }
-  EXPECT_GT(compared, 500U);
+}
+
+TEST(MeshEdges, ComponentsOrLevelsAloneAtTheCellsReplaceNoWind) {
+  const Folder folder;
+  write_mpas_edges(folder / "l.nc", {.lone_component = true});
+  write_mpas_edges(folder / "s.nc", {.near_surface = true});
+  for (const char* name : {"l.nc", "s.nc"}) {
+    const auto source = opened(folder / name);
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(reason_of(source->info(), "u"), "") << name;
+    EXPECT_TRUE(has_note(source->info(), "normal to the edges of the mesh: 'u'")) << name;
+    ASSERT_NE(source->info().find("wind"), nullptr) << name;
+    expect_flow(volume_of(*source, "wind"), 0.02);
+  }
+}
+
+TEST(MeshEdges, NegativeNumbersAreAbsentEdges) {
+  const Folder folder;
+  write_mpas_edges(folder / "n.nc", {.end = -1});
+  const auto source = opened(folder / "n.nc");
+  ASSERT_NE(source, nullptr);
+  ASSERT_NE(source->info().find("wind"), nullptr);
+  expect_flow(volume_of(*source, "wind"), 0.05);
+}
+
+TEST(MeshEdges, AnglesInDegreesAreConvertedAndThoseBeyondACircleAreRefused) {
+  const Folder folder;
+  write_mpas_edges(folder / "d.nc", {.per_radian = 1 / degree, .angle_units = "degrees"});
+  const auto source = opened(folder / "d.nc");
+  ASSERT_NE(source, nullptr);
+  expect_flow(volume_of(*source, "wind"), 0.02);
+
+  write_mpas_edges(folder / "r.nc", {.per_radian = 1 / degree});
+  const auto unclear = opened(folder / "r.nc");
+  ASSERT_NE(unclear, nullptr);
+  EXPECT_EQ(unclear->info().find("wind"), nullptr);
+  EXPECT_THAT(reason_of(unclear->info(), "u"),
+              HasSubstr("'angleEdge': edge 1 has the angle -90, more than a circle of 2 pi"));
+  EXPECT_NE(unclear->info().find("theta"), nullptr);
 }
 
 TEST(MeshEdges, VectorsAtTheCellsArePreferredAndUnknownDirectionsAreLeftOut) {
   const Folder folder;
-  write_mpas_edges(folder / "c.nc", {true, true});
+  write_mpas_edges(folder / "c.nc", {.vectors_at_cells = true});
   const auto both = opened(folder / "c.nc");
   ASSERT_NE(both, nullptr);
   EXPECT_THAT(reason_of(both->info(), "u"), HasSubstr("'uReconstructZonal'"));
   EXPECT_NEAR(volume_of(*both, "wind").range[1], std::sqrt(3.0), 1e-4);
 
-  write_mpas_edges(folder / "d.nc", {false, false});
+  write_mpas_edges(folder / "d.nc", {.angles = false});
   const auto unknown = opened(folder / "d.nc");
   ASSERT_NE(unknown, nullptr);
   EXPECT_EQ(unknown->info().find("wind"), nullptr);
@@ -234,20 +300,27 @@ class UgridEdges : public testing::Test {
     add("bearing", NC_FLOAT, "degree", "of the edge");
     add("kind", NC_INT, "1", "kind of the edge");
     add("bare", NC_FLOAT, "", "something");
+    add("salt", NC_FLOAT, "1e-3", "salinity");
+    add("warmth", NC_FLOAT, "degC", "of the water");
+    add("moved", NC_FLOAT, "m", "displacement in height");
+    add("along", NC_FLOAT, "m", "way");
+    add("rise", NC_FLOAT, "1", "");
+    add("zxu", NC_FLOAT, "-", "d(zeta)/dx");
+    add("kt", NC_FLOAT, "kt", "u");
+    add("kmh", NC_FLOAT, "km/h", "u");
+    add("volume", NC_FLOAT, "Sv", "volume moved");
+    add("hourly", NC_FLOAT, "m3/hr", "");
+    add("tau", NC_FLOAT, "N m-2", "");
+    add("push", NC_FLOAT, "m s**-2", "u in time");
     file.text(file.variable("level", NC_FLOAT, {face}, at_cells(sum_of)), "units", "m");
   }
 
-  // Why the values on edges of that file cannot be read.
+  // Why the values on edges of that file are left out.
   static std::string fault_of(const std::string& path) {
     const auto source = opened(path);
     if (source == nullptr) return {};
-    const FieldInfo* field = source->info().find("depth_on_edges");
-    EXPECT_NE(field, nullptr);
-    if (field == nullptr) return {};
-    const auto read =
-        source->read(static_cast<std::size_t>(field - source->info().fields.data()), 0);
-    EXPECT_FALSE(read);
-    return read ? std::string() : read.error().message;
+    EXPECT_EQ(source->info().find("depth_on_edges"), nullptr);
+    return reason_of(source->info(), "depth_on_edges");
   }
 
   Folder folder_;
@@ -260,20 +333,28 @@ TEST_F(UgridEdges, ScalarsAreAveragedAndWhatMayHaveADirectionIsLeftOut) {
   const auto source = opened(folder_ / "u.nc");
   ASSERT_NE(source, nullptr);
   expect_function(*source, "depth_on_edges", sum_of, 1);
-  EXPECT_TRUE(has_note(source->info(), "averaged to its cells: 'depth_on_edges'"));
+  EXPECT_TRUE(
+      has_note(source->info(), "averaged to its cells: 'depth_on_edges', 'salt', 'warmth'"));
   for (const char* name :
-       {"mesh2d_u1", "mesh2d_q1", "inflow", "slope", "bearing", "kind", "bare"}) {
+       {"mesh2d_u1", "mesh2d_q1", "inflow", "slope", "bearing", "kind", "bare", "moved", "along",
+        "rise", "zxu", "kt", "kmh", "volume", "hourly", "tau", "push"}) {
     EXPECT_EQ(source->info().find(name), nullptr) << name;
     EXPECT_THAT(reason_of(source->info(), name), HasSubstr("on the edges of the mesh: ")) << name;
   }
 }
 
-TEST_F(UgridEdges, DamagedTablesMakeTheirFieldsUnreadableAlone) {
+TEST_F(UgridEdges, DamagedTablesLeaveOutTheirFieldsAlone) {
   Table wrong = ends_;
   wrong[5] = nodes + 3;
   write(folder_ / "w.nc", wrong);
-  EXPECT_THAT(fault_of(folder_ / "w.nc"), HasSubstr("'ends': entry 3 has a number beyond 0 to 34"));
+  EXPECT_THAT(fault_of(folder_ / "w.nc"),
+              HasSubstr("'ends': entry 3 has the number " + std::to_string(nodes + 3) +
+                        ", beyond 0 to " + std::to_string(nodes - 1)));
   EXPECT_FALSE(volume_of(*opened(folder_ / "w.nc"), "level").values.empty());
+
+  wrong[5] = -999;
+  write(folder_ / "n.nc", wrong);
+  EXPECT_FALSE(volume_of(*opened(folder_ / "n.nc"), "depth_on_edges").values.empty());
 
   Table apart = ends_;
   for (std::size_t n = 0; n < apart.size(); n += 2) apart[n + 1] = std::fmod(apart[n] + 2, nodes);
