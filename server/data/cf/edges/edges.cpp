@@ -18,6 +18,12 @@ namespace {
 
 using SpaceVector = MeshEdges::Vector;
 
+// Whole numbers have all their digits.
+std::string number_in_file(double value) {
+  const bool is_whole = value == std::floor(value) && std::abs(value) < 1e15;
+  return is_whole ? std::to_string(static_cast<std::int64_t>(value)) : number_text(value);
+}
+
 class EdgeReader {
  public:
   EdgeReader(const ArrayFile& file, const EdgeTables& tables, const Topology& topology,
@@ -69,9 +75,9 @@ class EdgeReader {
       if (!(own >= 0 && own < static_cast<double>(most)) || own != std::floor(own)) {
         return make_error(ErrorKind::bad_data,
                           in_quotes(variable(v).name) + ": entry " + std::to_string(n / width + 1) +
-                              " has the number " + number_text(own + start) + ", beyond " +
-                              number_text(start) + " to " +
-                              number_text(static_cast<double>(most) - 1 + start));
+                              " has the number " + number_in_file(own + start) + ", beyond " +
+                              number_in_file(start) + " to " +
+                              number_in_file(static_cast<double>(most) - 1 + start));
       }
       out[n] = static_cast<std::int64_t>(own);
     }
