@@ -97,10 +97,10 @@ bool is_quantity_without_direction(const FileVariable& one) {
   constexpr auto of_temperature = std::to_array<std::string_view>(
       {"k", "kelvin", "c", "celsius", "degc", "deg_c", "degree_c", "degrees_c", "degree_celsius",
        "degrees_celsius", "degf", "deg_f", "fahrenheit"});
-  constexpr auto of_shares =
-      std::to_array<std::string_view>({"%", "percent", "kg kg-1", "kg/kg", "kg kg^-1", "kg kg^{-1}",
-                                       "kg kg**-1", "g kg-1", "g/kg", "psu"});
-  if (is_one_of(units, of_temperature) || is_one_of(units, of_shares)) return true;
+  constexpr auto of_mixtures = std::to_array<std::string_view>(
+      {"%", "percent", "kg kg-1", "kg/kg", "kg kg^-1", "kg kg^{-1}", "kg kg**-1", "g kg-1", "g/kg",
+       "kg m-3", "kg/m3", "kg m^-3", "kg m^{-3}", "kg m**-3", "psu"});
+  if (is_one_of(units, of_temperature) || is_one_of(units, of_mixtures)) return true;
   if (metres_in(units)) {
     return has_any_part(text, {"depth", "thickness", "height", "altitude", "elevation"});
   }
@@ -137,6 +137,15 @@ std::string problem_of_scalar(const FileVariable& one) {
 }
 
 }  // namespace
+
+const std::string& EdgeNotes::fault_of_tables(const ArrayFile& file, const EdgeTables& tables,
+                                              const Topology& topology, const Mesh& mesh) {
+  if (!fault_) {
+    const auto read = read_edges(file, tables, topology, mesh);
+    fault_ = read ? std::string() : "on the edges of the mesh: " + read.error().message;
+  }
+  return *fault_;
+}
 
 void EdgeNotes::add(const std::string& name, const EdgeUse& use) {
   const auto append = [&](std::string& told) {

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "server/data/cf/array_file.hpp"
 #include "server/data/cf/contents.hpp"
 #include "server/data/cf/edges/edges.hpp"
+#include "server/data/cf/mesh/mesh.hpp"
 #include "server/data/cf/mesh/topology.hpp"
 
 namespace windsplat::data::cf {
@@ -40,6 +43,10 @@ std::array<FileVariable, 2> components_of_normal(const FileVariable& normal,
 // Says which variables on edges are drawn, and how.
 class EdgeNotes {
  public:
+  // What is wrong with the tables of edges; empty if nothing is. They are read for it at the first
+  // call, so that a fault leaves out the values on edges when the file is opened, and nothing else.
+  const std::string& fault_of_tables(const ArrayFile& file, const EdgeTables& tables,
+                                     const Topology& topology, const Mesh& mesh);
   void add(const std::string& name, const EdgeUse& use);
   void tell(std::vector<std::string>& notes) const;
 
@@ -47,6 +54,7 @@ class EdgeNotes {
   std::string means_;
   std::string normals_;
   std::string walls_;
+  std::optional<std::string> fault_;
 };
 
 }  // namespace windsplat::data::cf

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -77,7 +76,6 @@ class ContentsMaker {
       : file_(file),
         topology_(topology),
         mesh_(mesh),
-        on_sphere_(mesh.on_sphere),
         lattice_(lattice),
         contents_(out_.contents),
         dimensions_(dimensions_of(file.contents(), topology, mesh)),
@@ -126,13 +124,13 @@ class ContentsMaker {
     for (const bool is_x : {false, true}) {
       const LatticeAxis& axis = is_x ? lattice_.x : lattice_.y;
       FileVariable variable;
-      variable.name = free_name(on_sphere_ ? (is_x ? "lon" : "lat") : (is_x ? "x" : "y"));
+      variable.name = free_name(mesh_.on_sphere ? (is_x ? "lon" : "lat") : (is_x ? "x" : "y"));
       variable.type = "float64";
       variable.numeric = true;
-      variable.standard_name = on_sphere_
+      variable.standard_name = mesh_.on_sphere
                                    ? (is_x ? "longitude" : "latitude")
                                    : (is_x ? "projection_x_coordinate" : "projection_y_coordinate");
-      variable.units = on_sphere_ ? (is_x ? "degrees_east" : "degrees_north") : plane_units;
+      variable.units = mesh_.on_sphere ? (is_x ? "degrees_east" : "degrees_north") : plane_units;
       variable.axis = is_x ? "X" : "Y";
       MeshPart own;
       for (std::size_t i = 0; i < axis.count; ++i) own.values.push_back(axis.at(i));
@@ -220,7 +218,9 @@ class ContentsMaker {
   void add_on_edges(FileVariable variable, MeshPart own) {
     const EdgeUse use = use_of_edges(variable, file_.contents(),
                                      {dimensions_.cells, dimensions_.edges}, topology_, out_.edges);
-    const std::string reason = use.reason.empty() ? fault_of_edges() : use.reason;
+    const std::string reason =
+        use.reason.empty() ? edge_notes_.fault_of_tables(file_, out_.edges, topology_, mesh_)
+                           : use.reason;
     if (!reason.empty()) {
       variable.numeric = false;
       variable.unread = reason;
@@ -241,19 +241,9 @@ class ContentsMaker {
       add(std::move(variable), EdgePart::mean);
       return;
     }
-    const auto components = components_of_normal(variable, file_.contents(), on_sphere_);
+    const auto components = components_of_normal(variable, file_.contents(), mesh_.on_sphere);
     add(components[0], EdgePart::east);
     add(components[1], EdgePart::north);
-  }
-
-  // What is wrong with the tables of edges; empty if nothing is. They are read once for it, so that
-  // a fault leaves out the values on edges when the file is opened, and nothing else.
-  const std::string& fault_of_edges() {
-    if (!edge_fault_) {
-      const auto read = read_edges(file_, out_.edges, topology_, mesh_);
-      edge_fault_ = read ? std::string() : "on the edges of the mesh: " + read.error().message;
-    }
-    return *edge_fault_;
   }
 
   void place(FileVariable& variable, MeshPart& own) const {
@@ -362,14 +352,12 @@ class ContentsMaker {
   const ArrayFile& file_;
   const Topology& topology_;
   const Mesh& mesh_;
-  bool on_sphere_;
   const MeshLattice& lattice_;
   MeshContents out_;
   FileContents& contents_;
   MeshDimensions dimensions_;
   std::vector<int> parts_of_mesh_;  // variables of the file
   EdgeNotes edge_notes_;
-  std::optional<std::string> edge_fault_;
   std::vector<std::string> replaced_;  // variables in whose place there are other coordinates
 };
 

@@ -302,6 +302,7 @@ class UgridEdges : public testing::Test {
     add("bare", NC_FLOAT, "", "something");
     add("salt", NC_FLOAT, "1e-3", "salinity");
     add("warmth", NC_FLOAT, "degC", "of the water");
+    add("rho", NC_FLOAT, "kg m^{-3}", "of the water");
     add("moved", NC_FLOAT, "m", "displacement in height");
     add("along", NC_FLOAT, "m", "way");
     add("rise", NC_FLOAT, "1", "");
@@ -334,7 +335,7 @@ TEST_F(UgridEdges, ScalarsAreAveragedAndWhatMayHaveADirectionIsLeftOut) {
   ASSERT_NE(source, nullptr);
   expect_function(*source, "depth_on_edges", sum_of, 1);
   EXPECT_TRUE(
-      has_note(source->info(), "averaged to its cells: 'depth_on_edges', 'salt', 'warmth'"));
+      has_note(source->info(), "averaged to its cells: 'depth_on_edges', 'salt', 'warmth', 'rho'"));
   for (const char* name :
        {"mesh2d_u1", "mesh2d_q1", "inflow", "slope", "bearing", "kind", "bare", "moved", "along",
         "rise", "zxu", "kt", "kmh", "volume", "hourly", "tau", "push"}) {
