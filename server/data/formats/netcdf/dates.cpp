@@ -24,14 +24,42 @@ std::optional<int> number_in(std::string_view text) {
   return out;
 }
 
+// Whether units count from a date, which begins with a digit: not from "simulation start".
+bool counts_from_a_date(const std::string& units) {
+  constexpr std::string_view since = " since ";
+  const std::size_t found = lower(units).find(since);
+  if (found == std::string::npos) return false;
+  const std::size_t first = units.find_first_not_of(' ', found + since.size());
+  return first != std::string::npos && units[first] >= '0' && units[first] <= '9';
+}
+
 bool has_numeric_time(const FileContents& contents, int dimension) {
   const std::string& name = contents.dimensions[cf::at(dimension)].name;
   return std::any_of(contents.variables.begin(), contents.variables.end(),
                      [&](const FileVariable& one) {
                        return one.numeric && one.dims == std::vector{dimension} &&
-                              (one.name == name || one.standard_name == "time" ||
-                               lower(one.units).find(" since ") != std::string::npos);
+                              (one.name == name || counts_from_a_date(one.units) ||
+                               (one.standard_name == "time" &&
+                                lower(one.units).find(" since ") == std::string::npos));
                      });
+}
+
+// Of what follows the whole seconds; nullopt if that is no fraction, Z or blank.
+std::optional<double> fraction_in(std::string_view text) {
+  std::size_t end = 0;
+  double out = 0;
+  if (!text.empty() && text[0] == '.') {
+    double place = 0.1;
+    for (end = 1; end < text.size() && text[end] >= '0' && text[end] <= '9'; ++end) {
+      out += place * (text[end] - '0');
+      place /= 10;
+    }
+    if (end == 1) return std::nullopt;
+  }
+  if (end < text.size() && text[end] == 'Z') ++end;
+  constexpr std::string_view blanks(" \0", 2);
+  if (text.find_first_not_of(blanks, end) != std::string_view::npos) return std::nullopt;
+  return out;
 }
 
 }  // namespace
@@ -58,8 +86,10 @@ double seconds_of_date(std::string_view text) {
                                          std::chrono::month(static_cast<unsigned>(month)),
                                          std::chrono::day(static_cast<unsigned>(day))};
   if (!date.ok() || hour > 24 || minute > 59 || second > 60) return none;
+  const auto fraction = fraction_in(text.substr(form.size()));
+  if (!fraction) return none;
   const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-  return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second;
+  return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second + *fraction;
 }
 
 int name_dates_of_wrf(FileContents& contents) {
@@ -70,7 +100,7 @@ int name_dates_of_wrf(FileContents& contents) {
   const int time = dates.dims[0];
   const std::size_t width = contents.dimensions[cf::at(dates.dims[1])].length;
   if (lower(contents.dimensions[cf::at(time)].name) != "time" || width < date_length ||
-      has_numeric_time(contents, time)) {
+      width > date_width_max || has_numeric_time(contents, time)) {
     return -1;
   }
   dates.type = "float64";
@@ -78,6 +108,7 @@ int name_dates_of_wrf(FileContents& contents) {
   dates.dims = {time};
   dates.standard_name = "time";
   dates.units = date_units;
+  dates.calendar = "proleptic_gregorian";
   contents.notes.push_back("times are read from the text of 'Times'");
   return found;
 }

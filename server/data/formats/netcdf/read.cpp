@@ -2,6 +2,7 @@
 #include <netcdf.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -149,8 +150,21 @@ Result<void> File::read_block(int variable, const Block& block, T* out, const Ge
 // Characters of unwritten chunks are no date. block: of the dimension of time.
 Result<void> File::read_dates(const Block& block, double* out) const {
   const std::vector<std::size_t> start{block.start.at(0), 0};
-  const std::vector<std::size_t> count{block.count.at(0), date_length};
-  std::string text(count[0] * date_length, ' ');
+  std::size_t width = 0;
+  {
+    const LibraryLock lock;
+    const auto [group, id] = place_of(dates_);
+    std::array<int, 2> dims{};
+    int rank = 0;
+    if (nc_inq_varndims(group, id, &rank) != NC_NOERR || rank != 2 ||
+        nc_inq_vardimid(group, id, dims.data()) != NC_NOERR ||
+        nc_inq_dimlen(group, dims[1], &width) != NC_NOERR || width < date_length ||
+        width > date_width_max) {
+      return fault("is damaged: the characters of 'Times' cannot be read");
+    }
+  }
+  const std::vector<std::size_t> count{block.count.at(0), width};
+  std::string text(count[0] * width, ' ');
   std::vector<double> absent(text.size(), 0);
   auto done = read_block(dates_, {start, count}, absent.data(), [&] {
     const auto [group, id] = place_of(dates_);
@@ -158,8 +172,8 @@ Result<void> File::read_dates(const Block& block, double* out) const {
   });
   if (!done) return done;
   for (std::size_t i = 0; i < count[0]; ++i) {
-    const double masked = absent[i * date_length];
-    out[i] = masked + seconds_of_date(std::string_view(text).substr(i * date_length, date_length));
+    const double masked = absent[i * width];
+    out[i] = masked + seconds_of_date(std::string_view(text).substr(i * width, width));
   }
   return {};
 }

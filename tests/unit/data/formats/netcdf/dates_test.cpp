@@ -16,17 +16,17 @@ namespace {
 
 // One field at the dates; with XTIME if minutes are given.
 void write_dates(const std::string& path, const std::vector<std::string>& dates, int mode,
-                 const std::vector<double>& minutes = {}) {
+                 const std::vector<double>& minutes = {},
+                 const std::string& epoch = "2000-01-01 00:00:00") {
   NetcdfMaker file(path, mode);
   const int time = file.dimension("Time", dates.size());
-  const int width = file.dimension("DateStrLen", 19);
+  const int width = file.dimension("DateStrLen", dates.front().size());
   const int y = file.axis("y", {0, 1, 2}, "m");
   const int x = file.axis("x", {0, 1}, "m");
   const int text = file.variable("Times", NC_CHAR, {time, width});
   file.variable("T", NC_FLOAT, {time, y, x}, counting(6 * dates.size()));
   if (!minutes.empty()) {
-    file.text(file.variable("XTIME", NC_FLOAT, {time}, minutes), "units",
-              "minutes since 2000-01-01 00:00:00");
+    file.text(file.variable("XTIME", NC_FLOAT, {time}, minutes), "units", "minutes since " + epoch);
   }
   nc_enddef(file.id());
   std::string all;
@@ -58,6 +58,29 @@ TEST(WrfDates, NumericTimesHavePrecedence) {
             (std::vector<std::string>{"2000-01-01T00:00:00Z", "2000-01-01T01:00:00Z"}));
 }
 
+TEST(WrfDates, TimesSinceNoDateLeaveTheTextInForce) {
+  const Folder folder;
+  write_dates(folder / "x.nc", {"2004-02-28_21:00:00", "2004-02-29_00:30:00"}, NC_NETCDF4, {0, 60},
+              "simulation start");
+  EXPECT_EQ(times_of(folder / "x.nc"),
+            (std::vector<std::string>{"2004-02-28T21:00:00Z", "2004-02-29T00:30:00Z"}));
+}
+
+TEST(WrfDates, YearOneOfIdealisedRunsIsThatOfTheText) {
+  const Folder folder;
+  write_dates(folder / "ideal.nc", {"0001-01-01_00:00:00", "0001-01-01_00:10:00"}, NC_NETCDF4);
+  EXPECT_EQ(times_of(folder / "ideal.nc"),
+            (std::vector<std::string>{"0001-01-01T00:00:00Z", "0001-01-01T00:10:00Z"}));
+}
+
+TEST(WrfDates, FractionsOfSecondsAreRead) {
+  const Folder folder;
+  write_dates(folder / "f.nc", {"2004-02-28_21:00:00.5000", "2004-02-28_21:00:00.7500"},
+              NC_NETCDF4);
+  EXPECT_EQ(times_of(folder / "f.nc"),
+            (std::vector<std::string>{"2004-02-28T21:00:00.500Z", "2004-02-28T21:00:00.750Z"}));
+}
+
 TEST(WrfDates, FilesOfASeriesAreInTheOrderOfTheirDates) {
   const Folder folder;
   write_dates(folder / "s_1.nc", {"2004-03-01_00:00:00"}, NC_NETCDF4);
@@ -78,8 +101,11 @@ TEST(WrfDates, SecondsCountFrom1970) {
   EXPECT_EQ(netcdf::seconds_of_date("1970-01-01_00:00:00"), 0);
   EXPECT_EQ(netcdf::seconds_of_date("2000-03-01_12:00:01"), 951912001);
   EXPECT_EQ(netcdf::seconds_of_date("1969-12-31_23:59:59"), -1);
-  for (const char* text : {"", "2000-03-01", "2000-13-01_00:00:00", "2001-02-29_00:00:00",
-                           "2000-03-01_25:00:00", "2000-03-0a_00:00:00", "-200-03-01_00:00:00"}) {
+  EXPECT_EQ(netcdf::seconds_of_date("1970-01-01_00:00:01.25 "), 1.25);
+  EXPECT_EQ(netcdf::seconds_of_date("1970-01-01T00:00:01Z"), 1);
+  for (const char* text : {"1970-01-01_00:00:00+06", "1970-01-01_00:00:00.", "", "2000-03-01",
+                           "2000-13-01_00:00:00", "2001-02-29_00:00:00", "2000-03-01_25:00:00",
+                           "2000-03-0a_00:00:00", "-200-03-01_00:00:00"}) {
     EXPECT_TRUE(std::isnan(netcdf::seconds_of_date(text))) << text;
   }
 }
