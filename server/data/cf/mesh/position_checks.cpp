@@ -6,9 +6,11 @@
 #include <functional>
 #include <numbers>
 #include <string>
+#include <string_view>
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/coordinates.hpp"
+#include "server/data/cf/grid/axes.hpp"
 
 namespace windsplat::data::cf {
 
@@ -52,20 +54,29 @@ bool are_radians(const std::array<std::vector<double>, 2>& positions) {
   return spans(0, 2 * half_turn) && spans(1, half_turn) && most[1] < half_turn / 2 + 1e-5;
 }
 
+bool is_unitless(std::string_view units) { return units.empty() || units == "1" || units == "-"; }
+
 Result<void> check_units(const FileContents& contents, const std::array<int, 2>& variables,
                          const std::array<std::vector<double>, 2>& positions) {
   const auto& all = contents.variables;
   const std::array limits{2 * std::numbers::pi, std::numbers::pi / 2};
+  std::array<bool, 2> open{};  // could be degrees or radians
+  bool in_radians = false;
   for (std::size_t a = 0; a < 2; ++a) {
     const FileVariable& one = all.at(at(variables.at(a)));
-    const bool has_units = std::any_of(all.begin(), all.end(), [&](const FileVariable& other) {
-      return !other.units.empty() && (&other == &one || other.bounds == one.name);
-    });
+    bool has_units = false;
+    for (const FileVariable& other : all) {
+      if (is_unitless(other.units) || (&other != &one && other.bounds != one.name)) continue;
+      has_units = true;
+      in_radians = in_radians || is_radian(other.units);
+    }
     const bool is_degrees =
         std::any_of(positions.at(a).begin(), positions.at(a).end(),
                     [&](double value) { return std::abs(value) > limits.at(a) + 1e-5; });
-    if (has_units || is_degrees) return {};
+    open.at(a) = !has_units && !is_degrees;
   }
+  const bool is_ambiguous = in_radians ? open[0] || open[1] : open[0] && open[1];
+  if (!is_ambiguous) return {};
   return make_error(ErrorKind::bad_data,
                     "the positions in " + in_quotes(all.at(at(variables[0])).name) + " and " +
                         in_quotes(all.at(at(variables[1])).name) +

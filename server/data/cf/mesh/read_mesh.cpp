@@ -261,7 +261,7 @@ class MeshReader {
   Result<std::vector<double>> angles(int v, bool is_angle) const {
     if (!is_angle) return unpacked_values(file_, v);
     auto values = unpacked_degrees(file_, v);
-    const bool by_convention = from_.is_radian && variable(v).units.empty();
+    const bool by_convention = from_.is_radian && is_unitless(variable(v).units);
     if (values && by_convention) {
       for (double& value : *values) value *= 180 / std::numbers::pi;
     }

@@ -406,7 +406,7 @@ TEST(Delaunay, TracksStayRefusedHoweverCloseTheirPositions) {
 }
 
 // A list of cells around 10 degrees east and 50 north, in the given units.
-void write_cells(const std::string& path, const std::string& units, double scale) {
+void write_cells(const std::string& path, const std::array<std::string, 2>& units, double scale) {
   constexpr std::size_t count = 200;
   NetcdfMaker file(path);
   const int cells = file.dimension("ncells", count);
@@ -421,7 +421,8 @@ void write_cells(const std::string& path, const std::string& units, double scale
        {std::tuple("tlon", "longitude", east), std::tuple("tlat", "latitude", north)}) {
     const int v = file.variable(name, NC_DOUBLE, {cells}, values);
     file.text(v, "standard_name", standard);
-    if (!units.empty()) file.text(v, "units", units);
+    const std::string& unit = units.at(name == std::string("tlon") ? 0 : 1);
+    if (!unit.empty()) file.text(v, "units", unit);
   }
   const int z = file.axis("height", {10, 20}, "m", "height");
   const int t = file.variable("t", NC_FLOAT, {z, cells}, counting(2 * count));
@@ -430,17 +431,24 @@ void write_cells(const std::string& path, const std::string& units, double scale
 
 TEST(Delaunay, RadiansOfARegionAreDegreesByTheirUnitsOnly) {
   const Folder folder;
-  write_cells(folder / "r.nc", "radian", degree);
+  write_cells(folder / "r.nc", {"radian", "radian"}, degree);
   const auto source = opened(folder / "r.nc");
   ASSERT_NE(source, nullptr);
   EXPECT_NEAR(source->info().grid.axes[0].coordinates.front(), 8, 0.3);
   EXPECT_NEAR(source->info().grid.axes[1].coordinates.back(), 51, 0.3);
-  write_cells(folder / "d.nc", "", 1);
+  write_cells(folder / "d.nc", {}, 1);
   EXPECT_NE(opened(folder / "d.nc"), nullptr) << "50 and more are no radians";
-  write_cells(folder / "n.nc", "", degree);
-  EXPECT_THAT(refusal(folder / "n.nc"),
-              HasSubstr("the positions in 'tlon' and 'tlat' have no units and could be degrees or "
-                        "radians"));
+  using Units = std::array<std::string, 2>;
+  for (const Units& units : {Units{"", ""}, Units{"radian", ""}, Units{"", "radian"},
+                             Units{"1", "1"}, Units{"-", "radian"}}) {
+    write_cells(folder / "n.nc", units, degree);
+    EXPECT_THAT(refusal(folder / "n.nc"),
+                HasSubstr("the positions in 'tlon' and 'tlat' have no units and could be degrees "
+                          "or radians"))
+        << units[0] << ", " << units[1];
+  }
+  write_cells(folder / "one.nc", {"degrees_east", ""}, degree);
+  EXPECT_NE(opened(folder / "one.nc"), nullptr) << "the other is in degrees by its units";
 }
 
 }  // namespace
