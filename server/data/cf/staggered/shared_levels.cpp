@@ -6,6 +6,7 @@
 #include <optional>
 #include <sstream>
 #include <string_view>
+#include <utility>
 
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/grid/axes.hpp"
@@ -56,8 +57,7 @@ class SharedLevelFinder {
            std::count(variable.dims.begin(), variable.dims.end(), dimension) > 0;
   }
 
-  // Those that variables name, of most variables first. A variable that names several belongs to
-  // the first of them.
+  // Those of most variables first. A variable that names several belongs to the first of them.
   [[nodiscard]] std::vector<Heights> heights_on(int dimension) const {
     std::vector<Heights> out;
     for (std::size_t v = 0; v < contents_.variables.size(); ++v) {
@@ -77,54 +77,69 @@ class SharedLevelFinder {
       });
       if (named != out.end()) named->users.push_back(static_cast<int>(u));
     }
-    out.erase(std::remove_if(out.begin(), out.end(),
-                             [](const Heights& one) { return one.users.empty(); }),
-              out.end());
     std::stable_sort(out.begin(), out.end(), [](const Heights& a, const Heights& b) {
       return a.users.size() > b.users.size();
     });
     return out;
   }
 
-  // Ascending if they are monotonic: with the opposite sign if the levels run the other way.
+  // Metres, ascending if they are monotonic: with the opposite sign if the levels run the other
+  // way.
   [[nodiscard]] Result<std::vector<double>> values_of(int v, bool falls) const {
     auto values = unpacked_values(file_, v);
     if (!values) return values;
-    const double sign = falls ? -1 : 1;
-    for (double& value : *values) value *= sign;
+    const double metres = metres_in(variable(v).units).value_or(1);
+    for (double& value : *values) value *= falls ? -metres : metres;
     return values;
   }
 
   Result<void> compare(int dimension) {
     const std::vector<Heights> all = heights_on(dimension);
-    if (all.size() < 2) return {};
+    if (all.size() < 2 || all[0].users.empty()) return {};
     auto centers = values_of(all[0].variable, false);
     if (!centers) return centers.error();
     const bool falls = centers->size() > 1 && centers->back() < centers->front();
     for (double& value : *centers) value *= falls ? -1 : 1;
+    std::vector<std::vector<double>> values{*centers};
     for (std::size_t n = 1; n < all.size(); ++n) {
-      const auto faces = values_of(all[n].variable, falls);
+      auto faces = values_of(all[n].variable, falls);
       if (!faces) return faces.error();
-      if (*faces == *centers) continue;
-      place(all[n], dimension, *faces, *centers, all[0].variable);
+      values.push_back(std::move(*faces));
+      if (values.back() == *centers || all[n].users.empty()) continue;
+      place(all[n], dimension, values.back(), *centers, all[0].variable);
     }
+    if (std::count(values.begin(), values.end(), *centers) == std::ssize(values)) return {};
+    leave_out(all, values, dimension);
+    return {};
+  }
+
+  // Variables along the dimension that name none of its heights, or several that differ.
+  // values: of all.
+  void leave_out(const std::vector<Heights>& all, const std::vector<std::vector<double>>& values,
+                 int dimension) {
     for (std::size_t v = 0; v < contents_.variables.size(); ++v) {
       const FileVariable& one = contents_.variables[v];
-      const bool is_placed = std::any_of(all.begin(), all.end(), [&](const Heights& heights) {
-        return std::count(heights.users.begin(), heights.users.end(), static_cast<int>(v)) > 0;
-      });
-      if (is_placed || !is_along(one, dimension) || one.dims.size() < 3) continue;
-      found_.unread[v] = "on levels that have several heights, of which it names none";
+      if (!is_along(one, dimension)) continue;
+      const std::vector<double>* first = nullptr;
+      bool differs = false;
+      for (std::size_t n = 0; n < all.size(); ++n) {
+        if (!names(one, variable(all[n].variable).name)) continue;
+        differs = differs || (first != nullptr && *first != values[n]);
+        first = &values[n];
+      }
+      if (differs) {
+        found_.unread[v] = "its 'coordinates' names several heights that differ on its levels";
+        found_.staggers[v] = {};
+      } else if (first == nullptr && one.dims.size() > 2) {
+        found_.unread[v] = "on levels that have several heights, of which it names none";
+      }
     }
-    return {};
   }
 
   void place(const Heights& at_faces, int dimension, const std::vector<double>& faces,
              const std::vector<double>& centers, int of_centers) {
-    const bool same_way =
-        direction_of_levels(variable(at_faces.variable)) ==
-            direction_of_levels(variable(of_centers)) &&
-        metres_in(variable(at_faces.variable).units) == metres_in(variable(of_centers).units);
+    const bool same_way = direction_of_levels(variable(at_faces.variable)) ==
+                          direction_of_levels(variable(of_centers));
     std::optional<std::ptrdiff_t> first;
     if (same_way) first = interleaved(faces, centers, Interleaving::between);
     for (const int user : at_faces.users) {

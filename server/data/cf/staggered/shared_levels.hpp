@@ -21,7 +21,7 @@ struct SharedLevels {
 // `coordinates` name. On dimensions whose coordinate only numbers the levels, variables at other
 // heights than those that most variables name are staggered along the dimension, with the weights
 // of linear interpolation in height, if their heights lie between those; otherwise they cannot be
-// read, nor can those that name no heights. Errors: bad_data.
+// read, nor can those that name no heights, or several that differ. Errors: bad_data.
 Result<SharedLevels> find_shared_levels(const ArrayFile& file);
 
 }  // namespace windsplat::data::cf

@@ -167,6 +167,8 @@ struct Shared {
   std::vector<std::string> at_theta{"air_temperature", "specific_humidity", "cloud"};
   std::vector<std::string> at_rho{"x_wind", "y_wind"};
   std::vector<std::string> nowhere;  // without `coordinates`
+  std::vector<std::string> at_both;  // name the heights of both
+  double rho_unit = 1;               // metres; 1000: km
   bool rho_first = false;
   bool falls = false;
 };
@@ -177,8 +179,10 @@ void write_shared(const std::string& path, const Shared& one) {
   const int z = file.axis("model_level_number", counting(levels, 1), "1", "model_level_number");
   const auto put_heights = [&](const std::string& name, std::vector<double> values) {
     if (one.falls) std::reverse(values.begin(), values.end());
+    const bool in_km = name == "level_height_0" && one.rho_unit == 1000;
+    for (double& value : values) value /= in_km ? 1000 : 1;
     const int height = file.variable(name, NC_DOUBLE, {z}, values);
-    file.text(height, "units", "m");
+    file.text(height, "units", in_km ? "km" : "m");
     file.text(height, "positive", "up");
     file.text(height, "long_name", "level_height");
   };
@@ -201,6 +205,7 @@ void write_shared(const std::string& path, const Shared& one) {
   for (const std::string& name : one.at_theta) put(name, one.theta, "level_height sigma");
   for (const std::string& name : one.at_rho) put(name, one.rho, "level_height_0 sigma_0");
   for (const std::string& name : one.nowhere) put(name, one.theta, "");
+  for (const std::string& name : one.at_both) put(name, one.rho, "level_height level_height_0");
 }
 
 // Whether a field that is its own height equals the axis at all levels that it surrounds.
@@ -210,6 +215,34 @@ void expect_placed(Source& source, const std::string& name, std::size_t first, s
   for (std::size_t k = first; k < end; ++k) {
     EXPECT_NEAR(volume.values[k * columns], z.at(k), 1e-5 * z.at(k)) << name << " level " << k;
   }
+}
+
+TEST(SharedLevels, VariablesThatNameNoneOfTwoHeightsOrBothAreLeftOut) {
+  const Folder folder;
+  Shared none;
+  none.at_rho.clear();
+  none.nowhere = {"x_wind", "y_wind"};
+  write_shared(folder / "none.nc", none);
+  EXPECT_THAT(reason_of(opened(folder / "none.nc")->info(), "x_wind"),
+              testing::HasSubstr("several heights, of which it names none"));
+  Shared both;
+  both.at_rho = {"y_wind"};
+  both.at_both = {"x_wind"};
+  write_shared(folder / "both.nc", both);
+  const auto source = opened(folder / "both.nc");
+  EXPECT_THAT(reason_of(source->info(), "x_wind"),
+              testing::HasSubstr("names several heights that differ"));
+  expect_placed(*source, "y_wind", 0, 4);
+}
+
+TEST(SharedLevels, HeightsInOtherUnitsLieBetweenThose) {
+  const Folder folder;
+  Shared one;
+  one.rho_unit = 1000;
+  write_shared(folder / "km.nc", one);
+  const auto source = opened(folder / "km.nc");
+  EXPECT_EQ(reason_of(source->info(), "x_wind"), "");
+  expect_placed(*source, "x_wind", 0, 4);
 }
 
 TEST(SharedLevels, WindsBetweenUnevenLevelsAreInterpolatedToTheirHeights) {
