@@ -46,8 +46,9 @@ Span span_of(const Stagger& stagger, std::size_t start, std::size_t count, std::
   return {start, count, static_cast<std::size_t>(low), static_cast<std::size_t>(high - low + 1)};
 }
 
-// upper: weight of b.
+// upper: weight of b; NaN: masked.
 double mean(double a, double b, double upper, bool walls) {
+  if (std::isnan(upper)) return upper;
   if (std::isnan(a)) return walls ? upper * b : b;  // NaN if both are masked
   if (std::isnan(b)) return walls ? (1 - upper) * a : a;
   return (1 - upper) * a + upper * b;
@@ -92,6 +93,8 @@ class CollocatedFile final : public ArrayFile {
       : base_(std::move(base)), contents_(base_->contents()) {
     const std::vector<DimensionRole> roles = classify_dimensions(contents_);
     std::string names;
+    std::string by_height;
+    std::string masked;
     for (FileVariable& variable : contents_.variables) {
       const std::string& unread = levels.unread.at(ways_.size());
       if (!unread.empty()) {
@@ -104,7 +107,9 @@ class CollocatedFile final : public ArrayFile {
       const Way& way = ways_.back();
       if (!way.is_changed()) continue;
       if (!way.first_step) {
-        names += (names.empty() ? "" : ", ") + in_quotes(variable.name);
+        append(names, variable.name);
+        if (way.is_weighted()) append(by_height, variable.name);
+        if (way.has_masked_end()) append(masked, variable.name);
         for (std::size_t d = 0; d < variable.dims.size(); ++d) {
           if (way.staggers[d].centers < 0) continue;
           variable.dims[d] = way.staggers[d].centers;
@@ -124,6 +129,12 @@ class CollocatedFile final : public ArrayFile {
     if (!names.empty()) {
       contents_.notes.push_back("on a staggered grid, averaged to the centers of its cells: " +
                                 names);
+    }
+    if (!by_height.empty()) {
+      contents_.notes.push_back("between levels, interpolated by height: " + by_height);
+    }
+    if (!masked.empty()) {
+      contents_.notes.push_back("levels beyond their first or last height are masked: " + masked);
     }
     name_velocities(contents_);
     computed_ = variables_of_wrf(contents_);
@@ -188,7 +199,21 @@ class CollocatedFile final : public ArrayFile {
     bool walls = false;             // a masked neighbor counts as 0
     std::vector<Stagger> staggers;  // one per dimension; empty if none is staggered
     [[nodiscard]] bool is_changed() const { return first_step || !staggers.empty(); }
+    [[nodiscard]] bool is_weighted() const {
+      return std::any_of(staggers.begin(), staggers.end(),
+                         [](const Stagger& one) { return !one.upper.empty(); });
+    }
+    [[nodiscard]] bool has_masked_end() const {
+      return std::any_of(staggers.begin(), staggers.end(), [](const Stagger& one) {
+        return std::any_of(one.upper.begin(), one.upper.end(),
+                           [](double weight) { return std::isnan(weight); });
+      });
+    }
   };
+
+  static void append(std::string& names, const std::string& name) {
+    names += (names.empty() ? "" : ", ") + in_quotes(name);
+  }
 
   static Way way_of(const FileVariable& variable, const std::vector<Stagger>& staggers,
                     const Stagger& levels) {

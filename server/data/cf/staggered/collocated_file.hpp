@@ -13,7 +13,7 @@ namespace windsplat::data::cf {
 // order, in which those on faces or corners are averages over their neighbors around each center:
 //  - a sample is the mean of the two neighbors along each staggered dimension, weighted by their
 //    heights where the file gives heights of numbered levels; at the end of the grid, where there
-//    is one neighbor only, its value;
+//    is one neighbor only, its value, or masked where heights weight it;
 //  - variables at other heights on a shared dimension of levels are averaged or become unreadable
 //    (shared_levels.hpp);
 //  - a masked neighbor of a variable in units of speed is a wall and counts as 0, unless all

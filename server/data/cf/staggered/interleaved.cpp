@@ -2,6 +2,7 @@
 #include "server/data/cf/staggered/interleaved.hpp"
 
 #include <cmath>
+#include <limits>
 
 namespace windsplat::data::cf {
 
@@ -45,7 +46,7 @@ std::optional<std::ptrdiff_t> interleaved(const std::vector<double>& faces,
 
 std::vector<double> upper_weights(const std::vector<double>& faces,
                                   const std::vector<double>& centers, std::ptrdiff_t first) {
-  std::vector<double> out(centers.size(), 0.5);
+  std::vector<double> out(centers.size(), std::numeric_limits<double>::quiet_NaN());
   const auto count = static_cast<std::ptrdiff_t>(faces.size());
   for (std::size_t i = 0; i < centers.size(); ++i) {
     const std::ptrdiff_t low = static_cast<std::ptrdiff_t>(i) + first;

@@ -21,7 +21,7 @@ enum class Interleaving { near_middle, between };
 std::optional<std::ptrdiff_t> interleaved(const std::vector<double>& faces,
                                           const std::vector<double>& centers, Interleaving how);
 
-// Weights of face i + first + 1 in the linear interpolation at center i; 1/2 where a center has one
+// Weights of face i + first + 1 in the linear interpolation at center i; NaN where a center has one
 // face only.
 std::vector<double> upper_weights(const std::vector<double>& faces,
                                   const std::vector<double>& centers, std::ptrdiff_t first);

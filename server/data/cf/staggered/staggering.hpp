@@ -15,7 +15,8 @@ struct Stagger {
   int centers = -1;          // dimension of the centers; -1: the dimension is not staggered
   bool aligned = false;      // sample i lies at center i: the dimension only has another name
   std::ptrdiff_t first = 0;  // otherwise center i lies between samples i + first and i + first + 1
-  std::vector<double> upper = {};  // weights of the latter at each center; empty: all 1/2
+  std::vector<double> upper =
+      {};  // weights of the latter at each center, NaN: masked; empty: all 1/2
 };
 
 // One entry per dimension of the file. Evidence in this order: what the reader

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -243,6 +244,19 @@ TEST(SharedLevels, HeightsInOtherUnitsLieBetweenThose) {
   const auto source = opened(folder / "km.nc");
   EXPECT_EQ(reason_of(source->info(), "x_wind"), "");
   expect_placed(*source, "x_wind", 0, 4);
+}
+
+TEST(SharedLevels, TheLevelBeyondTheLastHeightIsMaskedAndNoted) {
+  const Folder folder;
+  write_shared(folder / "um.nc", {});
+  const auto source = opened(folder / "um.nc");
+  const Volume wind = volume_of(*source, "x_wind");
+  for (std::size_t i = 0; i < columns; ++i) {
+    EXPECT_FALSE(std::isnan(wind.values[3 * columns + i]));
+    EXPECT_TRUE(std::isnan(wind.values[4 * columns + i])) << "no wind is above";
+  }
+  EXPECT_TRUE(has_note(source->info(), "interpolated by height"));
+  EXPECT_TRUE(has_note(source->info(), "masked"));
 }
 
 TEST(SharedLevels, WindsBetweenUnevenLevelsAreInterpolatedToTheirHeights) {
