@@ -27,6 +27,8 @@ constexpr double told_share = 0.35;
 // Errors that are surely less than the least one that is reported need not be known.
 constexpr int tried_for_none = 256;
 constexpr double none_below = 1e-10;
+// Fewer samples do not tell where a picture shows something with the eye among kernels.
+constexpr std::size_t samples_few = 256;
 
 struct Place {
   Index near{};         // a sample beside the ray
@@ -42,14 +44,17 @@ std::uint32_t nth_place(std::uint32_t n) {
   return out;
 }
 
-// Places spread evenly over the part of a picture where the lattice is.
+// Places spread evenly over the part of a picture where the lattice is, or, if that is not known
+// from samples, over the picture.
 class Places {
  public:
-  explicit Places(const RayKernels& kernels) : view_(kernels.view()), samples_(kernels.samples()) {}
+  explicit Places(const RayKernels& kernels)
+      : view_(kernels.view()), samples_(kernels.samples()), reach_(reach()) {}
 
   struct Spread {
     std::vector<Place> places;
-    double area = 0;  // square pixels
+    double area = 0;     // square pixels
+    bool empty = false;  // certainly: no ray passes what kernels reach
   };
   [[nodiscard]] Spread spread(const std::vector<RayThrough>& through) const {
     struct Candidate {
@@ -67,6 +72,10 @@ class Places {
       out.area += one.stands_for * face(one.sample) * pixels * pixels;
       candidates.push_back({one.sample, at, pixels, out.area});
     }
+    // Beside the eye, kernels are seen whose samples are behind it.
+    const bool surrounded = view_.perspective && reach_ && reach_->surrounds_eye;
+    if (reach_ && (candidates.empty() || (surrounded && candidates.size() < samples_few)))
+      return over_picture();
     for (const Candidate& one : candidates) {
       while (out.places.size() < places_count) {
         const auto taken = static_cast<std::uint32_t>(out.places.size());
@@ -78,6 +87,87 @@ class Places {
   }
 
  private:
+  // What kernels of an even lattice reach, from the eye, world units.
+  struct Reach {
+    Vec low{};
+    Vec high{};
+    bool surrounds_eye = true;
+  };
+  [[nodiscard]] std::optional<Reach> reach() const {
+    const scene::Scene& scene = samples_.scene();
+    if (scene.lattice.places) return std::nullopt;
+    int stride = 1;
+    for (const scene::ScalarLayer& layer : scene.scalars) stride = std::max(stride, layer.stride);
+    if (scene.vector) stride = std::max(stride, scene.vector->stride);
+    const double line = scene.vector ? 0.5 * scene.vector->length : 0;
+    Reach out;
+    for (std::size_t a = 0; a < 3; ++a) {
+      out.low[a] = 1e300;
+      out.high[a] = -1e300;
+      for (const int end : {samples_.low()[a], samples_.high()[a] - 1}) {
+        Index i = samples_.low();
+        i[a] = end;
+        const double beyond = stride * reference::footprint_t * samples_.edge(i, a) + line;
+        const double at = from_eye(i)[a];
+        out.low[a] = std::min(out.low[a], at - beyond);
+        out.high[a] = std::max(out.high[a], at + beyond);
+      }
+      out.surrounds_eye = out.surrounds_eye && out.low[a] <= 0 && out.high[a] >= 0;
+    }
+    return out;
+  }
+  // The sample nearest to where a ray enters what kernels reach, beyond the near plane; nothing if
+  // it does not.
+  [[nodiscard]] std::optional<Index> first_sample(const PictureRay& ray) const {
+    double from = view_.perspective ? view_.near : -1e300;
+    double to = 1e300;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double rate = ray.direction[a];
+      const double low = reach_->low[a] - ray.origin[a];
+      const double high = reach_->high[a] - ray.origin[a];
+      if (std::abs(rate) < 1e-12) {
+        if (low > 0 || high < 0) return std::nullopt;
+        continue;
+      }
+      from = std::max(from, std::min(low / rate, high / rate));
+      to = std::min(to, std::max(low / rate, high / rate));
+    }
+    if (from > to) return std::nullopt;
+    const Vec at = reference::plus(ray.origin, from, ray.direction);
+    Index out = samples_.low();
+    for (std::size_t a = 0; a < 3; ++a) {
+      double nearest = 1e300;
+      Index i = samples_.low();
+      for (; i[a] < samples_.high()[a]; ++i[a]) {
+        const double away = std::abs(from_eye(i)[a] - at[a]);
+        if (away < nearest) out[a] = i[a];
+        nearest = std::min(nearest, away);
+      }
+    }
+    return out;
+  }
+  // One place in each part of a grid, at random, in the order of a quadtree.
+  [[nodiscard]] Spread over_picture() const {
+    constexpr double parts = 1U << places_bits / 2;  // along each edge
+    Spread out;
+    out.empty = true;
+    out.area = 4 * view_.half_width * view_.half_height;
+    for (std::uint32_t n = 0; n < places_count; ++n) {
+      std::array<std::uint32_t, 2> part{};
+      for (std::uint32_t bit = 0; bit < places_bits; ++bit)
+        part[bit % 2] |= (n >> bit & 1U) << bit / 2;
+      const auto random = pcg3d({n, 47, 53});
+      Place place;
+      place.x = std::floor(2 * view_.half_width * (part[0] + random[0] / 4294967296.0) / parts);
+      place.y = std::floor(2 * view_.half_height * (part[1] + random[1] / 4294967296.0) / parts);
+      const auto near = first_sample(picture_ray(view_, place.x + 0.5, place.y + 0.5));
+      place.inside = near.has_value();
+      if (near) place.near = *near;
+      out.empty = out.empty && !near;
+      out.places.push_back(place);
+    }
+    return out;
+  }
   // At random within the cell of a sample and 0.2 cells around, and within the picture if it may
   // be: the area for which samples stand is that in the picture, and cells may be larger than it.
   [[nodiscard]] Place place_near(const Index& i, const Vec& at, double pixels,
@@ -162,6 +252,7 @@ class Places {
 
   const reference::View& view_;
   const DrawnSamples& samples_;
+  const std::optional<Reach> reach_;  // empty: not known
 };
 
 // Mean squares of differences at places.
@@ -203,7 +294,7 @@ class TryingPixels {
 
   // Few places may have most of the error, and sooner too few than too many of them are met: the
   // standard error is added.
-  // Nothing if too few places can be tried for their work.
+  // Nothing if too few places can be tried for their work, or if it is not known where.
   PixelTrials run(const std::vector<RayThrough>& through) {
     const Places::Spread spread = Places(kernels_).spread(through);
     const std::vector<Place>& places = spread.places;
@@ -211,7 +302,9 @@ class TryingPixels {
     MeanSquare slab;
     MeanSquare half;
     PixelTrials out;
-    for (std::uint32_t n = 0; n < places_count && !places.empty(); ++n) {
+    if (spread.empty) out.trials.emplace();
+    if (spread.empty || places.empty()) return out;
+    for (std::uint32_t n = 0; n < places_count; ++n) {
       if (kernel.is_told() && (scene_.scalars.empty() || slab.is_told())) break;
       if (cancel_.cancelled()) return {};
       if (out.places == trial_places_most || work() > trial_work_most) break;
@@ -229,7 +322,7 @@ class TryingPixels {
     }
     out.work = work();
     const bool told = kernel.count() >= tried_least && (kernel.is_told() || kernel.mean() > 0);
-    if (!places.empty() && !told) return out;
+    if (!told) return out;
     const double pixels = static_cast<double>(scene_.camera.width) * scene_.camera.height;
     const auto error = [&](const MeanSquare& of) {
       return std::sqrt(spread.area / pixels * (of.mean() + of.standard_error()));

@@ -218,7 +218,10 @@ bool RayKernels::meets(const Index& near, const PictureRay& ray) {
   for (const Group& group : groups_) {
     find_path(group, near, ray);
     for (const Place& place : path_) {
-      if (view_.perspective && place.depth <= view_.near) continue;
+      // Kernels reach beyond their centres, which are up to a cell beside the ray.
+      const double reach = 2 * reference::footprint_t / reference::length(place.direction) +
+                           (group.lines != nullptr ? 0.5 * group.lines->length : 0);
+      if (view_.perspective && place.depth + reach <= view_.near) continue;
       if (is_drawn_beside(group, place)) return true;
     }
   }

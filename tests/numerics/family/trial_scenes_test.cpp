@@ -120,6 +120,40 @@ TEST(PixelTrials, HaveTheErrorsOfPicturesOfUnusualViews) {
   }
 }
 
+// The eye within the outermost cells and just beyond them, looking outward: every sample is behind
+// it, and its splats are before it.
+TEST(PixelTrials, HaveTheErrorsOfKernelsWhoseSamplesAreBehindTheEye) {
+  for (const double beyond : {-0.02, 0.02, 0.06}) {  // the last samples; cells are 1 / 6 wide
+    for (const glm::dvec3& forward : {glm::dvec3(0.1, 0.05, 1), glm::dvec3(0.9, 0.2, 1)}) {
+      Scene scene = cloudy_scene(12, 100);
+      scene.vector.reset();
+      const auto dense = [](int, double x, double y, double z) {
+        return static_cast<float>(30 + 15 * std::sin(9 * x + z) + 15 * std::cos(8 * y));
+      };
+      scene.scalars[0].field = make_volume(scene.lattice, 1, dense);
+      scene.scalars[0].color = ramp_color(0, 60, {0.9F, 0.2F, 0.1F}, {0.2F, 0.5F, 1.0F});
+      look_from(scene, {0.13, -0.21, 1 - 1 / 12.0 + beyond}, forward);
+      const auto tried = frame::content_of(scene)->trials;
+      ASSERT_TRUE(tried) << beyond;
+      scene.method = scene::Method::kernel;
+      const engine::Image kernels = render(scene, 2).image;
+      scene.method = scene::Method::slab;
+      scene.slab_thickness = 1;
+      const engine::Image slabs = render(scene, 2).image;
+      scene.slab_thickness = 0.125;
+      const engine::Image truth = render(scene, 2).image;
+      const double kernel = frame::difference_of(kernels.rgba, truth.rgba).rmse;
+      const double slab = frame::difference_of(slabs.rgba, truth.rgba).rmse;
+      EXPECT_GT(std::max(kernel, slab), 1e-4) << beyond;
+      for (const auto& [of, error] : {std::pair{tried->kernel, kernel}, {tried->slab, slab}}) {
+        if (error < 1e-4) continue;
+        EXPECT_LT(std::abs(std::log(of / error)), std::log(2))
+            << beyond << ' ' << forward.x << ' ' << of << ' ' << error;
+      }
+    }
+  }
+}
+
 // Some thousand samples, evenly over the lattice.
 std::vector<frame::RayThrough> some_samples_of(const Scene& scene) {
   const frame::DrawnSamples samples(scene);
@@ -173,6 +207,22 @@ TEST(PixelTrials, TakeBoundedWorkForManyFaintLines) {
     scene.vector->length = length;
     expect_bounded_work(scene, "faint lines");
   }
+}
+
+TEST(PixelTrials, TellNoErrorOfPicturesOfNothing) {
+  Scene scene = cloudy_scene(12, 100);
+  look_from(scene, {0, 0, 3}, {0, 0.1, 1});
+  const auto tried = frame::content_of(scene)->trials;
+  ASSERT_TRUE(tried);
+  EXPECT_EQ(tried->kernel, 0);
+  EXPECT_EQ(tried->slab, 0);
+}
+
+// It is not known what the samples of a curved lattice reach.
+TEST(PixelTrials, DoNotTellErrorsWhereNoSampleIsSeenOfACurvedLattice) {
+  Scene scene = cloudy_scene(12, 100);
+  displace(scene.lattice, [](const glm::dvec3& p) { return p; });
+  EXPECT_FALSE(frame::pixel_trials(scene, {}).trials);
 }
 
 TEST(PixelTrials, AreNotTriedOnceCancelled) {
