@@ -65,7 +65,7 @@ struct Prefetch {
   quality::Setting setting;  // setting with which they will be drawn
 };
 // The view is at rest: measure time and error of each setting for it. Not answered; cancelled by
-// the next render.
+// the next render, and sent again after the last of the stills.
 struct Calibrate {
   protocol::View view;  // not completed; names its dataset
 };

@@ -73,6 +73,12 @@ void count_sent(SessionState& state, const Render& render, const Drawn& drawn, M
   if (moves) state.quality.learn_bytes(render, drawn, frame_bytes, text_bytes);
 }
 
+// The view is at rest and its final frame was sent; its description is made between stills.
+void calibrate(SessionState& state) {
+  if (state.player.running() || !state.stills.empty()) return;
+  state.effects.emplace_back(Calibrate{state.view.view()});
+}
+
 // Call after a frame of the stream (not a still) was sent.
 void after_frame(SessionState& state, const Render& render, std::uint32_t seq, double error,
                  bool final, bool blank) {
@@ -83,9 +89,7 @@ void after_frame(SessionState& state, const Render& render, std::uint32_t seq, d
   // A final frame is of the current view: any change would have cancelled it.
   state.displayed.sent_final(state.view, seq, error, blank);
   state.send(state.stats);
-  if (!state.player.running() && state.stills.empty()) {
-    state.effects.emplace_back(Calibrate{state.view.view()});
-  }
+  calibrate(state);
 }
 
 // Sends the frame with its accompanying messages.
@@ -139,9 +143,7 @@ bool is_cancelled(const Render& render, ErrorKind kind) {
   return kind == ErrorKind::cancelled || (released && render.purpose != Purpose::still);
 }
 
-}  // namespace
-
-void deliver(SessionState& state, const Render& render, Result<Drawn> drawn, Micros now) {
+void deliver_result(SessionState& state, const Render& render, Result<Drawn> drawn, Micros now) {
   if (!drawn) {
     if (is_cancelled(render, drawn.error().kind)) {
       ++state.stats.cancelled;
@@ -167,6 +169,15 @@ void deliver(SessionState& state, const Render& render, Result<Drawn> drawn, Mic
     state.view.confirm(render.version);
     state.displayed.withheld(render.version);
   }
+}
+
+}  // namespace
+
+void deliver(SessionState& state, const Render& render, Result<Drawn> drawn, Micros now) {
+  deliver_result(state, render, std::move(drawn), now);
+  // The still cancelled the calibration of the view.
+  if (render.purpose != Purpose::still || !state.view_is_shown()) return;
+  if (state.displayed.is_final() && state.displayed.equals(state.view.view())) calibrate(state);
 }
 
 void confirm_unchanged(SessionState& state) {

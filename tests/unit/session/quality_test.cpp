@@ -330,6 +330,24 @@ TEST(Refining, LosslessFinalFrameIsAPng) {
   EXPECT_EQ(driver.frames.back().header.codec, protocol::Codec::png);
 }
 
+// A still cancels the calibration, which describes the view.
+TEST(Refining, ViewAtRestIsCalibratedAgainAfterItsLastStill) {
+  Driver driver;
+  driver.patch(1, R"({"dataset":"wind"})");
+  driver.settle();
+  ASSERT_EQ(driver.calibrations.size(), 1U);
+  for (std::uint32_t id = 1; id <= 2; ++id) {
+    protocol::StillMessage still;
+    still.id = id;
+    driver.say(still);
+  }
+  EXPECT_EQ(driver.calibrations.size(), 1U);
+  driver.finish_render(10 * ms);
+  EXPECT_EQ(driver.calibrations.size(), 1U) << "the second still would cancel it";
+  driver.settle();
+  EXPECT_EQ(driver.calibrations.size(), 2U);
+}
+
 TEST(Refining, ViewAtRestIsCalibratedOnce) {
   Driver driver;
   driver.patch(1, R"({"dataset":"wind"})");
