@@ -205,9 +205,10 @@ def write_um(path, levels_shared=False):
     # Longitude i lies between faces i and i + 1, of which the last is missing.
     u, v = np.flip(between_all(np.flip(u, 2), 2, 6), 2), between(v, 1)
     for name, values in (("x_wind", u), ("y_wind", v)):
-        # Linear in height; beyond the ends the nearest level.
+        # Linear in height; beyond the ends masked.
         fields[name] = np.apply_along_axis(
-            lambda column: np.interp(theta, rho, column), 0, np.asarray(values, float))
+            lambda column: np.interp(theta, rho, column, np.nan, np.nan), 0,
+            np.asarray(values, float))
     units = {name: "m s-1" for name in ("x_wind", "y_wind", "upward_air_velocity", "wind")}
     return Independent({"x": lon, "y": lat, "z": theta},
                        as_masked({name: values[None] for name, values in fields.items()}),
