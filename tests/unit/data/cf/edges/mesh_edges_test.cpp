@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/unit/data/cf/edges_maker.hpp"
+#include "tests/unit/data/cf/edges/edges_maker.hpp"
 #include "tests/unit/data/cf/mesh_maker.hpp"
 #include "tests/unit/data/dataset_probe.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"

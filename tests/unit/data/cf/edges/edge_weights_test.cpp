@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "server/data/cf/edges/edges.hpp"
-#include "tests/unit/data/cf/edges_maker.hpp"
+#include "tests/unit/data/cf/edges/edges_maker.hpp"
 #include "tests/unit/data/cf/mesh_maker.hpp"
 
 namespace windsplat::data::test::mesh {
