@@ -231,9 +231,9 @@ std::vector<Levels> level_parts(const ArrayFile& file, const Placement& grid, in
     chunks_bytes *= static_cast<double>(chunk[d]);
     if (!is_across(about.dims[d])) continue;
     const std::size_t length = file.contents().dimensions.at(at(about.dims[d])).length;
-    const auto along = static_cast<double>((length + chunk[d] - 1) / chunk[d]);
-    chunks *= along;
-    chunks_bytes *= along;
+    const std::size_t along = (length + chunk[d] - 1) / chunk[d];
+    chunks *= static_cast<double>(along);
+    chunks_bytes *= static_cast<double>(along);
   }
   const std::size_t deep = chunk[static_cast<std::size_t>(place - about.dims.begin())];
   const bool in_chunks = deep <= levels_max;
