@@ -230,9 +230,11 @@ TEST_F(Rest, PictureReportsItsErrorAndMeetsErrorAndBudget) {
   EXPECT_GT(pure["error"]["value"], 0);
   EXPECT_GT(pure["jpegError"], 0);
   EXPECT_EQ(pure["width"], 320);
-  const Json exact = frame_of(R"({"maxError":0.01})");
+  // Against the method reference (`windsplat render` of this sample) the RMS error of kernels is
+  // 0.007 and that of slabs 0.002.
+  const Json exact = frame_of(R"({"maxError":0.004})");
   EXPECT_EQ(exact["method"], "slab");
-  EXPECT_LE(exact["error"]["value"], 0.01);
+  EXPECT_LE(exact["error"]["value"], 0.004);
   const Json quick = frame_of(R"({"budgetMs":1})");
   EXPECT_LT(quick["width"], 320);
   EXPECT_GT(quick["error"]["value"], exact["error"]["value"]);
