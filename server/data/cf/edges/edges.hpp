@@ -47,9 +47,8 @@ struct MeshEdges {
   std::vector<Vector> normals;  // of length 1; empty if they are not known
 };
 
-// Errors: bad_data, naming the variable: numbers that do not exist; angles
-// beyond a circle; edges of which most are no
-// sides of cells.
+// Errors: bad_data, naming the variable: numbers that do not exist; angles beyond a circle; edges
+// of which most are no sides of cells.
 Result<MeshEdges> read_edges(const ArrayFile& file, const EdgeTables& tables,
                              const Topology& topology, const Mesh& mesh);
 
