@@ -12,22 +12,6 @@ namespace {
 
 using scene::Scene;
 
-using Bend = std::function<glm::dvec3(const glm::dvec3&)>;
-
-void bend(scene::Lattice& lattice, const Bend& to_world) {
-  auto places = std::make_shared<std::vector<std::array<float, 3>>>();
-  for (const double z : lattice.positions[2]) {
-    for (const double y : lattice.positions[1]) {
-      for (const double x : lattice.positions[0]) {
-        const glm::dvec3 p = to_world({x, y, z});
-        places->push_back(
-            {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
-      }
-    }
-  }
-  lattice.places = places;
-}
-
 // A medium and lines on 16 x 12 x 6 samples.
 Scene flat_scene(bool lines, bool perspective) {
   Scene scene;
@@ -75,7 +59,7 @@ TEST(Curved, StraightPositionsRenderLikeTheRectilinearLattice) {
     Scene scene = flat_scene(true, perspective);
     scene.method = scene::Method::slab;
     const engine::Rendered flat = render(scene);
-    bend(scene.lattice, [](const glm::dvec3& p) { return p; });
+    displace(scene.lattice, [](const glm::dvec3& p) { return p; });
     const engine::Rendered curved = render(scene);
     double most = 0;
     for (std::size_t i = 0; i < flat.image.rgba.size(); ++i) {
@@ -89,18 +73,18 @@ TEST(Curved, StraightPositionsRenderLikeTheRectilinearLattice) {
 }
 
 TEST(Curved, CurvedLatticesApproachTheReference) {
-  const Bend shell = [](const glm::dvec3& p) {
+  const ToWorld shell = [](const glm::dvec3& p) {
     const double r = 0.7 + 0.6 * p.z;
     return glm::dvec3{r * std::cos(1.2 * p.y) * std::sin(2 * p.x),
                       -r * std::cos(1.2 * p.y) * std::cos(2 * p.x), r * std::sin(1.2 * p.y)};
   };
-  const Bend hills = [](const glm::dvec3& p) {
+  const ToWorld hills = [](const glm::dvec3& p) {
     return p + glm::dvec3{0, 0, 0.15 * std::sin(3 * p.x) * std::cos(3 * p.y)};
   };
-  for (const Bend& to_world : {shell, hills}) {
+  for (const ToWorld& to_world : {shell, hills}) {
     for (const bool lines : {false, true}) {
       Scene scene = flat_scene(lines, true);
-      bend(scene.lattice, to_world);
+      displace(scene.lattice, to_world);
       const std::vector<double> truth = truth_of(scene);
       scene.method = scene::Method::slab;
       double last = 1;

@@ -43,6 +43,20 @@ scene::Lattice even_lattice(std::array<int, 3> dims, std::array<double, 3> spaci
   return make_lattice(all);
 }
 
+void displace(scene::Lattice& lattice, const ToWorld& to_world) {
+  auto places = std::make_shared<std::vector<std::array<float, 3>>>();
+  for (const double z : lattice.positions[2]) {
+    for (const double y : lattice.positions[1]) {
+      for (const double x : lattice.positions[0]) {
+        const glm::dvec3 p = to_world({x, y, z});
+        places->push_back(
+            {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
+      }
+    }
+  }
+  lattice.places = places;
+}
+
 std::shared_ptr<const data::Volume> make_volume(
     const scene::Lattice& lattice, int components,
     const std::function<float(int, double, double, double)>& value) {

@@ -23,6 +23,10 @@ inline constexpr double footprint_integral = 1.4476982547;
 scene::Lattice make_lattice(const std::array<std::vector<double>, 3>& spacing);
 scene::Lattice even_lattice(std::array<int, 3> dims, std::array<double, 3> spacing);
 
+// Makes the lattice curved: puts every sample at to_world(its place).
+using ToWorld = std::function<glm::dvec3(const glm::dvec3&)>;
+void displace(scene::Lattice& lattice, const ToWorld& to_world);
+
 // A volume whose component c at world position (x, y, z) is value(c, x, y, z).
 std::shared_ptr<const data::Volume> make_volume(
     const scene::Lattice& lattice, int components,

@@ -11,14 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "server/data/resident/dataset.hpp"
-#include "server/data/samples/samples.hpp"
 #include "server/frame/content.hpp"
 #include "server/frame/difference.hpp"
 #include "server/frame/drawn_samples.hpp"
 #include "server/frame/pixel_trials.hpp"
-#include "server/scene/build.hpp"
-#include "server/scene/completed_view.hpp"
 #include "tests/numerics/scenes.hpp"
 
 namespace windsplat::test {
@@ -29,22 +25,6 @@ using scene::Scene;
 // The eye at a place, looking along `forward`.
 void look_from(Scene& scene, const glm::dvec3& eye, const glm::dvec3& forward) {
   scene.camera = look(eye + glm::normalize(forward), forward, 1, 110, 90, true, 0.6);
-}
-
-// Every sample at another place.
-template <class Displace>
-void displace(scene::Lattice& lattice, const Displace& to_world) {
-  auto places = std::make_shared<std::vector<std::array<float, 3>>>();
-  for (const double z : lattice.positions[2]) {
-    for (const double y : lattice.positions[1]) {
-      for (const double x : lattice.positions[0]) {
-        const glm::dvec3 p = to_world({x, y, z});
-        places->push_back(
-            {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
-      }
-    }
-  }
-  lattice.places = places;
 }
 
 Scene with_strides(int lines, int medium) {
@@ -98,19 +78,27 @@ std::vector<UnusualView> unusual_scenes() {
   return out;
 }
 
-// Of pictures by the engine, against slabs of an eighth of a cell.
+struct Errors {
+  double kernel, slab;
+};
+
+// RMS errors of pictures by the engine, against slabs of an eighth of a cell.
+Errors errors_of(Scene scene) {
+  scene.method = scene::Method::kernel;
+  const engine::Image kernels = render(scene, 2).image;
+  scene.method = scene::Method::slab;
+  scene.slab_thickness = 1;
+  const engine::Image slabs = render(scene, 2).image;
+  scene.slab_thickness = 0.125;
+  const engine::Image truth = render(scene, 2).image;
+  return {frame::difference_of(kernels.rgba, truth.rgba).rmse,
+          frame::difference_of(slabs.rgba, truth.rgba).rmse};
+}
+
 TEST(PixelTrials, HaveTheErrorsOfPicturesOfUnusualViews) {
   for (auto& [name, scene] : unusual_scenes()) {
     const quality::Trials tried = frame::content_of(scene)->trials.value();
-    scene.method = scene::Method::kernel;
-    const engine::Image kernels = render(scene, 2).image;
-    scene.method = scene::Method::slab;
-    scene.slab_thickness = 1;
-    const engine::Image slabs = render(scene, 2).image;
-    scene.slab_thickness = 0.125;
-    const engine::Image truth = render(scene, 2).image;
-    const double kernel = frame::difference_of(kernels.rgba, truth.rgba).rmse;
-    const double slab = frame::difference_of(slabs.rgba, truth.rgba).rmse;
+    const auto [kernel, slab] = errors_of(scene);
     EXPECT_GT(kernel, 1e-4) << name;
     EXPECT_LT(std::abs(std::log(tried.kernel / kernel)), std::log(2))
         << name << ' ' << tried.kernel << ' ' << kernel;
@@ -135,15 +123,7 @@ TEST(PixelTrials, HaveTheErrorsOfKernelsWhoseSamplesAreBehindTheEye) {
       look_from(scene, {0.13, -0.21, 1 - 1 / 12.0 + beyond}, forward);
       const auto tried = frame::content_of(scene)->trials;
       ASSERT_TRUE(tried) << beyond;
-      scene.method = scene::Method::kernel;
-      const engine::Image kernels = render(scene, 2).image;
-      scene.method = scene::Method::slab;
-      scene.slab_thickness = 1;
-      const engine::Image slabs = render(scene, 2).image;
-      scene.slab_thickness = 0.125;
-      const engine::Image truth = render(scene, 2).image;
-      const double kernel = frame::difference_of(kernels.rgba, truth.rgba).rmse;
-      const double slab = frame::difference_of(slabs.rgba, truth.rgba).rmse;
+      const auto [kernel, slab] = errors_of(scene);
       EXPECT_GT(std::max(kernel, slab), 1e-4) << beyond;
       for (const auto& [of, error] : {std::pair{tried->kernel, kernel}, {tried->slab, slab}}) {
         if (error < 1e-4) continue;
@@ -175,23 +155,7 @@ void expect_bounded_work(const Scene& scene, const std::string& name) {
   EXPECT_LE(tried.work, frame::trial_work_most + frame::place_work_most) << name;
 }
 
-// Rays pass along layers of cells that are far thinner than a pixel, and kernels of lines reach
-// over hundreds of them.
-TEST(PixelTrials, TakeBoundedWorkOnAFineGlobe) {
-  data::Dataset dataset(data::open_sample("climate", {480, 240, 8}, 1).value(), "climate",
-                        1ULL << 30);
-  protocol::View view;
-  view.dataset = "climate";
-  view.image.width = 1280;
-  view.image.height = 720;
-  view.geometry.mapping = protocol::GeometryMapping::sphere;
-  for (const auto detail : {protocol::Detail::automatic, protocol::Detail::full}) {
-    view.method.detail = detail;
-    const auto completed = scene::complete(view, dataset).value();
-    expect_bounded_work(scene::build_scene(completed, dataset).value(), "globe");
-  }
-}
-
+// Kernels of long lines reach over hundreds of cells.
 TEST(PixelTrials, TakeBoundedWorkForManyFaintLines) {
   constexpr int side = 160;
   constexpr double cell = 2.0 / side;
