@@ -242,7 +242,7 @@ TEST(SharedLevels, HeightsInOtherUnitsLieBetweenThose) {
   one.rho_unit = 1000;
   write_shared(folder / "km.nc", one);
   const auto source = opened(folder / "km.nc");
-  EXPECT_EQ(reason_of(source->info(), "x_wind"), "");
+  ASSERT_EQ(reason_of(source->info(), "x_wind"), "");
   expect_placed(*source, "x_wind", 0, 4);
 }
 
