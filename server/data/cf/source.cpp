@@ -296,7 +296,7 @@ class ArraySource final : public FileSource {
 
   Result<void> find_axis(std::size_t which) {
     const int id = choice_.space.at(which);
-    const DimensionRole& role = roles_.at(static_cast<std::size_t>(id));
+    DimensionRole& role = roles_.at(static_cast<std::size_t>(id));
     if (dimension(id).length > axis_max) {
       return make_error(ErrorKind::bad_data, "the dimension " + in_quotes(dimension(id).name) +
                                                  " is longer than " + std::to_string(axis_max));
@@ -311,6 +311,12 @@ class ArraySource final : public FileSource {
         return read.error();
       }
       coordinates = std::move(*read);
+      const bool fits = can_be_axis(coordinates, role.kind);
+      if (role.is_assumed) tell_assumed(variable.name, dimension(id).name, fits);
+      if (role.is_assumed && !fits) {
+        role.coordinate = -1;
+        coordinates.clear();
+      }
       if (is_angle && is_radian(variable.units)) {
         info_.notes.push_back(in_quotes(variable.name) + " is in radians: shown in degrees");
       }
@@ -329,8 +335,9 @@ class ArraySource final : public FileSource {
     return {};
   }
 
-  [[nodiscard]] const std::string& variable_name(int variable) const {
-    return file_->contents().variables.at(static_cast<std::size_t>(variable)).name;
+  void tell_assumed(const std::string& name, const std::string& dimension, bool fits) {
+    const char* const what = fits ? " is taken as" : " is not monotonic: it is not";
+    info_.notes.push_back(in_quotes(name) + what + " the coordinate of " + in_quotes(dimension));
   }
 
   Result<void> find_fields() {

@@ -377,6 +377,14 @@ class FieldFinder {
 
 }  // namespace
 
+bool has_velocity_name(const FileVariable& variable) {
+  constexpr auto usual = std::to_array<std::string_view>(
+      {"u",    "v",   "w",   "ua",   "va",       "wa",       "uo",      "vo",   "wo",
+       "ut",   "vt",  "wt",  "uwnd", "vwnd",     "ugrd",     "vgrd",    "uvel", "vvel",
+       "wvel", "ucx", "ucy", "ucz",  "vozocrtx", "vomecrty", "vovecrtz"});
+  return is_one_of(lower(variable.name), usual);
+}
+
 bool is_velocity_component(const FileVariable& variable) {
   const std::string& name = variable.standard_name;
   const bool of_flow = contains(name, "wind") || contains(name, "velocity");
@@ -385,13 +393,9 @@ bool is_velocity_component(const FileVariable& variable) {
                   contains(name, "_x_") || contains(name, "_y_"))) {
     return true;
   }
-  constexpr auto usual = std::to_array<std::string_view>(
-      {"u",        "v",        "w",        "ua",   "va",   "wa",   "uo",   "vo",
-       "wo",       "uwnd",     "vwnd",     "ugrd", "vgrd", "uvel", "vvel", "wvel",
-       "vozocrtx", "vomecrty", "vovecrtz", "ucx",  "ucy",  "ucz"});
   constexpr auto of_schism = std::to_array<std::string_view>(  // which writes no units
       {"horizontalvelx", "horizontalvely", "verticalvelocity"});
-  return (is_speed(variable.units) && is_one_of(lower(variable.name), usual)) ||
+  return (is_speed(variable.units) && has_velocity_name(variable)) ||
          (is_velocity(variable.units) && is_one_of(lower(variable.name), of_schism));
 }
 

@@ -16,7 +16,11 @@ struct FieldPlan {
   std::vector<double> factors;  // one per component: from the variable's unit to that of the field
 };
 
-// Whether a variable is by its name a component of a velocity.
+// Whether a variable has a usual name of a component of a velocity, whatever its units: u, va,
+// wvel.
+bool has_velocity_name(const FileVariable& variable);
+
+// Whether a variable is by its name and units a component of a velocity.
 bool is_velocity_component(const FileVariable& variable);
 
 // variables: those on the chosen grid. vertical: the kind of its z axis (with a depth axis, u and v

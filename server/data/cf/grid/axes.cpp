@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/base/ascii.hpp"
+#include "server/data/cf/axis_names.hpp"
 #include "server/data/cf/grid/cell_lists.hpp"
 #include "server/data/cf/grid/longitudes.hpp"
 #include "server/data/cf/time.hpp"
@@ -126,39 +127,9 @@ Evidence by_units(std::string_view units) {
   return {};
 }
 
-// Strips the number that distinguishes grids of a file: "lat_0", "isobaric1", "gridx_6".
-std::string_view without_number(std::string_view name) {
-  const auto end = name.find_last_not_of("0123456789_");
-  return end == std::string_view::npos ? name : name.substr(0, end + 1);
-}
-
-Role role_of_name(std::string_view name) {
-  constexpr auto x_names = std::to_array<std::string_view>(
-      {"lon",     "longitude", "long",       "rlon", "x",  "xc", "xt",
-       "xu",      "xi",        "nlon",       "i",    "ni", "nx", "east",
-       "easting", "west_east", "longitudes", "xdim", "xh", "xf"});
-  constexpr auto y_names = std::to_array<std::string_view>(
-      {"lat",         "latitude",  "rlat", "y",    "yc", "yt",    "yu",
-       "eta_rho",     "nlat",      "j",    "nj",   "ny", "north", "northing",
-       "south_north", "latitudes", "yv",   "ydim", "yh", "yf"});
-  constexpr auto z_names = std::to_array<std::string_view>(
-      {"z",        "lev",      "level",      "levels", "plev",     "height",  "heights", "alt",
-       "altitude", "depth",    "depths",     "k",      "nk",       "nz",      "zc",      "zt",
-       "zlev",     "pressure", "pres",       "press",  "isobaric", "layer",   "layers",  "lay",
-       "sigma",    "hybrid",   "bottom_top", "deptht", "depthu",   "depthv",  "depthw",  "st_ocean",
-       "vertical", "nlev",     "levelist",   "mlev",   "ilev",     "lv_isbl", "zdim",    "zh",
-       "zf",       "zu_3d",    "zw_3d"});
-  constexpr auto time_names = std::to_array<std::string_view>(
-      {"time", "t", "times", "nt", "timestep", "time_step", "step", "steps", "date", "frtime",
-       "frame", "frames", "ntime", "time_counter", "month", "record"});
-  constexpr auto other_names = std::to_array<std::string_view>(
-      {"bnds", "bounds", "nv", "nbnd", "nbnds", "vertices", "corners", "nvertex", "member",
-       "ensemble", "realization", "number", "strlen", "ncells", "ncol", "bnd", "expver"});
-  if (is_one_of(name, x_names)) return Role::x;
-  if (is_one_of(name, y_names)) return Role::y;
-  if (is_one_of(name, z_names)) return Role::z;
-  if (is_one_of(name, time_names)) return Role::time;
-  return is_one_of(name, other_names) ? Role::other : Role::unknown;
+// Names that do not say whether levels are numbers or heights.
+bool is_plain_height(std::string_view name) {
+  return is_one_of(name, std::to_array<std::string_view>({"z", "zc", "zt", "zm", "zdim"}));
 }
 
 Evidence by_name(std::string_view full_name, std::string_view units, bool has_coordinates) {
@@ -183,7 +154,7 @@ Evidence by_name(std::string_view full_name, std::string_view units, bool has_co
       found = {Role::z, AxisKind::pressure, true, true};
     } else if (name.starts_with("height") || name.starts_with("alt")) {
       found = {Role::z, AxisKind::height, true, false};
-    } else if (name != "z" && name != "zc" && name != "zt" && name != "zdim" && !is_length(units)) {
+    } else if (!is_plain_height(name) && !is_length(units)) {
       // Sigma is 1 at the ground, and hybrid levels are numbered from the top.
       const bool from_top = name == "sigma" || name == "hybrid";
       found = {Role::z, AxisKind::level, true, from_top};
@@ -313,6 +284,10 @@ void heed_values(const FileVariable& variable, const std::vector<double>& coordi
 DimensionRole classify(const FileContents& contents, int dimension) {
   DimensionRole out;
   out.coordinate = coordinate_of(contents, dimension);
+  if (out.coordinate < 0) {
+    out.coordinate = named_coordinate(contents, dimension);
+    out.is_assumed = out.coordinate >= 0;
+  }
   const FileDimension& self = contents.dimensions.at(static_cast<std::size_t>(dimension));
   std::vector<Evidence> pieces;
   std::string units;
@@ -441,6 +416,15 @@ Layout lay_out(const FileContents& contents, const std::vector<DimensionRole>& r
     *place = *rest;
   }
   return layout;
+}
+
+bool can_be_axis(std::vector<double> values, AxisKind kind) {
+  const auto is_finite = [](double value) { return std::isfinite(value); };
+  if (!std::all_of(values.begin(), values.end(), is_finite)) return false;
+  if (kind == AxisKind::longitude) continue_over_seam(values);
+  const bool rises = values.size() < 2 || values[1] > values[0];
+  const auto is_wrong = [rises](double a, double b) { return rises ? !(b > a) : !(b < a); };
+  return std::adjacent_find(values.begin(), values.end(), is_wrong) == values.end();
 }
 
 Result<OrientedAxis> orient_axis(const FileContents& contents, const DimensionRole& role,

@@ -22,6 +22,7 @@ struct DimensionRole {
   bool kind_is_sure = false;   // false: only the role is known, e.g. vertical
   bool positive_down = false;  // larger coordinates lie lower
   int coordinate = -1;         // the 1-D variable that gives its coordinates; -1: none
+  bool is_assumed = false;     // the coordinate is that of named_coordinate()
   bool is_list = false;        // cells or stations in a list; `role` is then other
 };
 
@@ -61,6 +62,10 @@ struct OrientedAxis {
   bool turned = false;
   std::string note;  // which assumption was made; empty if none
 };
+
+// Whether orient_axis() accepts coordinates: finite and strictly monotonic, longitudes in degrees
+// also past the end of their range.
+bool can_be_axis(std::vector<double> values, AxisKind kind);
 
 // which: 0 x, 1 y, 2 z. coordinates: as in the file, angles in degrees; empty: the dimension has
 // none, samples are placed by index. horizontal: kind of the x axis, which distinguishes a height

@@ -203,9 +203,10 @@ class StaggerFinder {
   [[nodiscard]] bool has_velocity(int dimension) const {
     return std::any_of(contents_.variables.begin(), contents_.variables.end(),
                        [dimension](const FileVariable& variable) {
-                         return is_velocity_component(variable) &&
-                                std::count(variable.dims.begin(), variable.dims.end(), dimension) >
-                                    0;
+                         const bool flows = is_velocity_component(variable) ||
+                                            (variable.units.empty() && has_velocity_name(variable));
+                         return flows && std::count(variable.dims.begin(), variable.dims.end(),
+                                                    dimension) > 0;
                        });
   }
 
@@ -216,6 +217,7 @@ class StaggerFinder {
     std::ptrdiff_t uses = 0;
     bool falls = false;
     bool by_height = false;      // values are those of heights_on()
+    bool by_place = false;       // the role is that of roles_by_place()
     std::vector<double> values;  // ascending: with the opposite sign if the coordinate falls
   };
 
@@ -233,15 +235,38 @@ class StaggerFinder {
                : static_cast<int>(found - contents_.variables.begin());
   }
 
+  // The roles of dimensions, also of those with a coordinate that neither name nor attribute
+  // explains, by their place among the dimensions of every variable: ym of v(zt, ym, xt).
+  [[nodiscard]] std::vector<DimensionRole> roles_by_place(std::vector<bool>& by_place) const {
+    const std::vector<DimensionRole> known = classify_dimensions(contents_);
+    std::vector<DimensionRole> out = known;
+    by_place.assign(known.size(), false);
+    for (const FileVariable& variable : contents_.variables) {
+      if (!variable.numeric || variable.dims.size() < 2) continue;
+      const Layout layout = lay_out(contents_, known, variable);
+      if (!layout.problem.empty()) continue;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const int d = layout.space.at(a);
+        if (d < 0 || known[at(d)].role != Role::unknown || known[at(d)].coordinate < 0) continue;
+        const Role role = a == 0 ? Role::x : a == 1 ? Role::y : Role::z;
+        const bool is_same = !by_place[at(d)] || out[at(d)].role == role;
+        out[at(d)].role = is_same ? role : Role::other;
+        by_place[at(d)] = true;
+      }
+    }
+    return out;
+  }
+
   // Dimensions with coordinates that no name has explained, those of most variables first.
   Result<std::vector<Line>> lines() const {
     std::vector<Line> out;
-    const std::vector<DimensionRole> roles = classify_dimensions(contents_);
+    std::vector<bool> by_place;
+    const std::vector<DimensionRole> roles = roles_by_place(by_place);
     for (std::size_t d = 0; d < roles.size(); ++d) {
       const DimensionRole& role = roles[d];
       const bool in_space = role.role == Role::x || role.role == Role::y || role.role == Role::z;
-      Line line{
-          static_cast<int>(d), role.role, role.kind, uses(static_cast<int>(d)), false, false, {}};
+      Line line{static_cast<int>(d), role.role, role.kind, uses(static_cast<int>(d)), false, false,
+                by_place[d],         {}};
       if (!in_space || role.coordinate < 0 || line.uses == 0 || found_[d].centers >= 0 ||
           contents_.dimensions[d].length > compared_length_max) {
         continue;
@@ -264,7 +289,21 @@ class StaggerFinder {
     return out;
   }
 
-  // MITgcm (X, Xp1, Zl), MOM (xh, xq, zl, zi; xt_ocean, xu_ocean), ...
+  // Whether two lines may be compared.
+  [[nodiscard]] static bool run_alike(const Line& a, const Line& b) {
+    const bool are_of_one_kind = a.kind == b.kind || a.by_place || b.by_place;
+    return a.role == b.role && are_of_one_kind && a.falls == b.falls && a.by_height == b.by_height;
+  }
+
+  // Meso-NH: nj_u has the values of nj. Equal numbers of levels or of other variables may mean
+  // different places.
+  [[nodiscard]] bool are_twins(const Line& faces, const Line& centers) const {
+    return faces.role != Role::z && has_velocity(faces.dimension) &&
+           std::equal(faces.values.begin(), faces.values.end(), centers.values.begin(),
+                      centers.values.end(), same_place);
+  }
+
+  // MITgcm (X, Xp1, Zl), MOM (xh, xq, zl, zi; xt_ocean, xu_ocean), DALES (xt, xm), ...
   Result<void> by_coordinates() {
     auto found = lines();
     if (!found) return found.error();
@@ -272,28 +311,27 @@ class StaggerFinder {
       const Line& centers = (*found)[c];
       if (found_[at(centers.dimension)].centers >= 0) continue;
       for (std::size_t f = c + 1; f < found->size(); ++f) {
-        const Line& faces = (*found)[f];
-        if (faces.role != centers.role || faces.kind != centers.kind ||
-            faces.falls != centers.falls || faces.by_height != centers.by_height) {
-          continue;
-        }
-        // As many levels between others are faces only if a velocity lies on them.
-        const bool is_sure = faces.role != Role::z ||
-                             faces.values.size() != centers.values.size() ||
-                             has_velocity(faces.dimension);
-        if (!is_sure) continue;
-        const bool are_longitudes = faces.kind == AxisKind::longitude;
-        const auto first = interleaved(
-            are_longitudes ? turned_near(faces.values, centers.values) : faces.values,
-            centers.values, centers.by_height ? Interleaving::between : Interleaving::near_middle);
-        if (!first) continue;
-        add(faces.dimension, centers.dimension, false, *first);
-        if (centers.by_height && found_[at(faces.dimension)].centers == centers.dimension) {
-          found_[at(faces.dimension)].upper = upper_weights(faces.values, centers.values, *first);
-        }
+        if (run_alike((*found)[f], centers)) compare((*found)[f], centers);
       }
     }
     return {};
+  }
+
+  void compare(const Line& faces, const Line& centers) {
+    if (are_twins(faces, centers)) return add(faces.dimension, centers.dimension, true, 0);
+    // As many levels between others are faces only if a velocity lies on them.
+    const bool is_sure = faces.role != Role::z || faces.values.size() != centers.values.size() ||
+                         has_velocity(faces.dimension);
+    if (!is_sure) return;
+    const bool are_longitudes = faces.kind == AxisKind::longitude;
+    const auto first = interleaved(
+        are_longitudes ? turned_near(faces.values, centers.values) : faces.values, centers.values,
+        centers.by_height ? Interleaving::between : Interleaving::near_middle);
+    if (!first) return;
+    add(faces.dimension, centers.dimension, false, *first);
+    if (centers.by_height && found_[at(faces.dimension)].centers == centers.dimension) {
+      found_[at(faces.dimension)].upper = upper_weights(faces.values, centers.values, *first);
+    }
   }
 
   // A dimension between samples that lie between others themselves is not understood.

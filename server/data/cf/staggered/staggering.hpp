@@ -22,8 +22,8 @@ struct Stagger {
 // One entry per dimension of the file. Evidence in this order: what the reader
 // knows (FileDimension::centers), SGRID metadata (sgrid.github.io,
 // version 0.3: cf_role = grid_topology), names of dimensions of WRF, ROMS and PALM, 1-D coordinates
-// of which each lies amid two of another dimension; of the Unified Model's levels their heights,
-// with the weights of linear interpolation.
+// of which each lies amid two of another dimension, or horizontal ones that equal those of another;
+// of the Unified Model's levels their heights, with the weights of linear interpolation.
 // Errors: bad_data if coordinates cannot be read.
 Result<std::vector<Stagger>> find_staggering(const ArrayFile& file);
 
