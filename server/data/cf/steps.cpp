@@ -35,6 +35,18 @@ void note_disorder(const std::string& name, const std::vector<double>& times, Da
   info.notes.push_back(std::move(note));
 }
 
+std::string missing_text(const std::vector<double>& times) {
+  std::size_t first = times.size();
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    if (std::isfinite(times[i])) continue;
+    first = std::min(first, i);
+    ++count;
+  }
+  const std::string steps = count > 1 ? std::to_string(count) + " steps, first at step " : "step ";
+  return "time is missing at " + steps + std::to_string(first) + ": steps are numbered";
+}
+
 }  // namespace
 
 Result<void> find_steps(const ArrayFile& file, int time, int coordinate, DatasetInfo& info) {
@@ -75,7 +87,7 @@ Result<void> find_steps(const ArrayFile& file, int time, int coordinate, Dataset
   }
   if (time >= 0) {
     info.left_out.push_back({contents.dimensions.at(at(time)).name,
-                             coordinate >= 0 ? "time has missing values: steps are numbered"
+                             !values.empty() ? missing_text(values)
                                              : "dimension without a coordinate variable: steps "
                                                "are numbered"});
   }

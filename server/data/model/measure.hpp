@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "server/base/cancel.hpp"
@@ -46,12 +48,20 @@ struct Place {
   std::array<double, 3> coordinates{};  // coordinates of the sample, from the axes or columns
 };
 
+// The heights of a lattice that follows the terrain: a scalar of the same samples.
+struct SampleHeights {
+  std::shared_ptr<const Volume> values;
+  std::string units;
+};
+
 // `at` is in the units of the axes; for a grid with columns, longitude and latitude in degrees. A
 // coordinate may be absent if the grid has one sample along it; it is then ignored. Nearest by
 // coordinate difference (longitudes modulo 360), for columns by great-circle distance. Errors:
 // invalid if a coordinate is missing, or more than half a cell beyond the first or last sample; the
-// message contains the box.
-Result<Place> nearest_sample(const Grid& grid, const std::array<std::optional<double>, 3>& at);
+// message contains the box. heights: replace the vertical axis, in its own units, by the heights in
+// the nearest column; invalid if one of them is masked. Null: the axis counts.
+Result<Place> nearest_sample(const Grid& grid, const std::array<std::optional<double>, 3>& at,
+                             const SampleHeights* heights = nullptr);
 
 // The components at a sample; empty if it is masked.
 std::optional<std::vector<double>> value_at(const Volume& volume, const std::array<int, 3>& index);

@@ -1,9 +1,11 @@
-// Position in the units of a grid -> index of the sample whose cell contains it.
+// Position in the units of a grid, or at heights of its own -> index of the sample whose cell
+// contains it.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -157,9 +159,27 @@ Result<void> nearest_column(const Grid& grid, const std::array<std::optional<dou
   return {};
 }
 
+// The levels of one column, at their heights there.
+Result<Axis> levels_of(const Grid& grid, const SampleHeights& heights, std::array<int, 3> column) {
+  Axis levels = grid.axes[2];
+  levels.kind = AxisKind::height;
+  levels.units = heights.units;
+  for (std::size_t k = 0; k < levels.coordinates.size(); ++k) {
+    column[2] = static_cast<int>(k);
+    const auto height = value_at(*heights.values, column);
+    if (!height) {
+      return make_error(ErrorKind::invalid,
+                        "level " + std::to_string(k) + " has no height at this position");
+    }
+    levels.coordinates[k] = height->front();
+  }
+  return levels;
+}
+
 }  // namespace
 
-Result<Place> nearest_sample(const Grid& grid, const std::array<std::optional<double>, 3>& at) {
+Result<Place> nearest_sample(const Grid& grid, const std::array<std::optional<double>, 3>& at,
+                             const SampleHeights* heights) {
   Place place;
   std::size_t first_plain = 0;
   if (grid.columns) {
@@ -167,10 +187,17 @@ Result<Place> nearest_sample(const Grid& grid, const std::array<std::optional<do
     first_plain = 2;
   }
   for (std::size_t a = first_plain; a < 3; ++a) {
-    const auto index = nearest_along(grid.axes[a], a, at[a]);
+    std::optional<Axis> levels;
+    if (a == 2 && heights != nullptr) {
+      auto found = levels_of(grid, *heights, place.index);
+      if (!found) return found.error();
+      levels = std::move(*found);
+    }
+    const Axis& axis = levels ? *levels : grid.axes[a];
+    const auto index = nearest_along(axis, a, at[a]);
     if (!index) return index.error();
     place.index[a] = *index;
-    place.coordinates[a] = grid.axes[a].coordinates[static_cast<std::size_t>(*index)];
+    place.coordinates[a] = axis.coordinates[static_cast<std::size_t>(*index)];
   }
   return place;
 }

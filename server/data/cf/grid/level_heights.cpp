@@ -274,8 +274,10 @@ class HeightFinder {
     return std::optional(values->front());
   }
 
-  // A height in metres above sea level at every sample; -1 if there is none.
+  // A height in metres at every sample, above sea level or, in second place, of the standard name
+  // "height", which older files of ICON give to z_mc; -1 if there is none.
   [[nodiscard]] int find_variable() const {
+    int second = -1;
     for (const int v : variables_) {
       const FileVariable& one = variable(v);
       const auto along_levels = std::count(one.dims.begin(), one.dims.end(), grid_.space[2]);
@@ -284,10 +286,12 @@ class HeightFinder {
                          one.standard_name.starts_with("geometric_height_at_full_level") ||
                          one.standard_name == "height_above_geopotential_datum";
       const bool of_schism = one.name == "zCoordinates" && one.units.empty();
-      const bool in_metres = named || one.name == "zCoordinates";
-      if (along_levels == 1 && (of_schism || (in_metres && metres_in(one.units) == 1.0))) return v;
+      const bool in_metres = metres_in(one.units) == 1.0;
+      if (along_levels != 1) continue;
+      if (of_schism || (in_metres && (named || one.name == "zCoordinates"))) return v;
+      if (second < 0 && in_metres && one.standard_name == "height") second = v;
     }
-    return -1;
+    return second;
   }
 
   // An auxiliary coordinate of the levels in units of length: a height or depth by its standard
@@ -430,7 +434,9 @@ class HeightFinder {
     }
     axis.coordinates = *mean;
     axis.kind = AxisKind::height;
-    axis.standard_name = "altitude";
+    const bool as_height =
+        !heights.parametric && variable(heights.variable).standard_name == "height";
+    axis.standard_name = as_height ? "height" : "altitude";
     axis.units = "m";
     const std::string field = heights.parametric ? "height" : variable(heights.variable).name;
     info_.notes.push_back("levels are placed at their mean heights at the first step; the field " +

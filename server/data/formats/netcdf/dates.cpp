@@ -92,25 +92,31 @@ double seconds_of_date(std::string_view text) {
   return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second + *fraction;
 }
 
-int name_dates_of_wrf(FileContents& contents) {
-  const int found = cf::variable_named(contents, "Times");
-  if (found < 0) return -1;
-  FileVariable& dates = contents.variables[cf::at(found)];
-  if (dates.type != "text" || !dates.unread.empty() || dates.dims.size() != 2) return -1;
-  const int time = dates.dims[0];
-  const std::size_t width = contents.dimensions[cf::at(dates.dims[1])].length;
-  if (lower(contents.dimensions[cf::at(time)].name) != "time" || width < date_length ||
-      width > date_width_max || has_numeric_time(contents, time)) {
-    return -1;
+int text_of_dates(const FileContents& contents) {
+  for (const char* name : {"Times", "xtime"}) {
+    const int found = cf::variable_named(contents, name);
+    if (found < 0) continue;
+    const FileVariable& dates = contents.variables[cf::at(found)];
+    if (dates.type != "text" || !dates.unread.empty() || dates.dims.size() != 2) continue;
+    const int time = dates.dims[0];
+    const std::size_t width = contents.dimensions[cf::at(dates.dims[1])].length;
+    if (lower(contents.dimensions[cf::at(time)].name) == "time" && width >= date_length &&
+        width <= date_width_max && !has_numeric_time(contents, time)) {
+      return found;
+    }
   }
+  return -1;
+}
+
+void use_dates(FileContents& contents, int text) {
+  FileVariable& dates = contents.variables[cf::at(text)];
   dates.type = "float64";
   dates.numeric = true;
-  dates.dims = {time};
+  dates.dims.pop_back();
   dates.standard_name = "time";
   dates.units = date_units;
   dates.calendar = "proleptic_gregorian";
-  contents.notes.push_back("times are read from the text of 'Times'");
-  return found;
+  contents.notes.push_back("times are read from the text of " + in_quotes(dates.name));
 }
 
 }  // namespace windsplat::data::netcdf

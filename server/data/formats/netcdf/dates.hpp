@@ -1,4 +1,4 @@
-// Dates as text, by which WRF numbers its steps: "2005-08-28_00:00:00".
+// Dates as text, by which WRF and MPAS number their steps: "2005-08-28_00:00:00".
 #pragma once
 
 #include <cstddef>
@@ -9,16 +9,18 @@
 namespace windsplat::data::netcdf {
 
 inline constexpr std::size_t date_length = 19;
-inline constexpr std::size_t date_width_max = 64;  // characters of one entry of Times
+inline constexpr std::size_t date_width_max = 64;  // characters of one entry
 inline constexpr const char* date_units = "seconds since 1970-01-01 00:00:00";
 
 // Seconds since 1970 in the proleptic Gregorian calendar; NaN if the text is no date. After the
 // seconds may follow a fraction of them, the letter Z and blanks.
 double seconds_of_date(std::string_view text);
 
-// The variable Times of characters (time, characters), if its dimension of time has no other
-// coordinate that counts from a date: its index, and the variable becomes a coordinate in
-// date_units. -1: there is none.
-int name_dates_of_wrf(FileContents& contents);
+// The variable of characters (time, characters), Times of WRF or xtime of MPAS, if its dimension of
+// time has no other coordinate that counts from a date. -1: there is none.
+int text_of_dates(const FileContents& contents);
+
+// Makes that variable a coordinate in date_units.
+void use_dates(FileContents& contents, int text);
 
 }  // namespace windsplat::data::netcdf

@@ -78,7 +78,7 @@ class File final : public cf::ArrayFile {
   Result<void> scan_group(const std::string& path);
   Result<void> scan_dimensions(int group);
   void set_spacing_of_wrf(int group);
-  void find_dates_of_wrf();
+  void find_dates();
   Result<void> scan_variables(int group, bool above);
   Result<void> scan_variable(const Place& place, bool above);
   [[nodiscard]] bool has_field() const;

@@ -160,7 +160,8 @@ Result<void> File::read_dates(const Block& block, double* out) const {
         nc_inq_vardimid(group, id, dims.data()) != NC_NOERR ||
         nc_inq_dimlen(group, dims[1], &width) != NC_NOERR || width < date_length ||
         width > date_width_max) {
-      return fault("is damaged: the characters of 'Times' cannot be read");
+      return fault("is damaged: the characters of " +
+                   in_quotes(contents_.variables.at(cf::at(dates_)).name) + " cannot be read");
     }
   }
   const std::vector<std::size_t> count{block.count.at(0), width};

@@ -208,7 +208,7 @@ Result<void> File::scan_group(const std::string& path) {
     }
     if (nc_inq_grp_parent(at, &at) != NC_NOERR) break;
   }
-  find_dates_of_wrf();
+  find_dates();
   if (!classic_) {
     name_axes_of_meep(contents_);
     name_steps_of_bare_arrays(contents_);
@@ -271,14 +271,15 @@ void File::set_spacing_of_wrf(int group) {
 }
 
 // Only characters: strings (NC_STRING) are not read.
-void File::find_dates_of_wrf() {
+void File::find_dates() {
   dates_ = -1;
-  const int found = cf::variable_named(contents_, "Times");
+  const int found = text_of_dates(contents_);
   nc_type type = NC_NAT;
   if (found < 0) return;
   const Place place = place_of(found);
   if (nc_inq_vartype(place.group, place.id, &type) != NC_NOERR || type != NC_CHAR) return;
-  dates_ = name_dates_of_wrf(contents_);
+  use_dates(contents_, found);
+  dates_ = found;
 }
 
 Result<void> File::scan_variables(int group, bool above) {

@@ -32,6 +32,35 @@ TEST(NoteWords, HeightsOfSamplesAreNamedAsInTheFile) {
   EXPECT_FALSE(has_note(source->info(), "\"height\""));
 }
 
+// As older files of ICON call z_mc. A height above sea level in the file has precedence.
+TEST(NoteWords, HeightsNamedHeightPlaceTheLevels) {
+  const Folder folder;
+  for (const bool with_altitude : {false, true}) {
+    {
+      NetcdfMaker file(folder / "icon.nc");
+      const int z = file.axis("lev", {1, 2, 3}, "");
+      const int y = file.axis("lat", {50, 51}, "degrees_north");
+      const int x = file.axis("lon", {0, 1, 2}, "degrees_east");
+      const int heights = file.variable("z_mc", NC_FLOAT, {z, y, x}, counting(18, 100));
+      file.text(heights, "units", "m");
+      file.text(heights, "standard_name", "height");
+      if (with_altitude) {
+        const int altitude = file.variable("zsl", NC_FLOAT, {z, y, x}, counting(18, 500));
+        file.text(altitude, "units", "m");
+        file.text(altitude, "standard_name", "altitude");
+      }
+    }
+    const auto source = opened(folder / "icon.nc");
+    // Six samples a level, of consecutive numbers from 100 or 500.
+    const double first = with_altitude ? 502.5 : 102.5;
+    EXPECT_THAT(source->info().grid.axes[2].coordinates,
+                testing::ElementsAre(first, first + 6, first + 12));
+    EXPECT_EQ(source->info().grid.axes[2].standard_name, with_altitude ? "altitude" : "height");
+    EXPECT_TRUE(has_note(source->info(), with_altitude ? "the field 'zsl' has the height"
+                                                       : "the field 'z_mc' has the height"));
+  }
+}
+
 TEST(NoteWords, PositionsInUseAreNotOmitted) {
   const Folder folder;
   {

@@ -302,7 +302,7 @@ TEST(NetcdfAxes, TimeWithGapsIsCounted) {
   EXPECT_EQ(source->info().steps.at(2).text, "2");
   EXPECT_TRUE(std::any_of(source->info().left_out.begin(), source->info().left_out.end(),
                           [](const LeftOut& left) {
-                            return left.reason == "time has missing values: steps are numbered";
+                            return left.reason == "time is missing at step 1: steps are numbered";
                           }));
 }
 

@@ -1,4 +1,4 @@
-// The text variable Times of WRF as the times of steps.
+// The text variables Times of WRF and xtime of MPAS as the times of steps.
 #include "server/data/formats/netcdf/dates.hpp"
 
 #include <gtest/gtest.h>
@@ -17,13 +17,14 @@ namespace {
 // One field at the dates; with XTIME if minutes are given.
 void write_dates(const std::string& path, const std::vector<std::string>& dates, int mode,
                  const std::vector<double>& minutes = {},
-                 const std::string& epoch = "2000-01-01 00:00:00") {
+                 const std::string& epoch = "2000-01-01 00:00:00",
+                 const std::string& name = "Times") {
   NetcdfMaker file(path, mode);
   const int time = file.dimension("Time", dates.size());
   const int width = file.dimension("DateStrLen", dates.front().size());
   const int y = file.axis("y", {0, 1, 2}, "m");
   const int x = file.axis("x", {0, 1}, "m");
-  const int text = file.variable("Times", NC_CHAR, {time, width});
+  const int text = file.variable(name, NC_CHAR, {time, width});
   file.variable("T", NC_FLOAT, {time, y, x}, counting(6 * dates.size()));
   if (!minutes.empty()) {
     file.text(file.variable("XTIME", NC_FLOAT, {time}, minutes), "units", "minutes since " + epoch);
@@ -94,7 +95,32 @@ TEST(WrfDates, TextThatIsNoDateNumbersTheStepsWithAReason) {
   write_dates(folder / "bad.nc", {"2004-02-28_21:00:00", "2003-02-29_00:00:00"}, NC_NETCDF4);
   EXPECT_EQ(times_of(folder / "bad.nc"), (std::vector<std::string>{"0", "1"}));
   EXPECT_EQ(reason_of(opened(folder / "bad.nc")->info(), "Time"),
-            "time has missing values: steps are numbered");
+            "time is missing at step 1: steps are numbered");
+}
+
+TEST(WrfDates, BlankEntriesAreCounted) {
+  const Folder folder;
+  const std::string blank(19, ' ');
+  write_dates(folder / "bad.nc", {"2004-02-28_21:00:00", blank, "2004-02-28_23:00:00", blank},
+              NC_NETCDF4);
+  EXPECT_EQ(times_of(folder / "bad.nc"), (std::vector<std::string>{"0", "1", "2", "3"}));
+  EXPECT_EQ(reason_of(opened(folder / "bad.nc")->info(), "Time"),
+            "time is missing at 2 steps, first at step 1: steps are numbered");
+}
+
+// MPAS writes 64 characters, with blanks or zeros behind the date.
+TEST(WrfDates, TextOfMpasIsRead) {
+  const Folder folder;
+  for (const char rest : {' ', '\0'}) {
+    std::vector<std::string> dates;
+    for (const char* date : {"0004-02-28_21:00:00", "0004-02-29_00:30:00"}) {
+      dates.push_back(date + std::string(45, rest));
+    }
+    write_dates(folder / "history.nc", dates, NC_64BIT_DATA, {}, "", "xtime");
+    EXPECT_EQ(times_of(folder / "history.nc"),
+              (std::vector<std::string>{"0004-02-28T21:00:00Z", "0004-02-29T00:30:00Z"}));
+    EXPECT_TRUE(has_note(opened(folder / "history.nc")->info(), "the text of 'xtime'"));
+  }
 }
 
 TEST(WrfDates, SecondsCountFrom1970) {
