@@ -17,6 +17,7 @@
 #include "server/data/model/measure.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
+#include "server/scene/place.hpp"
 #include "server/tasks/run_guarded.hpp"
 
 namespace windsplat::api {
@@ -83,6 +84,38 @@ std::array<std::optional<double>, 3> read_place(http::QueryReader& query) {
           query.number("z", -limits::coordinate_max, limits::coordinate_max)};
 }
 
+// A position, whose z is an absolute height if `height_field` names a field of heights.
+struct Position {
+  std::array<std::optional<double>, 3> at;
+  std::optional<std::string> height_field;
+};
+
+Position read_position(http::QueryReader& query) {
+  return {read_place(query), query.text("heightField")};
+}
+
+// The heights of the first step, at which views place samples.
+Result<std::optional<data::SampleHeights>> heights_for(tasks::Catalogue& catalogue,
+                                                       const data::Dataset& dataset,
+                                                       const Position& position,
+                                                       const CancelToken& cancel) {
+  if (!position.height_field) return std::optional<data::SampleHeights>();
+  const auto field =
+      scene::find_field(dataset.info(), *position.height_field, data::FieldKind::scalar, "");
+  if (!field) {
+    return make_error(field.error().kind,
+                      "query parameter 'heightField': " + field.error().message);
+  }
+  auto values = load(catalogue, dataset, (*field)->name, 0, cancel);
+  if (!values) return values.error();
+  return std::optional(data::SampleHeights{std::move(*values), (*field)->units});
+}
+
+struct Located {
+  data::Place place;
+  protocol::PositionDescription position;
+};
+
 protocol::PositionDescription describe(const data::Place& place, const data::Grid& grid) {
   protocol::PositionDescription out;
   out.index = place.index;
@@ -92,6 +125,18 @@ protocol::PositionDescription describe(const data::Place& place, const data::Gri
     out.units[0] = "degrees_east";
     out.units[1] = "degrees_north";
   }
+  return out;
+}
+
+Result<Located> locate(tasks::Catalogue& catalogue, const data::Dataset& dataset,
+                       const Position& position, const CancelToken& cancel) {
+  const data::Grid& grid = dataset.info().grid;
+  const auto heights = heights_for(catalogue, dataset, position, cancel);
+  if (!heights) return heights.error();
+  const auto place = data::nearest_sample(grid, position.at, *heights ? &**heights : nullptr);
+  if (!place) return place.error();
+  Located out{*place, describe(*place, grid)};
+  if (*heights) out.position.units[2] = (*heights)->units;
   return out;
 }
 
@@ -208,13 +253,12 @@ http::Response histogram_response(const Subject& subject, const HistogramQuery& 
 // --- probe --------------------------------------------------------------------------------------
 
 http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& dataset,
-                              const std::array<std::optional<double>, 3>& at, int step,
-                              const CancelToken& cancel) {
+                              const Position& position, int step, const CancelToken& cancel) {
   const data::DatasetInfo& info = dataset.info();
-  const auto place = data::nearest_sample(info.grid, at);
-  if (!place) return http::problem_response(place.error());
+  const auto located = locate(catalogue, dataset, position, cancel);
+  if (!located) return http::problem_response(located.error());
   protocol::ProbeDescription out;
-  out.position = describe(*place, info.grid);
+  out.position = located->position;
   out.step = step;
   for (const data::FieldInfo& field : info.fields) {
     if (cancel.cancelled()) {
@@ -227,7 +271,7 @@ http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& datase
     if (!volume && field.derived) continue;
     if (!volume) return http::problem_response(volume.error());
     out.fields.push_back(describe(field));
-    out.values.push_back(data::value_at(**volume, place->index));
+    out.values.push_back(data::value_at(**volume, located->place.index));
   }
   return json_response(protocol::encode_probe(out));
 }
@@ -292,7 +336,7 @@ void get_probe(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const st
     return;
   }
   http::QueryReader query(request.query);
-  const auto at = read_place(query);
+  const Position at = read_position(query);
   const int step = read_step(query, **dataset).value_or(0);
   if (const auto ok = query.finish(); !ok) {
     reply(http::problem_response(ok.error()));
@@ -311,7 +355,7 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
   if (!subject) return refuse(subject.error());
   const data::DatasetInfo& info = subject->dataset->info();
   http::QueryReader query(request.query);
-  const auto at = read_place(query);
+  const Position at = read_position(query);
   if (const auto ok = query.finish(); !ok) return refuse(ok.error());
   if (const auto ok = check_steps(info); !ok) return refuse(ok.error());
 
@@ -319,17 +363,17 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
   series->field = describe(subject->field);
   for (const data::TimeStep& step : info.steps) series->times.push_back({step.value, step.text});
   const auto pass = pass_over(std::move(*subject), request, std::move(reply));
-  const auto place = std::make_shared<std::optional<data::Place>>();
+  const auto index = std::make_shared<std::array<int, 3>>();
   // Locating the position is slow among many columns, so it runs on a loading thread.
-  pass->begin = [at, series, place, grid = &info.grid]() -> Result<void> {
-    const auto found = data::nearest_sample(*grid, at);
+  pass->begin = [at, series, index, &of = pass->subject]() -> Result<void> {
+    const auto found = locate(*of.catalogue, *of.dataset, at, of.cancel);
     if (!found) return found.error();
-    *place = *found;
-    series->position = describe(*found, *grid);
+    *index = found->place.index;
+    series->position = found->position;
     return {};
   };
-  pass->take = [series, place](const data::Volume& volume) {
-    series->values.push_back(data::value_at(volume, (*place)->index));
+  pass->take = [series, index](const data::Volume& volume) {
+    series->values.push_back(data::value_at(volume, *index));
   };
   pass->finish = [series] { return json_response(protocol::encode_series(*series)); };
   go_on(loads, pass, false);

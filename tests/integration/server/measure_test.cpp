@@ -84,13 +84,44 @@ TEST_F(Measures, ProbeReturnsEveryFieldAtTheNearestSample) {
   }
 }
 
+// Any scalar can be the heights of samples; z is then one of its values in the column.
+TEST_F(Measures, PositionsAreAtTheHeightsOfAField) {
+  const auto& heights = field(windsplat::data::FieldKind::scalar);
+  const auto there = volume(heights.name, 0);
+  const auto in_column = [&](int k) {
+    return static_cast<double>(there->component(0)[flat(5, 3, k)]);
+  };
+  // The middle of the column's box, which reaches half a step beyond its ends.
+  const double z = (in_column(0) - (in_column(1) - in_column(0)) / 2 + in_column(5) +
+                    (in_column(5) - in_column(4)) / 2) /
+                   2;
+  int nearest = 0;
+  for (int k = 0; k < 6; ++k) {
+    if (std::abs(in_column(k) - z) < std::abs(in_column(nearest) - z)) nearest = k;
+  }
+  std::string at = near(5, 3, 2);
+  at = at.substr(0, at.find("&z=")) + "&z=" + Json(z).dump() + "&heightField=" + heights.name;
+  for (const std::string& query :
+       {"probe" + at + "&step=1", "fields/" + heights.name + "/series" + at}) {
+    const Json position = ask(query)["position"];
+    EXPECT_EQ(position["index"], Json({{"x", 5}, {"y", 3}, {"z", nearest}}));
+    EXPECT_NEAR(position["z"].get<double>(), in_column(nearest), 1e-6);
+    EXPECT_EQ(position["units"]["z"], heights.units);
+  }
+  const std::string vector = field(windsplat::data::FieldKind::vector).name;
+  expect_problem_saying(refused("probe" + near(5, 3, 2) + "&heightField=" + vector), 422,
+                        "is a vector, not a scalar");
+  expect_problem_saying(refused("probe" + near(5, 3, 2) + "&heightField=none"), 422,
+                        "'heightField'");
+}
+
 TEST_F(Measures, InvalidOrOutsideProbesAreRefused) {
   expect_problem_saying(refused("probe?x=0&y=95&z=500"), 422, "box");
   expect_problem_saying(refused("probe?x=0&y=0"), 422, "z is required");
   expect_problem_saying(refused("probe?x=here&y=0&z=500"), 400);
   expect_problem_saying(refused("probe?x=1e999&y=0&z=500"), 400);
   expect_problem_saying(refused("probe?x=0&y=0&z=500&step=3"), 422);
-  expect_problem_saying(refused("probe?lon=0&y=0&z=500"), 400, "x, y, z, step");
+  expect_problem_saying(refused("probe?lon=0&y=0&z=500"), 400, "x, y, z, heightField, step");
   expect_problem_saying(get(port(), "/v1/datasets/none/probe?x=0&y=0&z=0"), 404);
 }
 

@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <memory>
 #include <random>
 
 #include "server/data/model/measure.hpp"
@@ -170,6 +172,34 @@ TEST(NearestSample, OutsideTheColumnsIsRefusedWithTheirBox) {
               HasSubstr("x and y are longitude and latitude"))
       << "metres of a map";
   refusal(grid, {std::nullopt, 85, 850});
+}
+
+// Levels over a slope that rises by 100 m per column, three of them 1000 m apart.
+TEST(NearestSample, HeightsOfTheColumnReplaceTheVerticalAxis) {
+  Grid grid = model_grid();
+  grid.axes[2] = axis_of(AxisKind::height, {450, 1450, 2450}, "m");
+  auto volume = std::make_shared<Volume>();
+  volume->dims = {10, 4, 3};
+  volume->values = Samples(120);
+  for (std::size_t n = 0; n < 120; ++n) {
+    volume->values[n] = static_cast<float>(100 * (n % 10) + 1000 * (n / 40));
+  }
+  volume->values[40] = std::nanf("");
+  const SampleHeights heights{volume, "metres"};
+  for (const auto& [x, z, level, height] :
+       {std::array{10.0, 599.0, 0.0, 100.0}, std::array{10.0, 601.0, 1.0, 1100.0},
+        std::array{90.0, 601.0, 0.0, 900.0}, std::array{90.0, 3399.0, 2.0, 2900.0}}) {
+    const auto place = nearest_sample(grid, {x, 60, z}, &heights);
+    ASSERT_TRUE(place) << place.error().message;
+    EXPECT_EQ(place->index[2], static_cast<int>(level)) << x << ' ' << z;
+    EXPECT_EQ(place->coordinates[2], height);
+  }
+  const auto above = nearest_sample(grid, {10, 60, 2700}, &heights);
+  ASSERT_FALSE(above);
+  EXPECT_THAT(above.error().message, HasSubstr("-400 to 2600 metres"));
+  const auto masked = nearest_sample(grid, {0, 60, 0}, &heights);
+  ASSERT_FALSE(masked);
+  EXPECT_THAT(masked.error().message, HasSubstr("level 1 has no height"));
 }
 
 }  // namespace
