@@ -132,9 +132,11 @@ std::string grid_text(const protocol::DatasetDescription& dataset) {
     world += number(dataset.world_max[a]);
   }
   if (const auto& times = dataset.vertical_exaggeration) {
-    world += "\nheights are drawn ";
-    const bool to_scale = std::abs(*times - 1) < 0.005;
+    const bool by_pressure = dataset.axes[2].kind == "pressure";
+    world += by_pressure ? "\nheights are drawn about " : "\nheights are drawn ";
+    const bool to_scale = !by_pressure && std::abs(*times - 1) < 0.005;
     world += to_scale ? "to scale" : short_number(*times) + " times as high as to scale";
+    if (by_pressure) world += ", by the standard atmosphere";
   }
   if (is_whole_globe(dataset)) {
     world += "\nthe longitudes go around: /geometry/mapping=sphere draws a globe, flat a map";

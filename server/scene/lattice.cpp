@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "server/data/cf/fields/atmosphere.hpp"
 #include "server/data/cf/units.hpp"
 #include "server/scene/angles.hpp"
 #include "server/scene/bend.hpp"
@@ -238,6 +239,44 @@ Result<void> check_aspect(const data::Grid& grid, const protocol::GeometryView& 
                                              " times as wide as the widest of " + wide + limit);
 }
 
+// Along the middle row (axis 0) or column (axis 1) of a grid with a longitude and latitude for
+// every column, metres.
+double length_of_line(const data::Grid& grid, std::size_t axis) {
+  const data::Columns& columns = *grid.columns;
+  const auto width = static_cast<std::size_t>(grid.dims()[0]);
+  const auto height = static_cast<std::size_t>(grid.dims()[1]);
+  const std::size_t first = axis == 0 ? height / 2 * width : width / 2;
+  const std::size_t step = axis == 0 ? 1 : width;
+  double metres = 0;
+  for (std::size_t n = 1; n < (axis == 0 ? width : height); ++n) {
+    const std::size_t to = first + n * step;
+    const std::size_t from = to - step;
+    const double latitude = 0.5 * (columns.latitude[from] + columns.latitude[to]);
+    const double east = std::remainder(columns.longitude[to] - columns.longitude[from], 360.0);
+    metres += metres_per_degree * std::hypot(columns.latitude[to] - columns.latitude[from],
+                                             east * std::cos(latitude * radians_per_degree));
+  }
+  return metres;
+}
+
+// Metres from the first to the last sample of an axis: of pressures by the ICAO standard
+// atmosphere, of axes of map projections and rows by the positions of the columns. nullopt:
+// unknown.
+std::optional<double> length_of(const data::Grid& grid, std::size_t axis) {
+  const Axis& own = grid.axes.at(axis);
+  const double first = own.coordinates.front();
+  const double last = own.coordinates.back();
+  if (own.kind == AxisKind::pressure) {
+    const auto pascals = data::pascals_in(own.units);
+    if (!pascals || !(first > 0) || !(last > 0)) return std::nullopt;
+    return std::abs(data::cf::standard_height(last * *pascals) -
+                    data::cf::standard_height(first * *pascals));
+  }
+  if (const auto unit = metres_per_unit(own)) return std::abs(last - first) * *unit;
+  if (axis < 2 && grid.columns) return length_of_line(grid, axis);
+  return std::nullopt;
+}
+
 }  // namespace
 
 Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
@@ -257,15 +296,16 @@ double cell_size(const Lattice& lattice, std::size_t axis) {
 std::optional<double> vertical_exaggeration(const data::Grid& grid, const Lattice& lattice) {
   // World units per metre along an axis; nullopt: unknown.
   const auto scale = [&](std::size_t a) -> std::optional<double> {
-    const std::vector<double>& at = grid.axes.at(a).coordinates;
     const std::vector<double>& world = lattice.positions.at(a);
-    const auto unit = metres_per_unit(grid.axes.at(a));
-    if (!unit || at.size() < 2) return std::nullopt;
-    return (world.back() - world.front()) / (std::abs(at.back() - at.front()) * *unit);
+    if (world.size() < 2) return std::nullopt;
+    const auto metres = length_of(grid, a);
+    if (!metres || !(*metres > 0)) return std::nullopt;
+    return (world.back() - world.front()) / *metres;
   };
   const auto up = scale(2);
   auto across = scale(1);
-  if (!across && grid.axes[0].kind != AxisKind::longitude) across = scale(0);
+  const bool is_narrowed = grid.axes[0].kind == AxisKind::longitude && !grid.columns;
+  if (!across && !is_narrowed) across = scale(0);
   if (!up || !across || !(*across > 0)) return std::nullopt;
   return *up / *across;
 }

@@ -30,8 +30,9 @@ Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryVi
                               const Heights* heights = nullptr);
 
 // How many times as high as to the scale of y (without y, of x) the vertical axis of a flat lattice
-// is drawn; a degree of latitude has 111 km. nullopt: the axes are not both lengths or degrees, as
-// with pressure.
+// is drawn; a degree of latitude has 111 km. Pressures, drawn by their logarithm, have the heights
+// of the ICAO standard atmosphere at both ends; grids with a longitude and latitude for every
+// column the length of their middle column. nullopt: a length is not known, as of levels.
 std::optional<double> vertical_exaggeration(const data::Grid& grid, const Lattice& lattice);
 
 // Mean width of the lattice's cells along an axis, world units.

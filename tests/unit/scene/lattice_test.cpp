@@ -211,7 +211,53 @@ TEST(Lattice, VerticalAxisIsToScaleOnRequest) {
   const auto refused = place_lattice(atmosphere_grid(), geometry);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().at.at(0).pointer, "/geometry/vertical");
-  EXPECT_FALSE(vertical_exaggeration(atmosphere_grid(), *place_lattice(atmosphere_grid(), {})));
+}
+
+// 1000 hPa lie at 110.8 m and 250 hPa at 10363 m of the ICAO standard atmosphere (Doc 7488).
+TEST(Lattice, PressuresAreExaggeratedByTheStandardAtmosphere) {
+  const data::Grid grid = atmosphere_grid();
+  const auto lattice = place_lattice(grid, {});
+  ASSERT_TRUE(lattice);
+  const double up = lattice->positions[2].back() - lattice->positions[2].front();
+  const double north = lattice->positions[1].back() - lattice->positions[1].front();
+  const auto times = vertical_exaggeration(grid, *lattice);
+  ASSERT_TRUE(times);
+  EXPECT_NEAR(*times, (up / (10363 - 110.8)) / (north / (20 * 111194.93)), 0.001 * *times);
+  data::Grid levels = grid;
+  levels.axes[2].kind = data::AxisKind::level;
+  EXPECT_FALSE(vertical_exaggeration(levels, *place_lattice(levels, {})));
+}
+
+// Rows and columns without units, 3 km apart in both directions at 60 N, below 10 km: WRF.
+TEST(Lattice, RowsAreToTheScaleOfTheirPositions) {
+  data::Grid grid = metres({0, 1, 2, 3}, {0, 1, 2}, {0, 5000, 10000});
+  grid.axes[0].units = grid.axes[1].units = "";
+  data::Columns columns;
+  const double north = 3000 / 111194.93;
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 4; ++i) {
+      columns.latitude.push_back(60 + j * north);
+      columns.longitude.push_back(179.98 + i * 2 * north - (i > 0 ? 360 : 0));
+    }
+  }
+  grid.columns = std::make_shared<const data::Columns>(columns);
+  const auto lattice = place_lattice(grid, {});
+  ASSERT_TRUE(lattice);
+  const double up = lattice->positions[2].back() - lattice->positions[2].front();
+  const double across = lattice->positions[1].back() - lattice->positions[1].front();
+  EXPECT_NEAR(vertical_exaggeration(grid, *lattice).value_or(0), (up / 10000) / (across / 6000),
+              1e-6);
+  data::Grid section = grid;
+  section.axes[1].coordinates = {0};
+  columns.latitude.resize(4);
+  columns.longitude.resize(4);
+  section.columns = std::make_shared<const data::Columns>(columns);
+  const auto row = place_lattice(section, {});
+  ASSERT_TRUE(row);
+  const double along = row->positions[0].back() - row->positions[0].front();
+  const double rise = row->positions[2].back() - row->positions[2].front();
+  EXPECT_NEAR(vertical_exaggeration(section, *row).value_or(0), (rise / 10000) / (along / 9000),
+              1e-4);
 }
 
 TEST(Lattice, DimensionOfOneIsOneCellThick) {

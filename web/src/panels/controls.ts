@@ -155,12 +155,14 @@ export function sliceText(dataset: Dataset, view: View): string {
 export function exaggerationText(dataset: Dataset, view: View): string {
   const { vertical = "auto", mapping = "flat", heightField = null, scale } = view.geometry ?? {};
   if (mapping !== "flat" || heightField !== null || vertical === "index") return "";
+  const byPressure = dataset.axes.z.kind === "pressure"; // drawn by its logarithm unless linear
   const base = vertical === "metric" ? 1 : dataset.verticalExaggeration;
-  if (base === undefined) return "";
+  if (base === undefined || (byPressure && vertical === "linear")) return "";
   const across = dataset.dims.y > 1 ? 1 : 0;
   const times = (base * (scale?.[2] ?? 1)) / (scale?.[across] ?? 1);
-  if (Math.abs(times - 1) < 0.005) return "Heights are drawn to scale.";
-  return `Heights are drawn ${formatNumber(times, 3)} times as high as to scale.`;
+  if (!byPressure && Math.abs(times - 1) < 0.005) return "Heights are drawn to scale.";
+  const shown = byPressure ? `about ${formatNumber(times, 2)}` : formatNumber(times, 3);
+  return `Heights are drawn ${shown} times as high as to scale.`;
 }
 
 // Colours the lines by a different quantity: the old range has the wrong unit and is removed, and a
