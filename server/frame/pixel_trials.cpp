@@ -7,7 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "server/base/pcg3d.hpp"
 #include "server/frame/ray_kernels.hpp"
@@ -285,6 +288,7 @@ struct Squares {
   double kernel = 0;
   double slab = 0;
   double half = 0;
+  double stop = 0;
 };
 
 class TryingPixels {
@@ -301,6 +305,7 @@ class TryingPixels {
     MeanSquare kernel;
     MeanSquare slab;
     MeanSquare half;
+    MeanSquare stop;
     PixelTrials out;
     if (spread.empty) out.trials.emplace();
     if (spread.empty || places.empty()) return out;
@@ -319,6 +324,7 @@ class TryingPixels {
       kernel.add(here.kernel);
       slab.add(here.slab);
       half.add(here.half);
+      stop.add(here.stop);
     }
     out.work = work();
     const bool told = kernel.count() >= tried_least && (kernel.is_told() || kernel.mean() > 0);
@@ -332,7 +338,7 @@ class TryingPixels {
     const auto of_pieces = [](double n) { return n * n / (n * n - 1); };
     const double n = light_.pieces_of_slab();
     out.trials = {error(kernel), error(slab) * of_pieces(n), error(half) * of_pieces(0.5 * n),
-                  light_.thinnest()};
+                  light_.thinnest(), error(stop)};
     return out;
   }
 
@@ -360,6 +366,7 @@ class TryingPixels {
     const auto count = static_cast<double>(rays_.size());
     met_ += count * static_cast<double>(found.size());
     Squares out;
+    ends_.clear();
     for (const PictureRay& one : rays_) {
       const Light drawn = light_.by_kernels(found, one);
       const RayLight::ByDepth by_depth = light_.by_depth(found, one);
@@ -367,8 +374,28 @@ class TryingPixels {
       out.kernel += square_difference(drawn, by_depth.exact) / count;
       out.slab += square_difference(by_depth.slabs, by_depth.exact) / count;
       out.half += square_difference(by_depth.halves, by_depth.exact) / count;
+      ends_.push_back({by_depth.exact, by_depth.end});
     }
+    out.stop = lost_behind();
     return out;
+  }
+
+  // The rays of a block end together, once no more than the stop is left of any. Behind it the
+  // light is taken to be what it is on the whole ray. Mean of squares.
+  [[nodiscard]] double lost_behind() const {
+    std::int64_t last = std::numeric_limits<std::int64_t>::min();
+    for (const auto& [exact, end] : ends_) {
+      if (end.left.empty()) return 0;
+      last = std::max(last, end.piece);
+    }
+    double sum = 0;
+    for (const auto& [exact, end] : ends_) {
+      const auto behind = static_cast<std::size_t>(last - end.piece);
+      const double left = end.left[std::min(behind, end.left.size() - 1)];
+      const double lost = std::max(0.0, left - exact.transmittance) / exact.alpha;
+      sum += lost * lost * square_difference(exact, {});
+    }
+    return sum / static_cast<double>(ends_.size());
   }
 
   const scene::Scene& scene_;
@@ -376,7 +403,8 @@ class TryingPixels {
   RayKernels kernels_;
   RayLight light_;
   std::vector<PictureRay> rays_;
-  double met_ = 0;  // kernels by each ray
+  std::vector<std::pair<Light, RayLight::End>> ends_;  // of these rays
+  double met_ = 0;                                     // kernels by each ray
 };
 
 }  // namespace

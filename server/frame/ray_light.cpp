@@ -161,7 +161,7 @@ RayLight::ByDepth RayLight::by_depth(const RayKernelList& kernels, const Picture
   const Division division{start, step, static_cast<std::size_t>(first)};
   for (const Stretch& one : stretches_) divide(one, division);
   const auto whole = static_cast<std::size_t>(pieces_of_slab_);
-  pass_in(division, 1, out.exact);
+  pass_in(division, 1, out.exact, &out.end);
   pass_in(division, whole / 2, out.halves);
   pass_in(division, whole, out.slabs);
   return out;
@@ -189,16 +189,20 @@ void RayLight::divide(const Stretch& one, const Division& by) {
 }
 
 // Every `together` pieces as one.
-void RayLight::pass_in(const Division& by, std::size_t together, Light& to) const {
+void RayLight::pass_in(const Division& by, std::size_t together, Light& to, End* end) const {
   std::size_t next = 0;
-  const std::size_t end = by.first + pieces_.size();
-  for (std::size_t k = by.first / together * together; k < end; k += together) {
+  const double stop = scene_.stop_transmittance;
+  const std::size_t behind = by.first + pieces_.size();
+  for (std::size_t k = by.first / together * together; k < behind; k += together) {
     Piece sum{};
-    for (std::size_t p = std::max(k, by.first); p < std::min(k + together, end); ++p) {
+    for (std::size_t p = std::max(k, by.first); p < std::min(k + together, behind); ++p) {
       for (std::size_t c = 0; c < 4; ++c) sum[c] += pieces_[p - by.first][c];
     }
     const double begin = by.start + static_cast<double>(k) * by.step;
     pass(sum, begin, static_cast<double>(together) * by.step, next, to);
+    if (end == nullptr || to.transmittance > stop) continue;
+    if (end->left.empty()) end->piece = std::llround((begin - anchor_) / by.step);
+    if (end->left.empty() || end->left.back() > 0.01 * stop) end->left.push_back(to.transmittance);
   }
   for (; next < surfaces_.size(); ++next) reference::cross_surface(surfaces_[next], to);
 }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "server/engine/reference/ray.hpp"
@@ -24,10 +25,18 @@ class RayLight {
 
   // As drawn by method `kernel` with analytic compositing.
   [[nodiscard]] Light by_kernels(const RayKernelList& kernels, const PictureRay& ray) const;
+  // Where no more than the scene's stop_transmittance is left: the number of the piece, counted
+  // from the middle of the volume, and what is left behind it and each of the next ones, as far as
+  // it counts. Empty if the ray goes on.
+  struct End {
+    std::int64_t piece = 0;
+    std::vector<double> left;
+  };
   struct ByDepth {
     Light exact;
-    Light slabs;        // of one cell, or of the least depth if cells are thinner
-    Light halves;       // half as thick as these
+    Light slabs;   // of one cell, or of the least depth if cells are thinner
+    Light halves;  // half as thick as these
+    End end;
     bool known = true;  // false: of too many pieces
   };
   // `exact`: in pieces of a quarter of a cell.
@@ -54,7 +63,7 @@ class RayLight {
   [[nodiscard]] engine::reference::Surface body(const PictureRay& ray) const;
   void meet(const RayKernelList& kernels, const PictureRay& ray);
   void divide(const Stretch& one, const Division& by);
-  void pass_in(const Division& by, std::size_t together, Light& to) const;
+  void pass_in(const Division& by, std::size_t together, Light& to, End* end = nullptr) const;
   void pass(const Piece& piece, double begin, double whole, std::size_t& next, Light& to) const;
 
   const scene::Scene& scene_;

@@ -22,6 +22,7 @@ struct Trials {
   double slab = 0;    // of slabs of one cell, or of the least depth if cells are thinner
   double half = 0;    // of slabs of half a cell, of no meaning if slabs are at least one cell thick
   double thinnest = 0;  // the least depth of a slab, cells
+  double stop = 0;      // of ending rays at the transmittance of the view
 };
 
 // Lengths are in heights of the picture. Means are over what is visible, weighted by its light. The

@@ -149,6 +149,11 @@ double tried_error(const Kind& kind, const Setting& setting, const Viewpoint& vi
   return std::pow(trials.slab, 1 - share) * std::pow(trials.half, share);
 }
 
+double stop_error(const Kind& kind, const Viewpoint& viewpoint) {
+  const bool known = viewpoint.content && viewpoint.content->trials;
+  return known && kind.medium ? viewpoint.content->trials->stop : kind.stop;
+}
+
 Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   // A smaller picture and merged samples have the error of the method too. It is independent of
   // theirs for a medium; the laws of lines are fitted to the whole error.
@@ -164,7 +169,9 @@ Expected expected_error(const Kind& kind, const Setting& setting, const Viewpoin
     }
     error = std::pow(std::pow(other, power) + std::pow(error, power), 1 / power);
   }
-  return {std::clamp(std::hypot(error, kind.rule / setting.thinner, kind.stop), error_least, 1.0),
+  const double whole_error =
+      std::hypot(error, kind.rule / setting.thinner, stop_error(kind, viewpoint));
+  return {std::clamp(whole_error, error_least, 1.0),
           law_of(kind, cause_of(setting, viewpoint)).scatter};
 }
 

@@ -58,6 +58,10 @@ const Scatter& error_scatter(const Kind& kind, Cause cause);
 // where the content of a view is unknown, that of a typical one.
 double tried_error(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 
+// What is lost where rays end (protocol: stopTransmittance): of the tried pixels, or a typical
+// error.
+double stop_error(const Kind& kind, const Viewpoint& viewpoint);
+
 Features features_of(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
 
 // Linear RMSE, and milliseconds of rendering on the machine on which the laws were fitted.

@@ -61,7 +61,8 @@ double error_of_rule(protocol::Compositing compositing) {
   return 0;
 }
 
-// Rays that end at transmittance T miss up to T times the light behind.
+// Rays that end at transmittance T miss up to T times the light behind. The factor is that of the
+// default views of the samples, of which few pixels are opaque.
 double error_of_stop(double transmittance) {
   constexpr double shine = 0.04;
   return shine * std::max(0.0, transmittance - stop_of_the_truth);

@@ -25,8 +25,9 @@ struct Viewpoint {
 // detail and the content are those of `otherwise`, scaled by the size of the volume in the picture.
 Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise = {});
 
-// Stop transmittance of reference pictures; below it nothing is visible in 8 bits.
-inline constexpr double stop_of_the_truth = 1.5e-4;
+// Stop transmittance of reference pictures. Of pixels that all end there, less is lost than the
+// least error that is reported (quality/laws.hpp).
+inline constexpr double stop_of_the_truth = 1e-5;
 
 // The properties of a scene that the prior depends on.
 struct Kind {
@@ -35,7 +36,7 @@ struct Kind {
   double radius = 1.4;   // radius of the lines, pixels at a picture height of 720
   double thickness = 1;  // thickness of slabs, cells
   double rule = 0;       // error of approximate compositing, at the slab thickness of the view
-  double stop = 0;       // error of early termination
+  double stop = 0;       // error of early termination where the content is unknown
 };
 
 // Everything in a completed view that affects errors except camera, picture size and step, as a

@@ -121,6 +121,22 @@ TEST(Laws, ErrorsOfMethodsAreThoseOfTriedPixels) {
   }
 }
 
+// Independent of that of the method; where nothing was tried it is that of the kind of scene.
+TEST(Laws, ErrorsContainWhatIsLostWhereRaysEnd) {
+  Viewpoint seen{2, {}, 640, 480};
+  seen.content = Content{};
+  seen.content->trials = Trials{4e-3, 1e-3, 3e-4};
+  const Setting slab{MethodName::slab, 0, 0};
+  const double of_method = error_of(media, slab, seen);
+  seen.content->trials->stop = 2e-3;
+  EXPECT_NEAR(error_of(media, slab, seen), std::hypot(of_method, 2e-3), 1e-12);
+  Kind kind = media;
+  kind.stop = 5e-3;
+  EXPECT_NEAR(error_of(kind, slab, seen), std::hypot(of_method, 2e-3), 1e-12);
+  seen.content.reset();
+  EXPECT_GE(error_of(kind, slab, seen), 5e-3);
+}
+
 // Slabs that would be thinner than the least ones are drawn as these.
 TEST(Laws, SlabsBelowTheLeastDepthHaveItsError) {
   Viewpoint seen{2, {}, 640, 480};
