@@ -1,5 +1,7 @@
 # Two stages: the first builds the release program on Debian 12; the second contains only the
-# program and the libraries it is linked to. BASE may be any Debian 12 image.
+# program and the libraries it is linked to. BASE may be any Debian 12 image. VTK is not installed, so
+# that cases of OpenFOAM and EnSight are refused: for them add the group vtk to scripts/setup, and
+# libvtk9.1 and windsplat-vtk to the second stage (126 MiB).
 ARG BASE=debian:bookworm-slim
 
 FROM ${BASE} AS build

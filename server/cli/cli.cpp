@@ -154,6 +154,19 @@ std::string shortage(const std::string& what) {
                         : "out of memory: " + what + limits;
 }
 
+// The path of another program in the folder of this one; empty if that is not known.
+std::string beside_this_program(const char* name) {
+  std::error_code fault;
+  const auto here = std::filesystem::read_symlink("/proc/self/exe", fault);
+  return fault ? std::string() : (here.parent_path() / name).native();
+}
+
+std::string text_on_cases() {
+  return std::string("Cases of OpenFOAM and EnSight are ") +
+         (data::loader::has_case_program() ? "read by windsplat-vtk."
+                                           : "not read: windsplat-vtk is not installed.");
+}
+
 }  // namespace
 
 int run(int argc, const char* const* argv) {
@@ -162,8 +175,10 @@ int run(int argc, const char* const* argv) {
   try {
     if (argc == 2 && std::string_view(argv[1]) == "load") return load();
     data::loader::set_program("/proc/self/exe");
+    data::loader::set_case_program(beside_this_program("windsplat-vtk"));
     CLI::App app(description, "windsplat");
     app.set_version_flag("--version", "windsplat " WINDSPLAT_VERSION);
+    app.footer(text_on_cases());
     app.require_subcommand(1);
     Action chosen;
     add_serve(app, chosen);

@@ -40,8 +40,9 @@ Error not_opened(const std::string& name, int reason) {
           (absent          ? std::string("no such file")
            : outside       ? std::string("lies outside the dataset's folder")
            : not_companion ? std::string("is another file; only files whose name ends in "
-                                         ".nhdr, .json, .ctl, .dx, .pvd, .pvti, .pvtr, .pvts, "
-                                         ".pvtu, .vtm, .vtmb, .vtpd or .vtpc may refer to others")
+                                         ".nhdr, .json, .ctl, .dx, .pvd, .foam, .case, .encas, "
+                                         ".pvti, .pvtr, .pvts, .pvtu, .vtm, .vtmb, .vtpd or .vtpc "
+                                         "may refer to others")
                            : std::generic_category().message(reason)));
 }
 

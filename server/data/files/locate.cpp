@@ -21,11 +21,11 @@ namespace {
 namespace fs = std::filesystem;
 
 // Extensions of formats whose headers name companion files.
-constexpr auto with_companions =
-    std::to_array<std::string_view>({".pvd", ".ctl", ".json", ".nhdr", ".dx", ".pvti", ".pvtr",
-                                     ".pvts", ".pvtu", ".vtm", ".vtmb", ".vtpd", ".vtpc"});
+constexpr auto with_companions = std::to_array<std::string_view>(
+    {".pvd", ".ctl", ".json", ".nhdr", ".dx", ".foam", ".openfoam", ".case", ".encas", ".pvti",
+     ".pvtr", ".pvts", ".pvtu", ".vtm", ".vtmb", ".vtpd", ".vtpc"});
 // Of these, those of a single step, of which a pattern makes a series.
-constexpr std::size_t first_of_a_step = 5;
+constexpr std::size_t first_of_a_step = 9;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 

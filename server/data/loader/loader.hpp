@@ -52,6 +52,11 @@ struct Limits {
 // Sets the executable of loaders, run as `program load`; call it once, before the first loader is
 // started. There is no default, so that a program without that command never starts itself.
 void set_program(std::string path);
+// The executable of loaders for cases of OpenFOAM and EnSight (server/vtk_loader), likewise.
+// Without one, or if it is not there, the other program refuses them.
+void set_case_program(std::string path);
+// Whether it is there and may be executed.
+bool has_case_program();
 
 // A dataset whose files are read by a loader. The loader is started on demand, and restarted by the
 // next call after it was released or ended. Not thread-safe, except for cancel().

@@ -16,6 +16,7 @@
 
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/loader/bytes.hpp"
+#include "server/data/open/cases.hpp"
 
 namespace windsplat::data::loader {
 
@@ -24,6 +25,7 @@ namespace {
 struct Program {
   std::mutex mutex;
   std::string path;
+  std::string cases;  // for cases of OpenFOAM and EnSight
 };
 
 Program& program() {
@@ -34,6 +36,20 @@ Program& program() {
 std::string program_path() {
   const std::lock_guard lock(program().mutex);
   return program().path;
+}
+
+// Empty: not there.
+std::string case_program_path() {
+  const std::lock_guard lock(program().mutex);
+  const std::string& path = program().cases;
+  return !path.empty() && ::access(path.c_str(), X_OK) == 0 ? path : std::string();
+}
+
+// The executable that reads a location.
+std::string program_for(const Location& location) {
+  const std::string cases = case_program_path();
+  if (cases.empty() || location.fetched) return program_path();
+  return case_named(*direct_files(location)) == CaseFormat::none ? program_path() : cases;
 }
 
 // A regular file below one of the folders where libraries keep their tables.
@@ -79,6 +95,13 @@ void set_program(std::string path) {
   program().path = std::move(path);
 }
 
+void set_case_program(std::string path) {
+  const std::lock_guard lock(program().mutex);
+  program().cases = std::move(path);
+}
+
+bool has_case_program() { return !case_program_path().empty(); }
+
 // Remaining time of a call.
 struct RunningLoader::Patience {
   Clock::time_point end;
@@ -102,7 +125,7 @@ RunningLoader::RunningLoader(Location location, const Limits& limits)
     : location_(std::move(location)), limits_(limits), memory_(limits.budget) {}
 
 Result<std::string> RunningLoader::open() {
-  const std::string path = program_path();
+  const std::string path = program_for(location_);
   if (path.empty()) return make_error(ErrorKind::internal, "no loader executable is set");
   Task task;
   task.memory_bytes = limits_.memory_bytes;
@@ -294,6 +317,8 @@ Error RunningLoader::ended(Fate fate, const Call& what, const Patience& patience
                        std::chrono::duration_cast<std::chrono::milliseconds>(patience.postponed));
   } else if (fate != Fate::closed) {
     how = "violated the protocol and was terminated";
+  } else if (how.ends_with(" 127")) {  // of the dynamic linker
+    how += " (are the libraries that it needs installed? For cases: the package libvtk9.1)";
   }
   return make_error(ErrorKind::bad_data, loader_text() + ' ' + how + " while " + what.doing);
 }

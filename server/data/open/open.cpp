@@ -37,6 +37,7 @@
 #include "server/data/formats/zarr/store.hpp"
 #include "server/data/model/axis_check.hpp"
 #include "server/data/model/source.hpp"
+#include "server/data/open/cases.hpp"
 
 namespace windsplat::data {
 
@@ -231,33 +232,6 @@ ArraysResult open_parts(const std::shared_ptr<Files>& files, std::vector<Part> p
   return cf::collocated(std::move(*joined));
 }
 
-// Cases of OpenFOAM and EnSight are refused with advice: the errors of other formats would not say
-// what they are. A host is not asked for files of such a case, since its refusal would name a file
-// that nobody wanted.
-Result<void> not_a_case(Files& files, const Result<std::string>& head) {
-  const Location& location = files.location();
-  const std::string name = location.members.empty() ? location.stem : location.members.front().name;
-  const bool is_folder = location.kind == Location::Kind::folder;
-  const std::string ending = lower(name.substr(std::min(name.size(), name.find_last_of('.'))));
-  const bool foam =
-      (is_folder && !location.fetched && files.exists("system/controlDict")) || ending == ".foam" ||
-      ending == ".openfoam" ||
-      (head && head->find("FoamFile") != std::string::npos && head->find('{') != std::string::npos);
-  if (foam) {
-    return make_error(ErrorKind::bad_data,
-                      in_quotes(name) +
-                          " belongs to an OpenFOAM case, which is not read; convert the case with "
-                          "foamToVTK and open its .vtm or .vtk files");
-  }
-  if (head && head->starts_with("FORMAT") && lower(*head).find("ensight") != std::string::npos) {
-    return make_error(ErrorKind::bad_data,
-                      in_quotes(name) +
-                          " is an EnSight case, which is not read; convert it to VTK files, for "
-                          "example .pvd or .vtm with ParaView");
-  }
-  return {};
-}
-
 // The files that a pattern matches: along time, and for a list in braces joined by variables.
 ArraysResult open_series(const std::shared_ptr<Files>& files) {
   const Location& location = files->location();
@@ -347,7 +321,9 @@ SourceResult open_by_content(const std::shared_ptr<Files>& files) {
     return source_of(*files, as_arrays(*files, dap::open(files)));
   }
   const auto head = first_bytes(*files);
-  if (auto fine = not_a_case(*files, head); !fine) return fine.error();
+  if (const CaseFormat format = case_of(*files, head); format != CaseFormat::none) {
+    return open_case(files, format);
+  }
   if (!head) return head.error();
   if (list::looks_like(*head) && files->location().kind == Location::Kind::file) {
     const auto input = files->open(files->location().members.front().name);
