@@ -10,8 +10,10 @@ import re
 import shutil
 import struct
 import subprocess
+import sys
 
 import hdf5_bytes
+import seeds_cases
 import seeds_mesh
 import seeds_vtk
 import zarr3_bytes
@@ -385,7 +387,16 @@ def mesh_seeds():
         yield Seed("netcdf classic", f"mesh {name}", {"x.nc": data})
 
 
+def cases_if_read(program):
+    """Cases of OpenFOAM and EnSight, which other builds refuse."""
+    if pathlib.Path(program).with_name("windsplat-vtk").exists():
+        return seeds_cases.case_seeds()
+    print("seeds: without windsplat-vtk there are no cases of OpenFOAM and EnSight",
+          file=sys.stderr)
+    return []
+
+
 def plain_seeds(program, folder, real):
-    return [*nrrd_seeds(), *raw_seeds(), *grads_seeds(), *dx_seeds(), *zarr_seeds(),
+    return [*cases_if_read(program), *nrrd_seeds(), *raw_seeds(), *grads_seeds(), *dx_seeds(), *zarr_seeds(),
             *seeds_vtk.vtk_seeds(), *hdf5_seeds(), *netcdf_seeds(program, folder),
             *mesh_seeds(), *grib_seeds(folder), *real_seeds(real)]
