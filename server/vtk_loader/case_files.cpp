@@ -87,7 +87,12 @@ Result<void> CaseFiles::note(const std::string& name) {
 
 std::string CaseFiles::identity() const {
   std::string out;
-  for (const auto& [name, state] : states_) out += name + '=' + state + '\n';
+  for (const auto& [name, state] : states_) {
+    out += name;
+    out += '=';
+    out += state;
+    out += '\n';
+  }
   return out;
 }
 

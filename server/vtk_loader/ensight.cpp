@@ -189,7 +189,9 @@ class EnSightCase final : public Case {
     if (names == nullptr) return {};
     for (const std::string& found : *names) {
       if (found.ends_with('/') || data::alternative_matching({last}, found) < 0) continue;
-      const std::string whole = folder.empty() ? found : folder + '/' + found;
+      std::string whole = folder;
+      if (!whole.empty()) whole += '/';
+      whole += found;
       if (auto done = files_.note(whole); !done) return done;
     }
     return {};

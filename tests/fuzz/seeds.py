@@ -397,6 +397,6 @@ def cases_if_read(program):
 
 
 def plain_seeds(program, folder, real):
-    return [*cases_if_read(program), *nrrd_seeds(), *raw_seeds(), *grads_seeds(), *dx_seeds(), *zarr_seeds(),
-            *seeds_vtk.vtk_seeds(), *hdf5_seeds(), *netcdf_seeds(program, folder),
+    return [*cases_if_read(program), *nrrd_seeds(), *raw_seeds(), *grads_seeds(), *dx_seeds(),
+            *zarr_seeds(), *seeds_vtk.vtk_seeds(), *hdf5_seeds(), *netcdf_seeds(program, folder),
             *mesh_seeds(), *grib_seeds(folder), *real_seeds(real)]

@@ -82,6 +82,11 @@ class OpenFoam : public CaseLoader {
   void expect_cavity(const FoamBox& box) {
     auto source = opened(folder_ / "cavity");
     ASSERT_NE(source, nullptr);
+    for (std::size_t d = 0; d < 3; ++d) {
+      const auto& axis = source->info().grid.axes.at(d).coordinates;
+      EXPECT_LT(axis.front(), box.origin.at(d) + box.h / 2);
+      EXPECT_GT(axis.back(), box.origin.at(d) + box.h * (box.cells.at(d) - 0.5));
+    }
     for (const auto& [step, time] : {std::pair(0, 0.0), {1, 0.5}, {2, 10.0}}) {
       expect_cell_values(*source, "p", step, box,
                          [&](const Place& at) { return pressure_at(at, time); });
