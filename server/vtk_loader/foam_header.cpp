@@ -15,7 +15,7 @@ namespace windsplat::vtk_loader {
 
 namespace {
 
-constexpr std::size_t head_bytes = std::size_t{1} << 16;
+constexpr std::size_t head_bytes = std::size_t{1} << 13;
 
 std::string inflated(const std::string& packed) {
   std::string out(head_bytes, '\0');

@@ -218,7 +218,10 @@ class OpenFoamCase final : public Case {
               std::find(names->begin(), names->end(), name + ".gz") != names->end()) {
             continue;  // counted once
           }
-          auto done = take_file(folder + '/' + name, field);
+          std::string path = folder;
+          path += '/';
+          path += name;
+          auto done = take_file(path, field);
           if (!done) return done;
           ++seen[field];
         }
