@@ -240,7 +240,16 @@ Result<DatasetRequest> parse_dataset_request(std::string_view json) {
     reader.finish();
   } else {
     ObjectReader reader(*tree, "", faults);
-    reader.text("path", out.path, 1, Presence::required, limits::path_chars_max);
+    const bool is_named = !tree->is_object() || tree->contains("path");
+    if (!is_named) {
+      faults.add(
+          "/path",
+          "is required: a body is {\"path\": \"winds.nc\"}, with a file below --data-root or "
+          "a URL of a --data-host, {\"files\": [\"ua_*.nc\", \"va_*.nc\"]}, or {\"from\": "
+          "\"gcm\", \"selection\": {\"number\": 3}}");
+    }
+    reader.text("path", out.path, 1, is_named ? Presence::required : Presence::optional,
+                limits::path_chars_max);
     reader.finish();
   }
   if (!faults.empty()) return faults.error();

@@ -98,7 +98,8 @@ void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
                   tasks::Backend& backend, const http::Request& request, http::Reply reply) {
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
-                                 "Content-Type must be application/json: {\"path\": ...}"));
+                                 "Content-Type must be application/json: {\"path\": ...}, "
+                                 "{\"files\": [...]} or {\"from\": ..., \"selection\": {...}}"));
     return;
   }
   auto wanted = protocol::parse_dataset_request(request.body);

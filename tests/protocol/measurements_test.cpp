@@ -175,6 +175,13 @@ TEST(Measurements, DatasetRequestIsAPathOrEntries) {
   }
   EXPECT_THAT(parse_dataset_request(R"({"path":"b.nc","selection":{"number":3}})").error().message,
               HasSubstr("winds.nc?number=3"));
+  // A body without a known key names all three.
+  for (const char* json : {"{}", R"({"file":"a.nc"})"}) {
+    const std::string message = parse_dataset_request(json).error().message;
+    for (const char* key : {"\"path\"", "\"files\"", "\"from\"", "--data-host"}) {
+      EXPECT_THAT(message, HasSubstr(key)) << json;
+    }
+  }
   for (const char* json : {"", "{", R"({"path":"a","path":"b"})", "{\"path\":\"\xff\"}"}) {
     const auto refused = parse_dataset_request(json);
     ASSERT_FALSE(refused) << json;

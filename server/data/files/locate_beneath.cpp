@@ -54,7 +54,8 @@ Result<void> check_letters(const std::string& path) {
     return make_error(ErrorKind::invalid, "no path given");
   }
   if (looks_like_url(path)) {
-    return refused(without_secrets(path), "is a URL; only files below the data root are opened");
+    return refused(without_secrets(path),
+                   "is a URL; URLs are opened only of the hosts of --data-host, and none is given");
   }
   if (path.front() == '/') return refused(path, "is absolute; paths are below the data root");
   bool names_something = false;
