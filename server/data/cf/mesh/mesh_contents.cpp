@@ -183,7 +183,9 @@ class ContentsMaker {
     const bool is_table = std::any_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
       return is_one_of(lower(contents_.dimensions.at(at(d)).name), counts);
     });
-    const bool is_place = variable.dims.size() == 1 && side_of(variable) != 0;
+    const bool is_place =
+        variable.dims.size() == 1 &&
+        (side_of(variable) != 0 || describes_mesh_of(topology_.convention, variable.name));
     const bool listed = std::any_of(variable.dims.begin(), variable.dims.end(), [&](int d) {
       return MeshDimensions::has(dimensions_.cells, d) ||
              MeshDimensions::has(dimensions_.nodes, d) || MeshDimensions::has(dimensions_.edges, d);

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "server/base/ascii.hpp"
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/units.hpp"
 
@@ -31,6 +32,18 @@ constexpr auto mesh_names = std::to_array<KnownName>({
     {"FVCOM", "ww", "upward_sea_water_velocity"},
     {"CF bounds", "z_mc", "altitude"},
 });
+
+// Positions, sizes and numbers of cells, edges and vertices (MPAS mesh specification, version 1.0)
+// and positions of FVCOM, which have no units by which they could be recognised.
+constexpr auto mpas_descriptions = std::to_array<std::string_view>(
+    {"latcell",       "loncell",        "xcell",        "ycell",         "zcell",
+     "latedge",       "lonedge",        "xedge",        "yedge",         "zedge",
+     "latvertex",     "lonvertex",      "xvertex",      "yvertex",       "zvertex",
+     "areacell",      "areatriangle",   "meshdensity",  "dcedge",        "dvedge",
+     "angleedge",     "nedgesoncell",   "nedgesonedge", "indextocellid", "kiteareasonvertex",
+     "indextoedgeid", "indextovertexid"});
+constexpr auto fvcom_descriptions =
+    std::to_array<std::string_view>({"lon", "lat", "lonc", "latc", "x", "y", "xc", "yc"});
 
 int on_dimensions(const FileContents& contents, const char* name, const std::vector<int>& dims) {
   const int v = variable_named(contents, name);
@@ -101,6 +114,11 @@ FoundLevels mpas_levels(const ArrayFile& file) {
 }
 
 }  // namespace
+
+bool describes_mesh_of(std::string_view convention, const std::string& name) {
+  if (convention == "MPAS") return is_one_of(lower(name), mpas_descriptions);
+  return convention == "FVCOM" && is_one_of(lower(name), fvcom_descriptions);
+}
 
 void name_mesh_variables(FileContents& contents, const std::string& convention) {
   for (FileVariable& variable : contents.variables) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/base/error.hpp"
@@ -12,6 +13,10 @@ namespace windsplat::data::cf {
 
 // Sets standard names of the velocities and heights of MPAS, ICON and FVCOM, where there are none.
 void name_mesh_variables(FileContents& contents, const std::string& convention);
+
+// Whether a 1-D variable has the name of a position, size or number of a cell, edge or vertex of a
+// model, which need not have units: latCell, areaCell of MPAS.
+bool describes_mesh_of(std::string_view convention, const std::string& name);
 
 // A vertical coordinate that a model describes otherwise.
 struct MeshLevels {

@@ -102,6 +102,30 @@ TEST(MeshModels, LevelsOfMpasOceanGoDownward) {
   EXPECT_EQ(source->info().grid.axes[2].coordinates, (Table{55, 20, 5}));
 }
 
+// Positions and areas of MPAS have no units by which they could be told from fields.
+TEST(MeshModels, DescriptionsOfCellsOfMpasAreNoFields) {
+  const Folder folder;
+  write_mpas(folder / "mesh.nc", {});
+  {
+    int id = -1;
+    EXPECT_EQ(nc_open((folder / "mesh.nc").c_str(), NC_WRITE, &id), NC_NOERR);
+    EXPECT_EQ(nc_redef(id), NC_NOERR);
+    int cell = -1;
+    EXPECT_EQ(nc_inq_dimid(id, "nCells", &cell), NC_NOERR);
+    for (const char* name : {"latCell", "lonCell", "areaCell", "indexToCellID", "ter"}) {
+      int variable = -1;
+      EXPECT_EQ(nc_def_var(id, name, NC_DOUBLE, 1, &cell, &variable), NC_NOERR);
+    }
+    EXPECT_EQ(nc_close(id), NC_NOERR);
+  }
+  const auto source = opened(folder / "mesh.nc");
+  EXPECT_TRUE(has_note(source->info(), "?field=ter"));
+  for (const char* name : {"latCell", "lonCell", "areaCell", "indexToCellID"}) {
+    EXPECT_FALSE(has_note(source->info(), name)) << name;
+    EXPECT_EQ(reason_of(source->info(), name), "") << name;
+  }
+}
+
 // The corners of the cells as bounds of their centers.
 void write_grid(const std::string& path) {
   NetcdfMaker file(path);
