@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -77,9 +78,33 @@ Result<void> add_range(data::Dataset& dataset, std::size_t steps,
   return {};
 }
 
-// A further note is on vectors that are not shown.
+// Of a view of vectors alone: the scalars that it leaves out, since none is known to be a cloud, a
+// density or the like; empty if there are none. Components of the vectors are drawn with them.
+std::string unshown_scalars(const protocol::View& view, const data::DatasetInfo& info) {
+  const bool has_lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
+  if (!has_lines || (view.scalars && !view.scalars->empty())) return {};
+  std::set<std::string> components;
+  for (const data::FieldInfo& field : info.fields) {
+    if (field.kind != data::FieldKind::vector) continue;
+    components.insert(field.components.begin(), field.components.end());
+  }
+  constexpr std::size_t listed_max = 4;
+  std::string names;
+  std::size_t count = 0;
+  for (const data::FieldInfo& field : info.fields) {
+    const bool is_left_out = field.kind == data::FieldKind::scalar && !field.derived &&
+                             components.count(field.name) == 0;
+    if (!is_left_out || ++count > listed_max) continue;
+    names += (count > 1 ? ", " : "") + in_quotes(field.name);
+  }
+  if (count == 0) return {};
+  return "the default view shows vectors only: /scalars shows " + names +
+         (count > listed_max ? ", ..." : "");
+}
+
+// Two further notes are on vectors and scalars that are not shown.
 void add_bounded(const std::vector<std::string>& unread, std::vector<std::string>& notes) {
-  const std::size_t room = data::notes_max - 1 - std::min(notes.size(), data::notes_max - 2);
+  const std::size_t room = data::notes_max - 2 - std::min(notes.size(), data::notes_max - 3);
   const std::size_t listed = unread.size() <= room ? unread.size() : room - 1;
   notes.insert(notes.end(), unread.begin(), unread.begin() + static_cast<std::ptrdiff_t>(listed));
   if (listed == unread.size()) return;
@@ -180,7 +205,10 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
       out.default_view = completed->view();
       auto hidden = hidden_vectors(out.default_view, dataset);
       if (!hidden) return hidden.error();
-      if (!hidden->empty()) out.notes.push_back(std::move(*hidden));
+      std::string unshown = unshown_scalars(out.default_view, info);
+      for (std::string* note : {&*hidden, &unshown}) {
+        if (!note->empty()) out.notes.push_back(std::move(*note));
+      }
     }
     if (ranges == RangesOf::seen) add_seen_ranges(dataset, out);
   }
