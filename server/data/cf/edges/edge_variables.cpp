@@ -138,13 +138,23 @@ std::string problem_of_scalar(const FileVariable& one) {
 
 }  // namespace
 
-const std::string& EdgeNotes::fault_of_tables(const ArrayFile& file, const EdgeTables& tables,
-                                              const Topology& topology, const Mesh& mesh) {
+const std::string& EdgeNotes::fault_of_tables(const ArrayFile& file, EdgeTables& tables,
+                                              const Topology& topology, const Mesh& mesh,
+                                              bool is_normal) {
   if (!fault_) {
-    const auto read = read_edges(file, tables, topology, mesh);
-    fault_ = read ? std::string() : "on the edges of the mesh: " + read.error().message;
+    const auto fault = [&] {
+      const auto read = read_edges(file, tables, topology, mesh);
+      return read ? std::string() : "on the edges of the mesh: " + read.error().message;
+    };
+    fault_ = fault();
+    if (!fault_->empty() && tables.have_normals()) {
+      normals_fault_ = *fault_;
+      tables.angle = -1;
+      tables.normals = {-1, -1};
+      fault_ = fault();
+    }
   }
-  return *fault_;
+  return is_normal && !normals_fault_.empty() ? normals_fault_ : *fault_;
 }
 
 void EdgeNotes::add(const std::string& name, const EdgeUse& use) {

@@ -45,8 +45,10 @@ class EdgeNotes {
  public:
   // What is wrong with the tables of edges; empty if nothing is. They are read for it at the first
   // call, so that a fault leaves out the values on edges when the file is opened, and nothing else.
-  const std::string& fault_of_tables(const ArrayFile& file, const EdgeTables& tables,
-                                     const Topology& topology, const Mesh& mesh);
+  // Directions that cannot be read leave out the components along the normals alone; they are then
+  // removed from the tables.
+  const std::string& fault_of_tables(const ArrayFile& file, EdgeTables& tables,
+                                     const Topology& topology, const Mesh& mesh, bool is_normal);
   void add(const std::string& name, const EdgeUse& use);
   void tell(std::vector<std::string>& notes) const;
 
@@ -55,6 +57,7 @@ class EdgeNotes {
   std::string normals_;
   std::string walls_;
   std::optional<std::string> fault_;
+  std::string normals_fault_;
 };
 
 }  // namespace windsplat::data::cf

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <string_view>
 #include <utility>
@@ -322,6 +323,21 @@ bool assign_role(Layout& layout, Role role, int dimension) {
   return true;
 }
 
+// Angles without a unit that fill the range of radians: longitudes of a full turn, latitudes from
+// pole to pole.
+std::string note_on_radians(const FileVariable& variable, AxisKind kind,
+                            const std::vector<double>& values) {
+  const bool is_angle = kind == AxisKind::longitude || kind == AxisKind::latitude;
+  if (!is_angle || !variable.units.empty() || values.size() < 8) return {};
+  const double range = kind == AxisKind::longitude ? 2 * std::numbers::pi : std::numbers::pi;
+  const double span = std::abs(values.back() - values.front());
+  const double step = span / static_cast<double>(values.size() - 1);
+  const auto fills = [&](double length) { return std::abs(length - range) <= 0.02 * range; };
+  if (!fills(span) && !fills(span + step)) return {};
+  return in_quotes(variable.name) + " has no unit and fills the range of radians: its values are " +
+         "taken as degrees; the unit 'radian' would convert them";
+}
+
 Error bad_axis(const std::string& name, const std::string& what) {
   return make_error(ErrorKind::bad_data, "the coordinate '" + printable(name) + "' " + what);
 }
@@ -459,6 +475,7 @@ Result<OrientedAxis> orient_axis(const FileContents& contents, const DimensionRo
     if (!std::isfinite(value)) return bad_axis(variable.name, "has missing values");
   }
   if (role.kind == AxisKind::longitude) continue_over_seam(coordinates);
+  if (out.note.empty()) out.note = note_on_radians(variable, role.kind, coordinates);
   const bool rises = coordinates.size() < 2 || coordinates[1] > coordinates[0];
   for (std::size_t i = 1; i < coordinates.size(); ++i) {
     const double step = coordinates[i] - coordinates[i - 1];

@@ -218,11 +218,13 @@ class ContentsMaker {
   }
 
   void add_on_edges(FileVariable variable, MeshPart own) {
-    const EdgeUse use = use_of_edges(variable, file_.contents(),
-                                     {dimensions_.cells, dimensions_.edges}, topology_, out_.edges);
+    const EdgeUse use =
+        use_of_edges(variable, file_.contents(), {dimensions_.cells, dimensions_.edges}, topology_,
+                     find_edge_tables(file_, topology_));
     const std::string reason =
-        use.reason.empty() ? edge_notes_.fault_of_tables(file_, out_.edges, topology_, mesh_)
-                           : use.reason;
+        !use.reason.empty()
+            ? use.reason
+            : edge_notes_.fault_of_tables(file_, out_.edges, topology_, mesh_, use.is_normal);
     if (!reason.empty()) {
       variable.numeric = false;
       variable.unread = reason;

@@ -40,8 +40,9 @@ struct MpasParts {
   bool vectors_at_cells = false;
   bool lone_component = false;  // one component at the cells
   bool near_surface = false;    // a vector at the cells on one level
-  double end = 1;               // factor of an entry of verticesOnEdge
-  double per_radian = 1;        // the numbers of the angles
+  bool scalar_on_edges = false;
+  double end = 1;         // factor of an entry of verticesOnEdge
+  double per_radian = 1;  // the numbers of the angles
   const char* angle_units = "";
 };
 
@@ -80,6 +81,10 @@ void write_mpas_edges(const std::string& path, const MpasParts& parts) {
   file.variable("lonEdge", NC_DOUBLE, {edge}, Table(count, 0.5));
   file.variable("latEdge", NC_DOUBLE, {edge}, Table(count, 0.5));
   file.text(file.variable("u", NC_FLOAT, {time, edge, level}, u), "units", "m s^{-1}");
+  if (parts.scalar_on_edges) {
+    const int v = file.variable("theta_edge", NC_FLOAT, {time, edge, level}, Table(2 * count, 7));
+    file.text(v, "units", "K");
+  }
   const Table flat(2 * cells, 1);
   file.text(file.variable("theta", NC_FLOAT, {time, cell, level}, flat), "units", "K");
   file.text(file.variable("w", NC_FLOAT, {time, cell, level}, flat), "units", "m s^{-1}");
@@ -162,6 +167,25 @@ TEST(MeshEdges, AnglesInDegreesAreConvertedAndThoseBeyondACircleAreRefused) {
   EXPECT_THAT(reason_of(unclear->info(), "u"),
               HasSubstr("'angleEdge': edge 1 has the angle -90, more than a circle of 2 pi"));
   EXPECT_NE(unclear->info().find("theta"), nullptr);
+}
+
+// A scalar has no direction: the angles of edges do not matter for it, wherever it lies in the
+// file.
+TEST(MeshEdges, AnglesBeyondACircleLeaveScalarsOnEdges) {
+  const Folder folder;
+  write_mpas_edges(folder / "r.nc", {.scalar_on_edges = true, .per_radian = 1 / degree});
+  const auto source = opened(folder / "r.nc");
+  ASSERT_NE(source, nullptr);
+  EXPECT_THAT(reason_of(source->info(), "u"), HasSubstr("more than a circle of 2 pi"));
+  ASSERT_NE(source->info().find("theta_edge"), nullptr);
+  const Volume volume = volume_of(*source, "theta_edge");
+  std::size_t compared = 0;
+  for (const float value : volume.values) {
+    if (std::isnan(value)) continue;
+    ASSERT_NEAR(value, 7, 1e-5);
+    ++compared;
+  }
+  EXPECT_GT(compared, 500U);
 }
 
 TEST(MeshEdges, VectorsAtTheCellsArePreferredAndUnknownDirectionsAreLeftOut) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/model/source.hpp"
@@ -285,6 +286,28 @@ TEST(NetcdfAxes, FileWithoutTimeHasOneStepNamedByAScalarTime) {
     ASSERT_EQ(source->info().steps.size(), 1U);
     EXPECT_EQ(source->info().steps[0].text, timed ? "2001-01-02T12:00:00Z" : "0");
     EXPECT_EQ(source->info().time_units.empty(), !timed);
+  }
+}
+
+// 16 longitudes of a turn and 8 latitudes from pole to pole, by their unit or without one.
+TEST(NetcdfAxes, RadiansWithoutUnitAreNoted) {
+  const Folder folder;
+  constexpr double pi = std::numbers::pi;
+  for (const double turn : {2 * pi, 360.0, 6.0}) {
+    {
+      NetcdfMaker file(folder / "r.nc");
+      std::vector<double> lon;
+      std::vector<double> lat;
+      for (int n = 0; n < 16; ++n) lon.push_back(n * turn / 16);
+      for (int n = 0; n < 8; ++n) lat.push_back((n / 7.0 - 0.5) * turn / 2);
+      const int y = file.axis("lat", lat, "");
+      const int x = file.axis("lon", lon, "");
+      file.variable("f", NC_FLOAT, {y, x}, counting(128));
+    }
+    const auto source = opened(folder / "r.nc");
+    for (const char* name : {"'lon' has no unit", "'lat' has no unit"}) {
+      EXPECT_EQ(has_note(source->info(), name), turn == 2 * pi) << turn;
+    }
   }
 }
 
