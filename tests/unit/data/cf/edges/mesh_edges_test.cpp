@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -41,8 +42,10 @@ struct MpasParts {
   bool lone_component = false;  // one component at the cells
   bool near_surface = false;    // a vector at the cells on one level
   bool scalar_on_edges = false;
-  double end = 1;         // factor of an entry of verticesOnEdge
-  double per_radian = 1;  // the numbers of the angles
+  std::string wind = "u";     // the component along the normals
+  bool missing_side = false;  // it is missing at one edge that faces east or west
+  double end = 1;             // factor of an entry of verticesOnEdge
+  double per_radian = 1;      // the numbers of the angles
   const char* angle_units = "";
 };
 
@@ -72,6 +75,12 @@ void write_mpas_edges(const std::string& path, const MpasParts& parts) {
     u.insert(u.end(), {component(sides, e), 2 * component(sides, e)});
   }
   ends[8] *= parts.end;
+  constexpr double absent = -999;
+  for (std::size_t e = count / 2; parts.missing_side && e < count; ++e) {
+    if (std::abs(std::cos(angles[e])) < 0.99) continue;
+    u[2 * e] = u[2 * e + 1] = absent;
+    break;
+  }
   for (double& angle : angles) angle *= parts.per_radian;
   file.variable("verticesOnEdge", NC_INT, {edge, file.dimension("TWO", 2)}, ends);
   if (parts.angles) {
@@ -80,7 +89,9 @@ void write_mpas_edges(const std::string& path, const MpasParts& parts) {
   }
   file.variable("lonEdge", NC_DOUBLE, {edge}, Table(count, 0.5));
   file.variable("latEdge", NC_DOUBLE, {edge}, Table(count, 0.5));
-  file.text(file.variable("u", NC_FLOAT, {time, edge, level}, u), "units", "m s^{-1}");
+  const int normal = file.variable(parts.wind, NC_FLOAT, {time, edge, level}, u);
+  file.text(normal, "units", "m s^{-1}");
+  file.number(normal, "missing_value", NC_FLOAT, {absent});
   if (parts.scalar_on_edges) {
     const int v = file.variable("theta_edge", NC_FLOAT, {time, edge, level}, Table(2 * count, 7));
     file.text(v, "units", "K");
@@ -186,6 +197,30 @@ TEST(MeshEdges, AnglesBeyondACircleLeaveScalarsOnEdges) {
     ++compared;
   }
   EXPECT_GT(compared, 500U);
+}
+
+// No water flows through an edge without a value: of the two sides of a cell that face east and
+// west one has 10 m/s, the other 0, so that the cell has 5 m/s. Air without a value there is
+// unknown.
+TEST(MeshEdges, MissingNormalsOfMpasOceanAreWalls) {
+  const Folder folder;
+  for (const bool in_water : {true, false}) {
+    write_mpas_edges(folder / "walls.nc",
+                     {.wind = in_water ? "normalVelocity" : "u", .missing_side = true});
+    const auto source = opened(folder / "walls.nc");
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(has_note(source->info(),
+                       "missing components count as 0, the flow through a coast or the bottom: "
+                       "'normalVelocity'"),
+              in_water);
+    const Volume flow = volume_of(*source, in_water ? "current" : "wind");
+    double least = 100;
+    for (std::size_t n = 0; n < flow.samples() / 2; ++n) {
+      const double east = flow.component(0)[n];
+      if (!std::isnan(east)) least = std::min(least, east);
+    }
+    EXPECT_NEAR(least, in_water ? u_east / 2 : u_east, in_water ? 0.5 : 0.05);
+  }
 }
 
 TEST(MeshEdges, VectorsAtTheCellsArePreferredAndUnknownDirectionsAreLeftOut) {
