@@ -47,8 +47,14 @@ std::uint32_t nth_place(std::uint32_t n) {
   return out;
 }
 
+// A pixel shows what its middle shows: of few pixels each is tried, since cells may be much
+// smaller. Of no more than are tried at least, so that none is missed.
+bool is_each_pixel_tried(const scene::Camera& camera) {
+  return std::int64_t{camera.width} * camera.height <= tried_least;
+}
+
 // Places spread evenly over the part of a picture where the lattice is, or, if that is not known
-// from samples, over the picture.
+// from samples, over the picture; of a small picture each pixel.
 class Places {
  public:
   explicit Places(const RayKernels& kernels)
@@ -60,6 +66,7 @@ class Places {
     bool empty = false;  // certainly: no ray passes what kernels reach
   };
   [[nodiscard]] Spread spread(const std::vector<RayThrough>& through) const {
+    if (reach_ && is_each_pixel_tried(samples_.scene().camera)) return each_pixel();
     struct Candidate {
       Index sample{};
       Vec at{};
@@ -149,6 +156,21 @@ class Places {
     }
     return out;
   }
+  [[nodiscard]] Spread each_pixel() const {
+    const scene::Camera& camera = samples_.scene().camera;
+    Spread out;
+    out.empty = true;
+    out.area = static_cast<double>(camera.width) * camera.height;
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) add_pixel(x, y, out);
+    }
+    return out;
+  }
+  void add_pixel(double x, double y, Spread& to) const {
+    const auto near = first_sample(picture_ray(view_, x + 0.5, y + 0.5));
+    to.places.push_back({near.value_or(Index{}), x, y, near.has_value()});
+    to.empty = to.empty && !near;
+  }
   // One place in each part of a grid, at random, in the order of a quadtree.
   [[nodiscard]] Spread over_picture() const {
     constexpr double parts = 1U << places_bits / 2;  // along each edge
@@ -160,14 +182,10 @@ class Places {
       for (std::uint32_t bit = 0; bit < places_bits; ++bit)
         part[bit % 2] |= (n >> bit & 1U) << bit / 2;
       const auto random = pcg3d({n, 47, 53});
-      Place place;
-      place.x = std::floor(2 * view_.half_width * (part[0] + random[0] / 4294967296.0) / parts);
-      place.y = std::floor(2 * view_.half_height * (part[1] + random[1] / 4294967296.0) / parts);
-      const auto near = first_sample(picture_ray(view_, place.x + 0.5, place.y + 0.5));
-      place.inside = near.has_value();
-      if (near) place.near = *near;
-      out.empty = out.empty && !near;
-      out.places.push_back(place);
+      const auto within = [&](std::size_t a, double half) {
+        return std::floor(2 * half * (part[a] + random[a] / 4294967296.0) / parts);
+      };
+      add_pixel(within(0, view_.half_width), within(1, view_.half_height), out);
     }
     return out;
   }
@@ -313,7 +331,7 @@ class TryingPixels {
       if (kernel.is_told() && (scene_.scalars.empty() || slab.is_told())) break;
       if (cancel_.cancelled()) return {};
       if (out.places == trial_places_most || work() > trial_work_most) break;
-      const Place& place = places[nth_place(n) % places.size()];
+      const Place& place = places[nth_place(n) * places.size() / places_count];
       Squares here;
       if (place.inside && kernels_.meets(place.near, ray(place.x + 0.5, place.y + 0.5))) {
         const auto differences = differences_at(place);
@@ -348,17 +366,30 @@ class TryingPixels {
     return picture_ray(kernels_.view(), x, y);
   }
 
-  // Pixels of a block at a place: errors of lines are in few of them, those of a medium in many.
-  // Nothing if they meet too many kernels or slabs.
-  std::optional<Squares> differences_at(const Place& place) {
-    constexpr int edge = 4;
+  // Pixels of a block about a place, within the picture: errors of lines are in few of them, those
+  // of a medium in many.
+  void take_block(const Place& place) {
+    const int edge = is_each_pixel_tried(scene_.camera) ? 1 : 4;
+    const int wide = scene_.camera.width;
+    const int high = scene_.camera.height;
+    const auto first = [edge](double at, int size) {
+      return std::clamp(static_cast<int>(at) - edge / 2, 0, std::max(0, size - edge));
+    };
+    const bool all = edge == 1 || scene_.scalars.empty() || std::min(wide, high) < edge;
     rays_.clear();
     for (int n = 0; n < edge * edge; ++n) {
       const int column = n % edge;
       const int row = n / edge;
-      const bool taken = scene_.scalars.empty() || (2 * column + 1) % 5 == row;
-      if (taken) rays_.push_back(ray(place.x + column - 1.5, place.y + row - 1.5));
+      const int x = first(place.x, wide) + column;
+      const int y = first(place.y, high) + row;
+      if (x >= wide || y >= high) continue;
+      if (all || (2 * column + 1) % 5 == row) rays_.push_back(ray(x + 0.5, y + 0.5));
     }
+  }
+
+  // Nothing if the pixels meet too many kernels or slabs.
+  std::optional<Squares> differences_at(const Place& place) {
+    take_block(place);
     const double wide = scene_.vector ? scene_.vector->r2 : 0;
     const RayKernelList* const around = kernels_.around(place.near, rays_, wide);
     if (around == nullptr) return std::nullopt;

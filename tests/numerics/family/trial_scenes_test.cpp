@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/base/thread_pool.hpp"
+#include "server/engine/reference/reference.hpp"
 #include "server/frame/content.hpp"
 #include "server/frame/difference.hpp"
 #include "server/frame/drawn_samples.hpp"
@@ -170,6 +172,27 @@ TEST(PixelTrials, TakeBoundedWorkForManyFaintLines) {
   for (const double length : {0.02, 0.5}) {
     scene.vector->length = length;
     expect_bounded_work(scene, "faint lines");
+  }
+}
+
+// A pixel is several cells wide and shows what its middle shows.
+TEST(PixelTrials, HaveTheErrorsOfPicturesOfFewPixels) {
+  ThreadPool pool(2);
+  for (const auto& [wide, high] : {std::pair{1, 1}, std::pair{2, 2}, std::pair{5, 3}}) {
+    Scene scene = cloudy_scene(24, 100);
+    scene.vector.reset();  // lines are no thinner than a pixel and would cover the cloud
+    scene.camera = look({0, 0, 0}, {0.3, 1, -0.2}, 3, wide, high, true, 0.6);
+    const auto truth = engine::reference::render(scene, pool, {}, {1e-6}).value();
+    const auto tried = frame::content_of(scene)->trials;
+    ASSERT_TRUE(tried) << wide;
+    const auto check = [&](double told) {
+      const double error = frame::difference_of(render(scene, 2).image.rgba, truth.rgba).rmse;
+      EXPECT_GT(error, 1e-5) << wide;
+      EXPECT_LT(std::abs(std::log(told / error)), std::log(1.5)) << wide << ' ' << told / error;
+    };
+    check(tried->kernel);
+    scene.method = scene::Method::slab;
+    check(tried->slab);
   }
 }
 
