@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -220,6 +221,18 @@ void ThreadPool::run_loop(std::size_t count, Loop loop) {
     failure = std::exchange(state.failure, nullptr);
   }
   if (failure) std::rethrow_exception(failure);
+}
+
+std::unique_ptr<ThreadPool> few_threads(std::size_t wanted) {
+  constexpr std::size_t threads_max = 4;
+  const auto processors = std::size_t{std::max(1U, std::thread::hardware_concurrency())};
+  const std::size_t most = std::min(threads_max, processors);
+  try {
+    return std::make_unique<ThreadPool>(
+        static_cast<unsigned>(std::clamp(wanted, std::size_t{1}, most)));
+  } catch (const std::system_error&) {
+    return std::make_unique<ThreadPool>(1);
+  }
 }
 
 }  // namespace windsplat

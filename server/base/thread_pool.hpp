@@ -47,4 +47,8 @@ class ThreadPool {
   std::unique_ptr<State> state_;
 };
 
+// A pool beside the one that renders: `wanted` threads, at least one, at most four and the
+// processors. One if the system permits no more.
+std::unique_ptr<ThreadPool> few_threads(std::size_t wanted);
+
 }  // namespace windsplat

@@ -10,8 +10,6 @@
 #include <numbers>
 #include <sstream>
 #include <string>
-#include <system_error>
-#include <thread>
 #include <utility>
 
 #include "server/base/check.hpp"
@@ -129,19 +127,6 @@ float as_float(double value) {
   return static_cast<float>(value < -most ? -most : value > most ? most : value);
 }
 
-// A few threads, beside those that render. One suffices if the system permits no more.
-std::unique_ptr<ThreadPool> make_pool(std::size_t threads) {
-  constexpr std::size_t threads_max = 4;
-  const auto processors = std::size_t{std::max(1U, std::thread::hardware_concurrency())};
-  const std::size_t most = std::min(threads_max, processors);
-  try {
-    return std::make_unique<ThreadPool>(
-        static_cast<unsigned>(std::clamp(threads, std::size_t{1}, most)));
-  } catch (const std::system_error&) {
-    return std::make_unique<ThreadPool>(1);
-  }
-}
-
 // Calls visit(n, i, j, k, neighbours) for each sample, on several threads if there are many;
 // `neighbours` are those left by the previous call on the thread.
 template <class Visit>
@@ -150,7 +135,7 @@ void each_sample(const Section& section, const Visit& visit) {
   constexpr std::size_t blocks_a_thread = 16;
   const std::size_t samples = samples_of(section);
   const std::size_t blocks = (samples + block - 1) / block;
-  const auto pool = make_pool(blocks / blocks_a_thread);
+  const auto pool = few_threads(blocks / blocks_a_thread);
   const auto [nx, ny, nz] = section.dims;
   const Clock::time_point began = Clock::now();
   pool->run(blocks, [&, nx = nx, ny = ny](std::size_t number, unsigned) {

@@ -1,17 +1,21 @@
-// Two values of each group by its weighted mean, and drawn samples. A row of means first
-// accumulates its fine rows at full width, so that inner loops access memory sequentially; then it
-// is averaged along x.
+// Two values of each group by its weighted mean, and drawn samples. A row of groups accumulates its
+// fine rows at full width, in loops without branches over consecutive memory, and is then added up
+// along x. Coarse layers are independent of each other; large volumes are reduced by several
+// threads.
 #include "server/data/model/coarsen.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "server/base/check.hpp"
 #include "server/base/pcg3d.hpp"
+#include "server/base/thread_pool.hpp"
 
 namespace windsplat::data {
 
@@ -45,17 +49,71 @@ std::vector<float> shares(const std::vector<double>& widths, int samples, int ha
   return out;
 }
 
+// Masks of all bits or none, since compilers do not vectorise choices between floats that may trap.
+std::int32_t if_there(float v) {
+  constexpr std::int32_t magnitude = 0x7fffffff;
+  constexpr std::int32_t infinity = 0x7f800000;
+  return (std::bit_cast<std::int32_t>(v) & magnitude) <= infinity ? -1 : 0;  // masked: NaN
+}
+// A zero has no sign here, so that equal values are not below.
+std::int32_t if_below(float v, float mean) {
+  return std::bit_cast<std::int32_t>((v - mean) + 0.0F) >> 31;
+}
+float under(std::int32_t mask, float v) {
+  return std::bit_cast<float>(std::bit_cast<std::int32_t>(v) & mask);
+}
+
+// A thread for every million samples.
+std::unique_ptr<ThreadPool> threads_for(const Volume& fine) {
+  constexpr std::size_t samples_a_thread = std::size_t{1} << 20;
+  return few_threads(fine.samples() / samples_a_thread);
+}
+
+// Weighted sums of the samples of groups and their weights. Full width: of the samples of a row.
+struct Sums {
+  std::vector<float> sum, weight;
+  void reset(std::size_t count) {
+    sum.assign(count, 0.0F);
+    weight.assign(count, 0.0F);
+  }
+};
+
 // sum += w v and weight += w where v is not masked.
-void add_row(const float* row, std::size_t count, float w, float* sum, float* weight) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const float v = row[i];
-    const bool there = v == v;  // a masked sample is NaN
-    sum[i] += there ? w * v : 0.0F;
-    weight[i] += there ? w : 0.0F;
+void add_row(const float* values, float w, Sums& sums) {
+  float* const sum = sums.sum.data();
+  float* const weight = sums.weight.data();
+  for (std::size_t i = 0; i < sums.sum.size(); ++i) {
+    const std::int32_t there = if_there(values[i]);
+    sum[i] += under(there, w * values[i]);
+    weight[i] += under(there, w);
   }
 }
 
-// Means and two values of the groups of a scalar.
+// What a thread computes of a row of groups.
+struct RowOfGroups {
+  Sums all, low, high;      // full width
+  std::vector<float> mean;  // of the group of every sample of a row; NaN: all are masked
+  std::int64_t masked = 0;  // groups
+};
+
+// The same for the samples below the mean of their group, and for the others. No two of the six
+// arrays overlap, which a compiler could otherwise not know.
+void add_halves(const float* __restrict values, const float* __restrict mean, std::size_t count,
+                float w, float* __restrict low_sum, float* __restrict low_weight,
+                float* __restrict high_sum, float* __restrict high_weight) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float v = values[i];
+    const std::int32_t there = if_there(v);
+    const std::int32_t below = there & if_below(v, mean[i]);
+    const std::int32_t above = there & ~below;
+    low_sum[i] += under(below, w * v);
+    low_weight[i] += under(below, w);
+    high_sum[i] += under(above, w * v);
+    high_weight[i] += under(above, w);
+  }
+}
+
+// Two values of the groups of a scalar.
 class TwoValueReducer {
  public:
   TwoValueReducer(const Volume& fine, const Coarsening& how)
@@ -67,36 +125,28 @@ class TwoValueReducer {
     }
     coarse_.components = TwoValues::components;
     coarse_.values = Samples(coarse_.samples() * TwoValues::components);
-    sum_.resize(static_cast<std::size_t>(fine.dims[0]));
-    weight_.resize(sum_.size());
-    const auto row = static_cast<std::size_t>(coarse_.dims[0]);
-    mean_.resize(row);
-    for (Half* half : {&low_, &high_}) {
-      half->sum.resize(row);
-      half->share.resize(row);
-    }
   }
 
   Volume run() {
-    const auto rows = static_cast<std::size_t>(coarse_.dims[1]);
-    const auto layers = static_cast<std::size_t>(coarse_.dims[2]);
-    std::size_t to = 0;
-    for (std::size_t k = 0; k < layers; ++k) {
-      for (std::size_t j = 0; j < rows; ++j) {
-        find_means(j, k);
-        divide(j, k);
-        write(to);
-        to += static_cast<std::size_t>(coarse_.dims[0]);
-      }
-    }
+    const auto pool = threads_for(fine_);
+    std::vector<RowOfGroups> rows(pool->size());
+    pool->run(static_cast<std::size_t>(coarse_.dims[2]),
+              [&](std::size_t k, unsigned worker) { reduce_layer(k, rows[worker]); });
+    for (const RowOfGroups& row : rows) coarse_.masked += row.masked;
     coarse_.range = fine_.range;
     return std::move(coarse_);
   }
 
  private:
-  struct Half {
-    std::vector<float> sum, share;
-  };
+  void reduce_layer(std::size_t k, RowOfGroups& row) {
+    const auto width = static_cast<std::size_t>(coarse_.dims[0]);
+    const auto rows = static_cast<std::size_t>(coarse_.dims[1]);
+    for (std::size_t j = 0; j < rows; ++j) {
+      find_means(j, k, row);
+      divide(j, k, row);
+      write((k * rows + j) * width, row);
+    }
+  }
 
   // Calls visit(row of samples, its weight) for every fine row of a coarse row.
   template <class Visit>
@@ -112,69 +162,65 @@ class TwoValueReducer {
     }
   }
 
-  // NaN where all samples of a group are masked.
-  void find_means(std::size_t j, std::size_t k) {
-    std::fill(sum_.begin(), sum_.end(), 0.0F);
-    std::fill(weight_.begin(), weight_.end(), 0.0F);
-    each_row(j, k, [&](const float* row, float w) {
-      add_row(row, sum_.size(), w, sum_.data(), weight_.data());
-    });
-    for (std::size_t i = 0; i < mean_.size(); ++i) {
+  void find_means(std::size_t j, std::size_t k, RowOfGroups& row) const {
+    const auto samples = static_cast<std::size_t>(fine_.dims[0]);
+    row.all.reset(samples);
+    row.mean.resize(samples);
+    each_row(j, k, [&](const float* values, float w) { add_row(values, w, row.all); });
+    for (std::size_t i = 0; i < static_cast<std::size_t>(coarse_.dims[0]); ++i) {
       const Group x = group_at(i, halvings_[0], fine_.dims[0]);
       float sum = 0;
       float weight = 0;
       for (std::size_t n = x.first; n < x.first + x.count; ++n) {
-        sum += weights_[0][n] * sum_[n];
-        weight += weights_[0][n] * weight_[n];
+        sum += weights_[0][n] * row.all.sum[n];
+        weight += weights_[0][n] * row.all.weight[n];
       }
-      mean_[i] = weight > 0 ? sum / weight : std::numeric_limits<float>::quiet_NaN();
+      const float mean = weight > 0 ? sum / weight : std::numeric_limits<float>::quiet_NaN();
+      std::fill_n(row.mean.begin() + static_cast<std::ptrdiff_t>(x.first), x.count, mean);
     }
   }
 
-  void divide(std::size_t j, std::size_t k) {
-    for (Half* half : {&low_, &high_}) {
-      std::fill(half->sum.begin(), half->sum.end(), 0.0F);
-      std::fill(half->share.begin(), half->share.end(), 0.0F);
-    }
-    each_row(j, k, [&](const float* row, float w) {
-      for (std::size_t n = 0; n < sum_.size(); ++n) {
-        const float v = row[n];
-        if (v != v) continue;  // masked
-        const std::size_t i = n >> static_cast<unsigned>(halvings_[0]);
-        Half& half = v < mean_[i] ? low_ : high_;
-        const float share = w * weights_[0][n];
-        half.sum[i] += share * v;
-        half.share[i] += share;
-      }
+  void divide(std::size_t j, std::size_t k, RowOfGroups& row) const {
+    const auto samples = static_cast<std::size_t>(fine_.dims[0]);
+    row.low.reset(samples);
+    row.high.reset(samples);
+    each_row(j, k, [&](const float* values, float w) {
+      add_halves(values, row.mean.data(), samples, w, row.low.sum.data(), row.low.weight.data(),
+                 row.high.sum.data(), row.high.weight.data());
     });
   }
 
-  void write(std::size_t to) {
+  void write(std::size_t to, RowOfGroups& row) {
     const std::size_t samples = coarse_.samples();
     const auto set = [&](int component, std::size_t i, float v) {
       coarse_.values[static_cast<std::size_t>(component) * samples + to + i] = v;
     };
-    for (std::size_t i = 0; i < mean_.size(); ++i) {
-      if (mean_[i] != mean_[i]) {
-        for (int c = 0; c < TwoValues::components; ++c) set(c, i, mean_[i]);
-        ++coarse_.masked;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(coarse_.dims[0]); ++i) {
+      const Group x = group_at(i, halvings_[0], fine_.dims[0]);
+      const float mean = row.mean[x.first];
+      if (mean != mean) {
+        for (int c = 0; c < TwoValues::components; ++c) set(c, i, mean);
+        ++row.masked;
         continue;
       }
-      const auto value = [&](const Half& half) {
-        return half.share[i] > 0 ? half.sum[i] / half.share[i] : mean_[i];
+      const auto put = [&](const Sums& half, int value, int its_share) {
+        float sum = 0;
+        float share = 0;
+        for (std::size_t n = x.first; n < x.first + x.count; ++n) {
+          sum += weights_[0][n] * half.sum[n];
+          share += weights_[0][n] * half.weight[n];
+        }
+        set(value, i, share > 0 ? sum / share : mean);
+        set(its_share, i, share);
       };
-      set(TwoValues::low, i, value(low_));
-      set(TwoValues::high, i, value(high_));
-      set(TwoValues::low_share, i, low_.share[i]);
-      set(TwoValues::high_share, i, high_.share[i]);
+      put(row.low, TwoValues::low, TwoValues::low_share);
+      put(row.high, TwoValues::high, TwoValues::high_share);
     }
   }
 
   const Volume& fine_;
   std::array<int, 3> halvings_;
   std::array<std::vector<float>, 3> weights_;
-  std::vector<float> sum_, weight_, mean_;
-  Half low_, high_;
   Volume coarse_;
 };
 
@@ -195,25 +241,29 @@ class Drawer {
   }
 
   Volume run() {
-    const std::size_t samples = coarse_.samples();
-    std::size_t to = 0;
-    std::array<int, 3> group{};
-    for (group[2] = 0; group[2] < coarse_.dims[2]; ++group[2]) {
-      for (group[1] = 0; group[1] < coarse_.dims[1]; ++group[1]) {
-        for (group[0] = 0; group[0] < coarse_.dims[0]; ++group[0], ++to) {
-          const std::optional<std::size_t> from = drawn(group);
-          for (int c = 0; c < fine_.components; ++c) {
-            coarse_.values[samples * static_cast<std::size_t>(c) + to] =
-                from ? fine_.component(c)[*from] : std::numeric_limits<float>::quiet_NaN();
-          }
-        }
-      }
-    }
+    threads_for(fine_)->run(static_cast<std::size_t>(coarse_.dims[2]),
+                            [&](std::size_t k, unsigned) { draw_layer(static_cast<int>(k)); });
     finish_volume(coarse_);
     return std::move(coarse_);
   }
 
  private:
+  void draw_layer(int layer) {
+    const std::size_t samples = coarse_.samples();
+    std::size_t to =
+        samples / static_cast<std::size_t>(coarse_.dims[2]) * static_cast<std::size_t>(layer);
+    std::array<int, 3> group{0, 0, layer};
+    for (group[1] = 0; group[1] < coarse_.dims[1]; ++group[1]) {
+      for (group[0] = 0; group[0] < coarse_.dims[0]; ++group[0], ++to) {
+        const std::optional<std::size_t> from = drawn(group);
+        for (int c = 0; c < fine_.components; ++c) {
+          coarse_.values[samples * static_cast<std::size_t>(c) + to] =
+              from ? fine_.component(c)[*from] : std::numeric_limits<float>::quiet_NaN();
+        }
+      }
+    }
+  }
+
   // Empty: a place beyond the last sample.
   [[nodiscard]] std::optional<std::size_t> drawn(const std::array<int, 3>& group) const {
     const auto hash =

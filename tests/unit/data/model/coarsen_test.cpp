@@ -224,6 +224,46 @@ TEST(CoarsenToTwoValues, ConstantStaysConstant) {
   }
 }
 
+TEST(CoarsenToTwoValues, ZerosOfEitherSignAreEqual) {
+  const Volume fine = volume_of({2, 1, 1}, 1, {-0.0F, 0.0F});
+  Coarsening how;
+  how.halvings = {1, 0, 0};
+  how.widths[0] = {1, 1};
+  const Volume coarse = coarsen(fine, how);
+  EXPECT_EQ(coarse.component(TwoValues::low_share)[0], 0);
+  EXPECT_EQ(coarse.component(TwoValues::high_share)[0], 1);
+}
+
+// Layers of a level depend on their own samples only, whichever thread computes them.
+TEST(CoarsenToTwoValues, LargeVolumesHaveTheLevelsOfTheirParts) {
+  constexpr int side = 160;  // several million samples, for several threads
+  constexpr int part = 8;    // layers, for one
+  constexpr std::size_t layer = std::size_t{side} * side;
+  std::vector<float> values(layer * side);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> any(-1, 1);
+  for (float& v : values) v = any(random) < -0.8F ? masked : any(random);
+  Coarsening how;
+  how.halvings = {2, 2, 2};
+  for (auto& widths : how.widths) widths.assign(side, 1.0);
+  const Volume whole = coarsen(volume_of({side, side, side}, 1, values), how);
+  how.widths[2].assign(part, 1.0);
+  for (int k = 0; k < side; k += part) {
+    const auto from = values.begin() + static_cast<std::ptrdiff_t>(layer) * k;
+    const Volume alone = coarsen(
+        volume_of({side, side, part}, 1, {from, from + static_cast<std::ptrdiff_t>(layer) * part}),
+        how);
+    for (int c = 0; c < TwoValues::components; ++c) {
+      const float* const here = whole.component(c) + layer / 16 * static_cast<std::size_t>(k / 4);
+      for (std::size_t n = 0; n < alone.samples(); ++n) {
+        const float expected = alone.component(c)[n];
+        ASSERT_TRUE(here[n] == expected || (std::isnan(here[n]) && std::isnan(expected)))
+            << "layer " << k << ", component " << c << ", sample " << n;
+      }
+    }
+  }
+}
+
 TEST(CoarsenToTwoValues, IsMaskedOnlyWhereAllSamplesAre) {
   const Volume fine =
       volume_of({4, 2, 1}, 1, {1, masked, masked, masked, 3, masked, masked, masked});
