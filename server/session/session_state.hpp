@@ -28,7 +28,8 @@ struct SessionState {
       : options(given),
         surroundings(std::move(around)),
         view(now),
-        quality(surroundings.forecasts, surroundings.waiting, surroundings.may_try) {}
+        quality(surroundings.forecasts, surroundings.time_by_work, surroundings.waiting,
+                surroundings.may_try) {}
 
   void send(protocol::ServerMessage message) { effects.emplace_back(SendText{std::move(message)}); }
   void refuse(const Error& error, std::optional<std::uint32_t> id,

@@ -33,6 +33,10 @@ using WhatIsRead = std::function<std::optional<Reading>(const std::string& datas
 using Forecaster =
     std::function<quality::Forecasts(const quality::SceneSignature&, const quality::Viewpoint&)>;
 
+// Milliseconds that method `kernel` may need for a view, by the number of its kernels and before
+// its data are known; 0: unknown.
+using TimeByWork = std::function<double(const protocol::View&)>;
+
 // Recent time that frames of streams waited for the renderer.
 using Waiting = std::function<Micros()>;
 
@@ -43,10 +47,11 @@ using MayTry = std::function<bool(const quality::SceneSignature&)>;
 // Queries of a session to its environment. None may block.
 struct Surroundings {
   Check check;
-  WhatIsRead what_is_read;  // may be empty
-  Forecaster forecasts;     // empty: the prior
-  Waiting waiting = {};     // empty: unknown
-  MayTry may_try = {};      // empty: it may not
+  WhatIsRead what_is_read;       // may be empty
+  Forecaster forecasts;          // empty: the prior
+  Waiting waiting = {};          // empty: unknown
+  MayTry may_try = {};           // empty: it may not
+  TimeByWork time_by_work = {};  // empty: unknown
 };
 
 }  // namespace windsplat::session

@@ -13,6 +13,19 @@ constexpr double newest_weight = 0.5;
 constexpr double own_share = 0.3;
 constexpr double guessed_share = 0.5;  // of a setting whose time was a guess
 
+// A final frame for which so much work is expected takes long enough for a frame before it, even if
+// most kernels turn out to be empty or hidden: where samples are merged for a first frame of the
+// default budget, the final one of slabs is expected to take this long.
+constexpr double certainly_long_us = 300'000;
+
+// The time of a setting over that of method `kernel` at full size: merged samples have two values,
+// slabs take about four times as long, and half of the work does not depend on the size.
+double share_of_work(const quality::Setting& setting) {
+  const double merged = setting.coarser > 0 ? 2 * std::pow(8.0, -setting.coarser) : 1;
+  const double slabs = setting.method == protocol::MethodName::slab ? 4 : 1;
+  return merged * slabs * (0.5 + 0.5 * std::exp2(-setting.half_level));
+}
+
 // A single frame may have been disturbed: what the one before it does not confirm counts little.
 double believed(double newest, double last) {
   constexpr double most = 0.92;  // a factor of 2.5
@@ -53,11 +66,24 @@ bool FrameTimes::Correction::is_recent(Micros now) const {
   return at && now - *at < correction_life_us;
 }
 
+double FrameTimes::raise_by_work(const protocol::View& view, quality::Forecasts& settings) const {
+  const double whole_ms = time_by_work_ ? time_by_work_(view) : 0;
+  const bool timed = std::any_of(settings.begin(), settings.end(),
+                                 [](const quality::Forecast& known) { return known.timed; });
+  for (std::size_t i = 0; !timed && !measured_.any && i < settings.size(); ++i) {
+    const quality::Setting& setting = quality::settings[i];
+    const double ms = whole_ms * share_of_work(setting);
+    settings[i].ms = std::max(settings[i].ms, ms);
+  }
+  return 1000 * whole_ms * share_of_work(quality::settings[quality::own_setting(view)]);
+}
+
 FrameForecast FrameTimes::forecast(const protocol::View& view, Micros now) const {
   const auto another = kind_of_another(view);
   FrameForecast out{uncorrected(view, another)};
   const quality::Forecast& own = out.settings[quality::own_setting(view)];
   out.final_is_guessed = !final_factor_ && !own.timed;
+  const double least_us = out.final_is_guessed ? raise_by_work(view, out.settings) : 0;
   for (std::size_t i = 0; i < out.settings.size(); ++i) {
     quality::Forecast& forecast = out.settings[i];
     const Correction& correction = measured_.own[i];
@@ -69,7 +95,8 @@ FrameForecast FrameTimes::forecast(const protocol::View& view, Micros now) const
   }
   const bool slab = view.method.name == protocol::MethodName::slab;
   const double factor = final_factor_.value_or(slab ? 2.6 : 6.4);
-  out.final_us = static_cast<Micros>(factor * std::round(1000 * own.ms));
+  out.final_us = static_cast<Micros>(factor * std::max(std::round(1000 * own.ms), least_us));
+  if (factor * least_us > certainly_long_us) out.final_is_guessed = false;
   const quality::PictureSize size{view.image.width, view.image.height};
   if (size == drawn_size_ && !another) out.halvings = halvings_;
   return out;

@@ -25,11 +25,14 @@ struct FrameForecast {
   std::optional<quality::Halvings> halvings = std::nullopt;
 };
 
-// A forecast's time is multiplied by the recent ratio of measured to forecast times, common to all
+// Before any frame of a scene was timed, its settings take at least as long as the number of its
+// kernels suggests, since the forecasts of the tables know no number of samples. After that, a
+// forecast's time is multiplied by the recent ratio of measured to forecast times, common to all
 // settings and additionally per setting.
 class FrameTimes {
  public:
-  explicit FrameTimes(Forecaster forecaster) : forecaster_(std::move(forecaster)) {}
+  explicit FrameTimes(Forecaster forecaster, TimeByWork time_by_work = {})
+      : forecaster_(std::move(forecaster)), time_by_work_(std::move(time_by_work)) {}
 
   [[nodiscard]] FrameForecast forecast(const protocol::View& view, Micros now) const;
 
@@ -64,10 +67,15 @@ class FrameTimes {
 
   // nullopt: the view is of the scene drawn last.
   [[nodiscard]] std::optional<quality::Kind> kind_of_another(const protocol::View& view) const;
+  // The least time of a final frame that was never timed, microseconds. Raises `settings` to the
+  // times that the work of the view suggests if none of them is known.
+  [[nodiscard]] double raise_by_work(const protocol::View& view,
+                                     quality::Forecasts& settings) const;
   [[nodiscard]] quality::Forecasts uncorrected(const protocol::View& view,
                                                const std::optional<quality::Kind>& another) const;
 
   Forecaster forecaster_;
+  TimeByWork time_by_work_;
   std::string drawn_key_;              // key of the view drawn last, before completion
   quality::SceneSignature signature_;  // known after completion
   quality::Viewpoint viewpoint_;

@@ -27,8 +27,10 @@ struct FramePlan {
 
 class QualityControl {
  public:
-  QualityControl(Forecaster forecaster, Waiting waiting, MayTry may_try)
-      : times_(std::move(forecaster)), waiting_(std::move(waiting)), may_try_(std::move(may_try)) {}
+  QualityControl(Forecaster forecaster, TimeByWork time_by_work, Waiting waiting, MayTry may_try)
+      : times_(std::move(forecaster), std::move(time_by_work)),
+        waiting_(std::move(waiting)),
+        may_try_(std::move(may_try)) {}
 
   [[nodiscard]] FramePlan moving(const protocol::View& view, const Link& link, Micros now);
   // Refinement before the final frame: at most half of `shown_error`, that of the frame displayed,

@@ -41,6 +41,14 @@ std::optional<session::Reading> what_is_read(const tasks::Catalogue& catalogue,
   return session::Reading{loading->field, loading->done};
 }
 
+// Of method `kernel`: slabs and their number do not depend on the samples.
+double time_by_work(tasks::Backend& backend, protocol::View view) {
+  view.method.name = protocol::MethodName::kernel;
+  const auto checked = backend.check(view);
+  if (!checked) return 0;
+  return backend.request_times.estimate_ms(view.dataset, view.method.name, checked->cost.kernels);
+}
+
 session::Session new_session(const api::ServerOptions& server_options, tasks::Backend& backend) {
   session::Options options;
   options.idle_timeout_us = session::Micros{server_options.idle_timeout_s} * 1'000'000;
@@ -58,7 +66,8 @@ session::Session new_session(const api::ServerOptions& server_options, tasks::Ba
        [&backend] { return session::Micros{backend.renderer.stream_wait_us()}; },
        [&backend](const quality::SceneSignature& signature) {
          return backend.quality.begin_try(signature);
-       }},
+       },
+       [&backend](const protocol::View& view) { return time_by_work(backend, view); }},
       now_us()};
 }
 

@@ -244,6 +244,49 @@ TEST(Chooser, ExcludesPicturesTheLinkCannotCarry) {
 }
 
 // What the last view shows says nothing about another scene or dataset.
+// Nothing is known of the scene but the number of its kernels.
+struct FirstFrame {
+  double work_ms = 0;  // of method kernel at full size
+  protocol::View view;
+  FrameTimes times{{}, [this](const protocol::View& /*view*/) { return work_ms; }};
+
+  quality::Setting setting() const {
+    Chooser chooser;
+    return chooser.choose(
+        view, times.forecast(view, 0), {33.0, std::nullopt}, no_limit, [] { return true; }, 0);
+  }
+};
+
+TEST(FrameTimes, FirstFrameOfManySamplesMergesThem) {
+  FirstFrame first;
+  EXPECT_EQ(first.setting().coarser, 0) << "the work is unknown";
+  first.work_ms = 5;
+  EXPECT_EQ(first.setting().coarser, 0) << "every sample fits into the budget";
+  first.work_ms = 800;
+  const quality::Setting merged = first.setting();
+  EXPECT_GT(merged.coarser, 0);
+  EXPECT_LE(ms_at(first.times.forecast(first.view, 0).settings, merged), 33);
+}
+
+TEST(FrameTimes, MeasuredFramesReplaceTheTimesByWork) {
+  FirstFrame first;
+  first.work_ms = 800;
+  const std::size_t own = quality::own_setting(first.view);
+  EXPECT_GE(first.times.forecast(first.view, 0).settings[own].ms, 800);
+  first.times.learn(quality::settings[own], 20'000, first.view, 0);
+  EXPECT_LT(first.times.forecast(first.view, 0).settings[own].ms, 40);
+}
+
+// Otherwise a merged first frame would stay until a final one that takes seconds.
+TEST(FrameTimes, FinalFramesOfManySamplesAreKnownToBeLong) {
+  FirstFrame first;
+  EXPECT_TRUE(first.times.forecast(first.view, 0).final_is_guessed);
+  first.work_ms = 800;
+  const FrameForecast forecast = first.times.forecast(first.view, 0);
+  EXPECT_FALSE(forecast.final_is_guessed);
+  EXPECT_GT(forecast.final_us, 2'000'000);
+}
+
 TEST(FrameTimes, ContentIsOfTheSameSceneOnly) {
   std::vector<quality::Viewpoint> asked;
   FrameTimes times{[&](const auto& /*signature*/, const quality::Viewpoint& at) {
