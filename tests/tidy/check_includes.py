@@ -37,6 +37,7 @@ CONFINED = [
     ("libcurl", r"curl/", r"server/data/fetch/http_client\.cpp"),
     ("libseccomp", r"seccomp\.h", r"server/data/loader/.*|tests/.*"),
     ("an image library", r"(turbojpeg|jpeglib|png)\.h", r"server/image/.*|tests/.*"),
+    ("OpenH264", r"wels/", r"server/image/.*|tests/.*"),
     ("Highway", r"hwy/", r"server/engine/kernels/.*|server/image/ycc_rows\.cpp|tests/.*"),
     ("Beast or Asio", r"boost/(beast|asio)[/.]",
      r"server/transport/.*|server/api/page\.cpp|tests/.*"),
