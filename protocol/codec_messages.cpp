@@ -16,15 +16,16 @@ constexpr IntegerRange serial{0, limits::serial_max};
 constexpr IntegerRange step_range{0, limits::step_max};
 constexpr IntegerRange edge_range{1, limits::image_edge_max};
 
-enum class ClientKind { open, patch, still, play, pause, ack, visibility };
+enum class ClientKind { open, patch, still, play, pause, ack, visibility, video };
 
-constexpr std::array<Name<ClientKind>, 7> client_names{{{ClientKind::open, "open"},
+constexpr std::array<Name<ClientKind>, 8> client_names{{{ClientKind::open, "open"},
                                                         {ClientKind::patch, "patch"},
                                                         {ClientKind::still, "still"},
                                                         {ClientKind::play, "play"},
                                                         {ClientKind::pause, "pause"},
                                                         {ClientKind::ack, "ack"},
-                                                        {ClientKind::visibility, "visibility"}}};
+                                                        {ClientKind::visibility, "visibility"},
+                                                        {ClientKind::video, "video"}}};
 constexpr std::array<Name<bool>, 2> format_names{{{true, "png"}, {false, "jpeg"}}};
 
 OpenMessage read_open(ObjectReader& reader) {
@@ -108,6 +109,27 @@ VisibilityMessage read_visibility(ObjectReader& reader) {
   return message;
 }
 
+VideoMessage read_video(ObjectReader& reader) {
+  VideoMessage message;
+  const Json* codecs = reader.child("codecs", Presence::required);
+  if (codecs == nullptr) return message;
+  const std::string pointer = reader.at("codecs");
+  if (!codecs->is_array()) {
+    reader.faults().add(pointer, "must be an array, not " + described(*codecs));
+    return message;
+  }
+  if (codecs->size() > limits::video_codecs_max) {
+    reader.faults().add(pointer, "must have at most " + std::to_string(limits::video_codecs_max) +
+                                     " entries, not " + std::to_string(codecs->size()));
+    return message;
+  }
+  for (std::size_t n = 0; n < codecs->size(); ++n) {
+    auto codec = reader.read_text((*codecs)[n], pointer + "/" + std::to_string(n), 1);
+    if (codec) message.codecs.push_back(std::move(*codec));
+  }
+  return message;
+}
+
 ClientMessage read_body(ClientKind kind, ObjectReader& reader) {
   switch (kind) {
     case ClientKind::open:
@@ -124,6 +146,8 @@ ClientMessage read_body(ClientKind kind, ObjectReader& reader) {
       return read_ack(reader);
     case ClientKind::visibility:
       return read_visibility(reader);
+    case ClientKind::video:
+      return read_video(reader);
   }
   return PauseMessage{};
 }

@@ -96,7 +96,7 @@ Result<FrameHeader> parse_frame_header(std::span<const std::uint8_t> bytes) {
   if (get_u16(at + 6) != frame_header_bytes) {
     return bad_header("header length " + std::to_string(get_u16(at + 6)) + ", not 64");
   }
-  if (at[28] < 1 || at[28] > 2) return bad_header("codec " + std::to_string(at[28]));
+  if (at[28] < 1 || at[28] > 3) return bad_header("codec " + std::to_string(at[28]));
   if (at[30] < 1 || at[30] > 3) return bad_header("method " + std::to_string(at[30]));
   FrameHeader header;
   header.version = at[4];

@@ -9,13 +9,14 @@
 
 namespace windsplat::protocol {
 
-enum class Codec : std::uint8_t { jpeg = 1, png = 2 };
+enum class Codec : std::uint8_t { jpeg = 1, png = 2, h264 = 3 };
 enum class MethodCode : std::uint8_t { kernel = 1, slab = 2, reference = 3 };
 
 inline constexpr std::uint32_t flag_final = 1;
 inline constexpr std::uint32_t flag_error_measured = 2;
 inline constexpr std::uint32_t flag_error_estimated = 4;
 inline constexpr std::uint32_t flag_cached = 8;
+inline constexpr std::uint32_t flag_key = 16;  // a picture of H.264 that refers to no other
 
 inline constexpr std::size_t frame_header_bytes = 64;
 

@@ -69,7 +69,8 @@ inline constexpr int jobs_running_max = 2;
 inline constexpr int views_max = 10000;           // stored by a server
 inline constexpr int views_bytes_max = 16777216;  // total of all views as JSON
 
-inline constexpr int frames_in_flight_max = 2;  // unacknowledged, per session
+inline constexpr std::size_t video_codecs_max = 16;  // names in one announcement
+inline constexpr int frames_in_flight_max = 2;       // unacknowledged, per session
 inline constexpr int sessions_max_default = 64;
 
 }  // namespace windsplat::protocol::limits

@@ -52,8 +52,13 @@ struct AckMessage {
 struct VisibilityMessage {
   bool hidden = false;
 };
+// What the client can decode besides JPEG and PNG. Each announcement replaces the one before and
+// starts a new video stream.
+struct VideoMessage {
+  std::vector<std::string> codecs;  // RFC 6381, for example avc1.640033; none: no video
+};
 using ClientMessage = std::variant<OpenMessage, PatchMessage, StillMessage, PlayMessage,
-                                   PauseMessage, AckMessage, VisibilityMessage>;
+                                   PauseMessage, AckMessage, VisibilityMessage, VideoMessage>;
 
 // --- shapes shared by REST, stream and command line --------------------------------------------
 

@@ -12,6 +12,7 @@
 #include "server/frame/empty_picture.hpp"
 #include "server/frame/measure.hpp"
 #include "server/image/decode.hpp"
+#include "server/image/video_encoder.hpp"
 #include "server/quality/setting.hpp"
 #include "server/scene/build.hpp"
 
@@ -189,9 +190,25 @@ Error given_up(Error error, Workspace& workspace) {
   return error;
 }
 
+// nullopt: the encoder failed.
+std::optional<image::Bytes> video_of(Workspace& workspace) {
+  const Encoding& encoding = workspace.encoding;
+  auto unit = encoding.video->encode(workspace.planes, encoding.quality, encoding.key);
+  if (!unit) {
+    workspace.drawn.coded = Coded::video_failed;
+    workspace.drawn.video_fault = unit.error().message;
+    return std::nullopt;
+  }
+  workspace.drawn.coded = unit->key ? Coded::video_key : Coded::video;
+  return std::move(unit->bytes);
+}
+
 Result<image::Bytes> bytes_of(Workspace& workspace, ThreadPool& pool, const CancelToken& cancel) {
   const Encoding& encoding = workspace.encoding;
   if (encoding.format == Format::jpeg) {
+    if (encoding.video != nullptr) {
+      if (auto bytes = video_of(workspace)) return std::move(*bytes);
+    }
     image::Bytes bytes;
     auto done = workspace.jpeg.encode(workspace.planes, encoding.quality, pool, bytes, cancel);
     if (!done) return done.error();

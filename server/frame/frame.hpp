@@ -24,6 +24,10 @@
 #include "server/scene/completed_view.hpp"
 #include "server/scene/scene.hpp"
 
+namespace windsplat::image {
+class VideoEncoder;
+}
+
 namespace windsplat::frame {
 
 enum class Format { jpeg, png, npy };
@@ -40,7 +44,14 @@ struct Encoding {
   // 50 ms, so pictures with a measured error, which do not need it, are described only if this is
   // set. One of which the error should be measured and cannot be is described in any case.
   bool describe = false;
+  // Encodes a JPEG of 4:2:0 that is not measured as the next picture of this stream instead, a key
+  // one if `key` is set; if that fails, as JPEG.
+  image::VideoEncoder* video = nullptr;
+  bool key = false;
 };
+
+// How a picture was encoded.
+enum class Coded { as_asked, video, video_key, video_failed };
 
 struct Frame {
   image::Bytes bytes;
@@ -59,6 +70,8 @@ struct Frame {
   // that of its encoding.
   std::optional<double> error;
   std::optional<double> jpeg_error;
+  Coded coded = Coded::as_asked;
+  std::string video_fault;  // if video failed
 };
 
 // Storage reused between frames, which also holds the frame between drawing and encoding. Used for

@@ -142,6 +142,9 @@ struct Registrar {
   Counter& frame(const char* tier) const {
     return counter("windsplat_frames_total", "Frames sent to sessions.", {{"tier", tier}});
   }
+  Counter& video(const char* picture) const {
+    return counter("windsplat_video_frames_total", "Frames sent as H.264.", {{"picture", picture}});
+  }
   Counter& bytes(const char* over) const {
     return counter("windsplat_sent_bytes_total", "Bytes sent to sockets, without framing.",
                    {{"over", over}});
@@ -195,6 +198,10 @@ struct Metrics::State {
   std::array<Counter*, 2> sent{&add.bytes("http"), &add.bytes("stream")};
   Histogram& estimated = add.error("estimated");
   Histogram& measured = add.error("measured");
+  std::array<Counter*, 2> video{&add.video("predicted"), &add.video("key")};
+  Gauge& encoders = add.gauge("windsplat_video_encoders", "Encoders of H.264 in use.");
+  Counter& video_failures = add.counter("windsplat_video_failures_total",
+                                        "Frames sent as JPEG because the video encoder failed.");
   Counter& dropped = add.counter("windsplat_frames_dropped_total",
                                  "Frames drawn but not sent because the view had changed.");
   Counter& cancelled =
@@ -227,12 +234,20 @@ void Metrics::stage_took(Stage stage, std::int64_t us) {
 
 void Metrics::frame_sent(session::Tier tier, const protocol::FrameHeader& header) {
   state_->frames[static_cast<std::size_t>(tier)]->Increment();
+  if (header.codec == protocol::Codec::h264) {
+    const bool key = (header.flags & protocol::flag_key) != 0;
+    state_->video[key ? 1 : 0]->Increment();
+  }
   if (!std::isfinite(header.error)) return;
   if ((header.flags & protocol::flag_error_measured) != 0) state_->measured.Observe(header.error);
   if ((header.flags & protocol::flag_error_estimated) != 0) {
     state_->estimated.Observe(header.error);
   }
 }
+
+void Metrics::video_encoders(int more) { state_->encoders.Increment(more); }
+
+void Metrics::video_failed() { state_->video_failures.Increment(); }
 
 void Metrics::frames_dropped(std::uint64_t count) {
   state_->dropped.Increment(static_cast<double>(count));

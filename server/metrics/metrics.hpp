@@ -33,6 +33,8 @@ class Metrics {
   void stage_took(Stage stage, std::int64_t us);
   // A frame written completely to the socket.
   void frame_sent(session::Tier tier, const protocol::FrameHeader& header);
+  void video_encoders(int more);  // negative: fewer
+  void video_failed();            // the encoder: JPEG is sent
   void frames_dropped(std::uint64_t count);
   void renders_cancelled(std::uint64_t count);
   void bytes_sent(Over over, std::size_t bytes);

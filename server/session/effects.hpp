@@ -24,6 +24,7 @@ struct Encoding {
   int quality = 75;
   bool full_chroma = false;  // 4:4:4, else 4:2:0
   bool measure = false;      // the error of the picture, and of its encoding
+  bool key = false;          // of H.264: without reference to an earlier frame
 };
 
 struct SendText {
@@ -42,6 +43,8 @@ struct StartRender {
   quality::Setting setting;
   Encoding encoding;
 };
+// No further frame of H.264 until one with `key`: the encoder is no longer needed.
+struct EndVideo {};
 struct CancelRender {
   std::uint64_t ticket = 0;
 };
@@ -74,13 +77,15 @@ struct Close {
   int code = 1000;
   std::string reason;
 };
-using Effect = std::variant<SendText, Describe, StartRender, CancelRender, Ping, SendFrame,
-                            Prefetch, Calibrate, Close>;
+using Effect = std::variant<SendText, Describe, StartRender, EndVideo, CancelRender, Ping,
+                            SendFrame, Prefetch, Calibrate, Close>;
 using Effects = std::vector<Effect>;
 
 // A rendered frame.
 struct Drawn {
   Payload payload;
+  bool video = false;  // H.264; otherwise, though asked for, JPEG
+  bool key = false;    // of H.264
   protocol::FrameInfo info;
   std::string view_json;              // the completed view, canonical
   quality::SceneSignature signature;  // signature of the requested view, with its viewpoint

@@ -112,4 +112,10 @@ void MessageHandler::operator()(const protocol::VisibilityMessage& message) {
   if (state_.hidden) state_.slot.abandon(state_.effects);
 }
 
+void MessageHandler::operator()(const protocol::VideoMessage& message) {
+  // A frame that is being encoded belongs to the stream that ends here.
+  state_.slot.restart_video();
+  state_.video.announced(message.codecs);
+}
+
 }  // namespace windsplat::session

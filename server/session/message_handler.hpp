@@ -19,6 +19,7 @@ class MessageHandler {
   void operator()(const protocol::PauseMessage& message);
   void operator()(const protocol::AckMessage& message);
   void operator()(const protocol::VisibilityMessage& message);
+  void operator()(const protocol::VideoMessage& message);
 
  private:
   SessionState& state_;

@@ -113,6 +113,9 @@ Effects Session::finish(Micros now) {
     advance_playback(state_, now);
     confirm_unchanged(state_);
     start_due_render(state_, now);
+    if (!state_.slot.render() && state_.video.take_ended(now)) {
+      state_.effects.emplace_back(EndVideo{});
+    }
     request_prefetch();
     report_loading(now);
   }
@@ -147,6 +150,9 @@ std::optional<Micros> Session::wake_at() const {
   wake = std::min(wake, next_step_at(state_).value_or(wake));
   wake = std::min(wake, state_.load_progress.due_at().value_or(wake));
   wake = std::min(wake, next_render_at(state_).value_or(wake));
+  if (const Micros ends = state_.video.ends_at(); ends > 0 && !state_.slot.render()) {
+    wake = std::min(wake, ends);
+  }
   return wake;
 }
 

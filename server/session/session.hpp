@@ -14,8 +14,9 @@
 //
 // The link. A render starts no sooner than its frame will find link and client free (link.hpp), so
 // that it shows the newest view and does not queue. Quality and size of a moving frame follow the
-// rate of the link (jpeg_rate.hpp). Because a final frame blocks a slow link, the view must first
-// be at rest for half the transfer time, up to `quiet_most`.
+// rate of the link (moving_encoding.hpp); a slow one gets H.264 (video_choice.hpp). Because a final
+// frame blocks a slow link, the view must first be at rest for half the transfer time, up to
+// `quiet_most`.
 //
 // A final frame remains valid for every later view with the same picture: an equivalent view, a
 // return to it before another frame was sent, or another camera on a scene that is empty before and

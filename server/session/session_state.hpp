@@ -15,6 +15,7 @@
 #include "server/session/pacing/quality_control.hpp"
 #include "server/session/pacing/render_slot.hpp"
 #include "server/session/pacing/still_queue.hpp"
+#include "server/session/pacing/video_choice.hpp"
 #include "server/session/playback/playback_rate.hpp"
 #include "server/session/playback/player.hpp"
 #include "server/session/playback/prefetcher.hpp"
@@ -29,7 +30,8 @@ struct SessionState {
         surroundings(std::move(around)),
         view(now),
         quality(surroundings.forecasts, surroundings.time_by_work, surroundings.waiting,
-                surroundings.may_try) {}
+                surroundings.may_try),
+        video(given.video) {}
 
   void send(protocol::ServerMessage message) { effects.emplace_back(SendText{std::move(message)}); }
   void refuse(const Error& error, std::optional<std::uint32_t> id,
@@ -54,6 +56,7 @@ struct SessionState {
   LoadProgress load_progress;
 
   QualityControl quality;
+  VideoChoice video;
   FlowControl flow;
   RenderSlot slot;
   DisplayedFrame displayed;

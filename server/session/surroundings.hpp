@@ -16,6 +16,7 @@ struct Options {
   Micros idle_timeout_us = 300'000'000;  // time without a message
   Micros quiet_us = 120'000;             // time without a change, before the final frame
   Micros quiet_most_us = 1'000'000;      // maximum of quiet_us for slow links
+  bool video = false;                    // H.264 can be encoded
 };
 
 // Checks whether a view can be drawn, without loading; the value is the number of steps of its

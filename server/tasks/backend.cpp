@@ -10,6 +10,7 @@ Backend::Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool>
     : catalogue(std::move(store)),
       metrics(metrics_of_server),
       pool(std::move(threads)),
+      video([this](int more) { metrics.video_encoders(more); }),
       request_times(pool->size()),
       jobs(job_settings),
       renderer({requests_waiting_max,

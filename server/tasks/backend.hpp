@@ -9,6 +9,7 @@
 #include "server/base/thread_pool.hpp"
 #include "server/frame/cost.hpp"
 #include "server/frame/frame.hpp"
+#include "server/image/video_streams.hpp"
 #include "server/metrics/metrics.hpp"
 #include "server/quality/tables.hpp"
 #include "server/tasks/catalogue.hpp"
@@ -45,6 +46,7 @@ struct Backend {
   Catalogue catalogue;
   metrics::Metrics& metrics;
   std::shared_ptr<ThreadPool> pool;
+  image::VideoStreams video;
   frame::Workspace frames;  // used by the renderer's thread only
   quality::Tables quality;
   KnownRanges ranges;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "protocol/codec.hpp"
+#include "server/base/log.hpp"
 #include "server/frame/frame_info.hpp"
 #include "server/scene/build.hpp"
 #include "server/tasks/calibration_job.hpp"
@@ -24,7 +25,16 @@ frame::Encoding frame_encoding(const session::Encoding& wanted) {
   encoding.quality = wanted.quality;
   encoding.subsampling = wanted.full_chroma ? image::Subsampling::s444 : image::Subsampling::s420;
   encoding.measure = wanted.measure;
+  encoding.key = wanted.key;
   return encoding;
+}
+
+void report_video(Backend& backend, const frame::Frame& drawn, session::Drawn& out) {
+  out.video = drawn.coded == frame::Coded::video || drawn.coded == frame::Coded::video_key;
+  out.key = drawn.coded == frame::Coded::video_key;
+  if (drawn.coded != frame::Coded::video_failed) return;
+  log::warn("video could not be encoded; JPEG is sent", {{"why", drawn.video_fault}});
+  backend.metrics.video_failed();
 }
 
 Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
@@ -48,6 +58,7 @@ Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
     }
   }
   out.payload = std::make_shared<const std::vector<std::uint8_t>>(std::move(drawn->bytes));
+  report_video(backend, *drawn, out);
   out.queue_us = queue_us;
   out.render_us = drawn->render_us;
   out.measure_us = drawn->measure_us;
@@ -93,6 +104,26 @@ Result<std::vector<data::PrefetchRequest>> prefetch_requests_of(const data::Data
 
 }  // namespace
 
+// The encoder of the session's video stream. Used by one render at a time.
+struct Viewer::Video {
+  std::shared_ptr<image::VideoEncoder> encoder;
+  std::shared_ptr<const void> memory;  // reserved for it
+  std::uint64_t bytes = 0;
+
+  // Gives the picture the encoder; without memory for it the picture remains a JPEG.
+  void encode(PreparedPicture& picture, const data::Dataset& dataset) {
+    const scene::Camera& camera = picture.frame.scene.camera;
+    const std::uint64_t needed = image::VideoEncoder::bytes_for(camera.width, camera.height);
+    if (needed > bytes) {
+      auto reserved = dataset.reserve(needed);
+      if (!reserved) return;
+      memory = std::move(*reserved);
+      bytes = needed;
+    }
+    picture.frame.encoding.video = encoder.get();
+  }
+};
+
 // Pending prefetch requests. A dataset has at most one waiting job, however often the view changes;
 // the job evaluates the newest request when it runs.
 struct Viewer::PrefetchState {
@@ -126,15 +157,24 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
     return reply(effect.ticket, fits.error());
   }
   const auto shared = std::make_shared<const DrawnReply>(std::move(reply));
+  const bool as_video = effect.encoding.codec == protocol::Codec::h264;
+  if (as_video && video_ == nullptr) {
+    if (auto encoder = backend_.video.open()) {
+      video_ = std::make_shared<Video>(Video{std::move(encoder), {}, 0});
+    }
+  }
+  const auto video = as_video ? video_ : nullptr;
   Drawing drawing{
       RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
-  drawing.prepare = [effect, cancel, completion = completion_](data::Dataset& available,
-                                                               Loading loading) {
+  drawing.prepare = [effect, cancel, video, completion = completion_](data::Dataset& available,
+                                                                      Loading loading) {
     return run_guarded<PreparedPtr>("preparing a frame", cancel, [&]() -> Result<PreparedPtr> {
       const auto completed = completion->of(effect.view, available);
       if (!completed) return completed.error();
-      return prepare_picture(*completed, effect.setting, frame_encoding(effect.encoding), available,
-                             loading);
+      auto picture = prepare_picture(*completed, effect.setting, frame_encoding(effect.encoding),
+                                     available, loading);
+      if (picture && video) video->encode(**picture, available);
+      return picture;
     });
   };
   drawing.draw = [&backend = backend_, ticket = effect.ticket, cancel, shared](

@@ -32,6 +32,7 @@ class Viewer {
   void start(const session::Prefetch& effect);
   // Measures time and error of the settings for a view while the renderer is idle.
   void start(const session::Calibrate& effect);
+  void start(const session::EndVideo& /*effect*/) { video_.reset(); }
   void cancel(std::uint64_t ticket);
   void done(std::uint64_t ticket) { running_.erase(ticket); }
   void cancel_all();
@@ -54,7 +55,9 @@ class Viewer {
   CancelToken gone_;  // cancels descriptions
   std::shared_ptr<const char> describing_ =
       std::make_shared<const char>();  // held by each description job
-  CancelToken calibration_;            // cancels the latest calibration
+  struct Video;
+  std::shared_ptr<Video> video_;  // shared with the job that uses it
+  CancelToken calibration_;       // cancels the latest calibration
 };
 
 }  // namespace windsplat::tasks

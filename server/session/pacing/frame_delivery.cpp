@@ -31,6 +31,12 @@ Tier tier_of(Purpose purpose, bool final) {
   return purpose == Purpose::moving ? Tier::moving : Tier::rest;
 }
 
+// JPEG in place of video that failed.
+protocol::Codec codec_of(const Render& render, const Drawn& drawn) {
+  const protocol::Codec asked = render.encoding.codec;
+  return asked == protocol::Codec::h264 && !drawn.video ? protocol::Codec::jpeg : asked;
+}
+
 protocol::FrameHeader header_of(const Render& render, const Drawn& drawn, std::uint32_t seq,
                                 bool final) {
   protocol::FrameHeader header;
@@ -42,7 +48,8 @@ protocol::FrameHeader header_of(const Render& render, const Drawn& drawn, std::u
   if (drawn.info.error_kind == "estimated") header.flags |= protocol::flag_error_estimated;
   header.width = static_cast<std::uint16_t>(drawn.info.width);
   header.height = static_cast<std::uint16_t>(drawn.info.height);
-  header.codec = render.encoding.codec;
+  header.codec = codec_of(render, drawn);
+  if (drawn.key) header.flags |= protocol::flag_key;
   header.quality = static_cast<std::uint8_t>(render.encoding.quality);
   header.method = method_code(drawn.info.method);
   header.level = quality::wire_level(render.setting.half_level);
@@ -103,6 +110,7 @@ void send_frame(SessionState& state, const Render& render, Drawn drawn, Micros n
   const double otherwise = render.purpose == Purpose::refining ? 0 : 1;
   const double error = drawn.info.error_value.value_or(otherwise);
   const std::uint32_t seq = state.flow.next_seq();
+  if (drawn.video && !render.old_video) state.video.sent();
   count_sent(state, render, drawn, now);
   const protocol::FrameHeader header = header_of(render, drawn, seq, final || still);
 
@@ -174,6 +182,11 @@ void deliver_result(SessionState& state, const Render& render, Result<Drawn> dra
 }  // namespace
 
 void deliver(SessionState& state, const Render& render, Result<Drawn> drawn, Micros now) {
+  if (render.encoding.codec == protocol::Codec::h264) {
+    // The encoder refers to this frame, whether it is sent or not; send_frame() confirms that.
+    state.video.lost();
+    if (drawn && !drawn->video) state.video.failed(now);
+  }
   deliver_result(state, render, std::move(drawn), now);
   // The still cancelled the calibration of the view.
   if (render.purpose != Purpose::still || !state.view_is_shown()) return;

@@ -54,7 +54,9 @@ void start_final(SessionState& state, Micros now) {
 }
 
 void start_moving(SessionState& state, Micros now) {
-  const FramePlan plan = state.quality.moving(state.view.view(), state.flow.link(), now);
+  const FramePlan plan =
+      state.quality.moving(state.view.view(), state.flow.link(), state.video, now);
+  if (plan.encoding.codec == protocol::Codec::h264) state.video.started(now);
   start(state, Purpose::moving, plan, now);
 }
 

@@ -8,9 +8,7 @@
 namespace windsplat::session {
 namespace {
 
-constexpr double head_bytes = 620;  // JPEG tables
 constexpr double pixels_power = 0.8;
-constexpr double scale_power = 0.47;
 constexpr int quality_step = 5;
 constexpr double to_rise = 0.8;      // fraction of the limit that a better quality may use
 constexpr double to_coarsen = 1.25;  // tolerated factor above the maximum of pixels
@@ -21,20 +19,22 @@ constexpr int edge_min = 64;  // pixels; levels that make an edge shorter than t
 // Scale of libjpeg's tables, 1 at quality 50.
 double scale_of(int quality) { return quality < 50 ? 50.0 / quality : 2 - quality / 50.0; }
 
-double relative(int quality) { return std::pow(scale_of(quality), -scale_power); }
+double relative(int quality, const BytesModel& model) {
+  return std::pow(scale_of(quality), -model.scale_power);
+}
 
 }  // namespace
 
 void JpegRate::learn(double pixels, int quality, std::size_t bytes, std::size_t text_bytes) {
   text_bytes_ = static_cast<double>(text_bytes);
-  const double body = std::max(static_cast<double>(bytes) - head_bytes, 1.0);
-  const double factor = body / (std::pow(pixels, pixels_power) * relative(quality));
+  const double body = std::max(static_cast<double>(bytes) - model_.head_bytes, 1.0);
+  const double factor = body / (std::pow(pixels, pixels_power) * relative(quality, model_));
   // Rises at once, falls slowly.
   factor_ = std::max(factor, 0.5 * (factor_ + factor));
 }
 
 double JpegRate::predicted_bytes(double pixels, int quality) const {
-  return head_bytes + factor_ * std::pow(pixels, pixels_power) * relative(quality);
+  return model_.head_bytes + factor_ * std::pow(pixels, pixels_power) * relative(quality, model_);
 }
 
 int JpegRate::choose(double pixels, const Link& link, Micros budget) {
@@ -51,11 +51,16 @@ int JpegRate::choose(double pixels, const Link& link, Micros budget) {
   return quality_;
 }
 
+Micros JpegRate::time_on(const Link& link, double pixels, int quality) const {
+  return link.transfer(text_bytes_ + predicted_bytes(pixels, quality));
+}
+
 double JpegRate::pixels_max(const Link& link, Micros budget) const {
   if (!link.known()) return std::numeric_limits<double>::infinity();
   const double time_s = 1e-6 * static_cast<double>(std::max(budget, moving_most_us));
-  const double bytes = time_s * link.bytes_per_s() - text_bytes_ - head_bytes;
-  return std::pow(std::max(bytes, 1.0) / (factor_ * relative(quality_least)), 1 / pixels_power);
+  const double bytes = time_s * link.bytes_per_s() - text_bytes_ - model_.head_bytes;
+  return std::pow(std::max(bytes, 1.0) / (factor_ * relative(quality_least, model_)),
+                  1 / pixels_power);
 }
 
 int JpegRate::least_level(int width, int height, const Link& link, Micros budget) {

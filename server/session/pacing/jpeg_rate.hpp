@@ -1,4 +1,4 @@
-// JPEG quality and picture size that the link can carry during motion.
+// Quality and picture size that the link can carry during motion, for JPEG and H.264.
 #pragma once
 
 #include <cstddef>
@@ -7,12 +7,24 @@
 
 namespace windsplat::session {
 
-// Models the bytes of a frame with 4:2:0 chroma as head + c pixels^0.8 s(quality)^-0.47, where s is
-// the scale of libjpeg's quantisation tables. The exponents were fitted to pictures of climate and
-// tornado from 160x90 to 1280x720 at qualities 40 to 85 (within a third); c follows the frames
-// sent.
+// Bytes of a frame with 4:2:0 chroma are head + c pixels^0.8 s(quality)^-p, where s is the scale of
+// libjpeg's quantisation tables and of the quantiser of H.264; c follows the frames sent.
+struct BytesModel {
+  double head_bytes = 620;    // JPEG tables
+  double scale_power = 0.47;  // p
+  double factor = 0.72;       // c at first; that of climate
+};
+// Fitted to pictures of climate and tornado from 160x90 to 1280x720 at qualities 40 to 85 (within a
+// third).
+inline constexpr BytesModel jpeg_bytes{};
+// Of frames that are not key frames: drags of climate, clouds and tornado at qualities 50 and 85
+// (docs/benchmarks/links.md, Video codecs). A key frame has about the bytes of a JPEG.
+inline constexpr BytesModel video_bytes{20, 0.7, 0.2};
+
 class JpegRate {
  public:
+  explicit JpegRate(const BytesModel& model = jpeg_bytes) : model_(model), factor_(model.factor) {}
+
   static constexpr int quality_least = 40;
   static constexpr int quality_usual = 75;           // quality also used while the link is unknown
   static constexpr int quality_most = 85;            // quality on a fast link
@@ -28,6 +40,9 @@ class JpegRate {
   // a quarter of it; rises by at most one step per call.
   [[nodiscard]] int choose(double pixels, const Link& link, Micros budget);
 
+  // Time of a frame with that many pixels on the link; 0 while the rate is unknown.
+  [[nodiscard]] Micros time_on(const Link& link, double pixels, int quality) const;
+
   // Number of pixels whose frame at quality_least takes at most `budget`, or moving_most_us if
   // longer, on the link. Infinite while the rate is unknown.
   [[nodiscard]] double pixels_max(const Link& link, Micros budget) const;
@@ -37,7 +52,8 @@ class JpegRate {
   [[nodiscard]] int least_level(int width, int height, const Link& link, Micros budget);
 
  private:
-  double factor_ = 0.72;  // c; the initial value is that of climate
+  BytesModel model_;
+  double factor_;  // c
   double text_bytes_ = 0;
   int quality_ = quality_usual;
   int level_ = 0;

@@ -54,14 +54,14 @@ bool QualityControl::final_is_cheap(const protocol::View& view, Micros now) cons
   return times_.forecast(view, now).final_us <= budget_of(view);
 }
 
-FramePlan QualityControl::moving(const protocol::View& view, const Link& link, Micros now) {
+FramePlan QualityControl::moving(const protocol::View& view, const Link& link, VideoChoice& video,
+                                 Micros now) {
   FramePlan plan;
-  const int width = view.image.width;
-  const int height = view.image.height;
   const Micros budget = budget_of(view);
-  const int least = jpeg_.least_level(width, height, link, budget);
-  const double pixels_most = least > 0 ? static_cast<double>(width) * height / std::pow(4.0, least)
-                                       : std::numeric_limits<double>::infinity();
+  const int least = encoding_.least_level(view, link, video, budget, now);
+  const double whole = static_cast<double>(view.image.width) * view.image.height;
+  const double pixels_most =
+      least > 0 ? whole / std::pow(4.0, least) : std::numeric_limits<double>::infinity();
   if (!is_reference(view)) {
     if (view.quality != limits_) chooser_.forget();
     limits_ = view.quality;
@@ -75,7 +75,7 @@ FramePlan QualityControl::moving(const protocol::View& view, const Link& link, M
         chooser_.choose(view, times_.forecast(view, now), limits, pixels_most, may_try, now);
     moving_setting_ = plan.setting;
   }
-  plan.encoding.quality = jpeg_.choose(quality::pixels_at(view, plan.setting), link, budget);
+  plan.encoding = encoding_.choose(view, plan.setting, link, video, budget);
   return plan;
 }
 
@@ -95,7 +95,7 @@ std::optional<FramePlan> QualityControl::refining(const protocol::View& view, co
   FramePlan plan;
   plan.setting = quality::settings[next.setting];
   plan.encoding.quality = usual;
-  const double bytes = jpeg_.predicted_bytes(quality::pixels_at(view, plan.setting), usual);
+  const double bytes = encoding_.jpeg_bytes_at(quality::pixels_at(view, plan.setting), usual);
   if (!(link.transfer(bytes) < cost / 2)) return std::nullopt;
   return plan;
 }
@@ -151,8 +151,7 @@ void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewS
 
 void QualityControl::learn_bytes(const Render& render, const Drawn& drawn, std::size_t frame_bytes,
                                  std::size_t text_bytes) {
-  const double pixels = static_cast<double>(drawn.info.width) * drawn.info.height;
-  jpeg_.learn(pixels, render.encoding.quality, frame_bytes, text_bytes);
+  encoding_.learn(drawn, render.encoding.quality, frame_bytes, text_bytes);
 }
 
 bool QualityControl::needs_thinner_slabs(const Render& render, const Drawn& drawn,

@@ -12,9 +12,10 @@
 #include "server/session/effects.hpp"
 #include "server/session/pacing/chooser.hpp"
 #include "server/session/pacing/frame_times.hpp"
-#include "server/session/pacing/jpeg_rate.hpp"
 #include "server/session/pacing/link.hpp"
+#include "server/session/pacing/moving_encoding.hpp"
 #include "server/session/pacing/render_slot.hpp"
+#include "server/session/pacing/video_choice.hpp"
 #include "server/session/view_state.hpp"
 
 namespace windsplat::session {
@@ -32,7 +33,8 @@ class QualityControl {
         waiting_(std::move(waiting)),
         may_try_(std::move(may_try)) {}
 
-  [[nodiscard]] FramePlan moving(const protocol::View& view, const Link& link, Micros now);
+  [[nodiscard]] FramePlan moving(const protocol::View& view, const Link& link, VideoChoice& video,
+                                 Micros now);
   // Refinement before the final frame: at most half of `shown_error`, that of the frame displayed,
   // at a fraction of the final time. nullopt: draw the final frame next.
   [[nodiscard]] std::optional<FramePlan> refining(const protocol::View& view, const Link& link,
@@ -67,7 +69,7 @@ class QualityControl {
   Waiting waiting_;
   MayTry may_try_;
   Chooser chooser_;
-  JpegRate jpeg_;
+  MovingEncoding encoding_;
   quality::Setting moving_setting_;  // the last one chosen
   std::optional<double> queue_us_;   // recent waiting time of moving frames for the renderer
   protocol::QualityView limits_;     // of the last moving frame

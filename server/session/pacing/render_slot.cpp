@@ -30,6 +30,10 @@ void RenderSlot::abandon_rest(Effects& effects) {
   if (draws_stream() && render_->purpose != Purpose::moving) cancel(effects);
 }
 
+void RenderSlot::restart_video() {
+  if (render_) render_->old_video = true;
+}
+
 void RenderSlot::cancel(Effects& effects) {
   if (!render_ || render_->unwanted) return;
   render_->unwanted = true;

@@ -26,8 +26,9 @@ struct Render {
   quality::Setting setting;
   Encoding encoding;
   std::uint32_t still_id = 0;
-  bool unwanted = false;  // true: its frame will not be sent
-  bool played = false;    // the first one of a step reached by playback
+  bool unwanted = false;   // true: its frame will not be sent
+  bool played = false;     // the first one of a step reached by playback
+  bool old_video = false;  // of a stream of H.264 that the client has abandoned meanwhile
 };
 
 class RenderSlot {
@@ -47,6 +48,8 @@ class RenderSlot {
   void abandon(Effects& effects);
   // Cancels the render of a view at rest.
   void abandon_rest(Effects& effects);
+  // A frame of H.264 in progress will not begin the stream that follows.
+  void restart_video();
   // Cancels the render, even a still.
   void cancel(Effects& effects);
 

@@ -52,6 +52,7 @@ double time_by_work(tasks::Backend& backend, protocol::View view) {
 session::Session new_session(const api::ServerOptions& server_options, tasks::Backend& backend) {
   session::Options options;
   options.idle_timeout_us = session::Micros{server_options.idle_timeout_s} * 1'000'000;
+  options.video = backend.video.available();
   return {
       options,
       {[&backend](const protocol::View& view) -> Result<int> {

@@ -21,11 +21,17 @@ namespace limits = protocol::limits;
 
 constexpr int steps = 5;
 
+session::Options with_video() {
+  session::Options options;
+  options.video = true;
+  return options;
+}
+
 // Every request of the session gets a result: a frame of one byte, or an unknown dataset.
 class Viewer {
  public:
   Viewer()
-      : session_(session::Options{},
+      : session_(with_video(),
                  {[](const protocol::View& view) -> Result<int> {
                     if (view.dataset.empty() || view.dataset == "none") {
                       return make_error_at(ErrorKind::not_found, "/dataset", "does not exist");
@@ -124,6 +130,7 @@ class Viewer {
   [[nodiscard]] Result<session::Drawn> drawn(const session::StartRender& what) const {
     if (cancelled_) return make_error(ErrorKind::cancelled, "cancelled");
     session::Drawn out;
+    out.video = what.encoding.codec == protocol::Codec::h264;
     out.payload = std::make_shared<const std::vector<std::uint8_t>>(1);
     out.view_json = protocol::encode_view(what.view);
     return out;

@@ -144,6 +144,9 @@ class Driver {
   int renders = 0;
   std::optional<Close> closed;
   bool write_at_once = true;
+  std::size_t payload_bytes = 100;  // of each frame
+  bool video_fails = false;         // frames asked as H.264 are JPEG
+  int videos_ended = 0;
   int step_count = steps;
   Micros waiting = 0;              // of the frames of other sessions
   Micros queue = 0;                // simulated time that a frame waits for the renderer
@@ -167,7 +170,9 @@ class Driver {
 
   Drawn drawn(const StartRender& done, Micros cost, bool loaded) const {
     Drawn out;
-    out.payload = std::make_shared<const std::vector<std::uint8_t>>(100);
+    out.payload = std::make_shared<const std::vector<std::uint8_t>>(payload_bytes);
+    out.video = done.encoding.codec == protocol::Codec::h264 && !video_fails;
+    out.key = out.video && done.encoding.key;
     const bool kernel = done.setting.method == protocol::MethodName::kernel;
     out.info.method = kernel ? "kernel" : "slab";
     out.signature.key = "its style";
@@ -221,6 +226,7 @@ class Driver {
         frames.push_back(*frame);
         unwritten_ = true;
       }
+      if (std::holds_alternative<EndVideo>(effect)) ++videos_ended;
       if (auto* request = std::get_if<Prefetch>(&effect)) requests.push_back(*request);
       if (auto* calibration = std::get_if<Calibrate>(&effect)) calibrations.push_back(*calibration);
       if (auto* close = std::get_if<Close>(&effect)) closed = *close;

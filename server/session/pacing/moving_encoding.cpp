@@ -1,0 +1,56 @@
+#include "server/session/pacing/moving_encoding.hpp"
+
+#include <algorithm>
+
+#include "server/quality/sizes.hpp"
+
+namespace windsplat::session {
+namespace {
+
+constexpr int key_quality_least = 15;
+constexpr int key_quality_step = 5;
+
+}  // namespace
+
+int MovingEncoding::least_level(const protocol::View& view, const Link& link, VideoChoice& video,
+                                Micros budget, Micros now) {
+  const int width = view.image.width;
+  const int height = view.image.height;
+  const double pixels = static_cast<double>(width) * height;
+  video.choose(jpeg_.time_on(link, pixels, VideoChoice::quality_low),
+               jpeg_.time_on(link, pixels, VideoChoice::quality_good), budget, now);
+  return (video.on() ? video_ : jpeg_).least_level(width, height, link, budget);
+}
+
+// The client waits for a key frame as for a JPEG, so its quality is that of a JPEG which takes no
+// longer than a moving frame may; the frames after it improve the picture.
+Encoding MovingEncoding::choose(const protocol::View& view, const quality::Setting& setting,
+                                const Link& link, const VideoChoice& video, Micros budget) {
+  Encoding encoding;
+  const double pixels = quality::pixels_at(view, setting);
+  const quality::PictureSize size = quality::size_at(view, setting);
+  if (!video.on() || !video.fits(size.width, size.height)) {
+    encoding.quality = jpeg_.choose(pixels, link, budget);
+    return encoding;
+  }
+  encoding.codec = protocol::Codec::h264;
+  encoding.quality = video_.choose(pixels, link, budget);
+  encoding.key = video.needs_key() || pixels != video_pixels_;
+  video_pixels_ = pixels;
+  if (!encoding.key) return encoding;
+  const Micros most = std::max(budget, JpegRate::moving_most_us);
+  while (encoding.quality > key_quality_least &&
+         jpeg_.time_on(link, pixels, encoding.quality) > most) {
+    encoding.quality -= key_quality_step;
+  }
+  return encoding;
+}
+
+void MovingEncoding::learn(const Drawn& drawn, int quality, std::size_t frame_bytes,
+                           std::size_t text_bytes) {
+  if (drawn.video && drawn.key) return;
+  const double pixels = static_cast<double>(drawn.info.width) * drawn.info.height;
+  (drawn.video ? video_ : jpeg_).learn(pixels, quality, frame_bytes, text_bytes);
+}
+
+}  // namespace windsplat::session

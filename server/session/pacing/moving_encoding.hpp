@@ -1,0 +1,39 @@
+// Codec, quality and size of moving frames that the link can carry.
+#pragma once
+
+#include <cstddef>
+
+#include "protocol/view.hpp"
+#include "server/quality/setting.hpp"
+#include "server/session/effects.hpp"
+#include "server/session/pacing/jpeg_rate.hpp"
+#include "server/session/pacing/link.hpp"
+#include "server/session/pacing/video_choice.hpp"
+
+namespace windsplat::session {
+
+// JPEG, or H.264 while VideoChoice is on; each with its own model of bytes.
+class MovingEncoding {
+ public:
+  // For the next moving frame: chooses the codec and returns the least level of its picture.
+  int least_level(const protocol::View& view, const Link& link, VideoChoice& video, Micros budget,
+                  Micros now);
+  // The encoding of that frame, drawn at a setting.
+  Encoding choose(const protocol::View& view, const quality::Setting& setting, const Link& link,
+                  const VideoChoice& video, Micros budget);
+
+  // Records that a moving frame was sent.
+  void learn(const Drawn& drawn, int quality, std::size_t frame_bytes, std::size_t text_bytes);
+
+  // Bytes of a JPEG.
+  [[nodiscard]] double jpeg_bytes_at(double pixels, int quality) const {
+    return jpeg_.predicted_bytes(pixels, quality);
+  }
+
+ private:
+  JpegRate jpeg_;
+  JpegRate video_{video_bytes};
+  double video_pixels_ = 0;  // of the last frame of H.264
+};
+
+}  // namespace windsplat::session
