@@ -139,7 +139,7 @@ test("valid frame headers have their field values", () => {
   for (const one of cases("valid", "frameHeader")) {
     const header = parseFrameHeader(bytesOf(one.hex!));
     const fields = one.fields!;
-    const codes = { jpeg: 1, png: 2 };
+    const codes = { jpeg: 1, png: 2, h264: 3 };
     const methods = { kernel: 1, slab: 2, reference: 3 };
     const orNull = (value: number) => (Number.isNaN(value) ? null : value);
     const {

@@ -31,6 +31,7 @@ import {
 } from "../wire/protocol";
 import { problemText } from "../wire/requests";
 import { UndoControl } from "./undo_control";
+import { VideoOffer } from "./video_offer";
 import { ViewModel } from "../view/view_model";
 import type { Outgoing, Patch } from "../view/view_state";
 import type { DrawnFrame } from "../viewport/viewport";
@@ -43,6 +44,7 @@ export class App {
   readonly cameras: CameraControl;
   readonly playback: Playback;
   readonly undoControl: UndoControl;
+  readonly video = new VideoOffer((message) => void this.connection.send(message));
   private readonly model = new ViewModel();
   private readonly answers = new PatchAnswers(this.model.state);
   private readonly connection: Connection;
@@ -301,6 +303,7 @@ export class App {
     this.parts.entries.refuse(""); // another server may allow it
     this.parts.viewport.newSession(hello.limits.imagePixelsMax);
     this.answers.newSession();
+    this.video.greet();
     if (!this.maps.loaded) this.loadMaps();
     if (this.opener.begin(hello.datasets)) this.sendVisibility();
   }

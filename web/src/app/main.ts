@@ -46,6 +46,7 @@ const viewport = new Viewport(canvas, {
   decoded: (header, decodeMs) => app.acknowledge(header.seq, decodeMs),
   drawn: (frame) => app.onDrawn(frame),
   broken: (header) => app.onBroken(header.seq),
+  videoFailed: () => app.video.failed(),
   resized: debouncedResize(),
 });
 const timeBar = new TimeBar({

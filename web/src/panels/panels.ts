@@ -20,6 +20,7 @@ import { middleSample, sampleWithin, type Sample } from "../view/sample_position
 import { ProbePanel, probeTitle } from "./panel_probe";
 import { addCamera, addGeometry, type CameraSwitch } from "./panel_geometry";
 import type { RangeMode } from "./range_choice";
+import { videoUse, type VideoUse } from "../view/video_setting";
 
 const streamBudgetMs = 33; // for streams whose view names no budget
 const firstLimit = 0.01; // initial error limit when one is switched on; linear RMSE
@@ -162,4 +163,9 @@ function addQuality(gui: GUI, kit: PanelKit): void {
   kit.showWhen((states) => states.errorLimit, limit);
   kit.note(folder, () => qualityHint(host.view()));
   kit.toggle(folder, "lossless final", keyAccess("/quality/lossless"));
+  const video = { value: videoUse.value };
+  folder
+    .add(video, "value", ["auto", "never"] satisfies VideoUse[])
+    .name("video for slow links")
+    .onChange((use: VideoUse) => videoUse.set(use));
 }

@@ -47,6 +47,9 @@ export function encodingLabel(
   { codec, jpegError }: FrameHeader,
   metric: ErrorMetric = "rmse",
 ): LabelText {
+  if (codec === "h264") {
+    return { text: "", title: "A picture of a video stream, because the link is slow." };
+  }
   if (codec === "png") {
     return { text: "PNG lossless", title: "The picture was encoded without loss." };
   }

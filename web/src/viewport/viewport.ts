@@ -1,10 +1,12 @@
 // Encoded frames -> canvas. Only the newest is shown: a frame decoded after a newer one was drawn
 // is discarded, and a frame replaced while waiting is not decoded, so at most three are in memory.
+// Frames of video are all decoded.
 // Frames of any size fill the canvas. The displayed state is also published as data attributes of
 // the canvas (seq, rev, step, state, level, width, height) for tests and style sheets.
 import { frameState } from "./frame_text";
 import type { Frame, FrameHeader } from "../wire/protocol";
 import { clamp } from "../base/values";
+import { VideoPictures } from "./video_pictures";
 
 export interface DrawnFrame {
   header: FrameHeader;
@@ -18,6 +20,7 @@ export interface ViewportEvents {
   decoded(header: FrameHeader, decodeMs: number): void;
   drawn(frame: DrawnFrame): void;
   broken(header: FrameHeader): void; // the frame could not be decoded
+  videoFailed(): void; // frames of video cannot be decoded
   resized(): void; // size() may have changed
 }
 
@@ -72,6 +75,7 @@ export class Viewport {
   private decoding = 0;
   // the newest frame while decodesMax others are being decoded
   private waiting: Frame | null = null;
+  private readonly video: VideoPictures;
 
   constructor(
     readonly canvas: HTMLCanvasElement,
@@ -80,6 +84,7 @@ export class Viewport {
     const context = canvas.getContext("2d", { alpha: false });
     if (context === null) throw new Error("the browser has no 2-D canvas");
     this.context = context;
+    this.video = new VideoPictures(() => this.events.videoFailed());
     new ResizeObserver(() => this.report()).observe(canvas);
     window.addEventListener("resize", () => this.report());
     this.watchDensity();
@@ -111,10 +116,12 @@ export class Viewport {
     this.session += 1;
     this.drawn = null;
     this.waiting = null;
+    this.video.end();
   }
 
   // A replaced frame is not acknowledged itself: an acknowledgement covers all earlier frames.
   async show(frame: Frame): Promise<void> {
+    if (frame.header.codec === "h264") return this.showVideo(frame);
     if (this.decoding >= decodesMax) {
       this.waiting = frame;
       return;
@@ -143,33 +150,46 @@ export class Viewport {
       if (session === this.session) this.events.broken(header);
       return;
     }
-    const decodeMs = performance.now() - arrivedAt;
-    if (session === this.session) {
-      this.events.decoded(header, decodeMs);
-      if (header.seq > (this.drawn?.seq ?? 0)) {
-        this.draw(bitmap, header);
-        this.drawn = header;
-        this.events.drawn({ header, decodeMs, arrivedAt, drawnAt: performance.now() });
-      }
-    }
+    if (session === this.session) this.take(bitmap, header, arrivedAt);
     bitmap.close();
   }
 
-  private draw(bitmap: ImageBitmap, header: FrameHeader): void {
+  private async showVideo(frame: Frame): Promise<void> {
+    const arrivedAt = performance.now();
+    const session = this.session;
+    const picture = await this.video.decode(frame);
+    if (session === this.session) {
+      if (picture !== null) this.take(picture, frame.header, arrivedAt);
+      else this.events.decoded(frame.header, 0); // returns its credit
+    }
+    picture?.close();
+  }
+
+  private take(picture: ImageBitmap | VideoFrame, header: FrameHeader, arrivedAt: number): void {
+    const decodeMs = performance.now() - arrivedAt;
+    this.events.decoded(header, decodeMs);
+    if (header.seq <= (this.drawn?.seq ?? 0)) return;
+    this.draw(picture, header);
+    this.drawn = header;
+    this.events.drawn({ header, decodeMs, arrivedAt, drawnAt: performance.now() });
+  }
+
+  // A picture of video has even sides; the header tells how much of it belongs to the frame.
+  private draw(bitmap: ImageBitmap | VideoFrame, header: FrameHeader): void {
     const { canvas, context } = this;
     const [width, height] = this.size();
     if (canvas.width !== width || canvas.height !== height) {
       canvas.width = width; // clears the canvas; the picture is drawn before the next repaint
       canvas.height = height;
     }
-    const place = pictureRect(canvas, bitmap);
+    const place = pictureRect(canvas, header);
     if (place[2] < width || place[3] < height) context.clearRect(0, 0, width, height);
     context.imageSmoothingEnabled = true;
     // Without a GPU, high-quality scaling takes as long as a display frame, so it is used only at
     // rest.
     const state = frameState(header, this.drawn);
     context.imageSmoothingQuality = state === "moving" ? "low" : "high";
-    context.drawImage(bitmap, ...place);
+    context.drawImage(bitmap, 0, 0, header.width, header.height, ...place);
     canvas.dataset.seq = String(header.seq);
     canvas.dataset.rev = String(header.rev);
     canvas.dataset.step = String(header.step);

@@ -31,10 +31,11 @@ export interface FrameHeader {
   errorMeasured: boolean;
   errorEstimated: boolean;
   cached: boolean;
+  key: boolean; // of H.264: refers to no other frame
   flags: number;
   width: number; // pixels, as rendered
   height: number;
-  codec: "jpeg" | "png";
+  codec: "jpeg" | "png" | "h264";
   quality: number;
   method: "kernel" | "slab" | "reference";
   level: number; // 0 full resolution, n = 1/2^n
@@ -57,7 +58,7 @@ export class WireError extends Error {
 }
 
 const magic = 0x4c505357; // "WSPL" read little-endian
-const codecs = { 1: "jpeg", 2: "png" } as const;
+const codecs = { 1: "jpeg", 2: "png", 3: "h264" } as const;
 const methods = { 1: "kernel", 2: "slab", 3: "reference" } as const;
 
 function named<T>(names: Record<number, T>, code: number, what: string): T {
@@ -90,6 +91,7 @@ export function parseFrameHeader(bytes: Uint8Array): FrameHeader {
     errorMeasured: (flags & 2) !== 0,
     errorEstimated: (flags & 4) !== 0,
     cached: (flags & 8) !== 0,
+    key: (flags & 16) !== 0,
     width: data.getUint16(24, true),
     height: data.getUint16(26, true),
     codec: named(codecs, data.getUint8(28), "codec"),

@@ -1,0 +1,11 @@
+// Whether moving frames may be video over slow links. Kept for the session of the tab; not part of
+// the view.
+import { Observable } from "../base/observable";
+import { orNull } from "../base/storage";
+
+export type VideoUse = "auto" | "never";
+
+const storageKey = "windsplat.video";
+const stored = orNull(() => sessionStorage.getItem(storageKey));
+export const videoUse = new Observable<VideoUse>(stored === "never" ? "never" : "auto");
+videoUse.watch((use) => orNull(() => sessionStorage.setItem(storageKey, use)));
