@@ -11,7 +11,9 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "edge"))
 from wire_client import BINARY, TEXT, Closed, Target, WebSocket  # noqa: E402
 
-FINAL = 1  # bit of the frame header's flags
+FINAL = 1  # bits of the frame header's flags
+KEY = 16
+H264 = 3  # codec of the frame header
 FRAME_HEADER_BYTES = 64
 
 
@@ -21,7 +23,8 @@ class Frame:
     def __init__(self, payload, text_bytes, now):
         self.seq, self.rev, _, flags = struct.unpack_from("<4I", payload, 8)
         self.width, self.height = struct.unpack_from("<2H", payload, 24)
-        self.quality, self.level = payload[29], payload[31]
+        self.codec, self.quality, self.level = payload[28], payload[29], payload[31]
+        self.key = bool(flags & KEY)
         self.queue_s, self.render_s, self.encode_s = (
             us * 1e-6 for us in struct.unpack_from("<3I", payload, 40))
         self.t = struct.unpack_from("<d", payload, 56)[0] * 1e-3
@@ -42,6 +45,9 @@ class LinkViewer(WebSocket):
         self.rev = 0
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
+
+    def announce_video(self):
+        self.say({"type": "video", "codecs": ["avc1.640033"]})
 
     def patch(self, patch):
         self.rev += 1

@@ -3,28 +3,30 @@
 size and age. Prints a Markdown table. Linux only.
 
 Usage: links.py [--program=windsplat] [--how=auto|tunnel|proxy] [--mbit=0.5,2,...] [--trip-ms=...]
-       [--size=1280x720] [--dataset=climate] [--seconds=10] [--check] [--smoke]
+       [--size=1280x720] [--dataset=climate] [--seconds=10] [--video] [--check] [--smoke]
 
 The client changes the camera every 16 ms and acknowledges frames as they arrive. A frame's age
 is its arrival time minus the time of the newest change it shows. The link time is the round trip
 plus the bytes of the frame and of the text messages before it, divided by the rate. The render
 interval is the mean time between moving frames. A link is within bounds if the 99th percentile of
 age minus link time is at most two render intervals; --check exits 1 if any link is not. Frames of
-the first two seconds do not count, because the daemon and TCP are still adapting to the link."""
+the first two seconds do not count, because the daemon and TCP are still adapting to the link. With
+--video the client announces that it decodes H.264; the table tells the share of such frames and how
+many of them are key frames."""
 import argparse
 import math
 import statistics
 import sys
 import time
 
-from link_client import LinkViewer
+from link_client import H264, LinkViewer
 from link_path import Proxy, Tunnel, can_tunnel
 
 SETTLE_S = 2.0
 PATCH_S = 0.016
-COLUMNS = ["Mbit/s", "round trip", "frames/s", "kB", "quality", "width", "drawn in", "interval",
-           "link", "age p50", "age p99", "p99 of age - link - drawn", "p99 of age - link",
-           "<= 2 intervals", "text waits, most", "final after, s", "kB"]
+COLUMNS = ["Mbit/s", "round trip", "frames/s", "kB", "H.264", "keys", "quality", "width",
+           "drawn in", "interval", "link", "age p50", "age p99", "p99 of age - link - drawn",
+           "p99 of age - link", "<= 2 intervals", "text waits, most", "final after, s", "kB"]
 
 
 def quantile(values, share):
@@ -55,6 +57,8 @@ def measure(options, how, mbit, trip_ms):
                              f"{link.host}:0", "--allow-remote", "--allow-root"])
         port = int(daemon.stdout.readline().strip().rstrip("/").rsplit(":", 1)[1])
         viewer = LinkViewer(link.host, link.port_of(port))
+        if options.video:
+            viewer.announce_video()
         width, height = map(int, options.size.split("x"))
         viewer.patch({"dataset": options.dataset, "image": {"width": width, "height": height}})
         if viewer.wait_for_final(120) is None:
@@ -89,6 +93,8 @@ def row(options, viewer, moving, final, mbit, trip_ms, seconds, end):
     levels = sorted({f.width for f in moving})
     print(f"| {mbit:g} | {trip_ms:g} | {len(moving) / seconds:.1f} "
           f"| {statistics.mean(f.bytes for f in moving) / 1e3:.1f} "
+          f"| {sum(f.codec == H264 for f in moving) / len(moving):.0%} "
+          f"| {sum(f.key for f in moving)} "
           f"| {statistics.median(f.quality for f in moving):.0f} "
           f"| {'-'.join(str(w) for w in (levels[0], levels[-1])[:len(levels)])} "
           f"| {1e3 * statistics.median(drawn):.0f} | {1e3 * interval:.0f} "
@@ -114,6 +120,7 @@ def main():
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--dataset", default="climate")
     parser.add_argument("--seconds", type=float, default=10)
+    parser.add_argument("--video", action="store_true")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--smoke", action="store_true", help="one small, short link by each method")
     options = parser.parse_args()
