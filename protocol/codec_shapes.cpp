@@ -177,6 +177,7 @@ Json limits_json(std::int64_t image_pixels_max) {
               {"jobsRunningMax", limits::jobs_running_max},
               {"viewsMax", limits::views_max},
               {"viewsBytesMax", limits::views_bytes_max},
+              {"videoCodecsMax", limits::video_codecs_max},
               {"framesInFlightMax", limits::frames_in_flight_max},
               {"sessionsMaxDefault", limits::sessions_max_default}};
 }
