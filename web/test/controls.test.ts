@@ -272,7 +272,9 @@ test("the HUD names method and compositing, and the samples that were skipped", 
 });
 
 test("the vertical exaggeration follows the scales, and is 1 to scale", () => {
-  const wide = { ...dataset, dims: { x: 4, y: 3, z: 5 }, verticalExaggeration: 15 } as Dataset;
+  const pressures = { ...dataset, dims: { x: 4, y: 3, z: 5 }, verticalExaggeration: 15 } as Dataset;
+  const z = { ...dataset.axes.z, kind: "height" };
+  const wide = { ...pressures, axes: { ...dataset.axes, z } } as Dataset;
   const text = (geometry: View["geometry"]) => exaggerationText(wide, { geometry });
   assert.match(text({}), /drawn 15 times/);
   assert.match(text({ scale: [1, 2, 4] }), /drawn 30 times/);
@@ -280,5 +282,7 @@ test("the vertical exaggeration follows the scales, and is 1 to scale", () => {
   assert.equal(text({ mapping: "sphere" }), "");
   assert.equal(text({ heightField: "height" }), "");
   assert.equal(text({ vertical: "index" }), "");
-  assert.equal(exaggerationText(dataset, {}), "", "pressures");
+  assert.equal(exaggerationText(dataset, {}), "", "unknown");
+  assert.match(exaggerationText(pressures, {}), /drawn about 15 times/);
+  assert.equal(exaggerationText(pressures, { geometry: { vertical: "linear" } }), "");
 });
