@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/quality/pick.hpp"
 #include "server/quality/sizes.hpp"
 
 namespace windsplat::session {
