@@ -14,8 +14,7 @@ namespace windsplat::quality {
 namespace {
 
 constexpr double ms_least = 1e-3;
-constexpr double near = 0.5;   // distance below which a calibration run adds no information
-constexpr double same = 1e-6;  // distance of a viewpoint from itself, at most
+constexpr double near = 0.5;  // distance below which a calibration run adds no information
 constexpr std::size_t nearest_max = 8;
 // Correlations of the errors of settings by cause: order of kernels, fewer pixels, merged samples,
 // slabs (the residuals of the laws over the generated family).
@@ -128,6 +127,10 @@ struct ErrorObservation {
   double log_ratio = 0;
   double apart = 0;      // distance from the requested viewpoint
   double closeness = 0;  // exp(-apart)
+  // Of its content, which was a guess: standard deviation in the same units, and what it has in
+  // common with a guess at the requested viewpoint.
+  double guessed = 0;
+  double guess_shared = 0;
 };
 
 }  // namespace
@@ -144,8 +147,11 @@ class NearErrors {
       for (const Table::Entry& entry : table.entries_[i]) {
         if (!entry.log_error) continue;
         const double apart = distance(entry.viewpoint, viewpoint);
+        const double guessed =
+            std::sqrt(entry.guessed) * error_scatter(table.kind_, entry.cause).content;
         all_.push_back({i, entry.cause, &entry.viewpoint, *entry.log_error / entry.spread, apart,
-                        std::exp(-apart)});
+                        std::exp(-apart), guessed / entry.spread,
+                        1 - unknown_share(entry.viewpoint, viewpoint)});
       }
     }
     first_[settings_count] = all_.size();
@@ -160,8 +166,10 @@ class NearErrors {
   }
 
   // From the observations that correlate most: those of the setting itself, and those selected once
-  // for all settings of the cause.
-  [[nodiscard]] Kriged krige_at(std::size_t setting, Cause cause, const Scatter& scatter) {
+  // for all settings of the cause. What a guess of the content leaves out, `guessed` being its
+  // standard deviation, is common to all errors of a view, less so the farther views are apart.
+  [[nodiscard]] Kriged krige_at(std::size_t setting, Cause cause, const Scatter& scatter,
+                                double guessed) {
     const auto covariance = [&](const ErrorObservation& e, std::size_t b, Cause cause_b,
                                 double closeness) {
       const bool same = e.setting == b && e.cause == cause_b;
@@ -186,14 +194,25 @@ class NearErrors {
                       found.begin() + static_cast<std::ptrdiff_t>(count),
                       [](const Candidate& a, const Candidate& b) { return a.shared > b.shared; });
     const double noise = squared(scatter.noise);
+    const double unit = spread_of(scatter);
+    const auto alike = [](const ErrorObservation& e, std::size_t b, Cause cause_b) {
+      return e.setting == b && e.cause == cause_b ? 1 : correlation(e.cause, cause_b);
+    };
     return krige(
-        used, squared(scatter.signature) + squared(scatter.viewpoint) + noise,
-        [&](std::size_t i) { return found[i].error->log_ratio * spread_of(scatter); },
-        [&](std::size_t i) { return found[i].shared; },
+        used, squared(scatter.signature) + squared(scatter.viewpoint) + noise + squared(guessed),
+        [&](std::size_t i) { return found[i].error->log_ratio * unit; },
+        [&](std::size_t i) {
+          const ErrorObservation& e = *found[i].error;
+          return found[i].shared +
+                 alike(e, setting, cause) * unit * e.guessed * guessed * e.guess_shared;
+        },
         [&](std::size_t i, std::size_t j) {
+          const ErrorObservation& a = *found[i].error;
           const ErrorObservation& b = *found[j].error;
-          const double apart = distance(*found[i].error->viewpoint, *b.viewpoint);
-          return covariance(*found[i].error, b.setting, b.cause, std::exp(-apart)) +
+          const double apart = distance(*a.viewpoint, *b.viewpoint);
+          double guesses = squared(unit) * a.guessed * b.guessed * alike(a, b.setting, b.cause);
+          if (i != j) guesses *= 1 - unknown_share(*a.viewpoint, *b.viewpoint);
+          return covariance(a, b.setting, b.cause, std::exp(-apart)) + guesses +
                  (i == j ? noise : 0);
         });
   }
@@ -241,8 +260,9 @@ void Table::add(std::size_t setting, const Viewpoint& seen, const Measured& meas
   };
   if (is_bad(measured.error) || is_bad(measured.ms)) return;
   const Setting& how = settings[setting];
-  const Viewpoint viewpoint = measured.error ? filled(seen).viewpoint : seen;
-  Entry entry{viewpoint, {}, {}, false, !seen.content, cause_of(how, viewpoint), 1};
+  const Sight sight = measured.error ? filled(seen) : Sight{seen, seen.content ? 0.0 : 1.0};
+  const Viewpoint& viewpoint = sight.viewpoint;
+  Entry entry{viewpoint, {}, {}, false, sight.guessed, cause_of(how, viewpoint), 1};
   entry.spread = spread_of(error_scatter(kind_, entry.cause));
   if (measured.error) {
     const double error = std::max(*measured.error, error_least);
@@ -282,22 +302,28 @@ void Table::add_frame(std::size_t setting, const Viewpoint& viewpoint, double ms
 
 void Table::describe(const Viewpoint& viewpoint) {
   if (!viewpoint.content) return;
-  const auto is_same = [&](const Viewpoint& other) { return distance(other, viewpoint) < same; };
+  const auto is_same = [&](const Viewpoint& other) { return is_same_view(other, viewpoint); };
   described_.erase(std::remove_if(described_.begin(), described_.end(), is_same), described_.end());
   described_.push_back(viewpoint);
   if (described_.size() > descriptions_max) described_.pop_front();
   for (std::size_t i = 0; i < settings_count; ++i) {
     for (Entry& entry : entries_[i]) {
-      if (!entry.guessed || !entry.log_error || !is_same(entry.viewpoint)) continue;
+      if (entry.guessed == 0 || !entry.log_error || !is_same(entry.viewpoint)) continue;
       const auto log_expected = [&] {
         return std::log(expected_error(kind_, settings[i], entry.viewpoint).value);
       };
       const double log_measured = *entry.log_error + log_expected();
       entry.viewpoint.content = viewpoint.content;
       entry.log_error = log_measured - log_expected();
-      entry.guessed = false;
+      entry.guessed = 0;
     }
   }
+}
+
+std::optional<Content> Table::content(const Viewpoint& viewpoint) const {
+  const Viewpoint* const known = nearest_known(viewpoint);
+  if (known == nullptr || !is_same_view(*known, viewpoint)) return std::nullopt;
+  return known->content;
 }
 
 bool Table::begin_try() {
@@ -311,7 +337,7 @@ const Viewpoint* Table::nearest_known(const Viewpoint& viewpoint) const {
   const Viewpoint* nearest = nullptr;
   double apart = 0;
   const auto compare = [&](const Viewpoint& known) {
-    const double its = distance(known, viewpoint);
+    const double its = is_same_view(known, viewpoint) ? -1 : distance(known, viewpoint);
     if (nearest != nullptr && its >= apart) return;
     nearest = &known;
     apart = its;
@@ -319,7 +345,7 @@ const Viewpoint* Table::nearest_known(const Viewpoint& viewpoint) const {
   for (const Viewpoint& described : described_) compare(described);
   for (const std::deque<Entry>& entries : entries_) {
     for (const Entry& entry : entries) {
-      if (!entry.guessed) compare(entry.viewpoint);
+      if (entry.guessed == 0) compare(entry.viewpoint);
     }
   }
   return nearest;
@@ -329,7 +355,7 @@ Table::Sight Table::filled(const Viewpoint& viewpoint) const {
   if (viewpoint.content) return {viewpoint, 0};
   const Viewpoint* const nearest = nearest_known(viewpoint);
   if (nearest == nullptr) return {viewpoint, 1};
-  Sight out{viewpoint, -std::expm1(-distance(*nearest, viewpoint))};
+  Sight out{viewpoint, unknown_share(*nearest, viewpoint)};
   out.viewpoint.content = scaled(*nearest->content, nearest->height / viewpoint.height);
   return out;
 }
@@ -340,14 +366,14 @@ Forecast Table::forecast_at(std::size_t setting, const Sight& sight, NearErrors&
   Forecast out = prior(kind_, how, viewpoint);
   const Cause cause = cause_of(how, viewpoint);
   const Scatter& of_error = error_scatter(kind_, cause);
-  double spread = spread_of(of_error);
+  const double guessed = std::sqrt(sight.guessed) * of_error.content;
+  out.spread = std::hypot(spread_of(of_error), guessed);
   if (!errors.empty()) {
     out.measured = errors.is_measured(setting, cause);
-    const Kriged kriged = errors.krige_at(setting, cause, of_error);
+    const Kriged kriged = errors.krige_at(setting, cause, of_error, guessed);
     out.error = std::clamp(out.error * std::exp(kriged.log_ratio), error_least, 1.0);
-    spread = std::sqrt(kriged.variance);
+    out.spread = std::sqrt(kriged.variance);
   }
-  out.spread = std::hypot(spread, std::sqrt(sight.guessed) * of_error.content);
   std::vector<TimeObservation> times;
   for (const Entry& entry : entries_[setting]) {
     if (!entry.log_ms) continue;

@@ -39,7 +39,7 @@ class Table {
  public:
   static constexpr std::size_t measurements_max = 24;  // per setting
   static constexpr std::size_t studies_max = 16;
-  static constexpr std::size_t descriptions_max = 16;
+  static constexpr std::size_t descriptions_max = 64;
 
   explicit Table(const Kind& kind) : kind_(kind) {}
 
@@ -48,9 +48,11 @@ class Table {
   // and unused where a calibration run measured the setting.
   void add_frame(std::size_t setting, const Viewpoint& viewpoint, double ms);
 
-  // What is seen from a viewpoint became known. Measurements made there before count against what
-  // is expected of this content.
+  // What is seen from a viewpoint became known. Measurements made of this very view before count
+  // against what is expected of this content.
   void describe(const Viewpoint& viewpoint);
+  // The content of this very view; empty: not described, or too long ago.
+  [[nodiscard]] std::optional<Content> content(const Viewpoint& viewpoint) const;
 
   // Forecasts of all settings. Times without measurements are estimated from those with.
   [[nodiscard]] Forecasts forecasts(const Viewpoint& viewpoint) const;
@@ -83,16 +85,17 @@ class Table {
     std::optional<double> log_error;
     std::optional<double> log_ms;
     bool of_frames = false;  // log_ms is the mean of frames
-    bool guessed = false;    // the content is typical or that of another viewpoint
+    double guessed = 0;      // share of the variance of unknown content: 0 if it was known
     Cause cause = Cause::kernel;
     double spread = 1;  // standard deviation of log_error without measurements
   };
-  // The viewpoint with the content of the nearest known one, if its own is unknown.
+  // The viewpoint with the content of the nearest known one, if that of its own view is unknown.
   struct Sight {
     Viewpoint viewpoint;
     double guessed = 0;  // share of the variance of unknown content
   };
   [[nodiscard]] Sight filled(const Viewpoint& viewpoint) const;
+  // That of the same view, or the nearest one with known content; null: none.
   [[nodiscard]] const Viewpoint* nearest_known(const Viewpoint& viewpoint) const;
   [[nodiscard]] Forecast forecast_at(std::size_t setting, const Sight& sight,
                                      NearErrors& errors) const;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <list>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -24,8 +25,9 @@ class Tables {
   void add(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,
            const Measured& measured);
 
-  // See Table::describe.
+  // See Table::describe and Table::content.
   void describe(const SceneSignature& signature, const Viewpoint& viewpoint);
+  std::optional<Content> content(const SceneSignature& signature, const Viewpoint& viewpoint);
 
   // The time of a frame of a session, see Table::add_frame.
   void add_frame(const SceneSignature& signature, std::size_t setting, const Viewpoint& viewpoint,

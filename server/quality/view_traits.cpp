@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <string>
 
 #include "protocol/codec.hpp"
 
@@ -14,6 +16,18 @@ constexpr double radians_per_degree = 0.017453292519943295;
 constexpr double height_scale = 0.5;     // change of the logarithm of heights
 constexpr double pixels_scale = 1;       // change of the logarithm of pixels
 constexpr double direction_scale = 1.2;  // radians
+// Of another view at a distance of 0: moved sideways, of another step, or of another width.
+constexpr double unknown_share_least = 0.1;
+
+std::uint64_t identity_of(const protocol::View& view) {
+  protocol::View shown;
+  shown.camera = view.camera;
+  shown.step = view.step;
+  shown.image.width = view.image.width;
+  shown.image.height = view.image.height;
+  shown.vector.motion_time = view.vector.motion_time;
+  return std::max<std::uint64_t>(std::hash<std::string>{}(protocol::encode_view(shown)), 1);
+}
 
 }  // namespace
 
@@ -21,6 +35,8 @@ Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise) {
   Viewpoint viewpoint = otherwise;
   viewpoint.width = view.image.width;
   viewpoint.pixels_high = view.image.height;
+  viewpoint.identity = identity_of(view);
+  if (!is_same_view(viewpoint, otherwise)) viewpoint.content.reset();
   viewpoint.detail *= static_cast<double>(viewpoint.pixels_high) / otherwise.pixels_high;
   if (!view.camera.eye || !view.camera.target) return viewpoint;
   protocol::Vec3 way{};
@@ -36,9 +52,6 @@ Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise) {
           ? *view.camera.height
           : 2 * length * std::tan(0.5 * radians_per_degree * view.camera.fov_y);
   viewpoint.detail *= otherwise.height / viewpoint.height;
-  if (viewpoint.content) {
-    viewpoint.content = scaled(*viewpoint.content, otherwise.height / viewpoint.height);
-  }
   return viewpoint;
 }
 
@@ -90,6 +103,11 @@ SceneSignature signature_of(const protocol::View& completed) {
   signature.key = protocol::encode_view(view);
   signature.dataset = completed.dataset;
   return signature;
+}
+
+double unknown_share(const Viewpoint& a, const Viewpoint& b) {
+  if (is_same_view(a, b)) return 0;
+  return 1 - (1 - unknown_share_least) * std::exp(-distance(a, b));
 }
 
 double distance(const Viewpoint& a, const Viewpoint& b) {

@@ -1,6 +1,7 @@
 // The properties of a view that determine its error and time: scene signature and viewpoint.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -19,10 +20,19 @@ struct Viewpoint {
   // or unknown.
   double detail = 0;
   std::optional<Content> content = std::nullopt;  // empty: unknown
+  // Hash of everything in the view beside its scene signature that changes what it shows: camera,
+  // step, phase of motion and size of the picture. 0: unknown.
+  std::uint64_t identity = 0;
 };
 
+// Whether both are of the same view, if they are of the same scene signature.
+inline bool is_same_view(const Viewpoint& a, const Viewpoint& b) {
+  return a.identity != 0 && a.identity == b.identity;
+}
+
 // The viewpoint of a view; values that the view leaves to defaults are taken from `otherwise`. The
-// detail and the content are those of `otherwise`, scaled by the size of the volume in the picture.
+// detail is that of `otherwise`, scaled by the size of the volume in the picture. The content is
+// that of `otherwise` if this is of the same view, and else unknown.
 Viewpoint viewpoint_of(const protocol::View& view, const Viewpoint& otherwise = {});
 
 // Stop transmittance of reference pictures. Of pixels that all end there, less is lost than the
@@ -47,6 +57,10 @@ struct SceneSignature {
   Kind kind;
 };
 SceneSignature signature_of(const protocol::View& completed);
+
+// Share of the variance of unknown content that is left where the content of a view is that of
+// another one: 0 for the same view, 1 far away.
+double unknown_share(const Viewpoint& a, const Viewpoint& b);
 
 // Distance of two viewpoints; at about 1, measurements at one are hardly informative about the
 // other.

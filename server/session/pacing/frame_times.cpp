@@ -57,7 +57,11 @@ quality::Forecasts FrameTimes::uncorrected(const protocol::View& view,
     signature = {{}, view.dataset, *another};
     last.content.reset();
   }
-  const quality::Viewpoint viewpoint = quality::viewpoint_of(view, last);
+  quality::Viewpoint viewpoint = quality::viewpoint_of(view, last);
+  if (!another && viewpoint.identity == asked_identity_) {
+    viewpoint.identity = last.identity;
+    viewpoint.content = last.content;
+  }
   if (forecaster_) return forecaster_(signature, viewpoint);
   return quality::Table(signature.kind).forecasts(viewpoint);
 }
@@ -106,6 +110,7 @@ void FrameTimes::complete(const protocol::View& view, const Drawn& drawn) {
   drawn_key_ = quality::signature_of(view).key;
   signature_ = drawn.signature;
   viewpoint_ = drawn.viewpoint;
+  asked_identity_ = quality::viewpoint_of(view).identity;
   halvings_ = drawn.halvings;
   drawn_size_ = {view.image.width, view.image.height};
 }
@@ -164,6 +169,7 @@ void FrameTimes::learn_final(Micros cost, const protocol::View& view, Micros now
 void FrameTimes::forget() {
   drawn_key_.clear();
   viewpoint_ = {};
+  asked_identity_ = 0;
   drawn_size_ = {};
   measured_ = {};
   final_factor_.reset();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -79,6 +80,7 @@ class FrameTimes {
   std::string drawn_key_;              // key of the view drawn last, before completion
   quality::SceneSignature signature_;  // known after completion
   quality::Viewpoint viewpoint_;
+  std::uint64_t asked_identity_ = 0;  // of the view drawn last, before completion
   quality::Halvings halvings_{};
   quality::PictureSize drawn_size_;  // of the view
   Measured measured_;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "server/quality/laws.hpp"
 #include "server/quality/pick.hpp"
@@ -23,6 +24,13 @@ const Kind kind{true, true, 1.4, 1};
 Viewpoint sight_at(double steps) {
   Viewpoint viewpoint{std::exp(0.5 * steps), {0, 1, 0}, 640, 480};
   viewpoint.content.emplace();
+  viewpoint.identity = std::hash<double>{}(steps) | 1U;
+  return viewpoint;
+}
+
+// Moved sideways, or of another step.
+Viewpoint beside(Viewpoint viewpoint) {
+  viewpoint.identity += 2;
   return viewpoint;
 }
 
@@ -138,7 +146,8 @@ TEST(Table, GuessedContentOfAMeasurementStaysAGuess) {
   EXPECT_GT(table.forecast(merged, unknown).spread, 1.02 * known);
 }
 
-// A typical content is least certain, and that of another viewpoint the less the farther it is.
+// A typical content is least certain, and that of another view the less the farther it is; only the
+// content of the very same view is certain.
 TEST(Table, GuessedContentWidensTheSpread) {
   const auto unknown_at = [](double steps) {
     Viewpoint viewpoint = sight_at(steps);
@@ -152,14 +161,60 @@ TEST(Table, GuessedContentWidensTheSpread) {
   table.add(half, sight_at(0), {1e-3, {}});
   EXPECT_NEAR(table.forecast(half, unknown_at(0)).spread, table.forecast(half, sight_at(0)).spread,
               1e-12)
-      << "the content of this very viewpoint";
-  double last = 0;
+      << "the content of this very view";
+  const double moved = table.forecast(half, beside(unknown_at(0))).spread;
+  double last = moved - table.forecast(half, beside(sight_at(0))).spread;
+  EXPECT_GT(last, 1e-3) << "the content of a view beside it";
   for (const double steps : {0.5, 1.0, 2.0}) {
     const double known = table.forecast(half, sight_at(steps)).spread;
     const double guessed = table.forecast(half, unknown_at(steps)).spread;
     EXPECT_GT(guessed - known, last) << steps;
     last = guessed - known;
   }
+}
+
+// Panned cameras and other steps have the same viewpoint but for their identity.
+TEST(Table, DescribingAViewLeavesThoseBesideItAsTheyAre) {
+  Viewpoint seen = sight_at(0);
+  seen.content->cell *= 3;
+  Viewpoint other = beside(sight_at(0));
+  Table table(kind);
+  table.describe(seen);
+  table.describe(other);
+  ASSERT_TRUE(table.content(seen));
+  EXPECT_EQ(table.content(seen)->cell, seen.content->cell);
+  ASSERT_TRUE(table.content(other));
+  EXPECT_EQ(table.content(other)->cell, other.content->cell);
+  EXPECT_FALSE(table.content(beside(other))) << "not described";
+  seen.content.reset();
+  EXPECT_EQ(table.forecast(half, seen).spread, prior(kind, settings[half], sight_at(0)).spread);
+  for (std::size_t n = 0; n < Table::descriptions_max; ++n) {
+    table.describe(sight_at(static_cast<double>(n + 1)));
+  }
+  EXPECT_FALSE(table.content(seen)) << "no more are kept";
+}
+
+// Measured of another view whose content is a guess: what the guess leaves out is not an error of
+// the law.
+TEST(Table, AMeasurementOfGuessedContentCorrectsKnownContentLess) {
+  const double ratio = 3;
+  const auto correction = [&](bool known) {
+    Table table(kind);
+    Viewpoint measured = sight_at(0);
+    if (!known) measured.content.reset();
+    table.add(half, measured, {ratio * prior_of(half, sight_at(0)), {}});
+    return table.forecast(half, beside(sight_at(0))).error / prior_of(half, sight_at(0));
+  };
+  EXPECT_GT(correction(true), 1.8);
+  EXPECT_GT(correction(false), 1.02);
+  EXPECT_LT(correction(false), 0.95 * correction(true));
+  // At the measured view itself, of the same guess, the measurement holds.
+  Table table(kind);
+  Viewpoint unknown = sight_at(0);
+  unknown.content.reset();
+  const double error = ratio * prior(kind, settings[half], unknown).error;
+  table.add(half, unknown, {error, {}});
+  EXPECT_NEAR(table.forecast(half, unknown).error / error, 1, 0.03);
 }
 
 TEST(Table, ErrorMeasurementsNeverReplaceTimes) {

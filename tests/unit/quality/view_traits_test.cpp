@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <vector>
 
 namespace windsplat::quality {
 namespace {
@@ -54,6 +56,46 @@ TEST(Viewpoint, DetailIsScaledFromTheOther) {
   view.image.height = 960;
   EXPECT_NEAR(viewpoint_of(view, known).detail, 2, 1e-12);
   EXPECT_EQ(viewpoint_of(view).detail, 0) << "unknown";
+}
+
+// Each of these changes what is seen and none the scene signature.
+TEST(Viewpoint, IdentityIsThatOfTheView) {
+  const Viewpoint own = viewpoint_of(completed());
+  EXPECT_TRUE(is_same_view(own, viewpoint_of(completed())));
+  EXPECT_FALSE(is_same_view({}, {})) << "unknown";
+  const std::vector<std::function<void(protocol::View&)>> changes{
+      [](auto& view) { view.step = 1; },
+      [](auto& view) { view.image.width += 1; },
+      [](auto& view) { view.image.height += 1; },
+      [](auto& view) { view.vector.motion_time = 0.5; },
+      [](auto& view) { view.camera.fov_y += 1; },
+      [](auto& view) {
+        view.camera.up = {1, 0, 0};
+      },
+      [](auto& view) {
+        (*view.camera.eye)[0] += 0.1;
+        (*view.camera.target)[0] += 0.1;
+      },
+  };
+  for (std::size_t n = 0; n < changes.size(); ++n) {
+    protocol::View view = completed();
+    changes[n](view);
+    EXPECT_EQ(signature_of(view).key, signature_of(completed()).key) << n;
+    EXPECT_FALSE(is_same_view(viewpoint_of(view), own)) << n;
+  }
+  protocol::View same = completed();
+  same.quality.max_error = 0.01;
+  same.method.name = protocol::MethodName::kernel;
+  EXPECT_TRUE(is_same_view(viewpoint_of(same), own));
+}
+
+TEST(Viewpoint, ContentOfAnotherViewIsNotTaken) {
+  protocol::View view = completed();
+  Viewpoint known = viewpoint_of(view);
+  known.content.emplace();
+  EXPECT_TRUE(viewpoint_of(view, known).content);
+  view.step = 1;
+  EXPECT_FALSE(viewpoint_of(view, known).content);
 }
 
 TEST(SceneSignature, DoesNotDependOnCameraAndStep) {
