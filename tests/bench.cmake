@@ -29,7 +29,9 @@ windsplat_bench(bench_kernels)
 windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
 windsplat_bench(bench_path)
 windsplat_bench(bench_left_out)
-windsplat_bench(bench_estimates ${naive_dir}/trial_fields.cpp ${naive_dir}/family/family.cpp)
+windsplat_bench(bench_estimates ${bench_dir}/scenes/scene_set.cpp
+  ${bench_dir}/scenes/time_estimates.cpp ${naive_dir}/trial_fields.cpp
+  ${naive_dir}/family/family.cpp)
 windsplat_bench(bench_pool)
 windsplat_bench(bench_picture)
 windsplat_bench(bench_load)

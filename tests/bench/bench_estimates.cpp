@@ -3,6 +3,8 @@
 //
 //   bench_estimates --measure=FILE [--members=N --scenes=N --views=N]
 //   bench_estimates --list=FILE
+//   bench_estimates --times=SIDE    forecast and measured times of generated scenes
+//   bench_estimates --family-times=N  the same for N members of each kind of generated data
 //   bench_estimates                 the time of forecasts
 #include <array>
 #include <chrono>
@@ -24,6 +26,7 @@
 #include "server/quality/table.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
+#include "tests/bench/scenes/time_estimates.hpp"
 #include "tests/bench/support.hpp"
 #include "tests/bench/text_table.hpp"
 #include "tests/numerics/family/family.hpp"
@@ -204,7 +207,11 @@ int main(int argc, char** argv) {
     const int scenes = number("--scenes", 9);
     measure(measured, members, scenes, number("--views", 2));
   }
+  const int side = number("--times", 0);
+  const int family = number("--family-times", 0);
   if (!listed.empty()) list(read(listed));
-  if (measured.empty() && listed.empty()) time_forecasts();
+  if (side > 0) list_times(side);
+  if (family > 0) list_family_times(family, 2);
+  if (measured.empty() && listed.empty() && side <= 0 && family <= 0) time_forecasts();
   return 0;
 }

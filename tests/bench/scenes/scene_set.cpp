@@ -145,8 +145,9 @@ std::vector<GeneratedScene> generated_scenes(int side) {
   return out;
 }
 
-scene::Scene scene_of(const GeneratedScene& scene, data::Dataset& dataset, Content content,
-                      const Size& size, protocol::MethodName method) {
+scene::CompletedView completed_view_of(const GeneratedScene& scene, data::Dataset& dataset,
+                                       Content content, const Size& size,
+                                       protocol::MethodName method, protocol::Detail detail) {
   protocol::View view;
   view.dataset = dataset.info().id;
   view.geometry = scene.geometry;
@@ -159,14 +160,21 @@ scene::Scene scene_of(const GeneratedScene& scene, data::Dataset& dataset, Conte
   view = completed.view();
   scene::orbit(view, completed.lattice(), 20, 35, 1);
   view.method.name = method;
-  view.method.detail = protocol::Detail::full;
+  view.method.detail = detail;
   if (scene.every_line && view.vector.magnitude_range) {
     view.vector.min_magnitude = 1e-3 * (*view.vector.magnitude_range)[1];
   }
   if (scene.cloudy_share > 0) {
     for (protocol::ScalarView& layer : *view.scalars) cover(scene.cloudy_share, dataset, layer);
   }
-  return value_or_give_up(scene::build_scene(view, dataset));
+  return value_or_give_up(scene::complete(view, dataset));
+}
+
+scene::Scene scene_of(const GeneratedScene& scene, data::Dataset& dataset, Content content,
+                      const Size& size, protocol::MethodName method) {
+  const auto completed =
+      completed_view_of(scene, dataset, content, size, method, protocol::Detail::full);
+  return value_or_give_up(scene::build_scene(completed, dataset));
 }
 
 }  // namespace windsplat::bench

@@ -8,6 +8,7 @@
 
 #include "protocol/view.hpp"
 #include "server/data/resident/dataset.hpp"
+#include "server/scene/completed_view.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::bench {
@@ -32,7 +33,12 @@ struct Size {
   int width, height;
 };
 
-// Seen from azimuth 20, elevation 35 (degrees), with every sample.
+// Seen from azimuth 20, elevation 35 (degrees).
+scene::CompletedView completed_view_of(const GeneratedScene& scene, data::Dataset& dataset,
+                                       Content content, const Size& size,
+                                       protocol::MethodName method, protocol::Detail detail);
+
+// The same with every sample.
 scene::Scene scene_of(const GeneratedScene& scene, data::Dataset& dataset, Content content,
                       const Size& size, protocol::MethodName method);
 
