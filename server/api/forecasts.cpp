@@ -7,10 +7,10 @@
 #include "protocol/codec.hpp"
 #include "protocol/measurements.hpp"
 #include "server/api/resources.hpp"
-#include "server/frame/measure.hpp"
 #include "server/http/problem.hpp"
 #include "server/quality/curve.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/tasks/calibration_job.hpp"
 
 namespace windsplat::api {
 namespace {
@@ -37,13 +37,17 @@ Error naming_the_way_out(Error error) {
   return error;
 }
 
-Result<protocol::ForecastDescription> forecast(quality::Tables& tables, const protocol::View& view,
-                                               data::Dataset resident) {
+Result<protocol::ForecastDescription> forecast(tasks::Backend& backend, const protocol::View& view,
+                                               data::Dataset resident, const CancelToken& cancel) {
   const auto completed = scene::complete(view, resident);
   if (!completed) return naming_the_way_out(completed.error());
-  return quality::curve(completed->view(),
-                        tables.forecasts(quality::signature_of(completed->view()),
-                                         frame::viewpoint_of(*completed, resident)));
+  const auto described = tasks::describe_view(backend, *completed, resident, cancel);
+  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "forecast cancelled");
+  const quality::Forecasts known =
+      backend.quality.forecasts(quality::signature_of(completed->view()), described.viewpoint);
+  // That of a JPEG: the format is not known before the picture is requested.
+  const double encoding_ms = backend.request_times.encoding_ms(frame::Format::jpeg, 1);
+  return quality::curve(completed->view(), known, encoding_ms);
 }
 
 }  // namespace
@@ -66,8 +70,9 @@ void post_forecast(tasks::Backend& backend, const http::Request& request, http::
   }
   // No dataset id: the job reads no data, so it waits only while all loading threads are busy.
   run_later(backend.loads, request, std::move(reply), "a forecast", nullptr,
-            [&backend, view = std::move(*view), dataset = *dataset]() -> http::Response {
-              const auto made = forecast(backend.quality, view, dataset->resident_only());
+            [&backend, view = std::move(*view), dataset = *dataset,
+             cancel = request.cancel]() -> http::Response {
+              const auto made = forecast(backend, view, dataset->resident_only(), cancel);
               return made ? json_response(protocol::encode_forecast(*made))
                           : http::problem_response(made.error());
             });

@@ -1,5 +1,6 @@
 // Pictures: a query or a posted view becomes a render job; the response has the encoded picture and
 // its report.
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <utility>
@@ -8,7 +9,6 @@
 #include "protocol/limits.hpp"
 #include "server/api/resources.hpp"
 #include "server/frame/frame_info.hpp"
-#include "server/frame/measure.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
@@ -16,6 +16,7 @@
 #include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/presets.hpp"
+#include "server/tasks/calibration_job.hpp"
 #include "server/tasks/drawing.hpp"
 #include "server/tasks/error_report.hpp"
 #include "server/tasks/run_guarded.hpp"
@@ -123,14 +124,35 @@ bool is_chosen(const protocol::View& view) {
   return view.quality.budget_ms || view.quality.max_error;
 }
 
+// Whether a picture is described for its limits: not if this is expected to take more than a
+// quarter of the budget. The tables' guess of what it shows decides then, as for moving frames.
+bool is_worth_describing(tasks::Backend& backend, const protocol::View& view) {
+  constexpr double share = 0.25;
+  return !view.quality.budget_ms ||
+         backend.request_times.describing_ms(view.dataset) <= share * *view.quality.budget_ms;
+}
+
+// The viewpoint of a picture with limits, described from its scene if there is one and the budget
+// allows it.
+frame::Described viewpoint_for_limits(tasks::Backend& backend,
+                                      const scene::CompletedView& completed,
+                                      const scene::Scene* scene, const CancelToken& cancel) {
+  if (scene == nullptr || !is_worth_describing(backend, completed.view())) {
+    return {frame::known_viewpoint_of(completed, backend.quality)};
+  }
+  return tasks::describe_view(backend, completed, *scene, cancel);
+}
+
 // At the setting that its limits need. What the view shows decides, so its data become resident
 // first; a picture at the view's own setting is drawn from that scene. Errors: not_resident if
-// nothing may be loaded.
+// nothing may be loaded; cancelled.
 Result<tasks::PreparedPtr> prepare_limited(tasks::Backend& backend,
                                            const scene::CompletedView& completed,
-                                           const frame::Encoding& encoding, data::Dataset& dataset,
-                                           tasks::Loading loading) {
+                                           frame::Encoding encoding, data::Dataset& dataset,
+                                           tasks::Loading loading, const CancelToken& cancel) {
   const protocol::View& view = completed.view();
+  // Not after drawing: the budget does not allow it, or it was done before.
+  encoding.describe = false;
   std::optional<frame::Prepared> own;
   {
     auto prepared = frame::prepare(completed, frame::own_setting(completed), dataset, encoding);
@@ -142,13 +164,16 @@ Result<tasks::PreparedPtr> prepare_limited(tasks::Backend& backend,
       return prepared.error();
     }
   }
-  const quality::Viewpoint viewpoint = frame::viewpoint_of(completed, own ? &own->scene : nullptr);
-  auto known = backend.quality.forecasts(quality::signature_of(view), viewpoint);
-  for (std::size_t i = 0; i < known.size(); ++i) {
-    const double pixels = quality::pixels_at(view, quality::settings[i]);
-    known[i].ms += backend.request_times.encoding_ms(encoding.format, pixels);
+  const auto [viewpoint, describe_us] =
+      viewpoint_for_limits(backend, completed, own ? &own->scene : nullptr, cancel);
+  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "request cancelled");
+  const auto known = quality::with_encoding(
+      view, backend.quality.forecasts(quality::signature_of(view), viewpoint),
+      backend.request_times.encoding_ms(encoding.format, 1));
+  quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
+  if (aim.budget_ms) {
+    *aim.budget_ms = std::max(0.0, *aim.budget_ms - 1e-3 * static_cast<double>(describe_us));
   }
-  const quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
   const quality::Setting& setting = quality::settings[quality::pick(view, known, aim).setting];
   if (own && setting == own->setting) {
     own->content = viewpoint.content;
@@ -172,7 +197,8 @@ http::Response unchanged_response(const std::string& etag) {
 // completed view, which may require reading data, so it is not known earlier.
 Result<tasks::PreparedPtr> prepare(tasks::Backend& backend, const Picture& picture,
                                    tasks::ViewCompletion& completion, data::Dataset& dataset,
-                                   tasks::Loading loading, const http::Reply& reply) {
+                                   tasks::Loading loading, const http::Reply& reply,
+                                   const CancelToken& cancel) {
   const auto completed = complete(picture, completion, dataset);
   if (!completed) {
     if (loading == tasks::Loading::none) return completed.error();
@@ -187,10 +213,12 @@ Result<tasks::PreparedPtr> prepare(tasks::Backend& backend, const Picture& pictu
     }
   }
   if (is_chosen(view) && view.method.name != protocol::MethodName::reference) {
-    return prepare_limited(backend, *completed, picture.encoding, dataset, loading);
+    return prepare_limited(backend, *completed, picture.encoding, dataset, loading, cancel);
   }
-  return tasks::prepare_picture(*completed, frame::own_setting(*completed), picture.encoding,
-                                dataset, loading);
+  auto own = tasks::prepare_picture(*completed, frame::own_setting(*completed), picture.encoding,
+                                    dataset, loading);
+  if (own) (*own)->frame.content = frame::known_viewpoint_of(*completed, backend.quality).content;
+  return own;
 }
 
 Result<http::Response> draw(tasks::Backend& backend, const Picture& picture,
@@ -202,6 +230,7 @@ Result<http::Response> draw(tasks::Backend& backend, const Picture& picture,
   protocol::FrameInfo info = frame::frame_info(*drawn, drawn->view);
   tasks::report_error(*drawn, tasks::observed_in(*drawn, prepared.frame.setting),
                       prepared.frame.setting, prepared.frame.encoding, backend.quality, info);
+  tasks::learn_describing(backend, drawn->view.dataset, drawn->describe_us);
   backend.metrics.stage_took(metrics::Metrics::Stage::queue, queue_us);
   backend.metrics.stage_took(metrics::Metrics::Stage::render, drawn->render_us);
   backend.metrics.stage_took(metrics::Metrics::Stage::encode, drawn->encode_us);
@@ -260,7 +289,10 @@ void submit_picture(tasks::Backend& backend, access::Admission& admission, Pictu
                      id = request.id](data::Dataset& available, tasks::Loading loading) {
     return tasks::run_guarded<tasks::PreparedPtr>(
         "preparing a picture", cancel,
-        [&] { return prepare(backend, *picture, *completion, available, loading, *answer); }, id);
+        [&] {
+          return prepare(backend, *picture, *completion, available, loading, *answer, cancel);
+        },
+        id);
   };
   drawing.draw = [&backend, picture, answer, cancel, id = request.id](
                      const tasks::PreparedPicture& prepared, data::Dataset& resident,

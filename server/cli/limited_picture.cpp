@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "protocol/codec.hpp"
+#include "server/frame/content.hpp"
 #include "server/frame/frame_info.hpp"
 #include "server/frame/measure.hpp"
 #include "server/quality/pick.hpp"
@@ -54,7 +55,7 @@ std::string short_text(double value) {
 Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
                                         const CancelToken& cancel) {
   const quality::SceneSignature signature = quality::signature_of(completed.view());
-  if (!tables_.begin_study(signature, frame::viewpoint_of(completed, dataset_))) return {};
+  if (!tables_.begin_study(signature, frame::viewpoint_of(completed, nullptr))) return {};
   if (auto loaded = frame::load_for_calibration(completed, dataset_, cancel); !loaded) {
     return loaded.error();
   }
@@ -62,7 +63,8 @@ Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
   const auto keep = [&](const frame::CalibrationSample& found) {
     tables_.add(signature, found.setting, found.viewpoint, found.measured);
   };
-  const auto done = frame::calibrate(completed, resident, pool_, cancel, workspace_, keep);
+  const auto content = frame::described(completed, resident, tables_, cancel).viewpoint.content;
+  const auto done = frame::calibrate(completed, resident, pool_, cancel, workspace_, keep, content);
   tables_.end_study(signature, static_cast<bool>(done));
   // Without memory for these pictures, the setting follows from the measurements made so far and
   // from forecasts.
@@ -71,14 +73,13 @@ Result<void> LimitedPictures::calibrate(const scene::CompletedView& completed,
   return short_of_memory ? Result<void>() : done;
 }
 
-quality::Setting LimitedPictures::setting_of(const scene::CompletedView& completed) {
+quality::Setting LimitedPictures::setting_of(const scene::CompletedView& completed,
+                                             const CancelToken& cancel) {
   const protocol::View& view = completed.view();
   if (!is_limited(view)) return frame::own_setting(completed);
-  auto known =
-      tables_.forecasts(quality::signature_of(view), frame::viewpoint_of(completed, dataset_));
-  for (std::size_t i = 0; i < known.size(); ++i) {
-    known[i].ms += encode_ms_a_pixel_ * quality::pixels_at(view, quality::settings[i]);
-  }
+  const auto viewpoint = frame::described(completed, dataset_, tables_, cancel).viewpoint;
+  const auto known = quality::with_encoding(
+      view, tables_.forecasts(quality::signature_of(view), viewpoint), encode_ms_a_pixel_);
   const quality::Aim aim{view.quality.budget_ms, view.quality.max_error};
   return quality::settings[quality::pick(view, known, aim).setting];
 }
@@ -95,6 +96,7 @@ Result<Picture> LimitedPictures::draw_at(const scene::CompletedView& completed,
     prepared = frame::prepare(completed, setting, dataset_, encoding);
     if (!prepared) return prepared.error();
   }
+  prepared->content = frame::known_viewpoint_of(completed, tables_).content;
   auto drawn = frame::produce(*prepared, dataset_, pool_, cancel, workspace_);
   if (!drawn) return drawn.error();
   encode_ms_a_pixel_ =
@@ -116,12 +118,12 @@ Result<Picture> LimitedPictures::draw(const protocol::View& view, const CancelTo
   if (is_limited(completed->view())) {
     if (auto done = calibrate(*completed, cancel); !done) return done.error();
   }
-  quality::Setting setting = setting_of(*completed);
+  quality::Setting setting = setting_of(*completed, cancel);
   auto best = draw_at(*completed, setting, cancel);
   // The time of encoding and the measured error of a picture correct the forecasts.
   constexpr int attempts_max = 3;
   for (int n = 1; n < attempts_max && best && !exceeded_limits(*best).empty(); ++n) {
-    const quality::Setting next = setting_of(*completed);
+    const quality::Setting next = setting_of(*completed, cancel);
     if (next == setting) break;
     setting = next;
     auto picture = draw_at(*completed, setting, cancel);

@@ -40,7 +40,9 @@ class LimitedPictures {
 
  private:
   Result<void> calibrate(const scene::CompletedView& completed, const CancelToken& cancel);
-  [[nodiscard]] quality::Setting setting_of(const scene::CompletedView& completed);
+  // Describes the view, unless it was described before.
+  [[nodiscard]] quality::Setting setting_of(const scene::CompletedView& completed,
+                                            const CancelToken& cancel);
   Result<Picture> draw_at(const scene::CompletedView& completed, const quality::Setting& setting,
                           const CancelToken& cancel);
 

@@ -3,18 +3,23 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "server/base/pcg3d.hpp"
 #include "server/engine/reference/kernels.hpp"
 #include "server/frame/drawn_samples.hpp"
 #include "server/frame/light_changes.hpp"
+#include "server/frame/measure.hpp"
 #include "server/frame/pixel_trials.hpp"
+#include "server/scene/build.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -320,9 +325,14 @@ class Sampling {
   int stride_ = 1;
 };
 
+std::atomic<std::uint64_t> described_scenes{0};
+
 }  // namespace
 
+std::uint64_t descriptions() { return described_scenes; }
+
 std::optional<quality::Content> content_of(const scene::Scene& scene, const CancelToken& cancel) {
+  ++described_scenes;
   const Sampling sampling(scene, cancel);
   const std::vector<Seen> seen = sampling.seen();
   if (cancel.cancelled()) return std::nullopt;
@@ -386,6 +396,48 @@ std::optional<quality::Content> content_of(const scene::Scene& scene, const Canc
   out.trials = pixel_trials(scene, sampling.rays_through(seen), cancel).trials;
   if (cancel.cancelled()) return std::nullopt;
   return out;
+}
+
+namespace {
+
+Described describe(quality::Viewpoint viewpoint, const quality::SceneSignature& signature,
+                   const scene::Scene& scene, quality::Tables& tables, const CancelToken& cancel) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  Described out{std::move(viewpoint)};
+  out.viewpoint.content = content_of(scene, cancel);
+  const auto took = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
+  out.describe_us = std::max<std::int64_t>(took.count(), 1);
+  if (out.viewpoint.content) tables.describe(signature, out.viewpoint);
+  return out;
+}
+
+}  // namespace
+
+quality::Viewpoint known_viewpoint_of(const scene::CompletedView& completed,
+                                      quality::Tables& tables) {
+  quality::Viewpoint viewpoint = viewpoint_of(completed, nullptr);
+  viewpoint.content = tables.content(quality::signature_of(completed.view()), viewpoint);
+  return viewpoint;
+}
+
+Described described(const scene::CompletedView& completed, const scene::Scene& scene,
+                    quality::Tables& tables, const CancelToken& cancel) {
+  quality::Viewpoint viewpoint = known_viewpoint_of(completed, tables);
+  if (viewpoint.content) return {std::move(viewpoint)};
+  return describe(std::move(viewpoint), quality::signature_of(completed.view()), scene, tables,
+                  cancel);
+}
+
+Described described(const scene::CompletedView& completed, const data::Dataset& dataset,
+                    quality::Tables& tables, const CancelToken& cancel) {
+  quality::Viewpoint viewpoint = known_viewpoint_of(completed, tables);
+  if (viewpoint.content) return {std::move(viewpoint)};
+  data::Dataset resident = dataset.resident_only();
+  const auto scene = scene::build_scene(completed, resident);
+  if (!scene) return {std::move(viewpoint)};
+  return describe(std::move(viewpoint), quality::signature_of(completed.view()), *scene, tables,
+                  cancel);
 }
 
 }  // namespace windsplat::frame

@@ -279,10 +279,12 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   }
   drawn.content = prepared.content;
   if (!drawn.content && needs_content(prepared, drawn)) {
+    const Clock::time_point described_from = Clock::now();
     drawn.content = content_of(scene, cancel);
     if (!drawn.content) {
       return given_up(make_error(ErrorKind::cancelled, "description cancelled"), workspace);
     }
+    drawn.describe_us = std::max<std::int64_t>(microseconds(described_from, Clock::now()), 1);
   }
   drawn.measure_us = microseconds(measured_from, Clock::now());
   return {};

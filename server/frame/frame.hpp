@@ -65,6 +65,7 @@ struct Frame {
   std::string empty;           // why the picture shows nothing of the data; empty if it shows some
   std::int64_t render_us = 0;  // time of scene and engine, including the tone mapping of JPEG tiles
   std::int64_t measure_us = 0;
+  std::int64_t describe_us = 0;  // of measure_us; 0: its content was known, or not needed
   std::int64_t encode_us = 0;
   // Measured in linear light: the error of the picture relative to the reference of the view, and
   // that of its encoding.

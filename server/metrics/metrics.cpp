@@ -191,8 +191,8 @@ struct Metrics::State {
 
   prometheus::Registry registry;
   const Registrar add{registry};
-  std::array<Histogram*, 4> stages{&add.stage("queue"), &add.stage("render"), &add.stage("encode"),
-                                   &add.stage("write")};
+  std::array<Histogram*, 5> stages{&add.stage("queue"), &add.stage("render"), &add.stage("encode"),
+                                   &add.stage("write"), &add.stage("describe")};
   std::array<Counter*, 4> frames{&add.frame(tier_names[0]), &add.frame(tier_names[1]),
                                  &add.frame(tier_names[2]), &add.frame(tier_names[3])};
   std::array<Counter*, 2> sent{&add.bytes("http"), &add.bytes("stream")};

@@ -20,7 +20,7 @@ namespace windsplat::metrics {
 // Thread-safe.
 class Metrics {
  public:
-  enum class Stage { queue, render, encode, write };
+  enum class Stage { queue, render, encode, write, describe };
   enum class Over { http, stream };
 
   Metrics();

@@ -34,7 +34,8 @@ protocol::ForecastPoint point_at(const protocol::View& view, const Setting& sett
 
 }  // namespace
 
-protocol::ForecastDescription curve(const protocol::View& completed, const Forecasts& forecasts) {
+protocol::ForecastDescription curve(const protocol::View& completed, const Forecasts& forecasts,
+                                    double encoding_ms_a_pixel) {
   WINDSPLAT_CHECK(completed.method.name != protocol::MethodName::reference);
   std::vector<std::size_t> order(settings_count);
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -56,7 +57,8 @@ protocol::ForecastDescription curve(const protocol::View& completed, const Forec
   }
   const Aim aim{completed.quality.budget_ms, completed.quality.max_error};
   if (aim.budget_ms || aim.max_error) {
-    const std::size_t picked = pick(completed, forecasts, aim).setting;
+    const std::size_t picked =
+        pick(completed, with_encoding(completed, forecasts, encoding_ms_a_pixel), aim).setting;
     out.chosen =
         static_cast<std::size_t>(std::find(order.begin(), order.end(), picked) - order.begin());
   }

@@ -37,6 +37,13 @@ double pixels_at(const protocol::View& view, const Setting& setting) {
   return static_cast<double>(size.width) * size.height;
 }
 
+Forecasts with_encoding(const protocol::View& view, Forecasts forecasts, double ms_a_pixel) {
+  for (std::size_t i = 0; i < forecasts.size(); ++i) {
+    forecasts[i].ms += ms_a_pixel * pixels_at(view, settings[i]);
+  }
+  return forecasts;
+}
+
 bool is_candidate(const Setting& setting, const protocol::View& view, const Aim& aim) {
   const bool any_finer = aim.max_error && !aim.before_final;
   return is_allowed(setting, view) && (any_finer || !is_finer(setting, view));

@@ -33,6 +33,9 @@ double error_low(const Forecast& forecast);
 // Pixels of the view's picture at a setting.
 double pixels_at(const protocol::View& view, const Setting& setting);
 
+// The forecasts with the time of encoding each picture, which a budget includes.
+Forecasts with_encoding(const protocol::View& view, Forecasts forecasts, double ms_a_pixel);
+
 struct Choice {
   std::size_t setting = 0;  // its index in the list of settings, or of options
   bool fits = false;        // within the budget; otherwise the fastest setting was chosen

@@ -62,9 +62,9 @@ class Study {
 std::shared_ptr<Study> begin(Backend& backend, const scene::CompletedView& completed,
                              const data::Dataset& dataset, const CancelToken& unwanted) {
   quality::SceneSignature signature = quality::signature_of(completed.view());
-  const quality::Viewpoint viewpoint = frame::viewpoint_of(completed, dataset, unwanted);
+  const quality::Viewpoint viewpoint =
+      describe_view(backend, completed, dataset, unwanted).viewpoint;
   if (unwanted.cancelled()) return nullptr;
-  backend.quality.describe(signature, viewpoint);
   if (!frame::is_worth_calibrating(completed.view())) return nullptr;
   if (!backend.quality.begin_study(signature, viewpoint)) return nullptr;
   return std::make_shared<Study>(backend, completed, std::move(signature), viewpoint.content);
@@ -100,6 +100,26 @@ void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::V
                                                     // job
   };
   (void)backend.loads.submit({unwanted, run, true, (*found)->shared_info()});
+}
+
+void learn_describing(Backend& backend, const std::string& dataset, std::int64_t took_us) {
+  if (took_us <= 0) return;
+  backend.metrics.stage_took(metrics::Metrics::Stage::describe, took_us);
+  backend.request_times.learn_describing(dataset, took_us);
+}
+
+frame::Described describe_view(Backend& backend, const scene::CompletedView& completed,
+                               const scene::Scene& scene, const CancelToken& cancel) {
+  frame::Described out = frame::described(completed, scene, backend.quality, cancel);
+  learn_describing(backend, completed.view().dataset, out.describe_us);
+  return out;
+}
+
+frame::Described describe_view(Backend& backend, const scene::CompletedView& completed,
+                               const data::Dataset& dataset, const CancelToken& cancel) {
+  frame::Described out = frame::described(completed, dataset, backend.quality, cancel);
+  learn_describing(backend, completed.view().dataset, out.describe_us);
+  return out;
 }
 
 }  // namespace windsplat::tasks

@@ -19,6 +19,11 @@ void report_error(const frame::Frame& drawn, const Observation& observed,
                   quality::Tables& tables, protocol::FrameInfo& info) {
   if (drawn.view.method.name == protocol::MethodName::reference) return;
   const auto index = quality::index_of(setting);
+  // A smaller picture shows it less exactly.
+  if (drawn.describe_us > 0 && drawn.width == drawn.view.image.width &&
+      drawn.height == drawn.view.image.height) {
+    tables.describe(observed.signature, observed.viewpoint);
+  }
   if (drawn.error) {
     info.error_value = drawn.error;
     info.error_kind = "measured";

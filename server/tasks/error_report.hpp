@@ -14,7 +14,8 @@ struct Observation {
 };
 Observation observed_in(const frame::Frame& drawn, const quality::Setting& setting);
 
-// Sets error and jpegError of the frame's report. Measured errors are stored in the tables.
+// Sets error and jpegError of the frame's report. Measured errors are stored in the tables, and
+// what the view shows if it was described.
 // `quality` and chroma are those of the JPEG; other formats have no jpegError.
 void report_error(const frame::Frame& drawn, const Observation& observed,
                   const quality::Setting& setting, const frame::Encoding& encoding,

@@ -51,4 +51,20 @@ double RequestTimes::encoding_ms(frame::Format format, double pixels) const {
   return encoding_us_a_pixel_.at(static_cast<std::size_t>(format)) * pixels / 1000;
 }
 
+void RequestTimes::learn_describing(const std::string& dataset, std::int64_t took_us) {
+  const double seen = static_cast<double>(took_us) / 1000;
+  const std::lock_guard lock(mutex_);
+  if (describing_ms_.size() >= known_max && !describing_ms_.contains(dataset)) {
+    describing_ms_.clear();  // the next views tell it again
+  }
+  const auto [at, is_new] = describing_ms_.try_emplace(dataset, seen);
+  at->second += (seen > at->second ? weight_above : weight_below) * (seen - at->second);
+}
+
+double RequestTimes::describing_ms(const std::string& dataset) const {
+  const std::lock_guard lock(mutex_);
+  const auto known = describing_ms_.find(dataset);
+  return known == describing_ms_.end() ? describing_ms_unknown : known->second;
+}
+
 }  // namespace windsplat::tasks

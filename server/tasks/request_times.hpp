@@ -39,6 +39,11 @@ class RequestTimes {
   void learn_encoding(frame::Format format, double pixels, std::int64_t took_us);
   [[nodiscard]] double encoding_ms(frame::Format format, double pixels) const;
 
+  // Time of describing a view of a dataset (frame/content.hpp).
+  static constexpr double describing_ms_unknown = 50;
+  void learn_describing(const std::string& dataset, std::int64_t took_us);
+  [[nodiscard]] double describing_ms(const std::string& dataset) const;
+
  private:
   using Key = std::pair<std::string, protocol::MethodName>;
   struct Known {
@@ -50,6 +55,7 @@ class RequestTimes {
   mutable std::mutex mutex_;
   std::map<Key, Known> known_;
   std::uint64_t uses_ = 0;
+  std::map<std::string, double> describing_ms_;
   // By format: JPEG, PNG, NPY. Before any picture: of one thread at 1920x1080.
   std::array<double, 3> encoding_us_a_pixel_{0.008, 0.05, 0.01};
 };

@@ -57,6 +57,7 @@ Result<session::Drawn> draw(Backend& backend, const PreparedPicture& picture,
                                 1e-3 * static_cast<double>(drawn->render_us));
     }
   }
+  learn_describing(backend, drawn->view.dataset, drawn->describe_us);
   out.payload = std::make_shared<const std::vector<std::uint8_t>>(std::move(drawn->bytes));
   report_video(backend, *drawn, out);
   out.queue_us = queue_us;
@@ -166,14 +167,17 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   const auto video = as_video ? video_ : nullptr;
   Drawing drawing{
       RenderService::Kind::stream, owner_, cancel, std::move(*dataset), {}, {}, {}, 0, payer_};
-  drawing.prepare = [effect, cancel, video, completion = completion_](data::Dataset& available,
-                                                                      Loading loading) {
+  drawing.prepare = [&backend = backend_, effect, cancel, video, completion = completion_](
+                        data::Dataset& available, Loading loading) {
     return run_guarded<PreparedPtr>("preparing a frame", cancel, [&]() -> Result<PreparedPtr> {
       const auto completed = completion->of(effect.view, available);
       if (!completed) return completed.error();
       auto picture = prepare_picture(*completed, effect.setting, frame_encoding(effect.encoding),
                                      available, loading);
       if (picture && video) video->encode(**picture, available);
+      if (picture && effect.encoding.measure) {
+        (*picture)->frame.content = frame::known_viewpoint_of(*completed, backend.quality).content;
+      }
       return picture;
     });
   };

@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/frame/content.hpp"
 #include "server/frame/frame.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/transport/server_parts.hpp"
@@ -127,6 +128,26 @@ TEST_F(Descriptions, FollowTheFinalFrame) {
   viewer_.start(session::Calibrate{view_});
   loads_done().wait();
   EXPECT_LT(spread(), 0.99 * before);
+}
+
+// Neither again at rest nor for its next final frame, which has its content.
+TEST_F(Descriptions, OfAViewAreMadeOnce) {
+  draw_final();
+  const std::uint64_t before = frame::descriptions();
+  for (int visits = 0; visits < 2; ++visits) {
+    viewer_.start(session::Calibrate{view_});
+    loads_done().wait();
+  }
+  EXPECT_EQ(frame::descriptions() - before, 1U);
+  draw_final();
+  EXPECT_TRUE(drawn_.viewpoint.content);
+  EXPECT_EQ(frame::descriptions() - before, 1U);
+  view_.step = 1;
+  draw_final();
+  EXPECT_FALSE(drawn_.viewpoint.content) << "of another step";
+  viewer_.start(session::Calibrate{view_});
+  loads_done().wait();
+  EXPECT_EQ(frame::descriptions() - before, 2U);
 }
 
 TEST_F(Descriptions, OfAnOldViewEndWhenANewOneArrives) {

@@ -129,6 +129,20 @@ TEST_F(Curve, ChosenPointIsThePickedSetting) {
   }
 }
 
+// A picture is encoded within its budget too, which the points do not include.
+TEST_F(Curve, ChosenPointLeavesTimeForEncoding) {
+  view.quality.budget_ms = 20;
+  const double slow = 1e-4;  // ms for each pixel
+  const ForecastDescription out = curve(view, forecasts, slow);
+  const Choice choice = pick(view, with_encoding(view, forecasts, slow), {20.0, 0.5});
+  ASSERT_TRUE(out.chosen);
+  const ForecastPoint& point = out.points[*out.chosen];
+  EXPECT_EQ(point.ms, forecasts[choice.setting].ms);
+  EXPECT_NE(out.chosen, curve(view, forecasts).chosen) << "otherwise this test proves nothing";
+  EXPECT_TRUE(choice.fits);
+  EXPECT_LE(point.ms + slow * point.width * point.height, 20);
+}
+
 // One scene: near the measured viewpoint and as far from it as possible.
 TEST(Measured, IsReportedForErrorsOfNearbyViewpointsOnly) {
   Table table{Kind{}};

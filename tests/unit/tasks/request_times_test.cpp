@@ -51,6 +51,16 @@ TEST(RequestTimes, OfEncodingFollowPixelsAndFormat) {
   EXPECT_DOUBLE_EQ(times.encoding_ms(frame::Format::jpeg, 1e6), jpeg);
 }
 
+TEST(RequestTimes, OfDescribingFollowTheDataset) {
+  RequestTimes times(2);
+  EXPECT_DOUBLE_EQ(times.describing_ms("a"), RequestTimes::describing_ms_unknown);
+  for (int i = 0; i < 100; ++i) times.learn_describing("a", 200'000);
+  EXPECT_NEAR(times.describing_ms("a"), 200, 0.1);
+  EXPECT_DOUBLE_EQ(times.describing_ms("b"), RequestTimes::describing_ms_unknown);
+  for (int i = 0; i < 100; ++i) times.learn_describing("a", 10'000);
+  EXPECT_NEAR(times.describing_ms("a"), 10, 0.1);
+}
+
 // A suspension of the machine during a picture must not cause pictures to be refused permanently.
 TEST(RequestTimes, IgnoreOutliers) {
   RequestTimes times(2);
