@@ -33,8 +33,9 @@ class EnSight : public CaseLoader {
   std::string run(EnSightCoding coding, const std::vector<EnSightBox>& parts = {EnSightBox()}) {
     std::filesystem::create_directories(folder_ / "run/data");
     test::write_geometry(folder_ / "run/run.geo", coding, parts);
-    for (const auto& [name, time] : {std::pair("0003", 0.5), {"0005", 2.0}}) {
-      const std::string end = std::string(".") + name;
+    for (const auto& written : {std::pair("0003", 0.5), {"0005", 2.0}}) {
+      const double time = written.second;
+      const std::string end = std::string(".") + written.first;
       test::write_variable(folder_ / ("run/data/p" + end), coding, parts, false,
                            [&](const Place& at) { return pressure_at(at, time); });
       test::write_variable(folder_ / ("run/data/v" + end), coding, parts, false,
@@ -52,7 +53,9 @@ class EnSight : public CaseLoader {
 
   static void expect_linear(RemoteSource& source) {
     const double h = EnSightBox().h;
-    for (const auto& [step, time] : {std::pair(0, 0.5), {1, 2.0}}) {
+    for (const auto& written : {std::pair(0, 0.5), {1, 2.0}}) {
+      const int step = written.first;
+      const double time = written.second;
       const auto pressure = volume_of(source, "pressure", step);
       const auto wind = volume_of(source, "velocity", step);
       const auto heat = volume_of(source, "heat", step);

@@ -87,7 +87,9 @@ class OpenFoam : public CaseLoader {
       EXPECT_LT(axis.front(), box.origin.at(d) + box.h / 2);
       EXPECT_GT(axis.back(), box.origin.at(d) + box.h * (box.cells.at(d) - 0.5));
     }
-    for (const auto& [step, time] : {std::pair(0, 0.0), {1, 0.5}, {2, 10.0}}) {
+    for (const auto& written : {std::pair(0, 0.0), {1, 0.5}, {2, 10.0}}) {
+      const int step = written.first;
+      const double time = written.second;
       expect_cell_values(*source, "p", step, box,
                          [&](const Place& at) { return pressure_at(at, time); });
       expect_cell_values(*source, "U", step, box,
