@@ -15,10 +15,33 @@
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/grid/longitudes.hpp"
 #include "server/data/cf/staggered/interleaved.hpp"
+#include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {
 
 namespace {
+
+// What values in the unit `from` are multiplied by to be in `to`: 1 if either is missing or neither
+// is a known length or pressure; nullopt: they measure different quantities.
+std::optional<double> ratio_of_units(const std::string& from, const std::string& to) {
+  if (from.empty() || to.empty() || from == to) return 1.0;
+  for (const auto measure : {metres_in, pascals_in}) {
+    const auto own = measure(from);
+    const auto other = measure(to);
+    if (own && other) return *own / *other;
+    if (own || other) return std::nullopt;
+  }
+  return 1.0;
+}
+
+// Whether values are the numbers 0, 1, ... or 1, 2, ... of samples, which say nothing of places.
+bool is_counted(const std::vector<double>& values) {
+  if (values.empty() || (values.front() != 0 && values.front() != 1)) return false;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] != values.front() + static_cast<double>(i)) return false;
+  }
+  return true;
+}
 
 class StaggerFinder {
  public:
@@ -218,6 +241,7 @@ class StaggerFinder {
     bool falls = false;
     bool by_height = false;      // values are those of heights_on()
     bool by_place = false;       // the role is that of roles_by_place()
+    std::string units;           // of the values, longitudes in degrees
     std::vector<double> values;  // ascending: with the opposite sign if the coordinate falls
   };
 
@@ -266,7 +290,7 @@ class StaggerFinder {
       const DimensionRole& role = roles[d];
       const bool in_space = role.role == Role::x || role.role == Role::y || role.role == Role::z;
       Line line{static_cast<int>(d), role.role, role.kind, uses(static_cast<int>(d)), false, false,
-                by_place[d],         {}};
+                by_place[d],         {},        {}};
       if (!in_space || role.coordinate < 0 || line.uses == 0 || found_[d].centers >= 0 ||
           contents_.dimensions[d].length > compared_length_max) {
         continue;
@@ -274,10 +298,10 @@ class StaggerFinder {
       const int heights = role.role == Role::z ? heights_on(line.dimension) : -1;
       line.by_height = heights >= 0;
       const bool is_longitude = role.kind == AxisKind::longitude;
-      auto values = is_longitude
-                        ? unpacked_degrees(file_, role.coordinate)
-                        : unpacked_values(file_, line.by_height ? heights : role.coordinate);
+      const int source = line.by_height ? heights : role.coordinate;
+      auto values = is_longitude ? unpacked_degrees(file_, source) : unpacked_values(file_, source);
       if (!values) return values.error();
+      line.units = is_longitude ? "degrees" : contents_.variables[at(source)].units;
       line.values = std::move(*values);
       if (is_longitude) continue_over_seam(line.values);
       line.falls = line.values.size() > 1 && line.values[1] < line.values[0];
@@ -289,16 +313,20 @@ class StaggerFinder {
     return out;
   }
 
-  // Whether two lines may be compared.
-  [[nodiscard]] static bool run_alike(const Line& a, const Line& b) {
-    const bool are_of_one_kind = a.kind == b.kind || a.by_place || b.by_place;
-    return a.role == b.role && are_of_one_kind && a.falls == b.falls && a.by_height == b.by_height;
+  // Whether two lines may be compared. By its place alone a dimension may be of another quantity,
+  // such as bins of sizes or tiles of the ground, unless a velocity lies on it.
+  [[nodiscard]] bool run_alike(const Line& faces, const Line& centers) const {
+    const bool are_of_one_kind = faces.by_place || centers.by_place ? has_velocity(faces.dimension)
+                                                                    : faces.kind == centers.kind;
+    return faces.role == centers.role && are_of_one_kind && faces.falls == centers.falls &&
+           faces.by_height == centers.by_height;
   }
 
   // Meso-NH: nj_u has the values of nj. Equal numbers of levels or of other variables may mean
   // different places.
   [[nodiscard]] bool are_twins(const Line& faces, const Line& centers) const {
     return faces.role != Role::z && has_velocity(faces.dimension) &&
+           !(faces.units.empty() && is_counted(faces.values)) &&
            std::equal(faces.values.begin(), faces.values.end(), centers.values.begin(),
                       centers.values.end(), same_place);
   }
@@ -311,7 +339,17 @@ class StaggerFinder {
       const Line& centers = (*found)[c];
       if (found_[at(centers.dimension)].centers >= 0) continue;
       for (std::size_t f = c + 1; f < found->size(); ++f) {
-        if (run_alike((*found)[f], centers)) compare((*found)[f], centers);
+        const Line& faces = (*found)[f];
+        if (!run_alike(faces, centers)) continue;
+        const auto ratio = ratio_of_units(faces.units, centers.units);
+        if (!ratio) continue;
+        if (*ratio == 1.0) {
+          compare(faces, centers);
+          continue;
+        }
+        Line converted = faces;
+        for (double& value : converted.values) value *= *ratio;
+        compare(converted, centers);
       }
     }
     return {};

@@ -242,5 +242,74 @@ TEST(BareStaggering, ScalarsOnEqualCoordinatesStayApart) {
   EXPECT_EQ(source->info().find("c"), nullptr);
 }
 
+// Bins of sizes, tiles of the ground: numbers of another quantity amid those of levels.
+TEST(BareStaggering, ScalarsOfAnotherQuantityAreNotFacesOfLevels) {
+  const Folder folder;
+  for (const bool are_pressures : {true, false}) {
+    {
+      NetcdfMaker file(folder / "bins.nc");
+      const Along z = are_pressures ? along(file, "plev", {100, 200, 300, 400}, "hPa")
+                                    : along(file, "lev", {1, 2, 3, 4}, "");
+      const Along y = along(file, "yt", line(ny, 25, 50));
+      const Along x = along(file, "xt", line(nx, 25, 50));
+      const Along bin = are_pressures ? along(file, "bin", {150, 250, 350}, "")
+                                      : along(file, "bin", {1.5, 2.5, 3.5}, "");
+      put(file, "u", 1, z, y, x);
+      put(file, "v", 2, z, y, x);
+      put(file, "spectrum", 1, bin, y, x, "m-3");
+    }
+    const auto source = opened(folder / "bins.nc");
+    EXPECT_NE(source->info().find("wind"), nullptr);
+    EXPECT_EQ(source->info().find("spectrum"), nullptr) << are_pressures;
+  }
+}
+
+// xm in km beside xt in m: of equal numbers at different places, and of the same places.
+TEST(BareStaggering, CoordinatesAreComparedInOneUnit) {
+  const Folder folder;
+  const Values x = line(nx, 25, 50);
+  const Values y = line(ny, 25, 50);
+  const Values z = line(nz, 20, 40);
+  for (const bool are_faces : {true, false}) {
+    {
+      NetcdfMaker file(folder / "units.nc");
+      const Along zt = along(file, "zt", z);
+      const Along yt = along(file, "yt", y);
+      const Along xt = along(file, "xt", x);
+      const double to_km = are_faces ? 0.001 : 1;
+      Along xm = along(file, "xm", line(nx, 0, 50 * to_km), "km");
+      xm.at = line(nx, 0, 50);
+      put(file, "u", 1, zt, yt, xm);
+      put(file, "v", 2, zt, yt, xt);
+      put(file, "thl", 1, zt, yt, xt, "K");
+    }
+    const auto source = opened(folder / "units.nc");
+    ASSERT_EQ(source->info().find("wind") != nullptr, are_faces);
+    if (!are_faces) continue;
+    const Volume wind = volume_of(*source, "wind");
+    EXPECT_NEAR(wind.values[0], linear(x[0], y[0], z[0]), 1e-5);
+  }
+}
+
+TEST(BareStaggering, NumbersOfSamplesDoNotTellThatGridsAreTheSame) {
+  const Folder folder;
+  for (const bool are_counted : {true, false}) {
+    {
+      NetcdfMaker file(folder / "nests.nc");
+      const Values x = line(nx, 1, are_counted ? 1 : 50);
+      const Along z = along(file, "zt", line(nz, 20, 40));
+      const Along y = along(file, "y", line(ny, 25, 50));
+      const Along outer = along(file, "x", x, "");
+      const Along inner = along(file, "x_2", x, "");
+      put(file, "a", 1, z, y, outer, "K");
+      put(file, "b", 1, z, y, outer, "K");
+      put(file, "u", 1, z, y, inner);
+    }
+    const auto source = opened(folder / "nests.nc");
+    EXPECT_NE(source->info().find("a"), nullptr);
+    EXPECT_EQ(source->info().find("u") == nullptr, are_counted);
+  }
+}
+
 }  // namespace
 }  // namespace windsplat::data::test
