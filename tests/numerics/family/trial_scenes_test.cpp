@@ -178,7 +178,9 @@ TEST(PixelTrials, TakeBoundedWorkForManyFaintLines) {
 // A pixel is several cells wide and shows what its middle shows.
 TEST(PixelTrials, HaveTheErrorsOfPicturesOfFewPixels) {
   ThreadPool pool(2);
-  for (const auto& [wide, high] : {std::pair{1, 1}, std::pair{2, 2}, std::pair{5, 3}}) {
+  for (const auto& size : {std::pair{1, 1}, std::pair{2, 2}, std::pair{5, 3}}) {
+    const int wide = size.first;
+    const int high = size.second;
     Scene scene = cloudy_scene(24, 100);
     scene.vector.reset();  // lines are no thinner than a pixel and would cover the cloud
     scene.camera = look({0, 0, 0}, {0.3, 1, -0.2}, 3, wide, high, true, 0.6);
