@@ -58,9 +58,9 @@ struct PlaneView {
   bool operator==(const PlaneView&) const = default;
 };
 
-// An opaque surface: a globe within the shell of a sphere, otherwise the bottom of the box.
+// An opaque surface: a terrain, a globe within the shell of a sphere, or the bottom of the box.
 struct BodyView {
-  BodyShow show = BodyShow::automatic;    // automatic: on a sphere
+  BodyShow show = BodyShow::automatic;    // automatic: a globe, a terrain
   std::string surface_color = "#2b3a4d";  // sRGB
   bool operator==(const BodyView&) const = default;
 };

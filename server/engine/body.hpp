@@ -6,7 +6,7 @@
 
 namespace windsplat::engine {
 
-// The shape is body_none if the scene has no body.
+// The shape is body_none if the scene has no body. Refers to the terrain of the scene.
 kernels::Body make_body(const scene::Scene& scene);
 
 }  // namespace windsplat::engine

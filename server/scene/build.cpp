@@ -320,13 +320,17 @@ Result<NeededScene> needed_scene(const CompletedView& completed, const std::arra
 // The sphere lies slightly inside the lowest cells, so that lines in them are not cut off.
 constexpr double globe_share = 0.999;
 
-std::optional<Body> make_body(const protocol::GeometryView& geometry, const Lattice& lattice) {
+std::optional<Body> make_body(const protocol::GeometryView& geometry, const Placed& placed,
+                              const data::DatasetInfo& info) {
+  const Lattice& lattice = placed.lattice;
   const bool sphere = geometry.mapping == protocol::GeometryMapping::sphere;
+  const bool terrain = has_terrain(geometry, info) && lattice.places;
   const bool shown = geometry.body.show == protocol::BodyShow::on ||
-                     (geometry.body.show == protocol::BodyShow::automatic && sphere);
+                     (geometry.body.show == protocol::BodyShow::automatic && (sphere || terrain));
   if (!shown) return std::nullopt;
   Body body;
-  body.shape = sphere ? BodyShape::sphere : BodyShape::ground;
+  body.shape = sphere ? BodyShape::sphere : terrain ? BodyShape::terrain : BodyShape::ground;
+  if (terrain) body.terrain = terrain_of(geometry, placed);
   body.radius = globe_share * lattice.inner_radius;
   body.low = {lattice.box_min.x, lattice.box_min.y};
   body.high = {lattice.box_max.x, lattice.box_max.y};
@@ -403,7 +407,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   const double depth = depths[1] - depths[0];
   scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
                      depths[0] + view.depth_cue.far * depth};
-  scene.body = make_body(view.geometry, lattice);
+  scene.body = make_body(view.geometry, *completed.placed(), dataset.info());
   scene.method = engine_method(view.method.name);
   scene.compositing = engine_compositing(view.method.compositing);
   scene.slab_thickness = view.method.slab_thickness;

@@ -13,6 +13,7 @@
 #include "server/scene/bend.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/refusal.hpp"
+#include "server/terrain/lower_boundary.hpp"
 
 namespace windsplat::scene {
 
@@ -46,6 +47,24 @@ Result<const data::FieldInfo*> find_field(const data::DatasetInfo& info, const s
 
 bool is_bent(const protocol::GeometryView& geometry) {
   return geometry.mapping != protocol::GeometryMapping::flat || geometry.height_field.has_value();
+}
+
+bool has_terrain(const protocol::GeometryView& geometry, const data::DatasetInfo& info) {
+  return geometry.height_field && info.grid.axes[2].kind != data::AxisKind::pressure;
+}
+
+std::shared_ptr<const terrain::Terrain> terrain_of(const protocol::GeometryView& geometry,
+                                                   const Placed& placed) {
+  LazyTerrain& lazy = *placed.terrain;
+  std::call_once(lazy.once, [&] {
+    const Lattice& lattice = placed.lattice;
+    const auto mean = [&lattice](std::size_t a) { return cell_size(lattice, a); };
+    const bool sphere = geometry.mapping == protocol::GeometryMapping::sphere;
+    lazy.made = terrain::lower_boundary(
+        {*lattice.places, lattice.dims, {mean(0), mean(1), mean(2)}, lattice.around},
+        sphere ? terrain::Base::globe : terrain::Base::map);
+  });
+  return lazy.made;
 }
 
 namespace {

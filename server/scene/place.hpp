@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -12,11 +13,27 @@
 
 namespace windsplat::scene {
 
+// The terrain of a placed grid, made by the first picture that shows it.
+struct LazyTerrain {
+  std::once_flag once;
+  std::shared_ptr<const terrain::Terrain> made;
+};
+
 // The placed grid of a dataset (heights as its vertical axis) and the positions of its samples.
 struct Placed {
   data::Grid grid;
   Lattice lattice;
+  std::shared_ptr<LazyTerrain> terrain = std::make_shared<LazyTerrain>();
 };
+
+// Whether the lowest cells of the grid end at the ground or the sea floor, so that an opaque body
+// is a terrain: a field gives their heights, and the levels are not those of pressure, which pass
+// above and below the ground.
+bool has_terrain(const protocol::GeometryView& geometry, const data::DatasetInfo& info);
+
+// The surface below the lowest cells of a curved lattice.
+std::shared_ptr<const terrain::Terrain> terrain_of(const protocol::GeometryView& geometry,
+                                                   const Placed& placed);
 
 // Loads the height field if there is one; the dataset caches a bent lattice. Errors: those of
 // place_lattice() and of loading.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "server/data/model/volume.hpp"
+#include "server/terrain/terrain.hpp"
 
 namespace windsplat::scene {
 
@@ -136,15 +137,16 @@ enum class Method { kernel, slab, reference };
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
 
 // An opaque surface that hides what lies behind it: a sphere about the origin, which an eye inside
-// it does not see, or a horizontal rectangle. Its brightness is body_ambient + (1 - body_ambient)
-// |cos(normal, ray)|.
-enum class BodyShape { sphere, ground };
+// it does not see, a horizontal rectangle, or a terrain. A sphere may have a terrain above it. Its
+// brightness is body_ambient + (1 - body_ambient) |cos(normal, ray)|.
+enum class BodyShape { sphere, ground, terrain };
 struct Body {
   BodyShape shape = BodyShape::sphere;
-  double radius = 1;                    // sphere, world units
-  glm::dvec2 low{-1, -1}, high{1, 1};   // ground: corners in x and y
-  double height = 0;                    // ground: z
-  std::array<float, 3> color{0, 0, 0};  // linear
+  double radius = 1;                                // sphere, world units
+  glm::dvec2 low{-1, -1}, high{1, 1};               // ground: corners in x and y
+  double height = 0;                                // ground: z
+  std::shared_ptr<const terrain::Terrain> terrain;  // of shape terrain, or above a sphere; or null
+  std::array<float, 3> color{0, 0, 0};              // linear
 };
 constexpr double body_ambient = 0.6;
 

@@ -118,7 +118,10 @@ BodyCover fill_body_block(const Camera& camera, const Body& body, double left, d
   alignas(64) double depth[block_pixels];
   alignas(64) double coverage[block_pixels];
   alignas(64) double cosine[block_pixels];
-  for (int l = 0; l < block_pixels; l += wide_lanes) {
+  for (int l = 0; body.shape == body_terrain && l < block_pixels; ++l) {
+    depth[l] = coverage[l] = cosine[l] = 0;
+  }
+  for (int l = 0; body.shape != body_terrain && l < block_pixels; l += wide_lanes) {
     const int row = l / block_side;
     const double down = top + row + 0.5 - static_cast<double>(camera.half_height_px);
     const double right = left + l % block_side + 0.5 - static_cast<double>(camera.half_width_px);
@@ -128,6 +131,7 @@ BodyCover fill_body_block(const Camera& camera, const Body& body, double left, d
     hn::Store(lanes.coverage, WideTag(), coverage + l);
     hn::Store(lanes.cosine, WideTag(), cosine + l);
   }
+  if (body.terrain != nullptr) add_terrain(camera, body, left, top, depth, coverage, cosine);
   to.nearest = body_nowhere;
   to.farthest = -body_nowhere;
   int covered = 0;

@@ -4,6 +4,10 @@
 
 #include <cstdint>
 
+namespace windsplat::terrain {
+class Terrain;
+}
+
 namespace windsplat::engine::kernels {
 
 constexpr int block_side = 4;                          // pixels
@@ -123,11 +127,13 @@ struct Camera {
 constexpr int body_none = 0;
 constexpr int body_sphere = 1;
 constexpr int body_ground = 2;
+constexpr int body_terrain = 3;
 struct Body {
   int shape;
-  double pixel;            // as Camera::pixel, without rounding to float
-  double centre[3];        // sphere: right, down and forward of the eye, world units
-  double radius;           // sphere
+  const terrain::Terrain* terrain;  // of shape terrain, or above a sphere; or null
+  double pixel;                     // as Camera::pixel, without rounding to float
+  double centre[3];                 // sphere: right, down and forward of the eye, world units
+  double radius;                    // sphere
   double low[3], high[3];  // ground: corners relative to the eye, world axes; both at its height
   float rgb[3];
   float ambient;
@@ -206,6 +212,13 @@ struct TileBody {
   std::uint32_t seen[tile_blocks];    // bit set: the block still waits for light of the body
   std::uint32_t opaque[tile_blocks];  // bit set: the body covers every pixel of the block
 };
+
+// Adds the terrain of a body to the rest of the body at the pixels of a block, given as view depth,
+// part of the pixel covered and cosine between ray and normal; (left, top): its left upper corner.
+// The same code for every instruction set.
+void add_terrain(const Camera& camera, const Body& body, double left, double top,
+                 double depth[block_pixels], double coverage[block_pixels],
+                 double cosine[block_pixels]);
 
 // Pixels of one tile as blocks of 4 x 4; see block_channels. Rays, for perspective media: the
 // length of the ray of each pixel at unit view depth.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/terrain/terrain_pixel.hpp"
+
 namespace windsplat::engine::reference {
 
 namespace {
@@ -34,11 +36,7 @@ double step_of(const Function& value, double x, double y) {
 // The part of a pixel within an edge at this distance in pixels.
 double within(double pixels) { return std::clamp(0.5 + pixels, 0.0, 1.0); }
 
-struct Hit {
-  double depth = 0;
-  double coverage = 0;
-  double cosine = 0;  // between ray and normal
-};
+using Hit = terrain::PixelSurface;
 
 Hit hit_sphere(const scene::Body& body, const View& view, double x, double y) {
   // Distance of the ray from the centre, and the view depth there.
@@ -76,14 +74,33 @@ Hit hit_ground(const scene::Body& body, const View& view, double x, double y) {
   return hit;
 }
 
+Hit hit_terrain(const terrain::Terrain& terrain, const View& view, double x, double y) {
+  const auto vector = [](const Vec& from) { return glm::dvec3(from[0], from[1], from[2]); };
+  Hit hit;
+  terrain::look(terrain,
+                {vector(view.eye), vector(view.right), vector(view.down), vector(view.forward),
+                 view.pixel, view.near, view.perspective},
+                x - 0.5 - view.half_width, y - 0.5 - view.half_height, 1, &hit);
+  return hit;
+}
+
+// Nothing if it lies before the near plane.
+Hit hit_plain(const scene::Body& body, const View& view, double x, double y) {
+  if (body.shape == scene::BodyShape::terrain) return {};
+  Hit hit = body.shape == scene::BodyShape::sphere ? hit_sphere(body, view, x, y)
+                                                   : hit_ground(body, view, x, y);
+  if (view.perspective && hit.depth < view.near) hit.coverage = 0;
+  return hit;
+}
+
 }  // namespace
 
 Surface body_surface(const scene::Body& body, const View& view, double x, double y) {
-  const bool sphere = body.shape == scene::BodyShape::sphere;
-  const Hit hit = sphere ? hit_sphere(body, view, x, y) : hit_ground(body, view, x, y);
+  Hit hit = hit_plain(body, view, x, y);
+  if (body.terrain) hit = terrain::combined(hit_terrain(*body.terrain, view, x, y), hit);
   Surface out;
   out.depth = hit.depth;
-  if (view.perspective && hit.depth < view.near) return out;
+  if (!(hit.coverage > 0)) return out;
   out.opacity = hit.coverage;
   const double shade = scene::body_ambient + (1 - scene::body_ambient) * hit.cosine;
   for (int c = 0; c < 3; ++c) out.color[c] = shade * static_cast<double>(body.color[c]);

@@ -2,7 +2,9 @@
 #include "server/study/truth/integrator.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -84,9 +86,54 @@ Sight sight_of(const scene::Camera& camera, Real x, Real y) {
   return {vec(camera.eye) + aside, vec(camera.forward)};
 }
 
-// Where a line of sight enters a sphere about the origin, or passes through a rectangle.
-std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera, Real x, Real y) {
-  const auto [origin, way] = sight_of(camera, x, y);
+// A crossing of a line of sight with a surface: its view depth and the unit normal.
+struct Crossing {
+  Real depth = 0;
+  Vec normal;
+};
+
+// The nearest triangle of a terrain, of all of them (T. Moeller, B. Trumbore: Fast, Minimum Storage
+// Ray/Triangle Intersection, 1997).
+std::optional<Crossing> meet_terrain(const terrain::Terrain& terrain, const Sight& sight,
+                                     Real least) {
+  std::optional<Crossing> nearest;
+  const auto try_triangle = [&](const std::array<std::array<int, 2>, 3>& corners) {
+    std::array<Vec, 3> p;
+    for (std::size_t n = 0; n < 3; ++n) p[n] = vec(terrain.vertex(corners[n][0], corners[n][1]));
+    const Vec e1 = p[1] - p[0];
+    const Vec e2 = p[2] - p[0];
+    const Vec turned = cross(sight.way, e2);
+    const Real determinant = dot(e1, turned);
+    const Vec off = sight.origin - p[0];
+    const Real u = dot(off, turned) / determinant;
+    const Vec lifted = cross(off, e1);
+    const Real v = dot(sight.way, lifted) / determinant;
+    if (!(u >= 0 && v >= 0 && u + v <= 1)) return;
+    const Real depth = dot(e2, lifted) / determinant;
+    if (!(depth > least) || (nearest && depth >= nearest->depth)) return;
+    const Vec across = cross(e1, e2);
+    const Vec at = sight.origin + depth * sight.way;
+    const bool inward = dot(across, sight.way) * dot(across, at) >= 0;
+    if (terrain.base() == terrain::Base::globe && inward) return;
+    const auto normal = [&](std::size_t n) {
+      return vec(terrain.normal(corners[n][0], corners[n][1]));
+    };
+    const Vec sum = (1 - u - v) * normal(0) + u * normal(1) + v * normal(2);
+    nearest = Crossing{depth, (1 / length(sum)) * sum};
+  };
+  for (int y = 0; y + 1 < terrain.height(); ++y) {
+    for (int x = 0; x + 1 < terrain.width(); ++x) {
+      try_triangle({{{x, y}, {x + 1, y}, {x + 1, y + 1}}});
+      try_triangle({{{x, y}, {x + 1, y + 1}, {x, y + 1}}});
+    }
+  }
+  return nearest;
+}
+
+// Where a line of sight enters a sphere about the origin, or passes through a rectangle or a
+// terrain.
+std::optional<Crossing> meet_plain(const scene::Body& body, const Sight& sight) {
+  const auto& [origin, way] = sight;
   Vec normal{0, 0, 1};
   Real depth = 0;
   if (body.shape == scene::BodyShape::sphere) {
@@ -96,6 +143,8 @@ std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera
     if (beside >= radius) return {};
     depth = middle - std::sqrt((radius * radius - beside * beside) / dot(way, way));
     normal = (1 / radius) * (origin + depth * way);
+  } else if (body.shape == scene::BodyShape::terrain) {
+    return {};
   } else {
     depth = (body.height - origin.z) / way.z;
     const Vec at = origin + depth * way;
@@ -103,9 +152,21 @@ std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera
                         at.y < body.high.y && std::isfinite(depth);
     if (!within) return {};
   }
-  if (camera.perspective && !(depth > camera.near)) return {};
-  const Real bright = 0.6L + 0.4L * std::abs(dot(normal, way)) / length(way);
-  return Surface{depth, 1, bright * Vec{body.color[0], body.color[1], body.color[2]}};
+  return Crossing{depth, normal};
+}
+
+std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera, Real x, Real y) {
+  const Sight sight = sight_of(camera, x, y);
+  const Real least = camera.perspective ? static_cast<Real>(camera.near) : -1e300L;
+  std::optional<Crossing> at = meet_plain(body, sight);
+  if (at && !(at->depth > least)) at.reset();
+  if (body.terrain) {
+    const auto above = meet_terrain(*body.terrain, sight, least);
+    if (above && (!at || above->depth < at->depth)) at = above;
+  }
+  if (!at) return {};
+  const Real bright = 0.6L + 0.4L * std::abs(dot(at->normal, sight.way)) / length(sight.way);
+  return Surface{at->depth, 1, bright * Vec{body.color[0], body.color[1], body.color[2]}};
 }
 
 // A splat on a ray: the distance from its centre at view depth z is

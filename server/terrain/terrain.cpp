@@ -1,0 +1,280 @@
+// Vertices -> normals and the pyramid of boxes; rays through the pyramid.
+#include "server/terrain/terrain.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "server/base/check.hpp"
+
+namespace windsplat::terrain {
+
+namespace {
+
+constexpr int block = 2;  // cells or blocks along a side
+
+bool is_missing(const glm::dvec3& place) {
+  return std::isnan(place.x) || std::isnan(place.y) || std::isnan(place.z);
+}
+
+// A direction without zeros, so that its inverse is finite.
+double inverse_of(double direction) {
+  constexpr double least = 1e-300;
+  return 1 / (std::abs(direction) < least ? std::copysign(least, direction) : direction);
+}
+
+}  // namespace
+
+Terrain::Terrain(std::vector<Vertex> vertices, int width, Base base)
+    : vertices_(std::move(vertices)),
+      width_(width),
+      height_(static_cast<int>(vertices_.size() / static_cast<std::size_t>(width))),
+      base_(base) {
+  WINDSPLAT_CHECK(width_ >= 2 && height_ >= 2);
+  WINDSPLAT_CHECK(vertices_.size() ==
+                  static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  set_normals();
+  set_levels();
+}
+
+std::size_t Terrain::bytes() const {
+  std::size_t bytes = (vertices_.size() + normals_.size()) * sizeof(Vertex);
+  for (const Level& level : levels_) bytes += level.boxes.size() * sizeof(Box);
+  return bytes;
+}
+
+glm::dvec3 Terrain::up(const glm::dvec3& place) const {
+  const double length = glm::length(place);
+  return base_ == Base::map || !(length > 0) ? glm::dvec3(0, 0, 1) : place / length;
+}
+
+void Terrain::set_normals() {
+  normals_.resize(vertices_.size());
+  // The way between the neighbours along an axis, or to the one that is not missing.
+  const auto way = [this](int x, int y, int dx, int dy) {
+    const auto present = [this](int i, int j) {
+      return i >= 0 && j >= 0 && i < width_ && j < height_ && !is_missing(vertex(i, j));
+    };
+    const int after = present(x + dx, y + dy) ? 1 : 0;
+    const int before = present(x - dx, y - dy) ? 1 : 0;
+    return vertex(x + after * dx, y + after * dy) - vertex(x - before * dx, y - before * dy);
+  };
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      const glm::dvec3 place = vertex(x, y);
+      glm::dvec3 normal = up(place);
+      const glm::dvec3 across = glm::cross(way(x, y, 1, 0), way(x, y, 0, 1));
+      const double length = glm::length(across);
+      if (length > 0) normal = across * ((glm::dot(across, normal) < 0 ? -1 : 1) / length);
+      normals_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+               static_cast<std::size_t>(x)] = {
+          static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)};
+    }
+  }
+}
+
+// Without the cells that lack a vertex. low > high: there are no others.
+Terrain::Box Terrain::box_of_cells(int x, int y) const {
+  constexpr float most = std::numeric_limits<float>::infinity();
+  Box box{{most, most, most}, {-most, -most, -most}};
+  for (int j = y; j < std::min(y + block, height_ - 1); ++j) {
+    for (int i = x; i < std::min(x + block, width_ - 1); ++i) {
+      const std::size_t first = static_cast<std::size_t>(j) * static_cast<std::size_t>(width_) +
+                                static_cast<std::size_t>(i);
+      const std::array<std::size_t, 4> corners{first, first + 1,
+                                               first + static_cast<std::size_t>(width_),
+                                               first + static_cast<std::size_t>(width_) + 1};
+      const bool missing = std::any_of(corners.begin(), corners.end(), [this](std::size_t n) {
+        const Vertex& v = vertices_[n];
+        return is_missing({v[0], v[1], v[2]});
+      });
+      if (missing) continue;
+      for (const std::size_t n : corners) {
+        for (std::size_t a = 0; a < 3; ++a) {
+          box.low[a] = std::min(box.low[a], vertices_[n][a]);
+          box.high[a] = std::max(box.high[a], vertices_[n][a]);
+        }
+      }
+    }
+  }
+  return box;
+}
+
+void Terrain::set_levels() {
+  const auto blocks_of = [](int count) { return (count + block - 1) / block; };
+  Level cells{blocks_of(width_ - 1), blocks_of(height_ - 1), {}};
+  for (int y = 0; y < cells.height; ++y) {
+    for (int x = 0; x < cells.width; ++x) cells.boxes.push_back(box_of_cells(block * x, block * y));
+  }
+  levels_.push_back(std::move(cells));
+  while (levels_.back().boxes.size() > 1) {
+    const Level& finer = levels_.back();
+    Level level{blocks_of(finer.width), blocks_of(finer.height), {}};
+    for (int y = 0; y < level.height; ++y) {
+      for (int x = 0; x < level.width; ++x) {
+        Box box = finer.boxes[static_cast<std::size_t>(block * y * finer.width + block * x)];
+        for (int j = block * y; j < std::min(block * (y + 1), finer.height); ++j) {
+          for (int i = block * x; i < std::min(block * (x + 1), finer.width); ++i) {
+            const Box& part = finer.boxes[static_cast<std::size_t>(j * finer.width + i)];
+            for (std::size_t a = 0; a < 3; ++a) {
+              box.low[a] = std::min(box.low[a], part.low[a]);
+              box.high[a] = std::max(box.high[a], part.high[a]);
+            }
+          }
+        }
+        level.boxes.push_back(box);
+      }
+    }
+    levels_.push_back(std::move(level));
+  }
+}
+
+// The search of some rays: descends into the boxes that any of them meets before what it has met.
+class Terrain::Search {
+ public:
+  Search(const Terrain& terrain, const Ray* rays, int count, Hit* hits)
+      : terrain_(terrain), rays_(rays), hits_(hits) {
+    Ids all;
+    for (int r = 0; r < count; ++r) {
+      hits[r] = {};
+      for (int a = 0; a < 3; ++a) {
+        inverse_[static_cast<std::size_t>(r)][static_cast<std::size_t>(a)] =
+            inverse_of(rays[r].along[a]);
+      }
+      all.ray[static_cast<std::size_t>(r)] = static_cast<std::uint8_t>(r);
+      middle_ += rays[r].along;
+    }
+    all.count = count;
+    visit(terrain.levels_.size() - 1, 0, 0, all);
+  }
+
+ private:
+  struct Ids {
+    std::array<std::uint8_t, rays_max> ray;
+    int count = 0;
+  };
+
+  [[nodiscard]] bool enters(std::size_t r, const Box& box) const {
+    const Ray& ray = rays_[r];
+    double from = ray.first;
+    double to = hits_[r].along;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double origin = ray.from[static_cast<glm::length_t>(a)];
+      const double low = (static_cast<double>(box.low[a]) - origin) * inverse_[r][a];
+      const double high = (static_cast<double>(box.high[a]) - origin) * inverse_[r][a];
+      from = std::max(from, std::min(low, high));
+      to = std::min(to, std::max(low, high));
+    }
+    constexpr double rounding = 1e-12;
+    return from <= to + rounding * (std::abs(from) + std::abs(to));
+  }
+
+  void visit(std::size_t level, int x, int y, const Ids& above) {
+    const Level& here = terrain_.levels_[level];
+    const Box& box = here.boxes[static_cast<std::size_t>(y * here.width + x)];
+    if (box.low[0] > box.high[0]) return;
+    Ids ids;
+    for (int n = 0; n < above.count; ++n) {
+      const std::uint8_t r = above.ray[static_cast<std::size_t>(n)];
+      if (enters(r, box)) ids.ray[static_cast<std::size_t>(ids.count++)] = r;
+    }
+    if (ids.count == 0) return;
+    if (level == 0) return meet_cells(block * x, block * y, ids);
+    struct Child {
+      int x, y;
+      double depth;
+    };
+    const Level& finer = terrain_.levels_[level - 1];
+    std::array<Child, static_cast<std::size_t>(block) * block> children{};
+    std::size_t count = 0;
+    for (int j = block * y; j < std::min(block * (y + 1), finer.height); ++j) {
+      for (int i = block * x; i < std::min(block * (x + 1), finer.width); ++i) {
+        const Box& part = finer.boxes[static_cast<std::size_t>(j * finer.width + i)];
+        double depth = 0;
+        for (std::size_t a = 0; a < 3; ++a) {
+          depth += static_cast<double>(part.low[a] + part.high[a]) *
+                   middle_[static_cast<glm::length_t>(a)];
+        }
+        std::size_t place = count++;
+        for (; place > 0 && children[place - 1].depth > depth; --place) {
+          children[place] = children[place - 1];
+        }
+        children[place] = {i, j, depth};
+      }
+    }
+    for (std::size_t c = 0; c < count; ++c) visit(level - 1, children[c].x, children[c].y, ids);
+  }
+
+  void meet_cells(int x, int y, const Ids& ids) {
+    for (int j = y; j < std::min(y + block, terrain_.height_ - 1); ++j) {
+      for (int i = x; i < std::min(x + block, terrain_.width_ - 1); ++i) meet_cell(i, j, ids);
+    }
+  }
+
+  void meet_cell(int x, int y, const Ids& ids) {
+    const std::array<std::array<int, 2>, 4> corner{
+        {{x, y}, {x + 1, y}, {x + 1, y + 1}, {x, y + 1}}};
+    std::array<glm::dvec3, 4> place;
+    for (std::size_t c = 0; c < 4; ++c) {
+      place[c] = terrain_.vertex(corner[c][0], corner[c][1]);
+      if (is_missing(place[c])) return;
+    }
+    for (int n = 0; n < ids.count; ++n) {
+      const auto r = static_cast<std::size_t>(ids.ray[static_cast<std::size_t>(n)]);
+      std::array<glm::dvec3, 4> from;
+      for (std::size_t c = 0; c < 4; ++c) from[c] = place[c] - rays_[r].from;
+      for (const std::array<std::size_t, 3>& triangle :
+           {std::array<std::size_t, 3>{0, 1, 2}, std::array<std::size_t, 3>{0, 2, 3}}) {
+        meet_triangle(r, from, triangle, corner);
+      }
+    }
+  }
+
+  // With u, v and w the volumes spanned by the ray and each edge, as seen along the ray: it passes
+  // within where they have one sign. They differ in nothing but the sign on both sides of a shared
+  // edge, so that no ray passes between triangles.
+  void meet_triangle(std::size_t r, const std::array<glm::dvec3, 4>& from,
+                     const std::array<std::size_t, 3>& triangle,
+                     const std::array<std::array<int, 2>, 4>& corner) {
+    const Ray& ray = rays_[r];
+    const glm::dvec3& a = from[triangle[0]];
+    const glm::dvec3& b = from[triangle[1]];
+    const glm::dvec3& c = from[triangle[2]];
+    const double u = glm::dot(ray.along, glm::cross(c, b));
+    const double v = glm::dot(ray.along, glm::cross(a, c));
+    if (u * v < 0) return;
+    const double w = glm::dot(ray.along, glm::cross(b, a));
+    if (u * w < 0 || v * w < 0) return;
+    const double whole = u + v + w;
+    if (whole == 0) return;
+    const glm::dvec3 at = (u * a + v * b + w * c) / whole;
+    const double along = glm::dot(at, ray.along) / glm::dot(ray.along, ray.along);
+    Hit& hit = hits_[r];
+    if (!(along >= ray.first && along < hit.along)) return;
+    if (terrain_.base_ == Base::globe) {
+      const glm::dvec3 across = glm::cross(b - a, c - a);
+      const double upward = glm::dot(across, at + ray.from);
+      if (glm::dot(across, ray.along) * upward >= 0) return;
+    }
+    const auto normal_at = [&](std::size_t n) {
+      return terrain_.normal(corner[triangle[n]][0], corner[triangle[n]][1]);
+    };
+    const glm::dvec3 normal = (u * normal_at(0) + v * normal_at(1) + w * normal_at(2)) / whole;
+    hit.along = along;
+    hit.normal = normal / std::max(glm::length(normal), 1e-300);
+  }
+
+  const Terrain& terrain_;
+  const Ray* rays_;
+  Hit* hits_;
+  std::array<std::array<double, 3>, rays_max> inverse_;
+  glm::dvec3 middle_{0};
+};
+
+void Terrain::meet(const Ray* rays, int count, Hit* hits) const {
+  WINDSPLAT_CHECK(count <= rays_max);
+  const Search search(*this, rays, count, hits);
+}
+
+}  // namespace windsplat::terrain

@@ -1,0 +1,100 @@
+// Rays through the corners and the middles of pixels, and more at silhouettes.
+#include "server/terrain/terrain_pixel.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+
+#include "server/base/check.hpp"
+
+namespace windsplat::terrain {
+
+namespace {
+
+constexpr int parts = 4;  // rays along a side of a pixel at a silhouette
+static_assert((side_max + 1) * (side_max + 1) + side_max * side_max <= rays_max);
+static_assert(parts * parts <= rays_max);
+
+Ray ray_at(const View& view, double right, double down) {
+  const glm::dvec3 aside = view.pixel * (right * view.right + down * view.down);
+  if (view.perspective) return {view.eye, view.forward + aside, view.near};
+  return {view.eye + aside, view.forward, std::numeric_limits<double>::lowest()};
+}
+
+bool is_met(const Hit& hit) { return hit.along < std::numeric_limits<double>::infinity(); }
+
+double cosine_of(const Ray& ray, const Hit& hit) {
+  return std::min(std::abs(glm::dot(ray.along, hit.normal)) / glm::length(ray.along), 1.0);
+}
+
+// A pixel that the terrain covers in part. `middle`: with or without a hit.
+PixelSurface silhouette(const Terrain& terrain, const View& view, double right, double down,
+                        const Ray& ray, const Hit& middle) {
+  std::array<Ray, static_cast<std::size_t>(parts) * parts> rays;
+  std::array<Hit, rays.size()> hits;
+  for (int n = 0; n < parts * parts; ++n) {
+    rays[static_cast<std::size_t>(n)] =
+        ray_at(view, right + (n % parts + 0.5) / parts, down + (n / parts + 0.5) / parts);
+  }
+  terrain.meet(rays.data(), static_cast<int>(rays.size()), hits.data());
+  PixelSurface sum;
+  double count = 0;
+  for (std::size_t n = 0; n < rays.size(); ++n) {
+    if (!is_met(hits[n])) continue;
+    sum.depth += hits[n].along;
+    sum.cosine += cosine_of(rays[n], hits[n]);
+    ++count;
+  }
+  if (count == 0) return {};
+  const double coverage = count / static_cast<double>(rays.size());
+  if (is_met(middle)) return {middle.along, coverage, cosine_of(ray, middle)};
+  return {sum.depth / count, coverage, sum.cosine / count};
+}
+
+}  // namespace
+
+void look(const Terrain& terrain, const View& view, double right, double down, int side,
+          PixelSurface* pixels) {
+  WINDSPLAT_CHECK(side >= 1 && side <= side_max);
+  std::array<Ray, rays_max> rays;
+  std::array<Hit, rays_max> hits;
+  const int corners = (side + 1) * (side + 1);
+  for (int n = 0; n < corners; ++n) {
+    rays[static_cast<std::size_t>(n)] = ray_at(view, right + n % (side + 1), down + n / (side + 1));
+  }
+  for (int n = 0; n < side * side; ++n) {
+    rays[static_cast<std::size_t>(corners + n)] =
+        ray_at(view, right + n % side + 0.5, down + n / side + 0.5);
+  }
+  terrain.meet(rays.data(), corners + side * side, hits.data());
+  for (int n = 0; n < side * side; ++n) {
+    const int first = n / side * (side + 1) + n % side;
+    const auto middle = static_cast<std::size_t>(corners + n);
+    int met = is_met(hits[middle]) ? 1 : 0;
+    for (const int corner : {first, first + 1, first + side + 1, first + side + 2}) {
+      met += is_met(hits[static_cast<std::size_t>(corner)]) ? 1 : 0;
+    }
+    pixels[n] = {};
+    if (met == 5) {
+      pixels[n] = {hits[middle].along, 1, cosine_of(rays[middle], hits[middle])};
+    } else if (met > 0) {
+      pixels[n] =
+          silhouette(terrain, view, right + n % side, down + n / side, rays[middle], hits[middle]);
+    }
+  }
+}
+
+PixelSurface combined(const PixelSurface& front, const PixelSurface& behind) {
+  if (!(front.coverage > 0)) return behind;
+  if (!(behind.coverage > 0)) return front;
+  if (front.depth > behind.depth && front.coverage >= 1 && behind.coverage >= 1) return behind;
+  PixelSurface one;
+  one.depth = front.coverage >= 0.5 ? front.depth : behind.depth;
+  one.coverage = std::max(front.coverage, behind.coverage);
+  one.cosine = front.coverage * front.cosine + (1 - front.coverage) * behind.cosine;
+  return one;
+}
+
+}  // namespace windsplat::terrain
