@@ -60,7 +60,7 @@ struct PlaneView {
 
 // An opaque surface: a terrain, a globe within the shell of a sphere, or the bottom of the box.
 struct BodyView {
-  BodyShow show = BodyShow::automatic;    // automatic: a globe, a terrain
+  BodyShow show = BodyShow::automatic;    // automatic: on a sphere
   std::string surface_color = "#2b3a4d";  // sRGB
   bool operator==(const BodyView&) const = default;
 };

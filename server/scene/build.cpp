@@ -324,13 +324,15 @@ std::optional<Body> make_body(const protocol::GeometryView& geometry, const Plac
                               const data::DatasetInfo& info) {
   const Lattice& lattice = placed.lattice;
   const bool sphere = geometry.mapping == protocol::GeometryMapping::sphere;
-  const bool terrain = has_terrain(geometry, info) && lattice.places;
-  const bool shown = geometry.body.show == protocol::BodyShow::on ||
-                     (geometry.body.show == protocol::BodyShow::automatic && (sphere || terrain));
+  const bool asked = geometry.body.show == protocol::BodyShow::on;
+  const bool shown = asked || (geometry.body.show == protocol::BodyShow::automatic && sphere);
   if (!shown) return std::nullopt;
   Body body;
-  body.shape = sphere ? BodyShape::sphere : terrain ? BodyShape::terrain : BodyShape::ground;
-  if (terrain) body.terrain = terrain_of(geometry, placed);
+  // Not by default: moving frames cannot afford its rays.
+  if (asked && has_terrain(geometry, info) && lattice.places) {
+    body.terrain = terrain_of(geometry, placed);
+  }
+  body.shape = sphere ? BodyShape::sphere : body.terrain ? BodyShape::terrain : BodyShape::ground;
   body.radius = globe_share * lattice.inner_radius;
   body.low = {lattice.box_min.x, lattice.box_min.y};
   body.high = {lattice.box_max.x, lattice.box_max.y};

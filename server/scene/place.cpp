@@ -1,9 +1,12 @@
 #include "server/scene/place.hpp"
 
+#include <algorithm>
 #include <any>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/geometric.hpp>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -53,6 +56,29 @@ bool has_terrain(const protocol::GeometryView& geometry, const data::DatasetInfo
   return geometry.height_field && info.grid.axes[2].kind != data::AxisKind::pressure;
 }
 
+namespace {
+
+// Whether the heights of the vertices (on a globe: their radii) differ by more than the rounding of
+// positions in floats.
+bool has_relief(const terrain::Terrain& terrain) {
+  constexpr double rounding = 1e-5;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  double most = 0;
+  for (int y = 0; y < terrain.height(); ++y) {
+    for (int x = 0; x < terrain.width(); ++x) {
+      const glm::dvec3 at = terrain.vertex(x, y);
+      const double height = terrain.base() == terrain::Base::globe ? glm::length(at) : at.z;
+      low = std::min(low, height);
+      high = std::max(high, height);
+      most = std::max(most, glm::length(at));
+    }
+  }
+  return high - low > rounding * most;
+}
+
+}  // namespace
+
 std::shared_ptr<const terrain::Terrain> terrain_of(const protocol::GeometryView& geometry,
                                                    const Placed& placed) {
   LazyTerrain& lazy = *placed.terrain;
@@ -63,6 +89,7 @@ std::shared_ptr<const terrain::Terrain> terrain_of(const protocol::GeometryView&
     lazy.made = terrain::lower_boundary(
         {*lattice.places, lattice.dims, {mean(0), mean(1), mean(2)}, lattice.around},
         sphere ? terrain::Base::globe : terrain::Base::map);
+    if (!has_relief(*lazy.made)) lazy.made.reset();
   });
   return lazy.made;
 }

@@ -16,7 +16,7 @@ namespace windsplat::scene {
 // The terrain of a placed grid, made by the first picture that shows it.
 struct LazyTerrain {
   std::once_flag once;
-  std::shared_ptr<const terrain::Terrain> made;
+  std::shared_ptr<const terrain::Terrain> made;  // null: without relief
 };
 
 // The placed grid of a dataset (heights as its vertical axis) and the positions of its samples.
@@ -31,7 +31,7 @@ struct Placed {
 // above and below the ground.
 bool has_terrain(const protocol::GeometryView& geometry, const data::DatasetInfo& info);
 
-// The surface below the lowest cells of a curved lattice.
+// The surface below the lowest cells of a curved lattice; null if it lies at one height.
 std::shared_ptr<const terrain::Terrain> terrain_of(const protocol::GeometryView& geometry,
                                                    const Placed& placed);
 

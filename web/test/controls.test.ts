@@ -178,8 +178,6 @@ test("controls without effect are hidden or disabled", () => {
   assert.equal(off({ geometry: { mapping: "flat" } }).body, false);
   assert.equal(off({ geometry: { mapping: "flat", body: { show: "on" } } }).body, true);
   assert.equal(off({ geometry: { mapping: "sphere" } }).body, true);
-  assert.equal(off({ geometry: { heightField: "height" } }).body, true);
-  assert.equal(off({ geometry: { heightField: "height", body: { show: "off" } } }).body, false);
   assert.equal(off({ geometry: { mapping: "sphere", body: { show: "auto" } } }).body, true);
   assert.equal(off({ geometry: { mapping: "sphere", body: { show: "off" } } }).body, false);
   assert.equal(off({ depthCue: { strength: 0 } }).depthCue, false);

@@ -398,9 +398,7 @@ std::vector<Case> mappings(Projection projection) {
   add("flat with ground", waves(cube_grid())).geometry.body.show = BodyShow::on;
   add("slice across x", waves(cube_grid())).geometry.slice = {protocol::GridAxis::x, 1};
   add("slice across z", waves(cube_grid())).geometry.slice = {protocol::GridAxis::z, 2};
-  View& terrain = add("terrain", terrain_samples());
-  terrain.geometry.height_field = "height";
-  terrain.geometry.body.show = BodyShow::off;
+  add("terrain", terrain_samples()).geometry.height_field = "height";
   View& ground = add("terrain with ground", terrain_samples());
   ground.geometry.height_field = "height";
   ground.geometry.body.show = BodyShow::on;

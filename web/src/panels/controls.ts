@@ -207,14 +207,13 @@ export const qualityHint = (view: View): string =>
     : "Moving frames: the least error that the budget allows.";
 
 // The choices of geometry.body.show.
-export const bodyOptions: Options = { "globe or terrain": "auto", always: "on", never: "off" };
+export const bodyOptions: Options = { "on a globe": "auto", always: "on", never: "off" };
 
-// Whether the view draws its opaque body. Taken as drawn with a height field, though not by default
-// on levels of pressure.
+// Whether the view draws its opaque body.
 export function showsBody(view: View): boolean {
-  const { mapping = "flat", heightField = null, body } = view.geometry ?? {};
+  const { mapping = "flat", body } = view.geometry ?? {};
   const show = body?.show ?? "auto";
-  return show === "auto" ? mapping === "sphere" || heightField !== null : show === "on";
+  return show === "auto" ? mapping === "sphere" : show === "on";
 }
 
 // Which controls apply to a view; the others are hidden or disabled.
