@@ -14,6 +14,8 @@ namespace {
 
 constexpr int block = 2;  // cells or blocks along a side
 
+constexpr double rounding = 1e-12;  // relative, of the distances at which a ray meets a box
+
 bool is_missing(const glm::dvec3& place) {
   return std::isnan(place.x) || std::isnan(place.y) || std::isnan(place.z);
 }
@@ -131,6 +133,7 @@ void Terrain::set_levels() {
 }
 
 // The search of some rays: descends into the boxes that any of them meets before what it has met.
+// The bundle of all rays, as intervals of origins and directions, excludes most boxes at once.
 class Terrain::Search {
  public:
   Search(const Terrain& terrain, const Ray* rays, int count, Hit* hits)
@@ -146,6 +149,7 @@ class Terrain::Search {
       middle_ += rays[r].along;
     }
     all.count = count;
+    set_bundle(count);
     visit(terrain.levels_.size() - 1, 0, 0, all);
   }
 
@@ -154,6 +158,51 @@ class Terrain::Search {
     std::array<std::uint8_t, rays_max> ray;
     int count = 0;
   };
+
+  // The origins and inverse directions of all rays along an axis. Without bounds if directions
+  // of both signs occur.
+  struct Range {
+    double from_low = 0, from_high = 0, inverse_low = 0, inverse_high = 0;
+    bool bounded = false;
+  };
+
+  void set_bundle(int count) {
+    if (count == 0) return;
+    first_ = rays_[0].first;
+    for (std::size_t a = 0; a < 3; ++a) {
+      Range& range = bundle_[a];
+      for (int n = 0; n < count; ++n) {
+        const auto r = static_cast<std::size_t>(n);
+        const double from = rays_[r].from[static_cast<glm::length_t>(a)];
+        const double inverse = inverse_[r][a];
+        range.from_low = n == 0 ? from : std::min(range.from_low, from);
+        range.from_high = n == 0 ? from : std::max(range.from_high, from);
+        range.inverse_low = n == 0 ? inverse : std::min(range.inverse_low, inverse);
+        range.inverse_high = n == 0 ? inverse : std::max(range.inverse_high, inverse);
+        first_ = std::min(first_, rays_[r].first);
+      }
+      range.bounded = range.inverse_low > 0 || range.inverse_high < 0;
+    }
+  }
+
+  // False only if no ray enters the box: bounds of enters() over all rays.
+  [[nodiscard]] bool may_enter(const Box& box) const {
+    double from = first_;
+    double to = std::numeric_limits<double>::infinity();
+    for (std::size_t a = 0; a < 3; ++a) {
+      const Range& range = bundle_[a];
+      if (!range.bounded) continue;
+      const bool upward = range.inverse_low > 0;
+      // Ways to the plane that the rays meet first and to the other, signed along the axis.
+      const double entry = upward ? static_cast<double>(box.low[a]) - range.from_high
+                                  : static_cast<double>(box.high[a]) - range.from_low;
+      const double exit = upward ? static_cast<double>(box.high[a]) - range.from_low
+                                 : static_cast<double>(box.low[a]) - range.from_high;
+      from = std::max(from, std::min(entry * range.inverse_low, entry * range.inverse_high));
+      to = std::min(to, std::max(exit * range.inverse_low, exit * range.inverse_high));
+    }
+    return from <= to + rounding * (std::abs(from) + std::abs(to));
+  }
 
   [[nodiscard]] bool enters(std::size_t r, const Box& box) const {
     const Ray& ray = rays_[r];
@@ -166,21 +215,29 @@ class Terrain::Search {
       from = std::max(from, std::min(low, high));
       to = std::min(to, std::max(low, high));
     }
-    constexpr double rounding = 1e-12;
     return from <= to + rounding * (std::abs(from) + std::abs(to));
   }
 
   void visit(std::size_t level, int x, int y, const Ids& above) {
     const Level& here = terrain_.levels_[level];
     const Box& box = here.boxes[static_cast<std::size_t>(y * here.width + x)];
-    if (box.low[0] > box.high[0]) return;
-    Ids ids;
-    for (int n = 0; n < above.count; ++n) {
-      const std::uint8_t r = above.ray[static_cast<std::size_t>(n)];
-      if (enters(r, box)) ids.ray[static_cast<std::size_t>(ids.count++)] = r;
+    if (box.low[0] > box.high[0] || !may_enter(box)) return;
+    const auto meets = [&](std::uint8_t r) { return enters(r, box); };
+    const auto* const first = above.ray.begin();
+    if (level > 0) {
+      // One ray is enough to descend; which others do is decided by the finest boxes.
+      if (std::none_of(first, first + above.count, meets)) return;
+      return visit_parts(level, x, y, above);
     }
-    if (ids.count == 0) return;
-    if (level == 0) return meet_cells(block * x, block * y, ids);
+    Ids ids;
+    for (const auto* r = first; r != first + above.count; ++r) {
+      if (meets(*r)) ids.ray[static_cast<std::size_t>(ids.count++)] = *r;
+    }
+    if (ids.count > 0) meet_cells(block * x, block * y, ids);
+  }
+
+  // The parts of a box, the nearest first.
+  void visit_parts(std::size_t level, int x, int y, const Ids& ids) {
     struct Child {
       int x, y;
       double depth;
@@ -269,6 +326,8 @@ class Terrain::Search {
   const Ray* rays_;
   Hit* hits_;
   std::array<std::array<double, 3>, rays_max> inverse_;
+  std::array<Range, 3> bundle_{};
+  double first_ = 0;  // the least of all rays
   glm::dvec3 middle_{0};
 };
 
