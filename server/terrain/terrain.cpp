@@ -277,31 +277,51 @@ class Terrain::Search {
       place[c] = terrain_.vertex(corner[c][0], corner[c][1]);
       if (is_missing(place[c])) return;
     }
+    // Rays of a perspective view share their origin, and with it the triangles as seen from there.
+    std::array<Seen, 2> seen{};
+    const glm::dvec3* origin = nullptr;
     for (int n = 0; n < ids.count; ++n) {
       const auto r = static_cast<std::size_t>(ids.ray[static_cast<std::size_t>(n)]);
-      std::array<glm::dvec3, 4> from;
-      for (std::size_t c = 0; c < 4; ++c) from[c] = place[c] - rays_[r].from;
-      for (const std::array<std::size_t, 3>& triangle :
-           {std::array<std::size_t, 3>{0, 1, 2}, std::array<std::size_t, 3>{0, 2, 3}}) {
-        meet_triangle(r, from, triangle, corner);
+      const glm::dvec3& from = rays_[r].from;
+      if (origin == nullptr || from != *origin) {
+        for (std::size_t t = 0; t < 2; ++t) {
+          seen[t] = seen_from(from, place[0], place[t + 1], place[t + 2]);
+        }
+        origin = &from;
+      }
+      for (std::size_t t = 0; t < 2; ++t) {
+        meet_triangle(r, seen[t], {corner[0], corner[t + 1], corner[t + 2]});
       }
     }
+  }
+
+  // A triangle relative to the origin of a ray, and the products of its edges' ends.
+  struct Seen {
+    glm::dvec3 a, b, c;
+    glm::dvec3 cb, ac, ba;
+  };
+
+  static Seen seen_from(const glm::dvec3& from, const glm::dvec3& p, const glm::dvec3& q,
+                        const glm::dvec3& r) {
+    const glm::dvec3 a = p - from;
+    const glm::dvec3 b = q - from;
+    const glm::dvec3 c = r - from;
+    return {a, b, c, glm::cross(c, b), glm::cross(a, c), glm::cross(b, a)};
   }
 
   // With u, v and w the volumes spanned by the ray and each edge, as seen along the ray: it passes
   // within where they have one sign. They differ in nothing but the sign on both sides of a shared
   // edge, so that no ray passes between triangles.
-  void meet_triangle(std::size_t r, const std::array<glm::dvec3, 4>& from,
-                     const std::array<std::size_t, 3>& triangle,
-                     const std::array<std::array<int, 2>, 4>& corner) {
+  void meet_triangle(std::size_t r, const Seen& seen,
+                     const std::array<std::array<int, 2>, 3>& corner) {
     const Ray& ray = rays_[r];
-    const glm::dvec3& a = from[triangle[0]];
-    const glm::dvec3& b = from[triangle[1]];
-    const glm::dvec3& c = from[triangle[2]];
-    const double u = glm::dot(ray.along, glm::cross(c, b));
-    const double v = glm::dot(ray.along, glm::cross(a, c));
+    const glm::dvec3& a = seen.a;
+    const glm::dvec3& b = seen.b;
+    const glm::dvec3& c = seen.c;
+    const double u = glm::dot(ray.along, seen.cb);
+    const double v = glm::dot(ray.along, seen.ac);
     if (u * v < 0) return;
-    const double w = glm::dot(ray.along, glm::cross(b, a));
+    const double w = glm::dot(ray.along, seen.ba);
     if (u * w < 0 || v * w < 0) return;
     const double whole = u + v + w;
     if (whole == 0) return;
@@ -315,7 +335,7 @@ class Terrain::Search {
       if (glm::dot(across, ray.along) * upward >= 0) return;
     }
     const auto normal_at = [&](std::size_t n) {
-      return terrain_.normal(corner[triangle[n]][0], corner[triangle[n]][1]);
+      return terrain_.normal(corner[n][0], corner[n][1]);
     };
     const glm::dvec3 normal = (u * normal_at(0) + v * normal_at(1) + w * normal_at(2)) / whole;
     hit.along = along;

@@ -144,6 +144,49 @@ TEST(Terrain, RaysMeetHillsWhereAMarcherCrossesThem) {
   EXPECT_GT(count, 200);
 }
 
+// Needle cells, a missing vertex; bundles of rays near each other from within, below and above, of
+// one origin or one direction, and some of which the directions differ in sign.
+TEST(Terrain, RaysTogetherMeetWhatEachOfThemMeetsAlone) {
+  std::vector<Terrain::Vertex> vertices;
+  for (int n = 0; n < 40 * 31; ++n) {
+    const double x = -1 + n % 40 / 19.5;
+    const double y = 1e-3 * (n / 40 - 15);
+    const double z = n == 20 + 40 * 15 ? std::nan("") : 3 * hill(x, 800 * y);
+    vertices.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
+  }
+  const Terrain needles(vertices, 40, Base::map);
+  const auto hills = map_terrain(33, 27, hill);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> draw(-1, 1);
+  const auto vector = [&](double size) {
+    return size * glm::dvec3(draw(random), draw(random), draw(random));
+  };
+  int count = 0;
+  for (int bundle = 0; bundle < 2000; ++bundle) {
+    const glm::dvec3 from = vector(bundle % 3 == 0 ? 0.3 : 2);
+    const glm::dvec3 to = vector(0.5) - from;
+    const double spread = std::exp(2 * draw(random) - 4);
+    std::array<Ray, terrain::rays_max> rays;
+    for (Ray& ray : rays) {
+      ray = {from, to, bundle % 5 == 0 ? 0.2 : 0};
+      if (bundle % 2 == 0) ray.along += vector(spread);
+      if (bundle % 2 == 1 || bundle % 7 == 0) ray.from += vector(spread);
+    }
+    for (const Terrain* terrain : {hills.get(), &needles}) {
+      std::array<Hit, rays.size()> hits;
+      terrain->meet(rays.data(), static_cast<int>(rays.size()), hits.data());
+      for (std::size_t r = 0; r < rays.size(); ++r) {
+        const Hit alone = met(*terrain, rays[r]);
+        ASSERT_EQ(is_met(hits[r]), is_met(alone)) << bundle;
+        if (!is_met(alone)) continue;
+        ++count;
+        ASSERT_EQ(hits[r].along, alone.along) << bundle;
+      }
+    }
+  }
+  EXPECT_GT(count, 20000);
+}
+
 TEST(Terrain, NoRayPassesBetweenTriangles) {
   const auto terrain = map_terrain(17, 17, hill);
   for (int j = 1; j < 64; ++j) {
