@@ -32,12 +32,19 @@ class VideoEncoder {
   // Whether this build can encode.
   [[nodiscard]] static bool available();
 
-  // Upper bound on the memory of the encoder of such a picture: measured 10 to 17 bytes a pixel.
+  // Upper bound on the resident memory of the encoder of such a picture. Its pictures are whole
+  // macroblocks with a border of 32 pixels. For noise at quality 75 it grew by 7.6 to 9.6 bytes
+  // for each of these pixels and by 1.2 MB (OpenH264 2.3.1; 16 x 16 to 1920 x 1088, 17 x 8192).
   [[nodiscard]] static std::uint64_t bytes_for(int width, int height) {
     constexpr std::uint64_t bytes_a_pixel = 11;
-    constexpr std::uint64_t base = std::uint64_t{1} << 20;
-    return base +
-           bytes_a_pixel * static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+    constexpr std::uint64_t base = std::uint64_t{3} << 19;
+    constexpr int macroblock = 16;
+    constexpr int borders = 2 * 32;
+    const auto stored = [](int edge) {
+      return static_cast<std::uint64_t>((edge + macroblock - 1) / macroblock * macroblock +
+                                        borders);
+    };
+    return base + bytes_a_pixel * stored(width) * stored(height);
   }
 
   VideoEncoder();

@@ -11,6 +11,12 @@ namespace {
 constexpr int key_quality_least = 15;
 constexpr int key_quality_step = 5;
 
+quality::Setting at_level(int level) {
+  quality::Setting setting;
+  setting.half_level = 2 * level;
+  return setting;
+}
+
 }  // namespace
 
 int MovingEncoding::least_level(const protocol::View& view, const Link& link, VideoChoice& video,
@@ -20,7 +26,15 @@ int MovingEncoding::least_level(const protocol::View& view, const Link& link, Vi
   const double pixels = static_cast<double>(width) * height;
   video.choose(jpeg_.time_on(link, pixels, VideoChoice::quality_low),
                jpeg_.time_on(link, pixels, VideoChoice::quality_good), budget, now);
-  return (video.on() ? video_ : jpeg_).least_level(width, height, link, budget);
+  const int of_jpeg = jpeg_.least_level(width, height, link, budget);
+  if (!video.on()) return of_jpeg;
+  int level = video_.least_level(width, height, link, budget);
+  const auto fits = [&] {
+    const auto size = quality::size_at(quality::PictureSize{width, height}, at_level(level));
+    return video.fits(size.width, size.height);
+  };
+  while (level < of_jpeg && !fits()) ++level;
+  return level;
 }
 
 // The client waits for a key frame as for a JPEG, so its quality is that of a JPEG which takes no
@@ -36,8 +50,8 @@ Encoding MovingEncoding::choose(const protocol::View& view, const quality::Setti
   }
   encoding.codec = protocol::Codec::h264;
   encoding.quality = video_.choose(pixels, link, budget);
-  encoding.key = video.needs_key() || pixels != video_pixels_;
-  video_pixels_ = pixels;
+  encoding.key = video.needs_key() || size != video_size_;
+  video_size_ = size;
   if (!encoding.key) return encoding;
   const Micros most = std::max(budget, JpegRate::moving_most_us);
   while (encoding.quality > key_quality_least &&

@@ -15,7 +15,8 @@ namespace windsplat::session {
 // JPEG, or H.264 while VideoChoice is on; each with its own model of bytes.
 class MovingEncoding {
  public:
-  // For the next moving frame: chooses the codec and returns the least level of its picture.
+  // For the next moving frame: chooses the codec and returns the least level of its picture. With
+  // video it is at least one whose picture can be H.264, or that of JPEG.
   int least_level(const protocol::View& view, const Link& link, VideoChoice& video, Micros budget,
                   Micros now);
   // The encoding of that frame, drawn at a setting.
@@ -33,7 +34,7 @@ class MovingEncoding {
  private:
   JpegRate jpeg_;
   JpegRate video_{video_bytes};
-  double video_pixels_ = 0;  // of the last frame of H.264
+  quality::PictureSize video_size_{0, 0};  // of the last frame of H.264
 };
 
 }  // namespace windsplat::session

@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdint>
 #include <string_view>
 #include <utility>
 
 namespace windsplat::session {
 namespace {
 
-// MaxFS of ITU-T H.264, table A-1: macroblocks of a frame, by level_idc.
+// MaxFS of ITU-T H.264, table A-1: macroblocks of a frame, by level_idc. An edge has at most
+// sqrt(8 MaxFS) of them (A.3.1).
 constexpr std::array<std::pair<int, int>, 9> levels{{{30, 1620},
                                                      {31, 3600},
                                                      {32, 5120},
@@ -50,7 +52,6 @@ void VideoChoice::announced(const std::vector<std::string>& codecs) {
   for (const std::string& codec : codecs) {
     macroblocks_most_ = std::max(macroblocks_most_, macroblocks_of(codec));
   }
-  macroblocks_most_ = std::min(macroblocks_most_, encoder_macroblocks);
   needs_key_ = true;
   if (macroblocks_most_ == 0) end();
 }
@@ -74,7 +75,10 @@ bool VideoChoice::choose(Micros low_us, Micros good_us, Micros budget, Micros no
 }
 
 bool VideoChoice::fits(int width, int height) const {
-  return std::min(width, height) >= edge_least && macroblocks(width, height) <= macroblocks_most_;
+  const std::int64_t longest = (std::max(width, height) + 15) / 16;
+  return std::min(width, height) >= edge_least &&
+         macroblocks(width, height) <= std::min(macroblocks_most_, encoder_macroblocks) &&
+         longest * longest <= std::int64_t{8} * macroblocks_most_;
 }
 
 void VideoChoice::started(Micros now) {

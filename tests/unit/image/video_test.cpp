@@ -1,8 +1,13 @@
 // H.264 of moving pictures: decoded by OpenH264's own decoder and compared with the planes encoded.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <fstream>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "server/image/jpeg_encoder.hpp"
@@ -235,6 +240,40 @@ TEST(VideoEncoder, RefusesWhatItCannotEncode) {
   ASSERT_TRUE(unit) << "a refusal does not spoil the encoder";
   EXPECT_TRUE(unit->key);
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+std::uint64_t resident_bytes() {
+  std::ifstream file("/proc/self/statm");
+  std::uint64_t all = 0;
+  std::uint64_t resident = 0;
+  file >> all >> resident;
+  return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+// Noise, whose units are the longest.
+TEST(VideoEncoder, TakesNoMoreMemoryThanItsBoundAlsoForNarrowPictures) {
+  for (const auto& [width, height] : {Size{320, 180}, Size{17, 8192}, Size{200, 8000}}) {
+    SCOPED_TRACE(std::to_string(width) + " x " + std::to_string(height));
+    std::vector<float> rgba(static_cast<std::size_t>(width) * height * 4, 1.0F);
+    unsigned state = 1;
+    for (std::size_t n = 0; n < rgba.size(); ++n) {
+      state = state * 1664525U + 1013904223U;  // Numerical Recipes, 7.1
+      if (n % 4 != 3) rgba[n] = static_cast<float>(state >> 8U) / 16777216.0F;
+    }
+    YccPicture picture;
+    picture.reset(width, height, Subsampling::s420, {0, 0, 0});
+    picture.put({0, 0, width, height, rgba.data(), static_cast<std::size_t>(4 * width)});
+    std::array<VideoEncoder, 3> encoders;
+    const std::uint64_t before = resident_bytes();
+    for (VideoEncoder& encoder : encoders) {
+      for (int time = 0; time < 3; ++time) ASSERT_TRUE(encoder.encode(picture, 75, time == 2));
+    }
+    EXPECT_LE(resident_bytes(), before + encoders.size() * VideoEncoder::bytes_for(width, height));
+  }
+}
+
+#endif
 
 #else
 

@@ -66,6 +66,10 @@ TEST(VideoChoice, PicturesKeepToTheLevelAnnounced) {
   EXPECT_TRUE(video.fits(1280, 720));
   EXPECT_FALSE(video.fits(1296, 720));
   EXPECT_FALSE(video.fits(640, 15));
+  // A.3.1: an edge has at most sqrt(8 x 3600) = 169.7 macroblocks.
+  EXPECT_TRUE(video.fits(169 * 16, 16));
+  EXPECT_FALSE(video.fits(170 * 16, 16));
+  EXPECT_FALSE(video.fits(16, 170 * 16));
   video.announced({"avc1.640033"});
   EXPECT_TRUE(video.fits(1920, 1088));
   EXPECT_FALSE(video.fits(1920, 1104)) << "beyond the encoder";
@@ -80,9 +84,9 @@ Options with_video() {
 // A client behind a link of 250 kB/s that moves the camera; frames of 20 kB.
 class SlowViewer : public Driver {
  public:
-  explicit SlowViewer(bool announces = true) : Driver(with_video()) {
+  explicit SlowViewer(const std::vector<std::string>& codecs = high) : Driver(with_video()) {
     payload_bytes = 20'000;
-    if (announces) say(protocol::VideoMessage{high});
+    if (!codecs.empty()) say(protocol::VideoMessage{codecs});
     patch(1, R"({"dataset":"wind","image":{"width":1280,"height":720}})");
     finish_render();
     ack(1);  // the round trip takes no time
@@ -98,7 +102,7 @@ class SlowViewer : public Driver {
       if (!render) continue;
       finish_render();
       out.push_back(frames.back());
-      wait(80 * ms);
+      wait(link_us);
       ack(frames.back().header.seq);
     }
     return out;
@@ -111,6 +115,8 @@ class SlowViewer : public Driver {
     }
     FAIL() << "no video";
   }
+
+  Micros link_us = 80 * ms;  // from the end of a render to its acknowledgement
 
  private:
   std::uint32_t rev_ = 1;
@@ -148,7 +154,7 @@ TEST(Video, MovingFramesOfASlowLinkAreVideoAndFinalOnesAreNot) {
 }
 
 TEST(Video, ClientsThatAnnounceNothingGetJpegOnly) {
-  SlowViewer viewer(false);
+  SlowViewer viewer(std::vector<std::string>{});
   viewer.move(30);
   for (const SendFrame& frame : viewer.frames) EXPECT_EQ(frame.header.codec, Codec::jpeg);
 }
@@ -232,6 +238,30 @@ TEST(Video, AnotherSizeOfThePictureIsAKeyFrameOfTheQualityOfAJpeg) {
   ASSERT_TRUE(viewer.render);
   EXPECT_EQ(viewer.render->encoding.codec, Codec::h264);
   EXPECT_TRUE(viewer.render->encoding.key);
+}
+
+TEST(Video, TheSameNumberOfPixelsInAnotherShapeIsAKeyFrame) {
+  SlowViewer viewer;
+  viewer.begin_video();
+  viewer.move(3);
+  viewer.patch(3000, R"({"image":{"width":720,"height":1280}})");
+  viewer.wait(100 * ms);
+  ASSERT_TRUE(viewer.render);
+  EXPECT_EQ(viewer.render->encoding.codec, Codec::h264);
+  EXPECT_TRUE(viewer.render->encoding.key);
+}
+
+// A JPEG of the size that only the bytes of video permit would occupy the link for too long.
+TEST(Video, PicturesBeyondTheLevelAnnouncedAreDrawnSmallerInsteadOfAsLargeJpeg) {
+  SlowViewer viewer(std::vector<std::string>{"avc1.64001e"});
+  viewer.payload_bytes = 120'000;
+  viewer.link_us = 300 * ms;
+  viewer.begin_video();
+  viewer.payload_bytes = 5'000;
+  for (const SendFrame& frame : viewer.move(40)) {
+    if (Driver::is_final(frame)) continue;
+    EXPECT_EQ(frame.header.codec, Codec::h264) << frame.header.seq;
+  }
 }
 
 }  // namespace
