@@ -136,6 +136,19 @@ test("every frame of video returns its credit, also after its decoder failed", (
     },
   ));
 
+test("a decoder that returns no pictures does not stop the stream", () =>
+  withLink(
+    async (page, link) => {
+      await dragUntil(page, () => link.moving("h264").length >= 1);
+      await until(() => link.announced.length === 2);
+      assert.deepEqual(link.announced[1], []);
+      await finalPicture(page);
+      await dragUntil(page, () => link.frames.at(-1).codec === "jpeg");
+      assert.ok(link.acked >= link.moving("h264").at(-1).seq);
+    },
+    { initScript: () => (VideoDecoder.prototype.decode = () => {}) },
+  ));
+
 test("a browser without the decoder announces nothing", () =>
   withLink(
     async (page, link) => {

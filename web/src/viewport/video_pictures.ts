@@ -16,16 +16,21 @@ export async function decodesVideo(): Promise<boolean> {
   }
 }
 
+// A decoder that holds pictures back, against the stream's parameters, would wait for units that the
+// server does not send before those in flight are acknowledged.
+const longestMs = 3000;
+
 interface Waiting {
   at: number; // time stamp of the unit
   done(picture: VideoFrame | null): void;
+  timer: ReturnType<typeof setTimeout>;
 }
 
 export class VideoPictures {
   private decoder: VideoDecoder | null = null;
   private waiting: Waiting[] = [];
 
-  // failed: the decoder reported an error; units are discarded until the next key unit.
+  // failed: the decoder reported an error, or no picture for longestMs; units are discarded until the next key unit.
   constructor(private readonly failed: () => void) {}
 
   // The picture of a unit, to be closed by the caller; null: there is none, because the stream
@@ -33,11 +38,13 @@ export class VideoPictures {
   decode({ header, picture }: Frame): Promise<VideoFrame | null> {
     if (this.decoder === null && !header.key) return Promise.resolve(null);
     return new Promise((done) => {
-      this.waiting.push({ at: header.seq, done });
+      const { seq } = header;
+      const timer = setTimeout(() => this.fail(), longestMs);
+      this.waiting.push({ at: seq, done, timer });
       try {
         this.decoder ??= this.begin();
         const type = header.key ? "key" : "delta";
-        this.decoder.decode(new EncodedVideoChunk({ type, timestamp: header.seq, data: picture }));
+        this.decoder.decode(new EncodedVideoChunk({ type, timestamp: seq, data: picture }));
       } catch {
         this.fail();
       }
@@ -49,7 +56,10 @@ export class VideoPictures {
     const { decoder } = this;
     this.decoder = null;
     if (decoder !== null && decoder.state !== "closed") decoder.close();
-    for (const { done } of this.waiting.splice(0)) done(null);
+    for (const { done, timer } of this.waiting.splice(0)) {
+      clearTimeout(timer);
+      done(null);
+    }
   }
 
   private begin(): VideoDecoder {
@@ -71,6 +81,7 @@ export class VideoPictures {
     for (;;) {
       const next = this.waiting.shift();
       if (next === undefined) return picture.close();
+      clearTimeout(next.timer);
       if (next.at === picture.timestamp) return next.done(picture);
       next.done(null);
     }
