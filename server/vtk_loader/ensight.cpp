@@ -15,6 +15,7 @@
 #include "server/data/files/pattern.hpp"
 #include "server/vtk_loader/case.hpp"
 #include "server/vtk_loader/ensight_check.hpp"
+#include "server/vtk_loader/ensight_times.hpp"
 #include "server/vtk_loader/parts.hpp"
 
 namespace windsplat::vtk_loader {
@@ -35,6 +36,11 @@ class EnSightCase final : public Case {
 
   Result<void> open() {
     const std::string name = files_.files().location().members.front().name;
+    const auto text = text_of(name);
+    if (!text) return text.error();
+    const EnSightTimes times = times_of_case(*text);
+    // VTK does not return from some of them.
+    if (times.has_file_sets) return bad_case("has several steps in one file, which is not read");
     reader_->SetCaseFileName((std::string(case_root) + name).c_str());
     reader_->ReadAllVariablesOff();
     if (auto fine = guarded(files_, [&] { reader_->UpdateInformation(); }); !fine) return fine;
@@ -45,9 +51,10 @@ class EnSightCase final : public Case {
     }
     contents_.format = version == vtkGenericEnSightReader::ENSIGHT_GOLD ? "EnSight Gold (ASCII)"
                                                                         : "EnSight Gold (binary)";
-    find_times();
+    find_times(times);
     find_fields();
-    return note_files(name);
+    leave_out_other_times(times);
+    return note_files(*text);
   }
 
   Result<Parts> read(std::size_t step, const CaseField* field) override {
@@ -87,7 +94,15 @@ class EnSightCase final : public Case {
   }
 
  private:
-  void find_times() {
+  Result<std::string> text_of(const std::string& name) {
+    const auto file = files_.open(name);
+    if (!file) return file.error();
+    constexpr std::size_t case_bytes_max = std::size_t{1} << 20;
+    return (*file)->head(case_bytes_max);
+  }
+
+  // The reader has the times of all sets together.
+  void find_times(const EnSightTimes& times) {
     auto* const about = reader_->GetOutputInformation(0);
     auto* const key = vtkStreamingDemandDrivenPipeline::TIME_STEPS();
     if (about != nullptr && about->Has(key)) {
@@ -95,6 +110,7 @@ class EnSightCase final : public Case {
       std::sort(contents_.times.begin(), contents_.times.end());
     }
     is_timed_ = !contents_.times.empty();
+    if (auto most = times.most_frequent(); is_timed_ && !most.empty()) contents_.times = most;
     if (!is_timed_) contents_.times = {0};
   }
 
@@ -152,16 +168,25 @@ class EnSightCase final : public Case {
     }
   }
 
+  // VTK would hold the values of the time before.
+  void leave_out_other_times(const EnSightTimes& times) {
+    const auto has_others = [&](const CaseField& field) {
+      const auto set = times.set_of.find(field.name);
+      const auto own = set == times.set_of.end() ? times.sets.end() : times.sets.find(set->second);
+      if (own == times.sets.end() || own->second == contents_.times) return false;
+      contents_.left_out.push_back(
+          {field.name, "has other times than most variables: time set " + set->second});
+      return true;
+    };
+    auto& fields = contents_.fields;
+    fields.erase(std::remove_if(fields.begin(), fields.end(), has_others), fields.end());
+  }
+
   // Notes the states of all files that the case file names, of all steps.
-  Result<void> note_files(const std::string& name) {
-    const auto file = files_.open(name);
-    if (!file) return file.error();
-    constexpr std::size_t case_bytes_max = std::size_t{1} << 20;
-    const auto text = (*file)->head(case_bytes_max);
-    if (!text) return text.error();
-    for (std::size_t at = 0; at < text->size();) {
-      const std::size_t end = std::min(text->find('\n', at), text->size());
-      std::string line = text->substr(at, end - at);
+  Result<void> note_files(const std::string& text) {
+    for (std::size_t at = 0; at < text.size();) {
+      const std::size_t end = std::min(text.find('\n', at), text.size());
+      std::string line = text.substr(at, end - at);
       at = end + 1;
       while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
       const auto colon = line.find(':');

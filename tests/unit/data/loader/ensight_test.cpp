@@ -128,6 +128,36 @@ TEST_F(EnSight, AVariableWithoutTimesIsReadAtEachStep) {
   }
 }
 
+// Of another time set: VTK would show its values at times that it does not have.
+TEST_F(EnSight, AVariableOfOtherTimesIsLeftOut) {
+  run(EnSightCoding::text);
+  test::write_variable(folder_ / "run/late.0000", EnSightCoding::text, {EnSightBox()}, false,
+                       [](const Place& at) { return std::vector<double>{at[2]}; });
+  std::string text = std::string(case_text) +
+                     "time set: 7\nnumber of steps: 1\nfilename start number: 0\n"
+                     "filename increment: 1\ntime values: 1.5\n";
+  text.insert(text.find("scalar per node"), "scalar per node: 7 late late.****\n");
+  auto source = opened(write_case(text));
+  ASSERT_NE(source, nullptr);
+  ASSERT_EQ(source->info().steps.size(), 2U);
+  EXPECT_DOUBLE_EQ(source->info().steps[1].value, 2);
+  EXPECT_EQ(source->info().find("late"), nullptr);
+  bool is_told = false;
+  for (const auto& left : source->info().left_out) {
+    is_told =
+        is_told || (left.name == "late" && left.reason.find("time set 7") != std::string::npos);
+  }
+  EXPECT_TRUE(is_told);
+  expect_linear(*source);
+}
+
+TEST_F(EnSight, SeveralStepsInOneFileAreRefused) {
+  run(EnSightCoding::text);
+  EXPECT_THAT(
+      refusal(write_case(std::string(case_text) + "FILE\nfile set: 1\nnumber of steps: 2\n")),
+      AllOf(HasSubstr("'run.case'"), HasSubstr("several steps in one file")));
+}
+
 TEST_F(EnSight, DamagedFilesAreRefusedByName) {
   const std::string path = run(EnSightCoding::text);
   std::filesystem::remove(folder_ / "run/run.geo");
