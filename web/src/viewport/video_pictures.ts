@@ -16,7 +16,7 @@ export async function decodesVideo(): Promise<boolean> {
   }
 }
 
-// A decoder that holds pictures back, against the stream's parameters, would wait for units that the
+// A decoder that holds pictures back would wait for units that the
 // server does not send before those in flight are acknowledged.
 const longestMs = 3000;
 
@@ -30,7 +30,8 @@ export class VideoPictures {
   private decoder: VideoDecoder | null = null;
   private waiting: Waiting[] = [];
 
-  // failed: the decoder reported an error, or no picture for longestMs; units are discarded until the next key unit.
+  // failed: the decoder reported an error, or no picture for longestMs; units are discarded until
+  // the next key unit.
   constructor(private readonly failed: () => void) {}
 
   // The picture of a unit, to be closed by the caller; null: there is none, because the stream
