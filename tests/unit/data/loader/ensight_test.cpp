@@ -133,9 +133,12 @@ TEST_F(EnSight, AVariableOfOtherTimesIsLeftOut) {
   run(EnSightCoding::text);
   test::write_variable(folder_ / "run/late.0000", EnSightCoding::text, {EnSightBox()}, false,
                        [](const Place& at) { return std::vector<double>{at[2]}; });
-  std::string text = std::string(case_text) +
-                     "time set: 7\nnumber of steps: 1\nfilename start number: 0\n"
-                     "filename increment: 1\ntime values: 1.5\n";
+  std::string text = std::string(case_text) + R"(time set: 7
+number of steps: 1
+filename start number: 0
+filename increment: 1
+time values: 1.5
+)";
   text.insert(text.find("scalar per node"), "scalar per node: 7 late late.****\n");
   auto source = opened(write_case(text));
   ASSERT_NE(source, nullptr);
@@ -153,9 +156,12 @@ TEST_F(EnSight, AVariableOfOtherTimesIsLeftOut) {
 
 TEST_F(EnSight, SeveralStepsInOneFileAreRefused) {
   run(EnSightCoding::text);
-  EXPECT_THAT(
-      refusal(write_case(std::string(case_text) + "FILE\nfile set: 1\nnumber of steps: 2\n")),
-      AllOf(HasSubstr("'run.case'"), HasSubstr("several steps in one file")));
+  const std::string text = std::string(case_text) + R"(FILE
+file set: 1
+number of steps: 2
+)";
+  EXPECT_THAT(refusal(write_case(text)),
+              AllOf(HasSubstr("'run.case'"), HasSubstr("several steps in one file")));
 }
 
 TEST_F(EnSight, DamagedFilesAreRefusedByName) {
