@@ -33,7 +33,7 @@ class VideoEncoder {
   [[nodiscard]] static bool available();
 
   // Upper bound on the resident memory of the encoder of such a picture. Its pictures are whole
-  // macroblocks with a border of 32 pixels. For noise at quality 75 it grew by 7.6 to 9.6 bytes
+  // macroblocks with a border of 32 pixels. For noise it grew by 7.6 to 10.0 bytes
   // for each of these pixels and by 1.2 MB (OpenH264 2.3.1; 16 x 16 to 1920 x 1088, 17 x 8192).
   [[nodiscard]] static std::uint64_t bytes_for(int width, int height) {
     constexpr std::uint64_t bytes_a_pixel = 11;

@@ -269,7 +269,8 @@ Scene over_hills(bool perspective, std::array<int, 3> dims = {14, 12, 5}) {
 
 TEST(Terrain, TheLowerBoundaryLiesHalfACellBelowTheLowestSamples) {
   const Scene scene = over_hills(true);
-  const auto& [nx, ny, nz] = scene.lattice.dims;
+  const int nx = scene.lattice.dims[0];
+  const int ny = scene.lattice.dims[1];
   const Terrain& terrain = *scene.body->terrain;
   ASSERT_EQ(terrain.width(), nx + 2);
   ASSERT_EQ(terrain.height(), ny + 2);
