@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "server/base/pcg3d.hpp"
@@ -400,11 +399,11 @@ std::optional<quality::Content> content_of(const scene::Scene& scene, const Canc
 
 namespace {
 
-Described describe(quality::Viewpoint viewpoint, const quality::SceneSignature& signature,
+Described describe(const quality::Viewpoint& viewpoint, const quality::SceneSignature& signature,
                    const scene::Scene& scene, quality::Tables& tables, const CancelToken& cancel) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
-  Described out{std::move(viewpoint)};
+  Described out{viewpoint};
   out.viewpoint.content = content_of(scene, cancel);
   const auto took = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
   out.describe_us = std::max<std::int64_t>(took.count(), 1);
@@ -423,21 +422,19 @@ quality::Viewpoint known_viewpoint_of(const scene::CompletedView& completed,
 
 Described described(const scene::CompletedView& completed, const scene::Scene& scene,
                     quality::Tables& tables, const CancelToken& cancel) {
-  quality::Viewpoint viewpoint = known_viewpoint_of(completed, tables);
-  if (viewpoint.content) return {std::move(viewpoint)};
-  return describe(std::move(viewpoint), quality::signature_of(completed.view()), scene, tables,
-                  cancel);
+  const quality::Viewpoint viewpoint = known_viewpoint_of(completed, tables);
+  if (viewpoint.content) return {viewpoint};
+  return describe(viewpoint, quality::signature_of(completed.view()), scene, tables, cancel);
 }
 
 Described described(const scene::CompletedView& completed, const data::Dataset& dataset,
                     quality::Tables& tables, const CancelToken& cancel) {
-  quality::Viewpoint viewpoint = known_viewpoint_of(completed, tables);
-  if (viewpoint.content) return {std::move(viewpoint)};
+  const quality::Viewpoint viewpoint = known_viewpoint_of(completed, tables);
+  if (viewpoint.content) return {viewpoint};
   data::Dataset resident = dataset.resident_only();
   const auto scene = scene::build_scene(completed, resident);
-  if (!scene) return {std::move(viewpoint)};
-  return describe(std::move(viewpoint), quality::signature_of(completed.view()), *scene, tables,
-                  cancel);
+  if (!scene) return {viewpoint};
+  return describe(viewpoint, quality::signature_of(completed.view()), *scene, tables, cancel);
 }
 
 }  // namespace windsplat::frame

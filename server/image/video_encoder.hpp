@@ -38,11 +38,11 @@ class VideoEncoder {
   [[nodiscard]] static std::uint64_t bytes_for(int width, int height) {
     constexpr std::uint64_t bytes_a_pixel = 11;
     constexpr std::uint64_t base = std::uint64_t{3} << 19;
-    constexpr int macroblock = 16;
-    constexpr int borders = 2 * 32;
+    constexpr std::uint64_t macroblock = 16;
+    constexpr std::uint64_t borders = std::uint64_t{2} * 32;
     const auto stored = [](int edge) {
-      return static_cast<std::uint64_t>((edge + macroblock - 1) / macroblock * macroblock +
-                                        borders);
+      const auto macroblocks = (static_cast<std::uint64_t>(edge) + macroblock - 1) / macroblock;
+      return macroblocks * macroblock + borders;
     };
     return base + bytes_a_pixel * stored(width) * stored(height);
   }

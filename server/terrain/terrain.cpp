@@ -12,6 +12,11 @@ namespace windsplat::terrain {
 
 namespace {
 
+std::size_t index_of(int width, int x, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+         static_cast<std::size_t>(x);
+}
+
 constexpr int block = 2;  // cells or blocks along a side
 
 constexpr double rounding = 1e-12;  // relative, of the distances at which a ray meets a box
@@ -69,8 +74,7 @@ void Terrain::set_normals() {
       const glm::dvec3 across = glm::cross(way(x, y, 1, 0), way(x, y, 0, 1));
       const double length = glm::length(across);
       if (length > 0) normal = across * ((glm::dot(across, normal) < 0 ? -1 : 1) / length);
-      normals_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-               static_cast<std::size_t>(x)] = {
+      normals_[index_of(width_, x, y)] = {
           static_cast<float>(normal.x), static_cast<float>(normal.y), static_cast<float>(normal.z)};
     }
   }
@@ -82,8 +86,7 @@ Terrain::Box Terrain::box_of_cells(int x, int y) const {
   Box box{{most, most, most}, {-most, -most, -most}};
   for (int j = y; j < std::min(y + block, height_ - 1); ++j) {
     for (int i = x; i < std::min(x + block, width_ - 1); ++i) {
-      const std::size_t first = static_cast<std::size_t>(j) * static_cast<std::size_t>(width_) +
-                                static_cast<std::size_t>(i);
+      const std::size_t first = index_of(width_, i, j);
       const std::array<std::size_t, 4> corners{first, first + 1,
                                                first + static_cast<std::size_t>(width_),
                                                first + static_cast<std::size_t>(width_) + 1};
@@ -115,10 +118,10 @@ void Terrain::set_levels() {
     Level level{blocks_of(finer.width), blocks_of(finer.height), {}};
     for (int y = 0; y < level.height; ++y) {
       for (int x = 0; x < level.width; ++x) {
-        Box box = finer.boxes[static_cast<std::size_t>(block * y * finer.width + block * x)];
+        Box box = finer.boxes[index_of(finer.width, block * x, block * y)];
         for (int j = block * y; j < std::min(block * (y + 1), finer.height); ++j) {
           for (int i = block * x; i < std::min(block * (x + 1), finer.width); ++i) {
-            const Box& part = finer.boxes[static_cast<std::size_t>(j * finer.width + i)];
+            const Box& part = finer.boxes[index_of(finer.width, i, j)];
             for (std::size_t a = 0; a < 3; ++a) {
               box.low[a] = std::min(box.low[a], part.low[a]);
               box.high[a] = std::max(box.high[a], part.high[a]);
@@ -220,7 +223,7 @@ class Terrain::Search {
 
   void visit(std::size_t level, int x, int y, const Ids& above) {
     const Level& here = terrain_.levels_[level];
-    const Box& box = here.boxes[static_cast<std::size_t>(y * here.width + x)];
+    const Box& box = here.boxes[index_of(here.width, x, y)];
     if (box.low[0] > box.high[0] || !may_enter(box)) return;
     const auto meets = [&](std::uint8_t r) { return enters(r, box); };
     const auto* const first = above.ray.begin();
@@ -247,7 +250,7 @@ class Terrain::Search {
     std::size_t count = 0;
     for (int j = block * y; j < std::min(block * (y + 1), finer.height); ++j) {
       for (int i = block * x; i < std::min(block * (x + 1), finer.width); ++i) {
-        const Box& part = finer.boxes[static_cast<std::size_t>(j * finer.width + i)];
+        const Box& part = finer.boxes[index_of(finer.width, i, j)];
         double depth = 0;
         for (std::size_t a = 0; a < 3; ++a) {
           depth += static_cast<double>(part.low[a] + part.high[a]) *

@@ -35,8 +35,10 @@ PixelSurface silhouette(const Terrain& terrain, const View& view, double right, 
   std::array<Ray, static_cast<std::size_t>(parts) * parts> rays;
   std::array<Hit, rays.size()> hits;
   for (int n = 0; n < parts * parts; ++n) {
+    const int i = n % parts;
+    const int j = n / parts;
     rays[static_cast<std::size_t>(n)] =
-        ray_at(view, right + (n % parts + 0.5) / parts, down + (n / parts + 0.5) / parts);
+        ray_at(view, right + (i + 0.5) / parts, down + (j + 0.5) / parts);
   }
   terrain.meet(rays.data(), static_cast<int>(rays.size()), hits.data());
   PixelSurface sum;
@@ -62,16 +64,22 @@ void look(const Terrain& terrain, const View& view, double right, double down, i
   std::array<Hit, rays_max> hits;
   const int corners = (side + 1) * (side + 1);
   for (int n = 0; n < corners; ++n) {
-    rays[static_cast<std::size_t>(n)] = ray_at(view, right + n % (side + 1), down + n / (side + 1));
+    const int i = n % (side + 1);
+    const int j = n / (side + 1);
+    rays[static_cast<std::size_t>(n)] = ray_at(view, right + i, down + j);
   }
   for (int n = 0; n < side * side; ++n) {
-    rays[static_cast<std::size_t>(corners + n)] =
-        ray_at(view, right + n % side + 0.5, down + n / side + 0.5);
+    const int i = n % side;
+    const int j = n / side;
+    rays[static_cast<std::size_t>(corners) + static_cast<std::size_t>(n)] =
+        ray_at(view, right + i + 0.5, down + j + 0.5);
   }
   terrain.meet(rays.data(), corners + side * side, hits.data());
   for (int n = 0; n < side * side; ++n) {
-    const int first = n / side * (side + 1) + n % side;
-    const auto middle = static_cast<std::size_t>(corners + n);
+    const int i = n % side;
+    const int j = n / side;
+    const int first = j * (side + 1) + i;
+    const std::size_t middle = static_cast<std::size_t>(corners) + static_cast<std::size_t>(n);
     int met = is_met(hits[middle]) ? 1 : 0;
     for (const int corner : {first, first + 1, first + side + 1, first + side + 2}) {
       met += is_met(hits[static_cast<std::size_t>(corner)]) ? 1 : 0;
@@ -80,8 +88,7 @@ void look(const Terrain& terrain, const View& view, double right, double down, i
     if (met == 5) {
       pixels[n] = {hits[middle].along, 1, cosine_of(rays[middle], hits[middle])};
     } else if (met > 0) {
-      pixels[n] =
-          silhouette(terrain, view, right + n % side, down + n / side, rays[middle], hits[middle]);
+      pixels[n] = silhouette(terrain, view, right + i, down + j, rays[middle], hits[middle]);
     }
   }
 }

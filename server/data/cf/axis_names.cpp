@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/base/ascii.hpp"
+#include "server/data/cf/array_file.hpp"
 
 namespace windsplat::data::cf {
 
