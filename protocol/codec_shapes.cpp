@@ -202,6 +202,8 @@ Json frame_info_json(const FrameInfo& info) {
            {"height", info.height},
            {"error", {{"value", number_or_null(info.error_value)}, {"kind", info.error_kind}}},
            {"jpegError", number_or_null(info.jpeg_error)},
+           {"skippedChange",
+            {{"value", number_or_null(info.skipped_change)}, {"kind", info.skipped_change_kind}}},
            {"work",
             {{"samples", info.samples},
              {"culled", info.culled},

@@ -273,6 +273,9 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());
   const Clock::time_point measured_from = Clock::now();
   if (is_measured(prepared)) {
+    const auto change = measured_skipped_change(prepared, pool, cancel, workspace);
+    if (!change) return given_up(change.error(), workspace);
+    drawn.skipped_change = *change;
     auto error = measured_error(prepared, dataset, pool, cancel, workspace);
     if (!error) return given_up(error.error(), workspace);
     drawn.error = *error;

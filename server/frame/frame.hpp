@@ -37,8 +37,8 @@ struct Encoding {
   int quality = 90;
   image::Subsampling subsampling = image::Subsampling::s444;
   bool allow_reference = false;  // see complete()
-  // Whether the error of the picture is measured by a second, finer rendering, and that of a JPEG
-  // by decoding it.
+  // Whether the error of the picture is measured by a second, finer rendering, that of a JPEG by
+  // decoding it, and the change by what tolerances leave out by drawing that too.
   bool measure = false;
   // Whether what the view shows is described, which its estimated errors follow from. It takes some
   // 50 ms, so pictures with a measured error, which do not need it, are described only if this is
@@ -71,6 +71,7 @@ struct Frame {
   // that of its encoding.
   std::optional<double> error;
   std::optional<double> jpeg_error;
+  std::optional<double> skipped_change;  // measured_skipped_change; empty: not measured
   Coded coded = Coded::as_asked;
   std::string video_fault;  // if video failed
 };

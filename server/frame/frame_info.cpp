@@ -51,6 +51,10 @@ protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
   }
   info.width = frame.width;
   info.height = frame.height;
+  if (frame.skipped_change) {
+    info.skipped_change = frame.skipped_change;
+    info.skipped_change_kind = "measured";
+  }
   const engine::WorkReport& work = frame.work;
   info.samples = work.samples;
   info.culled = work.culled;

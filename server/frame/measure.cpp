@@ -417,6 +417,32 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
   return std::optional(std::max(quality::error_least, error));
 }
 
+Result<double> measured_skipped_change(const Prepared& prepared, ThreadPool& pool,
+                                       const CancelToken& cancel, Workspace& workspace) {
+  if (workspace.drawn.work.skipped_bound == 0) return 0.0;
+  scene::Scene whole = prepared.scene;
+  if (whole.vector) whole.vector->min_magnitude = 0;
+  for (scene::ScalarLayer& layer : whole.scalars) layer.min_optical_depth = 0;
+  const std::vector<float>& rgba = workspace.space.image().rgba;
+  const int width = whole.camera.width;
+  PartSums sums;
+  // Tiles in which neither picture has anything are not delivered.
+  const auto add = [&](const engine::TilePixels& tile) {
+    double sum = 0;
+    double most = 0;
+    each_value(tile, width, [&](std::size_t at, float value) {
+      most = std::max(most, std::abs(static_cast<double>(value) - rgba[at]));
+      if (at % channels != channels - 1) return;
+      sum += most;
+      most = 0;
+    });
+    sums.add(tile, sum);
+  };
+  const auto work = engine::render(whole, pool, cancel, workspace.space, add);
+  if (!work) return work.error();
+  return sums.total() * channels / static_cast<double>(rgba.size());
+}
+
 Result<void> load_for_calibration(const scene::CompletedView& completed, data::Dataset& dataset,
                                   const CancelToken& cancel) {
   const auto sized = calibrated(completed);

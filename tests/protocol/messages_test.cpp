@@ -282,6 +282,8 @@ TEST(Shapes, FrameInfoContainsEveryCount) {
   info.pixel_updates = 6;
   info.exponentials = 7;
   info.tiles_stopped = 8;
+  info.skipped_change = 0.125;
+  info.skipped_change_kind = "measured";
   info.skipped_bound = 0.25;
   info.stop_bound = 0.125;
   const std::string json = encode_frame_info(info);
@@ -289,6 +291,7 @@ TEST(Shapes, FrameInfoContainsEveryCount) {
   EXPECT_EQ(Json::parse(json), Json::parse(R"({"method":"kernel","compositing":"analytic",
       "stride":1,"slabThickness":null,"width":640,"height":480,
       "error":{"value":0.002,"kind":"measured"},"jpegError":null,
+      "skippedChange":{"value":0.125,"kind":"measured"},
       "work":{"samples":972800,"culled":1,"skippedVector":2,"skippedScalar":3,"skippedBoth":4,
               "occluded":5,"pixelUpdates":6,"exponentials":7,"tiles":300,"tilesStopped":8,
               "skippedBound":0.25,"stopBound":0.125,
@@ -306,11 +309,13 @@ TEST(Shapes, NumbersThatAreNotFiniteAreNull) {
   FrameInfo info = frame_info();
   info.error_value = std::numeric_limits<double>::quiet_NaN();
   info.jpeg_error = std::numeric_limits<double>::infinity();
+  info.skipped_change = std::numeric_limits<double>::quiet_NaN();
   info.skipped_bound = std::numeric_limits<double>::infinity();
   const std::string json = encode_frame_info(info);
   expect_shape("frameInfo", json);
   EXPECT_TRUE(Json::parse(json)["error"]["value"].is_null());
   EXPECT_TRUE(Json::parse(json)["jpegError"].is_null());
+  EXPECT_TRUE(Json::parse(json)["skippedChange"]["value"].is_null());
   EXPECT_TRUE(Json::parse(json)["work"]["skippedBound"].is_null());
 }
 

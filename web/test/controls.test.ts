@@ -253,13 +253,15 @@ test("the HUD names method and compositing, and the samples that were skipped", 
     occluded: 0,
     pixelUpdates: 3_300_000,
     exponentials: 1_234_000_000,
+    skippedBound: 0.472,
     variant: "over",
   } as ChosenMessage["work"];
-  const words = workLines(work).join(" · ");
+  const unknown = { value: null, kind: "none" } as const;
+  const words = workLines({ work, skippedChange: unknown }).join(" · ");
   for (const part of [
     "90.0 k of 97.3 k samples",
     "culled 1.0 k",
-    "6.3 k both",
+    "6.3 k both · change ≤ 0.47",
     "111 lines",
     "22.2 k splats",
     "occluded 0",
@@ -269,6 +271,9 @@ test("the HUD names method and compositing, and the samples that were skipped", 
   ]) {
     assert.ok(words.includes(part), `${part} in ${words}`);
   }
+  const skippedChange = { value: 0.0256, kind: "measured" } as const;
+  assert.match(workLines({ work, skippedChange })[1], / both · change 0\.026$/);
+  assert.match(workLines({ work, skippedChange: { value: 0, kind: "measured" } })[1], /change 0$/);
 });
 
 test("the vertical exaggeration follows the scales, and is 1 to scale", () => {

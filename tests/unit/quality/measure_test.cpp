@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -10,6 +11,7 @@
 #include <memory>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "server/data/resident/dataset.hpp"
 #include "server/data/samples/samples.hpp"
@@ -182,6 +184,70 @@ TEST_F(Measure, OtherRulesAndEarlyTerminationAreMeasuredAgainstTheIntegral) {
   }
 }
 
+// Mean over pixels of the channel that changes most.
+double mean_change(const Frame& picture, const Frame& whole) {
+  EXPECT_EQ(picture.bytes.size(), whole.bytes.size());
+  const std::size_t pixels = static_cast<std::size_t>(picture.width) * picture.height;
+  const auto values = [&](const Frame& of) {
+    std::vector<float> out(4 * pixels);
+    std::memcpy(out.data(), of.bytes.data() + of.bytes.size() - 4 * sizeof(float) * pixels,
+                4 * sizeof(float) * pixels);
+    return out;
+  };
+  const std::vector<float> a = values(picture);
+  const std::vector<float> b = values(whole);
+  double sum = 0;
+  for (std::size_t p = 0; p < 4 * pixels; p += 4) {
+    double most = 0;
+    for (std::size_t c = p; c < p + 4; ++c) {
+      most = std::max(most, std::abs(static_cast<double>(a[c]) - b[c]));
+    }
+    sum += most;
+  }
+  return sum / static_cast<double>(pixels);
+}
+
+TEST_F(Measure, ChangeBySkippedLinesAndSplatsIsThatOfThePictureWithAllOfThem) {
+  view.scalars.value()[0].min_optical_depth = 0.2;
+  view.vector.min_magnitude = 0.3 * view.vector.magnitude_range.value()[1];
+  const protocol::View skipping = view;
+  for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
+    view = skipping;
+    const Frame picture = drawn(method, Format::npy);
+    const double png = drawn(method, Format::png).skipped_change.value();
+    const double jpeg = drawn(method, Format::jpeg).skipped_change.value();
+    view.vector.min_magnitude = 0;
+    const Frame lines = drawn(method, Format::npy);
+    view.scalars.value()[0].min_optical_depth = 0;
+    const Frame whole = drawn(method, Format::npy);
+    const double truth = mean_change(picture, whole);
+    EXPECT_GT(truth, 0.02);
+    EXPECT_NEAR(picture.skipped_change.value(), truth, 1e-6 * truth);
+    EXPECT_LE(picture.skipped_change.value(), picture.work.skipped_bound);
+    EXPECT_EQ(png, picture.skipped_change.value());
+    EXPECT_EQ(jpeg, picture.skipped_change.value());
+    EXPECT_GT(lines.skipped_change.value(), 1e-4) << "of splats alone";
+    EXPECT_LT(lines.skipped_change.value(), truth);
+    EXPECT_EQ(whole.skipped_change, 0.0) << "nothing is skipped";
+  }
+}
+
+TEST_F(Measure, ChangeBySkippedLinesHasTheSameBitsForAnyNumberOfThreads) {
+  view.image.width = 640;
+  view.image.height = 480;
+  view.vector.min_magnitude = 0.3 * view.vector.magnitude_range.value()[1];
+  const double change = drawn(protocol::MethodName::slab, Format::jpeg).skipped_change.value();
+  EXPECT_GT(change, 0);
+  Encoding encoding;
+  encoding.measure = true;
+  for (const unsigned threads : {1U, 3U, 7U}) {
+    ThreadPool other(threads);
+    const auto frame = produce(view, *dataset, encoding, other, cancel);
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->skipped_change, change) << threads;
+  }
+}
+
 TEST_F(Measure, MeasuredPictureIsTheSentOne) {
   Encoding encoding;
   for (const Format format : {Format::png, Format::npy, Format::jpeg}) {
@@ -190,7 +256,7 @@ TEST_F(Measure, MeasuredPictureIsTheSentOne) {
     view.method.name = protocol::MethodName::slab;
     const auto plain = produce(view, *dataset, encoding, pool, cancel);
     ASSERT_TRUE(plain);
-    EXPECT_FALSE(plain->error);
+    EXPECT_FALSE(plain->error || plain->skipped_change);
     EXPECT_EQ(measured.bytes, plain->bytes) << static_cast<int>(format);
   }
 }

@@ -124,14 +124,23 @@ const many = (n: number): string => {
   return n < 1e9 ? `${(n / 1e6).toFixed(1)} M` : `${(n / 1e9).toFixed(1)} G`;
 };
 
+// Mean change of the picture by what was skipped: measured of a final frame, else its upper bound.
+function changeText(change: ChosenMessage["skippedChange"], bound: number | null): string {
+  if (change.value !== null) return ` · change ${formatNumber(change.value, 2)}`;
+  return bound === null ? "" : ` · change ≤ ${formatNumber(bound, 2)}`;
+}
+
 // The work drawn, the work left out, and the cost.
-export function workLines(work: ChosenMessage["work"]): [string, string, string] {
+export function workLines({
+  work,
+  skippedChange,
+}: Pick<ChosenMessage, "work" | "skippedChange">): [string, string, string] {
   const drawn = work.samples - work.culled - work.skippedBoth;
   return [
     `${many(drawn)} of ${many(work.samples)} samples · culled ${many(work.culled)}` +
       ` · occluded ${many(work.occluded)}`,
     `skipped ${many(work.skippedVector)} lines, ${many(work.skippedScalar)} splats,` +
-      ` ${many(work.skippedBoth)} both`,
+      ` ${many(work.skippedBoth)} both${changeText(skippedChange, work.skippedBound)}`,
     `${many(work.pixelUpdates)} pixel updates · ${many(work.exponentials)} exponentials` +
       ` · ${work.variant}`,
   ];

@@ -103,7 +103,7 @@ export class Hud {
       `queue ${ms(header.queueUs / 1e3)} · render ${ms(header.renderUs / 1e3)} · ` +
       `encode ${ms(header.encodeUs / 1e3)} · net ${msOrDash(this.network)} · ` +
       `decode ${ms(frame.decodeMs)} · latency ${msOrDash(this.latency)} ms`;
-    this.work.textContent = chosen === null ? "" : workLines(chosen.work).join("\n");
+    this.work.textContent = chosen === null ? "" : workLines(chosen).join("\n");
     this.showRate();
   }
 
