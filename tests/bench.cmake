@@ -28,7 +28,8 @@ target_link_libraries(bench_frame PRIVATE windsplat_truth)
 windsplat_bench(bench_kernels)
 windsplat_bench(bench_stages ${bench_dir}/allocations.cpp)
 windsplat_bench(bench_path)
-windsplat_bench(bench_left_out)
+windsplat_bench(bench_left_out ${bench_dir}/scenes/skipped_changes.cpp
+  ${naive_dir}/trial_fields.cpp)
 windsplat_bench(bench_estimates ${bench_dir}/scenes/scene_set.cpp
   ${bench_dir}/scenes/time_estimates.cpp ${naive_dir}/trial_fields.cpp
   ${naive_dir}/family/family.cpp)
@@ -52,6 +53,7 @@ windsplat_smoke(kernels bench_kernels --smoke)
 windsplat_smoke(stages bench_stages --smoke)
 windsplat_smoke(estimates bench_estimates --measure=bench_estimates.csv --list=bench_estimates.csv
   --members=1 --scenes=1 --views=1)
+windsplat_smoke(left_out bench_left_out --trials=24 --field=front)
 windsplat_smoke(picture bench_picture --benchmark_filter=640x480 --benchmark_min_time=0.001)
 file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"height\":24}}\n")
 windsplat_smoke(path bench_path tornado bench_views.jsonl bench_view.png)

@@ -2,6 +2,8 @@
 // drawn in turns by one thread, as a table on stdout and optionally as Markdown:
 //
 //   bench_left_out [--markdown=FILE] [--benchmark_filter=REGEX] [--benchmark_out=FILE]
+//   bench_left_out --trials=HEIGHT [--field=NAME]    what tolerances leave out of pictures of
+//   generated fields
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -26,6 +28,8 @@
 #include "server/scene/completed_view.hpp"
 #include "server/scene/place.hpp"
 #include "tests/bench/left_out_table.hpp"
+#include "tests/bench/scenes/skipped_changes.hpp"
+#include "tests/bench/support.hpp"
 
 namespace windsplat {
 namespace {
@@ -252,6 +256,14 @@ void write_markdown(const std::string& path, const std::vector<Pair>& pairs) {
 
 int run(int argc, char** argv) {
   constexpr int rounds = 7;
+  const std::string trials = bench::take_option(argc, argv, "--trials");
+  if (!trials.empty()) {
+    const std::string field = bench::take_option(argc, argv, "--field");
+    const int height = std::atoi(trials.c_str());  // NOLINT(cert-err34-c): 0 is refused
+    if (height < 1 || argc > 1) return 2;
+    std::fputs(bench::markdown(bench::skipped_changes(height, field)).c_str(), stdout);
+    return 0;
+  }
   benchmark::Initialize(&argc, argv);
   std::string output;
   const std::string option = "--markdown=";
