@@ -31,7 +31,8 @@ windsplat_bench(bench_path)
 windsplat_bench(bench_left_out ${bench_dir}/scenes/skipped_changes.cpp
   ${naive_dir}/trial_fields.cpp)
 windsplat_bench(bench_estimates ${bench_dir}/scenes/scene_set.cpp
-  ${bench_dir}/scenes/time_estimates.cpp ${naive_dir}/trial_fields.cpp
+  ${bench_dir}/scenes/time_estimates.cpp ${bench_dir}/scenes/odd_estimates.cpp
+  ${naive_dir}/trial_fields.cpp
   ${naive_dir}/family/family.cpp)
 windsplat_bench(bench_pool)
 windsplat_bench(bench_picture)

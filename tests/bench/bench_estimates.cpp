@@ -5,6 +5,7 @@
 //   bench_estimates --list=FILE
 //   bench_estimates --times=SIDE    forecast and measured times of generated scenes
 //   bench_estimates --family-times=N  the same for N members of each kind of generated data
+//   bench_estimates --odd=SCENES      views of unusual sizes, eyes and lattices
 //   bench_estimates                 the time of forecasts
 #include <array>
 #include <chrono>
@@ -26,6 +27,7 @@
 #include "server/quality/table.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
+#include "tests/bench/scenes/odd_estimates.hpp"
 #include "tests/bench/scenes/time_estimates.hpp"
 #include "tests/bench/support.hpp"
 #include "tests/bench/text_table.hpp"
@@ -212,6 +214,8 @@ int main(int argc, char** argv) {
   if (!listed.empty()) list(read(listed));
   if (side > 0) list_times(side);
   if (family > 0) list_family_times(family, 2);
-  if (measured.empty() && listed.empty() && side <= 0 && family <= 0) time_forecasts();
+  const int odd = number("--odd", 0);
+  if (odd > 0) list_odd(odd);
+  if (measured.empty() && listed.empty() && side <= 0 && family <= 0 && odd <= 0) time_forecasts();
   return 0;
 }
