@@ -271,10 +271,7 @@ class Rays {
     out.depth = glm::dot(at - camera.eye, camera.forward);
     out.pace = glm::dot(way, camera.forward);
     for (std::size_t a = 0; a < 3; ++a) {
-      const auto next = samples_.neighbour(through, a, 1);
-      const auto last = samples_.neighbour(through, a, -1);
-      if (!next && !last) continue;
-      const glm::dvec3 edge = next ? samples_.place(*next) - at : at - samples_.place(*last);
+      const glm::dvec3 edge = edge_of(through, a);
       const double length2 = glm::dot(edge, edge);
       if (length2 == 0) continue;
       out.rate[a] = glm::dot(way, edge) / length2;
@@ -292,6 +289,32 @@ class Rays {
                std::abs(out.rate[out.axis]);
     out.cells = cells_of(out);
     return out;
+  }
+
+  // From a sample to the next one. Along an axis of one sample that of its cell, which is across
+  // the two others on curved lattices; 0 if these have no plane.
+  [[nodiscard]] glm::dvec3 edge_of(const Index& i, std::size_t a) const {
+    const auto next = samples_.neighbour(i, a, 1);
+    const auto last = samples_.neighbour(i, a, -1);
+    if (next) return samples_.place(*next) - samples_.place(i);
+    if (last) return samples_.place(i) - samples_.place(*last);
+    glm::dvec3 way{0, 0, 0};
+    way[static_cast<glm::length_t>(a)] = 1;
+    if (samples_.scene().lattice.places) {
+      std::array<glm::dvec3, 2> across{};
+      for (std::size_t n = 0; n < 2; ++n) {
+        const std::size_t other = (a + 1 + n) % 3;
+        const auto beyond = samples_.neighbour(i, other, 1);
+        const auto before = samples_.neighbour(i, other, -1);
+        if (!beyond && !before) return {0, 0, 0};
+        across[n] = samples_.place(beyond ? *beyond : i) - samples_.place(before ? *before : i);
+      }
+      way = glm::cross(across[0], across[1]);
+      const double length = glm::length(way);
+      if (length == 0) return way;
+      way /= length;
+    }
+    return samples_.edge(i, a) * way;
   }
 
   // The cells of the lattice that a ray passes in front of the camera.

@@ -19,8 +19,8 @@ namespace reference = engine::reference;
 
 constexpr double pieces_of_cell = 4;
 
-// The mean cell along the view, of the coarsest medium.
-double cell_depth(const scene::Scene& scene) {
+// Mean cells passed by a direction, of the coarsest medium.
+double cells_along(const scene::Scene& scene, const Vec& direction) {
   int stride = scene.scalars.empty() && scene.vector ? scene.vector->stride : 1;
   for (const scene::ScalarLayer& layer : scene.scalars) stride = std::max(stride, layer.stride);
   double cells2 = 0;
@@ -30,10 +30,9 @@ double cell_depth(const scene::Scene& scene) {
     const double whole = std::accumulate(spacing.begin(), spacing.end(), 0.0);
     const bool sliced = scene.slice && static_cast<std::size_t>(scene.slice->axis) == a;
     const double together = sliced ? 1 : std::min(1.0 * stride, count);
-    cells2 +=
-        std::pow(scene.camera.forward[static_cast<glm::length_t>(a)] * count / together / whole, 2);
+    cells2 += std::pow(direction[a] * count / together / whole, 2);
   }
-  return 1 / std::sqrt(cells2);
+  return std::sqrt(cells2);
 }
 
 // Of a slab: of the diagonal of the box (engine/plan).
@@ -64,7 +63,7 @@ double square_difference(const Light& a, const Light& b) {
 
 RayLight::RayLight(const scene::Scene& scene)
     : scene_(scene), view_(reference::make_view(scene.camera)) {
-  const double cell = cell_depth(scene);
+  const double cell = 1 / cells_along(scene, view_.forward);
   const double least = least_depth(scene);
   constexpr double cells_most = 1e9;
   thinnest_ = std::min(least / cell, cells_most);
@@ -134,6 +133,14 @@ void RayLight::meet(const RayKernelList& kernels, const PictureRay& ray) {
             [](const auto& a, const auto& b) { return a.depth < b.depth; });
 }
 
+// Cells that a ray passes for each one that the view's axis passes, rounded: rays at a slant pass
+// more of them for each unit of depth, so that their pieces are made shallower.
+double RayLight::slant_of(const PictureRay& ray) const {
+  if (scene_.lattice.places) return std::round(ray.length);
+  const double cells = slab_ * cells_along(scene_, ray.direction);
+  return std::round(cells / std::max(1.0, thinnest_));
+}
+
 RayLight::ByDepth RayLight::by_depth(const RayKernelList& kernels, const PictureRay& ray) {
   meet(kernels, ray);
   ByDepth out;
@@ -151,16 +158,21 @@ RayLight::ByDepth RayLight::by_depth(const RayKernelList& kernels, const Picture
   }
   // Of the slabs only pieces where there is a medium: cells may be much thinner than a slab.
   constexpr double pieces_most = 16384;
-  const double step = slab_ / pieces_of_slab_;
   const double start = anchor_ + std::floor((from - anchor_) / slab_) * slab_;
+  const double slabs = std::floor((to - start) / slab_) + 1;
+  const double most = std::floor(pieces_most / (slabs * pieces_of_slab_));
+  const double slant = std::clamp(slant_of(ray), 1.0, std::max(1.0, most));
+  const double in_slab = slant * pieces_of_slab_;
+  const double step = slab_ / in_slab;
   const double first = std::floor((from - start) / step);
   const double count = std::floor((to - start) / step) + 1 - first;
   out.known = count < pieces_most;
   if (!out.known) return out;
   pieces_.assign(static_cast<std::size_t>(count), {});
-  const Division division{start, step, static_cast<std::size_t>(first)};
+  const Division division{start, step, static_cast<std::size_t>(first),
+                          static_cast<std::size_t>(slant)};
   for (const Stretch& one : stretches_) divide(one, division);
-  const auto whole = static_cast<std::size_t>(pieces_of_slab_);
+  const auto whole = static_cast<std::size_t>(in_slab);
   pass_in(division, 1, out.exact, &out.end);
   pass_in(division, whole / 2, out.halves);
   pass_in(division, whole, out.slabs);
@@ -200,8 +212,11 @@ void RayLight::pass_in(const Division& by, std::size_t together, Light& to, End*
     }
     const double begin = by.start + static_cast<double>(k) * by.step;
     pass(sum, begin, static_cast<double>(together) * by.step, next, to);
-    if (end == nullptr || to.transmittance > stop) continue;
-    if (end->left.empty()) end->piece = std::llround((begin - anchor_) / by.step);
+    if (end == nullptr || to.transmittance > stop || (k + 1) % by.slant != 0) continue;
+    if (end->left.empty()) {
+      const double piece = by.step * static_cast<double>(by.slant);
+      end->piece = std::llround((by.start - anchor_) / piece) + static_cast<int>(k / by.slant);
+    }
     if (end->left.empty() || end->left.back() > 0.01 * stop) end->left.push_back(to.transmittance);
   }
   for (; next < surfaces_.size(); ++next) reference::cross_surface(surfaces_[next], to);

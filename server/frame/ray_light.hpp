@@ -25,9 +25,9 @@ class RayLight {
 
   // As drawn by method `kernel` with analytic compositing.
   [[nodiscard]] Light by_kernels(const RayKernelList& kernels, const PictureRay& ray) const;
-  // Where no more than the scene's stop_transmittance is left: the number of the piece, counted
-  // from the middle of the volume, and what is left behind it and each of the next ones, as far as
-  // it counts. Empty if the ray goes on.
+  // Where no more than the scene's stop_transmittance is left: the number of the piece, a part of a
+  // slab, counted from the middle of the volume, and what is left behind it and each of the next
+  // ones, as far as it counts. Empty if the ray goes on.
   struct End {
     std::int64_t piece = 0;
     std::vector<double> left;
@@ -39,7 +39,7 @@ class RayLight {
     End end;
     bool known = true;  // false: of too many pieces
   };
-  // `exact`: in pieces of a quarter of a cell.
+  // `exact`: in pieces of a quarter of a cell along the ray.
   ByDepth by_depth(const RayKernelList& kernels, const PictureRay& ray);
   // The least depth of a slab, in cells.
   [[nodiscard]] double thinnest() const { return thinnest_; }
@@ -59,8 +59,10 @@ class RayLight {
     double start = 0;  // view depth
     double step = 0;
     std::size_t first = 0;
+    std::size_t slant = 1;  // pieces to each of a ray along the view
   };
   [[nodiscard]] engine::reference::Surface body(const PictureRay& ray) const;
+  [[nodiscard]] double slant_of(const PictureRay& ray) const;
   void meet(const RayKernelList& kernels, const PictureRay& ray);
   void divide(const Stretch& one, const Division& by);
   void pass_in(const Division& by, std::size_t together, Light& to, End* end = nullptr) const;
