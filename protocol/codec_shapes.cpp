@@ -261,6 +261,12 @@ Json dataset_json(const DatasetDescription& dataset) {
   if (dataset.vertical_exaggeration) {
     out["verticalExaggeration"] = canonical_number(*dataset.vertical_exaggeration);
   }
+  if (const auto& ground = dataset.ground) {
+    out["ground"] = {{"name", ground->name},
+                     {"kind", ground->kind},
+                     {"range", Json::array({canonical_number(ground->range[0]),
+                                            canonical_number(ground->range[1])})}};
+  }
   out["mappings"] = dataset.mappings;
   out["leftOut"] = std::move(left_out);
   out["choices"] = std::move(choices);

@@ -94,6 +94,12 @@ struct ChoiceDescription {
   std::vector<std::string> values;  // of the first entries
   std::string chosen;
 };
+// The variable of the file with the height of the ground or the sea floor of each column.
+struct GroundDescription {
+  std::string name;
+  std::string kind;  // "land" | "seaFloor"
+  Range range{};     // metres above sea level
+};
 struct DatasetDescription {
   std::string id;
   std::string title;
@@ -105,6 +111,7 @@ struct DatasetDescription {
   Vec3 world_min{};
   Vec3 world_max{};
   std::optional<double> vertical_exaggeration;  // of the default view
+  std::optional<GroundDescription> ground;
   std::vector<std::string> mappings;  // values of /geometry/mapping that its grid supports
   std::vector<FieldDescription> fields;
   std::vector<std::pair<std::string, std::string>> left_out;  // variable, reason

@@ -138,6 +138,11 @@ std::string grid_text(const protocol::DatasetDescription& dataset) {
     world += to_scale ? "to scale" : short_number(*times) + " times as high as to scale";
     if (by_pressure) world += ", by the standard atmosphere";
   }
+  if (const auto& ground = dataset.ground) {
+    world += ground->kind == "land" ? "\nground " : "\nsea floor ";
+    world += word(ground->name) + ", " + number(ground->range[0]) + " .. " +
+             number(ground->range[1]) + " m above sea level (/geometry/body/show=on)";
+  }
   if (is_whole_globe(dataset)) {
     world += "\nthe longitudes go around: /geometry/mapping=sphere draws a globe, flat a map";
   }

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -47,6 +50,20 @@ std::vector<std::string> mappings_of(const data::Grid& grid) {
   std::vector<std::string> out;
   for (const auto& [mapping, name] : all) {
     if (check_mapping(grid, mapping)) out.emplace_back(name);
+  }
+  return out;
+}
+
+std::optional<protocol::GroundDescription> describe_ground(const data::Grid& grid) {
+  if (!grid.ground) return std::nullopt;
+  protocol::GroundDescription out;
+  out.name = grid.ground->name;
+  out.kind = grid.ground->kind == data::GroundKind::land ? "land" : "seaFloor";
+  out.range = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  for (const float height : grid.ground->heights) {
+    if (std::isnan(height)) continue;
+    out.range[0] = std::min(out.range[0], static_cast<double>(height));
+    out.range[1] = std::max(out.range[1], static_cast<double>(height));
   }
   return out;
 }
@@ -166,6 +183,7 @@ Result<protocol::DatasetDescription> describe(data::Dataset& dataset, RangesOf r
     out.world_max[a] = lattice->box_max[index];
   }
   out.vertical_exaggeration = vertical_exaggeration(info.grid, *lattice);
+  out.ground = describe_ground(info.grid);
   out.mappings = mappings_of(info.grid);
   const std::size_t steps = ranges == RangesOf::all_steps ? info.steps.size() : 1;
   std::uint64_t components = 0;

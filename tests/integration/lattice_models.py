@@ -87,6 +87,7 @@ def write_cosmo(path):
     ground = noise(1, 5, 6, low=0, high=500)
     faces = ground + np.float32(1000) * np.arange(4, -1, -1, dtype=np.float32)[:, None, None]
     put(file, "HHL", ("level1", "rlat", "rlon"), faces, units="m", standard_name="altitude")
+    put(file, "HSURF", ("rlat", "rlon"), ground[0], units="m", standard_name="surface_altitude")
     t = put(file, "T", ("level", "rlat", "rlon"), noise(4, 5, 6), units="K")
     w = put(file, "W", ("level1", "rlat", "rlon"), noise(5, 5, 6), units="m s-1",
             standard_name="upward_air_velocity")
@@ -96,7 +97,7 @@ def write_cosmo(path):
     return Independent({"x": x, "y": y, "z": heights.mean(axis=(1, 2))},
                        as_masked({name: values[None] for name, values in fields.items()}), {},
                        {"x": "degrees", "y": "degrees", "z": "m", "T": "K", "W": "m s-1",
-                        "HHL": "m"})
+                        "HHL": "m"}, ground=("HSURF", "land", ground))
 
 
 def write_one_place(path):

@@ -33,13 +33,15 @@ class Independent:
     a grid has no such axis. scalars: name -> masked array (step, z, y, x). vectors: name -> names
     of its components. units: name of a scalar or an axis -> text, if the file contains it. columns:
     arrays (y, x) of longitudes and of latitudes, by which the program finds a column, or None.
-    falls: axes of levels that are counted from the top."""
+    falls: axes of levels that are counted from the top. ground: the name of the variable with the
+    height of the ground, "land" or "seaFloor" and its heights in metres; None: not compared."""
 
-    def __init__(self, axes, scalars, vectors, units=None, columns=None, falls=()):
+    def __init__(self, axes, scalars, vectors, units=None, columns=None, falls=(), ground=None):
         self.axes, self.scalars, self.vectors = axes, scalars, vectors
         self.units = units or {}
         self.columns = columns
         self.falls = falls
+        self.ground = ground
 
 
 def read_netcdf(path, inspected):
@@ -203,6 +205,11 @@ def compare_axes(check, inspected, other):
         upward = -1 if axis["kind"] in ("pressure", "depth") or a in other.falls else 1
         check.same_text(f"axis {a} units", axis["units"], other.units.get(a, ""))
         check.same(f"axis {a} ascends", np.all(upward * np.diff(axis["coordinates"]) > 0), True)
+    if other.ground is not None:
+        name, kind, heights = other.ground
+        found = inspected.get("ground", {"name": "", "kind": "", "range": [np.nan, np.nan]})
+        check.same_text("ground", f"{found['name']} {found['kind']}", f"{name} {kind}")
+        check.same("ground range", found["range"], [heights.min(), heights.max()], 1)
     other.scalars = {
         name: values[:, orders["z"]][:, :, orders["y"]][:, :, :, orders["x"]]
         for name, values in other.scalars.items()}

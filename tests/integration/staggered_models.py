@@ -9,8 +9,9 @@ from real_files import Independent
 
 # --- WRF ------------------------------------------------------------------------------------------
 
-def write_wrf(path, times=(0.0, 60.0)):
+def write_wrf(path, times=(0.0, 60.0), ground=None):
     nt, nz, ny, nx = len(times), 5, 7, 9
+    ground = noise(ny, nx, low=0, high=900) if ground is None else ground
     file = netCDF4.Dataset(path, "w", format="NETCDF3_64BIT_OFFSET")
     file.TITLE = " OUTPUT FROM WRF V4.2 MODEL"
     file.MAP_PROJ = np.int32(1)
@@ -42,8 +43,8 @@ def write_wrf(path, times=(0.0, 60.0)):
     full = ("Time", "bottom_top_stag", "south_north", "west_east")
     w = put(file, "W", full, noise(nt, nz + 1, ny, nx, low=-1, high=1), units="m s-1",
             stagger="Z", description="z-wind component", **beside)
-    heights = np.linspace(0, 12000, nz + 1)[None, :, None, None] + noise(nt, 1, ny, nx, low=0,
-                                                                        high=900)
+    rise = np.linspace(0, 12000, nz + 1)[None, :, None, None] + noise(nt, 1, ny, nx, low=0, high=9)
+    heights = ground + rise
     phb = put(file, "PHB", full, (9.81 * heights).astype(np.float32), units="m2 s-2", stagger="Z",
               **beside)
     ph = put(file, "PH", full, noise(nt, nz + 1, ny, nx), units="m2 s-2", stagger="Z", **beside)
@@ -57,8 +58,8 @@ def write_wrf(path, times=(0.0, 60.0)):
                 stagger="", **beside)
     put(file, "TSLB", ("Time", "soil_layers_stag", "south_north", "west_east"),
         noise(nt, 4, ny, nx, low=270, high=290), units="K", stagger="Z")
-    put(file, "HGT", ("Time", "south_north", "west_east"), noise(nt, ny, nx, low=0, high=900),
-        units="m", stagger="")
+    put(file, "HGT", ("Time", "south_north", "west_east"), np.repeat(ground[None], nt, 0),
+        units="m", stagger="", description="Terrain Height")
     file.close()
     pressure = p.astype(float) + pb
     height = between(ph, 1) / 9.81 + between(phb, 1) / 9.81
@@ -70,13 +71,15 @@ def write_wrf(path, times=(0.0, 60.0)):
              "QCLOUD": "kg kg-1", "PH": "m2 s-2", "PHB": "m2 s-2", "pressure": "Pa",
              "height": "m", "temperature": "K", "z": "m"}
     axes = {"x": np.arange(nx), "y": np.arange(ny), "z": height[0].mean(axis=(1, 2))}
-    return Independent(axes, as_masked(scalars), {"wind": ["U", "V", "W"]}, units, (east, north))
+    return Independent(axes, as_masked(scalars), {"wind": ["U", "V", "W"]}, units, (east, north),
+                       ground=("HGT", "land", ground))
 
 
 def write_wrf_series(path):
     """Two files of two steps each; path has an asterisk in its name."""
-    parts = [write_wrf(path.with_name(path.name.replace("*", str(n))), (120.0 * n, 120.0 * n + 60))
-             for n in range(2)]
+    ground = noise(7, 9, low=0, high=900)
+    parts = [write_wrf(path.with_name(path.name.replace("*", str(n))), (120.0 * n, 120.0 * n + 60),
+                       ground) for n in range(2)]
     first = parts[0]
     first.scalars = {name: np.ma.concatenate([part.scalars[name] for part in parts])
                      for name in first.scalars}
@@ -172,7 +175,8 @@ def write_roms(path, transform=2, terms=True):
              "temp": "Celsius", "height": "m", "z": "m"}
     axes = {"x": np.arange(nx), "y": np.arange(ny),
             "z": np.nanmean((z + dry)[0], axis=(1, 2))}
-    return Independent(axes, as_masked(scalars), {"current": ["u", "v", "w"]}, units, (lon, lat))
+    return Independent(axes, as_masked(scalars), {"current": ["u", "v", "w"]}, units, (lon, lat),
+                       ground=("h", "seaFloor", np.where(wet, -h, 0.0)))
 
 
 # --- grids told by their coordinates --------------------------------------------------------------
@@ -228,6 +232,9 @@ def write_mom6(path):
     thetao = put(file, "thetao", ("time", "zl", "yh", "xh"), noise(1, nz, ny, nx), units="degC")
     so = put(file, "so", ("time", "zl", "yh", "xh"), noise(1, nz, ny, nx), units="psu")
     e = put(file, "e", ("time", "zi", "yh", "xh"), noise(1, nz + 1, ny, nx), units="m")
+    depth = noise(ny, nx, low=20, high=440)
+    depth[1, 2:4] = 0
+    put(file, "depth_ocean", ("yh", "xh"), depth, units="m", long_name="Depth of the ocean")
     file.close()
     u = np.concatenate([np.asarray(u[..., :1], float), between(u, 3)], 3)
     v = np.concatenate([np.asarray(v[:, :, :1], float), between(v, 2)], 2)
@@ -235,7 +242,7 @@ def write_mom6(path):
     units = {"uo": "m s-1", "vo": "m s-1", "thetao": "degC", "so": "psu", "e": "m",
              "x": "degrees_east", "y": "degrees_north", "z": "meters"}
     return Independent({"x": x, "y": y, "z": z}, as_masked(scalars),
-                       {"current": ["uo", "vo"]}, units)
+                       {"current": ["uo", "vo"]}, units, ground=("depth_ocean", "seaFloor", -depth))
 
 
 def write_sgrid(path):

@@ -30,6 +30,7 @@
 #include "server/data/cf/grid/level_pressures.hpp"
 #include "server/data/cf/grid/plane_spacing.hpp"
 #include "server/data/cf/grid/positions.hpp"
+#include "server/data/cf/ground.hpp"
 #include "server/data/cf/packing.hpp"
 #include "server/data/cf/read_blocks.hpp"
 #include "server/data/cf/steps.hpp"
@@ -78,6 +79,7 @@ class ArraySource final : public FileSource {
       return named(heights.error());
     }
     heights_ = std::move(*heights);
+    find_ground(*file_, heights_, placement_, info_);
     if (auto done = find_fields(); !done) {
       return named(done.error());
     }

@@ -26,13 +26,16 @@ class Writer {
     count(value.size());
     bytes_ += value;
   }
-  void doubles(const std::vector<double>& values) {
+  void doubles(const std::vector<double>& values) { numbers(values); }
+  template <class T>
+  void numbers(const std::vector<T>& values) {
+    static_assert(std::is_arithmetic_v<T>);
     count(values.size());
     const auto at = bytes_.size();
-    bytes_.resize(at + values.size() * sizeof(double));
+    bytes_.resize(at + values.size() * sizeof(T));
     // An empty vector has no address to copy from.
     if (!values.empty()) {
-      std::memcpy(bytes_.data() + at, values.data(), values.size() * sizeof(double));
+      std::memcpy(bytes_.data() + at, values.data(), values.size() * sizeof(T));
     }
   }
   // Reserves exactly this many more bytes.
@@ -75,10 +78,13 @@ class Reader {
     rest_.remove_prefix(size);
     return out;
   }
-  std::vector<double> doubles(std::size_t most) {
-    std::vector<double> out(count(most, sizeof(double)));
-    if (!out.empty()) std::memcpy(out.data(), rest_.data(), out.size() * sizeof(double));
-    rest_.remove_prefix(out.size() * sizeof(double));
+  std::vector<double> doubles(std::size_t most) { return numbers<double>(most); }
+  template <class T>
+  std::vector<T> numbers(std::size_t most) {
+    static_assert(std::is_arithmetic_v<T>);
+    std::vector<T> out(count(most, sizeof(T)));
+    if (!out.empty()) std::memcpy(out.data(), rest_.data(), out.size() * sizeof(T));
+    rest_.remove_prefix(out.size() * sizeof(T));
     return out;
   }
   void fail() {

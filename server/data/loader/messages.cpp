@@ -67,6 +67,19 @@ std::shared_ptr<const Columns> columns_of(Reader& in, std::size_t expected) {
   return std::make_shared<const Columns>(std::move(columns));
 }
 
+std::shared_ptr<const Ground> ground_of(Reader& in, std::size_t expected) {
+  Ground ground;
+  ground.name = text_of(in);
+  const auto kind = in.number<std::uint8_t>();
+  if (kind > static_cast<std::uint8_t>(GroundKind::sea_floor)) in.fail();
+  ground.kind = static_cast<GroundKind>(in.sound() ? kind : 0);
+  ground.heights = in.numbers<float>(expected);
+  const auto is_height = [](float z) { return !std::isinf(z); };
+  const auto& all = ground.heights;
+  if (all.size() != expected || !std::all_of(all.begin(), all.end(), is_height)) in.fail();
+  return std::make_shared<const Ground>(std::move(ground));
+}
+
 // Each count is at most 2^24, so that the product of two cannot overflow.
 Grid grid_of(Reader& in) {
   Grid grid;
@@ -245,13 +258,23 @@ std::string encode_info(const DatasetInfo& info) {
     out.number(step.value);
     out.text(step.text);
   }
-  // The largest part by far comes last, so that the message is reallocated only once.
+  // The largest parts by far come last, so that the message is reallocated only once.
+  const Columns none;
+  const Columns& columns = info.grid.columns ? *info.grid.columns : none;
+  const std::size_t heights = info.grid.ground ? info.grid.ground->heights.size() : 0;
+  constexpr std::size_t beside = 1024;  // flags, counts and a name
+  out.reserve((columns.longitude.size() + columns.latitude.size()) * sizeof(double) +
+              heights * sizeof(float) + beside);
   out.number(static_cast<std::uint8_t>(info.grid.columns ? 1 : 0));
   if (info.grid.columns) {
-    const Columns& columns = *info.grid.columns;
-    out.reserve((columns.longitude.size() + columns.latitude.size() + 2) * sizeof(double));
     out.doubles(columns.longitude);
     out.doubles(columns.latitude);
+  }
+  out.number(static_cast<std::uint8_t>(info.grid.ground ? 1 : 0));
+  if (info.grid.ground) {
+    out.text(info.grid.ground->name);
+    out.number(static_cast<std::uint8_t>(info.grid.ground->kind));
+    out.numbers(info.grid.ground->heights);
   }
   return out.take();
 }
@@ -284,12 +307,15 @@ Result<DatasetInfo> decode_info(std::string_view bytes) {
     step.text = text_of(in);
     if (!std::isfinite(step.value)) in.fail();
   }
-  const auto curved = in.number<std::uint8_t>();
-  if (curved > 1) in.fail();
-  if (in.sound() && curved == 1) {
-    const auto& [x, y, z] = info.grid.axes;
-    info.grid.columns = columns_of(in, x.coordinates.size() * y.coordinates.size());
-  }
+  const auto follows = [&in] {
+    const auto flag = in.number<std::uint8_t>();
+    if (flag > 1) in.fail();
+    return in.sound() && flag == 1;
+  };
+  const std::size_t layer =
+      info.grid.axes[0].coordinates.size() * info.grid.axes[1].coordinates.size();
+  if (follows()) info.grid.columns = columns_of(in, layer);
+  if (follows()) info.grid.ground = ground_of(in, layer);
   if (!in.complete()) return malformed("a malformed description");
   if (info.fields.empty() || info.steps.empty()) return malformed("a dataset without data");
   return info;

@@ -29,10 +29,21 @@ struct Columns {
   std::vector<double> latitude;
 };
 
+enum class GroundKind { land, sea_floor };
+
+// The height of the ground or the sea floor of every column as the file gives it, metres above sea
+// level, x fastest; NaN: unknown.
+struct Ground {
+  std::string name;  // of the variable
+  GroundKind kind = GroundKind::land;
+  std::vector<float> heights;
+};
+
 // x, y, z: always three axes; a dimension that the data lack has one coordinate.
 struct Grid {
   std::array<Axis, 3> axes;
   std::shared_ptr<const Columns> columns;  // null: the axes determine all positions
+  std::shared_ptr<const Ground> ground;    // null: the file does not give it
   [[nodiscard]] std::array<int, 3> dims() const;
   [[nodiscard]] std::size_t samples() const;
 };

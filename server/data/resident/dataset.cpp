@@ -33,10 +33,10 @@ Result<VolumePtr> as_volume(const Result<Resident>& kept) {
 std::uint64_t bytes_of(const DatasetInfo& info) {
   std::uint64_t bytes = 0;
   for (const Axis& axis : info.grid.axes) bytes += axis.coordinates.size() * sizeof(double);
-  if (info.grid.columns) {
-    bytes +=
-        (info.grid.columns->longitude.size() + info.grid.columns->latitude.size()) * sizeof(double);
+  if (const auto& columns = info.grid.columns) {
+    bytes += (columns->longitude.size() + columns->latitude.size()) * sizeof(double);
   }
+  if (info.grid.ground) bytes += info.grid.ground->heights.size() * sizeof(float);
   for (const TimeStep& step : info.steps) bytes += sizeof step + step.text.capacity();
   return bytes;
 }

@@ -217,6 +217,7 @@ class HeightFinder {
     if (known == known_formulas.end() || terms.empty()) return Found();
     ParametricLevels out;
     out.formula = known->formula;
+    out.first_term = known->columns[0];
     std::string missing;
     for (std::size_t i = 0; i < 2; ++i) {
       if (known->columns.at(i) == nullptr) continue;

@@ -22,6 +22,7 @@ struct ParametricLevels {
   Formula formula = nullptr;
   std::vector<std::array<double, 3>> levels;  // lowest first
   std::array<int, 2> columns{-1, -1};         // variables; the second may depend on time
+  const char* first_term = "";                // of the first in the formula: "orog", "depth", ...
   Constants constants{};
 };
 

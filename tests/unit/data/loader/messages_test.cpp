@@ -40,6 +40,9 @@ DatasetInfo good() {
   columns->longitude = {1, 2, 3, 4, 5, 6};
   columns->latitude = {7, 8, 9, 10, 11, 12};
   info.grid.columns = columns;
+  const float open = std::numeric_limits<float>::quiet_NaN();
+  info.grid.ground = std::make_shared<const Ground>(
+      Ground{"deptho", GroundKind::sea_floor, {-5, -7, open, 0, 2, -9}});
   FieldInfo wind;
   wind.name = "wind";
   wind.kind = FieldKind::vector;
@@ -90,6 +93,13 @@ void expect_sound(const DatasetInfo& info) {
       ASSERT_TRUE(std::isfinite(info.grid.columns->latitude[i]));
     }
   }
+  if (const auto& ground = info.grid.ground) {
+    ASSERT_EQ(ground->heights.size(),
+              info.grid.axes[0].coordinates.size() * info.grid.axes[1].coordinates.size());
+    for (const float z : ground->heights) ASSERT_FALSE(std::isinf(z));
+    ASSERT_TRUE(ground->kind == GroundKind::land || ground->kind == GroundKind::sea_floor);
+    ASSERT_EQ(printable(ground->name, 1000000), ground->name);
+  }
   ASSERT_FALSE(info.steps.empty());
   for (const TimeStep& step : info.steps) ASSERT_TRUE(std::isfinite(step.value));
   ASSERT_FALSE(info.fields.empty());
@@ -123,6 +133,14 @@ TEST(LoaderMessages, InfoSurvivesARoundTrip) {
   ASSERT_TRUE(out->grid.columns);
   EXPECT_EQ(out->grid.columns->longitude, info.grid.columns->longitude);
   EXPECT_EQ(out->grid.columns->latitude, info.grid.columns->latitude);
+  ASSERT_TRUE(out->grid.ground);
+  EXPECT_EQ(out->grid.ground->name, "deptho");
+  EXPECT_EQ(out->grid.ground->kind, GroundKind::sea_floor);
+  ASSERT_EQ(out->grid.ground->heights.size(), 6U);
+  for (const std::size_t c : {0, 1, 3, 4, 5}) {
+    EXPECT_EQ(out->grid.ground->heights[c], info.grid.ground->heights[c]);
+  }
+  EXPECT_TRUE(std::isnan(out->grid.ground->heights[2]));
   ASSERT_EQ(out->fields.size(), 2U);
   for (std::size_t f = 0; f < 2; ++f) {
     EXPECT_EQ(out->fields[f].name, info.fields[f].name);
@@ -194,6 +212,18 @@ TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
          columns->longitude.pop_back();
          i.grid.columns = columns;
        }},
+      {"a ground of infinite height",
+       [](DatasetInfo& i) {
+         auto ground = std::make_shared<Ground>(*i.grid.ground);
+         ground->heights[1] = std::numeric_limits<float>::infinity();
+         i.grid.ground = ground;
+       }},
+      {"a ground without a column",
+       [](DatasetInfo& i) {
+         auto ground = std::make_shared<Ground>(*i.grid.ground);
+         ground->heights.pop_back();
+         i.grid.ground = ground;
+       }},
       {"more samples than allowed",
        [](DatasetInfo& i) {
          for (Axis& a : i.grid.axes) {
@@ -201,6 +231,7 @@ TEST(LoaderMessages, ValuesNoReaderReportsAreRefused) {
            for (std::size_t k = 0; k < 1300; ++k) a.coordinates[k] = static_cast<double>(k);
          }
          i.grid.columns = nullptr;
+         i.grid.ground = nullptr;
        }},
   };
   for (const auto& [what, lie] : lies) {
