@@ -320,17 +320,19 @@ Result<NeededScene> needed_scene(const CompletedView& completed, const std::arra
 // The sphere lies slightly inside the lowest cells, so that lines in them are not cut off.
 constexpr double globe_share = 0.999;
 
-std::optional<Body> make_body(const protocol::GeometryView& geometry, const Placed& placed,
-                              const data::DatasetInfo& info) {
+Result<std::optional<Body>> make_body(const protocol::GeometryView& geometry, const Placed& placed,
+                                      data::Dataset& dataset) {
   const Lattice& lattice = placed.lattice;
   const bool sphere = geometry.mapping == protocol::GeometryMapping::sphere;
   const bool asked = geometry.body.show == protocol::BodyShow::on;
   const bool shown = asked || (geometry.body.show == protocol::BodyShow::automatic && sphere);
-  if (!shown) return std::nullopt;
+  if (!shown) return std::optional<Body>();
   Body body;
   // Not by default: moving frames cannot afford its rays.
-  if (asked && has_terrain(geometry, info) && lattice.places) {
-    body.terrain = terrain_of(geometry, placed);
+  if (asked) {
+    auto terrain = terrain_of(geometry, placed, dataset);
+    if (!terrain) return terrain.error();
+    body.terrain = std::move(*terrain);
   }
   body.shape = sphere ? BodyShape::sphere : body.terrain ? BodyShape::terrain : BodyShape::ground;
   body.radius = globe_share * lattice.inner_radius;
@@ -338,7 +340,7 @@ std::optional<Body> make_body(const protocol::GeometryView& geometry, const Plac
   body.high = {lattice.box_max.x, lattice.box_max.y};
   body.height = lattice.box_min.z;
   body.color = parse_color(geometry.body.surface_color).value();
-  return body;
+  return std::optional(std::move(body));
 }
 
 Result<void> load(const Needed& needed, std::size_t step, data::Dataset& dataset,
@@ -409,7 +411,6 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   const double depth = depths[1] - depths[0];
   scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
                      depths[0] + view.depth_cue.far * depth};
-  scene.body = make_body(view.geometry, *completed.placed(), dataset.info());
   scene.method = engine_method(view.method.name);
   scene.compositing = engine_compositing(view.method.compositing);
   scene.slab_thickness = view.method.slab_thickness;
@@ -418,7 +419,12 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   scene.level = level_of(completed, dataset);
   auto needed = needed_scene(completed, scene.level, dataset);
   if (!needed) return needed.error();
-  return with_data(std::move(scene), std::move(*needed), completed, dataset);
+  auto built = with_data(std::move(scene), std::move(*needed), completed, dataset);
+  if (!built) return built;
+  auto body = make_body(view.geometry, *completed.placed(), dataset);
+  if (!body) return body.error();
+  built->body = std::move(*body);
+  return built;
 }
 
 double detail_shown(const CompletedView& completed) {

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "protocol/view.hpp"
 #include "server/base/error.hpp"
@@ -13,27 +13,28 @@
 
 namespace windsplat::scene {
 
-// The terrain of a placed grid, made by the first picture that shows it.
-struct LazyTerrain {
-  std::once_flag once;
-  std::shared_ptr<const terrain::Terrain> made;  // null: without relief
+// What an opaque body shows as the ground or the sea floor, if it is drawn.
+enum class GroundFrom {
+  none,    // a rectangle or a sphere
+  levels,  // the bottom of the lowest cells
+  file,    // the heights of the file (data::Ground)
 };
 
 // The placed grid of a dataset (heights as its vertical axis) and the positions of its samples.
 struct Placed {
   data::Grid grid;
   Lattice lattice;
-  std::shared_ptr<LazyTerrain> terrain = std::make_shared<LazyTerrain>();
+  GroundFrom ground = GroundFrom::none;
+  // Of every column the lowest level with an unmasked height; -1: none. Empty: level 0 everywhere.
+  std::vector<int> lowest;
 };
 
-// Whether the lowest cells of the grid end at the ground or the sea floor, so that an opaque body
-// is a terrain: a field gives their heights, and the levels are not those of pressure, which pass
-// above and below the ground.
-bool has_terrain(const protocol::GeometryView& geometry, const data::DatasetInfo& info);
-
-// The surface below the lowest cells of a curved lattice; null if it lies at one height.
-std::shared_ptr<const terrain::Terrain> terrain_of(const protocol::GeometryView& geometry,
-                                                   const Placed& placed);
+// The surface of the ground; null if the placement has none, or one at constant height below the
+// levels. Counted, shared and evicted like a level of a volume. Errors: out_of_memory,
+// not_resident.
+Result<std::shared_ptr<const terrain::Terrain>> terrain_of(const protocol::GeometryView& geometry,
+                                                           const Placed& placed,
+                                                           data::Dataset& dataset);
 
 // Loads the height field if there is one; the dataset caches a bent lattice. Errors: those of
 // place_lattice() and of loading.

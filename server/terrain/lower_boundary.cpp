@@ -1,9 +1,12 @@
-// Lowest samples -> faces below them -> half a cell beyond the edges.
+// Heights of the ground, or lowest samples and the faces below them -> half a cell beyond the
+// edges.
 #include "server/terrain/lower_boundary.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
+#include <limits>
 
 namespace windsplat::terrain {
 
@@ -20,22 +23,46 @@ class Bottom {
  public:
   Bottom(const Samples& samples, Base base) : samples_(samples), base_(base) {}
 
-  // The middle of the lowest face of a column.
-  [[nodiscard]] Point face(int i, int j) const { return place(i, j, 0) - 0.5 * rise(i, j); }
+  // The ground at column i, j or, where x or y differ from them, half a cell beyond it.
+  [[nodiscard]] Point vertex(int i, int j, int x, int y) const {
+    Point beside(0);
+    if (x != i) beside += beyond(i, j, 0, x < i ? -1 : 1);
+    if (y != j) beside += beyond(i, j, 1, y < j ? -1 : 1);
+    if (samples_.ground == nullptr) return face(i, j) + beside;
+    const Point at = place(i, j, 0) + beside;
+    const double height = (*samples_.ground)[column(i, j)];
+    if (base_ == Base::map) return {at.x, at.y, height};
+    return height * direction_of(at, Point(0, 0, 1));
+  }
 
-  // From the face of a column at the end of an axis to the end of its cell, away from the column
-  // before; nothing where the columns of the row coincide at a pole.
+ private:
+  [[nodiscard]] std::size_t column(int i, int j) const {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(samples_.dims[0]) +
+           static_cast<std::size_t>(i);
+  }
+
+  // The middle of the lowest face of a column; NaN: it is open.
+  [[nodiscard]] Point face(int i, int j) const {
+    const int level = samples_.lowest == nullptr ? 0 : (*samples_.lowest)[column(i, j)];
+    if (level < 0) return Point(std::numeric_limits<double>::quiet_NaN());
+    return place(i, j, level) - 0.5 * rise(i, j, level);
+  }
+
+  // From a column at the end of an axis to the end of its cell, away from the column before;
+  // nothing where the columns of the row coincide at a pole.
   [[nodiscard]] Point beyond(int i, int j, int axis, int sign) const {
     const auto a = static_cast<std::size_t>(axis);
     if (samples_.dims[a] > 1) {
       if (axis == 1 && is_pole(j)) return Point(0);
-      const Point before = axis == 0 ? face(i - sign, j) : face(i, j - sign);
-      return 0.5 * (face(i, j) - before);
+      const int before_i = axis == 0 ? i - sign : i;
+      const int before_j = axis == 0 ? j : j - sign;
+      const Point way = face(i, j) - face(before_i, before_j);
+      const bool level = samples_.ground != nullptr || std::isnan(way.x);
+      return 0.5 * (level ? place(i, j, 0) - place(before_i, before_j, 0) : way);
     }
     return 0.5 * sign * samples_.spacing[a] * across(i, j, axis);
   }
 
- private:
   [[nodiscard]] Point place(int i, int j, int k) const {
     const auto& dims = samples_.dims;
     const auto& p =
@@ -51,9 +78,10 @@ class Bottom {
     return base_ == Base::map ? vertical : direction_of(place(i, j, 0), vertical);
   }
 
-  // From the lowest sample to the one above it.
-  [[nodiscard]] Point rise(int i, int j) const {
-    if (samples_.dims[2] > 1) return place(i, j, 1) - place(i, j, 0);
+  // From the lowest sample to the one above it, or to it from the one below.
+  [[nodiscard]] Point rise(int i, int j, int level) const {
+    const int below = std::min(level, samples_.dims[2] - 2);
+    if (below >= 0) return place(i, j, below + 1) - place(i, j, below);
     return samples_.spacing[2] * up(i, j);
   }
 
@@ -67,7 +95,8 @@ class Bottom {
     if (count > 1) {
       const int at = other == 0 ? i : j;
       const int last = std::min(at + 1, count - 1);
-      along = other == 0 ? face(last, j) - face(last - 1, j) : face(i, last) - face(i, last - 1);
+      along = other == 0 ? place(last, j, 0) - place(last - 1, j, 0)
+                         : place(i, last, 0) - place(i, last - 1, 0);
     }
     const Point way = axis == 0 ? glm::cross(along, upward) : glm::cross(upward, along);
     return direction_of(way, axis == 0 ? Point(1, 0, 0) : Point(0, 1, 0));
@@ -83,7 +112,7 @@ class Bottom {
 
 }  // namespace
 
-std::shared_ptr<const Terrain> lower_boundary(const Samples& samples, Base base) {
+std::shared_ptr<const Terrain> surface_of(const Samples& samples, Base base) {
   const Bottom bottom(samples, base);
   const bool closed = samples.around > 0;
   const int columns = closed ? samples.around : samples.dims[0];
@@ -95,9 +124,7 @@ std::shared_ptr<const Terrain> lower_boundary(const Samples& samples, Base base)
     const int j = std::clamp(y, 0, rows - 1);
     for (int x = closed ? 0 : -1; x <= columns; ++x) {
       const int i = closed ? x % columns : std::clamp(x, 0, columns - 1);
-      Point at = bottom.face(i, j);
-      if (!closed && x != i) at += bottom.beyond(i, j, 0, x < i ? -1 : 1);
-      if (y != j) at += bottom.beyond(i, j, 1, y < j ? -1 : 1);
+      const Point at = bottom.vertex(i, j, closed ? i : x, y);
       vertices.push_back(
           {static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)});
     }

@@ -1,4 +1,5 @@
-// A curved lattice of samples -> the surface at the bottom of its lowest cells.
+// The columns of samples -> the surface of the ground: given heights, or the bottom of the lowest
+// cells.
 #pragma once
 
 #include <array>
@@ -15,11 +16,17 @@ struct Samples {
   std::array<int, 3> dims{1, 1, 1};
   std::array<double, 3> spacing{1, 1, 1};  // width of cells along an axis of one sample
   int around = 0;
+  // Of every column the height of the ground, world z or, on a globe, the radius; NaN: open. Null:
+  // the bottom of the lowest cells.
+  const std::vector<double>* ground = nullptr;
+  // Of every column the level of its lowest sample; -1: it has none and is open. Null: 0.
+  const std::vector<int>* lowest = nullptr;
 };
 
-// Half a cell below the lowest sample of every column, as far as the cells reach horizontally:
-// half a cell beyond the outermost columns, unless the columns close around the globe. Not beyond a
-// pole, where the columns of a row coincide.
-std::shared_ptr<const Terrain> lower_boundary(const Samples& samples, Base base);
+// At the heights of the ground, or half a cell below the lowest sample of every column, as far as
+// the cells reach horizontally: half a cell beyond the outermost columns, unless the columns close
+// around the globe. Not beyond a pole, where the columns of a row coincide. Open columns are
+// missing vertices.
+std::shared_ptr<const Terrain> surface_of(const Samples& samples, Base base);
 
 }  // namespace windsplat::terrain

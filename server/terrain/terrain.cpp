@@ -19,6 +19,8 @@ std::size_t index_of(int width, int x, int y) {
 
 constexpr int block = 2;  // cells or blocks along a side
 
+int blocks_of(int count) { return (count + block - 1) / block; }
+
 constexpr double rounding = 1e-12;  // relative, of the distances at which a ray meets a box
 
 bool is_missing(const glm::dvec3& place) {
@@ -48,6 +50,22 @@ Terrain::Terrain(std::vector<Vertex> vertices, int width, Base base)
 std::size_t Terrain::bytes() const {
   std::size_t bytes = (vertices_.size() + normals_.size()) * sizeof(Vertex);
   for (const Level& level : levels_) bytes += level.boxes.size() * sizeof(Box);
+  return bytes;
+}
+
+std::size_t bytes_of(int width, int height) {
+  const auto product = [](int x, int y) {
+    return static_cast<std::size_t>(x) * static_cast<std::size_t>(y);
+  };
+  constexpr std::size_t box_bytes = 6 * sizeof(float);
+  std::size_t bytes = sizeof(Terrain) + 2 * product(width, height) * sizeof(Terrain::Vertex);
+  int x = width - 1;
+  int y = height - 1;
+  do {
+    x = blocks_of(x);
+    y = blocks_of(y);
+    bytes += product(x, y) * box_bytes;
+  } while (x > 1 || y > 1);
   return bytes;
 }
 
@@ -107,8 +125,11 @@ Terrain::Box Terrain::box_of_cells(int x, int y) const {
 }
 
 void Terrain::set_levels() {
-  const auto blocks_of = [](int count) { return (count + block - 1) / block; };
+  const auto count_of = [](const Level& level) {
+    return static_cast<std::size_t>(level.width) * static_cast<std::size_t>(level.height);
+  };
   Level cells{blocks_of(width_ - 1), blocks_of(height_ - 1), {}};
+  cells.boxes.reserve(count_of(cells));
   for (int y = 0; y < cells.height; ++y) {
     for (int x = 0; x < cells.width; ++x) cells.boxes.push_back(box_of_cells(block * x, block * y));
   }
@@ -116,6 +137,7 @@ void Terrain::set_levels() {
   while (levels_.back().boxes.size() > 1) {
     const Level& finer = levels_.back();
     Level level{blocks_of(finer.width), blocks_of(finer.height), {}};
+    level.boxes.reserve(count_of(level));
     for (int y = 0; y < level.height; ++y) {
       for (int x = 0; x < level.width; ++x) {
         Box box = finer.boxes[index_of(finer.width, block * x, block * y)];

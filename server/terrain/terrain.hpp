@@ -82,4 +82,7 @@ class Terrain {
   std::vector<Level> levels_;  // the finest first: blocks of 2 x 2 cells; each next of 2 x 2 blocks
 };
 
+// What a terrain of that many vertices takes: about 32 bytes for each.
+std::size_t bytes_of(int width, int height);
+
 }  // namespace windsplat::terrain

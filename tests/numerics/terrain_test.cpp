@@ -252,8 +252,7 @@ Scene over_hills(bool perspective, std::array<int, 3> dims = {14, 12, 5}) {
   displace(scene.lattice, [](const glm::dvec3& p) {
     return glm::dvec3(p.x, p.y, 0.1 + p.z + (0.5 - p.z) * hill(p.x, p.y));
   });
-  scene.body =
-      body_of(terrain::lower_boundary({*scene.lattice.places, dims, {1, 1, 1}, 0}, Base::map));
+  scene.body = body_of(terrain::surface_of({*scene.lattice.places, dims, {1, 1, 1}, 0}, Base::map));
   scene.camera =
       look({0, 0, 0}, {0.5, 0.8, -0.3}, 3, 90, 60, perspective, perspective ? 0.35 : 1.1);
   scene.vector =
@@ -293,7 +292,7 @@ TEST(Terrain, OneColumnHasACell) {
     scene::Lattice lattice = even_lattice(dims, {0.3, 0.3, 0.1});
     displace(lattice, [](const glm::dvec3& p) { return p; });
     const auto terrain =
-        terrain::lower_boundary({*lattice.places, dims, {0.3, 0.3, 0.1}, 0}, Base::map);
+        terrain::surface_of({*lattice.places, dims, {0.3, 0.3, 0.1}, 0}, Base::map);
     const double x = 0.149 * dims[0];
     const double y = 0.149 * dims[1];
     EXPECT_NEAR(met(*terrain, {{x, y, 1}, {0, 0, -1}, 0}).along, 1 + 0.05 * dims[2], 1e-6);
@@ -318,7 +317,7 @@ TEST(Terrain, AGlobeClosesAroundWithoutASeam) {
     }
   }
   const auto terrain =
-      terrain::lower_boundary({places, {columns, rows, 1}, {0.3, 0.3, 0.1}, columns}, Base::globe);
+      terrain::surface_of({places, {columns, rows, 1}, {0.3, 0.3, 0.1}, columns}, Base::globe);
   for (int n = 0; n < 360; ++n) {
     const double longitude = n * pi / 180;
     const glm::dvec3 out{std::sin(longitude), -std::cos(longitude), 0.3};
