@@ -90,6 +90,7 @@ class ObjectReader {
             Presence presence = Presence::optional, std::size_t chars_max = limits::name_chars_max);
   void text(const char* key, std::optional<std::string>& out, std::size_t chars_min);
   void color(const char* key, std::string& out);
+  void color(const char* key, std::optional<std::string>& out);
 
   template <class Int>
   void integer(const char* key, Int& out, IntegerRange range,

@@ -124,6 +124,15 @@ void ObjectReader::color(const char* key, std::string& out) {
   }
 }
 
+void ObjectReader::color(const char* key, std::optional<std::string>& out) {
+  const Json* value = child(key, Presence::optional, Null::is_default);
+  if (value == nullptr) return;
+  std::string read;
+  const std::size_t before = faults_.count();
+  color(key, read);
+  if (faults_.count() == before) out = read;
+}
+
 bool ObjectReader::read_number_array(const Json& value, const std::string& pointer,
                                      NumberRange range, double* out, std::size_t count) {
   if (!value.is_array() || value.size() != count) {

@@ -153,6 +153,8 @@ Json limits_json(std::int64_t image_pixels_max) {
               {"slabThicknessMax", canonical_number(limits::slab_thickness_max)},
               {"sliceIndexMax", limits::slice_index_max},
               {"opticalDepthMax", canonical_number(limits::optical_depth_max)},
+              {"annotationSizeMin", canonical_number(limits::annotation_size_min)},
+              {"annotationSizeMax", canonical_number(limits::annotation_size_max)},
               {"depthCueMax", canonical_number(limits::depth_cue_max)},
               {"budgetMsMin", canonical_number(limits::budget_ms_min)},
               {"budgetMsMax", canonical_number(limits::budget_ms_max)},

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "protocol/codec.hpp"
+#include "protocol/codec_annotations.hpp"
 #include "protocol/codec_json.hpp"
 #include "protocol/codec_names.hpp"
 #include "protocol/limits.hpp"
@@ -439,6 +440,7 @@ View read_view(const Json& document, Faults& faults) {
   object("depthCue", read_depth_cue, view.depth_cue);
   object("method", read_method, view.method);
   object("quality", read_quality, view.quality);
+  object("annotations", read_annotations, view.annotations);
   reader.finish();
   return view;
 }
@@ -478,7 +480,8 @@ Json view_to_json(const View& view) {
               {"quality",
                {{"budgetMs", number_or_null(view.quality.budget_ms)},
                 {"maxError", number_or_null(view.quality.max_error)},
-                {"lossless", view.quality.lossless}}}};
+                {"lossless", view.quality.lossless}}},
+              {"annotations", annotations_to_json(view.annotations)}};
 }
 
 std::string encode_view(const View& view) { return dump(view_to_json(view)); }

@@ -167,6 +167,20 @@ struct QualityView {
   bool operator==(const QualityView&) const = default;
 };
 
+// What is written and drawn around the data, each if it is set.
+struct AnnotationsView {
+  bool box = false;
+  bool axes = false;
+  bool north = false;
+  bool scale_bar = false;
+  bool legend = false;
+  bool title = false;
+  bool step_time = false;
+  double size = 1;                        // factor of the size of texts and lines
+  std::optional<std::string> text_color;  // sRGB; empty: contrasts with the background
+  bool operator==(const AnnotationsView&) const = default;
+};
+
 struct View {
   std::string dataset;
   int step = 0;
@@ -178,6 +192,7 @@ struct View {
   DepthCueView depth_cue;
   MethodView method;
   QualityView quality;
+  AnnotationsView annotations;
   bool operator==(const View&) const = default;
 };
 
