@@ -116,6 +116,13 @@ double near_plane(const Lattice& lattice) {
   return std::max(cell, near_min);
 }
 
+// With ticks along its outline, the box leaves room for their texts.
+Framing with_room(const Framing& framing, const protocol::View& view) {
+  constexpr double room = 1.15;
+  if (!view.annotations.axes) return framing;
+  return {room * framing.distance, room * framing.height};
+}
+
 }  // namespace
 
 OrbitFrame orbit_frame(double azimuth, double elevation) {
@@ -147,7 +154,8 @@ void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double 
            double zoom) {
   const OrbitFrame frame = orbit_frame(azimuth, elevation);
   const glm::dvec3 target = 0.5 * (lattice.box_min + lattice.box_max);
-  const Framing framing = frame_box(lattice, frame, target, view.camera.fov_y, view.image);
+  const Framing framing =
+      with_room(frame_box(lattice, frame, target, view.camera.fov_y, view.image), view);
   const double distance = std::min(framing.distance / zoom, distance_max);
   view.camera.target = from_glm(target);
   view.camera.eye = from_glm(target - frame.forward * distance);
@@ -224,7 +232,7 @@ void face(const Face& plane, const Lattice& lattice, protocol::View& view) {
   const glm::dvec3 target = middle.x * frame.right + middle.y * frame.up + middle.z * frame.forward;
   Frame framed(frame, target, camera.fov_y, view.image, nearest_to(lattice));
   for (const glm::dvec3& point : points) framed.add(point, outline_reach(lattice));
-  const Framing framing = framed.framing();
+  const Framing framing = with_room(framed.framing(), view);
   camera.target = from_glm(target);
   camera.eye = from_glm(target - frame.forward * framing.distance);
   if (!camera.height) camera.height = std::max(framing.height, 1e-6);
@@ -241,7 +249,8 @@ void complete_camera(protocol::View& view, const Lattice& lattice) {
   if (!camera.target) camera.target = from_glm(0.5 * (lattice.box_min + lattice.box_max));
   const OrbitFrame frame = orbit_frame(front_azimuth(lattice), default_elevation);
   const glm::dvec3 target = to_glm(*camera.target);
-  const Framing framing = frame_box(lattice, frame, target, camera.fov_y, view.image);
+  const Framing framing =
+      with_room(frame_box(lattice, frame, target, camera.fov_y, view.image), view);
   if (!camera.eye) camera.eye = from_glm(target - frame.forward * framing.distance);
   if (!camera.height) camera.height = std::max(framing.height, 1e-6);
 }

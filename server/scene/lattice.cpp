@@ -105,7 +105,7 @@ double smallest_cell(const RawAxis& axis) {
 }
 
 // Metres per raw unit of an axis; nullopt: neither a length nor an angle, or without unit.
-std::optional<double> metres_per_unit(const Axis& axis) {
+std::optional<double> metres_in_unit(const Axis& axis) {
   if (is_angle(axis)) return metres_per_degree;
   if (axis.kind == AxisKind::pressure || axis.kind == AxisKind::level) return std::nullopt;
   return data::metres_in(axis.units);
@@ -134,8 +134,8 @@ Result<void> set_height(const data::Grid& grid, VerticalPlacement placement, dou
                         std::array<RawAxis, 3>& axes) {
   const Axis& z = grid.axes[2];
   const Axis& reference = axes[0].thin ? grid.axes[1] : grid.axes[0];
-  const auto unit = metres_per_unit(reference);
-  const auto vertical_unit = metres_per_unit(z);
+  const auto unit = metres_in_unit(reference);
+  const auto vertical_unit = metres_in_unit(z);
   const bool to_scale = unit && vertical_unit;
   if (placement == VerticalPlacement::metric) {
     if (!to_scale) {
@@ -166,8 +166,8 @@ Result<void> proportion(const data::Grid& grid, VerticalPlacement placement,
   const auto& [x, y, z] = grid.axes;
   for (RawAxis& axis : axes) axis.length = axis.raw_length();
   if (!axes[0].thin && !axes[1].thin && !same_unit(x, y)) {
-    const auto unit_x = is_angle(x) ? std::nullopt : metres_per_unit(x);
-    const auto unit_y = is_angle(y) ? std::nullopt : metres_per_unit(y);
+    const auto unit_x = is_angle(x) ? std::nullopt : metres_in_unit(x);
+    const auto unit_y = is_angle(y) ? std::nullopt : metres_in_unit(y);
     axes[1].length = unit_x && unit_y ? axes[1].length * *unit_y / *unit_x : axes[0].length;
   }
   axes[0].length *= longitude_share(x, y, axes);
@@ -272,9 +272,19 @@ std::optional<double> length_of(const data::Grid& grid, std::size_t axis) {
     return std::abs(data::cf::standard_height(last * *pascals) -
                     data::cf::standard_height(first * *pascals));
   }
-  if (const auto unit = metres_per_unit(own)) return std::abs(last - first) * *unit;
+  if (const auto unit = metres_in_unit(own)) return std::abs(last - first) * *unit;
   if (axis < 2 && grid.columns) return length_of_line(grid, axis);
   return std::nullopt;
+}
+
+// Metres for each world unit along an axis; nullopt: unknown.
+std::optional<double> metres_along(const data::Grid& grid, const Lattice& lattice,
+                                   std::size_t axis) {
+  const std::vector<double>& world = lattice.positions.at(axis);
+  if (world.size() < 2) return std::nullopt;
+  const auto metres = length_of(grid, axis);
+  if (!metres || !(*metres > 0)) return std::nullopt;
+  return *metres / (world.back() - world.front());
 }
 
 }  // namespace
@@ -293,21 +303,17 @@ double cell_size(const Lattice& lattice, std::size_t axis) {
   return length / lattice.dims.at(axis);
 }
 
-std::optional<double> vertical_exaggeration(const data::Grid& grid, const Lattice& lattice) {
-  // World units per metre along an axis; nullopt: unknown.
-  const auto scale = [&](std::size_t a) -> std::optional<double> {
-    const std::vector<double>& world = lattice.positions.at(a);
-    if (world.size() < 2) return std::nullopt;
-    const auto metres = length_of(grid, a);
-    if (!metres || !(*metres > 0)) return std::nullopt;
-    return (world.back() - world.front()) / *metres;
-  };
-  const auto up = scale(2);
-  auto across = scale(1);
+std::optional<double> metres_per_unit(const data::Grid& grid, const Lattice& lattice) {
+  if (const auto y = metres_along(grid, lattice, 1)) return y;
   const bool is_narrowed = grid.axes[0].kind == AxisKind::longitude && !grid.columns;
-  if (!across && !is_narrowed) across = scale(0);
-  if (!up || !across || !(*across > 0)) return std::nullopt;
-  return *up / *across;
+  return is_narrowed ? std::nullopt : metres_along(grid, lattice, 0);
+}
+
+std::optional<double> vertical_exaggeration(const data::Grid& grid, const Lattice& lattice) {
+  const auto up = metres_along(grid, lattice, 2);
+  const auto across = metres_per_unit(grid, lattice);
+  if (!up || !across) return std::nullopt;
+  return *across / *up;
 }
 
 Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryView& geometry,

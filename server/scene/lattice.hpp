@@ -35,6 +35,11 @@ Result<Lattice> place_lattice(const data::Grid& grid, const protocol::GeometryVi
 // column the length of their middle column. nullopt: a length is not known, as of levels.
 std::optional<double> vertical_exaggeration(const data::Grid& grid, const Lattice& lattice);
 
+// Metres for each world unit along y of a flat lattice, along x where y has no length; a degree of
+// latitude has 111 km, and grids with a longitude and latitude for every column have the length of
+// their middle column. nullopt: unknown.
+std::optional<double> metres_per_unit(const data::Grid& grid, const Lattice& lattice);
+
 // Mean width of the lattice's cells along an axis, world units.
 double cell_size(const Lattice& lattice, std::size_t axis);
 
