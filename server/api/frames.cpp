@@ -54,6 +54,10 @@ std::string_view media_type(frame::Format format) {
       return "image/png";
     case frame::Format::npy:
       return "application/x-npy";
+    case frame::Format::pdf:
+      return "application/pdf";
+    case frame::Format::svg:
+      return "image/svg+xml";
   }
   return "";
 }
@@ -388,9 +392,11 @@ void get_frame(tasks::Backend& backend, access::Admission& admission, frame::For
 
 void post_frame(tasks::Backend& backend, access::Admission& admission, const http::Request& request,
                 http::Reply reply) {
-  constexpr std::array<frame::Format, 3> formats{frame::Format::jpeg, frame::Format::png,
-                                                 frame::Format::npy};
-  constexpr std::array<std::string_view, 3> types{"image/jpeg", "image/png", "application/x-npy"};
+  constexpr std::array<frame::Format, 5> formats{frame::Format::jpeg, frame::Format::png,
+                                                 frame::Format::npy, frame::Format::pdf,
+                                                 frame::Format::svg};
+  constexpr std::array<std::string_view, 5> types{"image/jpeg", "image/png", "application/x-npy",
+                                                  "application/pdf", "image/svg+xml"};
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
                                  "Content-Type must be application/json"));
@@ -399,7 +405,8 @@ void post_frame(tasks::Backend& backend, access::Admission& admission, const htt
   const auto type = http::choose_type(request.header("Accept"), types);
   if (!type) {
     reply(http::problem_response(406, "Not Acceptable",
-                                 "Accept must allow image/jpeg, image/png or application/x-npy"));
+                                 "Accept must allow image/jpeg, image/png, application/x-npy, "
+                                 "application/pdf or image/svg+xml"));
     return;
   }
   auto picture = read_view(request, formats[*type]);

@@ -258,7 +258,7 @@ Result<void> animate(const AnimateArguments& arguments, const CancelToken& cance
   const auto plan = plan_of(arguments, (*dataset)->info(), view);
   if (!plan) return plan.error();
 
-  frame::Encoding encoding = file_encoding(plan->format, arguments.view.quality);
+  frame::Encoding encoding = file_encoding(plan->format, arguments.view);
   encoding.measure = !arguments.report.empty();
   ThreadPool pool(arguments.threads);
   LimitedPictures pictures(**dataset, encoding, pool);

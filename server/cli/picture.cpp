@@ -25,6 +25,10 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
       ->check(CLI::Range(1, 100))
       ->type_name("N")
       ->capture_default_str();
+  command.add_option("--dpi", arguments.dots_per_inch, "Pixels to the inch of .pdf and .svg")
+      ->check(CLI::Range(10, 2400))
+      ->type_name("N")
+      ->capture_default_str();
   add_memory_option(command, arguments.memory);
   add_data_host_options(command, arguments.data_hosts);
 }
@@ -69,15 +73,20 @@ Result<frame::Format> format_of(const std::string& output) {
   if (extension == ".png") return frame::Format::png;
   if (extension == ".jpg" || extension == ".jpeg") return frame::Format::jpeg;
   if (extension == ".npy") return frame::Format::npy;
+  if (extension == ".pdf") return frame::Format::pdf;
+  if (extension == ".svg") return frame::Format::svg;
   if (is_stream(output)) return frame::Format::png;  // as "-"
   return make_error(ErrorKind::invalid,
-                    "-o '" + printable(output) + "': the file name must end in .png, .jpg or .npy");
+                    "-o '" + printable(output) +
+                        "': the file name must end in .png, .jpg, .npy, .pdf or "
+                        ".svg");
 }
 
-frame::Encoding file_encoding(frame::Format format, int quality) {
+frame::Encoding file_encoding(frame::Format format, const ViewArguments& arguments) {
   frame::Encoding encoding;
   encoding.format = format;
-  encoding.quality = quality;
+  encoding.quality = arguments.quality;
+  encoding.dots_per_inch = arguments.dots_per_inch;
   encoding.allow_reference = true;
   return encoding;
 }

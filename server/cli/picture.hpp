@@ -24,9 +24,10 @@ struct ViewArguments {
   std::string memory = "8G";
   DataHostArguments data_hosts;
   int quality = 95;  // JPEG: files favour detail over size
+  double dots_per_inch = 300;
 };
 
-// DATASET, --view, --size, --set, --quality, --memory-limit and the options of data hosts;
+// DATASET, --view, --size, --set, --quality, --dpi, --memory-limit and the options of data hosts;
 // `arguments` must outlive the command.
 void add_view_options(CLI::App& command, ViewArguments& arguments);
 
@@ -36,8 +37,8 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments);
 // The format that the extension of a file name denotes. Errors: invalid.
 Result<frame::Format> format_of(const std::string& output);
 
-// Encoding of a picture file, `quality` 1..100 for a JPEG; the reference is allowed.
-frame::Encoding file_encoding(frame::Format format, int quality);
+// Encoding of a picture file; the reference is allowed.
+frame::Encoding file_encoding(frame::Format format, const ViewArguments& arguments);
 
 // Opens the dataset for this command. Errors: malformed for an invalid limit; those of
 // open_fetcher().

@@ -46,7 +46,7 @@ Result<void> render(const RenderArguments& arguments) {
   view.dataset = (*dataset)->info().id;
 
   ThreadPool pool(arguments.threads);
-  frame::Encoding encoding = file_encoding(*format, arguments.view.quality);
+  frame::Encoding encoding = file_encoding(*format, arguments.view);
   encoding.measure = !arguments.report.empty();
   const auto picture = LimitedPictures(**dataset, encoding, pool).draw(view, CancelToken());
   if (!picture) return picture.error();
@@ -64,7 +64,9 @@ void add_render(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<RenderArguments>();
   add_view_options(*command, arguments->view);
   command->add_option("--step", arguments->view.step, "Time step, from 0")->type_name("N");
-  command->add_option("-o", arguments->output, "out.png, .jpg or .npy; - writes a PNG to stdout")
+  command
+      ->add_option("-o", arguments->output,
+                   "out.png, .jpg, .npy, .pdf or .svg; - writes a PNG to stdout")
       ->required()
       ->type_name("FILE");
   command

@@ -5,6 +5,9 @@
 #include <string>
 #include <utility>
 
+#include "server/annotate/annotate.hpp"
+#include "server/annotate/paint/compose.hpp"
+#include "server/annotate/paint/document.hpp"
 #include "server/base/check.hpp"
 #include "server/base/trim_storage.hpp"
 #include "server/engine/reference/reference.hpp"
@@ -112,16 +115,24 @@ Result<engine::WorkReport> render_reference(const scene::Scene& scene, ThreadPoo
   return work;
 }
 
+void put_part(Workspace& workspace, const image::Part& part) {
+  if (workspace.overlay) {
+    annotate::put(*workspace.overlay, part, workspace.planes);
+  } else {
+    workspace.planes.put(part);
+  }
+}
+
 // Converts a picture to YCbCr, in strips of whole MCU rows. Unmeasured JPEGs are converted tile by
 // tile instead, while the pixels are in the cache.
-void put_in_strips(const engine::Image& picture, ThreadPool& pool, image::YccPicture& planes) {
+void put_in_strips(const engine::Image& picture, ThreadPool& pool, Workspace& workspace) {
   constexpr int strip_rows = 32;
   const auto stride = std::size_t{4} * static_cast<std::size_t>(picture.width);
   const int strips = (picture.height + strip_rows - 1) / strip_rows;
   pool.run(static_cast<std::size_t>(strips), [&](std::size_t n, unsigned) {
     const int y = static_cast<int>(n) * strip_rows;
-    planes.put({0, y, picture.width, std::min(strip_rows, picture.height - y),
-                picture.rgba.data() + stride * static_cast<std::size_t>(y), stride});
+    put_part(workspace, {0, y, picture.width, std::min(strip_rows, picture.height - y),
+                         picture.rgba.data() + stride * static_cast<std::size_t>(y), stride});
   });
 }
 
@@ -147,24 +158,20 @@ Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& po
     picture = {};
     planes.reset(scene.camera.width, scene.camera.height, workspace.encoding.subsampling,
                  scene.background);
+    if (workspace.overlay) annotate::put_empty(*workspace.overlay, pool, planes);
   }
   if (scene.method == scene::Method::reference) {
     auto work = render_reference(scene, pool, cancel, picture);
-    const std::size_t stride = std::size_t{4} * static_cast<std::size_t>(picture.width);
-    if (work && jpeg) {
-      planes.put({0, 0, picture.width, picture.height, picture.rgba.data(), stride});
-    }
+    if (work && jpeg) put_in_strips(picture, pool, workspace);
     return work;
   }
   const bool measured = is_measured(prepared);
-  const auto to_planes = [&planes](const engine::TilePixels& tile) {
-    planes.put({tile.x, tile.y, tile.width, tile.height, tile.rgba, tile.stride});
+  const auto to_planes = [&workspace](const engine::TilePixels& tile) {
+    put_part(workspace, {tile.x, tile.y, tile.width, tile.height, tile.rgba, tile.stride});
   };
   auto work = jpeg && !measured ? engine::render(scene, pool, cancel, workspace.space, to_planes)
                                 : engine::render(scene, pool, cancel, workspace.space);
-  if (work && jpeg && measured) {
-    put_in_strips(picture, pool, planes);
-  }
+  if (work && jpeg && measured) put_in_strips(picture, pool, workspace);
   if (work) work->variant.level = scene.level;
   return work;
 }
@@ -214,22 +221,46 @@ Result<image::Bytes> bytes_of(Workspace& workspace, ThreadPool& pool, const Canc
     if (!done) return done.error();
     return bytes;
   }
-  const auto& [width, height, rgba] = workspace.space.image();
+  auto& [width, height, rgba] = workspace.space.image();
   if (encoding.format == Format::npy) return image::encode_npy(rgba, width, height, cancel);
-  return image::encode_png(image::tone_map(rgba, width, height, workspace.background, cancel),
-                           width, height, cancel);
+  if (workspace.overlay) annotate::composite(*workspace.overlay, pool, rgba);
+  const image::Bytes rgb = image::tone_map(rgba, width, height, workspace.background, cancel);
+  if (encoding.format == Format::png) return image::encode_png(rgb, width, height, cancel);
+  annotate::Figure plain;
+  plain.width = width;
+  plain.height = height;
+  const annotate::Figure& figure = workspace.figure ? *workspace.figure : plain;
+  return encoding.format == Format::pdf ? annotate::encode_pdf(rgb, figure, encoding.dots_per_inch)
+                                        : annotate::encode_svg(rgb, figure, encoding.dots_per_inch);
+}
+
+// Errors: those of Overlay::of.
+Result<void> set_overlay(const Prepared& prepared, Workspace& workspace) {
+  workspace.overlay.reset();
+  workspace.figure = prepared.figure;
+  if (!workspace.figure) return {};
+  const Format format = prepared.encoding.format;
+  annotate::Figure drawn = *workspace.figure;
+  if (format == Format::pdf || format == Format::svg) drawn.above.clear();
+  auto overlay = annotate::Overlay::of(drawn);
+  if (!overlay) return overlay.error();
+  workspace.overlay = std::move(*overlay);
+  return {};
 }
 
 }  // namespace
 
-std::uint64_t bytes_beyond_kept(int width, int height, Format format) {
+std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annotated) {
   const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
   if (pixels <= retained_pixels) return 0;
   constexpr std::uint64_t linear = 4 * sizeof(float);
   constexpr std::uint64_t codes = 4;  // 8 bits each, and as many for the encoded form
-  const std::uint64_t bytes_a_pixel = format == Format::jpeg  ? 2 * codes
-                                      : format == Format::png ? linear + 2 * codes
-                                                              : 2 * linear;
+  std::uint64_t bytes_a_pixel = linear + 2 * codes;  // png
+  if (format == Format::jpeg) bytes_a_pixel = 2 * codes;
+  if (format == Format::npy) bytes_a_pixel = 2 * linear;
+  // Another copy of the codes, and the encoded form within the document.
+  if (format == Format::pdf || format == Format::svg) bytes_a_pixel += 3 * codes;
+  if (annotated) bytes_a_pixel += annotate::overlay_bytes(1, 1);
   return (pixels - retained_pixels) * bytes_a_pixel;
 }
 
@@ -240,11 +271,16 @@ Result<Prepared> prepare(const scene::CompletedView& completed, const quality::S
   if (!drawn) return drawn.error();
   auto scene = scene::build_scene(*drawn, dataset);
   if (!scene) return with_need(scene.error(), completed.view(), dataset);
+  std::optional<annotate::Figure> figure;
+  if (encoding.format != Format::npy && annotate::any(drawn->view().annotations)) {
+    figure = annotate::figure_of({*drawn, *scene, dataset.info()});
+  }
   return Prepared{std::move(*drawn),
                   completed.view().image,
                   std::move(*scene),
                   setting,
                   encoding,
+                  std::move(figure),
                   microseconds(start, Clock::now()),
                   {}};
 }
@@ -255,6 +291,7 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   const scene::Scene& scene = prepared.scene;
   workspace.encoding = prepared.encoding;
   workspace.background = scene.background;
+  if (auto ok = set_overlay(prepared, workspace); !ok) return ok.error();
   Result<engine::WorkReport> work = render_scene(prepared, pool, cancel, workspace);
   if (!work) return given_up(work.error(), workspace);
 
@@ -299,6 +336,7 @@ Result<Frame> encode(Workspace& workspace, ThreadPool& pool, const CancelToken& 
   // The pixels are no longer needed: those of a JPEG, which only served to measure it, are freed,
   // others beyond retained_pixels.
   const bool jpeg = workspace.encoding.format == Format::jpeg;
+  workspace.overlay.reset();
   trim_storage(workspace.space.image().rgba, 0, jpeg ? 0 : 4 * retained_pixels);
   if (!bytes) return bytes.error();
   Frame frame = std::move(workspace.drawn);

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "protocol/view.hpp"
+#include "server/annotate/figure.hpp"
+#include "server/annotate/paint/overlay.hpp"
 #include "server/base/cancel.hpp"
 #include "server/base/error.hpp"
 #include "server/base/thread_pool.hpp"
@@ -30,7 +32,8 @@ class VideoEncoder;
 
 namespace windsplat::frame {
 
-enum class Format { jpeg, png, npy };
+// pdf, svg: the picture with its annotations as texts and lines.
+enum class Format { jpeg, png, npy, pdf, svg };
 
 struct Encoding {
   Format format = Format::jpeg;
@@ -48,6 +51,7 @@ struct Encoding {
   // one if `key` is set; if that fails, as JPEG.
   image::VideoEncoder* video = nullptr;
   bool key = false;
+  double dots_per_inch = 300;  // of pdf and svg
 };
 
 // How a picture was encoded.
@@ -84,12 +88,14 @@ struct Workspace {
   image::JpegEncoder jpeg;
   Frame drawn;  // the frame, without bytes until it is encoded
   Encoding encoding;
-  std::array<float, 3> background{};  // linear
+  std::array<float, 3> background{};         // linear
+  std::optional<annotate::Figure> figure;    // of the frame; empty: no annotations
+  std::optional<annotate::Overlay> overlay;  // its pixels; of pdf and svg those below the data
 };
 
 // Upper bound on the memory for drawing and encoding a picture, beyond that for one of
 // retained_pixels (base/trim_storage.hpp).
-std::uint64_t bytes_beyond_kept(int width, int height, Format format);
+std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annotated = false);
 
 // Completes a view for its dataset; if memory does not suffice, the error states what all fields of
 // the view need. Errors: those of scene::complete(); invalid at /method/name for a reference that
@@ -111,7 +117,8 @@ struct Prepared {
   scene::Scene scene;
   quality::Setting setting;
   Encoding encoding;
-  std::int64_t prepare_us = 0;  // time of completing and preparing, counted in render_us
+  std::optional<annotate::Figure> figure;  // empty: the picture shows no annotations
+  std::int64_t prepare_us = 0;             // time of completing and preparing, counted in render_us
   std::optional<quality::Content> content;  // of the view, if it is known already
 };
 // Errors: those of the scene.

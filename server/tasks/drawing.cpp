@@ -66,7 +66,8 @@ Result<PreparedPtr> with_memory(frame::Prepared prepared, const data::Dataset& d
                                 Loading loading) {
   const int width = prepared.scene.camera.width;
   const int height = prepared.scene.camera.height;
-  const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, prepared.encoding.format);
+  const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, prepared.encoding.format,
+                                                       prepared.figure.has_value());
   Result<Held> reserved = bytes == 0 ? Held() : dataset.reserve(bytes);
   if (!reserved) {
     const Error& error = reserved.error();

@@ -1,0 +1,211 @@
+#include "server/annotate/box.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/annotate/axes.hpp"
+#include "server/annotate/labels.hpp"
+#include "server/annotate/paint/type.hpp"
+#include "server/annotate/projector.hpp"
+#include "server/annotate/room.hpp"
+
+namespace windsplat::annotate {
+namespace {
+
+// An edge parallel to `axis`, at the low (false) or high (true) side of the two other axes.
+struct Edge {
+  std::size_t axis = 0;
+  std::array<bool, 2> high{};  // of axes (axis + 1) % 3 and (axis + 2) % 3
+};
+
+class Box {
+ public:
+  explicit Box(const Subject& subject)
+      : low_(subject.completed.lattice().box_min),
+        high_(subject.completed.lattice().box_max),
+        projector_(subject.scene.camera) {}
+
+  [[nodiscard]] glm::dvec3 on(const Edge& edge, double along) const {
+    glm::dvec3 at(0);
+    at[static_cast<int>(edge.axis)] = along;
+    for (std::size_t n = 0; n < 2; ++n) {
+      const int other = static_cast<int>((edge.axis + 1 + n) % 3);
+      at[other] = edge.high.at(n) ? high_[other] : low_[other];
+    }
+    return at;
+  }
+  [[nodiscard]] std::array<double, 2> range(std::size_t axis) const {
+    return {low_[static_cast<int>(axis)], high_[static_cast<int>(axis)]};
+  }
+  // Of the two sides that meet in an edge, how many face the eye.
+  [[nodiscard]] int facing(const Edge& edge) const {
+    int count = 0;
+    for (std::size_t n = 0; n < 2; ++n) {
+      glm::dvec3 normal(0);
+      normal[static_cast<int>((edge.axis + 1 + n) % 3)] = edge.high.at(n) ? 1 : -1;
+      if (projector_.faces(on(edge, low_[static_cast<int>(edge.axis)]), normal)) ++count;
+    }
+    return count;
+  }
+  [[nodiscard]] std::optional<std::array<Point, 2>> pixels(const Edge& edge) const {
+    const auto [from, to] = range(edge.axis);
+    return projector_.edge(on(edge, from), on(edge, to));
+  }
+  [[nodiscard]] std::optional<Point> pixel(const Edge& edge, double along) const {
+    return projector_.pixel(on(edge, along));
+  }
+  [[nodiscard]] std::optional<Point> centre() const {
+    return projector_.pixel(0.5 * (low_ + high_));
+  }
+
+ private:
+  glm::dvec3 low_, high_;
+  Projector projector_;
+};
+
+std::vector<Edge> edges_along(std::size_t axis) {
+  return {
+      {axis, {false, false}}, {axis, {true, false}}, {axis, {false, true}}, {axis, {true, true}}};
+}
+
+double length_of(const std::array<Point, 2>& edge) {
+  return std::hypot(edge[1].x - edge[0].x, edge[1].y - edge[0].y);
+}
+
+// The length that a tick with its text takes along an edge: a width along a horizontal one, a
+// height along a vertical one.
+double room_of_tick(const std::array<Point, 2>& ends, double em) {
+  constexpr double width = 4;     // em, roughly
+  constexpr double height = 2.2;  // em
+  const double across = std::abs(ends[1].x - ends[0].x);
+  const double down = std::abs(ends[1].y - ends[0].y);
+  return em * (width * across + height * down) / length_of(ends);
+}
+
+// The edge of the outline on which an axis is labelled: one with room for two ticks.
+std::optional<Edge> labelled(const Box& box, std::size_t axis, double em) {
+  std::optional<Edge> chosen;
+  double best = 0;
+  for (const Edge& edge : edges_along(axis)) {
+    if (box.facing(edge) != 1) continue;
+    const auto ends = box.pixels(edge);
+    if (!ends || !(length_of(*ends) > 0)) continue;
+    if (length_of(*ends) < 2 * room_of_tick(*ends, em)) continue;
+    const double score = axis == 2 ? -((*ends)[0].x + (*ends)[1].x) : (*ends)[0].y + (*ends)[1].y;
+    if (!chosen || score > best) {
+      chosen = edge;
+      best = score;
+    }
+  }
+  return chosen;
+}
+
+// Unit vector across an edge, away from the centre of the box.
+Point outward(const std::array<Point, 2>& ends, const Point& centre) {
+  const double length = length_of(ends);
+  Point out{-(ends[1].y - ends[0].y) / length, (ends[1].x - ends[0].x) / length};
+  const double side = out.x * (0.5 * (ends[0].x + ends[1].x) - centre.x) +
+                      out.y * (0.5 * (ends[0].y + ends[1].y) - centre.y);
+  if (side < 0) out = {-out.x, -out.y};
+  return out;
+}
+
+// A text beside a point in a direction: its near side, or its corner, lies there.
+Text beside(std::string text, const Point& at, const Point& out, double size, const Style& style,
+            const Color& color) {
+  constexpr double cap_height = 0.73;  // em, of the font
+  const double align = 0.5 - 0.5 * std::clamp(1.5 * out.x, -1.0, 1.0);
+  const double baseline = at.y + 0.5 * cap_height * size * (1 + std::clamp(1.5 * out.y, -1.0, 1.0));
+  return Text{std::move(text), {at.x, baseline}, size, align, color, style.rim};
+}
+
+std::vector<Tick> ticks_of(const data::Axis& axis, const AxisMap& map,
+                           const std::array<double, 2>& range, int most) {
+  const double first = map.value(range[0]);
+  const double last = map.value(range[1]);
+  std::vector<Tick> ticks;
+  if (map.single()) {
+    const double value = axis.coordinates.front();
+    ticks.push_back({value, map.position(value), coordinate_text(axis, value, 0)});
+  } else if (map.even()) {
+    const bool degrees =
+        axis.kind == data::AxisKind::longitude || axis.kind == data::AxisKind::latitude;
+    const double step = degrees ? round_degrees(std::abs(last - first), most)
+                                : round_step(std::abs(last - first), most);
+    if (!(step > 0)) return ticks;
+    ticks = ticks_of_step(first, last, step);
+    for (Tick& tick : ticks) tick.text = coordinate_text(axis, tick.value, step);
+  } else {
+    const double gap = (range[1] - range[0]) / (most + 1);
+    ticks = uneven_ticks(first, last, gap, [&map](double value) { return map.position(value); });
+  }
+  for (Tick& tick : ticks) tick.at = map.position(tick.value);
+  return ticks;
+}
+
+void add_axis(const Subject& subject, std::size_t axis, const Box& box, const Style& style,
+              Figure& figure) {
+  const auto edge = labelled(box, axis, style.text);
+  const auto map = axis_map(subject, axis);
+  const auto centre = box.centre();
+  if (!edge || !map || !centre) return;
+  const auto ends = *box.pixels(*edge);
+  const Point out = outward(ends, *centre);
+  const data::Axis drawn = drawn_axis(subject, axis);
+  const double length = length_of(ends);
+  const int most = std::clamp(static_cast<int>(length / room_of_tick(ends, style.text)), 1, 10);
+  const double mark = 0.45 * style.text;
+  const double gap = 0.35 * style.text;
+  double widest = 0;
+  for (const Tick& tick : ticks_of(drawn, *map, box.range(axis), most)) {
+    const auto at = box.pixel(*edge, tick.at);
+    if (!at) continue;
+    const Point end{at->x + mark * out.x, at->y + mark * out.y};
+    figure.above.emplace_back(Line{{*at, end}, style.line, style.color});
+    const Text text = beside(tick.text, {end.x + gap * out.x, end.y + gap * out.y}, out, style.text,
+                             style, style.color);
+    add_if_free(text, figure);
+    widest = std::max(widest, width_of(text.text, text.size));
+  }
+  const std::string title = axis_title(drawn);
+  if (title.empty()) return;
+  const double away = mark + 3 * gap + style.text * std::abs(out.y) + widest * std::abs(out.x);
+  const Point middle{0.5 * (ends[0].x + ends[1].x) + away * out.x,
+                     0.5 * (ends[0].y + ends[1].y) + away * out.y};
+  Text text = beside(title, middle, out, style.text, style, style.quiet);
+  if (move_inside(figure, text)) add_if_free(std::move(text), figure);
+}
+
+}  // namespace
+
+void add_box(const Subject& subject, const Style& style, Figure& figure) {
+  if (subject.completed.view().geometry.mapping == protocol::GeometryMapping::sphere) return;
+  const Box box(subject);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const Edge& edge : edges_along(axis)) {
+      const auto ends = box.pixels(edge);
+      if (!ends) continue;
+      const bool front = box.facing(edge) == 2;
+      Color color = style.quiet;
+      constexpr double front_share = 0.6;  // over the data, edges are fainter
+      if (front) color.alpha *= front_share;
+      (front ? figure.above : figure.below)
+          .emplace_back(Line{{(*ends)[0], (*ends)[1]}, style.line, color});
+    }
+  }
+}
+
+void add_axes(const Subject& subject, const Style& style, Figure& figure) {
+  if (subject.completed.view().geometry.mapping == protocol::GeometryMapping::sphere) return;
+  const Box box(subject);
+  for (std::size_t axis = 0; axis < 3; ++axis) add_axis(subject, axis, box, style, figure);
+}
+
+}  // namespace windsplat::annotate

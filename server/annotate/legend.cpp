@@ -1,0 +1,332 @@
+#include "server/annotate/legend.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/annotate/axes.hpp"
+#include "server/annotate/labels.hpp"
+#include "server/annotate/paint/type.hpp"
+#include "server/image/tone_map.hpp"
+
+namespace windsplat::annotate {
+namespace {
+
+using Range = std::array<double, 2>;
+
+// Positions of ticks and of the curve are fractions of the width of the strip; those of the curve
+// also of its height, from below.
+struct Entry {
+  std::string title;
+  std::string units;
+  std::vector<Color> colors;
+  std::vector<Tick> ticks;
+  std::vector<Point> opacity;
+  std::vector<std::string> notes;
+};
+
+std::vector<Color> colors_of(const scene::ColorTable& table) {
+  constexpr std::size_t shown = 64;
+  std::vector<Color> colors;
+  for (std::size_t n = 0; n < shown; ++n) {
+    const std::size_t at = n * (table.entries.size() - 1) / (shown - 1);
+    const auto& [red, green, blue] = table.entries[at];
+    colors.push_back({image::srgb_from_linear(red), image::srgb_from_linear(green),
+                      image::srgb_from_linear(blue), 1});
+  }
+  return colors;
+}
+
+std::string spaced(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+std::string field_title(const data::FieldInfo* field, const std::string& name) {
+  constexpr std::size_t longest = 40;  // characters that fit over a strip
+  if (field == nullptr || field->long_name.empty() || field->long_name.size() > longest) {
+    return spaced(name);
+  }
+  return field->long_name;
+}
+
+constexpr int strip_parts = 5;
+
+// Bearings towards which lines point. Ticks are at quarters of the compass if two or more fit.
+std::vector<Tick> compass_ticks(const Range& range) {
+  static constexpr std::array<const char*, 4> quarters{"N", "E", "S", "W"};
+  constexpr double quarter = 90;
+  const double least = std::min(range[0], range[1]);
+  const double first = std::ceil(least / quarter - 1e-9);
+  std::vector<Tick> ticks;
+  for (int n = 0; n < 9; ++n) {
+    const double value = (first + n) * quarter;
+    if (value > std::max(range[0], range[1]) + 1e-6) break;
+    const auto name = static_cast<std::size_t>(std::fmod(std::fmod(first + n, 4) + 4, 4));
+    ticks.push_back({value, (value - range[0]) / (range[1] - range[0]), quarters.at(name)});
+  }
+  if (ticks.size() >= 2) return ticks;
+  ticks = even_ticks(range[0], range[1], strip_parts);
+  for (Tick& tick : ticks) tick.text += "\u00b0";
+  return ticks;
+}
+
+// Colours by world height: the coordinates of the vertical axis where it has some.
+void set_heights(const Subject& subject, const Range& range, Entry& entry) {
+  const auto map = axis_map(subject, 2);
+  const data::Axis axis = drawn_axis(subject, 2);
+  entry.ticks.clear();
+  if (!map || map->single()) {
+    entry.units = "world units";
+    entry.title += "height";
+    entry.ticks = even_ticks(range[0], range[1], strip_parts);
+    return;
+  }
+  constexpr double gap = 0.17;
+  const auto place = [&](double value) {
+    return (map->position(value) - range[0]) / (range[1] - range[0]);
+  };
+  // Only coordinates of the data: beyond them the colours have no value.
+  const auto& world = subject.completed.lattice().positions[2];
+  const double low = map->value(std::clamp(range[0], world.front(), world.back()));
+  const double high = map->value(std::clamp(range[1], world.front(), world.back()));
+  entry.ticks = uneven_ticks(low, high, gap, place);
+  entry.title += axis.kind == data::AxisKind::pressure ? "pressure"
+                 : axis.kind == data::AxisKind::depth  ? "depth"
+                 : axis.kind == data::AxisKind::height ? "height"
+                                                       : spaced(axis.name);
+  entry.units = unit_text(axis.units);
+}
+
+Entry lines_entry(const Subject& subject) {
+  const scene::VectorLayer& layer = *subject.scene.vector;
+  const protocol::VectorView& vector = subject.completed.view().vector;
+  const data::FieldInfo* const field = subject.info.find(vector.field.name);
+  const std::string units = field == nullptr ? std::string() : unit_text(field->units);
+  const Range& range = layer.color.range;
+  Entry entry;
+  entry.colors = colors_of(layer.color);
+  entry.ticks = even_ticks(range[0], range[1], strip_parts);
+  entry.title = spaced(vector.field.name) + ": ";
+  using scene::LineColor;
+  switch (layer.color_by) {
+    case LineColor::world_z:
+      set_heights(subject, range, entry);
+      break;
+    case LineColor::screen_z:
+      entry.title += "distance from the eye";
+      entry.units = "world units";
+      break;
+    case LineColor::rise: {
+      const auto percent = static_cast<int>(std::lround(100 * layer.rise_weight));
+      entry.title += percent == 100 ? "rise" : "height and rise";
+      entry.units = "world units";
+      if (percent < 100) {
+        entry.notes.push_back(std::to_string(percent) + " % rise, " +
+                              std::to_string(100 - percent) + " % height in the box");
+      }
+      break;
+    }
+    case LineColor::magnitude:
+      entry.title += "magnitude";
+      entry.units = units;
+      break;
+    case LineColor::direction:
+      entry.title += "direction";
+      entry.units = "towards";
+      entry.ticks = compass_ticks(range);
+      break;
+    case LineColor::scalar: {
+      const std::string name = vector.color.field.value_or("");
+      const data::FieldInfo* const scalar = subject.info.find(name);
+      entry.title += field_title(scalar, name);
+      entry.units = scalar == nullptr ? std::string() : unit_text(scalar->units);
+      break;
+    }
+    case LineColor::constant:
+      entry.title = spaced(vector.field.name);
+      entry.ticks.clear();
+      break;
+  }
+  const auto with_units = [&units](double value) {
+    return number_text_of(value, 3) + (units.empty() ? "" : " " + units);
+  };
+  std::string note = "longest line " + with_units(layer.magnitude_range[1]);
+  if (layer.head_desaturation > 0) note += ", white end ahead";
+  entry.notes.push_back(note);
+  if (layer.min_magnitude > 0) {
+    entry.notes.push_back("below " + with_units(layer.min_magnitude) + " not drawn");
+  }
+  return entry;
+}
+
+// The curve of a medium's extinction over its strip, highest at the greatest extinction.
+std::vector<Point> opacity_curve(const scene::ScalarLayer& layer, double most) {
+  const auto& [low, high] = layer.color.range;
+  std::vector<Point> curve;
+  const auto at = [&](std::size_t n) {
+    const double x = (layer.extinction[n][0] - low) / (high - low);
+    return Point{std::clamp(x, -1.0, 2.0), layer.extinction[n][1] / most};
+  };
+  for (std::size_t n = 0; n < layer.extinction.size(); ++n) curve.push_back(at(n));
+  if (high < low) std::reverse(curve.begin(), curve.end());
+  curve.insert(curve.begin(), {std::min(0.0, curve.front().x), curve.front().y});
+  curve.push_back({std::max(1.0, curve.back().x), curve.back().y});
+  return curve;
+}
+
+Entry medium_entry(const Subject& subject, const scene::ScalarLayer& layer,
+                   const std::string& name) {
+  const data::FieldInfo* const field = subject.info.find(name);
+  Entry entry;
+  entry.title = field_title(field, name);
+  entry.units = field == nullptr ? std::string() : unit_text(field->units);
+  entry.colors = colors_of(layer.color);
+  entry.ticks = even_ticks(layer.color.range[0], layer.color.range[1], strip_parts);
+  double most = 0;
+  for (const auto& [value, extinction] : layer.extinction) most = std::max(most, extinction);
+  if (most > 0) {
+    entry.opacity = opacity_curve(layer, most);
+    entry.notes.push_back("curve: opacity, from none to the greatest");
+  } else {
+    entry.notes.emplace_back("transparent");
+  }
+  return entry;
+}
+
+// The layers of the scene correspond to those of the view, without media of zero extinction.
+std::vector<Entry> entries_of(const Subject& subject) {
+  std::vector<Entry> entries;
+  if (subject.scene.vector) entries.push_back(lines_entry(subject));
+  auto layer = subject.scene.scalars.begin();
+  for (const protocol::ScalarView& scalar : subject.completed.view().scalars.value()) {
+    if (layer == subject.scene.scalars.end()) break;
+    if (layer->extinction != scalar.extinction.value()) continue;
+    entries.push_back(medium_entry(subject, *layer, scalar.field));
+    ++layer;
+  }
+  return entries;
+}
+
+// Lengths of a card in ems of its text.
+constexpr double card_width = 22;
+constexpr double pad = 0.8;
+constexpr double title_height = 1.7;
+constexpr double strip_height = 1;
+constexpr double ticks_height = 1.6;
+constexpr double note_height = 1.3;
+constexpr double gap = 0.6;
+
+double height_of(const Entry& entry) {
+  return 2 * pad + title_height + strip_height + (entry.ticks.empty() ? 0.3 : ticks_height) +
+         note_height * static_cast<double>(entry.notes.size()) - 0.5;
+}
+
+// Writes a text that is at most `room` pixels wide, in a smaller size where it is longer.
+void write(const std::string& text, const Point& at, double size, double align, double room,
+           const Color& color, Figure& figure) {
+  const double width = width_of(text, size);
+  const double fitted = width > room ? size * room / width : size;
+  figure.above.emplace_back(Text{text, at, fitted, align, color, {0, 0, 0, 0}});
+}
+
+void add_opacity(const Entry& entry, const Point& corner, double width, double height, double em,
+                 const Style& style, Figure& figure) {
+  if (entry.opacity.empty()) return;
+  std::vector<Point> curve;
+  for (const Point& at : entry.opacity) {
+    constexpr double margin = 0.06;  // of the height, above and below the curve
+    const double x = std::clamp(at.x, 0.0, 1.0);
+    curve.push_back(
+        {corner.x + x * width, corner.y + height * (1 - margin - (1 - 2 * margin) * at.y)});
+  }
+  std::vector<Point> covered = curve;
+  covered.insert(covered.begin(), {curve.front().x, corner.y});
+  covered.push_back({curve.back().x, corner.y});
+  Color cover = style.rim;
+  cover.alpha = 0.72;
+  figure.above.emplace_back(Area{covered, cover});
+  figure.above.emplace_back(Line{curve, 0.11 * em, style.color});
+}
+
+void add_card(const Entry& entry, const Point& corner, double em, const Style& style,
+              Figure& figure) {
+  const double width = card_width * em;
+  const double height = height_of(entry) * em;
+  Color ground = style.rim;
+  ground.alpha = 0.68;
+  figure.above.emplace_back(Area{{corner,
+                                  {corner.x + width, corner.y},
+                                  {corner.x + width, corner.y + height},
+                                  {corner.x, corner.y + height}},
+                                 ground});
+  figure.taken.push_back({corner, {corner.x + width, corner.y + height}});
+  const double left = corner.x + pad * em;
+  const double inner = width - 2 * pad * em;
+  double line = corner.y + (pad + 0.9) * em;
+  const double units_width = entry.units.empty() ? 0 : width_of(entry.units, em) + em;
+  write(entry.title, {left, line}, em, 0, inner - units_width, style.color, figure);
+  if (!entry.units.empty()) {
+    write(entry.units, {left + inner, line}, em, 1, 0.5 * inner, style.quiet, figure);
+  }
+  const Point strip{left, corner.y + (pad + title_height) * em};
+  figure.above.emplace_back(Strip{strip, inner, strip_height * em, entry.colors});
+  add_opacity(entry, strip, inner, strip_height * em, em, style, figure);
+  line = strip.y + strip_height * em;
+  for (const Tick& tick : entry.ticks) {
+    constexpr double beyond = 1e-6;
+    if (tick.at < -beyond || tick.at > 1 + beyond) continue;
+    const double x = left + tick.at * inner;
+    figure.above.emplace_back(Line{{{x, line}, {x, line + 0.35 * em}}, 0.08 * em, style.color});
+    write(tick.text, {x, line + 1.3 * em}, 0.92 * em, 0.5, inner, style.color, figure);
+  }
+  line += (entry.ticks.empty() ? 0.3 : ticks_height) * em;
+  for (const std::string& note : entry.notes) {
+    write(note, {left, line + 0.95 * em}, 0.88 * em, 0, inner, style.quiet, figure);
+    line += note_height * em;
+  }
+}
+
+}  // namespace
+
+void add_legend(const Subject& subject, const Style& style, Figure& figure) {
+  const std::vector<Entry> entries = entries_of(subject);
+  if (entries.empty()) return;
+  const double edge = 1.2 * style.text;
+  // Cards are made smaller until they fit the width, and in height 0.6 of the picture.
+  double em = std::min(style.text, (figure.width - 2 * edge) / card_width);
+  std::vector<double> rows;  // the greatest height of each
+  int columns = 1;
+  for (int tries = 0; tries < 2; ++tries) {
+    columns = std::max(
+        1, static_cast<int>((figure.width - 2 * edge + gap * em) / ((card_width + gap) * em)));
+    rows.assign((entries.size() + static_cast<std::size_t>(columns) - 1) /
+                    static_cast<std::size_t>(columns),
+                0);
+    double total = 0;
+    for (std::size_t n = 0; n < entries.size(); ++n) {
+      double& row = rows[n / static_cast<std::size_t>(columns)];
+      row = std::max(row, height_of(entries[n]));
+    }
+    for (const double row : rows) total += row + gap;
+    constexpr double share_most = 0.6;
+    const double fits = (share_most * figure.height) / total;
+    if (em <= fits) break;
+    em = fits;
+  }
+  double bottom = figure.height - edge;
+  for (std::size_t n = 0; n < entries.size(); ++n) {
+    const std::size_t column = n % static_cast<std::size_t>(columns);
+    if (n > 0 && column == 0) {
+      bottom -= (rows[n / static_cast<std::size_t>(columns) - 1] + gap) * em;
+    }
+    const double x = edge + static_cast<double>(column) * (card_width + gap) * em;
+    add_card(entries[n], {x, bottom - height_of(entries[n]) * em}, em, style, figure);
+  }
+}
+
+}  // namespace windsplat::annotate

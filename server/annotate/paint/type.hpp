@@ -1,0 +1,20 @@
+// Texts -> glyphs of the embedded font (DejaVu Sans), shaped by HarfBuzz.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "server/annotate/figure.hpp"
+
+struct _cairo;  // cairo_t
+
+namespace windsplat::annotate {
+
+// Pixels from the start of a text to its end. Safe to call concurrently.
+double width_of(std::string_view text, double size);
+
+// Draws a text with its outline in user space of `target`. Where a document keeps texts (PDF), it
+// can be searched and copied. Safe to call concurrently.
+void draw_text(_cairo* target, const Text& text);
+
+}  // namespace windsplat::annotate

@@ -1,0 +1,30 @@
+// What a figure is made of, and how its parts look.
+#pragma once
+
+#include "server/annotate/figure.hpp"
+#include "server/data/model/dataset_info.hpp"
+#include "server/scene/completed_view.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::annotate {
+
+// A view at the size at which it is drawn, its scene and its dataset.
+struct Subject {
+  const scene::CompletedView& completed;
+  const scene::Scene& scene;
+  const data::DatasetInfo& info;
+};
+
+struct Style {
+  double text = 13;  // em of texts, pixels
+  double line = 1;   // width of lines, pixels
+  Color color;       // of lines and texts
+  Color quiet;       // of what matters less
+  Color rim;         // of the outline of texts; the colour of cards
+};
+// Sizes follow the picture as radii of lines do: view.annotations.size times those at a height of
+// 720, and not more than fits the width. A colour that the view does not give contrasts with its
+// background.
+Style style_of(const Subject& subject);
+
+}  // namespace windsplat::annotate
