@@ -13,6 +13,7 @@ import {
 } from "./controls";
 import { errorMetric } from "../base/error_text";
 import { ForecastPlot } from "./forecast_plot";
+import { addAnnotations } from "./panel_annotations";
 import { addLines, type FlowSwitch } from "./panel_lines";
 import { addMedia } from "./panel_media";
 import { keyAccess, PanelKit, type PanelHost } from "./panel_kit";
@@ -44,6 +45,7 @@ export class Panels {
     probeTitle,
     "Geometry",
     "Camera and depth",
+    "Annotations",
     "Method",
     "Quality",
   ]);
@@ -70,6 +72,7 @@ export class Panels {
     addMedia(gui, kit);
     addGeometry(gui, kit);
     addCamera(gui, kit, this.actions);
+    addAnnotations(gui, kit);
     this.probe = new ProbePanel(gui, kit, () => this.actions.probed(), this.probePlace());
     addMethod(gui, kit);
     addQuality(gui, kit);

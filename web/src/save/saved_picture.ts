@@ -29,7 +29,8 @@ export async function finishPicture(
   size: ExportSize,
   legend: Shown | null,
 ): Promise<Bytes> {
-  const picture = legend === null ? drawn : await withLegend(drawn, view, size, legend);
+  const plain = legend === null || view.annotations?.legend === true; // or the server's legend
+  const picture = plain ? drawn : await withLegend(drawn, view, size, legend);
   return withTexts(await bytesOf(picture), {
     Software: "windsplat",
     [keyword]: JSON.stringify(view),

@@ -1,0 +1,21 @@
+// What the server draws and writes around the data: box, axes, legend and the like.
+import type GUI from "lil-gui";
+import { keyAccess, type PanelKit } from "./panel_kit";
+
+const parts: readonly [label: string, key: string][] = [
+  ["box", "box"],
+  ["axes", "axes"],
+  ["north arrow", "north"],
+  ["scale bar", "scaleBar"],
+  ["legend in the picture", "legend"],
+  ["title", "title"],
+  ["time", "stepTime"],
+];
+
+export function addAnnotations(gui: GUI, kit: PanelKit): void {
+  const folder = gui.addFolder("Annotations");
+  for (const [label, key] of parts) {
+    kit.toggle(folder, label, keyAccess<boolean>(`/annotations/${key}`));
+  }
+  kit.number(folder, "text size", keyAccess<number>("/annotations/size"), { step: 0.05 });
+}
