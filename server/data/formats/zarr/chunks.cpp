@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <type_traits>
@@ -104,6 +105,16 @@ Overlap overlap_of(const ArrayMetadata& array, const std::vector<std::size_t>& p
   return out;
 }
 
+std::size_t product(const std::vector<std::size_t>& counts) {
+  return std::accumulate(counts.begin(), counts.end(), std::size_t{1}, std::multiplies<>());
+}
+
+// Items of a chunk that lie in the array.
+std::size_t items_of(const ArrayMetadata& array, const std::vector<std::size_t>& place) {
+  return product(
+      overlap_of(array, place, std::vector<std::size_t>(place.size(), 0), array.shape).count);
+}
+
 // Items between neighbours along each dimension; order: dimensions, slowest first.
 std::vector<std::size_t> strides_of(const std::vector<std::size_t>& lengths,
                                     const std::vector<std::size_t>& order) {
@@ -158,8 +169,8 @@ double absent_value(const ArrayMetadata& array, bool as_float) {
 
 // Copies an overlap into the block row by row, or fills it if the chunk is absent.
 template <class Out>
-void copy_overlap(const ArrayMetadata& array, const std::vector<unsigned char>& bytes,
-                  const Overlap& part, const std::vector<std::size_t>& block, Out* out) {
+void copy_overlap(const ArrayMetadata& array, const ChunkBytes& bytes, const Overlap& part,
+                  const std::vector<std::size_t>& block, Out* out) {
   const std::size_t rank = block.size();
   const std::size_t item = array.dtype.bytes;
   const auto from = strides_of(array.chunks, array.order);
@@ -274,7 +285,7 @@ Result<ChunkBytes> Store::load(const Array& array, std::uint64_t file_number,
   if (span.bytes > stored_bytes_max(array.metadata)) {
     return fault(file.path, place + "has more bytes than its array can need");
   }
-  std::vector<unsigned char> stored(span.bytes);
+  ChunkBytes stored(span.bytes);
   if (auto done = file.input->read(span.offset, stored.data(), stored.size()); !done) {
     return done.error();
   }
@@ -283,18 +294,18 @@ Result<ChunkBytes> Store::load(const Array& array, std::uint64_t file_number,
   return bytes;
 }
 
-Result<const ChunkBytes*> Store::chunk_at(int variable, const std::vector<std::size_t>& place,
-                                          std::size_t kept_bytes_max) const {
+Result<Store::Chunk*> Store::chunk_at(int variable, const std::vector<std::size_t>& place,
+                                      std::size_t kept_bytes_max) const {
   const Array& array = array_of(variable);
   const ChunkPlace at = place_of(array.metadata, place);
   kept_.select(variable);
   shards_.select(variable);
-  if (const ChunkBytes* const kept = kept_.find(at.number())) return kept;
+  if (Chunk* const kept = kept_.find(at.number())) return kept;
   kept_.evict_for(array.metadata.chunk_items() * array.metadata.dtype.bytes, kept_bytes_max);
   auto loaded = load(array, at.file, at.in_file);
   if (!loaded) return loaded.error();
   const std::size_t bytes = loaded->size();
-  return kept_.add(at.number(), std::move(*loaded), bytes);
+  return kept_.add(at.number(), {std::move(*loaded), items_of(array.metadata, place)}, bytes);
 }
 
 cf::Unwritten Store::unwritten(int variable, std::size_t most) const {
@@ -366,7 +377,13 @@ Result<void> Store::read_block(int variable, const std::vector<std::size_t>& sta
     do {
       const auto chunk = chunk_at(variable, place, std::max(needed, kept_bytes_least));
       if (!chunk) return chunk.error();
-      copy_overlap(array, **chunk, overlap_of(array, place, start, count), count, out);
+      const Overlap part = overlap_of(array, place, start, count);
+      copy_overlap(array, (*chunk)->bytes, part, count, out);
+      // The next chunk takes the memory of one that was read to its end, which is still in the
+      // processor's cache.
+      const std::size_t items = product(part.count);
+      (*chunk)->unread_items -= std::min(items, (*chunk)->unread_items);
+      if ((*chunk)->unread_items == 0) kept_.drop_newest();
     } while (advance(place, first, last, rank));
   } while (advance(file, first_file, last_file, rank));
   return {};

@@ -22,7 +22,7 @@ namespace windsplat::data::zarr {
 
 namespace {
 
-using Bytes = std::vector<unsigned char>;
+using Bytes = ChunkBytes;
 
 Error broken_chunk(const std::string& what) { return make_error(ErrorKind::bad_data, what); }
 
@@ -222,7 +222,7 @@ Result<Bytes> decode(const Codec& codec, Bytes bytes, std::size_t decoded_bytes)
 
 }  // namespace
 
-bool ends_in_crc32c(const std::vector<unsigned char>& bytes) {
+bool ends_in_crc32c(std::span<const unsigned char> bytes) {
   if (bytes.size() < crc32c_bytes) return false;
   const unsigned char* const sum = bytes.data() + bytes.size() - crc32c_bytes;
   const std::uint32_t stored = std::uint32_t{sum[0]} | std::uint32_t{sum[1]} << 8U |

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
-#include <vector>
 
 #include "server/base/error.hpp"
+#include "server/data/formats/zarr/chunk_bytes.hpp"
 #include "server/data/formats/zarr/metadata.hpp"
 
 namespace windsplat::data::zarr {
@@ -15,11 +16,10 @@ std::size_t stored_bytes_max(const ArrayMetadata& array);
 
 // Whether a CRC-32C (RFC 3720) of the preceding bytes ends them, in little-endian order.
 constexpr std::size_t crc32c_bytes = 4;
-bool ends_in_crc32c(const std::vector<unsigned char>& bytes);
+bool ends_in_crc32c(std::span<const unsigned char> bytes);
 
 // Returns chunk_items() items. Sizes in the stored bytes are checked against the metadata before
 // use. Errors: bad_data; the message is a predicate without subject.
-Result<std::vector<unsigned char>> decode_chunk(const ArrayMetadata& array,
-                                                std::vector<unsigned char> stored);
+Result<ChunkBytes> decode_chunk(const ArrayMetadata& array, ChunkBytes stored);
 
 }  // namespace windsplat::data::zarr

@@ -24,11 +24,17 @@ class Recent {
     if (variable == variable_) clear();
   }
   // Null if absent; valid until the next call.
-  const Item* find(std::uint64_t number) {
+  Item* find(std::uint64_t number) {
     const auto at = by_number_.find(number);
     if (at == by_number_.end()) return nullptr;
     items_.splice(items_.begin(), items_, at->second);
     return &items_.front().item;
+  }
+  // Drops the item that find() or add() returned last.
+  void drop_newest() {
+    bytes_ -= items_.front().bytes;
+    by_number_.erase(items_.front().number);
+    items_.pop_front();
   }
   // Evicts items until `bytes` more fit, or none is left.
   void evict_for(std::size_t bytes, std::size_t bytes_max) {
@@ -39,7 +45,7 @@ class Recent {
     }
   }
   // An item that takes `bytes`.
-  const Item* add(std::uint64_t number, Item item, std::size_t bytes) {
+  Item* add(std::uint64_t number, Item item, std::size_t bytes) {
     bytes_ += bytes + bookkeeping_bytes;
     items_.push_front({number, bytes + bookkeeping_bytes, std::move(item)});
     by_number_.emplace(number, items_.begin());

@@ -11,13 +11,12 @@
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/cf/array_file.hpp"
 #include "server/data/files/files.hpp"
+#include "server/data/formats/zarr/chunk_bytes.hpp"
 #include "server/data/formats/zarr/recent.hpp"
 #include "server/data/formats/zarr/scan.hpp"
 #include "server/data/formats/zarr/shard.hpp"
 
 namespace windsplat::data::zarr {
-
-using ChunkBytes = std::vector<unsigned char>;  // empty if the chunk is absent
 
 // Whether a folder is a Zarr store.
 bool is_store(Files& files);
@@ -55,6 +54,10 @@ class Store final : public cf::ArrayFile {
     std::string path;                        // in the store
     std::shared_ptr<const InputFile> input;  // null if absent
   };
+  struct Chunk {
+    ChunkBytes bytes;              // empty if it is absent
+    std::size_t unread_items = 0;  // of the array, edges left out
+  };
   struct OpenShard {
     File file;
     std::vector<Span> index;  // empty if the file is absent
@@ -70,8 +73,9 @@ class Store final : public cf::ArrayFile {
   template <class Out>
   Result<void> read_block(int variable, const std::vector<std::size_t>& start,
                           const std::vector<std::size_t>& count, Out* out) const;
-  Result<const ChunkBytes*> chunk_at(int variable, const std::vector<std::size_t>& place,
-                                     std::size_t kept_bytes_max) const;
+  // place: indices of the chunk in the grid of all chunks.
+  Result<Chunk*> chunk_at(int variable, const std::vector<std::size_t>& place,
+                          std::size_t kept_bytes_max) const;
   // A chunk of a file, which is a shard if it has more than one.
   Result<ChunkBytes> load(const Array& array, std::uint64_t file_number, std::size_t in_file) const;
   Result<const OpenShard*> shard_at(const Array& array, std::uint64_t number) const;
@@ -81,7 +85,7 @@ class Store final : public cf::ArrayFile {
   std::shared_ptr<Files> files_;
   StoreContents contents_;
   mutable std::mutex mutex_;  // guards what is cached
-  mutable Recent<ChunkBytes> kept_;
+  mutable Recent<Chunk> kept_;
   mutable Recent<OpenShard> shards_;
 };
 
