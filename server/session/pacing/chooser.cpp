@@ -2,6 +2,7 @@
 #include "server/session/pacing/chooser.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace windsplat::session {
 namespace {
@@ -26,17 +27,18 @@ void Chooser::restart() {
 }
 
 quality::Setting Chooser::choose(const protocol::View& view, const FrameForecast& forecast,
-                                 const quality::Aim& aim, double pixels_most,
+                                 const quality::Aim& aim, const Limits& limits,
                                  const std::function<bool()>& may_try, Micros now) {
   // After a rest the choice starts again.
   constexpr Micros rest = 1'000'000;
   if (now - chosen_at_ > rest) chosen_.reset();
   chosen_at_ = now;
   const Case one{
-      view,    quality::options_of(view, forecast.settings, forecast.halvings, sizes_, chosen_),
-      aim,     pixels_most,
-      may_try, now};
-  const quality::Choice wanted = quality::pick(view, one.options, aim, pixels_most);
+      view,        quality::options_of(view, forecast.settings, forecast.halvings, sizes_, chosen_),
+      aim,         limits.pixels_most,
+      limits.calm, may_try,
+      now};
+  const quality::Choice wanted = quality::pick(view, one.options, aim, limits.pixels_most);
   const quality::Option* const here = measured_ ? current(one) : nullptr;
   if (here == nullptr) {
     go(one.options[wanted.setting].setting, now);
@@ -104,16 +106,24 @@ void Chooser::step(const quality::Option& here, const Case& one) {
            (other.error < share_of_error * here.forecast.error || (one.aim.max_error && is_faster));
   };
   bool changes = is_worth(better);
-  if (!changes && !late) {
-    next = quality::pick(one.view, one.options, aim, one.pixels_most);
-    changes = is_worth(worth_a_leap);
+  Micros least = late ? calm : one.calm;
+  // Where changes are dear, one far change replaces several.
+  if (!late && (!changes || one.calm > calm)) {
+    const quality::Choice nearest =
+        std::exchange(next, quality::pick(one.view, one.options, aim, one.pixels_most));
+    if (is_worth(worth_a_leap)) {
+      changes = true;
+      least = calm;
+    } else {
+      next = nearest;
+    }
   }
   if (!changes) {
     impatience_ = 0;
     return;
   }
   const quality::Option& other = one.options[next.setting];
-  if (++impatience_ < patient_frames || one.now - changed_at_ < calm) return;
+  if (++impatience_ < patient_frames || one.now - changed_at_ < least) return;
   if (other.forecast.timed || late) {
     go(other.setting, one.now);
     if (other.forecast.ms > here.forecast.ms) slower_since_ = one.now;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -33,11 +34,18 @@ class Chooser {
   // Other limits: the next choice is independent of the earlier ones.
   void forget() { chosen_.reset(); }
 
+  // What the link permits.
+  struct Limits {
+    double pixels_most = std::numeric_limits<double>::infinity();
+    // Between changes, not less than Chooser::calm. A longer one is for small improvements only,
+    // and a large one is then made in one change.
+    Micros calm = Chooser::calm;
+  };
   // Chooses among the settings that quality::is_candidate permits and whose pictures have at most
   // `pixels_most` pixels, or all if none has. `may_try` is asked
   // directly before a guessed time is tried.
   quality::Setting choose(const protocol::View& view, const FrameForecast& forecast,
-                          const quality::Aim& aim, double pixels_most,
+                          const quality::Aim& aim, const Limits& limits,
                           const std::function<bool()>& may_try, Micros now);
 
  private:
@@ -47,6 +55,7 @@ class Chooser {
     std::vector<quality::Option> options;
     const quality::Aim& aim;
     double pixels_most;
+    Micros calm;
     const std::function<bool()>& may_try;
     Micros now;
   };

@@ -77,7 +77,7 @@ void count_sent(SessionState& state, const Render& render, const Drawn& drawn, M
   state.stats.bytes += frame_bytes;
   state.flow.sent({text_bytes + frame_bytes, render.begun, moves, render.purpose == Purpose::final},
                   now);
-  if (moves) state.quality.learn_bytes(render, drawn, frame_bytes, text_bytes);
+  state.quality.learn_bytes(render, drawn, frame_bytes, text_bytes);
 }
 
 // The view is at rest and its final frame was sent; its description is made between stills.

@@ -27,10 +27,14 @@ double relative(int quality, const BytesModel& model) {
 
 void JpegRate::learn(double pixels, int quality, std::size_t bytes, std::size_t text_bytes) {
   text_bytes_ = static_cast<double>(text_bytes);
-  const double body = std::max(static_cast<double>(bytes) - model_.head_bytes, 1.0);
-  const double factor = body / (std::pow(pixels, pixels_power) * relative(quality, model_));
+  const double factor = factor_of(pixels, quality, bytes);
   // Rises at once, falls slowly.
   factor_ = std::max(factor, 0.5 * (factor_ + factor));
+}
+
+double JpegRate::factor_of(double pixels, int quality, std::size_t bytes) const {
+  const double body = std::max(static_cast<double>(bytes) - model_.head_bytes, 1.0);
+  return body / (std::pow(pixels, pixels_power) * relative(quality, model_));
 }
 
 double JpegRate::predicted_bytes(double pixels, int quality) const {

@@ -34,6 +34,11 @@ class JpegRate {
   // each frame.
   void learn(double pixels, int quality, std::size_t bytes, std::size_t text_bytes);
 
+  // The factor c of a frame with that many bytes.
+  [[nodiscard]] double factor_of(double pixels, int quality, std::size_t bytes) const;
+  // The content of frames changed so that their bytes did by that factor.
+  void scale(double by) { factor_ *= by; }
+
   [[nodiscard]] double predicted_bytes(double pixels, int quality) const;
 
   // Chooses for the next moving frame the best quality within `budget`, above quality_usual within

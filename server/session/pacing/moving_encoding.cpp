@@ -63,9 +63,27 @@ Encoding MovingEncoding::choose(const protocol::View& view, const quality::Setti
 
 void MovingEncoding::learn(const Drawn& drawn, int quality, std::size_t frame_bytes,
                            std::size_t text_bytes) {
+  was_video_ = drawn.video;
   if (drawn.video && drawn.key) return;
   const double pixels = static_cast<double>(drawn.info.width) * drawn.info.height;
   (drawn.video ? video_ : jpeg_).learn(pixels, quality, frame_bytes, text_bytes);
+}
+
+void MovingEncoding::learn_final(const Drawn& drawn, int quality, std::size_t frame_bytes) {
+  const double pixels = static_cast<double>(drawn.info.width) * drawn.info.height;
+  const double factor = jpeg_.factor_of(pixels, quality, frame_bytes);
+  if (was_video_ && final_factor_) jpeg_.scale(factor / *final_factor_);
+  final_factor_ = factor;
+}
+
+Micros MovingEncoding::calm(const protocol::View& view, const Link& link, const VideoChoice& video,
+                            Micros usual) const {
+  if (!video.on()) return usual;
+  const double pixels = static_cast<double>(view.image.width) * view.image.height;
+  const Micros key_us =
+      std::min(jpeg_.time_on(link, pixels, JpegRate::quality_usual), JpegRate::moving_most_us);
+  const auto rarely = static_cast<Micros>(static_cast<double>(key_us) / key_share);
+  return std::clamp(rarely, usual, calm_most_us);
 }
 
 }  // namespace windsplat::session

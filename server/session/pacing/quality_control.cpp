@@ -71,8 +71,9 @@ FramePlan QualityControl::moving(const protocol::View& view, const Link& link, V
       if (waited_us() <= static_cast<double>(budget)) return true;
       return may_try_ && may_try_(times_.signature_of(view));
     };
-    plan.setting =
-        chooser_.choose(view, times_.forecast(view, now), limits, pixels_most, may_try, now);
+    plan.setting = chooser_.choose(view, times_.forecast(view, now), limits,
+                                   {pixels_most, encoding_.calm(view, link, video, Chooser::calm)},
+                                   may_try, now);
     moving_setting_ = plan.setting;
   }
   plan.encoding = encoding_.choose(view, plan.setting, link, video, budget);
@@ -151,7 +152,12 @@ void QualityControl::learn(const Render& render, const Drawn& drawn, const ViewS
 
 void QualityControl::learn_bytes(const Render& render, const Drawn& drawn, std::size_t frame_bytes,
                                  std::size_t text_bytes) {
-  encoding_.learn(drawn, render.encoding.quality, frame_bytes, text_bytes);
+  const int quality = render.encoding.quality;
+  if (render.purpose == Purpose::moving) {
+    encoding_.learn(drawn, quality, frame_bytes, text_bytes);
+  } else if (render.purpose == Purpose::final && render.encoding.codec == protocol::Codec::jpeg) {
+    encoding_.learn_final(drawn, quality, frame_bytes);
+  }
 }
 
 bool QualityControl::needs_thinner_slabs(const Render& render, const Drawn& drawn,

@@ -52,7 +52,7 @@ class QualityControl {
   void on_view_changed(bool other_dataset);
   // Learns times only from frames drawn without loading.
   void learn(const Render& render, const Drawn& drawn, const ViewState& state, Micros now);
-  // Records that a moving frame is sent; `text_bytes` precede it.
+  // Records that a frame is sent; `text_bytes` precede it.
   void learn_bytes(const Render& render, const Drawn& drawn, std::size_t frame_bytes,
                    std::size_t text_bytes);
   // Whether a frame drawn as final exceeds maxError and thinner slabs are possible: the next one

@@ -18,7 +18,6 @@ namespace {
 using quality::Forecasts;
 using quality::settings;
 
-constexpr double no_limit = std::numeric_limits<double>::infinity();
 constexpr Micros frame_us = 33'000;
 const quality::Viewpoint viewpoint{1, {0, 1, 0}, 1280, 720};
 
@@ -43,6 +42,8 @@ double error_at(const Forecasts& known, const quality::Setting& setting) {
   return quality::forecast_between(setting, known).error;
 }
 
+constexpr double no_limit = std::numeric_limits<double>::infinity();
+
 struct Drag {
   Drag() {
     Drawn drawn;
@@ -55,6 +56,7 @@ struct Drag {
   Chooser chooser;
   protocol::View view;
   Micros now = 0;
+  Micros calm = Chooser::calm;
 
   // Settings of `count` frames. A setting takes `slower` times its forecast.
   std::vector<quality::Setting> run(const Forecasts& known, const quality::Aim& aim, int count,
@@ -64,7 +66,7 @@ struct Drag {
     std::vector<quality::Setting> drawn;
     for (int n = 0; n < count; ++n) {
       const quality::Setting setting = chooser.choose(
-          view, times.forecast(view, now), aim, no_limit, [&] { return may_try; }, now);
+          view, times.forecast(view, now), aim, {no_limit, calm}, [&] { return may_try; }, now);
       drawn.push_back(setting);
       now += frame_us;
       const auto cost = static_cast<Micros>(1000 * slower(n) * ms_at(known, setting));
@@ -120,22 +122,37 @@ Changes changes_in(const std::vector<quality::Setting>& drawn) {
 }
 
 // Load that swings by a sixth within seconds, with a frame of three times the time now and then.
+double swinging(int n) {
+  return (1 + 0.16 * std::sin(0.05 * n)) * (1 + 0.12 * std::cos(2.1 * n)) * (n % 37 == 0 ? 3 : 1);
+}
+
 TEST(Chooser, SteadyDragChangesItsSizeAtMostOnceASecondByOneStep) {
   for (const double budget : {12.0, 33.0, 66.0}) {
     Drag drag;
     const Forecasts known = calibrated(100);
     const quality::Aim aim{budget, std::nullopt};
-    const auto load = [](int n) {
-      return (1 + 0.16 * std::sin(0.05 * n)) * (1 + 0.12 * std::cos(2.1 * n)) *
-             (n % 37 == 0 ? 3 : 1);
-    };
-    (void)drag.run(known, aim, 5, load);
-    const auto drawn = drag.run(known, aim, 1200, load);
+    (void)drag.run(known, aim, 5, swinging);
+    const auto drawn = drag.run(known, aim, 1200, swinging);
     const Changes changes = changes_in(drawn);
     EXPECT_GT(changes.count, 0);
     EXPECT_GE(changes.least_apart, Chooser::calm) << budget;
     EXPECT_LE(changes.widest, quality::sixteenths_per_half_level) << budget;
   }
+}
+
+// Such changes cost a key frame of video each.
+TEST(Chooser, LinkOnWhichChangesAreDearMakesThemRarer) {
+  const Forecasts known = calibrated(100);
+  const auto changes_with = [&](Micros calm) {
+    Drag drag;
+    drag.calm = calm;
+    (void)drag.run(known, {33.0, std::nullopt}, 5, swinging);
+    return changes_in(drag.run(known, {33.0, std::nullopt}, 1200, swinging));
+  };
+  const Changes usual = changes_with(Chooser::calm);
+  const Changes rare = changes_with(4 * Chooser::calm);
+  EXPECT_GE(rare.count, 1);
+  EXPECT_LE(2 * rare.count, usual.count);
 }
 
 TEST(Chooser, DoesNotOscillateWhenCostsVary) {
@@ -215,7 +232,7 @@ TEST(Chooser, OnlyATryThatDidNotFitPostponesTheNextOne) {
     for (int n = 0; n < count; ++n) {
       now += frame_us;
       chosen = chooser.choose(
-          view, known, {30.0, std::nullopt}, no_limit, [] { return true; }, now);
+          view, known, {30.0, std::nullopt}, {}, [] { return true; }, now);
     }
     return chosen;
   };
@@ -238,7 +255,7 @@ TEST(Chooser, ExcludesPicturesTheLinkCannotCarry) {
   const FrameForecast known{calibrated(10)};
   const protocol::View view;
   const quality::Setting chosen = chooser.choose(
-      view, known, {100.0, std::nullopt}, 100'000, [] { return true; }, 0);
+      view, known, {100.0, std::nullopt}, {100'000}, [] { return true; }, 0);
   EXPECT_LE(quality::pixels_at(view, chosen), 100'000);
   EXPECT_GT(quality::pixels_at(view, chosen), 40'000);
 }
@@ -253,7 +270,7 @@ struct FirstFrame {
   quality::Setting setting() const {
     Chooser chooser;
     return chooser.choose(
-        view, times.forecast(view, 0), {33.0, std::nullopt}, no_limit, [] { return true; }, 0);
+        view, times.forecast(view, 0), {33.0, std::nullopt}, {}, [] { return true; }, 0);
   }
 };
 
