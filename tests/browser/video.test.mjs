@@ -18,10 +18,12 @@ class SlowLink {
   acked = 0;
   held = [];
   free = 0;
+  socket = null; // of the page
 
   async stand(page) {
     await page.routeWebSocket(/v1\/stream/, (socket) => {
       const server = socket.connectToServer();
+      this.socket = socket;
       socket.onMessage((text) => {
         const message = JSON.parse(text);
         if (message.type === "video") this.announced.push(message.codecs);
@@ -75,8 +77,10 @@ async function dragUntil(page, done) {
 }
 
 const until = async (done) => {
-  for (let n = 0; n < 500 && !done(); n++) await new Promise((next) => setTimeout(next, 20));
-  assert.ok(done());
+  for (let n = 0; n < 500 && !(await done()); n++) {
+    await new Promise((next) => setTimeout(next, 20));
+  }
+  assert.ok(await done());
 };
 
 test("moving frames of a slow link are video, and look like the final picture", () =>
@@ -132,6 +136,41 @@ test("every frame of video returns its credit, also after its decoder failed", (
           if (units === 4) throw new DOMException("no memory", "EncodingError");
           return decode.call(this, chunk);
         };
+      },
+    },
+  ));
+
+test("a failed decoder is told to the user, and video is tried again on a new connection", () =>
+  withLink(
+    async (page, link) => {
+      const told = () => page.evaluate(() => window.told.length);
+      await dragUntil(page, () => link.announced.length === 2);
+      await until(async () => (await told()) === 1);
+      await dragUntil(page, () => link.frames.at(-1).codec === "jpeg");
+      await link.socket.close({ code: 1012 });
+      await until(() => link.announced.length === 3);
+      assert.deepEqual(link.announced[2], ["avc1.640033"]);
+      const before = link.moving("h264").length;
+      await dragUntil(page, () => link.moving("h264").length >= before + 8);
+      assert.equal(link.announced.length, 3, "the decoder did not fail again");
+      assert.equal(await told(), 1);
+    },
+    {
+      initScript: () => {
+        let units = 0;
+        const { decode } = VideoDecoder.prototype;
+        VideoDecoder.prototype.decode = function (chunk) {
+          units += 1;
+          if (units === 4) throw new DOMException("no memory", "EncodingError");
+          return decode.call(this, chunk);
+        };
+        window.told = [];
+        addEventListener("DOMContentLoaded", () => {
+          const line = document.querySelector("#status");
+          new MutationObserver(() => {
+            if (line.textContent.includes("failed to decode video")) window.told.push(1);
+          }).observe(line, { childList: true, characterData: true, subtree: true });
+        });
       },
     },
   ));

@@ -44,7 +44,7 @@ export class App {
   readonly cameras: CameraControl;
   readonly playback: Playback;
   readonly undoControl: UndoControl;
-  readonly video = new VideoOffer((message) => void this.connection.send(message));
+  readonly video: VideoOffer;
   private readonly model = new ViewModel();
   private readonly answers = new PatchAnswers(this.model.state);
   private readonly connection: Connection;
@@ -78,6 +78,10 @@ export class App {
         },
       },
     );
+    this.video = new VideoOffer(clock, {
+      send: (message) => void this.connection.send(message),
+      note: (text) => this.parts.status.note(text),
+    });
     this.undoControl = new UndoControl({
       document: () => this.model.state.document,
       busy: () => this.model.open === null || this.opener.waiting,
