@@ -138,7 +138,7 @@ struct FrameInfo {
   std::string error_kind = "none";  // measured | estimated | none
   std::optional<double> jpeg_error;
   std::optional<double> skipped_change;      // mean change by what tolerances leave out; linear
-  std::string skipped_change_kind = "none";  // measured | none
+  std::string skipped_change_kind = "none";  // measured | estimated | none
   std::int64_t samples = 0, culled = 0, skipped_vector = 0, skipped_scalar = 0, skipped_both = 0;
   std::int64_t occluded = 0, pixel_updates = 0, exponentials = 0;
   std::int64_t tiles = 0, tiles_stopped = 0;

@@ -392,7 +392,9 @@ std::optional<quality::Content> content_of(const scene::Scene& scene, const Canc
   roots(light.shifts, out.shifts);
   out.order = std::sqrt(light.order.sum);
   out.step_cell = light.cell.value();
-  out.trials = pixel_trials(scene, sampling.rays_through(seen), cancel).trials;
+  const PixelTrials tried = pixel_trials(scene, sampling.rays_through(seen), cancel);
+  out.trials = tried.trials;
+  out.skipped_change = tried.skipped_change;
   if (cancel.cancelled()) return std::nullopt;
   return out;
 }

@@ -1,5 +1,5 @@
-// Errors of some pixels of a picture: composited in the order of method `kernel` and in slabs,
-// against the exact order by depth.
+// Some pixels of a picture: their errors, composited in the order of method `kernel` and in slabs,
+// against the exact order by depth; and their change by what tolerances leave out.
 #pragma once
 
 #include <optional>
@@ -16,12 +16,16 @@ namespace windsplat::frame {
 // kernels met by each ray, after which no other place is tried.
 inline constexpr int trial_places_most = 512;
 inline constexpr double trial_work_most = 4e6;
-inline constexpr double place_work_most = 1e6;  // of one place
+inline constexpr double place_work_most = 1e6;    // of one place
+inline constexpr double skipped_work_most = 2e6;  // for the change by what tolerances leave out
 
 struct PixelTrials {
   std::optional<quality::Trials> trials;  // empty: too few places could be tried, or cancelled
   int places = 0;                         // that drew something
   double work = 0;
+  // Mean over the picture of the channel of linear premultiplied RGBA that changes most; empty: too
+  // few places could be tried. 0 without trying if the tolerances are 0.
+  std::optional<double> skipped_change;
 };
 // `through`: samples that the picture shows.
 PixelTrials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough>& through,

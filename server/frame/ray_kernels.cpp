@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 
+#include "server/data/model/volume.hpp"
 #include "server/engine/reference/profile.hpp"
 
 namespace windsplat::frame {
@@ -45,6 +46,24 @@ void thin(std::vector<double>& rates, int halvings, std::size_t count) {
     out.push_back(rates[std::min(rates.size() - 1, i << static_cast<unsigned>(halvings))]);
   }
   rates = std::move(out);
+}
+
+// The sample of a kernel position.
+Index sample_of(const reference::LayerGroup& layers, const Index& i) {
+  Index out{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    out[a] = layers.axis[a][static_cast<std::size_t>(i[a])].sample;
+  }
+  return out;
+}
+
+double magnitude_of(const data::Volume& field, std::size_t sample) {
+  double square = 0;
+  for (int c = 0; c < field.components; ++c) {
+    const double v = field.component(c)[sample];
+    square += v * v;
+  }
+  return std::sqrt(square);
 }
 
 }  // namespace
@@ -92,8 +111,9 @@ double part_before(const SplatOnRay& on, double depth) {
   return std::min(1.0, on.rho * sum * step / on.tau);
 }
 
-RayKernels::RayKernels(const scene::Scene& scene)
+RayKernels::RayKernels(const scene::Scene& scene, const Tolerances& marked)
     : scene_(scene),
+      marked_(marked),
       view_(reference::make_view(scene.camera)),
       samples_(scene),
       layers_(reference::group_layers(scene)) {
@@ -184,10 +204,7 @@ void RayKernels::find_path(const Group& group, const Index& near, const PictureR
 }
 
 Medium RayKernels::medium(const Group& group, const Index& i) const {
-  Index sample{};
-  for (std::size_t a = 0; a < 3; ++a) {
-    sample[a] = group.layers->axis[a][static_cast<std::size_t>(i[a])].sample;
-  }
+  const Index sample = sample_of(*group.layers, i);
   if (group.layers->media.size() == scene_.scalars.size()) return samples_.medium(sample);
   Medium out;  // with strides samples are not merged
   for (const scene::ScalarLayer* layer : group.layers->media) {
@@ -198,17 +215,7 @@ Medium RayKernels::medium(const Group& group, const Index& i) const {
 
 double RayKernels::half_line(const Group& group, const Index& i) const {
   const scene::VectorLayer& layer = *group.lines;
-  Index sample{};
-  for (std::size_t a = 0; a < 3; ++a) {
-    sample[a] = group.layers->axis[a][static_cast<std::size_t>(i[a])].sample;
-  }
-  const std::size_t at = samples_.number(sample);
-  double square = 0;
-  for (int c = 0; c < layer.field->components; ++c) {
-    const double v = layer.field->component(c)[at];
-    square += v * v;
-  }
-  const double magnitude = std::sqrt(square);
+  const double magnitude = magnitude_of(*layer.field, samples_.number(sample_of(*group.layers, i)));
   if (!(magnitude > 0) || magnitude < layer.min_magnitude) return 0;
   const double full = layer.magnitude_range[1];
   return 0.5 * layer.length * (full > 0 ? std::min(1.0, magnitude / full) : 1);
@@ -376,6 +383,8 @@ void RayKernels::add(const Group& group, const Index& i, const Place& place, dou
   RayKernel kernel;
   if (half > 0) kernel.line = reference::make_ribbon(scene_, view_, *group.lines, at);
   if (kernel.line) {
+    const std::size_t sample = samples_.number(sample_of(*group.layers, i));
+    kernel.weak = magnitude_of(*group.lines->field, sample) < marked_.magnitude;
     kernel.box = reference::ribbon_box(*kernel.line);
     const bool aside = kernel.box.x0 > bundle.high[0] || kernel.box.x1 < bundle.low[0] ||
                        kernel.box.y0 > bundle.high[1] || kernel.box.y1 < bundle.low[1];
@@ -385,7 +394,12 @@ void RayKernels::add(const Group& group, const Index& i, const Place& place, dou
     const glm::dvec3 color = here.color();
     kernel.splat = {at.from_eye, at.inverse, here.extinction, {color.x, color.y, color.z}};
     Vec along{};
-    for (std::size_t a = 0; a < 3; ++a) along[a] = dot(view_.forward, at.edge[a]);
+    double longest = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      along[a] = dot(view_.forward, at.edge[a]);
+      longest = std::max(longest, reference::length(at.edge[a]));
+    }
+    kernel.thin = here.extinction * longest < marked_.optical_depth * reference::footprint_integral;
     const double depth = reference::footprint_t * reference::length(along);
     kernel.near = view_.perspective && at.centre[2] - 2 * depth < view_.near;
   }
@@ -400,12 +414,12 @@ void RayKernels::pass(const RayKernel& kernel, Bundle& bundle) const {
   for (std::size_t n = 0; n < count; ++n) {
     const std::size_t at = count > 1 ? n * (bundle.rays->size() - 1) / (count - 1) : 0;
     const PictureRay& ray = (*bundle.rays)[at];
-    if (kernel.splat.rho > 0) {
+    if (kernel.splat.rho > 0 && !kernel.thin) {
       const SplatOnRay on = splat_on_ray(kernel.splat, ray);
       const double unseen = view_.perspective ? part_before(on, view_.near) : 0;
       bundle.passed[n] *= std::exp(-on.tau * (1 - unseen));
     }
-    if (kernel.line) {
+    if (kernel.line && !kernel.weak) {
       bundle.passed[n] *= 1 - reference::hit_ribbon(*kernel.line, ray.x, ray.y).opacity;
     }
   }

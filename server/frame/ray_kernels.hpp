@@ -37,8 +37,16 @@ double half_extent(const SplatOnRay& on);
 // The part of its optical depth that lies before a view depth.
 double part_before(const SplatOnRay& on, double depth);
 
+// Tolerances of a scene; what is below them is marked instead of left out.
+struct Tolerances {
+  double magnitude = 0;
+  double optical_depth = 0;
+};
+
 struct RayKernel {
   OrderKey key{};
+  bool thin = false;               // the splat is below the tolerance
+  bool weak = false;               // the line is below the tolerance
   engine::reference::Splat splat;  // rho 0: none
   bool near = false;               // the splat lies within twice its depth of the near plane
   std::optional<engine::reference::Ribbon> line;
@@ -47,8 +55,9 @@ struct RayKernel {
 
 class RayKernels {
  public:
-  // The scene must outlive it.
-  explicit RayKernels(const scene::Scene& scene);
+  // The scene must outlive it. What is below `marked` hides nothing where it is decided how far a
+  // ray goes.
+  explicit RayKernels(const scene::Scene& scene, const Tolerances& marked = {});
 
   [[nodiscard]] const engine::reference::View& view() const { return view_; }
   [[nodiscard]] const DrawnSamples& samples() const { return samples_; }
@@ -107,6 +116,7 @@ class RayKernels {
   [[nodiscard]] double half_line(const Group& group, const Index& i) const;
 
   const scene::Scene& scene_;
+  Tolerances marked_;
   engine::reference::View view_;
   DrawnSamples samples_;
   std::vector<engine::reference::LayerGroup> layers_;

@@ -82,15 +82,15 @@ reference::Surface RayLight::body(const PictureRay& ray) const {
   return out;
 }
 
-Light RayLight::by_kernels(const RayKernelList& kernels, const PictureRay& ray) const {
+Light RayLight::by_kernels(const RayKernelList& kernels, const PictureRay& ray, bool skips) const {
   Light out;
   const reference::Surface ground = body(ray);
   for (const RayKernel* const one : kernels) {
     const RayKernel& kernel = *one;
     SplatOnRay on;
-    if (kernel.splat.rho > 0) on = splat_on_ray(kernel.splat, ray);
+    if (kernel.splat.rho > 0 && !(skips && kernel.thin)) on = splat_on_ray(kernel.splat, ray);
     if (on.middle > ground.depth) on.tau = 0;
-    auto line = hit(kernel, ray);
+    auto line = skips && kernel.weak ? decltype(hit(kernel, ray)){} : hit(kernel, ray);
     if (line.depth > ground.depth) line.opacity = 0;
     if (on.tau <= 0 && line.opacity <= 0) continue;
     reference::Cell cell;

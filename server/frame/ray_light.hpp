@@ -23,8 +23,10 @@ class RayLight {
   // The scene must outlive it.
   explicit RayLight(const scene::Scene& scene);
 
-  // As drawn by method `kernel` with analytic compositing.
-  [[nodiscard]] Light by_kernels(const RayKernelList& kernels, const PictureRay& ray) const;
+  // As drawn by method `kernel` with analytic compositing; without those marked as below tolerances
+  // if `skips`.
+  [[nodiscard]] Light by_kernels(const RayKernelList& kernels, const PictureRay& ray,
+                                 bool skips = false) const;
   // Where no more than the scene's stop_transmittance is left: the number of the piece, a part of a
   // slab, counted from the middle of the volume, and what is left behind it and each of the next
   // ones, as far as it counts. Empty if the ray goes on.

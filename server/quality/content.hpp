@@ -48,6 +48,8 @@ struct Content {
   double order = 3.7e-3;     // its change if neighbouring cells changed places along the ray
   double step_cell = 0.025;  // width of the cells where it differs
   std::optional<Trials> trials = std::nullopt;
+  // Mean over the picture of its change by what tolerances leave out, at some of its pixels.
+  std::optional<double> skipped_change = std::nullopt;
 };
 
 // A quantity at any distance: powers of it between those known, beyond them constant, and below

@@ -1,7 +1,23 @@
 // Frame + tables -> the errors of its report.
 #include "server/tasks/error_report.hpp"
 
+#include <algorithm>
+
 namespace windsplat::tasks {
+namespace {
+
+// From what the view shows, if that is known. It is never above the bound.
+void estimate_skipped_change(const frame::Frame& drawn, const Observation& observed,
+                             quality::Tables& tables, protocol::FrameInfo& info) {
+  if (info.skipped_change) return;
+  const auto content =
+      drawn.content ? drawn.content : tables.content(observed.signature, observed.viewpoint);
+  if (!content || !content->skipped_change) return;
+  info.skipped_change = std::min(*content->skipped_change, drawn.work.skipped_bound);
+  info.skipped_change_kind = "estimated";
+}
+
+}  // namespace
 
 Observation observed_in(const frame::Frame& drawn, const quality::Setting& setting) {
   protocol::View asked = drawn.view;
@@ -19,6 +35,7 @@ void report_error(const frame::Frame& drawn, const Observation& observed,
                   quality::Tables& tables, protocol::FrameInfo& info) {
   if (drawn.view.method.name == protocol::MethodName::reference) return;
   const auto index = quality::index_of(setting);
+  estimate_skipped_change(drawn, observed, tables, info);
   // A smaller picture shows it less exactly.
   if (drawn.describe_us > 0 && drawn.width == drawn.view.image.width &&
       drawn.height == drawn.view.image.height) {

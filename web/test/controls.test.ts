@@ -273,6 +273,8 @@ test("the HUD names method and compositing, and the samples that were skipped", 
   }
   const skippedChange = { value: 0.0256, kind: "measured" } as const;
   assert.match(workLines({ work, skippedChange })[1], / both · change 0\.026$/);
+  const estimated = { value: 0.3, kind: "estimated" } as const;
+  assert.match(workLines({ work, skippedChange: estimated })[1], /change 0\.3 est\.$/);
   assert.match(workLines({ work, skippedChange: { value: 0, kind: "measured" } })[1], /change 0$/);
 });
 

@@ -16,6 +16,7 @@
 #include "server/data/resident/dataset.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/engine/reference/reference.hpp"
+#include "server/frame/content.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
@@ -229,6 +230,29 @@ TEST_F(Measure, ChangeBySkippedLinesAndSplatsIsThatOfThePictureWithAllOfThem) {
     EXPECT_GT(lines.skipped_change.value(), 1e-4) << "of splats alone";
     EXPECT_LT(lines.skipped_change.value(), truth);
     EXPECT_EQ(whole.skipped_change, 0.0) << "nothing is skipped";
+  }
+}
+
+// Pixels are composited from the kernels that their rays meet, by other code.
+TEST_F(Measure, ChangeBySkippedLinesAndSplatsIsEstimatedFromSomePixels) {
+  view.image.width = 320;
+  view.image.height = 240;
+  const auto estimated = [&] {
+    const auto scene = scene::build_scene(completed(), *dataset);
+    return content_of(scene.value()).value().skipped_change.value();
+  };
+  view.scalars.value()[0].min_optical_depth = 0;
+  view.vector.min_magnitude = 0;
+  EXPECT_EQ(estimated(), 0);
+  for (const auto& [lines, splats] : {std::pair{0.3, 0.0}, std::pair{0.0, 0.2}}) {
+    view.vector.min_magnitude = lines * view.vector.magnitude_range.value()[1];
+    view.scalars.value()[0].min_optical_depth = splats;
+    for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
+      const double truth = drawn(method, Format::png).skipped_change.value();
+      EXPECT_GT(truth, 1e-4);
+      EXPECT_LT(std::abs(std::log(estimated() / truth)), std::log(1.5))
+          << lines << ' ' << splats << ' ' << estimated() << ' ' << truth;
+    }
   }
 }
 

@@ -124,9 +124,12 @@ const many = (n: number): string => {
   return n < 1e9 ? `${(n / 1e6).toFixed(1)} M` : `${(n / 1e9).toFixed(1)} G`;
 };
 
-// Mean change of the picture by what was skipped: measured of a final frame, else its upper bound.
+// Mean change of the picture by what was skipped: measured, estimated, or its upper bound.
 function changeText(change: ChosenMessage["skippedChange"], bound: number | null): string {
-  if (change.value !== null) return ` · change ${formatNumber(change.value, 2)}`;
+  if (change.value !== null) {
+    const kind = change.kind === "estimated" ? " est." : "";
+    return ` · change ${formatNumber(change.value, 2)}${kind}`;
+  }
   return bound === null ? "" : ` · change ≤ ${formatNumber(bound, 2)}`;
 }
 
