@@ -175,8 +175,9 @@ class GroundFinder {
       return "its depths are below zero throughout";
     }
     multiply(*factor, values.size(), values.data());
+    // A depth of 0 is a height of 0, not of -0.
     for (float& value : values) {
-      if (!std::isfinite(value)) value = std::numeric_limits<float>::quiet_NaN();
+      value = std::isfinite(value) ? value + 0.0F : std::numeric_limits<float>::quiet_NaN();
     }
     const bool sea_floor = from.quantity == GroundQuantity::depth;
     if (sea_floor) raise_land(values);

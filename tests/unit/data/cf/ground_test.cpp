@@ -174,6 +174,13 @@ TEST(GroundOfAFile, OfAnOceanIsBelowTheSeaAndItsLandIsNot) {
   }
 }
 
+TEST(GroundOfAFile, OfADepthOfZeroIsAtZero) {
+  Folder folder;
+  const auto ground = ground_by(folder / "a.nc", "deptho", "m", "", {0, 10, 0, 10, 0, 10});
+  ASSERT_TRUE(ground);
+  EXPECT_FALSE(std::signbit(ground->heights[0]));
+}
+
 TEST(GroundOfAFile, OfDepthsBelowZeroIsRefused) {
   Folder folder;
   const std::string path = file_with(folder / "a.nc", [](NetcdfMaker& made, int, int y, int x) {
