@@ -17,6 +17,7 @@ namespace windsplat::vtk_loader {
 
 struct CaseField {
   std::string name;
+  std::string array;   // its name in VTK
   int components = 1;  // 1 or 3
   bool of_cells = false;
   std::string units;  // as in CF ("m s-1", "1"); empty: not known

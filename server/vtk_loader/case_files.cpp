@@ -2,6 +2,7 @@
 #include "server/vtk_loader/case_files.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace windsplat::vtk_loader {
 
@@ -37,7 +38,11 @@ std::optional<std::string> CaseFiles::name_of(std::string_view path) {
     const std::string_view part = path.substr(0, end);
     path.remove_prefix(std::min(end + 1, path.size()));
     if (part.empty() || part == ".") continue;
-    if (part == "..") return {};
+    if (part == "..") {
+      if (out.empty()) return {};
+      out = parent_of(out);
+      continue;
+    }
     if (!out.empty()) out += '/';
     out += part;
   }
@@ -66,15 +71,23 @@ const std::vector<std::string>* CaseFiles::list(const std::string& folder) {
   return at->second ? &*at->second : nullptr;
 }
 
+std::optional<std::vector<std::string>> CaseFiles::list_shown(const std::string& folder) {
+  const auto* const names = list(folder);
+  if (names == nullptr) return {};
+  std::vector<std::string> out;
+  const std::string begin = folder.empty() ? "" : folder + '/';
+  std::copy_if(names->begin(), names->end(), std::back_inserter(out),
+               [&](const std::string& name) { return hidden_.count(begin + name) == 0; });
+  return out;
+}
+
 bool CaseFiles::exists(const std::string& name) {
   if (name.empty()) return true;
   const auto* const names = list(parent_of(name));
   if (names == nullptr) return false;
   const std::string last = name.substr(name.rfind('/') + 1);
-  return std::any_of(names->begin(), names->end(), [&](const std::string& found) {
-    return found == last ||
-           (found.size() == last.size() + 1 && found.starts_with(last) && found.back() == '/');
-  });
+  return std::binary_search(names->begin(), names->end(), last) ||
+         std::binary_search(names->begin(), names->end(), last + '/');
 }
 
 bool CaseFiles::is_folder(const std::string& name) { return exists(name) && list(name) != nullptr; }

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,8 +23,8 @@ class CaseFiles {
  public:
   explicit CaseFiles(std::shared_ptr<data::Files> files) : files_(std::move(files)) {}
 
-  // The name within the case of a path below /case/; nullopt for other paths, and for those that
-  // lead out of the case.
+  // The name within the case of a path below /case/, without "." and ".."; nullopt for other paths,
+  // and for those that lead out of the case.
   static std::optional<std::string> name_of(std::string_view path);
 
   // The files system/* of a decomposed case are also those of each folder processor*.
@@ -32,6 +33,11 @@ class CaseFiles {
   const std::vector<std::string>* list(const std::string& folder);
   [[nodiscard]] bool is_folder(const std::string& name);
   [[nodiscard]] bool exists(const std::string& name);
+
+  // Makes VTK's listings omit a file.
+  void hide(const std::string& name) { hidden_.insert(name); }
+  // The names in a folder without those that are hidden; null if it is none.
+  std::optional<std::vector<std::string>> list_shown(const std::string& folder);
 
   // Opens a file to note its state. Errors: those of Files::open().
   Result<void> note(const std::string& name);
@@ -42,13 +48,14 @@ class CaseFiles {
   std::optional<Error> take_fault();
   // The names that were opened since the last call, in order.
   std::vector<std::string> take_opened();
-  [[nodiscard]] std::string last_opened() const { return opened_.empty() ? "" : opened_.back(); }
+  [[nodiscard]] const std::vector<std::string>& opened() const { return opened_; }
   [[nodiscard]] const data::Files& files() const { return *files_; }
 
  private:
   std::shared_ptr<data::Files> files_;
   std::map<std::string, std::optional<std::vector<std::string>>> folders_;
   std::map<std::string, std::string> states_;  // by name
+  std::set<std::string> hidden_;
   std::vector<std::string> opened_;
   std::optional<Error> fault_;
 };

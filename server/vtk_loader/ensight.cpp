@@ -10,7 +10,9 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "server/data/files/pattern.hpp"
 #include "server/vtk_loader/case.hpp"
@@ -41,6 +43,8 @@ class EnSightCase final : public Case {
     const EnSightTimes times = times_of_case(*text);
     // VTK does not return from some of them.
     if (times.has_file_sets) return bad_case("has several steps in one file, which is not read");
+    if (!times.ascends) return bad_case("has time values that are no ascending numbers");
+    if (auto done = note_files(*text); !done) return done;
     reader_->SetCaseFileName((std::string(case_root) + name).c_str());
     reader_->ReadAllVariablesOff();
     if (auto fine = guarded(files_, [&] { reader_->UpdateInformation(); }); !fine) return fine;
@@ -54,15 +58,15 @@ class EnSightCase final : public Case {
     find_times(times);
     find_fields();
     leave_out_other_times(times);
-    return note_files(*text);
+    give_names();
+    return {};
   }
 
   Result<Parts> read(std::size_t step, const CaseField* field) override {
     reader_->GetPointDataArraySelection()->DisableAllArrays();
     reader_->GetCellDataArraySelection()->DisableAllArrays();
-    if (field != nullptr && field->of_cells) reader_->SetCellArrayStatus(field->name.c_str(), 1);
-    if (field != nullptr && !field->of_cells) reader_->SetPointArrayStatus(field->name.c_str(), 1);
-    static_cast<void>(files_.take_opened());
+    if (field != nullptr && field->of_cells) reader_->SetCellArrayStatus(field->array.c_str(), 1);
+    if (field != nullptr && !field->of_cells) reader_->SetPointArrayStatus(field->array.c_str(), 1);
     const auto fine = guarded(files_, [&] {
       if (is_timed_) {
         reader_->UpdateTimeStep(contents_.times.at(step));
@@ -87,7 +91,7 @@ class EnSightCase final : public Case {
     }
     if (out.empty()) {
       return bad_case("has no part with cells that VTK reads (the last file it read is " +
-                      in_quotes(files_.last_opened()) + ')');
+                      in_quotes(files_.opened().empty() ? "" : files_.opened().back()) + ')');
     }
     if (auto fine = check_opened(out, field); !fine) return fine.error();
     return out;
@@ -159,7 +163,7 @@ class EnSightCase final : public Case {
         continue;
       }
       const bool of_cells = type == scalar_per_element || type == vector_per_element;
-      contents_.fields.push_back({name, is_scalar ? 1 : 3, of_cells, ""});
+      contents_.fields.push_back({name, name, is_scalar ? 1 : 3, of_cells, ""});
     }
     for (int v = 0; v < inner->GetNumberOfComplexVariables(); ++v) {
       if (const char* const name = inner->GetComplexDescription(v)) {
@@ -171,7 +175,7 @@ class EnSightCase final : public Case {
   // VTK would hold the values of the time before.
   void leave_out_other_times(const EnSightTimes& times) {
     const auto has_others = [&](const CaseField& field) {
-      const auto set = times.set_of.find(field.name);
+      const auto set = times.set_of.find(EnSightTimes::key_of(field.name, field.of_cells));
       const auto own = set == times.set_of.end() ? times.sets.end() : times.sets.find(set->second);
       if (own == times.sets.end() || own->second == contents_.times) return false;
       contents_.left_out.push_back(
@@ -180,6 +184,26 @@ class EnSightCase final : public Case {
     };
     auto& fields = contents_.fields;
     fields.erase(std::remove_if(fields.begin(), fields.end(), has_others), fields.end());
+  }
+
+  // A variable of elements has the name of one of nodes with "_of_elements".
+  void give_names() {
+    std::vector<CaseField> kept;
+    std::set<std::pair<std::string, bool>> seen;
+    std::set<std::string> names;
+    std::stable_partition(contents_.fields.begin(), contents_.fields.end(),
+                          [](const CaseField& field) { return !field.of_cells; });
+    for (CaseField& field : contents_.fields) {
+      if (!seen.emplace(field.name, field.of_cells).second) {
+        contents_.left_out.push_back({field.name, "has the name of a variable before it"});
+        continue;
+      }
+      field.array = field.name;
+      if (names.count(field.name) > 0) field.name += "_of_elements";
+      while (!names.insert(field.name).second) field.name += '_';
+      kept.push_back(std::move(field));
+    }
+    contents_.fields = std::move(kept);
   }
 
   // Notes the states of all files that the case file names, of all steps.
@@ -203,7 +227,7 @@ class EnSightCase final : public Case {
 
   Result<void> note_matching(const std::string& pattern) {
     const auto plain = CaseFiles::name_of(std::string(case_root) + pattern);
-    if (!plain) {
+    if (!plain || pattern.starts_with('/')) {
       return bad_case("refers to " + in_quotes(pattern) +
                       ", which lies outside the folder of the case");
     }

@@ -30,7 +30,11 @@ class CaseReader {
     entry(key, words_of(line.substr(colon + 1)));
   }
   EnSightTimes take() {
-    for (auto& [set, times] : found_.sets) std::sort(times.begin(), times.end());
+    for (auto& [set, times] : found_.sets) {
+      const auto at = std::adjacent_find(times.begin(), times.end(),
+                                         [](double a, double b) { return !(a < b); });
+      found_.ascends = found_.ascends && at == times.end();
+    }
     return std::move(found_);
   }
 
@@ -54,7 +58,8 @@ class CaseReader {
     }
     // [time set [file set]] name file
     if (section_ == "VARIABLE" && words.size() >= 3) {
-      found_.set_of[words[words.size() - 2]] = words.front();
+      const bool of_elements = key.ends_with("per element");
+      found_.set_of[EnSightTimes::key_of(words[words.size() - 2], of_elements)] = words.front();
     }
   }
 
@@ -62,7 +67,11 @@ class CaseReader {
     for (const std::string& word : words) {
       std::istringstream in(word);
       double time = 0;
-      if (in >> time) found_.sets[set_].push_back(time);
+      if (in >> time) {
+        found_.sets[set_].push_back(time);
+      } else {
+        found_.ascends = false;
+      }
     }
   }
 

@@ -1,5 +1,5 @@
 // What VTK does not tell of the case file of EnSight Gold: which variable has values at which
-// times.
+// times, and the files that it names.
 #pragma once
 
 #include <map>
@@ -10,8 +10,14 @@ namespace windsplat::vtk_loader {
 
 struct EnSightTimes {
   std::map<std::string, std::vector<double>> sets;  // time set -> times, ascending
-  std::map<std::string, std::string> set_of;        // variable -> time set; none: at each time
+  std::map<std::string, std::string> set_of;        // key_of() -> time set; none: at each time
   bool has_file_sets = false;                       // several steps in one file
+  bool ascends = true;                              // each set, without two equal times
+
+  // Of a variable: nodes and elements may have variables of one name.
+  static std::string key_of(const std::string& name, bool of_elements) {
+    return (of_elements ? "e " : "n ") + name;
+  }
 
   // The times of the set that most variables have; empty: no variable has one.
   [[nodiscard]] std::vector<double> most_frequent() const;

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/vtk_loader/case_files.hpp"
@@ -136,12 +137,12 @@ int access(const char* path, int mode) __THROW {
 DIR* opendir(const char* path) {
   const auto name = vtk_loader::name_in_case(path);
   if (!name) return nullptr;
-  const auto* const names = vtk_loader::served()->list(*name);
-  if (names == nullptr) {
+  auto names = vtk_loader::served()->list_shown(*name);
+  if (!names) {
     errno = ENOENT;
     return nullptr;
   }
-  return reinterpret_cast<DIR*>(new vtk_loader::Listing{*names, 0, {}});
+  return reinterpret_cast<DIR*>(new vtk_loader::Listing{std::move(*names), 0, {}});
 }
 
 dirent* readdir(DIR* folder) { return vtk_loader::next_entry(folder); }

@@ -65,6 +65,20 @@ std::optional<std::string_view> after(std::string_view text, std::string_view wo
   return {};
 }
 
+std::string_view unquoted(std::string_view text) {
+  const bool is_quoted = text.size() >= 2 && text.front() == '"' && text.back() == '"';
+  return is_quoted ? text.substr(1, text.size() - 2) : text;
+}
+
+// The entry is a text with semicolons in it.
+std::string_view arch_of(std::string_view header) {
+  const auto begin = after(header, "arch", '"');  // up to the text: blanks only
+  if (!begin || !begin->empty()) return {};
+  const auto open = header.find('"', static_cast<std::size_t>(begin->data() - header.data()));
+  const auto close = header.find('"', open + 1);
+  return close == std::string_view::npos ? "" : header.substr(open + 1, close - open - 1);
+}
+
 // "[0 1 -1 0 0 0 0]" -> exponents of kg m s K mol A cd, of which the last two may be absent.
 std::optional<std::vector<double>> exponents_of(std::string_view text) {
   constexpr std::size_t all = 7;
@@ -114,14 +128,36 @@ std::optional<FoamHeader> parse_foam_header(std::string_view text) {
   const auto close = plain.find('}', begin);
   if (open == std::string::npos || close == std::string::npos || close < open) return {};
   const std::string_view all = plain;
-  const auto name = after(all.substr(open, close - open), "class", ';');
+  const auto entry = [&](std::string_view word) {
+    return after(all.substr(open, close - open), word, ';');
+  };
+  const auto name = entry("class");
   if (!name) return {};
   FoamHeader out;
   out.class_name = *name;
+  out.object = unquoted(entry("object").value_or(""));
+  out.is_binary = entry("format").value_or("") == "binary";
+  out.arch = arch_of(all.substr(open, close - open));
   if (const auto set = after(all.substr(close), "dimensions", ']')) {
     if (const auto exponents = exponents_of(*set)) out.units = units_of(*exponents);
   }
   return out;
+}
+
+std::optional<std::string> unread_layout_of(const FoamHeader& header) {
+  if (!header.is_binary || header.arch.empty()) return {};
+  std::string_view rest = header.arch;
+  bool is_known = true;
+  while (!rest.empty()) {
+    const auto end = std::min(rest.find(';'), rest.size());
+    const std::string_view part = trim(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    is_known = is_known && (part.empty() || part == "LSB" || part == "label=32" ||
+                            part == "label=64" || part == "scalar=32" || part == "scalar=64");
+  }
+  if (is_known) return {};
+  return "has binary data of the layout " + in_quotes(header.arch) +
+         ", which VTK does not read; write it as ascii (foamFormatConvert)";
 }
 
 Result<FoamHeader> foam_header_of(const data::InputFile& file) {

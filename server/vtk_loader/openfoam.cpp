@@ -13,6 +13,7 @@
 #include <array>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -65,7 +66,8 @@ class OpenFoamCase final : public Case {
     contents_.time_units = "s";
     contents_.length_units = "m";
     for (auto stage : {&OpenFoamCase::find_roots, &OpenFoamCase::find_times,
-                       &OpenFoamCase::find_fields, &OpenFoamCase::choose_fields}) {
+                       &OpenFoamCase::check_meshes, &OpenFoamCase::find_fields,
+                       &OpenFoamCase::choose_fields, &OpenFoamCase::leave_out_unlisted}) {
       if (auto done = (this->*stage)(); !done) return done;
     }
     contents_.notes.push_back("the mesh within the boundaries is shown; patches and zones are not");
@@ -196,8 +198,25 @@ class OpenFoamCase final : public Case {
     return {};
   }
 
+  Result<void> check_meshes() {
+    for (const auto& root : roots_) {
+      for (const char* name : {"points", "faces", "owner", "neighbour"}) {
+        std::string path = root->folder + "constant/polyMesh/" + name;
+        if (!files_.exists(path)) path += ".gz";
+        if (!files_.exists(path)) continue;  // VTK says so
+        const auto file = files_.open(path);
+        if (!file) return file.error();
+        const auto header = foam_header_of(**file);
+        if (!header) continue;
+        if (const auto why = unread_layout_of(*header)) return (*file)->fault(*why);
+      }
+    }
+    return {};
+  }
+
   struct Found {
     CaseField field;
+    std::string left_out;  // why
     std::string class_name;
     std::vector<bool> at;  // by step: whether the file is there, in every root
   };
@@ -214,8 +233,7 @@ class OpenFoamCase final : public Case {
         for (const std::string& name : *names) {
           if (name.ends_with('/') || name.front() == '.') continue;
           const std::string field = without_gz(name);
-          if (field == name &&
-              std::find(names->begin(), names->end(), name + ".gz") != names->end()) {
+          if (field == name && std::binary_search(names->begin(), names->end(), name + ".gz")) {
             continue;  // counted once
           }
           std::string path = folder;
@@ -245,9 +263,17 @@ class OpenFoamCase final : public Case {
       return {};  // not of OpenFOAM
     }
     Found& known = at->second;
+    // VTK names a field after the object in its header, and would take a copy for the field itself.
+    if (!header->object.empty() && header->object != field) {
+      files_.hide(path);
+      known.left_out = "has the object " + in_quotes(printable(header->object, 100)) +
+                       " in the header of " + in_quotes(path) + "; it must be the file's name";
+    }
+    if (const auto why = unread_layout_of(*header)) known.left_out = *why;
     if (is_new || known.class_name.empty()) {
       known.class_name = header->class_name;
       known.field.name = field;
+      known.field.array = field;
       known.field.units = header->units.value_or("");
     } else if (known.class_name != header->class_name ||
                known.field.units != header->units.value_or("")) {
@@ -282,6 +308,10 @@ class OpenFoamCase final : public Case {
                        "; scalars and vectors of cells and points are supported"});
         continue;
       }
+      if (!found.left_out.empty()) {
+        contents_.left_out.push_back({name, found.left_out});
+        continue;
+      }
       const auto absent =
           std::find(found.at.begin() + static_cast<std::ptrdiff_t>(first), found.at.end(), false);
       if (absent != found.at.end()) {
@@ -294,6 +324,37 @@ class OpenFoamCase final : public Case {
       found.field.of_cells = kind->of_cells;
       contents_.fields.push_back(found.field);
     }
+    return {};
+  }
+
+  // VTK omits files that it takes for old ones by their names, such as U_0, p.bak and p~.
+  Result<void> leave_out_unlisted() {
+    auto& reader = *roots_.front()->reader;
+    reader.SetRefresh();  // without the files that were hidden
+    if (auto fine = guarded(files_, [&] { reader.UpdateInformation(); }); !fine) return fine;
+    // It has listed the fields of its first time only.
+    if (contents_.times.size() < roots_.front()->time_names.size()) {
+      reader.DisableAllCellArrays();
+      reader.DisableAllPointArrays();
+      auto fine = guarded(files_, [&] { reader.UpdateTimeStep(contents_.times.front()); });
+      if (!fine) return fine;
+    }
+    std::set<std::string> listed;
+    for (int a = 0; a < reader.GetNumberOfCellArrays(); ++a) {
+      listed.insert(reader.GetCellArrayName(a));
+    }
+    for (int a = 0; a < reader.GetNumberOfPointArrays(); ++a) {
+      listed.insert(reader.GetPointArrayName(a));
+    }
+    std::vector<CaseField> kept;
+    for (CaseField& field : contents_.fields) {
+      if (listed.count(field.name) > 0) {
+        kept.push_back(std::move(field));
+      } else {
+        contents_.left_out.push_back({field.name, "has the name of an old or a spare file"});
+      }
+    }
+    contents_.fields = std::move(kept);
     return {};
   }
 

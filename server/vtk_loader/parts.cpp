@@ -66,8 +66,8 @@ Result<void> add_cell(int type, const vtkIdList& corners, vtkIdType points, std:
 }  // namespace
 
 vtkDataArray* array_of(vtkDataSet& part, const CaseField& field) {
-  return field.of_cells ? part.GetCellData()->GetArray(field.name.c_str())
-                        : part.GetPointData()->GetArray(field.name.c_str());
+  return field.of_cells ? part.GetCellData()->GetArray(field.array.c_str())
+                        : part.GetPointData()->GetArray(field.array.c_str());
 }
 
 Result<Mesh> mesh_of(const Parts& parts) {

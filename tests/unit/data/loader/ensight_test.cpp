@@ -213,7 +213,52 @@ TEST_F(EnSight, FilesOutsideTheFolderAreNotRead) {
   std::filesystem::rename(folder_ / "run/run.geo", folder_ / "run.geo");
   std::string text = case_text;
   text.replace(text.find("run.geo"), 7, "../run.geo");
-  EXPECT_THAT(refusal(write_case(text)), HasSubstr("'run.case'"));
+  EXPECT_THAT(refusal(write_case(text)),
+              AllOf(HasSubstr("'run.case'"), HasSubstr("'../run.geo', which lies outside")));
+}
+
+TEST_F(EnSight, FilesOfAbsoluteNamesAreRefused) {
+  run(EnSightCoding::text);
+  std::string text = case_text;
+  text.replace(text.find("data/h.****"), 11, "/proc/self/environ");
+  EXPECT_THAT(refusal(write_case(text)),
+              AllOf(HasSubstr("'/proc/self/environ'"), HasSubstr("outside the folder")));
+}
+
+TEST_F(EnSight, OneNameOfNodesAndElementsGivesTwoFields) {
+  run(EnSightCoding::text);
+  test::write_variable(folder_ / "run/still", EnSightCoding::text, {EnSightBox()}, true,
+                       [](const Place&) { return std::vector<double>{7}; });
+  std::string text = case_text;
+  text.insert(text.find("scalar per node"), "scalar per element: pressure still\n");
+  auto source = opened(write_case(text));
+  ASSERT_NE(source, nullptr);
+  expect_linear(*source);
+  const auto volume = volume_of(*source, "pressure_of_elements", 1);
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->range[0], 7);
+  EXPECT_EQ(volume->range[1], 7);
+}
+
+// VTK has one array for both.
+TEST_F(EnSight, AVariableOfTheSameNameIsLeftOut) {
+  run(EnSightCoding::text);
+  std::string text = case_text;
+  text.insert(text.find("vector per node"), "scalar per node: 1 pressure data/v.****\n");
+  const auto source = opened(write_case(text));
+  ASSERT_NE(source, nullptr);
+  EXPECT_THAT(source->info().left_out,
+              Contains(testing::Field(&LeftOut::reason, "has the name of a variable before it")));
+}
+
+// VTK finds steps by their times.
+TEST_F(EnSight, TimesThatDoNotAscendAreRefused) {
+  run(EnSightCoding::text);
+  for (const char* times : {"2 0.5", "2 2", "nan inf"}) {
+    std::string text = case_text;
+    text.replace(text.find("0.5 2"), 5, times);
+    EXPECT_THAT(refusal(write_case(text)), HasSubstr("no ascending numbers")) << times;
+  }
 }
 
 TEST_F(EnSight, OtherVersionsAreRefusedByName) {

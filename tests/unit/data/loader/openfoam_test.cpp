@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "tests/unit/data/loader/case_fixture.hpp"
 #include "tests/unit/data/loader/foam_maker.hpp"
@@ -254,10 +255,23 @@ TEST_F(OpenFoam, DamagedFilesAreRefusedByName) {
   EXPECT_THAT(refusal(folder_ / "cavity"), HasSubstr("'constant/polyMesh/points': no such file"));
 }
 
-TEST_F(OpenFoam, CellsThatReferToAbsentPointsAreRefused) {
+TEST_F(OpenFoam, FacesThatReferToAbsentPointsAreRefused) {
+  const auto made = cavity();
+  const std::string path = made.path("constant/polyMesh/faces");
+  std::ifstream in(path);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  const auto face = text.find("4(");
+  ASSERT_NE(face, std::string::npos);
+  text.replace(face, 3, "4(60");  // 60 points: 0 to 59
+  std::ofstream(path) << text;
+  EXPECT_THAT(refusal(folder_ / "cavity"),
+              AllOf(HasSubstr("'cavity'"), HasSubstr("out of range: 60 points")));
+}
+
+TEST_F(OpenFoam, AListOfOwnersForOtherFacesIsRefused) {
   auto made = cavity();
   made.write("constant/polyMesh", "owner", "labelList", "3\n(\n0\n1\n2\n)\n");
-  EXPECT_THAT(refusal(folder_ / "cavity"), HasSubstr("'cavity'"));
+  EXPECT_THAT(refusal(folder_ / "cavity"), AllOf(HasSubstr("'cavity'"), HasSubstr("owner")));
 }
 
 TEST_F(OpenFoam, ValuesThatEndEarlyAreRefusedByFileAndTime) {
@@ -308,6 +322,108 @@ TEST_F(OpenFoam, FilesOutsideTheCaseAreNotRead) {
   const auto volume = volume_of(*source, "p", 1);
   ASSERT_FALSE(volume);
   EXPECT_THAT(volume.error().message, HasSubstr("'cavity'"));
+}
+
+TEST_F(OpenFoam, NamesWithFoldersAboveStayInTheCase) {
+  auto made = cavity();
+  const auto p_with = [&](const std::string& included) {
+    made.write("0.5", "p", "volScalarField",
+               "dimensions [0 2 -2 0 0 0 0];\n#include \"" + included +
+                   "\"\nboundaryField\n{\nwalls { type zeroGradient; }\n}\n");
+  };
+  std::ofstream(made.path("constant/start")) << "internalField uniform 7;\n";
+  p_with("../constant/start");
+  auto source = opened(folder_ / "cavity");
+  ASSERT_NE(source, nullptr);
+  const auto volume = volume_of(*source, "p", 1);
+  ASSERT_TRUE(volume) << volume.error().message;
+  EXPECT_EQ(volume->range[1], 7);
+  // One more leads out; it must not be taken for the file of this name in the case.
+  p_with("../../constant/start");
+  source = opened(folder_ / "cavity");
+  ASSERT_NE(source, nullptr);
+  const auto outside = volume_of(*source, "p", 1);
+  ASSERT_FALSE(outside);
+  EXPECT_THAT(outside.error().message, HasSubstr("Cannot open file"));
+}
+
+TEST_F(OpenFoam, LinksThatLeadOutOfTheCaseAreRefused) {
+  const auto made = cavity();
+  std::filesystem::rename(made.path("0/p"), folder_ / "p");
+  std::filesystem::create_symlink("../../p", made.path("0/p"));
+  EXPECT_THAT(refusal(folder_ / "cavity"), HasSubstr("outside the dataset's folder"));
+}
+
+// VTK would show the values of the copy as those of p.
+TEST_F(OpenFoam, CopiesOfAFieldDoNotReplaceIt) {
+  auto made = cavity();
+  for (const char* time : {"0", "0.5", "1e+01"}) {
+    const std::string folder = time;
+    made.field(folder, "p", kinematic_pressure,
+               [](const Place&) { return std::vector<double>{-99}; });
+    for (const char* copy : {"/a", "/p.orig"}) {
+      std::filesystem::copy_file(made.path(folder + "/p"), made.path(folder + copy));
+    }
+  }
+  const auto box = cavity().box();
+  expect_cavity(box);
+  const auto source = opened(folder_ / "cavity");
+  ASSERT_NE(source, nullptr);
+  for (const char* copy : {"a", "p.orig"}) {
+    EXPECT_EQ(source->info().find(copy), nullptr);
+    EXPECT_THAT(source->info().left_out,
+                Contains(AllOf(testing::Field(&LeftOut::name, copy),
+                               testing::Field(&LeftOut::reason, HasSubstr("the object 'p'")))));
+  }
+}
+
+TEST_F(OpenFoam, OldFilesAreLeftOut) {
+  auto made = cavity();
+  for (const char* name : {"U_0", "p.bak", "p~"}) {
+    for (const char* time : {"0", "0.5", "1e+01"}) {
+      made.field(time, name, velocity, [](const Place&) { return std::vector<double>{1}; });
+    }
+  }
+  const auto source = opened(folder_ / "cavity");
+  ASSERT_NE(source, nullptr);
+  for (const char* name : {"U_0", "p.bak", "p~"}) {
+    EXPECT_EQ(source->info().find(name), nullptr) << name;
+    EXPECT_THAT(source->info().left_out, Contains(testing::Field(&LeftOut::name, name)));
+  }
+}
+
+// VTK would read the bytes in the order of this machine.
+TEST_F(OpenFoam, BinaryDataOfOtherLayoutsAreRefused) {
+  const auto made = cavity({}, FoamCoding::binary);
+  const auto change_layout = [&](const std::string& name, const std::string& from,
+                                 const std::string& to) {
+    std::ifstream in(made.path(name), std::ios::binary);
+    std::string text{std::istreambuf_iterator<char>(in), {}};
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos);
+    text.replace(at, from.size(), to);
+    std::ofstream(made.path(name), std::ios::binary) << text;
+  };
+  change_layout("0.5/p", "LSB", "MSB");
+  const auto source = opened(folder_ / "cavity");
+  ASSERT_NE(source, nullptr);
+  EXPECT_THAT(source->info().left_out,
+              Contains(AllOf(testing::Field(&LeftOut::name, "p"),
+                             testing::Field(&LeftOut::reason, HasSubstr("MSB;label=32")))));
+  change_layout("constant/polyMesh/owner", "label=32", "label=16");
+  EXPECT_THAT(refusal(folder_ / "cavity"), AllOf(HasSubstr("owner"), HasSubstr("label=16")));
+}
+
+TEST_F(OpenFoam, ErrorsThatNameTheirFileNameNoOther) {
+  auto made = cavity();
+  made.write("0.5", "p", "volScalarField",
+             "dimensions [0 2 -2 0 0 0 0];\ninternalField uniform #calc \"1\";\n");
+  auto source = opened(folder_ / "cavity");
+  ASSERT_NE(source, nullptr);
+  const auto volume = volume_of(*source, "p", 1);
+  ASSERT_FALSE(volume);
+  EXPECT_THAT(volume.error().message, AllOf(HasSubstr("0.5/p"), HasSubstr("calc"),
+                                            testing::Not(HasSubstr("the last file it read"))));
 }
 
 // What a program that cannot read a case says about it.
