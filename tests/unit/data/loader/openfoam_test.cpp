@@ -418,6 +418,7 @@ TEST_F(OpenFoam, ErrorsThatNameTheirFileNameNoOther) {
   auto made = cavity();
   made.write("0.5", "p", "volScalarField",
              "dimensions [0 2 -2 0 0 0 0];\ninternalField uniform #calc \"1\";\n");
+  made.field("0.5", "zeta", "0 0 0 0 0 0 0", [](const Place&) { return std::vector<double>{1}; });
   auto source = opened(folder_ / "cavity");
   ASSERT_NE(source, nullptr);
   const auto volume = volume_of(*source, "p", 1);
