@@ -329,9 +329,12 @@ class OpenFoamCase final : public Case {
 
   // VTK omits files that it takes for old ones by their names, such as U_0, p.bak and p~.
   Result<void> leave_out_unlisted() {
+    for (const auto& root : roots_) {
+      root->reader->SetRefresh();  // without the files that were hidden
+      auto fine = guarded(files_, [&] { root->reader->UpdateInformation(); });
+      if (!fine) return fine;
+    }
     auto& reader = *roots_.front()->reader;
-    reader.SetRefresh();  // without the files that were hidden
-    if (auto fine = guarded(files_, [&] { reader.UpdateInformation(); }); !fine) return fine;
     // It has listed the fields of its first time only.
     if (contents_.times.size() < roots_.front()->time_names.size()) {
       reader.DisableAllCellArrays();

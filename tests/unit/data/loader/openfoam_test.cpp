@@ -134,6 +134,9 @@ TEST_F(OpenFoam, DecomposedCasesAreUnited) {
     half.cells[0] = 2;
     half.origin[0] = 2 * whole.h * p;
     FoamCase part(folder + "/processor" + std::to_string(p), half);
+    // A copy, which must not replace p in any of the folders.
+    part.field("0", "p", kinematic_pressure, [](const Place&) { return std::vector<double>{-9}; });
+    std::filesystem::copy_file(part.path("0/p"), part.path("0/a"));
     write_fields(part, "0", 0);
     write_fields(part, "0.5", 0.5);
     write_fields(part, "1e+01", 10);
