@@ -3,12 +3,14 @@
 #include "protocol/measurements.hpp"
 
 #include <array>
+#include <charconv>
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -84,14 +86,69 @@ std::array<std::optional<double>, 3> read_place(http::QueryReader& query) {
           query.number("z", -limits::coordinate_max, limits::coordinate_max)};
 }
 
-// A position, whose z is an absolute height if `height_field` names a field of heights.
+// A position, whose z is an absolute height if `height_field` names a field of heights; or the
+// indices of a sample.
 struct Position {
   std::array<std::optional<double>, 3> at;
+  std::optional<std::array<int, 3>> index;
   std::optional<std::string> height_field;
 };
 
-Position read_position(http::QueryReader& query) {
-  return {read_place(query), query.text("heightField")};
+// "i,j,k"
+std::optional<std::array<int, 3>> indices_in(std::string_view text) {
+  std::array<int, 3> out{};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (std::size_t a = 0; a < out.size(); ++a) {
+    if (a > 0 && (at == end || *at++ != ',')) return std::nullopt;
+    const auto [rest, fault] = std::from_chars(at, end, out.at(a));
+    if (fault != std::errc()) return std::nullopt;
+    at = rest;
+  }
+  return at == end ? std::optional(out) : std::nullopt;
+}
+
+// Errors: malformed or invalid, also those of other parameters of the query.
+Result<Position> read_position(http::QueryReader& query, const data::Grid& grid) {
+  Position out{read_place(query), {}, query.text("heightField")};
+  const auto index = query.text("index");
+  if (!index) return out;
+  if (out.at[0] || out.at[1] || out.at[2]) {
+    return make_error(ErrorKind::invalid,
+                      "query parameters 'index' and 'x', 'y', 'z' are mutually exclusive");
+  }
+  out.index = indices_in(*index);
+  if (!out.index) {
+    return make_error(ErrorKind::malformed, "query parameter 'index' must be three integers i,j,k");
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (out.index->at(a) >= 0 && out.index->at(a) < grid.dims().at(a)) continue;
+    return make_error(ErrorKind::invalid, "query parameter 'index' must be below " +
+                                              std::to_string(grid.dims().at(a)) + " along " +
+                                              "xyz"[a] + " and not negative");
+  }
+  return out;
+}
+
+// The place of a sample. Errors: invalid if it has no height.
+Result<data::Place> place_of(const data::Grid& grid, const std::array<int, 3>& index,
+                             const std::optional<data::SampleHeights>& heights) {
+  data::Place out{index, {}};
+  for (std::size_t a = 0; a < 3; ++a) {
+    out.coordinates.at(a) = grid.axes.at(a).coordinates.at(static_cast<std::size_t>(index.at(a)));
+  }
+  if (grid.columns) {
+    const auto column =
+        static_cast<std::size_t>(index[1]) * static_cast<std::size_t>(grid.dims()[0]) +
+        static_cast<std::size_t>(index[0]);
+    out.coordinates[0] = grid.columns->longitude.at(column);
+    out.coordinates[1] = grid.columns->latitude.at(column);
+  }
+  if (!heights) return out;
+  const auto height = data::value_at(*heights->values, index);
+  if (!height) return make_error(ErrorKind::invalid, "the sample has no height");
+  out.coordinates[2] = height->front();
+  return out;
 }
 
 // The heights of the first step, at which views place samples.
@@ -133,7 +190,9 @@ Result<Located> locate(tasks::Catalogue& catalogue, const data::Dataset& dataset
   const data::Grid& grid = dataset.info().grid;
   const auto heights = heights_for(catalogue, dataset, position, cancel);
   if (!heights) return heights.error();
-  const auto place = data::nearest_sample(grid, position.at, *heights ? &**heights : nullptr);
+  const auto place = position.index
+                         ? place_of(grid, *position.index, *heights)
+                         : data::nearest_sample(grid, position.at, *heights ? &**heights : nullptr);
   if (!place) return place.error();
   Located out{*place, describe(*place, grid)};
   if (*heights) out.position.units[2] = (*heights)->units;
@@ -336,14 +395,15 @@ void get_probe(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const st
     return;
   }
   http::QueryReader query(request.query);
-  const Position at = read_position(query);
+  const auto at = read_position(query, (*dataset)->info().grid);
   const int step = read_step(query, **dataset).value_or(0);
-  if (const auto ok = query.finish(); !ok) {
-    reply(http::problem_response(ok.error()));
+  const auto ok = query.finish();
+  if (!ok || !at) {
+    reply(http::problem_response(!ok ? ok.error() : at.error()));
     return;
   }
   run_later(loads, request, std::move(reply), "a probe", dataset->get(),
-            [&catalogue, dataset = *dataset, at, step, cancel = request.cancel] {
+            [&catalogue, dataset = *dataset, at = *at, step, cancel = request.cancel] {
               return probe_response(catalogue, *dataset, at, step, cancel);
             });
 }
@@ -355,8 +415,9 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
   if (!subject) return refuse(subject.error());
   const data::DatasetInfo& info = subject->dataset->info();
   http::QueryReader query(request.query);
-  const Position at = read_position(query);
+  const auto position = read_position(query, info.grid);
   if (const auto ok = query.finish(); !ok) return refuse(ok.error());
+  if (!position) return refuse(position.error());
   if (const auto ok = check_steps(info); !ok) return refuse(ok.error());
 
   const auto series = std::make_shared<protocol::SeriesDescription>();
@@ -365,7 +426,7 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
   const auto pass = pass_over(std::move(*subject), request, std::move(reply));
   const auto index = std::make_shared<std::array<int, 3>>();
   // Locating the position is slow among many columns, so it runs on a loading thread.
-  pass->begin = [at, series, index, &of = pass->subject]() -> Result<void> {
+  pass->begin = [at = *position, series, index, &of = pass->subject]() -> Result<void> {
     const auto found = locate(*of.catalogue, *of.dataset, at, of.cancel);
     if (!found) return found.error();
     *index = found->place.index;

@@ -128,11 +128,11 @@ test("a series of the schema is parsed, and its ends are shown as times", async 
   );
   const ajv = new Ajv2020({ schemas, strict: false });
   assert.ok(ajv.validate("messages.schema.json#/$defs/series", series), ajv.errorsText());
-  const { times } = await server(series).api.series("d", "t", [1, 2, 3]);
+  const { times } = await server(series).api.series("d", "t", [1, 2, 3], null);
   assert.deepEqual(timeEnds(times), ["2001-01-01 00:00Z", "2001-01-01 12:00Z"]);
   assert.deepEqual(timeEnds([]), ["", ""]);
   const strings = server({ ...series, times: ["2001-01-01T00:00:00Z"] });
-  await assert.rejects(strings.api.series("d", "t", [1, 2, 3]), /not be understood/);
+  await assert.rejects(strings.api.series("d", "t", [1, 2, 3], null), /not be understood/);
 });
 
 test("each request has its URL below the base path", async () => {
@@ -146,11 +146,17 @@ test("each request has its URL below the base path", async () => {
   assert.deepEqual((await r.api.range("d", "t", null)).range, [1, 2]);
   assert.deepEqual(r.asked, ["http://host/base/v1/datasets/d/fields/t/range?of=all"]);
   const p = server({ position: { x: 1, y: 2, z: 3 }, values: {} });
-  await p.api.probe("d", [-1.5, 2, 1e-7], 4);
-  assert.deepEqual(p.asked, ["http://host/base/v1/datasets/d/probe?x=-1.5&y=2&z=1e-7&step=4"]);
+  await p.api.probe("d", [1, 2, 3], null, 4);
+  await p.api.probe("d", [1, 2, 3], "h of z", 4);
+  assert.deepEqual(p.asked, [
+    "http://host/base/v1/datasets/d/probe?index=1,2,3&step=4",
+    "http://host/base/v1/datasets/d/probe?index=1,2,3&heightField=h%20of%20z&step=4",
+  ]);
   const s = server(series);
-  await s.api.series("d", "t", [1, 2, 3]);
-  assert.deepEqual(s.asked, ["http://host/base/v1/datasets/d/fields/t/series?x=1&y=2&z=3"]);
+  await s.api.series("d", "t", [1, 2, 3], "z");
+  assert.deepEqual(s.asked, [
+    "http://host/base/v1/datasets/d/fields/t/series?index=1,2,3&heightField=z",
+  ]);
 });
 
 test("errors show the text of the server or of the page", async () => {

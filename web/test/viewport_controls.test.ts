@@ -20,7 +20,7 @@ import {
 import type { Vec3 } from "../src/base/vec3";
 import { Hover, type HoverTarget } from "../src/viewport/hover";
 import { MoveQueue, twist, wheelZoom } from "../src/viewport/input";
-import { hoverLines } from "../src/view/sample_position";
+import { hoverLines, placeText } from "../src/view/sample_position";
 import type { Dataset, View } from "../src/wire/protocol";
 import { Turn } from "../src/viewport/camera_turn";
 
@@ -316,14 +316,26 @@ const grid = {
     z: axis("lev", "hPa"),
   },
 } as unknown as Dataset;
+const units = { x: "degrees_east", y: "degrees_north", z: "hPa" };
 const probe: Probe = {
-  position: { x: -23.5, y: 41, z: 500 },
+  position: { x: -23.5, y: 41, z: 500, units },
   values: {
     cloud: { value: null, units: "1" },
     heat: { value: 280.26, units: "K" },
     wind: { value: [3, 4, 0], units: "m s-1" },
   },
 };
+
+test("places are told in the units of the answer where the axes have others", () => {
+  assert.equal(placeText(grid, probe), "");
+  const rows = { axes: { ...grid.axes, x: axis("west_east", ""), y: axis("south_north", "") } };
+  const position = { x: -23.5, y: 41, z: 2300, units: { ...units, z: "m" } };
+  const curved = rows as unknown as Dataset;
+  assert.equal(placeText(curved, { ...probe, position }), "at 23.5 °W, 41 °N, height 2300 m");
+  const view = { vector: { field: "wind" } } as View;
+  const [, place] = hoverLines(curved, view, { ...probe, position }, 2);
+  assert.equal(place, "23.5 °W, 41 °N · level 2300 m");
+});
 
 test("the hover text names field, position and level", () => {
   const view = { vector: { field: "wind" }, scalars: [{ field: "cloud" }] } as View;

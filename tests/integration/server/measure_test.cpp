@@ -108,11 +108,28 @@ TEST_F(Measures, PositionsAreAtTheHeightsOfAField) {
     EXPECT_NEAR(position["z"].get<double>(), in_column(nearest), 1e-6);
     EXPECT_EQ(position["units"]["z"], heights.units);
   }
+  // The page asks for the sample that it has drawn there.
+  const std::string sample = "?index=5,3," + std::to_string(nearest);
+  EXPECT_EQ(ask("probe" + sample + "&heightField=" + heights.name + "&step=1"),
+            ask("probe" + at + "&step=1"));
   const std::string vector = field(windsplat::data::FieldKind::vector).name;
   expect_problem_saying(refused("probe" + near(5, 3, 2) + "&heightField=" + vector), 422,
                         "is a vector, not a scalar");
   expect_problem_saying(refused("probe" + near(5, 3, 2) + "&heightField=none"), 422,
                         "'heightField'");
+}
+
+TEST_F(Measures, SamplesAreProbedByTheirIndices) {
+  EXPECT_EQ(ask("probe?index=5,3,2&step=1"), ask("probe" + near(5, 3, 2) + "&step=1"));
+  const std::string name = field(windsplat::data::FieldKind::scalar).name;
+  EXPECT_EQ(ask("fields/" + name + "/series?index=5,3,2"),
+            ask("fields/" + name + "/series" + near(5, 3, 2)));
+  for (const char* wrong : {"5,3", "5,3,2,1", "5,3,b", "5;3;2", ""}) {
+    expect_problem_saying(refused(std::string("probe?index=") + wrong), 400, "three integers");
+  }
+  expect_problem_saying(refused("probe?index=5,16,2"), 422, "below 16 along y");
+  expect_problem_saying(refused("probe?index=-1,3,2"), 422, "below 32 along x");
+  expect_problem_saying(refused("probe?index=5,3,2&x=0"), 422, "mutually exclusive");
 }
 
 TEST_F(Measures, InvalidOrOutsideProbesAreRefused) {
@@ -121,7 +138,7 @@ TEST_F(Measures, InvalidOrOutsideProbesAreRefused) {
   expect_problem_saying(refused("probe?x=here&y=0&z=500"), 400);
   expect_problem_saying(refused("probe?x=1e999&y=0&z=500"), 400);
   expect_problem_saying(refused("probe?x=0&y=0&z=500&step=3"), 422);
-  expect_problem_saying(refused("probe?lon=0&y=0&z=500"), 400, "x, y, z, heightField, step");
+  expect_problem_saying(refused("probe?lon=0&y=0&z=500"), 400, "x, y, z, heightField, index, step");
   expect_problem_saying(get(port(), "/v1/datasets/none/probe?x=0&y=0&z=0"), 404);
 }
 

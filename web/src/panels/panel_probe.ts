@@ -12,6 +12,7 @@ import {
   coordinatesOf,
   magnitude,
   nearestIndex,
+  placeText,
   valueText,
   type Sample,
 } from "../view/sample_position";
@@ -90,7 +91,12 @@ export class ProbePanel {
   }
 
   private key(): string {
-    return JSON.stringify([this.sample, this.kit.host.view().step ?? 0]);
+    return JSON.stringify([this.sample, this.kit.host.view().step ?? 0, this.heights()]);
+  }
+
+  // The field that gives the heights of samples in the view.
+  private heights(): string | null {
+    return this.kit.host.view().geometry?.heightField ?? null;
   }
 
   private addAxis(axis: number): void {
@@ -179,8 +185,9 @@ export class ProbePanel {
     this.wanted = key;
     const dataset = host.dataset();
     try {
-      const at = coordinatesOf(dataset, this.sample);
-      const { values } = await host.api.probe(dataset.id, at, host.view().step ?? 0);
+      const step = host.view().step ?? 0;
+      const answer = await host.api.probe(dataset.id, this.sample, this.heights(), step);
+      const { values } = answer;
       if (key !== this.wanted) return;
       this.values.replaceChildren(
         ...Object.entries(values).flatMap(([name, { value, units }]) => [
@@ -188,7 +195,7 @@ export class ProbePanel {
           make("dd", "", valueText(value, units)),
         ]),
       );
-      this.showMessage("");
+      this.showMessage(placeText(dataset, answer));
     } catch (failure) {
       if (key !== this.wanted) return;
       this.values.replaceChildren();
@@ -202,8 +209,7 @@ export class ProbePanel {
     const [sample, field] = [this.sample, this.picker.value];
     this.showMessage("reading every step…");
     try {
-      const at = coordinatesOf(dataset, sample);
-      const series = await host.api.series(dataset.id, field, at);
+      const series = await host.api.series(dataset.id, field, sample, this.heights());
       if (sample === this.sample && field === this.picker.value) this.series = series;
       this.showMessage("");
     } catch (failure) {

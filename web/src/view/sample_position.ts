@@ -78,15 +78,35 @@ export function valueText(value: Value, units: string): string {
 export const axisUnit = (units: string): string =>
   ({ degrees_east: "°E", degrees_north: "°N" })[units] ?? unitText(units);
 
-// A coordinate as text: "23.5 °W", "x 12 km".
-function coordinateText(dataset: Dataset, n: number, value: number, called?: string): string {
-  const { name, units } = dataset.axes[axisNames[n]!];
+// A coordinate as text: "23.5 °W", "x 12 km". own: its unit if it is not that of the axis.
+function coordinateText(
+  dataset: Dataset,
+  n: number,
+  value: number,
+  called?: string,
+  own?: string,
+): string {
+  const { name } = dataset.axes[axisNames[n]!];
+  const units = own ?? dataset.axes[axisNames[n]!].units;
   const unit = axisUnit(units);
   const opposite = value < 0 ? { "°E": "°W", "°N": "°S" }[unit] : undefined;
   const shown = opposite === undefined ? value : -value;
   const text = `${formatNumber(shown)} ${opposite ?? unit}`.trim();
   if (called !== undefined) return `${called} ${text}`;
   return unit.startsWith("°") ? text : `${name} ${text}`;
+}
+
+// Where a probe was read, if other coordinates than those of the axes tell: longitude and latitude
+// of a column, and the height of the sample where a field of heights places it.
+export function placeText(dataset: Dataset, { position }: Probe): string {
+  const { units } = position;
+  const others = axisNames.filter((name) => units[name] !== dataset.axes[name].units);
+  const parts = others.map((name) => {
+    const n = axisNames.indexOf(name);
+    const called = name === "z" ? "height" : undefined;
+    return coordinateText(dataset, n, position[name], called, units[name]);
+  });
+  return parts.length === 0 ? "" : `at ${parts.join(", ")}`;
 }
 
 // Lines of a probe beside the cursor: the drawn fields, or all fields if none is drawn, and the
@@ -100,7 +120,11 @@ export function hoverLines(dataset: Dataset, view: View, probe: Probe, axis: num
     (name) => `${name} ${valueText(magnitude(values[name]!.value), values[name]!.units)}`,
   );
   const at = axisNames.map((name) => probe.position[name]);
-  const across = coordinateText(dataset, axis, at[axis]!, axis === 2 ? "level" : "section");
-  const along = at.flatMap((value, n) => (n === axis ? [] : [coordinateText(dataset, n, value)]));
+  const unitsAt = axisNames.map((name) => probe.position.units[name]);
+  const called = axis === 2 ? "level" : "section";
+  const across = coordinateText(dataset, axis, at[axis]!, called, unitsAt[axis]);
+  const along = at.flatMap((value, n) =>
+    n === axis ? [] : [coordinateText(dataset, n, value, undefined, unitsAt[n])],
+  );
   return [parts.join(" · "), `${along.join(", ")} · ${across}`];
 }

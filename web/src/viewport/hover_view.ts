@@ -3,7 +3,7 @@
 import type { Api } from "../wire/api";
 import { make } from "../base/dom";
 import { Hover } from "./hover";
-import { coordinatesOf, hoverLines } from "../view/sample_position";
+import { hoverLines } from "../view/sample_position";
 import type { Found } from "./probe";
 import type { Dataset, View } from "../wire/protocol";
 import { hoverOn } from "../view/hover_setting";
@@ -63,16 +63,20 @@ export class HoverView {
   private find(at: [number, number]) {
     const found = this.host.find(at);
     if (found === null) return null;
-    const { dataset, step = 0, vector, scalars } = this.host.view();
+    const { dataset, step = 0, vector, scalars, geometry } = this.host.view();
     const fields = [vector?.field, scalars?.map(({ field }) => field)];
-    return { sample: found, key: JSON.stringify([dataset, step, found, fields]) };
+    return {
+      sample: found,
+      key: JSON.stringify([dataset, step, found, fields, geometry?.heightField]),
+    };
   }
 
   private async request({ sample, axis }: Found, signal: AbortSignal): Promise<string[]> {
     const { api } = this.host;
     const [dataset, view] = [this.host.dataset(), this.host.view()];
-    const at = coordinatesOf(dataset, sample);
-    return hoverLines(dataset, view, await api.probe(dataset.id, at, view.step ?? 0, signal), axis);
+    const heights = view.geometry?.heightField ?? null;
+    const probe = await api.probe(dataset.id, sample, heights, view.step ?? 0, signal);
+    return hoverLines(dataset, view, probe, axis);
   }
 
   private show(lines: string[], [x, y]: [number, number]): void {

@@ -26,6 +26,7 @@ export interface Position {
   x: number;
   y: number;
   z: number;
+  units: { x: string; y: string; z: string };
 }
 
 export type Value = number | (number | null)[] | null; // null: masked
@@ -117,14 +118,21 @@ export class Api {
     return this.get<FieldRange>(path, (a) => a.range === null || isRange(a.range));
   }
 
-  async probe(id: string, at: Vec3, step: number, signal?: AbortSignal): Promise<Probe> {
-    const path = `${this.dataset(id)}/probe?${place(at)}&step=${step}`;
+  // of: indices of the sample. With heights its position has the height of the sample there.
+  async probe(
+    id: string,
+    of: Vec3,
+    heights: string | null,
+    step: number,
+    signal?: AbortSignal,
+  ): Promise<Probe> {
+    const path = `${this.dataset(id)}/probe?${place(of, heights)}&step=${step}`;
     return this.get<Probe>(path, (a) => isObject(a.position) && isObject(a.values), { signal });
   }
 
   // Reads every step, so it may take a long time.
-  async series(id: string, field: string, at: Vec3): Promise<Series> {
-    const path = `${this.field(id, field)}/series?${place(at)}`;
+  async series(id: string, field: string, of: Vec3, heights: string | null): Promise<Series> {
+    const path = `${this.field(id, field)}/series?${place(of, heights)}`;
     return this.get<Series>(path, (a) => areTimes(a.times) && Array.isArray(a.values));
   }
 
@@ -191,7 +199,9 @@ export class Api {
 const isJob = (a: Record<string, unknown>): boolean =>
   typeof a.id === "string" && typeof a.state === "string";
 
-const place = ([x, y, z]: Vec3): string => `x=${x}&y=${y}&z=${z}`;
+// Of the sample at these indices; heights: the field that places samples in the view.
+const place = (of: Vec3, heights: string | null): string =>
+  `index=${of.join(",")}${heights === null ? "" : `&heightField=${encodeURIComponent(heights)}`}`;
 
 // Message of a failed promise.
 export const failureText = (failure: unknown): string =>
