@@ -242,6 +242,10 @@ test("a globe is offered for longitudes, and heights replace the vertical axis",
     assert.ok(heights.length >= 2, `${heights}`);
     await control(page, "heights from").selectOption({ label: heights[1] });
     assert.match(await lastPatch(page, "geometry", "heightField"), /./);
+    const asked = page.waitForRequest(/\/probe\?index=\d+,\d+,\d+&heightField=\w+&step=0$/);
+    await page.locator("#probe-button").click();
+    await asked;
+    await page.locator("#probe-button").click();
     await page.locator("#dataset").selectOption("tornado");
     await page.waitForFunction(() => location.hash.includes("%22tornado%22"));
     await finalPicture(page);
