@@ -48,12 +48,13 @@ struct FileVariable {
   // A statistic that distinguishes the variable from others of the quantity: the components of a
   // vector have the same.
   std::string process;
-  std::string unread;        // why a variable cannot be read; `numeric` is then false
-  bool packed = false;       // has scale_factor or add_offset
-  bool is_unsigned = false;  // _Unsigned = "true" on a signed integer type
-  bool preferred = false;    // its grid is shown, whatever others the file has
-  bool layers_apart = true;  // some of its layers are read at the cost of their share of all
-  bool in_use = false;       // a coordinate that named an entry or gave the times: not omitted
+  std::string unread;         // why a variable cannot be read; `numeric` is then false
+  bool packed = false;        // has scale_factor or add_offset
+  bool is_unsigned = false;   // _Unsigned = "true" on a signed integer type
+  bool is_date_text = false;  // the file has the times as text
+  bool preferred = false;     // its grid is shown, whatever others the file has
+  bool layers_apart = true;   // some of its layers are read at the cost of their share of all
+  bool in_use = false;        // a coordinate that named an entry or gave the times: not omitted
   std::string level;  // the coordinate of the vertical dimension of which one entry was chosen
 };
 

@@ -35,7 +35,7 @@ void note_disorder(const std::string& name, const std::vector<double>& times, Da
   info.notes.push_back(std::move(note));
 }
 
-std::string missing_text(const std::vector<double>& times) {
+std::string missing_text(const FileVariable& variable, const std::vector<double>& times) {
   std::size_t first = times.size();
   std::size_t count = 0;
   for (std::size_t i = 0; i < times.size(); ++i) {
@@ -44,7 +44,11 @@ std::string missing_text(const std::vector<double>& times) {
     ++count;
   }
   const std::string steps = count > 1 ? std::to_string(count) + " steps, first at step " : "step ";
-  return "time is missing at " + steps + std::to_string(first) + ": steps are numbered";
+  const std::string what = variable.is_date_text
+                               ? "the text of " + in_quotes(variable.name) +
+                                     " is no date of the calendar " + variable.calendar + " at "
+                               : "time is missing at ";
+  return what + steps + std::to_string(first) + ": steps are numbered";
 }
 
 }  // namespace
@@ -87,7 +91,7 @@ Result<void> find_steps(const ArrayFile& file, int time, int coordinate, Dataset
   }
   if (time >= 0) {
     info.left_out.push_back({contents.dimensions.at(at(time)).name,
-                             !values.empty() ? missing_text(values)
+                             !values.empty() ? missing_text(variables.at(at(coordinate)), values)
                                              : "dimension without a coordinate variable: steps "
                                                "are numbered"});
   }

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <chrono>
 #include <limits>
 #include <optional>
 #include <vector>
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/array_file.hpp"
+#include "server/data/cf/time.hpp"
 
 namespace windsplat::data::netcdf {
 
@@ -64,7 +64,7 @@ std::optional<double> fraction_in(std::string_view text) {
 
 }  // namespace
 
-double seconds_of_date(std::string_view text) {
+double seconds_of_date(std::string_view text, cf::Calendar calendar) {
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
   constexpr std::string_view form = "dddd-dd-dd_dd:dd:dd";
   if (text.size() < form.size()) return none;
@@ -82,14 +82,20 @@ double seconds_of_date(std::string_view text) {
     parts[i] = *part;
   }
   const auto [year, month, day, hour, minute, second] = parts;
-  const std::chrono::year_month_day date{std::chrono::year(year),
-                                         std::chrono::month(static_cast<unsigned>(month)),
-                                         std::chrono::day(static_cast<unsigned>(day))};
-  if (!date.ok() || hour > 24 || minute > 59 || second > 60) return none;
+  const cf::Date date{year, month, day};
+  if (!cf::is_valid(date, calendar) || hour > 24 || minute > 59 || second > 60) return none;
   const auto fraction = fraction_in(text.substr(form.size()));
   if (!fraction) return none;
-  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
+  const auto days = cf::day_number(date, calendar) - cf::day_number(cf::Date{1970, 1, 1}, calendar);
   return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + second + *fraction;
+}
+
+std::string calendar_of_dates(std::string_view text) {
+  const std::string name = lower(trim(text));
+  if (name.empty() || name == "gregorian" || name == "standard") return "proleptic_gregorian";
+  if (name == "gregorian_noleap" || name == "no_leap") return "noleap";
+  if (name == "360day") return "360_day";
+  return cf::parse_calendar(name) ? name : std::string();
 }
 
 int text_of_dates(const FileContents& contents) {
@@ -108,15 +114,17 @@ int text_of_dates(const FileContents& contents) {
   return -1;
 }
 
-void use_dates(FileContents& contents, int text) {
+void use_dates(FileContents& contents, int text, const std::string& calendar) {
   FileVariable& dates = contents.variables[cf::at(text)];
   dates.type = "float64";
   dates.numeric = true;
   dates.dims.pop_back();
   dates.standard_name = "time";
   dates.units = date_units;
-  dates.calendar = "proleptic_gregorian";
-  contents.notes.push_back("times are read from the text of " + in_quotes(dates.name));
+  dates.calendar = calendar;
+  dates.is_date_text = true;
+  contents.notes.push_back("times are read from the text of " + in_quotes(dates.name) +
+                           (calendar == "proleptic_gregorian" ? "" : ", calendar " + calendar));
 }
 
 }  // namespace windsplat::data::netcdf

@@ -172,9 +172,11 @@ Result<void> File::read_dates(const Block& block, double* out) const {
     return nc_get_vara_text(group, id, place(start), place(count), text.data());
   });
   if (!done) return done;
+  const auto calendar = cf::parse_calendar(contents_.variables.at(cf::at(dates_)).calendar);
   for (std::size_t i = 0; i < count[0]; ++i) {
     const double masked = absent[i * width];
-    out[i] = masked + seconds_of_date(std::string_view(text).substr(i * width, width));
+    out[i] = masked + seconds_of_date(std::string_view(text).substr(i * width, width),
+                                      calendar.value_or(cf::Calendar::proleptic_gregorian));
   }
   return {};
 }

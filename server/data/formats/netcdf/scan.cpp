@@ -278,7 +278,19 @@ void File::find_dates() {
   if (found < 0) return;
   const Place place = place_of(found);
   if (nc_inq_vartype(place.group, place.id, &type) != NC_NOERR || type != NC_CHAR) return;
-  use_dates(contents_, found);
+  std::string named = contents_.variables[cf::at(found)].calendar;
+  const bool is_own = !named.empty();
+  if (!is_own) named = text({place.group, NC_GLOBAL}, "config_calendar_type");
+  if (!is_own && named.empty()) named = text({ncid_, NC_GLOBAL}, "config_calendar_type");
+  const std::string calendar = calendar_of_dates(named);
+  if (calendar.empty()) {
+    contents_.variables[cf::at(found)].unread =
+        std::string("the calendar of its dates, ") +
+        (is_own ? "its attribute 'calendar'" : "the attribute 'config_calendar_type'") + ' ' +
+        in_quotes(named) + ", is unknown: steps are numbered";
+    return;
+  }
+  use_dates(contents_, found, calendar);
   dates_ = found;
 }
 
