@@ -5,55 +5,27 @@
 #include <boost/polygon/voronoi.hpp>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
+#include <limits>
 #include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "server/data/cf/mesh/directions.hpp"
+
 namespace windsplat::data::cf {
 
 namespace {
 
-using Direction = std::array<double, 3>;
 using ChartPoint = boost::polygon::point_data<std::int32_t>;
 using Diagram = boost::polygon::voronoi_diagram<double>;
 
-constexpr double unit_degree = std::numbers::pi / 180;
 constexpr double chart_extent = 1 << 30;
 constexpr double same_position = 1e-8;  // radians: 6 cm on the Earth
 constexpr double merged_max = 1e-6;     // radians: 6 m; in a chart
 constexpr double fullness_min = 0.02;   // triangles of a lattice of 1 to 25
 constexpr double near_share = 1e-3;     // of the mean spacing
-
-Direction direction_of(double longitude, double latitude) {
-  const double from_axis = std::cos(latitude * unit_degree);
-  return {from_axis * std::cos(longitude * unit_degree),
-          from_axis * std::sin(longitude * unit_degree), std::sin(latitude * unit_degree)};
-}
-
-double dot(const Direction& a, const Direction& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-double distance(const Direction& a, const Direction& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-}
-
-Direction between(const Direction& a, const Direction& b) {
-  return {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-}
-
-Direction opposite(const Direction& a) { return {-a[0], -a[1], -a[2]}; }
-
-Direction unit(const Direction& a) {
-  const double length = std::sqrt(dot(a, a));
-  return {a[0] / length, a[1] / length, a[2] / length};
-}
-
-Direction cross(const Direction& a, const Direction& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+constexpr double pair_share = 0.05;     // of the way to the next position from either
 
 class Triangulator {
  public:
@@ -65,13 +37,16 @@ class Triangulator {
       if (auto done = find_polygons(); !done) return done.error();
     }
     if (given - out_.repeated < centers_min) return too_few(given - out_.repeated);
-    if (median_fullness() < fullness_min && merge_near()) {
+    for (const bool by_pairs : {false, true}) {
+      if (fullness_above(0.25) >= fullness_min) break;
+      if (!(by_pairs ? merge_pairs() : merge_near())) continue;
       if (used_.size() < centers_min) return too_few(used_.size());
       if (auto done = find_polygons(); !done) return done.error();
     }
     if (auto fine = leave_out_gaps(); !fine) return fine.error();
     Mesh& mesh = out_.mesh;
     mesh.on_sphere = true;
+    mesh.twins = std::move(twins_);
     // Positions that are missing are no corners.
     for (std::size_t i = 0; i < longitudes.size(); ++i) {
       if (std::isfinite(longitudes[i]) && std::isfinite(latitudes[i])) continue;
@@ -116,13 +91,16 @@ class Triangulator {
       places.emplace_back(place, i);
     }
     std::sort(places.begin(), places.end());
-    const auto end =
-        std::unique(places.begin(), places.end(),
-                    [](const auto& one, const auto& two) { return one.first == two.first; });
-    out_.repeated = static_cast<std::size_t>(places.end() - end);
-    repeated_ = out_.repeated;
     used_.clear();
-    for (auto at = places.begin(); at != end; ++at) used_.push_back(at->second);
+    for (std::size_t n = 0; n < places.size(); ++n) {
+      if (n > 0 && places[n].first == places[n - 1].first) {
+        twins_.push_back({used_.back(), places[n].second});
+      } else {
+        used_.push_back(places[n].second);
+      }
+    }
+    out_.repeated = twins_.size();
+    repeated_ = out_.repeated;
     std::sort(used_.begin(), used_.end());
   }
 
@@ -141,7 +119,8 @@ class Triangulator {
     return std::sqrt(all / static_cast<double>(used_.size()));
   }
 
-  // Sites that are listed twice with slightly different positions make slivers of all triangles.
+  // Sites that are listed twice with slightly different positions make slivers of half of the
+  // triangles.
   // Leaves the first of positions within near_share of the mean spacing of each other, and no
   // polygons; false if there are none such. A cube of that size holds a bounded number of those
   // left, so that each is compared with few.
@@ -159,27 +138,85 @@ class Triangulator {
       return (cube_of(d, 0, x) & mask) << (2 * bits) | (cube_of(d, 1, y) & mask) << bits |
              (cube_of(d, 2, z) & mask);
     };
-    const auto is_near = [&](std::uint32_t i) {
+    // The one left that a position is near to, or itself.
+    const auto nearest_left = [&](std::uint32_t i) {
       const Direction& own = directions_[i];
       for (int n = 0; n < 27; ++n) {
         const auto found = cubes.find(key_at(own, n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1));
         if (found == cubes.end()) continue;
         for (const std::uint32_t other : found->second) {
-          if (distance(directions_[other], own) <= apart) return true;
+          if (distance(directions_[other], own) <= apart) return other;
         }
       }
-      return false;
+      return i;
     };
     std::vector<std::uint32_t> left;
     for (const std::uint32_t i : used_) {
-      if (is_near(i)) continue;
+      if (const std::uint32_t other = nearest_left(i); other != i) {
+        twins_.push_back({other, i});
+        continue;
+      }
       cubes[key_at(directions_[i], 0, 0, 0)].push_back(i);
       left.push_back(i);
     }
+    return leave(std::move(left), apart);
+  }
+
+  // Sites that are listed twice, farther apart than that: positions whose nearest are each other,
+  // at less than pair_share of the way from either to any other. Neighbours along an edge of the
+  // polygons suffice, since the nearest position of each is one of them. Leaves the first of both.
+  bool merge_pairs() {
+    struct Near {
+      float distance = std::numeric_limits<float>::infinity();
+      float second = std::numeric_limits<float>::infinity();  // to another position
+      std::uint32_t position = 0;
+    };
+    const Mesh& mesh = out_.mesh;
+    std::vector<Near> near(directions_.size());
+    const auto take = [&](std::uint32_t from, std::uint32_t to, float length) {
+      Near& own = near[from];
+      if (to == own.position && length == own.distance) return;
+      if (length < own.distance) {
+        own.second = own.distance;
+        own.distance = length;
+        own.position = to;
+      } else {
+        own.second = std::min(own.second, length);
+      }
+    };
+    for (std::size_t c = 0; c < mesh.cells(); ++c) {
+      for (std::uint32_t i = mesh.first[c]; i < mesh.first[c + 1]; ++i) {
+        const std::uint32_t next = i + 1 < mesh.first[c + 1] ? i + 1 : mesh.first[c];
+        const float length = edge_length(c, i);
+        take(mesh.corners[i], mesh.corners[next], length);
+        take(mesh.corners[next], mesh.corners[i], length);
+      }
+    }
+    std::vector<std::uint32_t> left;
+    float widest = 0;
+    for (const std::uint32_t i : used_) {
+      const Near& own = near[i];
+      const Near& other = near[own.position];
+      const bool is_pair = std::isfinite(own.second) && std::isfinite(other.second) &&
+                           other.position == i &&
+                           static_cast<double>(own.distance) <=
+                               pair_share * static_cast<double>(std::min(own.second, other.second));
+      if (!is_pair || i < own.position) {
+        left.push_back(i);
+        continue;
+      }
+      twins_.push_back({own.position, i});
+      widest = std::max(widest, own.distance);
+    }
+    return leave(std::move(left), static_cast<double>(widest));
+  }
+
+  // Leaves these positions and no polygons; false if that are all.
+  bool leave(std::vector<std::uint32_t> left, double apart) {
     if (left.size() == used_.size()) return false;
     out_.mesh = Mesh();
-    out_.near = used_.size() - left.size();
-    out_.near_degrees = apart / unit_degree;
+    out_.near += used_.size() - left.size();
+    out_.near_degrees = std::max(out_.near_degrees, apart / unit_degree);
     out_.repeated = repeated_;
     used_ = std::move(left);
     return true;
@@ -254,6 +291,7 @@ class Triangulator {
         continue;
       }
       ++out_.repeated;
+      twins_.push_back({out.sources.back(), i});
       if (distance(directions_[i], directions_[out.sources.back()]) <= merged_max) continue;
       return make_error(ErrorKind::bad_data,
                         "entries " + std::to_string(out.sources.back() + 1) + " and " +
@@ -328,8 +366,8 @@ class Triangulator {
     return std::sqrt(dot(area, area));
   }
 
-  // The median over the polygons of their area in squares of their longest edge.
-  [[nodiscard]] double median_fullness() const {
+  // The area in squares of their longest edge that this share of the polygons is below.
+  [[nodiscard]] double fullness_above(double share) const {
     const Mesh& mesh = out_.mesh;
     std::vector<double> all;
     for (std::size_t c = 0; c < mesh.cells(); ++c) {
@@ -341,9 +379,9 @@ class Triangulator {
       all.push_back(area_of(c) / (side * side));
     }
     if (all.empty()) return 0;
-    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-    std::nth_element(all.begin(), middle, all.end());
-    return *middle;
+    const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(all.size()));
+    std::nth_element(all.begin(), all.begin() + rank, all.end());
+    return all[static_cast<std::size_t>(rank)];
   }
 
   // The median length of the edges at every position.
@@ -402,7 +440,7 @@ class Triangulator {
   }
 
   Result<void> leave_out_gaps() {
-    if (!(median_fullness() >= fullness_min)) {
+    if (!(fullness_above(0.5) >= fullness_min)) {
       return make_error(ErrorKind::bad_data,
                         "the positions of cells without outlines lie along lines, such as tracks: "
                         "there is nothing to draw between them");
@@ -420,10 +458,11 @@ class Triangulator {
   }
 
   Triangulation out_;
-  std::vector<Direction> directions_;  // unit vectors
-  std::vector<std::uint32_t> used_;    // given positions that differ
-  std::size_t repeated_ = 0;           // equal ones
-  bool closed_ = true;                 // the positions surround the globe
+  std::vector<Direction> directions_;                // unit vectors
+  std::vector<std::uint32_t> used_;                  // given positions that differ
+  std::vector<std::array<std::uint32_t, 2>> twins_;  // as Mesh::twins
+  std::size_t repeated_ = 0;                         // equal ones
+  bool closed_ = true;                               // the positions surround the globe
 };
 
 }  // namespace

@@ -29,11 +29,13 @@ struct Triangulation {
 // The Delaunay polygons of positions on the sphere, in degrees: those of a stereographic chart,
 // since it maps circles to circles. If the positions surround the globe it is projected from a gap
 // between them, and a second one from the opposite has the polygons around that gap. Four or more
-// corners lie on a circle. If most polygons are slivers, positions closer to each other than a
-// thousandth of the mean spacing are one, that of the first. Errors: bad_data for a value that is
-// no longitude or latitude, and if fewer than centers_min positions differ, if positions more than
-// 1e-6 radians apart fall together in a chart, if they lie along lines (half of the polygons have
-// less area than 0.02 squares of their longest edge) or if none are left.
+// corners lie on a circle. If a quarter of the polygons are slivers, positions closer to each other
+// than a thousandth of the mean spacing are one, that of the first; so are then pairs that are
+// closer to each other than a twentieth of the way to any other. The others are twins of the mesh.
+// Errors: bad_data for a value that is no longitude or latitude, and if fewer than centers_min
+// positions differ, if positions more than 1e-6 radians apart fall together in a chart, if they lie
+// along lines (half of the polygons have less area than 0.02 squares of their longest edge) or if
+// none are left.
 Result<Triangulation> triangulate(std::vector<double> longitudes, std::vector<double> latitudes);
 
 }  // namespace windsplat::data::cf

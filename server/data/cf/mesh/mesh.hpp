@@ -19,6 +19,9 @@ struct Mesh {
   std::vector<double> y;
   std::vector<std::uint32_t> corners;  // nodes of each cell, cell after cell
   std::vector<std::uint32_t> first;    // of each cell in `corners`, and the end of the last
+  // Nodes that are one place: the one that is a corner, and one that is none, whose value stands in
+  // where that of the corner is missing. Applied in this order.
+  std::vector<std::array<std::uint32_t, 2>> twins;
 
   [[nodiscard]] std::size_t cells() const { return first.empty() ? 0 : first.size() - 1; }
   [[nodiscard]] std::size_t nodes() const { return x.size(); }

@@ -327,9 +327,11 @@ class MeshReader {
         "a Delaunay triangulation finds" +
         add(found->gaps, " of its polygons are gaps, with an edge of more than " +
                              number_text(gap_edges) + " times those around, and masked") +
-        add(found->repeated, " positions are those of others, whose values are drawn") +
+        add(found->repeated,
+            " positions are those of others, whose values are drawn where they "
+            "have any") +
         add(found->near, " positions are within " + two_digits(found->near_degrees) +
-                             " degrees of others, whose values are drawn") +
+                             " degrees of others, whose values are drawn where they have any") +
         add(found->missing, " positions are missing"));
     return std::move(found->mesh);
   }

@@ -204,8 +204,18 @@ void MeshWeights::complete_cells(const float* values) {
   }
 }
 
+const float* MeshWeights::with_twins(const float* values) {
+  if (location_ == MeshLocation::face || mesh_.twins.empty()) return values;
+  filled_.assign(values, values + mesh_.nodes());
+  for (const auto& [corner, other] : mesh_.twins) {
+    if (std::isnan(filled_[corner])) filled_[corner] = filled_[other];
+  }
+  return filled_.data();
+}
+
 void MeshWeights::gather(const float* values, float* out) {
   const bool at_cells = location_ == MeshLocation::face;
+  values = with_twins(values);
   if (at_cells) {
     complete_nodes(values);
   } else {

@@ -30,8 +30,9 @@ struct SamplePlace {
 //    89-1932). Weights that would be negative, because the node does not lie amid the centroids
 //    (at the rim of the mesh), are 0; if the others' mean is below a quarter, all are equal.
 // Errors are of second order in the cell size, at the rim for values at cells of first order.
-// Missing values: a cell without a value is masked, as is one with a node without a value; missing
-// cells do not count for the nodes beside them.
+// Missing values: a node without a value has that of its twin (Mesh::twins); a cell without a value
+// is masked, as is one with a node without a value; missing cells do not count for the nodes beside
+// them.
 class MeshWeights {
  public:
   // cells: of each sample, from find_cells().
@@ -46,6 +47,7 @@ class MeshWeights {
  private:
   void place_samples(const MeshLattice& lattice, const std::vector<std::uint32_t>& cells);
   void weigh_cells();
+  const float* with_twins(const float* values);
   void complete_nodes(const float* values);
   void complete_cells(const float* values);
 
@@ -57,6 +59,7 @@ class MeshWeights {
   std::vector<std::uint32_t> around_;
   std::vector<float> weights_;
   std::vector<float> completed_;  // values at nodes of values at cells, and the reverse
+  std::vector<float> filled_;     // values at nodes, with those of twins
 };
 
 }  // namespace windsplat::data::cf
