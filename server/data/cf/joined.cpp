@@ -15,6 +15,7 @@
 #include "server/data/cf/grid/curvilinear.hpp"
 #include "server/data/cf/selected/selected_file.hpp"
 #include "server/data/cf/series.hpp"
+#include "server/data/cf/staggered/column_offsets.hpp"
 #include "server/data/cf/time.hpp"
 #include "server/data/model/digest.hpp"
 
@@ -22,12 +23,10 @@ namespace windsplat::data::cf {
 
 namespace {
 
-// Degrees of the columns of a part: longitudes and latitudes of rows of `width` columns.
+// The columns of a part.
 struct GridOfPart {
   std::array<int, 2> dimensions{-1, -1};  // of rows and of columns, in the part
-  std::vector<double> longitude;
-  std::vector<double> latitude;
-  std::size_t width = 0;
+  ColumnPlaces places;
 };
 
 // The 2-D positions of a file; empty unless it has exactly one pair of them.
@@ -42,50 +41,14 @@ Result<std::optional<GridOfPart>> positions_in(const ArrayFile& file) {
     const int latitude = position_on(contents, dims[0], dims[1], false);
     if (longitude < 0 || latitude < 0) continue;
     if (found) return std::optional<GridOfPart>();
-    found = GridOfPart{dims, {}, {}, contents.dimensions.at(at(dims[1])).length};
-    for (const int v : {longitude, latitude}) {
-      auto values = unpacked_degrees(file, v);
-      if (!values) return values.error();
-      (v == longitude ? found->longitude : found->latitude) = std::move(*values);
+    if (contents.variables[at(longitude)].dims != contents.variables[at(latitude)].dims) {
+      return std::optional<GridOfPart>();
     }
+    auto places = column_places(file, longitude, latitude);
+    if (!places) return places.error();
+    found = GridOfPart{dims, std::move(*places)};
   }
   return found;
-}
-
-// How far the positions `b` lie from `a`, in cells along rows and columns: the mean over the
-// samples with neighbours, from the nearest combination of the steps to both.
-std::optional<std::array<double, 2>> offset_between(const GridOfPart& a, const GridOfPart& b) {
-  const std::size_t width = a.width;
-  const std::size_t height = a.longitude.size() / std::max<std::size_t>(width, 1);
-  if (b.width != width || b.longitude.size() != a.longitude.size() || width < 2 || height < 2) {
-    return std::nullopt;
-  }
-  std::array<double, 2> sum{0, 0};
-  std::size_t count = 0;
-  for (std::size_t j = 0; j + 1 < height; ++j) {
-    for (std::size_t i = 0; i + 1 < width; ++i) {
-      const std::size_t n = j * width + i;
-      const double shrink = std::cos(a.latitude[n] * 0.017453292519943295);
-      const auto step = [&](const GridOfPart& to, std::size_t m) {
-        return std::array<double, 2>{
-            std::remainder(to.longitude[m] - a.longitude[n], 360.0) * shrink,
-            to.latitude[m] - a.latitude[n]};
-      };
-      const auto along_rows = step(a, n + width);
-      const auto along_columns = step(a, n + 1);
-      const auto way = step(b, n);
-      const double area = along_rows[0] * along_columns[1] - along_rows[1] * along_columns[0];
-      const double rows = (way[0] * along_columns[1] - way[1] * along_columns[0]) / area;
-      const double columns = (along_rows[0] * way[1] - along_rows[1] * way[0]) / area;
-      if (!std::isfinite(rows) || !std::isfinite(columns)) continue;
-      sum[0] += rows;
-      sum[1] += columns;
-      ++count;
-    }
-  }
-  if (count == 0) return std::nullopt;
-  return std::array<double, 2>{sum[0] / static_cast<double>(count),
-                               sum[1] / static_cast<double>(count)};
 }
 
 Error cannot_join(const ArrayFile& part, const ArrayFile& first, const std::string& what) {
@@ -270,19 +233,19 @@ Result<void> JoinedFile::place_faces(const ArrayFile& part, std::vector<int>& di
   const std::array<int, 2> common{dimensions.at(at((*others)->dimensions[0])),
                                   dimensions.at(at((*others)->dimensions[1]))};
   if (common != (*own)->dimensions) return {};
-  const auto offset = offset_between(**own, **others);
+  const auto offset = offset_in_cells((*own)->places, (*others)->places);
   if (!offset) return {};
-  constexpr double tolerance = 0.1;  // cells; grids are stretched and curved
   for (std::size_t a = 0; a < 2; ++a) {
     const double cells = offset->at(a);
-    if (std::abs(cells) <= tolerance) continue;
-    if (std::abs(std::abs(cells) - 0.5) > tolerance) {
+    if (std::abs(cells) <= offset_tolerance) continue;
+    const auto first = first_face_at(cells);
+    if (!first) {
       return cannot_join(part, *parts_.front(), "its longitudes and latitudes are others");
     }
     FileDimension faces = contents_.dimensions.at(at(common.at(a)));
     faces.name += "_faces";
     faces.centers = common.at(a);
-    faces.first_face = cells > 0 ? -1 : 0;
+    faces.first_face = static_cast<int>(*first);
     dimensions.at(at((*others)->dimensions.at(a))) = add_dimension(contents_, std::move(faces));
   }
   return {};

@@ -11,6 +11,7 @@
 
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/packing.hpp"
+#include "server/data/cf/staggered/column_offsets.hpp"
 #include "server/data/cf/staggered/models.hpp"
 #include "server/data/cf/staggered/shared_levels.hpp"
 #include "server/data/cf/staggered/staggering.hpp"
@@ -89,25 +90,27 @@ class CollocatedFile final : public ArrayFile {
  public:
   // staggers: by dimension.
   CollocatedFile(std::unique_ptr<ArrayFile> base, const std::vector<Stagger>& staggers,
-                 const SharedLevels& levels)
+                 const SharedLevels& levels, const ColumnOffsets& columns)
       : base_(std::move(base)), contents_(base_->contents()) {
     const std::vector<DimensionRole> roles = classify_dimensions(contents_);
     std::string names;
     std::string by_height;
     std::string masked;
     for (FileVariable& variable : contents_.variables) {
-      const std::string& unread = levels.unread.at(ways_.size());
+      const std::string& beside = columns.unread.at(ways_.size());
+      const std::string& unread = beside.empty() ? levels.unread.at(ways_.size()) : beside;
       if (!unread.empty()) {
         variable.unread = unread;
         variable.numeric = false;
         variable.coordinates.clear();
       }
-      ways_.push_back(way_of(variable, staggers, levels.staggers.at(ways_.size())));
+      ways_.push_back(way_of(variable, staggers, levels.staggers.at(ways_.size()),
+                             columns.staggers.at(ways_.size())));
       ways_.back().first_step = is_position_of_each_step(contents_, roles, variable);
       const Way& way = ways_.back();
       if (!way.is_changed()) continue;
       if (!way.first_step) {
-        append(names, variable.name);
+        if (way.is_averaged()) append(names, variable.name);
         if (way.is_weighted()) append(by_height, variable.name);
         if (way.has_masked_end()) append(masked, variable.name);
         for (std::size_t d = 0; d < variable.dims.size(); ++d) {
@@ -199,6 +202,11 @@ class CollocatedFile final : public ArrayFile {
     bool walls = false;             // a masked neighbor counts as 0
     std::vector<Stagger> staggers;  // one per dimension; empty if none is staggered
     [[nodiscard]] bool is_changed() const { return first_step || !staggers.empty(); }
+    // Not only its dimensions have other names.
+    [[nodiscard]] bool is_averaged() const {
+      return std::any_of(staggers.begin(), staggers.end(),
+                         [](const Stagger& one) { return one.centers >= 0 && !one.aligned; });
+    }
     [[nodiscard]] bool is_weighted() const {
       return std::any_of(staggers.begin(), staggers.end(),
                          [](const Stagger& one) { return !one.upper.empty(); });
@@ -216,16 +224,19 @@ class CollocatedFile final : public ArrayFile {
   }
 
   static Way way_of(const FileVariable& variable, const std::vector<Stagger>& staggers,
-                    const Stagger& levels) {
+                    const Stagger& levels, const std::vector<Stagger>& columns) {
     Way way;
     const std::vector<int>& dims = variable.dims;
     if (!variable.numeric || dims.size() < 2 || is_position(variable)) return way;
     const bool staggered = std::any_of(dims.begin(), dims.end(), [&](int dimension) {
       return staggers.at(at(dimension)).centers >= 0;
     });
-    if (!staggered && levels.centers < 0) return way;
-    for (const int dimension : dims) {
-      way.staggers.push_back(dimension == levels.centers ? levels : staggers.at(at(dimension)));
+    if (!staggered && levels.centers < 0 && columns.empty()) return way;
+    for (std::size_t d = 0; d < dims.size(); ++d) {
+      const bool is_beside = !columns.empty() && columns[d].centers >= 0;
+      way.staggers.push_back(is_beside                   ? columns[d]
+                             : dims[d] == levels.centers ? levels
+                                                         : staggers.at(at(dims[d])));
     }
     way.walls = is_speed(variable.units);
     return way;
@@ -323,15 +334,20 @@ Result<std::unique_ptr<ArrayFile>> collocated(std::unique_ptr<ArrayFile> file) {
   if (!staggers) return staggers.error();
   const auto levels = find_shared_levels(*file);
   if (!levels) return levels.error();
+  const auto columns = find_column_offsets(*file);
+  if (!columns) return columns.error();
   const auto is_staggered = [](const Stagger& one) { return one.centers >= 0; };
+  const auto is_told = [](const std::string& reason) { return !reason.empty(); };
   const bool staggered =
       std::any_of(staggers->begin(), staggers->end(), is_staggered) ||
       std::any_of(levels->staggers.begin(), levels->staggers.end(), is_staggered) ||
-      std::any_of(levels->unread.begin(), levels->unread.end(),
-                  [](const std::string& reason) { return !reason.empty(); });
+      std::any_of(levels->unread.begin(), levels->unread.end(), is_told) ||
+      std::any_of(columns->unread.begin(), columns->unread.end(), is_told) ||
+      std::any_of(columns->staggers.begin(), columns->staggers.end(),
+                  [](const std::vector<Stagger>& one) { return !one.empty(); });
   if (!staggered && !has_positions_of_each_step(file->contents())) return file;
   return std::unique_ptr<ArrayFile>(
-      std::make_unique<CollocatedFile>(std::move(file), *staggers, *levels));
+      std::make_unique<CollocatedFile>(std::move(file), *staggers, *levels, *columns));
 }
 
 }  // namespace windsplat::data::cf

@@ -13,7 +13,9 @@
 #include "server/data/cf/coordinates.hpp"
 #include "server/data/cf/fields/fields.hpp"
 #include "server/data/cf/grid/axes.hpp"
+#include "server/data/cf/grid/cell_lists.hpp"
 #include "server/data/cf/grid/longitudes.hpp"
+#include "server/data/cf/staggered/column_offsets.hpp"
 #include "server/data/cf/staggered/interleaved.hpp"
 #include "server/data/cf/units.hpp"
 
@@ -43,6 +45,49 @@ bool is_counted(const std::vector<double>& values) {
   return true;
 }
 
+// Of as many faces as centers, where a center lies among the faces by the 2-D positions of both.
+Result<std::optional<Stagger>> by_columns(const ArrayFile& file, int faces, int centers) {
+  const FileContents& contents = file.contents();
+  std::optional<Stagger> out;
+  if (faces < 0 || centers < 0 ||
+      contents.dimensions[at(faces)].length != contents.dimensions[at(centers)].length) {
+    return out;
+  }
+  std::array<std::array<int, 2>, 2> found{};  // longitude and latitude on each
+  std::size_t side = 0;                       // of `faces` among the dimensions of its positions
+  for (std::size_t n = 0; n < 2; ++n) {
+    found.at(n) = {-1, -1};
+    for (std::size_t v = 0; v < contents.variables.size(); ++v) {
+      const FileVariable& one = contents.variables[v];
+      const auto on = std::find(one.dims.begin(), one.dims.end(), n == 0 ? faces : centers);
+      const int is = side_of(one);
+      if (!one.numeric || one.dims.size() != 2 || on == one.dims.end() || is == 0) continue;
+      const auto own = static_cast<std::size_t>(on - one.dims.begin());
+      int& place = found.at(n).at(is < 0 ? 0 : 1);
+      if (place >= 0 || (n == 1 && own != side)) continue;
+      place = static_cast<int>(v);
+      side = own;
+    }
+    const auto [longitude, latitude] = found.at(n);
+    if (longitude < 0 || latitude < 0 ||
+        contents.variables[at(longitude)].dims != contents.variables[at(latitude)].dims) {
+      return out;
+    }
+  }
+  const auto to = column_places(file, found[0][0], found[0][1]);
+  if (!to) return to.error();
+  const auto from = column_places(file, found[1][0], found[1][1]);
+  if (!from) return from.error();
+  const auto offset = offset_in_cells(*from, *to);
+  if (!offset) return out;
+  if (std::abs(offset->at(side)) <= offset_tolerance) {
+    out = Stagger{centers, true, 0};
+  } else if (const auto first = first_face_at(offset->at(side))) {
+    out = Stagger{centers, false, *first};
+  }
+  return out;
+}
+
 class StaggerFinder {
  public:
   explicit StaggerFinder(const ArrayFile& file)
@@ -53,7 +98,7 @@ class StaggerFinder {
     by_sgrid();
     by_suffix("_stag");
     by_suffix("P1");
-    by_roms_names();
+    if (auto done = by_roms_names(); !done) return done.error();
     by_generalized_heights();
     by_counted_levels();
     if (auto done = by_palm_levels(); !done) return done.error();
@@ -77,12 +122,12 @@ class StaggerFinder {
     found_[at(faces)] = {centers, aligned, first};
   }
 
-  // Where a center lies among faces, if only the lengths of both dimensions are known.
+  // Where a center lies among faces, if only the lengths of both dimensions are known: of as many
+  // either may be the first, in a part cut out of a file.
   void add_between(int faces, int centers) {
     if (faces < 0 || centers < 0) return;
     if (length(faces) == length(centers) + 1) add(faces, centers, false, 0);
     if (length(faces) + 1 == length(centers)) add(faces, centers, false, -1);
-    if (length(faces) == length(centers)) add(faces, centers, true, 0);
   }
 
   void by_reader() {
@@ -156,14 +201,22 @@ class StaggerFinder {
     }
   }
 
-  void by_roms_names() {
+  // Rows of u (eta_u) and columns of v (xi_v) are those of the centers.
+  Result<void> by_roms_names() {
     for (const std::string axis : {"xi", "eta"}) {
       const int centers = dimension_named(contents_, axis + "_rho");
+      const std::string own = axis == "xi" ? "_v" : "_u";
+      add(dimension_named(contents_, axis + own), centers, true, 0);
       for (const char* points : {"_u", "_v", "_psi"}) {
-        add_between(dimension_named(contents_, axis + points), centers);
+        const int faces = dimension_named(contents_, axis + points);
+        add_between(faces, centers);
+        const auto placed = by_columns(file_, faces, centers);
+        if (!placed) return placed.error();
+        if (*placed) add(faces, centers, (*placed)->aligned, (*placed)->first);
       }
     }
     add_between(dimension_named(contents_, "s_w"), dimension_named(contents_, "s_rho"));
+    return {};
   }
 
   // ICON: full levels 1 to n, and half levels 1 to n + 1, which surround them.
