@@ -1,8 +1,10 @@
 #include "server/data/formats/dap/das.hpp"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "server/base/ascii.hpp"
@@ -68,7 +70,10 @@ class DasParser {
 
   Result<void> values(const Word& type, Attribute& out) {
     out = {};
-    out.is_text = type.is_name("string") || type.is_name("url");
+    constexpr auto numbers = std::to_array<std::string_view>(
+        {"byte", "int16", "uint16", "int32", "uint32", "float32", "float64"});
+    // Also of types of other services, such as OtherXML of Hyrax.
+    out.is_text = !is_one_of(lower(type.text), numbers);
     out.is_floating = type.is_name("float32") || type.is_name("float64");
     do {
       const Word value = words_.take();

@@ -7,7 +7,10 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "server/base/ascii.hpp"
 #include "server/data/files/input_file.hpp"
@@ -21,6 +24,8 @@ namespace {
 constexpr std::size_t description_max = std::size_t{4} << 20;
 constexpr std::size_t header_max = std::size_t{64} << 10;  // DDS before the values of a variable
 constexpr std::size_t window_bytes = std::size_t{64} << 10;
+// Larger blocks are asked for in parts: THREDDS refuses answers of more than 500 MB by default.
+constexpr std::size_t answer_bytes = std::size_t{64} << 20;
 
 // Bytes of a number in an array: XDR has no types of one or two bytes, except arrays of bytes.
 std::size_t stored_bytes_of(Type type) {
@@ -87,7 +92,53 @@ Result<std::string> text_of_file(Files& files, const std::string& name) {
     return (*file)->fault("is answered with an error of the service: " +
                           printable(text->substr(begin), 300));
   }
+  if (std::string_view(*text).substr(begin).starts_with('<')) {
+    return (*file)->fault(
+        "is answered with a page (HTML or XML), not with a description: the service may need a "
+        "login, or is none of OPeNDAP");
+  }
   return text;
+}
+
+// Values of these attributes are compared with stored values.
+constexpr auto stored_attributes = std::to_array<std::string_view>(
+    {"_FillValue", "missing_value", "valid_min", "valid_max", "valid_range"});
+
+// Whether bytes are signed, which DAP 2 lacks: THREDDS says so by _Unsigned (netcdf-c 1317), older
+// ones only by a negative value of an attribute.
+bool is_signed_byte(const Array& array, const std::map<std::string, Attributes>& attributes) {
+  const auto all = attributes.find(array.name);
+  if (array.type != Type::uint8 || all == attributes.end()) return false;
+  const auto mark = all->second.find("_Unsigned");
+  if (mark != all->second.end()) return lower(trim(mark->second.text)) == "false";
+  return std::any_of(stored_attributes.begin(), stored_attributes.end(), [&](auto name) {
+    const auto found = all->second.find(std::string(name));
+    return found != all->second.end() &&
+           std::any_of(found->second.numbers.begin(), found->second.numbers.end(),
+                       [](double number) { return number < 0; });
+  });
+}
+
+// A number in the range of the type: services describe netCDF's int16 with _Unsigned as UInt16, but
+// leave its _FillValue -1 (netcdf-c 1614), and signed bytes as Byte.
+double as_stored(Type type, bool is_signed, double number) {
+  const double range = type == Type::uint8    ? 256.0
+                       : type == Type::uint16 ? 65536.0
+                       : type == Type::uint32 ? 4294967296.0
+                                              : 0.0;
+  if (is_signed) return number > 127 && number < range ? number - range : number;
+  return number < 0 && number >= -range / 2 ? number + range : number;
+}
+
+// The slowest dimension of several entries of a block of more than answer_bytes; otherwise their
+// number.
+std::size_t dimension_to_cut(const Array& array, const std::vector<std::size_t>& count) {
+  std::size_t bytes = stored_bytes_of(array.type);
+  for (const std::size_t one : count) bytes *= one;
+  if (bytes <= answer_bytes) return count.size();
+  std::size_t d = 0;
+  while (d < count.size() && count[d] < 2) ++d;
+  return d;
 }
 
 class ServedFile final : public cf::ArrayFile {
@@ -114,8 +165,14 @@ class ServedFile final : public cf::ArrayFile {
   [[nodiscard]] std::string identity() const override { return identity_; }
 
   [[nodiscard]] cf::Numbers numbers(int variable, const char* attribute) const override {
-    const Attribute* const found = find(arrays_[cf::at(variable)].name, attribute);
-    return found == nullptr ? cf::Numbers() : cf::Numbers{found->numbers, found->is_floating};
+    const Array& array = arrays_[cf::at(variable)];
+    const Attribute* const found = find(array.name, attribute);
+    if (found == nullptr) return {};
+    cf::Numbers out{found->numbers, found->is_floating};
+    if (!is_one_of(std::string(attribute), stored_attributes)) return out;
+    const bool is_signed = is_signed_byte(array, attributes_);
+    for (double& number : out.values) number = as_stored(array.type, is_signed, number);
+    return out;
   }
   [[nodiscard]] std::string text_of(int variable, const char* attribute) const override {
     return text(arrays_[cf::at(variable)].name, attribute);
@@ -154,6 +211,7 @@ class ServedFile final : public cf::ArrayFile {
 
   void fill(Dds dds) {
     contents_.title = text("NC_GLOBAL", "title");
+    if (contents_.title.empty()) contents_.title = text("HDF5_GLOBAL", "title");
     std::map<std::string, int> known;
     arrays_ = std::move(dds.arrays);
     for (const Array& array : arrays_) {
@@ -180,7 +238,7 @@ class ServedFile final : public cf::ArrayFile {
   void describe(const Array& array, FileVariable& out) const {
     const auto value = [&](const char* name) { return text(array.name, name); };
     out.name = array.name;
-    out.type = name_of(array.type);
+    out.type = is_signed_byte(array, attributes_) ? "int8" : name_of(array.type);
     out.numeric = array.type != Type::text;
     out.standard_name = value("standard_name");
     out.long_name = value("long_name");
@@ -204,6 +262,9 @@ class ServedFile final : public cf::ArrayFile {
   Result<void> read_any(int variable, const std::vector<std::size_t>& start,
                         const std::vector<std::size_t>& count, Out* out) const {
     const Array& array = arrays_[cf::at(variable)];
+    if (const std::size_t d = dimension_to_cut(array, count); d < count.size()) {
+      return read_parts(variable, start, count, d, out);
+    }
     std::string constraint = array.path;
     std::size_t values = 1;
     for (std::size_t d = 0; d < array.dims.size(); ++d) {
@@ -217,6 +278,21 @@ class ServedFile final : public cf::ArrayFile {
     const auto begin = values_begin(**file, array, count);
     if (!begin) return begin.error();
     return copy(**file, array, *begin, values, out);
+  }
+
+  // Reads both halves along dimension d. Those before have one entry, so that the first half comes
+  // first.
+  template <class Out>
+  Result<void> read_parts(int variable, std::vector<std::size_t> start,
+                          std::vector<std::size_t> count, std::size_t d, Out* out) const {
+    const std::size_t all = count[d];
+    count[d] = all / 2;
+    if (auto done = read_any(variable, start, count, out); !done) return done;
+    std::size_t values = 1;
+    for (const std::size_t one : count) values *= one;
+    start[d] += count[d];
+    count[d] = all - count[d];
+    return read_any(variable, start, count, out + values);
   }
 
   // The offset of the values behind the description of what was sent, which must be what was asked
@@ -262,8 +338,7 @@ class ServedFile final : public cf::ArrayFile {
                     Out* out) const {
     const bool is_single_byte = array.type == Type::uint8 && array.dims.empty();
     const std::size_t each = is_single_byte ? 4 : stored_bytes_of(array.type);
-    const bool is_signed =
-        array.type == Type::uint8 && lower(text(array.name, "_Unsigned")) == "false";
+    const bool is_signed = is_signed_byte(array, attributes_);
     std::vector<unsigned char> window(window_bytes);
     for (std::size_t done = 0; done < values;) {
       const std::size_t some = std::min(values - done, window_bytes / each);

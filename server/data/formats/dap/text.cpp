@@ -12,6 +12,29 @@ namespace {
 constexpr std::string_view marks = "{}[];,=:";
 constexpr std::string_view spaces = " \t\r\n";
 
+int digit_of(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  const char small = static_cast<char>(c | 0x20);
+  return small >= 'a' && small <= 'f' ? small - 'a' + 10 : -1;
+}
+
+// A name without its escapes (%20): DAP 2.0, 5.1. Those of control characters stay.
+std::string unescaped(std::string_view name) {
+  std::string out;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const int high = name[i] == '%' && i + 2 < name.size() ? digit_of(name[i + 1]) : -1;
+    const int low = high < 0 ? -1 : digit_of(name[i + 2]);
+    const int code = low < 0 ? 0 : high * 16 + low;
+    if (code < ' ' || code == 0x7f) {
+      out += name[i];
+      continue;
+    }
+    out += static_cast<char>(code);
+    i += 2;
+  }
+  return out;
+}
+
 }  // namespace
 
 bool Word::is_name(std::string_view name) const {
@@ -74,7 +97,8 @@ void Words::next() {
     const std::size_t end = rest_.find_first_of("{}[];,=\" \t\r\n");
     size = end == std::string_view::npos ? rest_.size() : end;
   }
-  word_.text = rest_.substr(0, size);
+  word_.text = word_.kind == Word::Kind::name ? unescaped(rest_.substr(0, size))
+                                              : std::string(rest_.substr(0, size));
   rest_.remove_prefix(size);
 }
 

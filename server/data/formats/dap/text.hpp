@@ -12,7 +12,7 @@ inline constexpr int depth_max = 8;
 struct Word {
   enum class Kind { none, name, quoted, mark };  // none: the text has ended
   Kind kind = Kind::none;
-  std::string text;  // of a quoted word without quotes and escapes; a mark is one of {}[];,=:
+  std::string text;  // without quotes and escapes; a mark is one of {}[];,=:
 
   [[nodiscard]] bool is(char mark) const {
     return kind == Kind::mark && text.size() == 1 && text[0] == mark;

@@ -257,5 +257,83 @@ TEST_F(Dap, BytesAreSignedOnlyIfTheServiceSaysSo) {
   EXPECT_THAT(out, ElementsAre(1, -1, -128));
 }
 
+// netcdf-c issue 1614: THREDDS serves int16 with _Unsigned as UInt16, but its _FillValue as Int16.
+TEST_F(Dap, FillValuesOfUnsignedVariablesAreTheValuesThatAreStored) {
+  answers_["air.nc.dds"] = "Dataset { UInt16 a[n = 3]; UInt32 b[n = 3]; Int16 c[n = 3]; } air.nc;";
+  answers_["air.nc.das"] =
+      "Attributes { a { Int16 _FillValue -1; Int16 valid_range 0, -6; Int16 add_offset -3; String "
+      "_Unsigned \"true\"; } b { Int32 missing_value -2; } c { Int16 _FillValue -1; } }";
+  const auto file = open(files());
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_THAT((*file)->numbers(0, "_FillValue").values, ElementsAre(65535));
+  EXPECT_THAT((*file)->numbers(0, "valid_range").values, ElementsAre(0, 65530));
+  EXPECT_THAT((*file)->numbers(0, "add_offset").values, ElementsAre(-3));
+  EXPECT_THAT((*file)->numbers(1, "missing_value").values, ElementsAre(4294967294.0));
+  EXPECT_THAT((*file)->numbers(2, "_FillValue").values, ElementsAre(-1));
+}
+
+// netcdf-c pull request 1317, tds issue 277: bytes of netCDF are signed; older services of THREDDS
+// leave out _Unsigned, others write the fill value as an unsigned byte.
+TEST_F(Dap, SignedBytesHaveTheirFillValue) {
+  answers_["air.nc.dds"] = "Dataset { Byte b[n = 3]; } air.nc;";
+  answers_["air.nc.dods?b[0:1:2]"] = "Dataset { Byte b[n = 3]; } air.nc;\nData:\n" + big(3U) +
+                                     big(3U) + std::string("\x01\xFF\x80\0", 4);
+  for (const char* attributes :
+       {"Int16 _FillValue -128;", "Byte _FillValue 128; String _Unsigned \"false\";"}) {
+    answers_["air.nc.das"] = std::string("Attributes { b { ") + attributes + " } }";
+    const auto file = open(files());
+    ASSERT_TRUE(file) << file.error().message;
+    std::vector<double> out(3);
+    ASSERT_TRUE((*file)->read(0, {0}, {3}, out.data()));
+    EXPECT_THAT(out, ElementsAre(1, -1, -128)) << attributes;
+    EXPECT_THAT((*file)->numbers(0, "_FillValue").values, ElementsAre(-128)) << attributes;
+    EXPECT_EQ((*file)->contents().variables[0].type, "int8");
+  }
+}
+
+TEST_F(Dap, NamesAreShownWithoutEscapesAndAskedForOnceEscaped) {
+  answers_["air.nc.dds"] = "Dataset { Float32 air%20t%5B2%5D[n%2em = 2]; } air%2enc;";
+  answers_["air.nc.das"] = "Attributes { air%20t%5B2%5D { String units \"K\"; } }";
+  const auto served = files();
+  const auto file = open(served);
+  ASSERT_TRUE(file) << file.error().message;
+  const FileContents& contents = (*file)->contents();
+  ASSERT_EQ(contents.variables.size(), 1U);
+  EXPECT_EQ(contents.variables[0].name, "air t[2]");
+  EXPECT_EQ(contents.variables[0].units, "K");
+  EXPECT_EQ(contents.dimensions[0].name, "n.m");
+  std::vector<double> out(2);
+  EXPECT_FALSE((*file)->read(0, {0}, {2}, out.data()));
+  EXPECT_EQ(served->asked.back(), "air.nc.dods?air t[2][0:1:1]");  // Files escape it
+}
+
+TEST_F(Dap, PagesInPlaceOfDescriptionsAreToldApart) {
+  for (const char* page : {"<!DOCTYPE html>\n<html>Log in</html>", "\n<?xml version=\"1.0\"?>"}) {
+    answers_["air.nc.dds"] = page;
+    EXPECT_THAT(refusal(), HasSubstr("may need a login"));
+  }
+}
+
+TEST_F(Dap, AttributesOfTypesOfHyraxAreText) {
+  answers_["air.nc.das"] =
+      "Attributes { t { OtherXML note \"<a>1</a>\"; String units \"K\"; } HDF5_GLOBAL { String "
+      "title \"Air of HDF5\"; } }";
+  const auto file = open(files());
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ((*file)->contents().title, "Air of HDF5");
+  EXPECT_EQ((*file)->contents().variables[2].units, "K");
+}
+
+TEST_F(Dap, LargeBlocksAreAskedForInParts) {
+  answers_["air.nc.dds"] = "Dataset { Float64 u[t = 1][z = 3][y = 2000][x = 2000]; } air.nc;";
+  answers_["air.nc.das"] = "Attributes { }";
+  const auto served = files();
+  const auto file = open(served);
+  ASSERT_TRUE(file) << file.error().message;
+  std::vector<double> out;
+  EXPECT_FALSE((*file)->read(0, {0, 0, 0, 0}, {1, 3, 2000, 2000}, out.data()));
+  EXPECT_EQ(served->asked.back(), "air.nc.dods?u[0:1:0][0:1:0][0:1:1999][0:1:1999]");
+}
+
 }  // namespace
 }  // namespace windsplat::data::dap
