@@ -298,7 +298,7 @@ class FieldFinder {
       if (z >= 0 && !joins(v, z, true)) z = -1;
       if (z < 0) {  // the vertical component often lacks standard_name
         const std::string short_name = lower(variable(v).name);
-        z = vertical_partner(v, short_name.starts_with('u') ? short_name.substr(1) : "");
+        z = vertical_partner(v, y, short_name.starts_with('u') ? short_name.substr(1) : "");
       }
       const std::string shown = contains(quantity, "sea_water_velocity") ? "current" : quantity;
       add_vector(shown, z >= 0 ? std::vector<int>{v, y, z} : std::vector<int>{v, y});
@@ -338,7 +338,7 @@ class FieldFinder {
     if (y < 0 || !joins(v, y, false)) {
       return;
     }
-    const int z = vertical_partner(v, rest);
+    const int z = vertical_partner(v, y, rest);
     const bool flows = is_velocity(variable(v).units);
     const bool in_water = vertical_ == AxisKind::depth || rest == "o" ||
                           contains(lower(variable(v).long_name), "current") ||
@@ -347,8 +347,9 @@ class FieldFinder {
     add_vector(shown, z >= 0 ? std::vector<int>{v, y, z} : std::vector<int>{v, y});
   }
 
-  // w... with the same rest, otherwise a common name of vertical velocity.
-  [[nodiscard]] int vertical_partner(int v, const std::string& rest) {
+  // w... with the same rest, otherwise a common name of vertical velocity. second: the other
+  // horizontal component, which may have one of these names (VVEL of POP and CICE).
+  [[nodiscard]] int vertical_partner(int v, int second, const std::string& rest) {
     const int alike = candidates_.named(v, 'w' + rest);
     const bool is_third = alike >= 0 && joins(v, alike, true);
     if (is_third || !is_velocity(variable(v).units)) {
@@ -356,7 +357,7 @@ class FieldFinder {
     }
     for (const char* usual : {"w", "wa", "wap", "omega", "vvel", "dzdt", "wwnd", "wgrd"}) {
       const int found = candidates_.named(v, usual);
-      if (found >= 0 && joins(v, found, true)) {
+      if (found >= 0 && found != second && joins(v, found, true)) {
         return found;
       }
     }

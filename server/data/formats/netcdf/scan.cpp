@@ -17,6 +17,7 @@
 #include "server/data/formats/netcdf/dates.hpp"
 #include "server/data/formats/netcdf/file.hpp"
 #include "server/data/formats/netcdf/meep.hpp"
+#include "server/data/formats/netcdf/radar.hpp"
 
 namespace windsplat::data::netcdf {
 
@@ -153,6 +154,10 @@ std::string File::text_of(int variable, const char* attribute) const {
 
 Result<void> File::scan(const std::string& group) {
   const LibraryLock lock;
+  if (const std::string why = refused_convention(text({ncid_, NC_GLOBAL}, "Conventions"));
+      !why.empty()) {
+    return fault(why);
+  }
   const std::vector<std::string> groups = groups_below(ncid_, "");
   if (auto done = choose_group(group, groups); !done) return done;
   std::copy_if(groups.begin(), groups.end(), std::back_inserter(contents_.groups),
@@ -209,6 +214,7 @@ Result<void> File::scan_group(const std::string& path) {
     if (nc_inq_grp_parent(at, &at) != NC_NOERR) break;
   }
   find_dates();
+  leave_out_rays(contents_);
   if (!classic_) {
     name_axes_of_meep(contents_);
     name_steps_of_bare_arrays(contents_);

@@ -10,6 +10,7 @@
 
 #include "server/data/model/dataset_info.hpp"
 #include "server/data/open/open.hpp"
+#include "tests/unit/data/dataset_probe.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"
 
 namespace windsplat::data::test {
@@ -362,6 +363,24 @@ TEST(NetcdfFields, LargestGridIsUsedAndTheRestIsExplained) {
   ASSERT_TRUE(first);
   ASSERT_TRUE(second);
   EXPECT_EQ(first->values, second->values);
+}
+
+// UVEL and VVEL of POP, uvel and vvel of CICE: vvel is also a usual name of vertical velocities.
+TEST(HorizontalVelocities, VvelIsNotItsOwnVerticalComponent) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "ice.nc");
+    const int y = file.axis("y", {0, 1, 2}, "m");
+    const int x = file.axis("x", {0, 1}, "m");
+    for (const char* name : {"uvel", "vvel"}) {
+      file.text(file.variable(name, NC_FLOAT, {y, x}, counting(6)), "units", "m s-1");
+    }
+  }
+  const auto source = opened(folder / "ice.nc");
+  ASSERT_NE(source, nullptr);
+  const FieldInfo* wind = source->info().find("wind");
+  ASSERT_NE(wind, nullptr);
+  EXPECT_EQ(wind->components, (std::vector<std::string>{"uvel", "vvel"}));
 }
 
 }  // namespace

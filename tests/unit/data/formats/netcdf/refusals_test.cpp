@@ -5,9 +5,11 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "server/data/formats/netcdf/classic_header.hpp"
 #include "server/data/open/open.hpp"
+#include "tests/unit/data/dataset_probe.hpp"
 #include "tests/unit/data/netcdf_maker.hpp"
 
 namespace windsplat::data::test {
@@ -291,6 +293,32 @@ TEST(NetcdfRefusals, DigestFollowsContentNotPath) {
   EXPECT_EQ(digest(folder / "a.nc"), digest(folder / "sub/a.nc"));
   std::filesystem::last_write_time(folder / "sub/a.nc", time + std::chrono::milliseconds(1));
   EXPECT_NE(digest(folder / "a.nc"), digest(folder / "sub/a.nc"));
+}
+
+// An array of azimuths and ranges would be drawn as a rectangle.
+TEST(RadarFiles, ValuesAlongRaysAreLeftOutWithTheReason) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "sweep.nc");
+    const int azimuth = file.axis("azimuth", counting(36), "degrees", "ray_azimuth_angle");
+    const int range = file.axis("range", counting(20), "m", "projection_range_coordinate");
+    file.variable("DBZ", NC_FLOAT, {azimuth, range}, counting(720));
+  }
+  EXPECT_NE(refusal(folder / "sweep.nc").find("polar coordinates are not supported"),
+            std::string::npos);
+}
+
+TEST(RadarFiles, FilesOfOdimAreRefusedByTheirConvention) {
+  const Folder folder;
+  {
+    NetcdfMaker file(folder / "volume.h5");
+    file.text(NC_GLOBAL, "Conventions", "ODIM_H5/V2_2");
+    const int rays = file.dimension("rays", 36);
+    const int bins = file.dimension("bins", 20);
+    file.variable("data", NC_UBYTE, {rays, bins}, std::vector<double>(720, 7));
+  }
+  EXPECT_NE(refusal(folder / "volume.h5").find("radar data of the convention 'ODIM_H5/V2_2'"),
+            std::string::npos);
 }
 
 }  // namespace
