@@ -3,10 +3,11 @@
 their cost. Tables as Markdown on stdout. Linux only (/proc).
 
 Usage: viewers.py [--program=windsplat] [--dataset=climate] [--viewers=16] [--seconds=20]
-       [--size=640x480] [--mixed] [--deaf=20] [--ended=200]
+       [--size=640x480] [--video=0] [--mixed] [--deaf=20] [--ended=200]
        [--min-jain=0.95] [--max-spread=0] [--smoke]
 
-A session sends the next camera with every frame it receives. --mixed adds one session at 1920x1080
+A session sends the next camera with every frame it receives. --video: of the sessions, so many
+announce H.264 and acknowledge frames as late as over a link of 2 Mbit/s. --mixed adds one session at 1920x1080
 and one that never reads. --deaf: sessions that request frames of 2560x1440 and never read, for the
 memory of each. --ended: short sessions, for the memory that they leave allocated, as many as fit
 into a minute. 0: none. Exit 1 if Jain's index of the frame rates, (sum x)^2 / (n sum x^2), is below
@@ -32,6 +33,8 @@ KIB = 1024
 BIG, DEAF_VIEW = (1920, 1080), (2560, 1440)
 ANSWER_S = 30  # until an answer is missing
 ENDED_S = 60   # for the sessions that end
+SLOW_BYTES_PER_S = 250e3  # with --video
+H264 = 3       # codec of the frame header
 DISTANCE = 2.4  # distance of the eye from the centre of the data
 
 
@@ -42,8 +45,9 @@ def camera(angle):
 class Orbit(threading.Thread):
     """A client that rotates the camera until stopped."""
 
-    def __init__(self, port, dataset, size, first_angle):
+    def __init__(self, port, dataset, size, first_angle, video=False):
         super().__init__(daemon=True)
+        self.video, self.videos = video, 0
         self.viewer = Viewer(port)
         self.viewer.socket.settimeout(ANSWER_S)
         self.size, self.angle, self.dataset = size, first_angle, dataset
@@ -64,6 +68,8 @@ class Orbit(threading.Thread):
 
     def run(self):
         try:
+            if self.video:
+                self.viewer.say({"type": "video", "codecs": ["avc1.640033"]})
             self.patch()
             while not self.over:
                 self.take(*self.viewer.message())
@@ -78,12 +84,15 @@ class Orbit(threading.Thread):
             if message["type"] == "unchanged" and message["rev"] == self.rev:
                 self.patch()  # a picture that shows nothing is not sent again
             return
+        if self.video:
+            time.sleep(len(payload) / SLOW_BYTES_PER_S)
         now = time.monotonic()
         seq, rev = struct.unpack_from("<2I", payload, 8)
         self.viewer.say({"type": "ack", "seq": seq, "decodeMs": 1})
         if self.counting:
             self.frames += 1
             self.bytes += len(payload)
+            self.videos += payload[28] == H264
             self.latencies.append(1000 * (now - self.sent[rev]))
         for old in [known for known in self.sent if known < rev]:
             del self.sent[old]
@@ -150,8 +159,8 @@ def row(name, orbit, took):
 
 def measure(daemon, options, size, count, mixed):
     """Prints the table of one run; returns whether its limits are kept."""
-    orbits = [Orbit(daemon.port, options.dataset_id, size, 2 * math.pi * i / count)
-              for i in range(count)]
+    orbits = [Orbit(daemon.port, options.dataset_id, size, 2 * math.pi * i / count,
+                    i < options.video and count > 1) for i in range(count)]
     big = [Orbit(daemon.port, options.dataset_id, BIG, 0)] if mixed else []
     deaf = Deaf(daemon.port, options.dataset_id, BIG) if mixed else None
     took = run(orbits + big, options.seconds, deaf.ask if deaf else None)
@@ -169,6 +178,12 @@ def measure(daemon, options, size, count, mixed):
           f"{sum(rates):.1f} frames/s together, Jain's index {index:.4f}, latency "
           f"{statistics.median(together or [math.nan]):.0f} ms median and "
           f"{percentile(together, 0.99):.0f} ms p99, RSS {held / MB:.1f} MB\n", flush=True)
+    slow = [orbit for orbit in orbits if orbit.video]
+    if slow:
+        fast = [orbit for orbit in orbits if not orbit.video]
+        print(f"{len(slow)} of them on slow links: {sum(o.frames for o in slow) / took:.1f} frames/s "
+              f"together ({sum(o.videos for o in slow) / took:.1f} of H.264), the others "
+              f"{sum(o.frames for o in fast) / took:.1f}\n", flush=True)
     spread = percentile(together, 0.99) / statistics.median(together or [math.nan])
     return index >= options.min_jain and not spread > (options.max_spread or math.inf)
 
@@ -269,6 +284,7 @@ def main():
     parser.add_argument("--viewers", type=int, default=16)
     parser.add_argument("--seconds", type=float, default=20)
     parser.add_argument("--size", default="640x480")
+    parser.add_argument("--video", type=int, default=0)
     parser.add_argument("--mixed", action="store_true")
     parser.add_argument("--deaf", type=int, default=20)
     parser.add_argument("--ended", type=int, default=200)
