@@ -1,6 +1,7 @@
 // Descriptions -> the JSON documents of messages.schema.json.
 #include "protocol/codec_shapes.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 #include "protocol/codec.hpp"
@@ -195,6 +196,20 @@ Json problem_json(const Problem& problem) {
   return out;
 }
 
+namespace {
+
+// With the error that was asked for, and whether it is kept.
+Json frame_error_json(const FrameInfo& info) {
+  Json out{{"value", number_or_null(info.error_value)}, {"kind", info.error_kind}};
+  if (info.error_asked && std::isfinite(info.error_value.value_or(NAN))) {
+    out["asked"] = *info.error_asked;
+    out["kept"] = *info.error_value <= *info.error_asked;
+  }
+  return out;
+}
+
+}  // namespace
+
 Json frame_info_json(const FrameInfo& info) {
   Json out{{"method", info.method},
            {"compositing", info.compositing},
@@ -202,7 +217,7 @@ Json frame_info_json(const FrameInfo& info) {
            {"slabThickness", number_or_null(info.slab_thickness)},
            {"width", info.width},
            {"height", info.height},
-           {"error", {{"value", number_or_null(info.error_value)}, {"kind", info.error_kind}}},
+           {"error", frame_error_json(info)},
            {"jpegError", number_or_null(info.jpeg_error)},
            {"skippedChange",
             {{"value", number_or_null(info.skipped_change)}, {"kind", info.skipped_change_kind}}},

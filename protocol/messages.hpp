@@ -135,7 +135,8 @@ struct FrameInfo {
   int width = 0;
   int height = 0;
   std::optional<double> error_value;
-  std::string error_kind = "none";  // measured | estimated | none
+  std::string error_kind = "none";    // measured | estimated | none
+  std::optional<double> error_asked;  // the view's maxError; empty: none
   std::optional<double> jpeg_error;
   std::optional<double> skipped_change;      // mean change by what tolerances leave out; linear
   std::string skipped_change_kind = "none";  // measured | estimated | none

@@ -36,6 +36,7 @@ void report_error(const frame::Frame& drawn, const Observation& observed,
   if (drawn.view.method.name == protocol::MethodName::reference) return;
   const auto index = quality::index_of(setting);
   estimate_skipped_change(drawn, observed, tables, info);
+  info.error_asked = drawn.view.quality.max_error;
   // A smaller picture shows it less exactly.
   if (drawn.describe_us > 0 && drawn.width == drawn.view.image.width &&
       drawn.height == drawn.view.image.height) {

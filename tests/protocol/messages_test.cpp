@@ -298,6 +298,20 @@ TEST(Shapes, FrameInfoContainsEveryCount) {
               "fields":["wind"],"bytes":3891200,"variant":"vector perspective"}})"));
 }
 
+TEST(Shapes, ErrorsSayWhatWasAskedAndWhetherItIsKept) {
+  FrameInfo info = frame_info();
+  info.error_asked = 0.001;
+  EXPECT_EQ(Json::parse(encode_frame_info(info))["error"],
+            Json::parse(R"({"value":null,"kind":"none"})"));
+  info.error_value = 0.002;
+  info.error_kind = "estimated";
+  expect_shape("frameInfo", encode_frame_info(info));
+  EXPECT_EQ(Json::parse(encode_frame_info(info))["error"],
+            Json::parse(R"({"value":0.002,"kind":"estimated","asked":0.001,"kept":false})"));
+  info.error_asked = 0.002;
+  EXPECT_EQ(Json::parse(encode_frame_info(info))["error"]["kept"], true);
+}
+
 TEST(Shapes, ReportIsTheFrameInfoWithItsTimes) {
   Json expected = Json::parse(encode_frame_info(frame_info()));
   expected["renderMs"] = 12.5;

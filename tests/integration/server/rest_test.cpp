@@ -240,6 +240,29 @@ TEST_F(Rest, PictureReportsItsErrorAndMeetsErrorAndBudget) {
   EXPECT_GT(quick["error"]["value"], exact["error"]["value"]);
 }
 
+// Within the least error, and within what a budget allows.
+TEST_F(Rest, PictureSaysWhetherTheErrorThatWasAskedForIsKept) {
+  const auto error_of = [&](const std::string& quality) {
+    const Answer answer =
+        post_view(port(), R"({"dataset":"small","image":{"width":320,"height":240},"quality":)" +
+                              quality + "}");
+    EXPECT_EQ(answer.status, 200);
+    return Json::parse(answer.header("windsplat-frame"))["error"];
+  };
+  const Json kept = error_of(R"({"maxError":0.05})");
+  EXPECT_EQ(kept["asked"], 0.05);
+  EXPECT_EQ(kept["kept"], true);
+  EXPECT_LE(kept["value"], 0.05);
+  const Json missed = error_of(R"({"maxError":0.0000051})");
+  EXPECT_EQ(missed["asked"], 0.0000051);
+  EXPECT_EQ(missed["kept"], false);
+  EXPECT_GT(missed["value"], 0.0000051);
+  EXPECT_EQ(missed["kind"], "estimated");
+  const Json hurried = error_of(R"({"maxError":0.001,"budgetMs":1})");
+  EXPECT_EQ(hurried["kept"], false) << "the budget takes precedence";
+  EXPECT_FALSE(error_of("{}").contains("asked"));
+}
+
 // --- invalid input ------------------------------------------------------------------------------
 
 TEST_F(Rest, InvalidViewsAreRefusedWithThePointer) {
