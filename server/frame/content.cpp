@@ -324,6 +324,17 @@ class Sampling {
   int stride_ = 1;
 };
 
+// What is typical, of cells as large as one before the eye: the kernels of samples behind it are
+// seen without a sample being seen.
+quality::Content of_cells_at_the_eye(const scene::Camera& camera) {
+  const quality::Content typical;
+  return quality::scaled(typical, 0.5 / camera.half_height / typical.cell);
+}
+
+bool shows_anything(const quality::Trials& trials) {
+  return std::max({trials.kernel, trials.slab, trials.half, trials.stop}) > 0;
+}
+
 std::atomic<std::uint64_t> described_scenes{0};
 
 }  // namespace
@@ -393,9 +404,12 @@ std::optional<quality::Content> content_of(const scene::Scene& scene, const Canc
   out.order = std::sqrt(light.order.sum);
   out.step_cell = light.cell.value();
   const PixelTrials tried = pixel_trials(scene, sampling.rays_through(seen), cancel);
+  if (cancel.cancelled()) return std::nullopt;
+  const bool beside =
+      scene.camera.perspective && tried.trials && shows_anything(*tried.trials);
+  if (seen.empty() && beside) out = of_cells_at_the_eye(scene.camera);
   out.trials = tried.trials;
   out.skipped_change = tried.skipped_change;
-  if (cancel.cancelled()) return std::nullopt;
   return out;
 }
 

@@ -99,5 +99,19 @@ TEST(OddViews, RaysAtASlantAreTriedInPiecesOfACell) {
   EXPECT_LT(tried, 1e-4);
 }
 
+// Every sample is behind the eye, and kernels of some are before it. Without the light of samples
+// merged and smaller pictures would be estimated to be nearly exact.
+TEST(OddViews, WhereNoSampleIsSeenContentIsThatOfTheCellsAtTheEye) {
+  scene::Scene scene = cloudy_scene(12, 100);
+  scene.vector.reset();
+  scene.camera = look({0.1, 0.05, 1.02}, {0.1, 0.05, 1}, 0.1, 110, 90, true, 0.6);
+  const auto content = frame::content_of(scene);
+  ASSERT_TRUE(content && content->trials);
+  ASSERT_GT(content->trials->kernel, 0);
+  EXPECT_NEAR(content->cell, 0.5 / 0.6, 1e-9);
+  EXPECT_GT(content->bends.back(), 1e-5);
+  EXPECT_GT(content->cell_bends[0], 1e-3);
+}
+
 }  // namespace
 }  // namespace windsplat::test
