@@ -20,7 +20,8 @@ FROM ${BASE}
 RUN apt-get -q update \
     && DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends \
         ca-certificates libblosc1 libboost-url1.81.0 libcairo2 libcurl4 libeccodes0 libfmt9 \
-        libharfbuzz0b libhwy1 liblz4-1 libnetcdf19 libopenh264-7 libpng16-16 libproj25 libprometheus-cpp-core1.0 libpugixml1v5 libseccomp2 \
+        libharfbuzz0b liblz4-1 libnetcdf19 libopenh264-7 libpng16-16 libproj25 \
+        libprometheus-cpp-core1.0 libpugixml1v5 libseccomp2 \
         libspdlog1.10 libssl3 libstdc++6 libturbojpeg0 libzstd1 zlib1g \
     && rm -rf /var/lib/apt/lists/* /var/cache/apt/* /var/log/apt /var/log/dpkg.log \
     && useradd --system --uid 10001 --user-group --no-create-home --home-dir /nonexistent \

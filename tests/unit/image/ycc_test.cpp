@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <random>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "server/image/decode.hpp"
@@ -245,6 +247,29 @@ TEST(Ycc, InstructionSetsAgree) {
   }
   hwy::GetChosenTarget().DeInit();
   for (const Bytes& samples : fused) EXPECT_EQ(samples, fused.front());
+}
+
+// The names of features are those of the kernel.
+TEST(Ycc, InstructionSetsAreThoseOfTheProcessor) {
+  std::ifstream file("/proc/cpuinfo");
+  std::string line;
+  while (std::getline(file, line) && !line.starts_with("flags")) {
+  }
+  if (!HWY_ARCH_X86 || line.empty()) GTEST_SKIP() << "no flags of an x86 processor are known";
+  line += ' ';
+  const auto has = [&](const std::vector<std::string>& names) {
+    return std::all_of(names.begin(), names.end(), [&](const std::string& name) {
+      return line.find(' ' + name + ' ') != std::string::npos;
+    });
+  };
+  const std::int64_t found = hwy::SupportedTargets();
+  const bool sse4 = has({"ssse3", "sse4_1", "sse4_2", "popcnt", "pclmulqdq", "aes"});
+  const bool avx2 = sse4 && has({"avx2", "fma", "bmi1", "bmi2", "f16c", "abm"});
+  const bool avx512 = avx2 && has({"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"});
+  EXPECT_EQ((found & HWY_SSE4) != 0, sse4);
+  EXPECT_EQ((found & HWY_AVX2) != 0, avx2);
+  EXPECT_EQ((found & HWY_AVX3) != 0, avx512);
+  EXPECT_NE(found & HWY_TARGETS, 0);
 }
 
 // A second picture with a different size and background contains nothing of the first.
