@@ -14,6 +14,7 @@ namespace windsplat::image {
 namespace {
 
 constexpr int compression_level = 1;                        // level of zlib
+constexpr int matches_of_runs = 3;                          // its strategy Z_RLE
 constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // largest IDAT
 
 enum class Fate { done, cancelled, failed };
@@ -46,9 +47,11 @@ class PngWriter {
     png_set_write_fn(png_, this, &append, nullptr);
     png_set_compression_level(png_, compression_level);
     png_set_compression_buffer_size(png_, chunk_bytes);
-    // For thin lines on a uniform background the sub and up filters are nearly as good as adaptive
-    // selection of all filters.
-    png_set_filter(png_, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB | PNG_FILTER_UP);
+    // For thin lines and smooth media, differences from the row above and matches of runs alone
+    // give files of about the size of a choice of filters for each row and of all matches, in three
+    // fifths of the time.
+    png_set_compression_strategy(png_, matches_of_runs);
+    png_set_filter(png_, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
     png_set_IHDR(png_, info_, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
                  PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE,
                  PNG_FILTER_TYPE_BASE);
