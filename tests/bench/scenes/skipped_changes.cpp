@@ -36,7 +36,7 @@ struct Ranges {
   Range truth;      // mean change of the picture
   Range bound;      // work.skippedBound over it
   Range measured;   // skippedChange over it
-  Range estimated;  // that of a view that was described
+  Range estimated;  // that of a view that was described; 0: none
   Range updates;    // of pixels: with everything over the picture
   Range time;       // of measuring the change over that of measuring the error
 };
