@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "protocol/codec.hpp"
 #include "server/cli/command.hpp"
@@ -24,7 +25,7 @@ constexpr std::uint64_t whole_series_bytes_max = 1ULL << 30;
 constexpr std::uint64_t bytes_of_a_read = 65536;  // minimum cost of a read
 
 struct InspectArguments {
-  std::string dataset;
+  std::vector<std::string> datasets;
   std::string memory = "8G";
   DataHostArguments data_hosts;
   std::string ranges = "auto";
@@ -110,7 +111,7 @@ std::string largest_field(const data::DatasetInfo& info) {
   return name;
 }
 
-Result<void> inspect(const InspectArguments& arguments) {
+Result<std::string> described(const InspectArguments& arguments, const std::string& name) {
   const auto limit = memory_limit(arguments.memory);
   if (!limit) return limit.error();
   const bool asked = arguments.ranges != "auto";
@@ -118,7 +119,7 @@ Result<void> inspect(const InspectArguments& arguments) {
   if (!fetcher) return fetcher.error();
   data::Store store(asked ? store_options(*limit, std::move(*fetcher))
                           : frugal_store_options(*limit, std::move(*fetcher)));
-  const auto dataset = store.add(arguments.dataset);
+  const auto dataset = store.add(name);
   if (!dataset) return dataset.error();
   auto description = scene::describe(**dataset, scene::RangesOf::none);
   if (!description) return description.error();
@@ -139,8 +140,28 @@ Result<void> inspect(const InspectArguments& arguments) {
   for (const std::string& note : {choice.note, store.note((*dataset)->info().id)}) {
     if (!note.empty()) description->notes.push_back(note);
   }
-  return write_stdout(arguments.json ? protocol::encode_dataset(*description) + "\n"
-                                     : inspect_text(*description));
+  return arguments.json ? protocol::encode_dataset(*description) + "\n"
+                        : inspect_text(*description);
+}
+
+// A file that cannot be read does not prevent the others from being described.
+int inspect(const InspectArguments& arguments) {
+  int code = exit_ok;
+  bool first = true;
+  for (const std::string& name : arguments.datasets) {
+    auto text = described(arguments, name);
+    if (text && !arguments.json && !first) text->insert(0, "\n");
+    const auto done = text ? write_stdout(*text) : Result<void>(text.error());
+    if (text && !done) return answer(done.error());
+    if (!done) {
+      Error error = done.error();
+      if (arguments.datasets.size() > 1) error.message = printable(name) + ": " + error.message;
+      const int failed = answer(error);
+      if (code == exit_ok) code = failed;
+    }
+    first = false;
+  }
+  return code;
 }
 
 }  // namespace
@@ -149,7 +170,7 @@ void add_inspect(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
       "inspect", "Describe a dataset: axes, fields, ranges, steps, and what is ignored and why");
   const auto arguments = std::make_shared<InspectArguments>();
-  command->add_option("file", arguments->dataset, "A file, or a sample's name")
+  command->add_option("files", arguments->datasets, "Files, or names of samples")
       ->required()
       ->type_name("FILE");
   add_memory_option(*command, arguments->memory);
@@ -160,13 +181,8 @@ void add_inspect(CLI::App& app, Action& chosen) {
                    "all, the first or none, depending on the cost of decoding")
       ->check(CLI::IsMember({"auto", "all", "first", "none"}))
       ->capture_default_str();
-  command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->callback([&chosen, arguments] {
-    chosen = [arguments] {
-      const auto done = inspect(*arguments);
-      return done ? exit_ok : answer(done.error());
-    };
-  });
+  command->add_flag("--json", arguments->json, "Print one line of JSON for each file");
+  command->callback([&chosen, arguments] { chosen = [arguments] { return inspect(*arguments); }; });
 }
 
 }  // namespace windsplat::cli

@@ -95,6 +95,12 @@ void add_data_options(CLI::App& command, ServeArguments& arguments) {
                   "Store saved views in this folder; default: in memory only")
       ->envname("WINDSPLAT_STATE_DIR")
       ->type_name("DIR");
+  command
+      .add_flag(
+          "--strict", arguments.strict,
+          "Do not start if one of the datasets cannot be opened; without it, such a dataset is "
+          "listed as failed")
+      ->envname("WINDSPLAT_STRICT");
   add_memory_option(command, arguments.memory_limit);
   command
       .add_option(

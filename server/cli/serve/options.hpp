@@ -23,6 +23,7 @@ struct ServeArguments {
   std::string base_path = "/";
   std::string data_root;
   bool fixed_entries = false;
+  bool strict = false;  // every dataset must open
   DataHostArguments data_hosts;
   std::string state_dir;
   std::string memory_limit = "8G";

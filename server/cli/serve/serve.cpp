@@ -152,9 +152,10 @@ Result<void> check_first_view(const data::Dataset& dataset) {
   return dataset.check_room(scene::fields_of({}, dataset.info()));
 }
 
-// One bad file does not prevent serving the others: it is listed as failed. The value is the exit
-// code if nothing can be served (that of bad data if any file is bad), else exit_ok.
-int open_datasets(const std::vector<std::string>& named, data::Store& store) {
+// One bad file does not prevent serving the others, unless `strict`: it is listed as failed. The
+// value is the exit code if nothing can be served (that of bad data if any file is bad), or with
+// `strict` not all, else exit_ok.
+int open_datasets(const std::vector<std::string>& named, bool strict, data::Store& store) {
   int code = exit_ok;
   for (const std::string& name : named.empty() ? data::sample_names() : named) {
     const auto dataset = store.add(name);
@@ -178,7 +179,7 @@ int open_datasets(const std::vector<std::string>& named, data::Store& store) {
                 {{"dataset", info.id}, {"fault", beyond.substr(2)}});
     }
   }
-  if (store.all().empty()) return code;
+  if (store.all().empty() || strict) return code;
   if (code != exit_ok) {
     log::warn("datasets that cannot be opened are listed as failed",
               {{"datasets", store.failed().size()}});
@@ -214,7 +215,8 @@ int serve(const CLI::App& given) {
       arguments.storage == "packed16" ? data::Storage::packed16 : data::Storage::float32);
   stored.check = check_first_view;
   const auto store = std::make_shared<data::Store>(std::move(stored));
-  if (const int code = open_datasets(arguments.datasets, *store); code != exit_ok) {
+  if (const int code = open_datasets(arguments.datasets, arguments.strict, *store);
+      code != exit_ok) {
     for (const data::Store::Failed& failed : store->failed())
       complain(printable(failed.problem, 2000));
     return code;

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -88,6 +89,21 @@ TEST(CliFiles, AnEntryOfADimensionIsChosenBehindTheName) {
   const Outcome nameless = run({"inspect", path + "?=3"});
   EXPECT_EQ(nameless.code, 2);
   EXPECT_THAT(nameless.err, HasSubstr("has a choice without a name"));
+}
+
+TEST(CliFiles, InspectTakesSeveralFilesAndGoesOnAfterABadOne) {
+  const Folder folder;
+  const std::string first = synth(folder, "climate", "16x8x5");
+  const std::string bad = folder.file("bad.nc");
+  write_file(bad, "not a data file");
+  const Outcome told = run({"inspect", "--json", first, bad, "tornado:8"});
+  EXPECT_NE(told.code, 0);
+  EXPECT_THAT(told.err, HasSubstr("bad.nc: "));
+  std::istringstream lines(told.out);
+  std::vector<std::string> titles;
+  for (std::string line; std::getline(lines, line);) titles.push_back(json::parse(line)["title"]);
+  EXPECT_THAT(titles, testing::SizeIs(2));
+  EXPECT_EQ(run({"inspect", first, "tornado:8"}).code, 0);
 }
 
 TEST(CliFiles, InspectTextNamesAxesFieldsStepsAndSize) {

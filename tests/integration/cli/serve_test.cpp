@@ -257,6 +257,14 @@ TEST_F(CliServe, PortInUseIsReported) {
   EXPECT_THAT(outcome.err, HasSubstr("use port 0 for any free port"));
 }
 
+TEST_F(CliServe, StrictRefusesToStartWithADatasetThatFailsToOpen) {
+  const std::string bad = folder.file("bad.nc");
+  write_file(bad, "not a data file");
+  const Outcome outcome = run({"serve", "--strict", "--listen", "127.0.0.1:0", bad, dataset});
+  EXPECT_NE(outcome.code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("not a netCDF file"));
+}
+
 TEST_F(CliServe, DatasetThatFailsToOpenIsListedAsFailed) {
   const std::string bad = folder.file("bad.nc");
   write_file(bad, "not a data file");
