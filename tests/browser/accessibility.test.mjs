@@ -41,6 +41,10 @@ const windows = [
 
 // Opens each dialog as a user does and waits for its complete content.
 const openers = {
+  about: async (page) => {
+    await page.keyboard.press("a");
+    await page.locator("#about dd").first().waitFor();
+  },
   datasets: async (page) => {
     await page.keyboard.press("d");
     await page.waitForFunction(() => {

@@ -43,11 +43,11 @@ async function linkSays(page, ...pathAndValue) {
 const numbers = [
   ["Lines", "length", 0.08, "vector", "length"],
   ["Lines", "opacity", 0.4, "vector", "opacity"],
-  ["Lines", "every n-th sample", 2, "vector", "stride"],
+  ["Lines", "sampling stride", 2, "vector", "stride"],
   ["Line shape", "core radius r1", 0.9, "vector", "r1"],
   ["Line shape", "edge radius r2", 2.5, "vector", "r2"],
-  ["Line shape", "head desaturation", 0.1, "vector", "headDesaturation"],
-  ["Line shape", "brightness by \\|v\\|", 0, "vector", "magnitudeIntensity"],
+  ["Line shape", "head whitening", 0.1, "vector", "headDesaturation"],
+  ["Line shape", "brightness by speed", 0, "vector", "magnitudeIntensity"],
   ["Kernels and jitter", "span \\(strides\\)", 3, "vector", "span"],
   ["Kernels and jitter", "jitter of centre", 0.9, "vector", "jitter", "center"],
   ["Kernels and jitter", "jitter of stride", 0.8, "vector", "jitter", "stride"],
@@ -73,9 +73,9 @@ test("every number is sent under its key and kept in the link", () =>
 const visible = [
   ["Lines", "length", 0.1],
   ["Lines", "opacity", 0.2],
-  ["Lines", "every n-th sample", 3],
+  ["Lines", "sampling stride", 3],
   ["Line shape", "edge radius r2", 4],
-  ["Line shape", "head desaturation", 0],
+  ["Line shape", "head whitening", 0],
   ["Kernels and jitter", "jitter of centre", 0],
   ["Kernels and jitter", "pattern", 5],
   ["Camera and depth", "depth cue", 1],
@@ -238,9 +238,9 @@ test("a globe is offered for longitudes, and heights replace the vertical axis",
     assert.deepEqual(await lastPatch(page, "geometry", "scale"), [1, 1, 3]);
     await type(page, "stretch in x", 2);
     assert.deepEqual(await lastPatch(page, "geometry", "scale"), [2, 1, 3]);
-    const heights = await control(page, "heights from").locator("option").allTextContents();
+    const heights = await control(page, "height field").locator("option").allTextContents();
     assert.ok(heights.length >= 2, `${heights}`);
-    await control(page, "heights from").selectOption({ label: heights[1] });
+    await control(page, "height field").selectOption({ label: heights[1] });
     assert.match(await lastPatch(page, "geometry", "heightField"), /./);
     const asked = page.waitForRequest(/\/probe\?index=\d+,\d+,\d+&heightField=\w+&step=0$/);
     await page.locator("#probe-button").click();

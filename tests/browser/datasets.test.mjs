@@ -101,7 +101,7 @@ test("the page follows changed files, their steps and their errors", async (t) =
   const times = dataset.steps.times.slice(0, 3);
   say({ type: "opened", id, dataset: { ...dataset, steps: { count: 3, times } } });
   await page.waitForFunction(
-    () => document.querySelector("#time-step").textContent === "step 2 of 3",
+    () => document.querySelector("#time-step").textContent === "step 3 of 3",
   );
   await finalPicture(page);
   assert.equal(await page.locator("#picture").getAttribute("data-step"), "2");

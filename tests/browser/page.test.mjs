@@ -142,7 +142,7 @@ test("playback updates step, slider and time; pausing keeps the step", () =>
     }));
     assert.ok(Number(shown.step) >= 1);
     assert.equal(shown.slider, shown.step);
-    assert.match(shown.words, new RegExp(`^step ${shown.step} of \\d+$`));
+    assert.match(shown.words, new RegExp(`^step ${Number(shown.step) + 1} of \\d+$`));
     assert.notEqual(shown.time, firstTime);
     assert.notEqual((await pixels(page)).hash, first.hash);
     await page.locator("#time-first").click();
@@ -382,9 +382,18 @@ test("every function is usable by keyboard", () =>
     await page.keyboard.press("Space");
     await page.waitForFunction(() => Number(document.querySelector("#picture").dataset.step) >= 1);
     await page.keyboard.press("Space");
+    assert.equal(await page.locator("#hud-times").isVisible(), false);
+    await page.keyboard.press("\\");
     assert.equal(await page.locator("#hud-times").isVisible(), true);
     await page.keyboard.press("\\");
     assert.equal(await page.locator("#hud-times").isVisible(), false);
+    await page.keyboard.press("a");
+    const about = page.locator("#about");
+    assert.match(await about.textContent(), /percent cloudiness/);
+    assert.match(await about.textContent(), /m s⁻¹/);
+    await shot(page, "about");
+    await page.keyboard.press("Escape");
+    assert.equal(await about.isVisible(), false);
     await page.keyboard.press("?");
     assert.equal(await page.locator("#help").isVisible(), true);
     await shot(page, "help");

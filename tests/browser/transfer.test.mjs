@@ -112,14 +112,14 @@ test("a press on an empty position adds a point, double click or Delete removes 
     assert.equal(added.length, 4);
     assert.ok(Math.abs(added[2][0] - 0.5) < 0.01 && Math.abs(added[2][1] - 0.7 * 7.5) < 0.15);
     assert.equal(
-      await control(page, "clear below", "input").isDisabled(),
+      await control(page, "transparent below", "input").isDisabled(),
       true,
       "the curve is not a ramp",
     );
     await page.mouse.dblclick(...(await center(points(page).nth(2))), { delay: 20 });
     await finalPicture(page);
     assert.equal((await drawnCurve(page)).length, 3);
-    assert.equal(await control(page, "clear below", "input").isDisabled(), false);
+    assert.equal(await control(page, "transparent below", "input").isDisabled(), false);
     await page.mouse.dblclick(box.x + 0.6 * box.width, box.y + 0.5 * box.height);
     await finalPicture(page);
     assert.equal(

@@ -89,7 +89,7 @@ test("fewer steps select the last one and keep the rest", () => {
   assert.deepEqual(scalars, [{ field: "temperature", stride: 2 }]);
   assert.equal(page.element("time-slider").max, "2");
   assert.equal(page.element("time-slider").value, "2");
-  assert.equal(page.element("time-step").textContent, "step 2 of 3");
+  assert.equal(page.element("time-step").textContent, "step 3 of 3");
   assert.equal(page.element("time-label").textContent, "2001-01-01 02:00Z");
   assert.equal(page.built, built + 1);
   // The server may already have tried the old step without a patch.
@@ -107,7 +107,7 @@ test("the time bar follows the number of steps, and the step is kept", () => {
   page.opened(described("storm", { steps: 9 }));
   assert.equal(page.sent("patch").length, patches, "no patch is needed");
   assert.equal(page.element("time-slider").max, "8");
-  assert.equal(page.element("time-step").textContent, "step 3 of 9");
+  assert.equal(page.element("time-step").textContent, "step 4 of 9");
   page.opened(described("storm", { steps: 1 }));
   assert.equal((page.sent("patch").at(-1)!.patch as View).step, 0);
   assert.equal(page.element("time-step").textContent, "one step");

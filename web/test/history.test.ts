@@ -107,7 +107,7 @@ test("redo reverts undo, and a new change clears it", () => {
     desk.change(patch, 1000);
     seen.push(desk.view);
   }
-  assert.deepEqual([desk.undo(), desk.undo(), desk.undo()], ["lines", "media", "camera"]);
+  assert.deepEqual([desk.undo(), desk.undo(), desk.undo()], ["lines", "volumes", "camera"]);
   assert.deepEqual(desk.view, seen[0]);
   for (let n = 1; n < seen.length; n++) {
     assert.notEqual(desk.redo(), null);

@@ -222,7 +222,7 @@ test("the legend states the slow limit in the unit of the field", () => {
 test("powers in units are superscript", () => {
   const rows: [string | undefined, string][] = [
     ["m s-1", "m s⁻¹"],
-    ["kg m-2 s-1", "kg m⁻² s⁻¹"],
+    ["kg m**-2 s^-1", "kg m⁻² s⁻¹"],
     ["m2", "m²"],
     ["m/s", "m/s"],
     ["%", "%"],

@@ -1,5 +1,6 @@
 // Assembles the page (parts, key bindings, buttons) and starts the application.
 import { drag, pan, roll, zoom, type Angles } from "../view/camera";
+import { About } from "./about";
 import { App } from "./app";
 import { Cards } from "./dataset_cards";
 import { DatasetList } from "./dataset_list";
@@ -58,6 +59,7 @@ const timeBar = new TimeBar({
   settings: () => app.playback.again(),
 });
 const hud = new Hud();
+const about = new About();
 const panelBox = byId("panel", HTMLElement);
 const host = {
   view: () => app.view(),
@@ -202,11 +204,16 @@ const bindings: Binding[] = [
   },
   { keys: ["\\"], shown: "\\", does: "frame times and errors", run: () => hud.toggle() },
   { keys: ["e"], shown: "e", does: "errors as RMSE or PSNR", run: toggleErrorMetric },
+  { keys: ["a"], shown: "a", does: "about this dataset", run: showAbout },
   { keys: ["d"], shown: "d", does: "datasets", run: () => cards.show() },
   { keys: ["p"], shown: "p", does: "panel", run: togglePanel },
   { keys: ["s"], shown: "s", does: "save: pictures and views", run: openSaving },
   { keys: ["?"], shown: "?", does: "this list", run: () => help.showModal() },
 ];
+
+function showAbout(): void {
+  if (app.isOpen()) about.show(app.dataset());
+}
 
 function fillHelp(): void {
   const list = byId("help-keys", HTMLElement);
@@ -235,6 +242,7 @@ app.undoControl.watch(document);
 bindKeys(bindings, document);
 fillHelp();
 onClick("datasets-button", () => cards.show());
+onClick("about-button", showAbout);
 onClick("cancel-button", () => app.cancelLoading());
 onClick("retry-button", () => app.connectNow());
 onClick("share-button", () => void app.copyLink());

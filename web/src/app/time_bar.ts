@@ -94,11 +94,11 @@ export class TimeBar {
     this.running = running;
     this.slider.value = String(step);
     const time = readableTime(this.times[step] ?? "");
-    this.stepText.textContent = this.count < 2 ? "one step" : `step ${step} of ${this.count}`;
+    this.stepText.textContent = this.count < 2 ? "one step" : `step ${step + 1} of ${this.count}`;
     this.label.textContent = time;
     this.slider.setAttribute(
       "aria-valuetext",
-      `step ${step} of ${this.count}${time === "" ? "" : `, ${time}`}`,
+      `step ${step + 1} of ${this.count}${time === "" ? "" : `, ${time}`}`,
     );
     for (const [direction, button, name] of this.buttons) {
       button.classList.toggle("running", running === direction);

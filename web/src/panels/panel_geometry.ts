@@ -55,7 +55,7 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
   if (Object.keys(fieldOptions(dataset, "scalar")).length > 0) {
     kit.choice(
       folder,
-      "heights from",
+      "height field",
       {
         pointer: "/geometry/heightField",
         get: (view) => view.geometry?.heightField ?? ownHeight,

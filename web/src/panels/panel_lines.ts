@@ -60,7 +60,7 @@ function addMain(folder: GUI, kit: PanelKit, per: string): void {
   });
   kit.showWhen((states) => states.combined, combine);
   kit.number(folder, `min |v|${per}`, keyAccess("/vector/minMagnitude"), { min: 0, max: top });
-  kit.number(folder, "every n-th sample", keyAccess("/vector/stride"), {
+  kit.number(folder, "sampling stride", keyAccess("/vector/stride"), {
     min: 1,
     max: 16,
     step: 1,
@@ -135,8 +135,8 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
 function addShape(parent: GUI, kit: PanelKit, per: string): GUI {
   const folder = parent.addFolder("Line shape");
   addWidth(folder, kit);
-  kit.number(folder, "head desaturation", keyAccess("/vector/headDesaturation"));
-  kit.number(folder, "brightness by |v|", keyAccess("/vector/magnitudeIntensity"));
+  kit.number(folder, "head whitening", keyAccess("/vector/headDesaturation"));
+  kit.number(folder, "brightness by speed", keyAccess("/vector/magnitudeIntensity"));
   addMagnitudes(folder, kit, per);
   kit.choice(folder, "direction", keyAccess("/vector/space"), {
     "by components": "components",

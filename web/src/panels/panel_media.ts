@@ -23,7 +23,7 @@ const layersMax = 4;
 export function addMedia(gui: GUI, kit: PanelKit): void {
   const options = fieldOptions(kit.host.dataset(), "scalar");
   if (Object.keys(options).length === 0) return;
-  const folder = gui.addFolder("Media");
+  const folder = gui.addFolder("Volumes");
   new MediaPanel(folder, kit, options);
 }
 
@@ -71,7 +71,7 @@ class MediaPanel {
     const used = new Set(this.layers.map((layer) => layer.view.field));
     const free = Object.values(this.options).find((field) => !used.has(field));
     const field = free ?? Object.values(this.options)[0]!;
-    this.controls.action(this.folder, "Add a medium", "One more scalar field", () => {
+    this.controls.action(this.folder, "Add a volume", "One more scalar field", () => {
       this.layers.push({ view: { field }, on: true });
       this.send();
     });
@@ -191,7 +191,7 @@ class MediaPanel {
   private addSampling(folder: GUI, index: number): void {
     this.controls.number(
       folder,
-      "every n-th sample",
+      "sampling stride",
       {
         pointer: "/scalars/stride",
         get: () => this.viewOf(index).stride,
@@ -235,7 +235,7 @@ class MediaPanel {
     });
     const clear = this.controls.number(
       folder,
-      units === "" ? "clear below" : `clear below (${units})`,
+      units === "" ? "transparent below" : `transparent below (${units})`,
       {
         pointer: "/scalars/extinction",
         get: () => thresholdOf(curve()) ?? low(),
@@ -243,7 +243,7 @@ class MediaPanel {
       },
       { min: ends()[0], max: ends()[1] },
     );
-    // "clear below" applies only to ramps and to curves scaled to zero.
+    // "transparent below" applies only to ramps and to curves scaled to zero.
     const follow = () => clear.enable(densityOf(curve()) === 0 || isRamp(curve()));
     this.controls.onRefresh(follow);
     follow();

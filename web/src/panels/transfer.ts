@@ -93,8 +93,8 @@ export function curvePath(curve: Curve, domain: [number, number], scale: Scale):
   return parts.join("");
 }
 
-// Whether the curve is zero up to one value and a ramp from there: the shape that "clear below"
-// edits.
+// Whether the curve is zero up to one value and a ramp from there: the shape that the control
+// "transparent below" edits.
 export const isRamp = (curve: Curve): boolean =>
   (curve.length === 2 || curve.length === 3) &&
   curve.every(([, extinction], n) => extinction > 0 === (n === curve.length - 1));

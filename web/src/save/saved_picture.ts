@@ -47,7 +47,8 @@ async function withLegend(drawn: Blob, view: View, { scale }: ExportSize, shown:
   bitmap.close();
   const { dataset, maps } = shown;
   const time = readableTime(dataset.steps.times[view.step ?? 0]?.text ?? "");
-  const step = dataset.steps.count > 1 ? ` · step ${view.step}` : "";
+  const step =
+    dataset.steps.count > 1 ? ` · step ${(view.step ?? 0) + 1} of ${dataset.steps.count}` : "";
   drawLegend(
     context,
     {

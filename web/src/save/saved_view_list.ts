@@ -65,7 +65,7 @@ export function savedViewList(
 
   function show(): void {
     if (host.isOpen())
-      newName.value = `${host.dataset().id}, step ${host.explicitView().step ?? 0}`;
+      newName.value = `${host.dataset().id}, step ${(host.explicitView().step ?? 0) + 1}`;
     byId("kept", HTMLElement).replaceChildren(...views.list().map(row));
   }
 

@@ -63,7 +63,7 @@ const changesOf = (entry: Entry): Difference[] => differences(entry.before, entr
 
 const partNames: Record<string, string> = {
   vector: "lines",
-  scalars: "media",
+  scalars: "volumes",
   depthCue: "depth cue",
   step: "time step",
   image: "background",

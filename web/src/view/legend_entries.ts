@@ -30,10 +30,10 @@ export function fieldTitle(field: Field | undefined, name: string): string {
 const raised: Record<string, string> = { "-": "⁻" };
 [..."⁰¹²³⁴⁵⁶⁷⁸⁹"].forEach((sign, digit) => (raised[String(digit)] = sign));
 
-// "m s-1" -> "m s⁻¹". In CF, "1" means dimensionless.
+// "m s-1", "m s**-1", "m s^-1" -> "m s⁻¹". In CF, "1" means dimensionless.
 export function unitText(units: string | undefined): string {
   if (units === undefined || units === "1") return "";
-  return units.replace(/(?<=[A-Za-z])-?\d+(?=$|[ ./*])/g, (power) =>
+  return units.replace(/(?<=[A-Za-z])(?:\*\*|\^)?(-?\d+)(?=$|[ ./*])/g, (_, power: string) =>
     [...power].map((sign) => raised[sign]).join(""),
   );
 }

@@ -1,6 +1,7 @@
 // Times, sizes and errors of the drawn frames: the table in the corner of the picture (key \). It
 // is not announced to screen readers.
 import { byId } from "../base/dom";
+import { orNull } from "../base/storage";
 import { errorMetric } from "../base/error_text";
 import {
   encodingLabel,
@@ -25,6 +26,7 @@ import { formatBytes } from "../base/ticks";
 import type { DrawnFrame } from "./viewport";
 
 const rateEveryMs = 1000;
+const key = "windsplat.frame-times"; // in the browser's storage: "shown"
 
 const ms = (value: number): string => (value < 10 ? value.toFixed(1) : value.toFixed(0));
 
@@ -52,13 +54,16 @@ export class Hud {
   private newest: { header: FrameHeader; limit: number | null } | null = null;
 
   constructor() {
+    if (orNull(() => window.localStorage.getItem(key)) === "shown") this.toggle();
     errorMetric.watch(() => this.showErrors());
     window.setInterval(() => this.showRate(), rateEveryMs);
   }
 
+  // Folded until the user asks for them: they cover the data. The browser remembers.
   toggle(): boolean {
-    this.element.classList.toggle("folded");
-    return !this.element.classList.contains("folded");
+    const shown = !this.element.classList.toggle("folded");
+    orNull(() => window.localStorage.setItem(key, shown ? "shown" : "folded"));
+    return shown;
   }
 
   // `scale` is the text from scaleText; it is shown unless the picture is final.

@@ -1,0 +1,86 @@
+// "About this dataset": what the file has, how it was read and what was left out of it.
+import { byId, make } from "../base/dom";
+import { formatNumber } from "../base/ticks";
+import { readableTime } from "../base/time_text";
+import { unitText } from "../view/legend_entries";
+import type { Dataset } from "../wire/protocol";
+
+type Axis = Dataset["axes"]["x"];
+type Row = readonly [name: string, text: string];
+
+export interface AboutSection {
+  title: string;
+  rows: Row[];
+}
+
+const withUnits = (text: string, units: string): string =>
+  units === "" ? text : `${text} ${units}`;
+
+function axisRow(axis: Axis): Row {
+  const { coordinates } = axis;
+  const first = formatNumber(coordinates[0] ?? NaN);
+  const last = formatNumber(coordinates.at(-1) ?? NaN);
+  const range = coordinates.length > 1 ? `${first} to ${last}` : first;
+  const samples = coordinates.length === 1 ? "one sample" : `${coordinates.length} samples`;
+  return [axis.name, `${withUnits(range, unitText(axis.units))}, ${samples}`];
+}
+
+function stepsText({ count, times }: Dataset["steps"]): string {
+  const first = readableTime(times[0]?.text ?? "");
+  const last = readableTime(times.at(-1)?.text ?? "");
+  if (count === 1) return first === "" ? "one" : first;
+  return `${count}, from ${first} to ${last}`;
+}
+
+function fieldRow(field: Dataset["fields"][number]): Row {
+  const units = unitText(field.units);
+  const range = field.range
+    ? withUnits(`${formatNumber(field.range[0])} to ${formatNumber(field.range[1])}`, units)
+    : units;
+  const long = field.longName ?? "";
+  return [field.name, [long === field.name ? "" : long, range].filter((part) => part).join("; ")];
+}
+
+// Only what the description has: a dataset without notes has no section of notes.
+export function aboutSections(dataset: Dataset): AboutSection[] {
+  const { axes, fields, leftOut, notes, source, format, steps } = dataset;
+  const sections: AboutSection[] = [
+    {
+      title: "Data",
+      rows: [
+        ["source", `${source} (${format})`],
+        axisRow(axes.x),
+        axisRow(axes.y),
+        axisRow(axes.z),
+        ["steps", stepsText(steps)],
+      ],
+    },
+    { title: "Fields", rows: fields.map(fieldRow) },
+    { title: "Left out", rows: leftOut.map(({ name, reason }) => [name, reason] as const) },
+    { title: "Notes", rows: notes.map((note) => ["", note] as const) },
+  ];
+  return sections.filter(({ rows }) => rows.length > 0);
+}
+
+export class About {
+  private readonly dialog = byId("about", HTMLDialogElement);
+  private readonly title = byId("about-title", HTMLElement);
+  private readonly body = byId("about-body", HTMLElement);
+
+  show(dataset: Dataset): void {
+    this.title.textContent = dataset.title;
+    this.body.replaceChildren(...aboutSections(dataset).flatMap(sectionElements));
+    this.dialog.showModal();
+  }
+}
+
+// Rows with names are a list of definitions, others one of items.
+function sectionElements({ title, rows }: AboutSection): HTMLElement[] {
+  const named = rows.every(([name]) => name !== "");
+  const list = make(named ? "dl" : "ul");
+  for (const [name, text] of rows) {
+    if (named) list.append(make("dt", "", name), make("dd", "", text));
+    else list.append(make("li", "", text));
+  }
+  return [make("h3", "", title), list];
+}

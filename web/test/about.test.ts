@@ -1,0 +1,57 @@
+// "About this dataset": description -> sections.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { aboutSections } from "../src/app/about";
+import type { Dataset } from "../src/wire/protocol";
+
+const axis = (name: string, units: string, coordinates: number[]) => ({
+  name,
+  standardName: "",
+  units,
+  kind: "cartesian",
+  coordinates,
+  world: coordinates,
+});
+
+const dataset = {
+  title: "Winds",
+  source: "winds.nc",
+  format: "netCDF classic",
+  axes: {
+    x: axis("x", "km", [0, 10, 20]),
+    y: axis("y", "km", [5]),
+    z: axis("lev", "hPa", [1000, 500]),
+  },
+  fields: [
+    { name: "wind", longName: "", units: "m s**-1", range: null },
+    { name: "t", longName: "temperature", units: "K", range: [210, 300.5] },
+  ],
+  leftOut: [{ name: "U", reason: "on another grid" }],
+  notes: ["averaged to mass points"],
+  steps: { count: 2, times: [{ text: "2001-01-01T00:00:00Z" }, { text: "2001-01-01T06:00:00Z" }] },
+} as unknown as Dataset;
+
+test("tells what was read, converted and left out", () => {
+  const sections = aboutSections(dataset);
+  assert.deepEqual(
+    sections.map(({ title }) => title),
+    ["Data", "Fields", "Left out", "Notes"],
+  );
+  const rows = Object.fromEntries(sections.flatMap((section) => section.rows));
+  assert.equal(rows.source, "winds.nc (netCDF classic)");
+  assert.equal(rows.x, "0 to 20 km, 3 samples");
+  assert.equal(rows.y, "5 km, one sample");
+  assert.equal(rows.wind, "m s⁻¹");
+  assert.equal(rows.t, "temperature; 210 to 300.5 K");
+  assert.equal(rows.U, "on another grid");
+  assert.equal(rows.steps, "2, from 2001-01-01 00:00Z to 2001-01-01 06:00Z");
+  assert.equal(rows[""], "averaged to mass points");
+});
+
+test("has no empty sections", () => {
+  const sections = aboutSections({ ...dataset, leftOut: [], notes: [] });
+  assert.deepEqual(
+    sections.map(({ title }) => title),
+    ["Data", "Fields"],
+  );
+});
