@@ -469,10 +469,7 @@ export class App {
 
   private showLegend(): void {
     const view = this.model.drawnView();
-    if (view === null) return;
-    // The server draws it into the picture instead if the view asks for it.
-    const inPicture = view.annotations?.legend === true;
-    this.parts.legend.show(inPicture ? [] : legendEntries(this.dataset(), view));
+    if (view !== null) this.parts.legend.show(legendEntries(this.dataset(), view));
   }
 
   private showTime(): void {

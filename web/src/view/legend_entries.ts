@@ -183,7 +183,9 @@ export function curvePoints(points: [number, number][]): [x: number, y: number][
   ].map(([x, share]) => [x, 0.94 - 0.88 * share]);
 }
 
+// Empty if the server draws the legend into the picture.
 export function legendEntries(dataset: Dataset, view: View): LegendEntry[] {
+  if (view.annotations?.legend === true) return [];
   const lines = linesEntry(dataset, view);
   const media = (view.scalars ?? []).map((layer) => mediumEntry(dataset, layer));
   return lines === null ? media : [lines, ...media];
