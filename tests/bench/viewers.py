@@ -9,8 +9,9 @@ Usage: viewers.py [--program=windsplat] [--dataset=climate] [--viewers=16] [--se
 A session sends the next camera with every frame it receives. --video: of the sessions, so many
 announce H.264 and acknowledge frames as late as over a link of 2 Mbit/s. --mixed adds one session
 at 1920x1080 and one that never reads. --deaf: sessions that request frames of 2560x1440 and never
-read, for the memory of each. --ended: short sessions, for the memory that they leave allocated, as many as fit
-into a minute. 0: none. Exit 1 if Jain's index of the frame rates, (sum x)^2 / (n sum x^2), is below
+read, for the memory of each. --ended: short sessions, for the memory that they leave allocated,
+as many as fit into a minute. 0: none. Exit 1 if Jain's index of the frame rates,
+(sum x)^2 / (n sum x^2), is below
 --min-jain, the p99 of the latency is above --max-spread times its median (0: any), a session that
 never reads takes more than two frames and 256 KiB, or a session gets no answer for 30 s.
 --smoke: small and short; fails only if nothing works."""
