@@ -166,7 +166,8 @@ Entry lines_entry(const Subject& subject) {
 
 // The curve of a medium's extinction over its strip, highest at the greatest extinction.
 std::vector<Point> opacity_curve(const scene::ScalarLayer& layer, double most) {
-  const auto& [low, high] = layer.color.range;
+  const double low = layer.color.range[0];
+  const double high = layer.color.range[1];
   std::vector<Point> curve;
   const auto at = [&](std::size_t n) {
     const double x = (layer.extinction[n][0] - low) / (high - low);

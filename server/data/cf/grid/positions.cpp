@@ -49,7 +49,7 @@ struct Place {
 };
 
 // Great-circle distance in degrees.
-double distance(const Place& a, const Place& b) {
+double distance_between(const Place& a, const Place& b) {
   const double along = std::sin((a.latitude - b.latitude) * radian / 2);
   const double across = std::sin((a.longitude - b.longitude) * radian / 2);
   const double h = along * along +
@@ -268,8 +268,8 @@ class PositionFinder {
       const std::size_t beside = i + 1 < width ? at + 1 : width > 1 ? at - 1 : at;
       const Place here{own.longitude[at], own.latitude[at]};
       farthest = std::max(
-          farthest, distance(here, {found->columns->longitude[n], found->columns->latitude[n]}));
-      cell = std::max(cell, distance(here, {own.longitude[beside], own.latitude[beside]}));
+          farthest, distance_between(here, {found->columns->longitude[n], found->columns->latitude[n]}));
+      cell = std::max(cell, distance_between(here, {own.longitude[beside], own.latitude[beside]}));
     }
     if (!(farthest > 0.5 * cell)) return;
     info_.notes.push_back(

@@ -68,7 +68,8 @@ class OffsetFinder {
       const int side = side_of(variable(found));
       if (side != 0) named.at(side < 0 ? 0 : 1) = found;
     }
-    const auto [longitude, latitude] = named;
+    const int longitude = named[0];
+    const int latitude = named[1];
     if (longitude < 0 || latitude < 0 || variable(longitude).dims != variable(latitude).dims)
       return;
     const std::vector<int>& dims = variable(longitude).dims;
