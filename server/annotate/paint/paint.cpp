@@ -57,7 +57,7 @@ class Painter {
 
 }  // namespace
 
-void paint(const std::vector<Item>& items, _cairo* target) {
+void paint(const std::vector<Item>& items, cairo_t* target) {
   for (const Item& item : items) std::visit(Painter(target), item);
 }
 

@@ -1,14 +1,14 @@
 // Items of a figure -> a Cairo context, in its user space.
 #pragma once
 
+#include <cairo/cairo.h>
+
 #include <vector>
 
 #include "server/annotate/figure.hpp"
 
-struct _cairo;  // cairo_t
-
 namespace windsplat::annotate {
 
-void paint(const std::vector<Item>& items, _cairo* target);
+void paint(const std::vector<Item>& items, cairo_t* target);
 
 }  // namespace windsplat::annotate

@@ -111,7 +111,7 @@ double width_of(std::string_view text, double size) {
   return size * font().shape(text).width;
 }
 
-void draw_text(_cairo* target, const Text& text) {
+void draw_text(cairo_t* target, const Text& text) {
   const std::lock_guard lock(font().mutex());
   Shaped shaped = font().shape(text.text);
   const double left = text.at.x - text.align * text.size * shaped.width;

@@ -1,12 +1,12 @@
 // Texts -> glyphs of the embedded font (DejaVu Sans), shaped by HarfBuzz.
 #pragma once
 
+#include <cairo/cairo.h>
+
 #include <string_view>
 #include <vector>
 
 #include "server/annotate/figure.hpp"
-
-struct _cairo;  // cairo_t
 
 namespace windsplat::annotate {
 
@@ -15,6 +15,6 @@ double width_of(std::string_view text, double size);
 
 // Draws a text with its outline in user space of `target`. Where a document keeps texts (PDF), it
 // can be searched and copied. Safe to call concurrently.
-void draw_text(_cairo* target, const Text& text);
+void draw_text(cairo_t* target, const Text& text);
 
 }  // namespace windsplat::annotate
