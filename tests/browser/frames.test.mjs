@@ -269,7 +269,6 @@ test("a picture keeps its aspect ratio in a window of another shape", () =>
       "the aspect ratio has changed",
     );
     // Checks the screen instead of the canvas: an empty band above the picture.
-    await page.keyboard.press("\\"); // hides the HUD
     const image = (await page.screenshot({ clip: box })).toString("base64");
     const [band, inside] = await page.evaluate(async (data) => {
       const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
