@@ -89,13 +89,14 @@ double room_of_tick(const std::array<Point, 2>& ends, double em) {
   return em * (width * across + height * down) / length_of(ends);
 }
 
-// The edge of the outline on which an axis is labelled: one with room for two ticks.
-std::optional<Edge> labelled(const Box& box, std::size_t axis, double em) {
+// The edge of the outline on which an axis is labelled: one with room for two ticks in the picture.
+std::optional<Edge> labelled(const Box& box, std::size_t axis, double em, const Figure& figure) {
   std::optional<Edge> chosen;
   double best = 0;
   for (const Edge& edge : edges_along(axis)) {
     if (box.facing(edge) != 1) continue;
-    const auto ends = box.pixels(edge);
+    const auto whole = box.pixels(edge);
+    const auto ends = whole ? visible_part(figure, *whole, 0) : std::nullopt;
     if (!ends || !(length_of(*ends) > 0)) continue;
     if (length_of(*ends) < 2 * room_of_tick(*ends, em)) continue;
     const double score = axis == 2 ? -((*ends)[0].x + (*ends)[1].x) : (*ends)[0].y + (*ends)[1].y;
@@ -152,15 +153,19 @@ std::vector<Tick> ticks_of(const data::Axis& axis, const AxisMap& map,
 
 void add_axis(const Subject& subject, std::size_t axis, const Box& box, const Style& style,
               Figure& figure) {
-  const auto edge = labelled(box, axis, style.text);
+  const auto edge = labelled(box, axis, style.text, figure);
   const auto map = axis_map(subject, axis);
   const auto centre = box.centre();
   if (!edge || !map || !centre) return;
-  const auto ends = *box.pixels(*edge);
-  const Point out = outward(ends, *centre);
+  const auto whole = *box.pixels(*edge);
+  const auto ends = *visible_part(figure, whole, 0);
+  const Point out = outward(whole, *centre);
   const data::Axis drawn = drawn_axis(subject, axis);
-  const double length = length_of(ends);
-  const int most = std::clamp(static_cast<int>(length / room_of_tick(ends, style.text)), 1, 10);
+  // As many in the picture as have room there, up to 10.
+  constexpr double ticks_most = 90;
+  const double shown = std::clamp(length_of(ends) / room_of_tick(ends, style.text), 1.0, 10.0);
+  const auto most = static_cast<int>(
+      std::clamp(std::floor(shown) * length_of(whole) / length_of(ends), 1.0, ticks_most));
   const double mark = 0.45 * style.text;
   const double gap = 0.35 * style.text;
   double widest = 0;
@@ -168,6 +173,7 @@ void add_axis(const Subject& subject, std::size_t axis, const Box& box, const St
     const auto at = box.pixel(*edge, tick.at);
     if (!at) continue;
     const Point end{at->x + mark * out.x, at->y + mark * out.y};
+    if (!visible_part(figure, {*at, end}, 0)) continue;
     figure.above.emplace_back(Line{{*at, end}, style.line, style.color});
     const Text text = beside(tick.text, {end.x + gap * out.x, end.y + gap * out.y}, out, style.text,
                              style, style.color);
@@ -190,7 +196,9 @@ void add_box(const Subject& subject, const Style& style, Figure& figure) {
   const Box box(subject);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (const Edge& edge : edges_along(axis)) {
-      const auto ends = box.pixels(edge);
+      // Far outside, coordinates exceed those of Cairo (24 bits before the point).
+      const auto whole = box.pixels(edge);
+      const auto ends = whole ? visible_part(figure, *whole, 4 * style.line) : std::nullopt;
       if (!ends) continue;
       const bool front = box.facing(edge) == 2;
       Color color = style.quiet;

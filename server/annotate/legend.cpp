@@ -269,10 +269,12 @@ void add_card(const Entry& entry, const Point& corner, double em, const Style& s
   const double left = corner.x + pad * em;
   const double inner = width - 2 * pad * em;
   double line = corner.y + (pad + 0.9) * em;
-  const double units_width = entry.units.empty() ? 0 : width_of(entry.units, em) + em;
-  write(entry.title, {left, line}, em, 0, inner - units_width, style.color, figure);
+  // Long units take at most half of the line.
+  const double units_width = std::min(width_of(entry.units, em), 0.5 * inner);
+  const double title_room = entry.units.empty() ? inner : inner - units_width - em;
+  write(entry.title, {left, line}, em, 0, title_room, style.color, figure);
   if (!entry.units.empty()) {
-    write(entry.units, {left + inner, line}, em, 1, 0.5 * inner, style.quiet, figure);
+    write(entry.units, {left + inner, line}, em, 1, units_width, style.quiet, figure);
   }
   const Point strip{left, corner.y + (pad + title_height) * em};
   figure.above.emplace_back(Strip{strip, inner, strip_height * em, entry.colors});

@@ -7,6 +7,7 @@
 #include <glm/vec3.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "server/annotate/labels.hpp"
 #include "server/annotate/projector.hpp"
@@ -189,19 +190,24 @@ void add_heading(const Subject& subject, const Style& style, Figure& figure) {
   if (shown.title) {
     constexpr double larger = 1.25;
     const std::string& own = subject.info.title;
-    add_if_free(Text{own.empty() ? subject.info.id : own,
-                     {edge, line},
-                     larger * style.text,
-                     0,
-                     style.color,
-                     style.rim},
-                figure);
+    const double size = larger * style.text;
+    // Left of the arrow to the north.
+    double room = figure.width - 2 * edge;
+    for (const Rectangle& taken : figure.taken) {
+      if (taken.low.y < line && taken.low.x > edge) room = std::min(room, taken.low.x - 2 * edge);
+    }
+    std::string text = fitted(own.empty() ? subject.info.id : own, size, room);
+    add_if_free(Text{std::move(text), {edge, line}, size, 0, style.color, style.rim}, figure);
     line += 1.6 * style.text;
   }
   if (!shown.step_time) return;
   const auto step = static_cast<std::size_t>(view.step);
   if (step >= subject.info.steps.size()) return;
   const data::TimeStep& time = subject.info.steps[step];
+  // The only step of data without times has the number 0 as its time, which tells nothing.
+  const bool untimed =
+      subject.info.steps.size() == 1 && subject.info.time_units.empty() && time.text == "0";
+  if (untimed) return;
   std::string text = time_text(time.text);
   if (subject.info.steps.size() > 1) {
     text += (text.empty() ? "" : "  \u00b7  ") + std::string("step ") + std::to_string(step + 1) +

@@ -14,6 +14,46 @@ bool overlap(const Rectangle& a, const Rectangle& b) {
 
 }  // namespace
 
+std::optional<std::array<Point, 2>> visible_part(const Figure& figure,
+                                                 const std::array<Point, 2>& ends, double margin) {
+  const Point by{ends[1].x - ends[0].x, ends[1].y - ends[0].y};
+  // Shares of the line (Liang and Barsky 1984, doi:10.1145/357332.357333).
+  double first = 0;
+  double last = 1;
+  const auto keep = [&](double from, double step, double low, double high) {
+    if (step == 0) return from >= low && from <= high;
+    const double enters = ((step > 0 ? low : high) - from) / step;
+    const double leaves = ((step > 0 ? high : low) - from) / step;
+    first = std::max(first, enters);
+    last = std::min(last, leaves);
+    return first <= last;
+  };
+  if (!keep(ends[0].x, by.x, -margin, figure.width + margin)) return std::nullopt;
+  if (!keep(ends[0].y, by.y, -margin, figure.height + margin)) return std::nullopt;
+  return std::array{Point{ends[0].x + first * by.x, ends[0].y + first * by.y},
+                    Point{ends[0].x + last * by.x, ends[0].y + last * by.y}};
+}
+
+std::string fitted(std::string text, double size, double room) {
+  if (width_of(text, size) <= room) return text;
+  static constexpr const char* ellipsis = "\u2026";
+  const auto continues = [&](std::size_t at) {
+    return at < text.size() && (static_cast<unsigned char>(text[at]) & 0xc0U) == 0x80U;
+  };
+  const auto cut = [&](std::size_t length) {
+    while (length > 0 && continues(length)) --length;
+    return text.substr(0, length) + ellipsis;
+  };
+  std::size_t fits = 0;
+  std::size_t too_long = text.size();
+  while (too_long - fits > 1) {
+    const std::size_t middle = fits + (too_long - fits) / 2;
+    (width_of(cut(middle), size) <= room ? fits : too_long) = middle;
+  }
+  std::string out = cut(fits);
+  return width_of(out, size) <= room ? out : std::string();
+}
+
 Rectangle bounds_of(const Text& text) {
   constexpr double ascent = 0.8;   // em
   constexpr double descent = 0.2;  // em

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/annotate/paint/document.hpp"
+#include "server/annotate/paint/type.hpp"
 
 namespace windsplat::annotate {
 namespace {
@@ -80,16 +81,21 @@ class Writer {
             number(strip.height) + "\" fill=\"url(#" + id + ")\"/>\n";
   }
   void operator()(const Text& text) {
-    const std::string anchor = text.align <= 0.25 ? "start" : text.align >= 0.75 ? "end" : "middle";
+    // SVG aligns in three ways only; the rest is a shift.
+    const double align = text.align <= 0.25 ? 0 : text.align >= 0.75 ? 1 : 0.5;
+    const std::string anchor = align == 0 ? "start" : align == 1 ? "end" : "middle";
+    const double shift =
+        align == text.align ? 0 : (align - text.align) * width_of(text.text, text.size);
     constexpr double rim_width = 0.22;  // em
     const std::string rim = text.rim.alpha > 0
                                 ? paint("stroke", text.rim) + " stroke-width=\"" +
                                       number(rim_width * text.size) +
                                       "\" stroke-linejoin=\"round\" paint-order=\"stroke\""
                                 : std::string();
-    out_ += "<text x=\"" + number(text.at.x) + "\" y=\"" + number(text.at.y) + "\" font-size=\"" +
-            number(text.size) + "\" text-anchor=\"" + anchor + "\" xml:space=\"preserve\"" + rim +
-            paint("fill", text.color) + ">" + escaped(text.text) + "</text>\n";
+    out_ += "<text x=\"" + number(text.at.x + shift) + "\" y=\"" + number(text.at.y) +
+            "\" font-size=\"" + number(text.size) + "\" text-anchor=\"" + anchor +
+            "\" xml:space=\"preserve\"" + rim + paint("fill", text.color) + ">" +
+            escaped(text.text) + "</text>\n";
   }
 
  private:

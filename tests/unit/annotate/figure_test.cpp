@@ -16,6 +16,7 @@
 #include "server/annotate/box.hpp"
 #include "server/annotate/legend.hpp"
 #include "server/annotate/marks.hpp"
+#include "server/annotate/paint/type.hpp"
 #include "server/annotate/projector.hpp"
 #include "server/annotate/room.hpp"
 #include "server/engine/render.hpp"
@@ -149,6 +150,7 @@ TEST(Box, HasTwelveEdgesOfWhichThoseOfTwoVisibleSidesAreOverTheData) {
   const Shown inside(scene::atmosphere_grid(), one_scalar(), [](protocol::View& view) {
     view.camera.eye = protocol::Vec3{0, 0, 0};
     view.camera.target = protocol::Vec3{0, 1, 0};
+    view.camera.fov_y = 120;
   });
   figure = empty_figure(inside);
   add_box(inside.subject(), style_of(inside.subject()), figure);
@@ -235,6 +237,93 @@ TEST(Figure, TextsLieInThePictureAndApart) {
 }
 
 // The bar's length is that between two points of the ground as they are drawn.
+// A view of a thousandth of the box: what is drawn lies at the picture, on the same lines as the
+// whole edges, and an axis that passes through has as many ticks as it has when all of it is seen.
+TEST(Axes, KeepTheirTicksInViewsOfAPart) {
+  const auto view_of = [](double height) {
+    return [height](protocol::View& view) {
+      view.camera.projection = protocol::Projection::orthographic;
+      view.camera.target = protocol::Vec3{0, -1, 0};
+      view.camera.eye = protocol::Vec3{0, -1, 3};
+      view.camera.up = protocol::Vec3{0, 1, 0};
+      view.camera.height = height;
+    };
+  };
+  data::Grid grid;
+  grid.axes = {scene::axis(data::AxisKind::cartesian, "m", {0, 1, 2, 3}),
+               scene::axis(data::AxisKind::cartesian, "m", {0, 1, 2, 3}),
+               scene::axis(data::AxisKind::cartesian, "m", {0, 1})};
+  for (const double height : {1.0, 0.1, 1e-6}) {
+    const Shown shown(grid, one_scalar(), view_of(height));
+    Figure figure = empty_figure(shown);
+    const Style style = style_of(shown.subject());
+    add_box(shown.subject(), style, figure);
+    EXPECT_FALSE(lines(figure.above).empty() && lines(figure.below).empty());
+    const auto edges = {lines(figure.above), lines(figure.below)};
+    add_axes(shown.subject(), style, figure);
+    for (const auto& layer : edges) {
+      for (const Line& line : layer) {
+        for (const Point& at : line.points) {
+          EXPECT_GE(at.x, -10);
+          EXPECT_LE(at.x, figure.width + 10);
+          EXPECT_NEAR(at.y, 240, 240 + 10);
+        }
+      }
+    }
+    if (height < 0.1) continue;
+    EXPECT_GE(texts(figure.above).size(), 4U) << height << ": three ticks and a name";
+  }
+}
+
+TEST(VisiblePart, EndsAtTheEdgesOfThePicture) {
+  Figure figure;
+  figure.width = 100;
+  figure.height = 50;
+  const auto part = visible_part(figure, {Point{-1e9, 25 - 1e9}, Point{1e9, 25 + 1e9}}, 0);
+  ASSERT_TRUE(part);
+  EXPECT_NEAR((*part)[0].x, -25 + 25, 1e-5);
+  EXPECT_NEAR((*part)[0].y, 25, 1e-5);
+  EXPECT_NEAR((*part)[1].x, 25, 1e-5);
+  EXPECT_NEAR((*part)[1].y, 50, 1e-5);
+  EXPECT_FALSE(visible_part(figure, {Point{-5, 0}, Point{-5, 50}}, 4));
+  EXPECT_TRUE(visible_part(figure, {Point{-3, 0}, Point{-3, 50}}, 4));
+  EXPECT_FALSE(visible_part(figure, {Point{-50, 40}, Point{20, 110}}, 0)) << "past a corner";
+}
+
+TEST(Fitted, CutsWholeCharacters) {
+  const std::string title = "\u98a8\u901f of the north";
+  EXPECT_EQ(fitted(title, 10, 1000), title);
+  for (double room = 0; room < width_of(title, 10); ++room) {
+    const std::string cut = fitted(title, 10, room);
+    EXPECT_LE(width_of(cut, 10), room);
+    if (cut.empty()) continue;
+    ASSERT_THAT(cut, testing::EndsWith("\u2026"));
+    const std::string kept = cut.substr(0, cut.size() - 3);
+    EXPECT_EQ(title.substr(0, kept.size()), kept);
+    EXPECT_NE(static_cast<unsigned char>(title[kept.size()]) & 0xc0U, 0x80U) << kept;
+  }
+}
+
+// A title of any length is written, cut short, beside the arrow; data without times have none.
+TEST(Heading, HasLongTitlesAndNoTimeWithoutTimes) {
+  Shown shown(scene::atmosphere_grid(), one_scalar(), [](protocol::View& view) {
+    view.annotations.title = true;
+    view.annotations.step_time = true;
+    view.annotations.north = true;
+  });
+  data::DatasetInfo info = shown.subject().info;
+  info.title = std::string(300, 'w');
+  info.steps = {{0, "0"}};
+  info.time_units.clear();
+  const Subject named = shown.subject();
+  const Figure figure = figure_of({named.completed, named.scene, info});
+  const auto written = texts(figure.above);
+  EXPECT_THAT(written, Contains(testing::StartsWith("wwwwww")));
+  EXPECT_THAT(written, Not(Contains("0")));
+  info.steps = {{7, "7"}};
+  EXPECT_THAT(texts(figure_of({named.completed, named.scene, info}).above), Contains("7"));
+}
+
 TEST(ScaleBar, HasTheLengthItTells) {
   const Shown shown(scene::atmosphere_grid(), one_scalar(), [](protocol::View& view) {
     view.camera.projection = protocol::Projection::orthographic;
@@ -344,6 +433,31 @@ TEST(Legend, TellsUnitsLengthsAndWhatIsLeftOut) {
   EXPECT_THAT(written, Contains("cloud"));
   EXPECT_THAT(written, Contains("kg m\u207b\u00b3"));
   for (const char* tick : {"0", "10", "20", "30", "40"}) EXPECT_THAT(written, Contains(tick));
+}
+
+// Units and names of any length keep their texts upright and within their card.
+TEST(Legend, LongUnitsLeaveTheirTextsReadable) {
+  std::vector<data::FieldInfo> fields{scene::scalar_info(
+      "cloud", std::string("kilograms per cubic metre, ") + std::string(90, 'm'))};
+  const Shown shown(scene::atmosphere_grid(), fields, [](protocol::View& view) {
+    view.scalars.emplace().push_back({});
+    view.scalars->front().field = "cloud";
+  });
+  Figure figure = empty_figure(shown);
+  const Style style = style_of(shown.subject());
+  add_legend(shown.subject(), style, figure);
+  ASSERT_THAT(texts(figure.above), Contains("cloud"));
+  const Rectangle card = figure.taken.front();
+  for (const Item& item : figure.above) {
+    const Text* text = std::get_if<Text>(&item);
+    if (text == nullptr) continue;
+    EXPECT_GT(text->size, 0) << text->text;
+    if (text->text == "cloud") {
+      EXPECT_DOUBLE_EQ(text->size, style.text);
+    }
+    EXPECT_GE(bounds_of(*text).low.x, card.low.x) << text->text;
+    EXPECT_LE(bounds_of(*text).high.x, card.high.x) << text->text;
+  }
 }
 
 // A medium by height: the ticks are pressures, at the colours of their heights.

@@ -10,7 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "server/annotate/paint/document.hpp"
 #include "server/annotate/paint/overlay.hpp"
+#include "server/annotate/paint/type.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/frame/frame.hpp"
 #include "server/image/decode.hpp"
@@ -144,6 +146,29 @@ TEST_F(AnnotatedPicture, SvgHasItsTextsAsText) {
   EXPECT_THAT(svg, HasSubstr(">Global circulation with clouds</text>"));
   EXPECT_THAT(svg, HasSubstr("data:image/png;base64,iVBORw0KGgo"));
   EXPECT_EQ(svg.find("nan", svg.find("</text>")), std::string::npos) << "behind the picture";
+}
+
+// SVG aligns texts at their start, middle and end: any other alignment is a shift, so that a text
+// lies where the pixels have it.
+TEST(Svg, PutsTextsWhereThePixelsHaveThem) {
+  for (const double align : {0.0, 0.2, 0.3, 0.5, 0.7, 0.9, 1.0}) {
+    Figure figure;
+    figure.width = 200;
+    figure.height = 20;
+    const Text text{"pressure", {100, 15}, 12, align, {}, {}};
+    figure.above.emplace_back(text);
+    const std::vector<std::uint8_t> rgb(std::size_t{3} * 200 * 20);
+    const auto made = encode_svg(rgb, figure, 300);
+    ASSERT_TRUE(made);
+    const std::string svg(made->begin(), made->end());
+    const std::size_t at = svg.find("<text x=\"");
+    const double x = std::stod(svg.substr(at + 9));
+    const double width = width_of(text.text, text.size);
+    const double left = svg.find("\"start\"", at) != std::string::npos ? x
+                        : svg.find("\"end\"", at) != std::string::npos ? x - width
+                                                                       : x - width / 2;
+    EXPECT_NEAR(left, 100 - align * width, 0.01) << align;
+  }
 }
 
 // Streams of a PDF that are compressed, as text.
