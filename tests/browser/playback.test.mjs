@@ -149,7 +149,7 @@ test("dragging the slider pauses playback until release", async () => {
     const under = await page.locator("#time-slider").inputValue();
     assert.equal(await label(page, "#time-play"), "Play", "playback is paused");
     const words = await page.locator("#time-step").textContent();
-    assert.match(words, new RegExp(`step ${under} `));
+    assert.match(words, new RegExp(`step ${Number(under) + 1} `));
     await page.waitForFunction(
       (step) => document.querySelector("#picture").dataset.step === step,
       under,
