@@ -260,6 +260,7 @@ Result<void> animate(const AnimateArguments& arguments, const CancelToken& cance
 
   frame::Encoding encoding = file_encoding(plan->format, arguments.view);
   encoding.measure = !arguments.report.empty();
+  encoding.measure_change = encoding.measure;
   ThreadPool pool(arguments.threads);
   LimitedPictures pictures(**dataset, encoding, pool);
   const auto reports = draw_all(*plan, view, pictures, cancel);

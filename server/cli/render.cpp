@@ -48,6 +48,7 @@ Result<void> render(const RenderArguments& arguments) {
   ThreadPool pool(arguments.threads);
   frame::Encoding encoding = file_encoding(*format, arguments.view);
   encoding.measure = !arguments.report.empty();
+  encoding.measure_change = encoding.measure;
   const auto picture = LimitedPictures(**dataset, encoding, pool).draw(view, CancelToken());
   if (!picture) return picture.error();
   if (const std::string text = exceeded_limits(*picture); !text.empty()) complain(text);

@@ -405,8 +405,7 @@ std::optional<quality::Content> content_of(const scene::Scene& scene, const Canc
   out.step_cell = light.cell.value();
   const PixelTrials tried = pixel_trials(scene, sampling.rays_through(seen), cancel);
   if (cancel.cancelled()) return std::nullopt;
-  const bool beside =
-      scene.camera.perspective && tried.trials && shows_anything(*tried.trials);
+  const bool beside = scene.camera.perspective && tried.trials && shows_anything(*tried.trials);
   if (seen.empty() && beside) out = of_cells_at_the_eye(scene.camera);
   out.trials = tried.trials;
   out.skipped_change = tried.skipped_change;

@@ -179,9 +179,34 @@ Result<engine::WorkReport> render_scene(const Prepared& prepared, ThreadPool& po
 // Content is that of the view, not of coarser data.
 bool needs_content(const Prepared& prepared, const Frame& drawn) {
   const Encoding& encoding = prepared.encoding;
-  const bool wanted = encoding.describe || (encoding.measure && !drawn.error);
+  const bool wanted = encoding.describe || (encoding.measure && !drawn.error) ||
+                      (encoding.measure_change && !drawn.skipped_change);
   return wanted && prepared.setting.coarser == 0 &&
          prepared.scene.method != scene::Method::reference;
+}
+
+// The change needs the picture and is measured first, unless whether it is depends on the error.
+Result<void> measure(const Prepared& prepared, data::Dataset& dataset, ThreadPool& pool,
+                     const CancelToken& cancel, Workspace& workspace) {
+  Frame& drawn = workspace.drawn;
+  const std::optional<double>& limit = drawn.view.quality.max_error;
+  const auto measure_change = [&]() -> Result<void> {
+    const auto change = measured_skipped_change(prepared, pool, cancel, workspace);
+    if (!change) return change.error();
+    drawn.skipped_change = *change;
+    return {};
+  };
+  const bool wanted = prepared.encoding.measure_change && !drawn.skipped_change &&
+                      is_change_measured(prepared.scene, drawn.work);
+  const bool afterwards = wanted && limit.has_value();
+  if (wanted && !afterwards) {
+    if (auto done = measure_change(); !done) return done.error();
+  }
+  const auto error = measured_error(prepared, dataset, pool, cancel, workspace, afterwards);
+  if (!error) return error.error();
+  drawn.error = *error;
+  const bool kept = !drawn.error || !limit || *drawn.error <= *limit;
+  return afterwards && kept ? measure_change() : Result<void>();
 }
 
 bool is_transparent(const engine::Image& picture) {
@@ -309,13 +334,10 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.halvings = halvings_of(prepared, dataset);
   drawn.render_us = prepared.prepare_us + microseconds(start, Clock::now());
   const Clock::time_point measured_from = Clock::now();
+  if (!drawn.work.variant.reference && drawn.work.skipped_bound == 0) drawn.skipped_change = 0;
   if (is_measured(prepared)) {
-    const auto change = measured_skipped_change(prepared, pool, cancel, workspace);
-    if (!change) return given_up(change.error(), workspace);
-    drawn.skipped_change = *change;
-    auto error = measured_error(prepared, dataset, pool, cancel, workspace);
-    if (!error) return given_up(error.error(), workspace);
-    drawn.error = *error;
+    auto done = measure(prepared, dataset, pool, cancel, workspace);
+    if (!done) return given_up(done.error(), workspace);
   }
   drawn.content = prepared.content;
   if (!drawn.content && needs_content(prepared, drawn)) {

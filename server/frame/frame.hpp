@@ -41,8 +41,12 @@ struct Encoding {
   image::Subsampling subsampling = image::Subsampling::s444;
   bool allow_reference = false;  // see complete()
   // Whether the error of the picture is measured by a second, finer rendering, that of a JPEG by
-  // decoding it, and the change by what tolerances leave out by drawing that too.
+  // decoding it.
   bool measure = false;
+  // Whether the change by what tolerances leave out is measured by drawing that too, if that takes
+  // no longer than is_change_measured() allows, and the error is within the view's maxError: other
+  // pictures are drawn again. Where it is not measured the view is described.
+  bool measure_change = false;
   // Whether what the view shows is described, which its estimated errors follow from. It takes some
   // 50 ms, so pictures with a measured error, which do not need it, are described only if this is
   // set. One of which the error should be measured and cannot be is described in any case.
@@ -75,7 +79,8 @@ struct Frame {
   // that of its encoding.
   std::optional<double> error;
   std::optional<double> jpeg_error;
-  std::optional<double> skipped_change;  // measured_skipped_change; empty: not measured
+  // measured_skipped_change, or 0 if it is certain that nothing is left out; empty: not measured.
+  std::optional<double> skipped_change;
   Coded coded = Coded::as_asked;
   std::string video_fault;  // if video failed
 };

@@ -36,16 +36,22 @@ bool is_measured(const Prepared& prepared);
 // of the difference, r being the ratio of the thicknesses; for other pictures it is the difference.
 // Empty if the finer rendering is not possible: merged data of which not every sample is resident,
 // or with more than four times the samples drawn, or more slabs than the engine draws. Reads no
-// file. Errors: those of the engine.
+// file. `keep`: the picture is kept, as that of every format but JPEG is. Errors: those of the
+// engine.
 Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dataset& dataset,
                                              ThreadPool& pool, const CancelToken& cancel,
-                                             Workspace& workspace);
+                                             Workspace& workspace, bool keep = false);
+
+// Whether drawing every line and splat is expected to take no longer than measuring the error, from
+// the counts of the picture, which depend on nothing else: few kernel positions, or few of them
+// left out.
+bool is_change_measured(const scene::Scene& scene, const engine::WorkReport& work);
 
 // The change of the picture by the lines and splats that its tolerances leave out: mean over pixels
 // of the channel of linear premultiplied RGBA that changes most. The picture in the workspace is
 // compared with that of the same scene with every line and splat, drawn by the same method, so that
-// the value is exact but for rounding (1e-7 for each update of a pixel). Draws nothing if nothing
-// is left out. Errors: those of the engine.
+// the value is exact but for rounding (1e-7 for each update of a pixel). Errors: those of the
+// engine.
 Result<double> measured_skipped_change(const Prepared& prepared, ThreadPool& pool,
                                        const CancelToken& cancel, Workspace& workspace);
 

@@ -174,12 +174,6 @@ class TryingPixels {
   double met_ = 0;                                     // kernels by each ray
 };
 
-scene::Scene without_tolerances(scene::Scene scene) {
-  if (scene.vector) scene.vector->min_magnitude = 0;
-  for (scene::ScalarLayer& layer : scene.scalars) layer.min_optical_depth = 0;
-  return scene;
-}
-
 // Those of the drawn scene: splats of several layers are left out below the least one.
 Tolerances tolerances_of(const scene::Scene& scene) {
   Tolerances out;
@@ -249,6 +243,12 @@ class TryingSkipped {
 };
 
 }  // namespace
+
+scene::Scene without_tolerances(scene::Scene scene) {
+  if (scene.vector) scene.vector->min_magnitude = 0;
+  for (scene::ScalarLayer& layer : scene.scalars) layer.min_optical_depth = 0;
+  return scene;
+}
 
 PixelTrials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough>& through,
                          const CancelToken& cancel) {

@@ -27,6 +27,10 @@ struct PixelTrials {
   // few places could be tried. 0 without trying if the tolerances are 0.
   std::optional<double> skipped_change;
 };
+
+// The scene with every line and splat.
+scene::Scene without_tolerances(scene::Scene scene);
+
 // `through`: samples that the picture shows.
 PixelTrials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough>& through,
                          const CancelToken& cancel = {});

@@ -35,7 +35,7 @@ struct Range {
 struct Ranges {
   Range truth;      // mean change of the picture
   Range bound;      // work.skippedBound over it
-  Range measured;   // skippedChange over it
+  Range measured;   // measured_skipped_change over it
   Range estimated;  // that of a view that was described; 0: none
   Range updates;    // of pixels: with everything over the picture
   Range time;       // of measuring the change over that of measuring the error
@@ -91,15 +91,16 @@ class TrialViews {
     const double truth = apart(space_.space.image().rgba, everything.image.rgba).mean;
     ranges_.truth.add(truth);
     ranges_.bound.add(drawn.work.skipped_bound / truth);
-    ranges_.measured.add(drawn.skipped_change.value() / truth);
     const auto content = frame::content_of(prepared.scene);
     ranges_.estimated.add(content->skipped_change.value_or(0) / truth);
     ranges_.updates.add(static_cast<double>(everything.work.pixel_updates) /
                         static_cast<double>(drawn.work.pixel_updates));
     const double start = processor_ms();
-    value_or_give_up(frame::measured_skipped_change(prepared, pool_, {}, space_));
+    const double change =
+        value_or_give_up(frame::measured_skipped_change(prepared, pool_, {}, space_));
     const double between = processor_ms();
     value_or_give_up(frame::measured_error(prepared, dataset, pool_, {}, space_));
+    ranges_.measured.add(change / truth);
     ranges_.time.add((between - start) / (processor_ms() - between));
   }
 

@@ -59,6 +59,7 @@ class Measure : public testing::Test {
     Encoding encoding;
     encoding.format = format;
     encoding.measure = true;
+    encoding.measure_change = true;
     auto frame = produce(own, *dataset, encoding, pool, cancel, workspace);
     EXPECT_TRUE(frame) << frame.error().message;
     return frame ? std::move(*frame) : Frame();
@@ -264,11 +265,61 @@ TEST_F(Measure, ChangeBySkippedLinesHasTheSameBitsForAnyNumberOfThreads) {
   EXPECT_GT(change, 0);
   Encoding encoding;
   encoding.measure = true;
+  encoding.measure_change = true;
   for (const unsigned threads : {1U, 3U, 7U}) {
     ThreadPool other(threads);
     const auto frame = produce(view, *dataset, encoding, other, cancel);
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->skipped_change, change) << threads;
+  }
+}
+
+// Which lines and splats are left out is known before: nothing needs to be measured for it.
+TEST_F(Measure, ChangeOfAnyPictureIsKnownToBeZeroIfNothingIsSkipped) {
+  view.scalars.value()[0].min_optical_depth = 0;
+  view.vector.min_magnitude = 0;
+  const auto plain = produce(view, *dataset, {}, pool, cancel);
+  ASSERT_TRUE(plain);
+  EXPECT_EQ(plain->work.skipped_bound, 0);
+  EXPECT_EQ(plain->skipped_change, 0.0);
+}
+
+// A picture beyond the error that was asked for is drawn again.
+TEST_F(Measure, ChangeIsMeasuredOnlyOfPicturesThatKeepTheirError) {
+  view.vector.min_magnitude = 0.3 * view.vector.magnitude_range.value()[1];
+  for (const Format format : {Format::jpeg, Format::npy}) {
+    view.quality.max_error.reset();
+    const Frame free = drawn(protocol::MethodName::kernel, format);
+    view.quality.max_error = 0.5 * free.error.value();
+    const Frame beyond = drawn(protocol::MethodName::kernel, format);
+    EXPECT_FALSE(beyond.skipped_change);
+    ASSERT_TRUE(beyond.content);
+    EXPECT_TRUE(beyond.content->skipped_change);
+    view.quality.max_error = 2 * free.error.value();
+    const Frame kept = drawn(protocol::MethodName::kernel, format);
+    EXPECT_EQ(kept.skipped_change, free.skipped_change.value());
+    EXPECT_EQ(kept.error, free.error);
+    EXPECT_EQ(kept.bytes, free.bytes);
+  }
+}
+
+// Counts of kernel positions decide, so that it does not depend on the load.
+TEST_F(Measure, ChangeIsNotMeasuredWhereDrawingEverythingWouldTakeMuchLongerThanThePicture) {
+  const auto scene = scene::build_scene(completed(), *dataset);
+  ASSERT_TRUE(scene);
+  scene::Scene some = scene.value();
+  for (const auto method : {scene::Method::kernel, scene::Method::slab}) {
+    some.method = method;
+    const auto is_measured_with = [&](double samples, double share_left_out) {
+      engine::WorkReport work;
+      work.samples = static_cast<std::int64_t>(samples);
+      work.skipped_both = static_cast<std::int64_t>(samples * share_left_out);
+      return is_change_measured(some, work);
+    };
+    EXPECT_TRUE(is_measured_with(1e8, 0.5));
+    EXPECT_TRUE(is_measured_with(2e5, 0.999)) << "takes no longer than describing the view";
+    EXPECT_FALSE(is_measured_with(1e8, 0.98));
+    EXPECT_FALSE(is_measured_with(1e8, 1));
   }
 }
 
@@ -280,7 +331,7 @@ TEST_F(Measure, MeasuredPictureIsTheSentOne) {
     view.method.name = protocol::MethodName::slab;
     const auto plain = produce(view, *dataset, encoding, pool, cancel);
     ASSERT_TRUE(plain);
-    EXPECT_FALSE(plain->error || plain->skipped_change);
+    EXPECT_FALSE(plain->error);
     EXPECT_EQ(measured.bytes, plain->bytes) << static_cast<int>(format);
   }
 }
