@@ -424,7 +424,7 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
 // of half the thickness 1.3 to 2.5.
 bool is_change_measured(const scene::Scene& scene, const engine::WorkReport& work) {
   const bool slab = scene.method == scene::Method::slab;
-  const double few = slab ? 1 << 18 : 1 << 20;  // take no longer than describing the view
+  const double few = slab ? 0x1p18 : 0x1p20;  // take no longer than describing the view
   const double pictures_most = slab ? 2.5 : 5;
   const double of_left_out = scene.scalars.empty() ? 0.25 : 0.15;
   const auto visible = static_cast<double>(work.samples - work.culled);
