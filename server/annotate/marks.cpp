@@ -73,7 +73,8 @@ std::optional<glm::dvec3> north_of(const Subject& subject, const glm::dvec3& at)
   return placed.grid.columns ? north_of_columns(placed.grid, placed.lattice) : std::nullopt;
 }
 
-// Where the centre of the picture meets a globe; the centre of the box otherwise, or beside it.
+// Where the centre of the picture meets the ground of a globe, the inner edge of its shell, or the
+// point of it nearest to the line of sight; without a globe the centre of the box.
 glm::dvec3 middle_of(const Subject& subject) {
   const scene::Lattice& lattice = subject.completed.lattice();
   const scene::Camera& camera = subject.scene.camera;
@@ -82,15 +83,20 @@ glm::dvec3 middle_of(const Subject& subject) {
   }
   const double along = -glm::dot(camera.eye, camera.forward);
   const glm::dvec3 nearest = camera.eye + along * camera.forward;
-  const double inside = 1 - glm::dot(nearest, nearest);
-  return inside > 0 ? nearest - std::sqrt(inside) * camera.forward : glm::normalize(nearest);
+  const double radius = lattice.inner_radius;
+  const double inside = radius * radius - glm::dot(nearest, nearest);
+  return inside > 0 ? nearest - std::sqrt(inside) * camera.forward
+                    : radius * glm::normalize(nearest);
 }
 
 // Metres on the ground for each world unit.
 std::optional<double> metres_per_unit(const Subject& subject) {
   const scene::Placed& placed = *subject.completed.placed();
   const GeometryMapping mapping = subject.completed.view().geometry.mapping;
-  if (mapping == GeometryMapping::sphere) return scene::earth_radius_m;
+  if (mapping == GeometryMapping::sphere) {
+    const double radius = subject.completed.lattice().inner_radius;
+    return radius > 0 ? std::optional(scene::earth_radius_m / radius) : std::nullopt;
+  }
   return scene::metres_per_unit(placed.grid, placed.lattice);
 }
 

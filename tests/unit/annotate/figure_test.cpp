@@ -348,6 +348,33 @@ TEST(ScaleBar, HasTheLengthItTells) {
   EXPECT_GE(pixels, 0.22 * 640 / 2.5) << "1, 2 and 5 are at most 2.5 times apart";
 }
 
+// A globe's shell is drawn thicker than the atmosphere; its ground is the body within it. In a
+// parallel projection the bar is to the radius of the ground's disc as its length to the Earth's.
+TEST(ScaleBar, HasTheLengthItTellsOnTheGroundOfAGlobe) {
+  for (const double thickness : {0.1, 1.0, 3.0}) {
+    const Shown shown(scene::atmosphere_grid(), one_scalar(), [&](protocol::View& view) {
+      view.geometry.mapping = protocol::GeometryMapping::sphere;
+      view.geometry.scale = protocol::Vec3{1, 1, thickness};
+      view.camera.projection = protocol::Projection::orthographic;
+      view.camera.eye = protocol::Vec3{0, -5, 0};
+      view.camera.target = protocol::Vec3{0, 0, 0};
+      view.camera.height = 2.5;
+    });
+    Figure figure = empty_figure(shown);
+    add_scale_bar(shown.subject(), style_of(shown.subject()), figure);
+    const auto written = texts(figure.above);
+    ASSERT_THAT(written, SizeIs(1));
+    const double km = std::stod(written[0]);
+    const auto bars = lines(figure.above);
+    ASSERT_THAT(bars, SizeIs(1));
+    const double pixels = bars[0].points[2].x - bars[0].points[1].x;
+    ASSERT_TRUE(shown.scene().body);
+    const double disc = shown.scene().body->radius * 480 / 2.5;
+    // The body is 0.999 of the ground, so that it lies within the lowest cells.
+    EXPECT_NEAR(km / 6371, pixels / disc, 0.002 * pixels / disc) << thickness;
+  }
+}
+
 TEST(ScaleBar, IsAbsentWithoutALength) {
   data::Grid grid = scene::atmosphere_grid();
   for (std::size_t a = 0; a < 2; ++a) {
