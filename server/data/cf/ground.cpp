@@ -2,8 +2,10 @@
 #include "server/data/cf/ground.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <initializer_list>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -14,6 +16,7 @@
 
 #include "server/base/ascii.hpp"
 #include "server/data/cf/grid/vertical.hpp"
+#include "server/data/cf/time.hpp"
 #include "server/data/cf/units.hpp"
 
 namespace windsplat::data::cf {
@@ -21,6 +24,8 @@ namespace windsplat::data::cf {
 namespace {
 
 constexpr double gravity_of_surface = 9.80665;  // m s-2, as for geopotentials of levels
+// Above the highest mountain known, Olympus Mons at 22 km: a fill value or another unit.
+constexpr float height_max = 30'000;  // metres
 
 enum class GroundQuantity { none, altitude, geopotential, depth };
 
@@ -42,29 +47,44 @@ GroundQuantity of_standard_name(const std::string& name) {
   return GroundQuantity::none;
 }
 
-// Names of models: WRF, CMIP, COSMO, ICON, the Unified Model; ROMS, NEMO, MOM6, MITgcm. A short one
-// needs a long name that says the same.
+bool says_any(const std::string& text, std::initializer_list<std::string_view> parts) {
+  return std::any_of(parts.begin(), parts.end(),
+                     [&](std::string_view part) { return text.find(part) != std::string::npos; });
+}
+
+// NCEP's HGT and others are also the heights of surfaces of constant pressure.
+bool is_of_pressure_level(const std::string& long_name) {
+  return says_any(long_name, {"hpa", " mb", "millibar", "pressure", "isobaric", "tropopause"}) ||
+         (says_any(long_name, {"geopotential"}) &&
+          !says_any(long_name, {"surface", "ground", "terrain", "orograph"}));
+}
+
+// A depth that names the floor, and no layer in the water or on land.
+bool is_depth_of_floor(const std::string& long_name) {
+  return says_any(long_name, {"sea floor", "bathymetry", "bottom", "ocean"}) &&
+         !says_any(long_name, {"mixed", "layer", "cline", "isotherm", "snow", "ice", "light"});
+}
+
+// Names of models: WRF, CMIP, COSMO, ICON, the Unified Model, FV3; ROMS, NEMO, MOM6, MITgcm. A
+// short one needs a long name that says the same.
 GroundQuantity of_usual_name(const FileVariable& variable) {
   constexpr auto heights = std::to_array<std::string_view>(
-      {"hgt", "hgt_m", "orog", "orography", "hsurf", "topography_c"});
+      {"hgt", "hgt_m", "orog", "orography", "hsurf", "topography_c", "zsurf", "hgtsfc"});
   constexpr auto geopotentials = std::to_array<std::string_view>({"phis", "fis", "geosp"});
   constexpr auto depths = std::to_array<std::string_view>(
       {"deptho", "depth_ocean", "bathymetry", "bathy", "bathy_meter", "bathy_metry"});
   const std::string name = lower(variable.name);
   const std::string long_name = lower(variable.long_name);
-  const auto says = [&](std::string_view part) {
-    return long_name.find(part) != std::string::npos;
-  };
+  const bool of_level = is_of_pressure_level(long_name);
   if (!variable.standard_name.empty()) {
-    const bool surface = says("surface") || says("orography");
+    const bool surface = says_any(long_name, {"surface", "orography"}) && !of_level;
     const bool of_surface = variable.standard_name == "geopotential" && surface;
     return of_surface ? GroundQuantity::geopotential : GroundQuantity::none;
   }
-  if (is_one_of(name, heights)) return GroundQuantity::altitude;
+  if (is_one_of(name, heights)) return of_level ? GroundQuantity::none : GroundQuantity::altitude;
   if (is_one_of(name, geopotentials)) return GroundQuantity::geopotential;
-  const bool short_depth = (name == "h" && says("bathymetry")) ||
-                           (name == "depth" && (says("sea floor") || says("bathymetry") ||
-                                                says("bottom") || says("ocean")));
+  const bool short_depth = (name == "h" && says_any(long_name, {"bathymetry"})) ||
+                           (name == "depth" && is_depth_of_floor(long_name));
   if (is_one_of(name, depths) || short_depth) return GroundQuantity::depth;
   return GroundQuantity::none;
 }
@@ -80,7 +100,26 @@ std::optional<double> upward_metres(const FileVariable& variable, const GroundCa
   const bool bare = variable.units.empty() && as.by == FoundBy::formula;
   const auto metres = bare ? std::optional(1.0) : metres_in(variable.units);
   if (!metres) return std::nullopt;
-  return as.quantity == GroundQuantity::depth ? -*metres : *metres;
+  const bool downward = as.quantity == GroundQuantity::depth && lower(variable.positive) != "up";
+  return downward ? -*metres : *metres;
+}
+
+// Depths that are heights throughout, or reach farther up than down: elevations are also called
+// bathymetry. Those of a standard name or a formula are defined as downward.
+std::string fault_of_depths(const std::vector<float>& depths, bool may_be_elevations) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const float depth : depths) {
+    if (!std::isfinite(depth)) continue;
+    low = std::min(low, static_cast<double>(depth));
+    high = std::max(high, static_cast<double>(depth));
+  }
+  if (low <= high && high < 0) return "its depths are below zero throughout";
+  if (!may_be_elevations || !(low < -high)) return {};
+  return "its depths of " + number_text(low) + " .. " + number_text(high) +
+         " reach farther above zero than below, as elevations do; its attribute 'positive' ('up' "
+         "or "
+         "'down') would tell";
 }
 
 class GroundFinder {
@@ -171,13 +210,23 @@ class GroundFinder {
     }
     std::vector<float> values;
     if (std::string fault = read(from.variable, values); !fault.empty()) return fault;
-    if (from.quantity == GroundQuantity::depth && is_upside_down(values)) {
-      return "its depths are below zero throughout";
+    if (from.quantity == GroundQuantity::depth && lower(one.positive) != "up") {
+      const bool is_defined = from.by != FoundBy::usual_name || !one.positive.empty();
+      if (std::string fault = fault_of_depths(values, !is_defined); !fault.empty()) return fault;
+    }
+    if (from.quantity != GroundQuantity::depth && lower(one.positive) == "down") {
+      return "its attribute 'positive' is 'down'";
     }
     multiply(*factor, values.size(), values.data());
     // A depth of 0 is a height of 0, not of -0.
     for (float& value : values) {
       value = std::isfinite(value) ? value + 0.0F : std::numeric_limits<float>::quiet_NaN();
+    }
+    const auto too_far = std::find_if(values.begin(), values.end(),
+                                      [](float z) { return std::abs(z) > height_max; });
+    if (too_far != values.end()) {
+      return "its values reach " + number_text(static_cast<double>(*too_far)) +
+             " m, where mountains and seas end at " + number_text(static_cast<double>(height_max));
     }
     const bool sea_floor = from.quantity == GroundQuantity::depth;
     if (sea_floor) raise_land(values);
@@ -193,13 +242,6 @@ class GroundFinder {
       if (left.name == one.name) left.reason = "gives the height of the ground (geometry.body)";
     }
     return {};
-  }
-
-  static bool is_upside_down(const std::vector<float>& depths) {
-    const auto known = [](float d) { return std::isfinite(d); };
-    return std::none_of(depths.begin(), depths.end(),
-                        [&](float d) { return known(d) && d >= 0; }) &&
-           std::any_of(depths.begin(), depths.end(), known);
   }
 
   std::string read_at(int v, std::size_t step, std::vector<float>& values) const {

@@ -193,6 +193,67 @@ TEST(GroundOfAFile, OfDepthsBelowZeroIsRefused) {
   EXPECT_TRUE(has_note(source->info(), "its depths are below zero throughout"));
 }
 
+// NCEP names the height of any surface HGT.
+TEST(GroundOfAFile, IsNoHeightOfASurfaceOfConstantPressure) {
+  Folder folder;
+  struct Case {
+    const char* name;
+    const char* units;
+    const char* standard_name;
+    const char* long_name;
+    bool is_ground;
+  };
+  for (const Case& one :
+       {Case{"HGT", "gpm", "", "Geopotential Height at 500 mb", false},
+        Case{"hgt", "m", "", "Geopotential height", false},
+        Case{"HGT", "gpm", "", "Geopotential height at the surface", true},
+        Case{"HGT", "m", "", "Terrain Height", true},
+        Case{"z", "m2 s-2", "geopotential", "Geopotential of the 500 hPa surface", false},
+        Case{"z", "m2 s-2", "geopotential", "Geopotential at the surface", true},
+        Case{"depth", "m", "", "Ocean mixed layer depth", false},
+        Case{"depth", "m", "", "Depth of the ocean", true}}) {
+    const std::string path = file_with(folder / "a.nc", [&](NetcdfMaker& made, int, int y, int x) {
+      const int v = made.variable(one.name, NC_DOUBLE, {y, x}, {0, 1, 2, 3, 4, 5});
+      made.text(v, "units", one.units);
+      made.text(v, "long_name", one.long_name);
+      if (*one.standard_name != 0) made.text(v, "standard_name", one.standard_name);
+    });
+    EXPECT_EQ(opened(path)->info().grid.ground != nullptr, one.is_ground) << one.long_name;
+  }
+}
+
+// GEBCO and others call elevations bathymetry.
+TEST(GroundOfAFile, IsUpwardWhereAnAttributeSaysSoAndRefusedWhereNoneDoes) {
+  Folder folder;
+  const std::vector<double> elevations{-4000, -300, -20, 0, 40, 900};
+  for (const char* positive : {"up", ""}) {
+    const std::string path = file_with(folder / "a.nc", [&](NetcdfMaker& made, int, int y, int x) {
+      const int v = made.variable("bathymetry", NC_DOUBLE, {y, x}, elevations);
+      made.text(v, "units", "m");
+      if (*positive != 0) made.text(v, "positive", positive);
+    });
+    const auto source = opened(path);
+    const auto& ground = source->info().grid.ground;
+    if (*positive != 0) {
+      ASSERT_TRUE(ground);
+      expect_heights(*ground, elevations);
+    } else {
+      EXPECT_FALSE(ground);
+      EXPECT_TRUE(has_note(source->info(), "its depths of -4000 .. 900 reach farther above zero"));
+    }
+  }
+}
+
+TEST(GroundOfAFile, IsNoFillValueWithoutAnAttribute) {
+  Folder folder;
+  const std::string path = file_with(folder / "a.nc", [](NetcdfMaker& made, int, int y, int x) {
+    made.text(made.variable("orog", NC_DOUBLE, {y, x}, {0, 1, 2, 3, 4, 99999}), "units", "m");
+  });
+  const auto source = opened(path);
+  EXPECT_FALSE(source->info().grid.ground);
+  EXPECT_TRUE(has_note(source->info(), "its values reach 99999 m"));
+}
+
 TEST(GroundOfAFile, OnOtherPointsIsNamedByANote) {
   Folder folder;
   const std::string path = file_with(folder / "a.nc", [](NetcdfMaker& made, int, int y, int) {
