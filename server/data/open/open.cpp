@@ -16,6 +16,7 @@
 #include "server/data/cf/grid/axes.hpp"
 #include "server/data/cf/joined.hpp"
 #include "server/data/cf/mesh/meshed_file.hpp"
+#include "server/data/cf/selected/index_axes.hpp"
 #include "server/data/cf/selected/selected_file.hpp"
 #include "server/data/cf/series.hpp"
 #include "server/data/cf/source.hpp"
@@ -113,7 +114,7 @@ Result<std::unique_ptr<cf::ArrayFile>> as_arrays(const Files& files,
                                                  Result<std::unique_ptr<File>> file) {
   auto chosen = chosen_of(files, std::move(file));
   if (!chosen) return chosen.error();
-  return cf::collocated(std::move(*chosen));
+  return cf::collocated(cf::without_index_axes(std::move(*chosen)));
 }
 
 // Only netCDF and HDF5 have groups; for other formats a group after '#/' must not be ignored.
