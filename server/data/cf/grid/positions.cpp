@@ -267,8 +267,8 @@ class PositionFinder {
       const std::size_t at = chosen[1][n / chosen[0].size()] * width + i;
       const std::size_t beside = i + 1 < width ? at + 1 : width > 1 ? at - 1 : at;
       const Place here{own.longitude[at], own.latitude[at]};
-      farthest = std::max(
-          farthest, distance_between(here, {found->columns->longitude[n], found->columns->latitude[n]}));
+      farthest = std::max(farthest, distance_between(here, {found->columns->longitude[n],
+                                                            found->columns->latitude[n]}));
       cell = std::max(cell, distance_between(here, {own.longitude[beside], own.latitude[beside]}));
     }
     if (!(farthest > 0.5 * cell)) return;
