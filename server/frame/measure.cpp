@@ -426,7 +426,7 @@ bool is_change_measured(const scene::Scene& scene, const engine::WorkReport& wor
   const bool slab = scene.method == scene::Method::slab;
   const double few = slab ? 0x1p18 : 0x1p20;  // take no longer than describing the view
   const double pictures_most = slab ? 2.5 : 5;
-  const double of_left_out = scene.scalars.empty() ? 0.25 : 0.15;
+  constexpr double of_left_out = 0.25;
   const auto visible = static_cast<double>(work.samples - work.culled);
   const auto left_out = static_cast<double>(work.skipped_both);
   return visible <= few ||

@@ -25,7 +25,6 @@ frame::Encoding frame_encoding(const session::Encoding& wanted) {
   encoding.quality = wanted.quality;
   encoding.subsampling = wanted.full_chroma ? image::Subsampling::s444 : image::Subsampling::s420;
   encoding.measure = wanted.measure;
-  encoding.measure_change = wanted.measure;
   encoding.key = wanted.key;
   return encoding;
 }
