@@ -174,6 +174,7 @@ void add_axis(const Subject& subject, std::size_t axis, const Box& box, const St
     if (!at) continue;
     const Point end{at->x + mark * out.x, at->y + mark * out.y};
     if (!visible_part(figure, {*at, end}, 0)) continue;
+    if (is_taken(figure, *at) || is_taken(figure, end)) continue;
     figure.above.emplace_back(Line{{*at, end}, style.line, style.color});
     const Text text = beside(tick.text, {end.x + gap * out.x, end.y + gap * out.y}, out, style.text,
                              style, style.color);

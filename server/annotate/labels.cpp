@@ -151,7 +151,7 @@ std::vector<Tick> uneven_ticks(double low, double high, double gap,
 }
 
 std::string unit_text(std::string_view units) {
-  if (units == "1") return {};
+  if (units == "1" || units == "(0 - 1)") return {};  // the latter of ECMWF
   std::string out;
   for (std::size_t i = 0; i < units.size();) {
     const char c = units[i];

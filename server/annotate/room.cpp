@@ -72,6 +72,13 @@ bool move_inside(const Figure& figure, Text& text) {
   return true;
 }
 
+bool is_taken(const Figure& figure, const Point& at) {
+  return std::any_of(figure.taken.begin(), figure.taken.end(), [&at](const Rectangle& other) {
+    return other.low.x <= at.x && at.x <= other.high.x && other.low.y <= at.y &&
+           at.y <= other.high.y;
+  });
+}
+
 bool add_if_free(Text text, Figure& figure) {
   const Rectangle box = bounds_of(text);
   const bool inside =

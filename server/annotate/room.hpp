@@ -24,6 +24,9 @@ Rectangle bounds_of(const Text& text);
 // Moves a text so that it lies within the picture. False: it is larger than the picture.
 bool move_inside(const Figure& figure, Text& text);
 
+// Whether something else is written at a point.
+bool is_taken(const Figure& figure, const Point& at);
+
 // Adds a text over the picture if it lies within the picture and no rectangle taken. Its own is
 // taken then.
 bool add_if_free(Text text, Figure& figure);

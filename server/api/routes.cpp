@@ -52,6 +52,8 @@ Handler later(Handle handle, Parts&... parts) {
 constexpr frame::Format jpeg = frame::Format::jpeg;
 constexpr frame::Format png = frame::Format::png;
 constexpr frame::Format npy = frame::Format::npy;
+constexpr frame::Format pdf = frame::Format::pdf;
+constexpr frame::Format svg = frame::Format::svg;
 constexpr const char* frame_name = "/v1/datasets/{id}/frame";
 
 }  // namespace
@@ -101,6 +103,10 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
       Route{"GET", "/v1/datasets/{id}/frame.png", later(get_frame, backend, admission, png),
             Query::taken, Charge::valid_picture, Place::base, frame_name},
       Route{"GET", "/v1/datasets/{id}/frame.npy", later(get_frame, backend, admission, npy),
+            Query::taken, Charge::valid_picture, Place::base, frame_name},
+      Route{"GET", "/v1/datasets/{id}/frame.pdf", later(get_frame, backend, admission, pdf),
+            Query::taken, Charge::valid_picture, Place::base, frame_name},
+      Route{"GET", "/v1/datasets/{id}/frame.svg", later(get_frame, backend, admission, svg),
             Query::taken, Charge::valid_picture, Place::base, frame_name},
       Route{"GET", "/v1/datasets/{id}/probe", later(get_probe, catalogue, loads), Query::taken,
             Charge::picture},

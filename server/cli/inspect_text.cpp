@@ -110,6 +110,16 @@ bool is_whole_globe(const protocol::DatasetDescription& dataset) {
   return span + 1.5 * span / static_cast<double>(at.size() - 1) >= 360;
 }
 
+// The keys of a view that draw the ground. Where samples have heights above sea level of their own,
+// the vertical axis does not tell where the ground is.
+std::string ground_keys(const protocol::DatasetDescription& dataset) {
+  for (const protocol::FieldDescription& field : dataset.fields) {
+    if (field.standard_name != "geopotential_height" && field.standard_name != "altitude") continue;
+    return "(/geometry/heightField=" + word(field.name) + " with /geometry/body/show=on)";
+  }
+  return "(/geometry/body/show=on)";
+}
+
 std::string grid_text(const protocol::DatasetDescription& dataset) {
   constexpr std::array<const char*, 3> letters{"x", "y", "z"};
   std::vector<Row> rows;
@@ -141,7 +151,11 @@ std::string grid_text(const protocol::DatasetDescription& dataset) {
   if (const auto& ground = dataset.ground) {
     world += ground->kind == "land" ? "\nground " : "\nsea floor ";
     world += word(ground->name) + ", " + number(ground->range[0]) + " .. " +
-             number(ground->range[1]) + " m above sea level (/geometry/body/show=on)";
+             number(ground->range[1]) + " m above sea level " + ground_keys(dataset);
+  }
+  if (std::count(dataset.mappings.begin(), dataset.mappings.end(), "curvilinear") > 0) {
+    world +=
+        "\neach column has a longitude and latitude: /geometry/mapping=curvilinear draws a map";
   }
   if (is_whole_globe(dataset)) {
     world += "\nthe longitudes go around: /geometry/mapping=sphere draws a globe, flat a map";

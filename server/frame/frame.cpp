@@ -218,6 +218,7 @@ bool is_transparent(const engine::Image& picture) {
 
 // Pixels that are not encoded are freed: they may occupy half a gigabyte.
 Error given_up(Error error, Workspace& workspace) {
+  workspace.overlay.reset();
   trim_storage(workspace.space.image().rgba, 0, 0);
   return error;
 }
@@ -277,7 +278,9 @@ Result<void> set_overlay(const Prepared& prepared, Workspace& workspace) {
 
 std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annotated) {
   const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  if (pixels <= retained_pixels) return 0;
+  // An overlay is not kept between frames, so all of it counts.
+  const std::uint64_t overlay = annotated ? annotate::overlay_bytes(width, height) : 0;
+  if (pixels <= retained_pixels) return overlay;
   constexpr std::uint64_t linear = 4 * sizeof(float);
   constexpr std::uint64_t codes = 4;  // 8 bits each, and as many for the encoded form
   std::uint64_t bytes_a_pixel = linear + 2 * codes;  // png
@@ -285,8 +288,7 @@ std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annot
   if (format == Format::npy) bytes_a_pixel = 2 * linear;
   // Another copy of the codes, and the encoded form within the document.
   if (format == Format::pdf || format == Format::svg) bytes_a_pixel += 3 * codes;
-  if (annotated) bytes_a_pixel += annotate::overlay_bytes(1, 1);
-  return (pixels - retained_pixels) * bytes_a_pixel;
+  return (pixels - retained_pixels) * bytes_a_pixel + overlay;
 }
 
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,

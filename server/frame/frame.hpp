@@ -99,7 +99,7 @@ struct Workspace {
 };
 
 // Upper bound on the memory for drawing and encoding a picture, beyond that for one of
-// retained_pixels (base/trim_storage.hpp).
+// retained_pixels (base/trim_storage.hpp) without annotations.
 std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annotated = false);
 
 // Completes a view for its dataset; if memory does not suffice, the error states what all fields of

@@ -123,6 +123,40 @@ Framing with_room(const Framing& framing, const protocol::View& view) {
   return {room * framing.distance, room * framing.height};
 }
 
+// The lower part of the picture that a row of a legend's cards takes below ticks, as a fraction of
+// the height. Texts have 14 pixels in a picture of 1280 x 720 (annotations.size).
+double share_of_legend(const protocol::View& view) {
+  const protocol::AnnotationsView& shown = view.annotations;
+  const bool sphere = view.geometry.mapping == protocol::GeometryMapping::sphere;
+  if (!shown.axes || !shown.legend || sphere) return 0;
+  constexpr double card = 10;  // em, with its distance from the edge
+  constexpr double share_most = 0.4;
+  const double narrow = view.image.width / 960.0 / view.image.height;
+  return std::min(card * 14 * shown.size * std::min(1 / 720.0, narrow), share_most);
+}
+
+// The whole box with the room that annotations need: above a legend, if it has ticks.
+struct Whole {
+  Framing framing;
+  glm::dvec3 target;
+};
+Whole place_box(const Lattice& lattice, const OrbitFrame& frame, const protocol::View& view,
+                double zoom) {
+  const double share = share_of_legend(view);
+  const double slope = std::tan(0.5 * view.camera.fov_y * radians_per_degree);
+  const double upper_fov_y = 2 * std::atan((1 - share) * slope) / radians_per_degree;
+  protocol::ImageView upper = view.image;
+  upper.height = std::max(1, static_cast<int>(std::lround((1 - share) * upper.height)));
+  glm::dvec3 target = 0.5 * (lattice.box_min + lattice.box_max);
+  Framing framing = with_room(frame_box(lattice, frame, target, upper_fov_y, upper), view);
+  framing.distance = std::min(framing.distance / zoom, distance_max);
+  framing.height /= (1 - share) * zoom;
+  const bool perspective = view.camera.projection == protocol::Projection::perspective;
+  const double height = perspective ? 2 * slope * framing.distance : framing.height;
+  target -= 0.5 * share * height * frame.up;
+  return {framing, target};
+}
+
 }  // namespace
 
 OrbitFrame orbit_frame(double azimuth, double elevation) {
@@ -153,13 +187,10 @@ double front_azimuth(const Lattice& lattice) {
 void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double elevation,
            double zoom) {
   const OrbitFrame frame = orbit_frame(azimuth, elevation);
-  const glm::dvec3 target = 0.5 * (lattice.box_min + lattice.box_max);
-  const Framing framing =
-      with_room(frame_box(lattice, frame, target, view.camera.fov_y, view.image), view);
-  const double distance = std::min(framing.distance / zoom, distance_max);
+  const auto [framing, target] = place_box(lattice, frame, view, zoom);
   view.camera.target = from_glm(target);
-  view.camera.eye = from_glm(target - frame.forward * distance);
-  view.camera.height = std::clamp(framing.height / zoom, 1e-6, distance_max);
+  view.camera.eye = from_glm(target - frame.forward * framing.distance);
+  view.camera.height = std::clamp(framing.height, 1e-6, distance_max);
   const bool upright = std::abs(elevation) < 89.9;
   view.camera.up = upright ? protocol::Vec3{0, 0, 1} : from_glm(frame.up);
 }
@@ -246,8 +277,15 @@ void complete_camera(protocol::View& view, const Lattice& lattice) {
   if (!camera.eye && !camera.target) {
     if (const auto plane = face_of(view.geometry, lattice)) return face(*plane, lattice, view);
   }
-  if (!camera.target) camera.target = from_glm(0.5 * (lattice.box_min + lattice.box_max));
   const OrbitFrame frame = orbit_frame(front_azimuth(lattice), default_elevation);
+  if (!camera.eye && !camera.target) {
+    const auto [framing, target] = place_box(lattice, frame, view, 1);
+    camera.target = from_glm(target);
+    camera.eye = from_glm(target - frame.forward * framing.distance);
+    if (!camera.height) camera.height = std::max(framing.height, 1e-6);
+    return;
+  }
+  if (!camera.target) camera.target = from_glm(0.5 * (lattice.box_min + lattice.box_max));
   const glm::dvec3 target = to_glm(*camera.target);
   const Framing framing =
       with_room(frame_box(lattice, frame, target, camera.fov_y, view.image), view);

@@ -8,14 +8,14 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ROUTE = re.compile(r'Route\{"([A-Z]+)",\s*(?:"([^"]+)"|(route_stream))')
 # Paths in one row that differ only in the format of the picture.
-FORMATS = ("frame.jpg", "frame.png", "frame.npy")
+FORMATS = ("frame.jpg", "frame.png", "frame.npy", "frame.pdf", "frame.svg")
 
 
 def routes_of(source):
     for method, path, stream in ROUTE.findall(source):
         path = "/v1/stream" if stream else path
         for name in FORMATS:
-            path = path.replace(name, "frame.{jpg,png,npy}")
+            path = path.replace(name, "frame.{jpg,png,npy,pdf,svg}")
         yield method, path.replace("/references/{id}", "/references/{id}.png")
 
 

@@ -227,7 +227,7 @@ test("powers in units are superscript", () => {
     ["m/s", "m/s"],
     ["%", "%"],
     ["hPa", "hPa"],
-    ["1", ""],
+    ["(0 - 1)", ""],
     [undefined, ""],
     ["degrees_north", "degrees_north"],
     ["W/m2", "W/m²"],

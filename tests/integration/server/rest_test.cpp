@@ -148,6 +148,13 @@ TEST_F(Rest, FormatsBySuffixAndByAccept) {
   EXPECT_EQ(npy.header("content-type"), "application/x-npy");
   EXPECT_THAT(npy.body, StartsWith("\x93NUMPY"));
   EXPECT_GE(npy.body.size(), std::size_t{40} * 30 * 16);
+  const Answer pdf = get(port(), "/v1/datasets/small/frame.pdf" + size);
+  EXPECT_EQ(pdf.header("content-type"), "application/pdf");
+  EXPECT_THAT(pdf.body, StartsWith("%PDF-"));
+  const Answer svg = get(port(), "/v1/datasets/small/frame.svg" + size);
+  EXPECT_EQ(svg.header("content-type"), "image/svg+xml");
+  EXPECT_THAT(svg.body, StartsWith("<svg "));
+  EXPECT_NE(svg.header("etag"), png.header("etag"));
   expect_problem(get(port(), "/v1/datasets/small/frame.gif"), 404);
 
   const std::string view = R"({"dataset":"small","image":{"width":40,"height":30}})";

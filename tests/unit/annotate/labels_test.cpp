@@ -74,6 +74,7 @@ TEST(UnitText, RaisesPowersInEveryUsualSpelling) {
   EXPECT_EQ(unit_text("m2/s2"), "m\u00b2/s\u00b2");
   EXPECT_EQ(unit_text("m s\u207b\u00b9"), "m s\u207b\u00b9");
   EXPECT_EQ(unit_text("1"), "");
+  EXPECT_EQ(unit_text("(0 - 1)"), "") << "a fraction, of ECMWF";
   EXPECT_EQ(unit_text("hPa"), "hPa");
   EXPECT_EQ(unit_text("O3x"), "O3x") << "no power";
 }

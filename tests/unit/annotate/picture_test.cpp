@@ -8,6 +8,7 @@
 #include <cstring>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/annotate/paint/document.hpp"
@@ -108,6 +109,18 @@ TEST_F(AnnotatedPicture, NpyAndMeasuredErrorsAreThoseOfTheData) {
   EXPECT_EQ(produce(Format::npy).bytes, produce(Format::npy, plain).bytes);
   EXPECT_EQ(produce(Format::png, view, true).error, produce(Format::png, plain, true).error);
   EXPECT_NE(produce(Format::png).bytes, produce(Format::png, plain).bytes);
+}
+
+// Two layers of 4 bytes a pixel, which no workspace keeps.
+TEST(AnnotatedMemory, CountsForPicturesOfEverySize) {
+  for (const auto& [width, height] :
+       {std::pair(1, 1), std::pair(1280, 720), std::pair(4096, 2160)}) {
+    for (const Format format : {Format::jpeg, Format::png, Format::svg}) {
+      const auto pixels = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+      EXPECT_EQ(frame::bytes_beyond_kept(width, height, format, true),
+                frame::bytes_beyond_kept(width, height, format, false) + 8 * pixels);
+    }
+  }
 }
 
 TEST_F(AnnotatedPicture, IsTheSameForAnyNumberOfThreads) {

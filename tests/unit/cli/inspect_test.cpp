@@ -130,6 +130,33 @@ TEST(Inspect, DescribesAFileOfWhichAFieldCannotBeRead) {
   EXPECT_EQ(run({"inspect", path}).code, 0);
 }
 
+// Of levels that follow the terrain the vertical axis has mean heights, among which the ground is a
+// rectangle: the field of heights places it.
+TEST(Inspect, NamesTheKeysThatDrawTheGround) {
+  const Folder folder;
+  for (const bool heights : {true, false}) {
+    const std::string path = folder.file(heights ? "terrain.nc" : "level.nc");
+    {
+      NetcdfMaker file(path);
+      const int z = file.axis("z", {100, 200}, "m", "altitude");
+      const int y = file.axis("lat", {40, 41, 42}, "degrees_north", "latitude");
+      const int x = file.axis("lon", {1, 2, 3}, "degrees_east", "longitude");
+      file.variable("t", NC_FLOAT, {z, y, x}, counting(std::size_t{18}));
+      const int orog = file.variable("orog", NC_FLOAT, {y, x}, counting(std::size_t{9}));
+      file.text(orog, "standard_name", "surface_altitude");
+      file.text(orog, "units", "m");
+      if (heights) {
+        const int levels = file.variable("zz", NC_FLOAT, {z, y, x}, counting(std::size_t{18}));
+        file.text(levels, "standard_name", "altitude");
+        file.text(levels, "units", "m");
+      }
+    }
+    const std::string keys = heights ? "(/geometry/heightField=zz with /geometry/body/show=on)\n"
+                                     : "(/geometry/body/show=on)\n";
+    EXPECT_THAT(run({"inspect", path}).out, HasSubstr("m above sea level " + keys));
+  }
+}
+
 TEST(Inspect, ShowsNotesInFull) {
   const Folder folder;
   const std::string path = folder.file("a.nc");

@@ -51,6 +51,16 @@ TEST(RequestTimes, OfEncodingFollowPixelsAndFormat) {
   EXPECT_DOUBLE_EQ(times.encoding_ms(frame::Format::jpeg, 1e6), jpeg);
 }
 
+TEST(RequestTimes, OfEncodingAreLearntForEveryFormat) {
+  using frame::Format;
+  for (const Format format : {Format::jpeg, Format::png, Format::npy, Format::pdf, Format::svg}) {
+    RequestTimes times(2);
+    EXPECT_GT(times.encoding_ms(format, 1e6), 0);
+    for (int i = 0; i < 100; ++i) times.learn_encoding(format, 1e6, 300'000);
+    EXPECT_NEAR(times.encoding_ms(format, 1e6), 300, 0.1);
+  }
+}
+
 TEST(RequestTimes, OfDescribingFollowTheDataset) {
   RequestTimes times(2);
   EXPECT_DOUBLE_EQ(times.describing_ms("a"), RequestTimes::describing_ms_unknown);

@@ -30,9 +30,9 @@ export function fieldTitle(field: Field | undefined, name: string): string {
 const raised: Record<string, string> = { "-": "⁻" };
 [..."⁰¹²³⁴⁵⁶⁷⁸⁹"].forEach((sign, digit) => (raised[String(digit)] = sign));
 
-// "m s-1", "m s**-1", "m s^-1" -> "m s⁻¹". In CF, "1" means dimensionless.
+// "m s-1", "m s**-1", "m s^-1" -> "m s⁻¹". In CF, "1" means dimensionless, as "(0 - 1)" of ECMWF.
 export function unitText(units: string | undefined): string {
-  if (units === undefined || units === "1") return "";
+  if (units === undefined || units === "1" || units === "(0 - 1)") return "";
   return units.replace(/(?<=[A-Za-z])(?:\*\*|\^)?(-?\d+)(?=$|[ ./*])/g, (_, power: string) =>
     [...power].map((sign) => raised[sign]).join(""),
   );
