@@ -137,9 +137,9 @@ TEST(CliUsage, UnknownWordIsReportedWithASuggestion) {
   EXPECT_THAT(run({"serve", "--memory-limt=4G"}).err, HasSubstr("did you mean --memory-limit?"));
   EXPECT_THAT(run({"serve", "--banana"}).err,
               StartsWith("windsplat: '--banana' is not an option of 'serve'\n"));
-  EXPECT_THAT(run({"inspect", "tornado", "extra"}).err,
-              HasSubstr("'extra' is an unexpected argument of 'inspect'\n"));
-  EXPECT_THAT(run({"inspect", WINDSPLAT_PROGRAM, WINDSPLAT_PROGRAM}).err,
+  EXPECT_THAT(run({"render", "tornado", "extra", "-o", "x.png"}).err,
+              HasSubstr("'extra' is an unexpected argument of 'render'\n"));
+  EXPECT_THAT(run({"render", WINDSPLAT_PROGRAM, WINDSPLAT_PROGRAM, "-o", "x.png"}).err,
               HasSubstr("a pattern of files must be in quotes"));
 }
 

@@ -144,7 +144,8 @@ TEST(VideoFloods, ASizeForEachFrameGivesAKeyFrameForEachAndOneEncoder) {
     if (header->codec != Codec::h264) continue;
     const std::pair<int, int> size{header->width, header->height};
     EXPECT_GE(std::min(size.first, size.second), 16);
-    if (size != before) {
+    // The first frame may still have the size that video began with.
+    if (videos > 0 && size != before) {
       EXPECT_TRUE((header->flags & protocol::flag_key) != 0) << n;
     }
     before = size;
