@@ -88,14 +88,6 @@ class HandshakePlaces : public testing::Test {
     return static_cast<std::size_t>(std::distance(begin(all), end(all)));
   }
 
-  static bool comes_true(const std::function<bool()>& holds) {
-    for (int turn = 0; turn < 1000; ++turn) {
-      if (holds()) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return false;
-  }
-
   static bool is_closed(Tcp::socket& client, int patience = patience_ms) {
     pollfd wait{client.native_handle(), POLLIN, 0};
     if (::poll(&wait, 1, patience) <= 0) return false;

@@ -37,14 +37,6 @@ double refused(std::uint16_t port, const std::string& limit) {
   return read.value("windsplat_refused_total{limit=\"" + limit + "\"}");
 }
 
-bool comes_true(const std::function<bool()>& holds) {
-  for (int turn = 0; turn < 1000; ++turn) {
-    if (holds()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
-}
-
 // Connections that have been accepted; `busy`: with the start of a request sent.
 std::vector<std::unique_ptr<Socket>> hold(std::uint16_t port, int count, bool busy = true) {
   std::vector<std::unique_ptr<Socket>> held;

@@ -245,13 +245,9 @@ TEST_F(Stream, TwoSessionsShareLoadedDataAndKeepTheirViews) {
   ASSERT_TRUE(second);
   EXPECT_EQ(first->header.width, 64);
   EXPECT_EQ(second->header.width, 96);
-  // The next step is prefetched some time after the frames.
-  std::uint64_t loads = server_.loads();
-  for (int quiet = 0; quiet < 20; ++quiet) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    if (server_.loads() != loads) quiet = 0;
-    loads = server_.loads();
-  }
+  // Two fields of this step, and of the next one, which is prefetched some time after the frames.
+  constexpr std::uint64_t loads = 4;
+  EXPECT_TRUE(comes_true([&] { return server_.loads() == loads; })) << server_.loads();
   Viewer three(port());
   three.patch(1, small_view);
   ASSERT_TRUE(three.final_frame(1));

@@ -5,7 +5,9 @@
 #include <turbojpeg.h>
 
 #include <array>
+#include <chrono>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -23,6 +25,15 @@ namespace server_test {
 using Json = nlohmann::json;
 
 inline Json json_of(const Answer& answer) { return Json::parse(answer.body, nullptr, false); }
+
+// Waits until a condition holds, for up to a minute.
+inline bool comes_true(const std::function<bool()>& holds) {
+  for (int turn = 0; turn < 6000; ++turn) {
+    if (holds()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
 
 inline constexpr int small_steps = 3;
 

@@ -31,14 +31,6 @@ double metric(std::uint16_t port, const std::string& name) {
   return parse_exposition(get(port, "/metrics").body).value(name);
 }
 
-bool comes_true(const std::function<bool()>& holds) {
-  for (int turn = 0; turn < 1200; ++turn) {
-    if (holds()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
-  return false;
-}
-
 // Announces H.264 and tells a slow link by late acknowledgements.
 class Misuser : public StreamClient {
  public:
