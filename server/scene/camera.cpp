@@ -59,7 +59,8 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   }
 }
 
-// The distance and height that show the points, which may reach that much farther, with a margin.
+// The distance, height and shift that show the points, which may reach that much farther, with a
+// margin.
 class Frame {
  public:
   Frame(const OrbitFrame& frame, const glm::dvec3& target, double fov_y,
@@ -79,19 +80,73 @@ class Frame {
     const double needed = std::max({x / (slope_y_ * aspect_), y / slope_y_, nearest_}) - depth;
     framing_.distance = std::max(framing_.distance, needed);
     framing_.height = std::max({framing_.height, 2.0 * margin * y, 2.0 * margin * x / aspect_});
+    points_.emplace_back(glm::dot(p, frame_.right), glm::dot(p, frame_.up), depth);
+    reach_ = reach;
   }
 
   [[nodiscard]] Framing framing() const {
     return {std::min(framing_.distance, distance_max), std::min(framing_.height, distance_max)};
   }
 
+  // The closest framing with equal free room on opposite edges of the picture.
+  [[nodiscard]] Framing centred(bool perspective) const {
+    const std::array<double, 2> slope = {slope_y_ * aspect_, slope_y_};
+    Framing framing{0, 0, {0, 0}};
+    for (const glm::dvec3& p : points_) {
+      framing.distance = std::max(framing.distance, nearest_ - p.z);
+    }
+    for (int a = 0; a < 2; ++a) {
+      const auto [above, below] = extents(a, slope[static_cast<std::size_t>(a)]);
+      framing.distance =
+          std::max(framing.distance, 0.5 * (above + below) / slope[static_cast<std::size_t>(a)]);
+      const auto [most, least] = extents(a, 0);
+      framing.height = std::max(framing.height, margin * (most + least) / (a == 0 ? aspect_ : 1));
+    }
+    framing.distance = std::min(framing.distance, distance_max);
+    framing.height = std::min(framing.height, distance_max);
+    for (int a = 0; a < 2; ++a) {
+      const double touching =
+          perspective ? touching_slope(a, framing.distance, slope[static_cast<std::size_t>(a)]) : 0;
+      const auto [above, below] = extents(a, touching);
+      framing.shift[a] = 0.5 * (above - below);
+    }
+    return framing;
+  }
+
  private:
+  // Along one axis of the picture the largest of p - slope * depth and of -p - slope * depth.
+  // Planes of that slope through an eye at (x, -d) touch the points if x - slope d is the one and
+  // -x - slope d the other.
+  [[nodiscard]] std::array<double, 2> extents(int axis, double slope) const {
+    std::array<double, 2> most{std::numeric_limits<double>::lowest(),
+                               std::numeric_limits<double>::lowest()};
+    for (const glm::dvec3& p : points_) {
+      most[0] = std::max(most[0], reach_ + p[axis] - slope * p.z);
+      most[1] = std::max(most[1], reach_ - p[axis] - slope * p.z);
+    }
+    return most;
+  }
+
+  // The slope, at most `steepest`, at which both planes touch the points from that distance.
+  [[nodiscard]] double touching_slope(int axis, double distance, double steepest) const {
+    double low = 0;
+    double high = steepest;
+    for (int n = 0; n < 40; ++n) {
+      const double middle = 0.5 * (low + high);
+      const auto [above, below] = extents(axis, middle);
+      (0.5 * (above + below) > middle * distance ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+  }
+
   const OrbitFrame& frame_;
   const glm::dvec3 target_;
   const double aspect_;
   const double slope_y_;
   const double nearest_;
-  Framing framing_{0, 0};
+  Framing framing_{0, 0, {0, 0}};
+  std::vector<glm::dvec3> points_;  // right, up and forward of the target
+  double reach_ = 0;
 };
 
 double nearest_to(const Lattice& lattice) {
@@ -116,11 +171,19 @@ double near_plane(const Lattice& lattice) {
   return std::max(cell, near_min);
 }
 
+Frame framed_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dvec3& target,
+                 double fov_y, const protocol::ImageView& image) {
+  Frame framed(frame, target, fov_y, image, nearest_to(lattice));
+  const double reach = outline_reach(lattice);
+  each_outline_point(lattice, [&](const glm::dvec3& point) { framed.add(point, reach); });
+  return framed;
+}
+
 // With ticks along its outline, the box leaves room for their texts.
 Framing with_room(const Framing& framing, const protocol::View& view) {
   constexpr double room = 1.15;
   if (!view.annotations.axes) return framing;
-  return {room * framing.distance, room * framing.height};
+  return {room * framing.distance, room * framing.height, framing.shift};
 }
 
 // The lower part of the picture that a row of a legend's cards takes below ticks, as a fraction of
@@ -135,23 +198,26 @@ double share_of_legend(const protocol::View& view) {
   return std::min(card * 14 * shown.size * std::min(1 / 720.0, narrow), share_most);
 }
 
-// The whole box with the room that annotations need: above a legend, if it has ticks.
+// The whole box with the room that annotations need: above a legend, if it has ticks. `centred`:
+// with equal room on opposite sides; otherwise with the middle of the box in the middle.
 struct Whole {
   Framing framing;
   glm::dvec3 target;
 };
 Whole place_box(const Lattice& lattice, const OrbitFrame& frame, const protocol::View& view,
-                double zoom) {
+                double zoom, bool centred) {
   const double share = share_of_legend(view);
   const double slope = std::tan(0.5 * view.camera.fov_y * radians_per_degree);
   const double upper_fov_y = 2 * std::atan((1 - share) * slope) / radians_per_degree;
   protocol::ImageView upper = view.image;
   upper.height = std::max(1, static_cast<int>(std::lround((1 - share) * upper.height)));
   glm::dvec3 target = 0.5 * (lattice.box_min + lattice.box_max);
-  Framing framing = with_room(frame_box(lattice, frame, target, upper_fov_y, upper), view);
+  const bool perspective = view.camera.projection == protocol::Projection::perspective;
+  const Frame framed = framed_box(lattice, frame, target, upper_fov_y, upper);
+  Framing framing = with_room(centred ? framed.centred(perspective) : framed.framing(), view);
   framing.distance = std::min(framing.distance / zoom, distance_max);
   framing.height /= (1 - share) * zoom;
-  const bool perspective = view.camera.projection == protocol::Projection::perspective;
+  target += framing.shift.x * frame.right + framing.shift.y * frame.up;
   const double height = perspective ? 2 * slope * framing.distance : framing.height;
   target -= 0.5 * share * height * frame.up;
   return {framing, target};
@@ -172,10 +238,18 @@ OrbitFrame orbit_frame(double azimuth, double elevation) {
 
 Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dvec3& target,
                   double fov_y, const protocol::ImageView& image) {
-  Frame framed(frame, target, fov_y, image, nearest_to(lattice));
-  const double reach = outline_reach(lattice);
-  each_outline_point(lattice, [&](const glm::dvec3& point) { framed.add(point, reach); });
-  return framed.framing();
+  return framed_box(lattice, frame, target, fov_y, image).framing();
+}
+
+double front_elevation(const Lattice& lattice, const protocol::ImageView& image) {
+  if (lattice.inner_radius > 0) return default_elevation;
+  const glm::dvec3 edge = lattice.box_max - lattice.box_min;
+  // Seen from elevation e the box is edge.x wide and y sin e + z cos e = r sin(e + a) high.
+  const double r = std::hypot(edge.y, edge.z);
+  const double rise = edge.x * image.height / image.width / r;
+  const double e =
+      (std::asin(std::min(rise, 1.0)) - std::atan2(edge.z, edge.y)) / radians_per_degree;
+  return std::clamp(e, default_elevation, steepest_elevation);
 }
 
 double front_azimuth(const Lattice& lattice) {
@@ -187,7 +261,7 @@ double front_azimuth(const Lattice& lattice) {
 void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double elevation,
            double zoom) {
   const OrbitFrame frame = orbit_frame(azimuth, elevation);
-  const auto [framing, target] = place_box(lattice, frame, view, zoom);
+  const auto [framing, target] = place_box(lattice, frame, view, zoom, false);
   view.camera.target = from_glm(target);
   view.camera.eye = from_glm(target - frame.forward * framing.distance);
   view.camera.height = std::clamp(framing.height, 1e-6, distance_max);
@@ -277,9 +351,10 @@ void complete_camera(protocol::View& view, const Lattice& lattice) {
   if (!camera.eye && !camera.target) {
     if (const auto plane = face_of(view.geometry, lattice)) return face(*plane, lattice, view);
   }
-  const OrbitFrame frame = orbit_frame(front_azimuth(lattice), default_elevation);
+  const OrbitFrame frame =
+      orbit_frame(front_azimuth(lattice), front_elevation(lattice, view.image));
   if (!camera.eye && !camera.target) {
-    const auto [framing, target] = place_box(lattice, frame, view, 1);
+    const auto [framing, target] = place_box(lattice, frame, view, 1, true);
     camera.target = from_glm(target);
     camera.eye = from_glm(target - frame.forward * framing.distance);
     if (!camera.height) camera.height = std::max(framing.height, 1e-6);

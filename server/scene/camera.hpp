@@ -9,11 +9,17 @@
 
 namespace windsplat::scene {
 
-inline constexpr double default_azimuth = 0;     // degrees: from the south, looking north
-inline constexpr double default_elevation = 35;  // degrees above the horizon
+inline constexpr double default_azimuth = 0;      // degrees: from the south, looking north
+inline constexpr double default_elevation = 35;   // degrees above the horizon
+inline constexpr double steepest_elevation = 50;  // of default views of flat boxes
 
 // The azimuth of default views: default_azimuth, or facing the region if it is part of a globe.
 double front_azimuth(const Lattice& lattice);
+
+// The elevation of default views: the one at which the outline of the box has the shape of the
+// picture, from default_elevation, also for a globe, to steepest_elevation; a flat box would
+// otherwise be a narrow strip, and from still higher up and down could not be told apart.
+double front_elevation(const Lattice& lattice, const protocol::ImageView& image);
 
 // Axes of an orbit camera; forward points at the target. Azimuth 0 looks north, positive azimuth
 // moves the eye eastward, elevation is above the horizon; degrees. Within 0.1 degrees of the
@@ -28,6 +34,8 @@ OrbitFrame orbit_frame(double azimuth, double elevation);
 struct Framing {
   double distance;  // distance from the eye to the target, world units
   double height;    // height of the picture at the target, world units, orthographic
+  glm::dvec2 shift{0,
+                   0};  // of the middle of the picture from the target, right and up, world units
 };
 Framing frame_box(const Lattice& lattice, const OrbitFrame& frame, const glm::dvec3& target,
                   double fov_y, const protocol::ImageView& image);
@@ -38,9 +46,10 @@ void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double 
            double zoom);
 
 // Fills in what the view does not state of its camera: it looks from front_azimuth() and
-// default_elevation and shows the whole box. If the view states neither eye nor target and shows a
-// slice or plane, it looks along its normal, from the side nearer to that, and shows the part in
-// the box; `up` becomes north if it is parallel to the normal.
+// front_elevation() and shows the whole box in the middle of the picture. If the view states
+// neither eye nor target and shows a slice or plane, it looks along its normal, from the side
+// nearer to that, and shows the part in the box; `up` becomes north if it is parallel to the
+// normal.
 void complete_camera(protocol::View& view, const Lattice& lattice);
 
 // The camera of a completed view. Errors: invalid with a pointer (eye equal to target; up parallel

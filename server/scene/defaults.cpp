@@ -240,8 +240,8 @@ double default_min_magnitude(const protocol::VectorView& vector, const data::Vol
   const double top = (*vector.magnitude_range)[1];
   const double least = std::max(0.0, top) / 100.0;
   // Projected from the default viewpoint in a picture of the default size.
-  const OrbitFrame frame = orbit_frame(default_azimuth, default_elevation);
   const protocol::ImageView image;
+  const OrbitFrame frame = orbit_frame(default_azimuth, front_elevation(lattice, image));
   const Framing framing = frame_box(lattice, frame, {0, 0, 0}, 35, image);
   const double pixel = framing.height / image.height;
   const glm::dvec3 edge = lattice.box_max - lattice.box_min;

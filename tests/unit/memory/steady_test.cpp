@@ -166,7 +166,7 @@ TEST_P(SteadyState, NewPathCostsFewAllocations) {
   const Spent known = spent_by([&] { draw(warm); });
   const Spent fresh = spent_by([&] { draw(scenes); });
   const std::int64_t picture = std::int64_t{4} * 240 * 180 * static_cast<int>(sizeof(float));
-  EXPECT_LE(fresh.bytes - known.bytes, turns * picture / 8);
+  EXPECT_LE(fresh.bytes - known.bytes, turns * picture / 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(Looks, SteadyState,

@@ -147,6 +147,63 @@ TEST(Orbit, ZoomOneFramesTheWholeBoxTightlyInEitherProjection) {
   }
 }
 
+// The box fills the picture in one direction, but for the margin, with equal room on opposite
+// sides in both.
+TEST(Camera, DefaultShowsTheWholeBoxInTheMiddleInEitherProjection) {
+  for (const std::array<int, 3> dims : {std::array<int, 3>{64, 32, 4}, {8, 8, 8}, {4, 4, 32}}) {
+    auto dataset = sample_dataset("climate", dims);
+    const Lattice lattice = *place_lattice(dataset->info().grid, {});
+    for (const auto projection :
+         {protocol::Projection::perspective, protocol::Projection::orthographic}) {
+      for (const std::array<int, 2> size : {std::array<int, 2>{1280, 720}, {300, 900}}) {
+        protocol::View view;
+        view.camera.projection = projection;
+        view.image.width = size[0];
+        view.image.height = size[1];
+        complete_camera(view, lattice);
+        const Camera camera = *resolve_camera(view, lattice);
+        std::array<double, 2> low{1, 1};
+        std::array<double, 2> high{-1, -1};
+        for (int n = 0; n < 8; ++n) {
+          const Pixel p = project(camera, {(n & 1) != 0 ? lattice.box_max.x : lattice.box_min.x,
+                                           (n & 2) != 0 ? lattice.box_max.y : lattice.box_min.y,
+                                           (n & 4) != 0 ? lattice.box_max.z : lattice.box_min.z});
+          const std::array<double, 2> at{2 * p.x / size[0] - 1, 2 * p.y / size[1] - 1};
+          for (std::size_t a = 0; a < 2; ++a) {
+            low[a] = std::min(low[a], at[a]);
+            high[a] = std::max(high[a], at[a]);
+          }
+        }
+        EXPECT_NEAR(low[0], -high[0], 1e-6);
+        EXPECT_NEAR(low[1], -high[1], 1e-6);
+        EXPECT_NEAR(std::max(high[0], high[1]), 1 / 1.04, 1e-6);
+      }
+    }
+  }
+}
+
+// The outline of a box that is x wide and seen from elevation e is y sin e + z cos e high.
+TEST(Camera, DefaultElevationGivesTheOutlineTheShapeOfThePicture) {
+  Lattice lattice;
+  protocol::ImageView image;
+  image.width = 1600;
+  image.height = 900;
+  const auto elevation = [&](double x, double y, double z) {
+    lattice.box_max = 0.5 * glm::dvec3(x, y, z);
+    lattice.box_min = -lattice.box_max;
+    return front_elevation(lattice, image);
+  };
+  const double e = elevation(2, 1.5, 0.1);
+  EXPECT_GT(e, default_elevation);
+  EXPECT_LT(e, steepest_elevation);
+  const double radians = e * std::acos(-1.0) / 180;
+  EXPECT_NEAR(1.5 * std::sin(radians) + 0.1 * std::cos(radians), 2 * 0.5625, 1e-9);
+  EXPECT_EQ(elevation(2, 1, 0.1), steepest_elevation);  // too flat to fill the picture
+  EXPECT_EQ(elevation(1, 1, 1), default_elevation);     // fills more than the picture
+  lattice.inner_radius = 0.5;
+  EXPECT_EQ(elevation(2, 1, 0.1), default_elevation);  // a globe
+}
+
 TEST(Orbit, ZoomTwoRendersTheCenterTwiceAsLarge) {
   auto dataset = atmosphere();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});

@@ -319,6 +319,11 @@ TEST_F(LevelWithin, ErrorsOfFullDetailAreReturned) {
 }
 
 TEST_F(LevelOfAScene, IsUnaffectedByTheScaleOfHeightAlone) {
+  // A camera of its own: default ones look from higher up at flatter boxes.
+  const Scene usual = built();
+  const auto& from = usual.camera;
+  view.camera.eye = {from.eye.x, from.eye.y, from.eye.z};
+  view.camera.target = protocol::Vec3{0, 0, 0};
   const Scene first = built();
   const std::uint64_t resident = dataset->resident_bytes();
   for (const double z : {0.97, 0.9, 0.83, 0.7}) {
