@@ -271,16 +271,29 @@ void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double 
 
 namespace {
 
-// The plane of a slice. None on a curved one, which has no normal: on the sphere, and across the
-// horizontal axes of a curvilinear map.
+// The plane of a slice, or of data that are one sample thick along one axis. None on a curved one,
+// which has no normal: on the sphere, over a height field, and across the horizontal axes of a
+// curvilinear map.
 struct Face {
   glm::dvec3 point, normal;
 };
+
+// The only sample along the only axis of one sample.
+std::optional<protocol::SliceView> sheet_of(const Lattice& lattice) {
+  const auto thin = std::count(lattice.dims.begin(), lattice.dims.end(), 1);
+  const auto at = std::find(lattice.dims.begin(), lattice.dims.end(), 1) - lattice.dims.begin();
+  if (thin != 1) return std::nullopt;
+  protocol::SliceView sheet;
+  sheet.axis = static_cast<protocol::GridAxis>(at);
+  return sheet;
+}
+
 std::optional<Face> face_of(const protocol::GeometryView& geometry, const Lattice& lattice) {
   if (const auto& plane = geometry.plane) {
     return Face{to_glm(plane->point), glm::normalize(to_glm(plane->normal))};
   }
-  const auto& slice = geometry.slice;
+  std::optional<protocol::SliceView> slice = geometry.slice;
+  if (!slice && !geometry.height_field) slice = sheet_of(lattice);
   const bool flat = geometry.mapping == protocol::GeometryMapping::flat;
   const bool level = slice && slice->axis == protocol::GridAxis::z &&
                      geometry.mapping != protocol::GeometryMapping::sphere;

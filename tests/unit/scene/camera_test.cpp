@@ -324,6 +324,31 @@ TEST(Camera, DefaultFacesTheSliceOrPlaneWithTheUsualMargin) {
   }
 }
 
+TEST(Camera, DefaultFacesDataOfOneSampleAlongOneAxis) {
+  const auto forward = [](const std::array<int, 3>& dims, protocol::GeometryView geometry) {
+    auto dataset = sample_dataset("climate", dims);
+    protocol::View view;
+    view.geometry = std::move(geometry);
+    const Lattice lattice = *place_lattice(dataset->info().grid, view.geometry);
+    complete_camera(view, lattice);
+    const Camera camera = *resolve_camera(view, lattice);
+    return std::array{camera.forward, camera.up};
+  };
+  const auto [down, north] = forward({16, 8, 1}, {});
+  EXPECT_NEAR(glm::length(down - glm::dvec3(0, 0, -1)), 0, 1e-12);
+  EXPECT_NEAR(glm::length(north - glm::dvec3(0, 1, 0)), 0, 1e-12);
+  const auto [west, up] = forward({1, 8, 16}, {});
+  EXPECT_NEAR(glm::length(west - glm::dvec3(-1, 0, 0)), 0, 1e-12);
+  EXPECT_NEAR(glm::length(up - glm::dvec3(0, 0, 1)), 0, 1e-12);
+  const auto [along, still_up] = forward({16, 1, 8}, {});
+  EXPECT_NEAR(glm::length(along - glm::dvec3(0, 1, 0)), 0, 1e-12);
+  EXPECT_NEAR(glm::length(still_up - glm::dvec3(0, 0, 1)), 0, 1e-12);
+  protocol::GeometryView terrain;
+  terrain.height_field = "orography";
+  EXPECT_GT(forward({16, 8, 1}, terrain)[0].y, 0.5);
+  EXPECT_GT(forward({16, 1, 1}, {})[0].y, 0.5);  // a row faces no side
+}
+
 TEST(Camera, ADirectionUpAlongTheNormalOfASliceIsReplaced) {
   auto dataset = atmosphere();
   for (const auto axis : {protocol::GridAxis::x, protocol::GridAxis::y, protocol::GridAxis::z}) {
