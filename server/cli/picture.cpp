@@ -18,6 +18,8 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
   command.add_option("--view", arguments.view_file, "A view as JSON; DATASET replaces its dataset")
       ->type_name("F");
   command.add_option("--size", arguments.size, "Pixels, for example 1280x720")->type_name("WxH");
+  command.add_flag("--figure", arguments.figure,
+                   "Draw box, axes, north arrow, scale bar, legend, title and time");
   command.add_option("--set", arguments.settings, "Change one key of the view; may be repeated")
       ->allow_extra_args(false)
       ->type_name("/json/pointer=value");
@@ -52,6 +54,11 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
     }
     changes.emplace_back("/image/width", std::to_string((*size)[0]));
     changes.emplace_back("/image/height", std::to_string((*size)[1]));
+  }
+  if (arguments.figure) {
+    for (const char* shown : {"box", "axes", "north", "scaleBar", "legend", "title", "stepTime"}) {
+      changes.emplace_back(std::string("/annotations/") + shown, "true");
+    }
   }
   for (const std::string& setting : arguments.settings) {
     const std::size_t equals = setting.find('=');

@@ -21,17 +21,18 @@ struct ViewArguments {
   std::string step;
   std::string size;
   std::vector<std::string> settings;  // "/json/pointer=value"
+  bool figure = false;
   std::string memory = "8G";
   DataHostArguments data_hosts;
   int quality = 95;  // JPEG: files favour detail over size
   double dots_per_inch = 300;
 };
 
-// DATASET, --view, --size, --set, --quality, --dpi, --memory-limit and the options of data hosts;
-// `arguments` must outlive the command.
+// DATASET, --view, --size, --figure, --set, --quality, --dpi, --memory-limit and the options of
+// data hosts; `arguments` must outlive the command.
 void add_view_options(CLI::App& command, ViewArguments& arguments);
 
-// The view file, overridden by --step, --size and --set in this order.
+// The view file, overridden by --step, --size, --figure and --set in this order.
 Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments);
 
 // The format that the extension of a file name denotes. Errors: invalid.

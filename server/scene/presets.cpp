@@ -9,7 +9,17 @@ namespace windsplat::scene {
 
 namespace {
 
-constexpr std::array<std::string_view, 5> names = {"default", "winds", "clouds", "top", "south"};
+constexpr std::array<std::string_view, 6> names = {"default", "winds", "clouds",
+                                                   "top",     "south", "figure"};
+
+void look_by_default(protocol::View& completed, const Lattice& lattice) {
+  protocol::CameraView& camera = completed.camera;
+  camera.eye.reset();
+  camera.target.reset();
+  camera.height.reset();
+  camera.up = protocol::CameraView{}.up;
+  complete_camera(completed, lattice);
+}
 
 }  // namespace
 
@@ -18,12 +28,12 @@ std::vector<std::string> preset_names() { return {names.begin(), names.end()}; }
 Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
                           const std::string& preset) {
   if (preset == "default") {
-    protocol::CameraView& camera = completed.camera;
-    camera.eye.reset();
-    camera.target.reset();
-    camera.height.reset();
-    camera.up = protocol::CameraView{}.up;
-    complete_camera(completed, lattice);
+    look_by_default(completed, lattice);
+  } else if (preset == "figure") {
+    protocol::AnnotationsView& shown = completed.annotations;
+    shown.box = shown.axes = shown.north = shown.scale_bar = true;
+    shown.legend = shown.title = shown.step_time = true;
+    look_by_default(completed, lattice);  // with room for texts
   } else if (preset == "winds") {
     completed.scalars.emplace();
   } else if (preset == "clouds") {

@@ -280,7 +280,8 @@ TEST(Presets, ChangeTheNamedProperties) {
   auto dataset = weather();
   const Lattice lattice = *place_lattice(dataset->info().grid, {});
   const View start = complete({}, *dataset)->view();
-  EXPECT_THAT(preset_names(), testing::ElementsAre("default", "winds", "clouds", "top", "south"));
+  EXPECT_THAT(preset_names(),
+              testing::ElementsAre("default", "winds", "clouds", "top", "south", "figure"));
   for (const std::string& name : preset_names()) {
     View view = start;
     ASSERT_TRUE(apply_preset(view, lattice, name)) << name;
@@ -299,6 +300,12 @@ TEST(Presets, ChangeTheNamedProperties) {
   EXPECT_GT((*view.camera.eye)[2], 1);
   ASSERT_TRUE(apply_preset(view, lattice, "default"));
   EXPECT_EQ(view.camera.eye, start.camera.eye);
+  view = start;
+  ASSERT_TRUE(apply_preset(view, lattice, "figure"));
+  EXPECT_TRUE(view.annotations.legend && view.annotations.axes && view.annotations.step_time);
+  View with_texts;
+  with_texts.annotations = view.annotations;
+  EXPECT_EQ(view.camera, complete(with_texts, *dataset)->view().camera);
   const auto refused = apply_preset(view, lattice, "sideways");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().at.at(0).pointer, "/preset");
