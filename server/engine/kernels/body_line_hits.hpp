@@ -197,7 +197,7 @@ inline void scale_hit(const BodyShare& share, BlockHit& m) {
 
 // The body as a line that covers its pixels, where it is in front of the end of the slab and still
 // waits for light; it no longer does then.
-inline void take_body(const Slab& slab, const float rgb[3], BodyBlock& body, BlockHit& m) {
+inline void take_body(const Slab& slab, BodyBlock& body, BlockHit& m) {
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel one = all<Pixel>(1.0F);
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
@@ -215,7 +215,7 @@ inline void take_body(const Slab& slab, const float rgb[3], BodyBlock& body, Blo
     const Pixel inverse = one / hn::Max(all_opacity, all<Pixel>(1e-37F));
     store(hn::IfThenElseZero(here, all_opacity), m.opacity + l);
     for (int c = 0; c < 3; ++c) {
-      const Pixel own = load<Pixel>(body.shade + l) * all<Pixel>(rgb[c]);
+      const Pixel own = load<Pixel>(body.rgb[c] + l);
       const Pixel light = load<Pixel>(body.light[c] + l);
       store(hn::IfThenElse(lined, hn::MulAdd(own, opacity, light) * inverse, own), m.color[c] + l);
       store(hn::IfThenZeroElse(here, light), body.light[c] + l);

@@ -142,7 +142,8 @@ BodyCover fill_body_block(const Camera& camera, const Body& body, double left, d
     to.opacity[l] = static_cast<float>(coverage[l]);
     to.behind[l] = 1.0F - to.opacity[l];
     for (auto& channel : to.light) channel[l] = 0;
-    to.shade[l] = body.ambient + (1.0F - body.ambient) * static_cast<float>(cosine[l]);
+    const float shade = body.ambient + (1.0F - body.ambient) * static_cast<float>(cosine[l]);
+    for (int c = 0; c < 3; ++c) to.rgb[c][l] = shade * body.rgb[c];
     to.nearest = smaller(to.nearest, to.depth[l]);
     to.farthest = larger(to.farthest, sees ? here : to.farthest);
     covered += to.opacity[l] >= 1.0F ? 1 : 0;
@@ -153,7 +154,6 @@ BodyCover fill_body_block(const Camera& camera, const Body& body, double left, d
 
 bool open_body(const Camera& camera, const Body& body, const Tile& tile, TileBody& to) {
   to.nearest = body_nowhere;
-  for (int c = 0; c < 3; ++c) to.rgb[c] = body.rgb[c];
   for (int row = 0; row < tile_blocks; ++row) {
     to.seen[row] = to.opaque[row] = 0;
     if (row >= blocks_of(tile.height)) continue;
@@ -182,10 +182,10 @@ void close_body(Tile& tile) {
       const Channels to = channels_of(block_at(tile, row, column));
       for (int l = 0; l < block_pixels; l += pixel_lanes) {
         const Pixel t = load<Pixel>(to.transmittance + l);
-        const Pixel own = load<Pixel>(from.opacity + l) * load<Pixel>(from.shade + l);
+        const Pixel opacity = load<Pixel>(from.opacity + l);
         for (int c = 0; c < 3; ++c) {
           const Pixel light =
-              hn::MulAdd(own, all<Pixel>(body.rgb[c]), load<Pixel>(from.light[c] + l));
+              hn::MulAdd(opacity, load<Pixel>(from.rgb[c] + l), load<Pixel>(from.light[c] + l));
           add_product(to.rgb[c] + l, t, light);
         }
         store(t * load<Pixel>(from.behind + l), to.transmittance + l);

@@ -130,7 +130,6 @@ struct Closing {
   float stop;
   const float* transmittance;  // transmittance in front of the slab
   BodyBlock* body;             // null: no pixel meets the body in the slab
-  const float* body_rgb;
 };
 
 // Stable rank sort of a few lines by depth: the number of predecessors is the index.
@@ -214,7 +213,7 @@ Outcome pass_sorted(const Closing& with, Between part, Passage* passage) {
   if (body) open_share(with.slab, *with.body, share);
   for (int h = 0; h < with.count || body;) {
     if (body && (h == with.count || with.met[h].depth >= with.body->nearest)) {
-      take_body(with.slab, with.body_rgb, *with.body, hits[held]);
+      take_body(with.slab, *with.body, hits[held]);
       body = false;
     } else {
       const MetLine& met = with.met[h++];
@@ -325,13 +324,11 @@ void close_slab(const Camera& camera, int compositing, const Slab& slab, const R
                   top_of(tile, row),
                   tile.stop,
                   block_at(tile, row, column),
-                  nullptr,
                   nullptr};
   const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(column);
   if (tile.body != nullptr && (tile.body->seen[row] & bit) != 0) {
     BodyBlock& body = tile.body->blocks[index];
     if (body.nearest < slab.back) with.body = &body;
-    with.body_rgb = tile.body->rgb;
   }
   if (camera.perspective != 0) {
     close_slab_on<true>(compositing, with, gathered, row, column, tile);

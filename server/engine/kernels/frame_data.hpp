@@ -194,7 +194,7 @@ struct Counters {
 struct BodyBlock {
   alignas(64) float depth[block_pixels];    // from the camera's depth origin, world units
   alignas(64) float opacity[block_pixels];  // part of the pixel that it covers
-  alignas(64) float shade[block_pixels];    // factor of its colour
+  alignas(64) float rgb[3][block_pixels];   // its colour including its shade
   // What is composited behind the body so far: its light and its transmittance, both including the
   // body's.
   alignas(64) float light[3][block_pixels];
@@ -207,7 +207,6 @@ constexpr float body_nowhere = 1e30F;
 // through it may come in any order; the slab method composites it at its depth.
 struct TileBody {
   BodyBlock* blocks;
-  float rgb[3];
   float nearest;                      // least depth in the tile
   std::uint32_t seen[tile_blocks];    // bit set: the block still waits for light of the body
   std::uint32_t opaque[tile_blocks];  // bit set: the body covers every pixel of the block
