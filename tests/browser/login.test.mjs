@@ -6,7 +6,17 @@ import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
-import { finalPicture, openPage, pixels, sharedDaemon, shot, state } from "./support.mjs";
+import {
+  drag,
+  finalPicture,
+  openPage,
+  ownPage,
+  patience,
+  pixels,
+  sharedDaemon,
+  shot,
+  state,
+} from "./support.mjs";
 
 const token = "a-token-for-the-browser-tests";
 const folder = mkdtempSync(join(tmpdir(), "windsplat-login-"));
@@ -113,3 +123,61 @@ test("another site cannot use the cookie", () =>
     assert.equal((await state(page)).state, "final", "the first page still works");
     await other.context().close();
   }));
+
+test("after the token was changed the page asks for it and keeps the view", async (t) => {
+  const own = join(folder, "changed");
+  const next = "another-token-for-the-browser-tests";
+  writeFileSync(own, `${token}\n`, { mode: 0o600 });
+  const { daemon, page } = await ownPage(t, shared.browser, {
+    args: ["--token-file", own, "tornado"],
+  });
+  await logIn(page, token);
+  await finalPicture(page);
+  await drag(page, 90, 30);
+  await finalPicture(page);
+  const before = await pixels(page);
+  writeFileSync(own, `${next}\n`, { mode: 0o600 });
+  daemon.child.kill("SIGHUP");
+  const dialog = page.locator("#login");
+  await dialog.waitFor();
+  assert.equal((await pixels(page)).hash, before.hash, "the picture remains");
+  await shot(page, "login-again");
+  await page.locator("#login-token").fill(token);
+  await page.keyboard.press("Enter");
+  await page.locator("#login-error:visible").waitFor();
+  assert.match(await page.locator("#login-error").innerText(), /Invalid token/);
+  // It can be put off.
+  await page.locator("#login-later").click();
+  assert.match(await page.locator("#offline").innerText(), /asks for its token/);
+  assert.equal(await page.locator("#retry-button").isVisible(), false);
+  await page.locator("#login-button").click();
+  await page.locator("#login-token").fill(next);
+  await page.keyboard.press("Enter");
+  await dialog.waitFor({ state: "hidden" });
+  await page.waitForFunction(() => document.documentElement.dataset.connection === "live");
+  await finalPicture(page);
+  assert.equal((await pixels(page)).hash, before.hash, "the same view");
+  assert.ok(!page.url().includes(next));
+});
+
+test("a server that returns after an outage is found within the longest delay", async (t) => {
+  const { daemon, page } = await ownPage(t, shared.browser, { args: ["tornado"] });
+  await finalPicture(page);
+  await daemon.kill();
+  await page.waitForFunction(() => document.documentElement.dataset.connection === "waiting");
+  // Each attempt fails at once; only the delays between them are counted here.
+  await page.evaluate(() => {
+    window.delays = [];
+    new MutationObserver(() => {
+      const left = /in (\d+) s/.exec(document.querySelector("#offline-text").textContent);
+      if (left !== null) window.delays.push(Number(left[1]));
+    }).observe(document.querySelector("#offline-text"), { childList: true });
+  });
+  await page.waitForFunction(() => window.delays.length >= 10, null, {
+    timeout: 60_000 * patience,
+  });
+  assert.ok(Math.max(...(await page.evaluate(() => window.delays))) <= 2);
+  await daemon.start("tornado");
+  await page.waitForFunction(() => document.documentElement.dataset.connection === "live");
+  await finalPicture(page);
+});

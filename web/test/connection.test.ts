@@ -12,6 +12,7 @@ import {
   type SocketLike,
 } from "../src/wire/connection";
 import type { Frame, HelloMessage, ServerMessage } from "../src/wire/protocol";
+import { logIn, reachOf, type AskServer, type Reach } from "../src/wire/reach";
 
 class FakeSocket implements SocketLike {
   binaryType = "blob";
@@ -106,7 +107,8 @@ function frameBytes(payload = 3): ArrayBuffer {
   return bytes.buffer;
 }
 
-function setUp() {
+// reach: what the server says to another request.
+function setUp(reach: () => Reach = () => "silent") {
   const clock = new FakeClock();
   const sockets: FakeSocket[] = [];
   const seen = {
@@ -129,6 +131,7 @@ function setUp() {
       message: (message) => seen.messages.push(message),
       frame: (frame) => seen.frames.push(frame),
     },
+    () => Promise.resolve(reach()),
   );
   const last = () => sockets[sockets.length - 1]!;
   const state = () => seen.states[seen.states.length - 1]!;
@@ -177,10 +180,10 @@ test("reconnection delays double from 0.5 s to 15 s with jitter", () => {
   assert.ok(reconnectDelayMs(3, 1) - reconnectDelayMs(3, 0) > 0.3 * reconnectDelayMs(3, 0.5));
 });
 
-test("reconnects later after each failure and at once after a frame", () => {
+test("reconnects later after each failure, up to 2 s, and at once after a frame", () => {
   const { clock, connection, last, sockets, state } = setUp();
   connection.start();
-  for (const delay of [625, 1250, 2500]) {
+  for (const delay of [625, 1250, 1600, 1600]) {
     last().dies();
     const waiting = state();
     assert.equal(waiting.name, "waiting");
@@ -196,6 +199,100 @@ test("reconnects later after each failure and at once after a frame", () => {
   last().dies();
   const waiting = state();
   assert.equal(waiting.name === "waiting" && waiting.delayMs, 625);
+});
+
+test("after an outage of any length the next attempt is at most 2 s away", () => {
+  for (const chance of [0, 0.5, 1]) {
+    const { clock, connection, last, sockets } = setUp();
+    clock.chance = chance;
+    connection.start();
+    for (let seconds = 0; seconds < 3600; seconds += 2) {
+      const before = sockets.length;
+      last().dies();
+      clock.advance(2000);
+      assert.equal(sockets.length, before + 1, `after ${seconds} s`);
+    }
+  }
+});
+
+const settled = () => new Promise((done) => setImmediate(done));
+
+test("a server that refuses streams but answers is tried less and less often", async () => {
+  const { clock, connection, last, sockets, state } = setUp(() => "answers");
+  connection.start();
+  const delays: number[] = [];
+  for (let n = 0; n < 6; n++) {
+    const before = sockets.length;
+    last().dies();
+    await settled();
+    const waiting = state();
+    delays.push(waiting.name === "waiting" ? waiting.delayMs : 0);
+    clock.advance(delays.at(-1)!);
+    assert.equal(sockets.length, before + 1, "one attempt");
+  }
+  assert.deepEqual(delays, [1250, 2500, 5000, 10_000, 12_500, 12_500]);
+});
+
+test("a server that asks for a token is not tried until the user has logged in", async () => {
+  for (const code of [1006, 1008]) {
+    const { clock, connection, last, sockets, state } = setUp(() => "login");
+    connection.start();
+    last().receives(hello);
+    last().receives(frameBytes());
+    last().dies(code);
+    await settled();
+    assert.equal(state().name, "locked");
+    clock.advance(3_600_000);
+    assert.equal(sockets.length, 1);
+    connection.retryNow();
+    assert.equal(sockets.length, 2);
+    last().receives(hello);
+    assert.equal(state().name, "live");
+  }
+});
+
+test("an answer that comes after the next attempt changes nothing", async () => {
+  const { clock, connection, last, state } = setUp(() => "login");
+  connection.start();
+  last().dies();
+  clock.advance(2000);
+  last().receives(hello);
+  await settled();
+  assert.equal(state().name, "live");
+});
+
+const answering =
+  (status: number, type: ResponseType = "basic"): AskServer =>
+  () =>
+    Promise.resolve({
+      ok: status === 200,
+      status,
+      type,
+      json: () => Promise.resolve({ type: "about:blank", title: "", status, detail: "too many" }),
+    });
+const offline: AskServer = () => Promise.reject(new TypeError("offline"));
+
+test("401 asks for a login; a server that is away or behind a proxy is silent", async () => {
+  const of = (ask: AskServer) => reachOf(ask, "http://h/a/");
+  assert.equal(await of(answering(200)), "answers");
+  assert.equal(await of(answering(429)), "answers");
+  assert.equal(await of(answering(401)), "login");
+  assert.equal(await of(answering(502)), "silent");
+  assert.equal(await of(offline), "silent");
+});
+
+test("a login tells why it failed, and sends the token in the body only", async () => {
+  let sent: [string, RequestInit] = ["", {}];
+  const accepted: AskServer = (url, init) => {
+    sent = [url, init];
+    return answering(0, "opaqueredirect")(url, init);
+  };
+  assert.equal(await logIn(accepted, "http://h/a/", "a+b&c"), null);
+  assert.equal(sent[0], "http://h/a/login");
+  assert.equal(sent[1].body, "token=a%2Bb%26c");
+  assert.equal(await logIn(answering(401), "http://h/", "x"), "Invalid token.");
+  assert.equal(await logIn(answering(429), "http://h/", "x"), "too many");
+  assert.match((await logIn(offline, "http://h/", "x"))!, /did not answer/);
 });
 
 test("a server that fails after hello is not contacted more often", () => {

@@ -134,7 +134,8 @@ test("a link to a member that the server does not list opens it", async () => {
       page.app.openView({ dataset: "gcm,number=5", camera } as View);
     }
     await settled();
-    assert.equal(calls[0], posting);
+    // a lost connection asks first whether the server answers
+    assert.equal(calls.filter((call) => !call.startsWith("HEAD "))[0], posting);
     assert.equal(page.sent("open").at(-1)!.dataset, "gcm,number=5");
     const patch = page.sent("patch").at(-1)!.patch as View;
     assert.deepEqual([patch.dataset, patch.camera], ["gcm,number=5", camera], `again ${again}`);

@@ -293,6 +293,7 @@ export class Page {
         settings: () => app.playback.again(),
       }),
       status: new Status(),
+      login: { ask: () => {}, done: () => {} },
       picker: this.element("dataset"),
       list: new DatasetList(this.element("dataset") as unknown as HTMLSelectElement),
       cards: { show: () => (this.cardsShown += 1) },

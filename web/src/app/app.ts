@@ -8,13 +8,7 @@ import { Api } from "../wire/api";
 import { anglesOf, distanceOf, rollOf } from "../view/camera";
 import { CameraControl } from "../view/camera_control";
 import { ColorMaps } from "../wire/color_maps";
-import {
-  Connection,
-  streamUrl,
-  type Clock,
-  type ConnectionState,
-  type SocketLike,
-} from "../wire/connection";
+import type { Clock, Connection, ConnectionState } from "../wire/connection";
 import { Flow } from "../view/flow";
 import { scaleText, type FrameState } from "../viewport/frame_text";
 import { loadHelpTexts } from "../panels/help_texts";
@@ -30,13 +24,12 @@ import {
   type View,
 } from "../wire/protocol";
 import { problemText } from "../wire/requests";
+import { openConnection, watchPresence } from "./server_link";
 import { UndoControl } from "./undo_control";
 import { VideoOffer } from "./video_offer";
 import { ViewModel } from "../view/view_model";
 import type { Outgoing, Patch } from "../view/view_state";
 import type { DrawnFrame } from "../viewport/viewport";
-
-const presenceMs = 60_000;
 
 export class App {
   readonly maps = new ColorMaps();
@@ -63,21 +56,15 @@ export class App {
       size: () => this.parts.viewport.size(),
       ready: () => this.connection.ready,
     });
-    this.connection = new Connection(
-      streamUrl(baseUri),
-      // SocketLike declares less than the browser's WebSocket.
-      (url, protocol) => new WebSocket(url, protocol) as unknown as SocketLike,
-      clock,
-      {
-        state: (state) => this.onState(state),
-        hello: (hello) => this.onHello(hello),
-        message: (message) => this.onMessage(message),
-        frame: (frame) => {
-          // A frame that cannot be shown must still return its credit to the server.
-          this.parts.viewport.show(frame).catch(() => this.onBroken(frame.header.seq));
-        },
+    this.connection = openConnection(baseUri, clock, {
+      state: (state) => this.onState(state),
+      hello: (hello) => this.onHello(hello),
+      message: (message) => this.onMessage(message),
+      frame: (frame) => {
+        // A frame that cannot be shown must still return its credit to the server.
+        this.parts.viewport.show(frame).catch(() => this.onBroken(frame.header.seq));
       },
-    );
+    });
     this.video = new VideoOffer(clock, {
       send: (message) => void this.connection.send(message),
       note: (text) => this.parts.status.note(text),
@@ -138,11 +125,7 @@ export class App {
       this.model.state.change(this.firstView(view ?? {}) as Patch);
       this.connection.start();
     });
-    window.addEventListener("online", () => this.connection.retryNow());
-    document.addEventListener("visibilitychange", () => this.sendVisibility());
-    window.setInterval(() => {
-      if (!document.hidden) this.sendVisibility();
-    }, presenceMs);
+    watchPresence(this.connection, () => this.sendVisibility());
   }
 
   private makeOpener({ status, list, cards, entries }: AppParts): DatasetOpener {
@@ -298,6 +281,8 @@ export class App {
 
   private onState(state: ConnectionState): void {
     this.parts.status.connection(state);
+    if (state.name === "locked") this.parts.login.ask();
+    if (state.name === "live") this.parts.login.done();
     if (state.name !== "live") this.playback.halt();
     this.showMark();
     if (this.model.open !== null) this.showTime();
@@ -489,7 +474,6 @@ export class App {
     );
   }
 
-  // Also sent periodically while the page is visible: a user who only watches is not idle.
   private sendVisibility(): void {
     if (!document.hidden) {
       this.connection.wake();

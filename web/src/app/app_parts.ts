@@ -6,6 +6,7 @@ import type { Gizmo } from "../viewport/gizmo";
 import type { HoverView } from "../viewport/hover_view";
 import type { Hud } from "../viewport/hud";
 import type { Legend } from "../viewport/legend";
+import type { Login } from "./login";
 import type { Panels } from "../panels/panels";
 import type { Probe } from "../viewport/probe";
 import type { Status } from "./status";
@@ -20,6 +21,7 @@ export interface AppParts {
   panels: Panels;
   timeBar: TimeBar;
   status: Status;
+  login: Pick<Login, "ask" | "done">;
   picker: HTMLSelectElement;
   entries: EntryPicker;
   probe: Probe;

@@ -14,6 +14,7 @@ import { Hud } from "../viewport/hud";
 import { MoveQueue, PointerInput } from "../viewport/input";
 import { bindKeys, modText, type Binding } from "./keyboard";
 import { Legend } from "../viewport/legend";
+import { Login } from "./login";
 import { Panels } from "../panels/panels";
 import { Probe } from "../viewport/probe";
 import { makeReference } from "../viewport/reference_view";
@@ -266,6 +267,7 @@ app.start({
   list,
   cards,
   status,
+  login: new Login(document.baseURI, () => app.connectNow()),
   picker: byId("dataset", HTMLSelectElement),
   entries: new EntryPicker(byId("entries", HTMLElement), (dimension, value) =>
     app.chooseEntry(dimension, value),

@@ -22,6 +22,8 @@ export class Status {
   private countdown: number | undefined;
   private readonly emptyText = byId("empty", HTMLElement);
   private readonly offline = byId("offline", HTMLElement);
+  private readonly retryButton = byId("retry-button", HTMLButtonElement);
+  private readonly loginButton = byId("login-button", HTMLButtonElement);
   private readonly offlineText = byId("offline-text", HTMLElement);
   private lost = false; // the line reports the lost connection and must not be overwritten
 
@@ -52,8 +54,11 @@ export class Status {
     window.clearInterval(this.countdown);
     document.documentElement.dataset.connection = state.name;
     this.light.title = state.name;
-    this.lost = state.name === "waiting" || state.name === "asleep";
+    const locked = state.name === "locked";
+    this.lost = state.name === "waiting" || state.name === "asleep" || locked;
     this.offline.hidden = !this.lost;
+    this.retryButton.hidden = locked;
+    this.loginButton.hidden = !locked;
     if (state.name !== "live") this.latency.textContent = "";
     if (state.name === "live") {
       this.setLine("live");
@@ -65,6 +70,10 @@ export class Status {
       this.loaded();
       this.setLine("idle; move the volume to reconnect");
       this.offlineText.textContent = `Idle: ${state.reason}.`;
+    } else if (state.name === "locked") {
+      this.loaded();
+      this.setLine("the server asks for its token");
+      this.offlineText.textContent = "The server asks for its token.";
     } else if (state.name === "waiting") {
       this.loaded();
       const until = performance.now() + state.delayMs;

@@ -12,6 +12,7 @@ import {
   type HelloMessage,
   type ServerMessage,
 } from "./protocol";
+import type { Reach } from "./reach";
 
 export interface MessageLike {
   data: unknown;
@@ -43,6 +44,7 @@ export type ConnectionState =
   | { name: "live" }
   | { name: "waiting"; attempt: number; delayMs: number; reason: string }
   | { name: "asleep"; reason: string } // closed as idle; input or showing the page reconnects
+  | { name: "locked" } // the server asks for a token; a login reconnects
   | { name: "stopped" };
 
 export interface ConnectionEvents {
@@ -55,14 +57,18 @@ export interface ConnectionEvents {
 const helloDeadlineMs = 10_000;
 const delayFirstMs = 625;
 const delayLastMs = 12_500;
+const silentDelayLastMs = 1_600;
 const socketOpen = 1;
 const waitingBytesMax = 2048; // a few patches
 const idleCode = 4410;
 
 // Milliseconds before attempt n (from 0): doubling each time, randomized by 20 % so that the
-// clients of a restarted server do not all reconnect at once; always within 500..15000.
-export function reconnectDelayMs(attempt: number, random: number): number {
-  const base = Math.min(delayLastMs, delayFirstMs * 2 ** Math.min(attempt, 30));
+// clients of a restarted server do not all reconnect at once. A server that answers but refuses is
+// tried less and less often, within 500..15000; one that is silent, which costs it nothing, within
+// 500..2000, so that the page is back soon after it.
+export function reconnectDelayMs(attempt: number, random: number, silent = false): number {
+  const last = silent ? silentDelayLastMs : delayLastMs;
+  const base = Math.min(last, delayFirstMs * 2 ** Math.min(attempt, 30));
   return Math.round(base * (0.8 + 0.4 * random));
 }
 
@@ -87,10 +93,12 @@ export class Connection {
   private socket: SocketLike | null = null;
   private greeted = false;
   private attempt = 0;
+  private refusals = 0; // attempts since the last frame at which the server was there
   private retryTimer: number | null = null;
   private helloTimer: number | null = null;
   private stopped = true;
   private asleep = false;
+  private locked = false;
   private fault: string | null = null;
 
   constructor(
@@ -98,6 +106,7 @@ export class Connection {
     private readonly openSocket: (url: string, protocol: string) => SocketLike,
     private readonly clock: Clock,
     private readonly events: ConnectionEvents,
+    private readonly reach: () => Promise<Reach>,
   ) {}
 
   get live(): boolean {
@@ -118,6 +127,7 @@ export class Connection {
   stop(): void {
     this.stopped = true;
     this.asleep = false;
+    this.locked = false;
     this.clearTimers();
     this.drop(1000, "");
     this.events.state({ name: "stopped" });
@@ -131,9 +141,10 @@ export class Connection {
     return true;
   }
 
-  // Reconnects without the remaining delay, as the network is available again.
+  // Reconnects without the remaining delay, as the network is available again, the page is shown or
+  // the user has logged in.
   retryNow(): void {
-    if (this.retryTimer !== null || this.asleep) this.connect();
+    if (this.retryTimer !== null || this.asleep || this.locked) this.connect();
   }
 
   // Reconnects an idle connection on input or when the page becomes visible.
@@ -144,6 +155,7 @@ export class Connection {
   private connect(): void {
     this.clearTimers();
     this.asleep = false;
+    this.locked = false;
     this.events.state({ name: "connecting", attempt: this.attempt });
     const socket = this.openSocket(this.url, subprotocol);
     this.socket = socket;
@@ -167,6 +179,7 @@ export class Connection {
         if (!this.greeted) throw new WireError("a frame before hello");
         this.events.frame(parseFrame(data));
         this.attempt = 0;
+        this.refusals = 0;
       } else {
         throw new WireError("a message of an unknown kind");
       }
@@ -210,6 +223,7 @@ export class Connection {
 
   private lost(code: number, reason: string): void {
     this.clearTimers();
+    const answered = this.greeted || (code !== 1001 && code !== 1006);
     this.socket = null;
     this.greeted = false;
     if (this.stopped) return;
@@ -219,13 +233,41 @@ export class Connection {
       return;
     }
     // policy violation: an early retry is unlikely to succeed
-    if (code === 1008) this.attempt = Math.max(this.attempt, 5);
-    const delayMs = reconnectDelayMs(this.attempt, this.clock.random());
+    if (code === 1008) this.refusals = Math.max(this.refusals, 5);
+    else if (answered && this.attempt > 0) this.refusals += 1;
     this.attempt += 1;
     const why = this.fault ?? closeReason(code, reason);
     this.fault = null;
+    const timer = this.retry(why);
+    void this.reach().then((reach) => {
+      if (this.retryTimer === timer) this.reached(reach, answered, why);
+    });
+  }
+
+  // Waits for the next attempt. Returns its timer.
+  private retry(reason: string): number {
+    const chance = this.clock.random();
+    const delayMs =
+      this.refusals > 0
+        ? reconnectDelayMs(this.refusals, chance)
+        : reconnectDelayMs(this.attempt - 1, chance, true);
     this.retryTimer = this.clock.setTimeout(() => this.connect(), delayMs);
-    this.events.state({ name: "waiting", attempt: this.attempt, delayMs, reason: why });
+    this.events.state({ name: "waiting", attempt: this.attempt, delayMs, reason });
+    return this.retryTimer;
+  }
+
+  // A browser does not say why a stream could not be opened; the server's answer to another request
+  // shows whether it asks for a token, or refuses streams for another reason.
+  private reached(reach: Reach, counted: boolean, reason: string): void {
+    if (reach === "silent" || (reach === "answers" && counted)) return;
+    this.clearTimers();
+    if (reach === "login") {
+      this.locked = true;
+      this.events.state({ name: "locked" });
+      return;
+    }
+    this.refusals += 1;
+    this.retry(reason);
   }
 
   private clearTimers(): void {
