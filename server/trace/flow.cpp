@@ -1,0 +1,201 @@
+// Interpolation of a field and of the positions of its samples.
+#include "server/trace/flow.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+
+namespace windsplat::trace {
+
+namespace {
+
+// The samples on both sides of a place along each axis, and the share of the second.
+struct Corners {
+  std::array<std::array<int, 2>, 3> sample{};
+  std::array<double, 3> part{};  // continues beyond [0, 1] in the outer half of outermost cells
+};
+
+Corners corners_of(const Flow& flow, const glm::dvec3& index) {
+  Corners out;
+  for (int a = 0; a < 3; ++a) {
+    const int count = flow.dims[a];
+    if (a == 0 && flow.around > 0) {
+      const double low = std::floor(index[a]);
+      const double turns = std::floor(low / flow.around);
+      const int first = std::clamp(static_cast<int>(low - turns * flow.around), 0, flow.around - 1);
+      out.sample[a] = {first, (first + 1) % flow.around};
+      out.part[a] = index[a] - low;
+      continue;
+    }
+    const double last = std::max(count - 2, 0);
+    const int first = static_cast<int>(std::clamp(std::floor(index[a]), 0.0, last));
+    out.sample[a] = {first, std::min(first + 1, count - 1)};
+    out.part[a] = index[a] - first;
+  }
+  return out;
+}
+
+std::size_t number_of(const Flow& flow, int x, int y, int z) {
+  const auto row = static_cast<std::size_t>(z) * static_cast<std::size_t>(flow.dims[1]) +
+                   static_cast<std::size_t>(y);
+  return row * static_cast<std::size_t>(flow.dims[0]) + static_cast<std::size_t>(x);
+}
+
+// Calls visit(number of the sample, corner) for the eight corners.
+template <class Visit>
+void each_corner(const Flow& flow, const Corners& at, const Visit& visit) {
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    visit(number_of(flow, at.sample[0][corner & 1U], at.sample[1][corner >> 1U & 1U],
+                    at.sample[2][corner >> 2U]),
+          corner);
+  }
+}
+
+double share_of(unsigned bit, double part) { return bit != 0 ? part : 1 - part; }
+
+glm::dvec3 place_of(const Flow& flow, std::size_t sample) {
+  const std::array<float, 3>& p = flow.places[sample];
+  return {p[0], p[1], p[2]};
+}
+
+// Edges of the cell at a place: the derivative of the position by each index. Along an axis of one
+// sample the edge has the width of the cell and is perpendicular to the others.
+struct Cell {
+  glm::dvec3 place{0, 0, 0};
+  std::array<glm::dvec3, 3> edge{};
+};
+
+void raise_edges(const Flow& flow, const glm::dvec3& index, Cell& cell) {
+  for (int a = 0; a < 3; ++a) {
+    if (flow.dims[a] > 1) continue;
+    const int b = (a + 1) % 3;
+    const int c = (a + 2) % 3;
+    glm::dvec3 normal(0);
+    normal[a] = 1;
+    if (flow.dims[b] > 1 && flow.dims[c] > 1) normal = glm::cross(cell.edge[b], cell.edge[c]);
+    const double size = glm::length(normal);
+    if (size > 0) cell.edge[a] = normal * (flow.spacing[a][0] / size);
+    cell.place += index[a] * cell.edge[a];
+  }
+}
+
+Cell curved_cell(const Flow& flow, const glm::dvec3& index, const Corners& at) {
+  Cell cell;
+  each_corner(flow, at, [&](std::size_t sample, unsigned corner) {
+    std::array<double, 3> share{};
+    std::array<double, 3> slope{};
+    for (unsigned a = 0; a < 3; ++a) {
+      const bool single = flow.dims[a] == 1;
+      const unsigned bit = corner >> a & 1U;
+      share[a] = single ? share_of(bit, 0) : share_of(bit, at.part[a]);
+      slope[a] = single ? 0 : bit != 0 ? 1 : -1;
+    }
+    const glm::dvec3 place = place_of(flow, sample);
+    cell.place += share[0] * share[1] * share[2] * place;
+    cell.edge[0] += slope[0] * share[1] * share[2] * place;
+    cell.edge[1] += share[0] * slope[1] * share[2] * place;
+    cell.edge[2] += share[0] * share[1] * slope[2] * place;
+  });
+  raise_edges(flow, index, cell);
+  return cell;
+}
+
+Cell straight_cell(const Flow& flow, const Corners& at) {
+  Cell cell;
+  for (int a = 0; a < 3; ++a) {
+    const auto [low, high] = at.sample[a];
+    const double from = flow.positions[a][static_cast<std::size_t>(low)];
+    const double width =
+        high > low ? flow.positions[a][static_cast<std::size_t>(high)] - from : flow.spacing[a][0];
+    cell.place[a] = from + at.part[a] * width;
+    cell.edge[a][a] = width;
+  }
+  return cell;
+}
+
+Cell cell_at(const Flow& flow, const glm::dvec3& index, const Corners& at) {
+  return flow.places != nullptr ? curved_cell(flow, index, at) : straight_cell(flow, at);
+}
+
+// Linear between the samples on both sides, constant beyond the outermost.
+double rate_at(std::span<const double> rates, const std::array<int, 2>& sample, double part) {
+  const double share = std::clamp(part, 0.0, 1.0);
+  return (1 - share) * rates[static_cast<std::size_t>(sample[0])] +
+         share * rates[static_cast<std::size_t>(sample[1])];
+}
+
+// False where every sample with a share is masked.
+bool interpolate(const Flow& flow, const Corners& at, glm::dvec3& vector) {
+  double total = 0;
+  vector = glm::dvec3(0);
+  each_corner(flow, at, [&](std::size_t sample, unsigned corner) {
+    double share = 1;
+    for (unsigned a = 0; a < 3; ++a) {
+      share *= share_of(corner >> a & 1U, std::clamp(at.part[a], 0.0, 1.0));
+    }
+    if (!(share > 0) || std::isnan(flow.components[0][sample])) return;
+    total += share;
+    for (int c = 0; c < 3; ++c) {
+      if (flow.components[c] != nullptr) {
+        vector[c] += share * static_cast<double>(flow.components[c][sample]);
+      }
+    }
+  });
+  if (!(total > 0)) return false;
+  vector /= total;
+  return true;
+}
+
+}  // namespace
+
+bool Flow::bounds(const glm::dvec3& index) const {
+  for (int a = 0; a < 3; ++a) {
+    if (a == 0 && around > 0) continue;
+    if (!(index[a] >= -0.5 && index[a] <= dims[a] - 0.5)) return false;
+  }
+  return true;
+}
+
+bool Flow::holds(const glm::dvec3& index) const {
+  if (!bounds(index)) return false;
+  std::array<int, 3> nearest{};
+  const Corners at = corners_of(*this, index);
+  for (int a = 0; a < 3; ++a) nearest[a] = at.sample[a][at.part[a] >= 0.5 ? 1 : 0];
+  return !std::isnan(components[0][number_of(*this, nearest[0], nearest[1], nearest[2])]);
+}
+
+glm::dvec3 Flow::place(const glm::dvec3& index) const {
+  return cell_at(*this, index, corners_of(*this, index)).place;
+}
+
+bool motion_at(const Flow& flow, const glm::dvec3& index, Motion& out) {
+  constexpr double flattest = 1e-6;  // of an edge, relative to the longest
+  const Corners at = corners_of(flow, index);
+  if (!interpolate(flow, at, out.vector)) return false;
+  out.magnitude = glm::length(out.vector);
+  glm::dvec3 drawn = out.vector * flow.scale;
+  if (!flow.rate_x.empty()) {
+    drawn *= glm::dvec3(rate_at(flow.rate_x, at.sample[1], at.part[1]), flow.rate_y,
+                        rate_at(flow.rate_z, at.sample[2], at.part[2]));
+  }
+  out.speed = glm::length(drawn);
+  out.along = glm::dvec3(0);
+  if (!(out.speed > 0)) return true;
+  drawn /= out.speed;
+  const Cell cell = cell_at(flow, index, at);
+  glm::dvec3 width(0);
+  for (int a = 0; a < 3; ++a) width[a] = glm::length(cell.edge[a]);
+  const double longest = std::max({width.x, width.y, width.z});
+  glm::dvec3 world(0);
+  for (int a = 0; a < 3; ++a) {
+    if (!(width[a] > flattest * longest)) return false;
+    world += drawn[a] / width[a] * cell.edge[a];
+  }
+  const double length = glm::length(world);
+  if (!(length > 0)) return false;
+  out.along = drawn / (width * length);
+  return true;
+}
+
+}  // namespace windsplat::trace

@@ -1,0 +1,203 @@
+// Steps of Dormand and Prince along a flow, with control of their length.
+#include "server/trace/path.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace windsplat::trace {
+
+namespace {
+
+using glm::dvec3;
+using glm::dvec4;
+
+constexpr int stages = 7;
+
+// The coefficients of the method (table 5.2 of Hairer, Norsett, Wanner) and of its interpolant.
+constexpr double weights[stages][stages - 1] = {
+    {},
+    {1.0 / 5},
+    {3.0 / 40, 9.0 / 40},
+    {44.0 / 45, -56.0 / 15, 32.0 / 9},
+    {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
+    {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
+    {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
+constexpr double errors[stages] = {71.0 / 57600,      0,          -71.0 / 16695, 71.0 / 1920,
+                                   -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
+constexpr double dense[stages] = {-12715105075.0 / 11282082432.0,  0,
+                                  87487479700.0 / 32700410799.0,   -10690763975.0 / 1880347072.0,
+                                  701980252875.0 / 199316789632.0, -1453857185.0 / 822651844.0,
+                                  69997945.0 / 29380423.0};
+
+dvec3 index_of(const dvec4& state) { return {state.x, state.y, state.z}; }
+
+// The largest change of an index.
+double widest(const dvec4& change) {
+  return std::max({std::abs(change.x), std::abs(change.y), std::abs(change.z)});
+}
+
+dvec4 place_in(const Step& step, double part) {
+  const double rest = 1 - part;
+  const auto& t = step.terms;
+  return t[0] + part * (t[1] + rest * (t[2] + part * (t[3] + rest * t[4])));
+}
+
+class Follower {
+ public:
+  Follower(const Flow& flow, double length, bool upstream, const Limits& limits, Path& out)
+      : flow_(flow), length_(length), sign_(upstream ? -1 : 1), limits_(limits), out_(out) {}
+
+  void run() {
+    if (!flow_.holds(out_.start)) {
+      out_.end = flow_.bounds(out_.start) ? End::masked : End::boundary;
+      return;
+    }
+    state_ = dvec4(out_.start, 0);
+    if (!slope(state_, slopes_[0])) {
+      out_.end = End::boundary;
+      return;
+    }
+    const double rate = widest(slopes_[0]);
+    if (!(rate > 0)) return;
+    double step = 0.25 / rate;
+    for (int n = 0; n < limits_.steps_max; ++n) {
+      const double left = length_ - out_.length;
+      if (!(left > 1e-12 * length_)) return finish(End::length);
+      const double rate_here = widest(slopes_[0]);
+      step = std::min({step, left, step_most / rate_here});
+      const double error = try_step(step) / limits_.tolerance;
+      if (!(error <= 1)) {
+        step *= std::isfinite(error) ? std::max(0.2, 0.9 * std::pow(error, -0.2)) : 0.25;
+        if (step * rate_here < step_least) return finish(blocked_);
+        continue;
+      }
+      if (reverses(step)) {
+        // About a sink, errors are of the order of the steps and would let it pass back and forth.
+        if (step * rate_here < std::max(20 * limits_.tolerance, step_least)) {
+          return finish(End::stagnation);
+        }
+        step *= 0.5;
+        continue;
+      }
+      if (!accept(step)) return;
+      step *= std::min(5.0, 0.9 * std::pow(std::max(error, 1e-10), -0.2));
+    }
+    finish(End::steps);
+  }
+
+ private:
+  void finish(End end) { out_.end = end; }
+
+  // The change of place and time per unit of world length. False where there is no flow.
+  bool slope(const dvec4& state, dvec4& out) {
+    ++out_.evaluations;
+    Motion motion;
+    if (!motion_at(flow_, index_of(state), motion)) return false;
+    out = motion.speed > 0 ? sign_ * dvec4(motion.along, 1 / motion.speed) : dvec4(0);
+    return true;
+  }
+
+  // Returns the estimated error in cells; infinite where a stage finds no flow. A step that cannot
+  // be shortened further ends the path for the reason `blocked_`.
+  double try_step(double step) {
+    blocked_ = End::stagnation;
+    for (int s = 1; s < stages; ++s) {
+      dvec4 at = state_;
+      for (int k = 0; k < s; ++k) at += step * weights[s][k] * slopes_[k];
+      if (!slope(at, slopes_[s])) {
+        blocked_ =
+            flow_.bounds(index_of(at)) && !flow_.holds(index_of(at)) ? End::masked : End::boundary;
+        return HUGE_VAL;
+      }
+      next_ = at;  // the last stage is the end of the step
+    }
+    dvec4 error(0);
+    for (int s = 0; s < stages; ++s) error += step * errors[s] * slopes_[s];
+    return widest(error);
+  }
+
+  // Whether the flow reverses, or all but does, within the last step tried.
+  [[nodiscard]] bool reverses(double step) const {
+    const dvec3 from = index_of(slopes_[0]);
+    const dvec3 to = index_of(slopes_[stages - 1]);
+    const double way = 0.5 * step * (glm::length(from) + glm::length(to));
+    return glm::dot(from, to) < 0 || glm::length(index_of(next_ - state_)) < 0.5 * way;
+  }
+
+  // Adds the step, or its part before the domain ends. Returns whether the path continues.
+  bool accept(double length) {
+    Step step{out_.length, length, {}};
+    const dvec4 change = next_ - state_;
+    const dvec4 bend = length * slopes_[0] - change;
+    dvec4 last(0);
+    for (int s = 0; s < stages; ++s) last += length * dense[s] * slopes_[s];
+    step.terms = {state_, change, bend, change - length * slopes_[6] - bend, last};
+    const double part = part_inside(step);
+    out_.steps.push_back(step);
+    out_.length += part * length;
+    if (part < 1) return false;
+    state_ = next_;
+    slopes_[0] = slopes_[6];
+    if (widest(slopes_[0]) > 0) return true;
+    finish(End::stagnation);
+    return false;
+  }
+
+  // The part of a step before it leaves the domain; sets the reason if it does.
+  double part_inside(const Step& step) {
+    constexpr int checks = 4;
+    constexpr int halvings = 40;
+    double low = 0;
+    for (int n = 1; n <= checks; ++n) {
+      double high = static_cast<double>(n) / checks;
+      const dvec3 there = index_of(place_in(step, high));
+      if (flow_.holds(there)) {
+        low = high;
+        continue;
+      }
+      finish(flow_.bounds(there) ? End::masked : End::boundary);
+      for (int k = 0; k < halvings; ++k) {
+        const double middle = 0.5 * (low + high);
+        (flow_.holds(index_of(place_in(step, middle))) ? low : high) = middle;
+      }
+      return low;
+    }
+    return 1;
+  }
+
+  const Flow& flow_;
+  const double length_;
+  const double sign_;
+  const Limits& limits_;
+  Path& out_;
+  dvec4 state_{0};
+  dvec4 next_{0};
+  std::array<dvec4, stages> slopes_{};
+  End blocked_ = End::stagnation;
+};
+
+}  // namespace
+
+Place Path::at(double from_start) const {
+  if (steps.empty()) return {start, 0};
+  auto after = std::upper_bound(
+      steps.begin(), steps.end(), from_start,
+      [](double length_there, const Step& step) { return length_there < step.start; });
+  if (after != steps.begin()) --after;
+  const double part = std::clamp((from_start - after->start) / after->length, 0.0, 1.0);
+  const dvec4 state = place_in(*after, part);
+  return {index_of(state), state.w};
+}
+
+void follow(const Flow& flow, const glm::dvec3& start, double length, bool upstream,
+            const Limits& limits, Path& out) {
+  out.steps.clear();
+  out.length = 0;
+  out.end = End::stagnation;
+  out.evaluations = 0;
+  out.start = start;
+  Follower(flow, length, upstream, limits, out).run();
+}
+
+}  // namespace windsplat::trace
