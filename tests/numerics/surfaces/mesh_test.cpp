@@ -1,4 +1,6 @@
 // Isosurfaces and sections as triangles: closed forms, topology, masked samples.
+#include "server/surface/mesh.hpp"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,25 +18,23 @@
 #include <vector>
 
 #include "server/base/thread_pool.hpp"
-#include "server/surface/mesh.hpp"
 
 namespace windsplat::test {
 namespace {
 
 using surface::Cut;
 using surface::Mesh;
-using surface::Point;
 using surface::Samples;
 using Function = std::function<double(const glm::dvec3&)>;
 
 constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
 
-glm::dvec3 vec(const Point& p) { return {p[0], p[1], p[2]}; }
+glm::dvec3 vec(const surface::Point& p) { return {p[0], p[1], p[2]}; }
 
 // A lattice with the values of a function at its samples.
 struct Lattice {
   std::array<std::vector<double>, 3> positions;
-  std::vector<Point> places;
+  std::vector<surface::Point> places;
   int around = 0;
   std::vector<float> values;
 
@@ -134,7 +134,8 @@ double squared(const glm::dvec3& p) { return glm::dot(p, p); }
 
 double farthest_from_sphere(const Mesh& mesh, double radius) {
   double most = 0;
-  for (const Point& p : mesh.places) most = std::max(most, std::abs(glm::length(vec(p)) - radius));
+  for (const surface::Point& p : mesh.places)
+    most = std::max(most, std::abs(glm::length(vec(p)) - radius));
   return most;
 }
 
@@ -251,7 +252,7 @@ TEST(SurfaceMesh, CellsWithAMaskedCornerAreAHoleOfThatSize) {
   const Mesh mesh = lattice.isosurface(0);
   EXPECT_NEAR(area(mesh), 4 - 4 * 0.2 * 0.2, 1e-6);
   EXPECT_EQ(euler(mesh), 0);  // an annulus
-  for (const Point& normal : mesh.normals) EXPECT_NEAR(normal[2], 1, 1e-6);
+  for (const surface::Point& normal : mesh.normals) EXPECT_NEAR(normal[2], 1, 1e-6);
 }
 
 TEST(SurfaceMesh, IsTheSameForAnyNumberOfThreadsAndAsMeasured) {
