@@ -22,9 +22,6 @@
 namespace windsplat::test {
 namespace {
 
-using surface::Cut;
-using surface::Mesh;
-using surface::Samples;
 using Function = std::function<double(const glm::dvec3&)>;
 
 constexpr float nan_value = std::numeric_limits<float>::quiet_NaN();
@@ -38,8 +35,8 @@ struct Lattice {
   int around = 0;
   std::vector<float> values;
 
-  [[nodiscard]] Samples samples() const {
-    Samples out;
+  [[nodiscard]] surface::Samples samples() const {
+    surface::Samples out;
     for (std::size_t a = 0; a < 3; ++a) {
       out.dims.at(a) = static_cast<int>(positions.at(a).size());
       out.positions.at(a) = positions.at(a).data();
@@ -49,7 +46,7 @@ struct Lattice {
     return out;
   }
   void fill(const Function& f) {
-    const Samples at = samples();
+    const surface::Samples at = samples();
     values.clear();
     for (int k = 0; k < at.dims[2]; ++k) {
       for (int j = 0; j < at.dims[1]; ++j) {
@@ -59,9 +56,9 @@ struct Lattice {
       }
     }
   }
-  [[nodiscard]] Mesh isosurface(double level, unsigned threads = 1) const {
+  [[nodiscard]] surface::Mesh isosurface(double level, unsigned threads = 1) const {
     ThreadPool pool(threads);
-    Cut cut;
+    surface::Cut cut;
     cut.level = level;
     cut.values = values.data();
     return surface::extract(samples(), cut, nullptr, pool);
@@ -100,7 +97,7 @@ Lattice globe(int columns) {
 }
 
 // How many triangles have each side.
-std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides_of(const Mesh& mesh) {
+std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides_of(const surface::Mesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
   for (const auto& t : mesh.triangles) {
     for (std::size_t n = 0; n < 3; ++n) ++sides[std::minmax(t.at(n), t.at((n + 1) % 3))];
@@ -109,19 +106,19 @@ std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides_of(const Mesh& mesh
 }
 
 // Vertices in use - sides + triangles.
-long euler(const Mesh& mesh) {
+long euler(const surface::Mesh& mesh) {
   std::set<std::uint32_t> used;
   for (const auto& t : mesh.triangles) used.insert(t.begin(), t.end());
   return static_cast<long>(used.size()) - static_cast<long>(sides_of(mesh).size()) +
          static_cast<long>(mesh.triangles.size());
 }
 
-long open_sides(const Mesh& mesh) {
+long open_sides(const surface::Mesh& mesh) {
   const auto sides = sides_of(mesh);
   return std::count_if(sides.begin(), sides.end(), [](const auto& s) { return s.second != 2; });
 }
 
-double area(const Mesh& mesh) {
+double area(const surface::Mesh& mesh) {
   double sum = 0;
   for (const auto& t : mesh.triangles) {
     const glm::dvec3 p = vec(mesh.places[t[0]]);
@@ -132,7 +129,7 @@ double area(const Mesh& mesh) {
 
 double squared(const glm::dvec3& p) { return glm::dot(p, p); }
 
-double farthest_from_sphere(const Mesh& mesh, double radius) {
+double farthest_from_sphere(const surface::Mesh& mesh, double radius) {
   double most = 0;
   for (const surface::Point& p : mesh.places)
     most = std::max(most, std::abs(glm::length(vec(p)) - radius));
@@ -145,7 +142,7 @@ TEST(SurfaceMesh, IsosurfaceOfTheSquaredRadiusIsASphereToSecondOrder) {
   std::array<double, 2> distance{};
   std::array<double, 2> missing{};
   for (std::size_t n = 0; n < 2; ++n) {
-    const Mesh mesh = cube(n == 0 ? 17 : 33, squared).isosurface(radius * radius);
+    const surface::Mesh mesh = cube(n == 0 ? 17 : 33, squared).isosurface(radius * radius);
     distance.at(n) = farthest_from_sphere(mesh, radius);
     missing.at(n) = std::abs(area(mesh) / whole - 1);
     EXPECT_EQ(euler(mesh), 2);
@@ -163,10 +160,10 @@ TEST(SurfaceMesh, IsosurfaceOfTheSquaredRadiusIsASphereToSecondOrder) {
 }
 
 TEST(SurfaceMesh, TorusHasTheEulerCharacteristicZero) {
-  const Mesh mesh = cube(41, [](const glm::dvec3& p) {
-                      const double ring = std::hypot(p.x, p.y) - 0.6;
-                      return ring * ring + p.z * p.z;
-                    }).isosurface(0.06);
+  const surface::Mesh mesh = cube(41, [](const glm::dvec3& p) {
+                               const double ring = std::hypot(p.x, p.y) - 0.6;
+                               return ring * ring + p.z * p.z;
+                             }).isosurface(0.06);
   EXPECT_EQ(euler(mesh), 0);
   EXPECT_EQ(open_sides(mesh), 0);
 }
@@ -176,7 +173,7 @@ TEST(SurfaceMesh, NoiseHasAClosedManifoldWithoutCracks) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> uniform(-1, 1);
   Lattice lattice = cube(20, [&](const glm::dvec3&) { return uniform(random); });
-  const Samples at = lattice.samples();
+  const surface::Samples at = lattice.samples();
   for (int k = 0; k < 20; ++k) {
     for (int j = 0; j < 20; ++j) {
       for (int i = 0; i < 20; ++i) {
@@ -185,7 +182,7 @@ TEST(SurfaceMesh, NoiseHasAClosedManifoldWithoutCracks) {
       }
     }
   }
-  const Mesh mesh = lattice.isosurface(0.1);
+  const surface::Mesh mesh = lattice.isosurface(0.1);
   EXPECT_GT(mesh.triangles.size(), 5000U);
   EXPECT_EQ(open_sides(mesh), 0);
 }
@@ -196,13 +193,14 @@ TEST(SurfaceMesh, LinearFieldIsCutExactlyFlatOnAnUnevenAxis) {
   lattice.fill([&](const glm::dvec3& p) { return 3 * glm::dot(p, normal); });
   for (const bool plane : {false, true}) {
     ThreadPool pool(1);
-    Cut cut;
+    surface::Cut cut;
     cut.level = 0.6;
     cut.values = lattice.values.data();
     if (plane) cut.kind = Cut::Kind::plane;
     cut.normal = normal;
     cut.point = 0.2 * normal;
-    const Mesh mesh = surface::extract(lattice.samples(), cut, lattice.values.data(), pool);
+    const surface::Mesh mesh =
+        surface::extract(lattice.samples(), cut, lattice.values.data(), pool);
     ASSERT_FALSE(mesh.places.empty());
     for (std::size_t v = 0; v < mesh.places.size(); ++v) {
       EXPECT_NEAR(glm::dot(vec(mesh.places[v]), normal), 0.2, 2e-7);
@@ -215,11 +213,11 @@ TEST(SurfaceMesh, LinearFieldIsCutExactlyFlatOnAnUnevenAxis) {
 TEST(SurfaceMesh, PlaneThroughACubeHasTheAreaOfItsSection) {
   const Lattice lattice = cube(7, squared);
   ThreadPool pool(1);
-  Cut cut;
+  surface::Cut cut;
   cut.kind = Cut::Kind::plane;
   cut.normal = glm::normalize(glm::dvec3(1, 1, 1));
   cut.values = lattice.values.data();
-  const Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
+  const surface::Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
   EXPECT_NEAR(area(mesh), 3 * std::sqrt(3.0), 1e-5);  // a regular hexagon of side sqrt(2)
 }
 
@@ -227,12 +225,12 @@ TEST(SurfaceMesh, LayerOfAGlobeIsAShellOfConstantRadiusThatCloses) {
   Lattice lattice = globe(24);
   lattice.fill(squared);
   ThreadPool pool(2);
-  Cut cut;
+  surface::Cut cut;
   cut.kind = Cut::Kind::layer;
   cut.axis = 2;
   cut.index = 1.5;
   cut.values = lattice.values.data();
-  const Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
+  const surface::Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
   EXPECT_EQ(mesh.triangles.size(), 24U * 8 * 2);
   EXPECT_LT(farthest_from_sphere(mesh, 0.875), 1e-6);
   EXPECT_EQ(open_sides(mesh), 2 * 24);  // the rings at the highest latitudes
@@ -249,7 +247,7 @@ TEST(SurfaceMesh, CellsWithAMaskedCornerAreAHoleOfThatSize) {
   const double before = area(lattice.isosurface(0));
   EXPECT_NEAR(before, 4, 1e-6);
   lattice.values[lattice.samples().index(5, 5, 5)] = nan_value;
-  const Mesh mesh = lattice.isosurface(0);
+  const surface::Mesh mesh = lattice.isosurface(0);
   EXPECT_NEAR(area(mesh), 4 - 4 * 0.2 * 0.2, 1e-6);
   EXPECT_EQ(euler(mesh), 0);  // an annulus
   for (const surface::Point& normal : mesh.normals) EXPECT_NEAR(normal[2], 1, 1e-6);
@@ -257,13 +255,13 @@ TEST(SurfaceMesh, CellsWithAMaskedCornerAreAHoleOfThatSize) {
 
 TEST(SurfaceMesh, IsTheSameForAnyNumberOfThreadsAndAsMeasured) {
   const Lattice lattice = cube(19, squared);
-  const Mesh one = lattice.isosurface(0.4, 1);
-  const Mesh three = lattice.isosurface(0.4, 3);
+  const surface::Mesh one = lattice.isosurface(0.4, 1);
+  const surface::Mesh three = lattice.isosurface(0.4, 3);
   EXPECT_EQ(one.places, three.places);
   EXPECT_EQ(one.normals, three.normals);
   EXPECT_EQ(one.triangles, three.triangles);
   ThreadPool pool(2);
-  Cut cut;
+  surface::Cut cut;
   cut.level = 0.4;
   cut.values = lattice.values.data();
   const surface::MeshSize size = surface::measure(lattice.samples(), cut, pool);
