@@ -196,7 +196,7 @@ TEST(SurfaceMesh, LinearFieldIsCutExactlyFlatOnAnUnevenAxis) {
     surface::Cut cut;
     cut.level = 0.6;
     cut.values = lattice.values.data();
-    if (plane) cut.kind = Cut::Kind::plane;
+    if (plane) cut.kind = surface::Cut::Kind::plane;
     cut.normal = normal;
     cut.point = 0.2 * normal;
     const surface::Mesh mesh =
@@ -214,7 +214,7 @@ TEST(SurfaceMesh, PlaneThroughACubeHasTheAreaOfItsSection) {
   const Lattice lattice = cube(7, squared);
   ThreadPool pool(1);
   surface::Cut cut;
-  cut.kind = Cut::Kind::plane;
+  cut.kind = surface::Cut::Kind::plane;
   cut.normal = glm::normalize(glm::dvec3(1, 1, 1));
   cut.values = lattice.values.data();
   const surface::Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
@@ -226,7 +226,7 @@ TEST(SurfaceMesh, LayerOfAGlobeIsAShellOfConstantRadiusThatCloses) {
   lattice.fill(squared);
   ThreadPool pool(2);
   surface::Cut cut;
-  cut.kind = Cut::Kind::layer;
+  cut.kind = surface::Cut::Kind::layer;
   cut.axis = 2;
   cut.index = 1.5;
   cut.values = lattice.values.data();
