@@ -56,6 +56,11 @@ const openers = {
     await page.keyboard.press("?");
     await page.locator("#help").waitFor();
   },
+  login: async (page) => {
+    // the button is shown once the server asks for a token
+    await page.evaluate(() => document.querySelector("#login-button").click());
+    await page.locator("#login").waitFor();
+  },
   save: async (page) => {
     await page.keyboard.press("s");
     await page.locator("#keep-name").fill("a view");

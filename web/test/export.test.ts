@@ -20,7 +20,7 @@ import {
 import { drawFrame, inOrder, waitFor, type FetchLike } from "../src/wire/frame_request";
 import { layoutCards } from "../src/save/legend_picture";
 import type { LegendEntry } from "../src/view/legend_entries";
-import { crc32, textOf, utf8, withTexts, type Bytes } from "../src/save/png_text";
+import { crc32, textOf, utf8, withDensity, withTexts, type Bytes } from "../src/save/png_text";
 import type { View } from "../src/wire/protocol";
 import { parseView } from "../src/save/saved_picture";
 import { Zip } from "../src/save/zip";
@@ -66,6 +66,8 @@ while at < len(data):
         language, translated, text = rest[2:].split(b"\\0", 2)
         assert language == translated == b""
         texts[keyword.decode("latin-1")] = text.decode("utf-8")
+    if body[:4] == b"pHYs":
+        texts["pHYs"] = list(struct.unpack(">IIB", body[4:]))
     at += 12 + length
 json.dump({"kinds": kinds, "texts": texts}, sys.stdout)
 `;
@@ -99,6 +101,14 @@ test("text chunks of a PNG survive a round trip and are read by another program"
   assert.equal(textOf(png, "Software"), "windsplat");
   assert.equal(textOf(png, "windsplat"), null);
   assert.equal(textOf(tinyPng(), "windsplat-view"), null);
+});
+
+test("the size in print of a PNG is read by another program", () => {
+  // 300 dots per inch are 300 / 0.0254 = 11811 pixels per metre
+  assert.deepEqual(python(pythonReader, withDensity(tinyPng(), 300), "a.png"), {
+    kinds: ["IHDR", "pHYs", "IDAT", "IEND"],
+    texts: { pHYs: [11811, 11811, 1] },
+  });
 });
 
 test("an international text chunk is read, a compressed one is not", () => {

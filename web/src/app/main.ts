@@ -1,5 +1,6 @@
 // Assembles the page (parts, key bindings, buttons) and starts the application.
 import { drag, pan, roll, zoom, type Angles } from "../view/camera";
+import { pictureCaption } from "../view/caption";
 import { About } from "./about";
 import { App } from "./app";
 import { Cards } from "./dataset_cards";
@@ -227,7 +228,10 @@ function debouncedResize(): () => void {
   let timer: number | undefined;
   return () => {
     window.clearTimeout(timer);
-    timer = window.setTimeout(() => app.resize(...viewport.size()), 120);
+    timer = window.setTimeout(() => {
+      // Paper shows the present picture; its size on paper is none to draw at.
+      if (!window.matchMedia("print").matches) app.resize(...viewport.size());
+    }, 120);
   };
 }
 
@@ -254,6 +258,11 @@ onClick("hud-button", () => hud.toggle());
 onClick("reset-button", () => app.cameras.reset());
 onClick("isometric-button", () => lookFrom(looks.at(-1)!.angles));
 onClick("projection-button", () => app.cameras.toggleProjection());
+
+window.addEventListener("beforeprint", () => {
+  const caption = app.isOpen() ? pictureCaption(app.dataset(), app.view().step ?? 0) : "";
+  byId("print-caption", HTMLElement).textContent = caption;
+});
 
 app.start({
   viewport,

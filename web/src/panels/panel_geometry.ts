@@ -18,6 +18,7 @@ import {
   sliceText,
   wholeVolume,
 } from "./controls";
+import { addCameraNumbers } from "./panel_camera";
 import { keyAccess, type PanelKit } from "./panel_kit";
 import type { Dataset } from "../wire/protocol";
 
@@ -205,4 +206,5 @@ export function addCamera(gui: GUI, kit: PanelKit, camera: CameraSwitch): void {
   kit.enableWhen((states) => states.lines, strength);
   kit.enableWhen((states) => states.depthCue, ...ends);
   kit.color(folder, "background", keyAccess("/image/background"));
+  addCameraNumbers(folder, kit, () => camera.camera());
 }

@@ -16,6 +16,7 @@ import { ForecastPlot } from "./forecast_plot";
 import { addAnnotations } from "./panel_annotations";
 import { addLines, type FlowSwitch } from "./panel_lines";
 import { addMedia } from "./panel_media";
+import { cameraNumbersTitle } from "./panel_camera";
 import { keyAccess, PanelKit, type PanelHost } from "./panel_kit";
 import { middleSample, sampleWithin, type Sample } from "../view/sample_position";
 import { ProbePanel, probeTitle } from "./panel_probe";
@@ -45,6 +46,7 @@ export class Panels {
     probeTitle,
     "Geometry",
     "Camera and depth",
+    cameraNumbersTitle,
     "Annotations",
     "Method",
     "Quality",

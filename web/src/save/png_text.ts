@@ -1,6 +1,6 @@
-// Text in PNG files: (bytes of a PNG, keywords and strings) -> bytes with one iTXt chunk for each,
-// and back. Pure. Source: PNG specification (ISO/IEC 15948), chunks 5.3, iTXt 11.3.4.5, CRC annex
-// D.
+// Text and size in print of PNG files: (bytes of a PNG, keywords and strings) -> bytes with one iTXt
+// chunk for each, and back; (bytes, dots per inch) -> bytes with a pHYs chunk. Pure. Source: PNG
+// specification (ISO/IEC 15948), chunks 5.3, iTXt 11.3.4.5, pHYs 11.3.5.3, CRC annex D.
 
 export type Bytes = Uint8Array<ArrayBuffer>;
 
@@ -58,6 +58,20 @@ export function withTexts(png: Uint8Array, texts: Record<string, string>): Bytes
     chunk("iTXt", join(utf8(keyword), new Uint8Array(5), utf8(text))),
   );
   return join(png.subarray(0, headEnd), ...chunks, png.subarray(headEnd));
+}
+
+const metresToTheInch = 0.0254;
+
+// The file must not have a pHYs chunk: neither the server nor a canvas writes one unasked.
+export function withDensity(png: Uint8Array, dotsPerInch: number): Bytes {
+  check(png);
+  const data = new DataView(new ArrayBuffer(9));
+  const perMetre = Math.round(dotsPerInch / metresToTheInch);
+  data.setUint32(0, perMetre);
+  data.setUint32(4, perMetre);
+  data.setUint8(8, 1); // the unit is the metre
+  const density = chunk("pHYs", new Uint8Array(data.buffer));
+  return join(png.subarray(0, headEnd), density, png.subarray(headEnd));
 }
 
 // null: no text has this keyword.

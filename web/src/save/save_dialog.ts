@@ -18,6 +18,7 @@ import { canRecord } from "./video";
 
 const pictureScaleMax = 4;
 const animationScaleMax = 2;
+const centimetresToTheInch = 2.54;
 const about: Record<string, string> = {
   zip: "Every frame lossless, with its view inside.",
   webm: "One file for players, not lossless. Recorded in real time: keep this page visible.",
@@ -45,15 +46,18 @@ const scaleChosen = (): string => select("scale").value;
 const sizeChosen = (host: SaveHost, scaleMax: number): ExportSize =>
   exportSize(...host.size(), Math.min(Number(scaleChosen()), scaleMax), host.pixelsMax());
 
+// Typed values are rounded and clamped.
+function number(id: string): number {
+  const { value, min, max } = input(id);
+  const most = max === "" ? framesMax : Number(max);
+  const right = clamp(Math.round(Number(value)), Number(min), most);
+  input(id).value = String(right);
+  return right;
+}
+
+const dotsPerInchChosen = (): number => number("dpi");
+
 function animationChosen(): Animation {
-  // Typed values are rounded and clamped.
-  const number = (id: string): number => {
-    const { value, min, max } = input(id);
-    const most = max === "" ? framesMax : Number(max);
-    const right = clamp(Math.round(Number(value)), Number(min), most);
-    input(id).value = String(right);
-    return right;
-  };
   const over = select("over").value as AnimationKind;
   const [from, to, every] = [number("from"), number("to"), number("every")];
   return { over, from, to, every, frames: number("frames"), fps: number("fps") };
@@ -76,7 +80,11 @@ function showChoices(host: SaveHost, dialog: HTMLElement, running: boolean): voi
   }
   const { width, height, scale } = sizeChosen(host, pictureScaleMax);
   const limited = scale < Number(scaleChosen()) ? ", the server's limit" : "";
-  part("size").textContent = `${width} × ${height} pixels${limited}.`;
+  const centimetres = (pixels: number): string =>
+    ((centimetresToTheInch * pixels) / dotsPerInchChosen()).toFixed(1);
+  part("size").textContent =
+    `${width} × ${height} pixels${limited}, ` +
+    `${centimetres(width)} × ${centimetres(height)} cm in print.`;
   const count = frameCount(chosen);
   const small = sizeChosen(host, animationScaleMax);
   part("about").textContent =
@@ -98,6 +106,7 @@ export function saveDialog(host: SaveHost, baseUri: string): () => void {
     legend: input("legend").checked
       ? { dataset: host.dataset(), view: host.view(), maps: host.maps }
       : null,
+    dotsPerInch: dotsPerInchChosen(),
   });
 
   const savePicture = (): Promise<void> =>

@@ -37,26 +37,31 @@ export interface SaveSetting {
   baseUri: string;
   pixels: ExportSize;
   legend: Shown | null; // null: without one
+  dotsPerInch: number; // the size of pictures in print
 }
 
 const draw = (baseUri: string, view: View, signal: AbortSignal): Promise<Blob> =>
   drawFrame((url, options) => fetch(url, options), baseUri, view, signal);
 
 // `scale`: the chosen scale, for the file name.
-export function pictureJob({ host, baseUri, pixels, legend }: SaveSetting, scale: string): Job {
+export function pictureJob(
+  { host, baseUri, pixels, legend, dotsPerInch }: SaveSetting,
+  scale: string,
+): Job {
   const view = pictureView(host.explicitView(), pixels);
   return {
     name: `${safeName(view.dataset ?? "")}-${view.step}-${scale}x.png`,
     work: async (signal, report) => {
       report("drawing…");
       const drawn = await draw(baseUri, view, signal);
-      return new Blob([await finishPicture(drawn, view, pixels, legend)], { type: "image/png" });
+      const picture = await finishPicture(drawn, view, pixels, legend, dotsPerInch);
+      return new Blob([picture], { type: "image/png" });
     },
   };
 }
 
 export function animationJob(setting: SaveSetting, chosen: Animation, video: boolean): Job {
-  const { host, baseUri, pixels, legend } = setting;
+  const { host, baseUri, pixels, legend, dotsPerInch } = setting;
   const whole = pictureView(host.explicitView(), pixels);
   const camera = host.camera()!;
   const count = frameCount(chosen);
@@ -74,7 +79,7 @@ export function animationJob(setting: SaveSetting, chosen: Animation, video: boo
       count,
       (n) => draw(baseUri, viewOf(n), signal),
       async (drawn, n) => {
-        const picture = await finishPicture(drawn, viewOf(n), pixels, legend);
+        const picture = await finishPicture(drawn, viewOf(n), pixels, legend, dotsPerInch);
         signal.throwIfAborted();
         if (video) frames.push(new Blob([picture], { type: "image/png" }));
         else zip.add(`${name}-${String(n).padStart(4, "0")}.png`, picture);

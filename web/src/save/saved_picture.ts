@@ -3,10 +3,10 @@
 import type { ColorMaps } from "../wire/color_maps";
 import type { ExportSize } from "./export_views";
 import { legendEntries } from "../view/legend_entries";
+import { pictureCaption } from "../view/caption";
 import { drawLegend } from "./legend_picture";
-import { textOf, withTexts, type Bytes } from "./png_text";
+import { textOf, withDensity, withTexts, type Bytes } from "./png_text";
 import type { Dataset, View } from "../wire/protocol";
-import { readableTime } from "../base/time_text";
 import { isView } from "../wire/view_shape";
 import { completeView } from "../view/view_state";
 
@@ -22,16 +22,17 @@ export interface Shown {
   maps: ColorMaps;
 }
 
-// `drawn` is the server's picture of `view`.
+// `drawn` is the server's picture of `view`; dotsPerInch: its size in print.
 export async function finishPicture(
   drawn: Blob,
   view: View,
   size: ExportSize,
   legend: Shown | null,
+  dotsPerInch: number,
 ): Promise<Bytes> {
   const plain = legend === null || view.annotations?.legend === true; // or the server's legend
   const picture = plain ? drawn : await withLegend(drawn, view, size, legend);
-  return withTexts(await bytesOf(picture), {
+  return withTexts(withDensity(await bytesOf(picture), dotsPerInch), {
     Software: "windsplat",
     [keyword]: JSON.stringify(view),
   });
@@ -46,13 +47,10 @@ async function withLegend(drawn: Blob, view: View, { scale }: ExportSize, shown:
   context.drawImage(bitmap, 0, 0);
   bitmap.close();
   const { dataset, maps } = shown;
-  const time = readableTime(dataset.steps.times[view.step ?? 0]?.text ?? "");
-  const step =
-    dataset.steps.count > 1 ? ` · step ${(view.step ?? 0) + 1} of ${dataset.steps.count}` : "";
   drawLegend(
     context,
     {
-      caption: `${dataset.title}${step}${time === "" ? "" : ` · ${time}`}`,
+      caption: pictureCaption(dataset, view.step ?? 0),
       entries: legendEntries(dataset, completeView(shown.view, view)),
       stops: (map) => maps.stops(map),
       font: getComputedStyle(document.body).fontFamily,
