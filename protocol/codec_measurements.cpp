@@ -153,8 +153,28 @@ std::string encode_series(const SeriesDescription& series) {
 }
 
 std::string encode_range(const RangeDescription& range) {
-  return dump(Json{
-      {"range", range_json(range.range)}, {"masked", range.masked}, {"rangeOf", range.range_of}});
+  Json out{
+      {"range", range_json(range.range)}, {"masked", range.masked}, {"rangeOf", range.range_of}};
+  if (range.places) {
+    out["places"] = {{"min", position_json((*range.places)[0])},
+                     {"max", position_json((*range.places)[1])}};
+  }
+  return dump(out);
+}
+
+std::string encode_pick(const std::optional<PickedFeature>& feature) {
+  Json out{{"feature", nullptr}};
+  if (feature) {
+    out["feature"] = {{"layer", feature->is_line ? "lines" : "medium"},
+                      {"field", feature->field},
+                      {"value", canonical_number(feature->value)},
+                      {"units", feature->units},
+                      {"position", position_json(feature->position)},
+                      {"share", canonical_number(feature->share)},
+                      {"depth", canonical_number(feature->depth)},
+                      {"at", numbers_json({feature->at[0], feature->at[1]})}};
+  }
+  return dump(out);
 }
 
 std::string encode_forecast(const ForecastDescription& forecast) {

@@ -63,6 +63,20 @@ struct RangeDescription {
   std::optional<Range> range;  // absent if all samples are masked
   std::int64_t masked = 0;
   std::string range_of;  // "step" | "all"
+  // Samples with the least and the greatest value, of a step only; absent if all are masked.
+  std::optional<std::array<PositionDescription, 2>> places;
+};
+
+// The sample that contributes most to a pixel.
+struct PickedFeature {
+  bool is_line = false;  // otherwise of a medium
+  std::string field;
+  double value = 0;  // of a vector the magnitude
+  std::string units;
+  PositionDescription position;
+  double share = 0;            // of the pixel's opacity
+  double depth = 0;            // view depth, world units
+  std::array<double, 2> at{};  // in the picture, pixels
 };
 
 // The finished reference picture of a view, and the error of the rendered view.
@@ -120,6 +134,7 @@ std::string encode_histogram(const HistogramDescription& histogram);
 std::string encode_probe(const ProbeDescription& probe);
 std::string encode_series(const SeriesDescription& series);
 std::string encode_range(const RangeDescription& range);
+std::string encode_pick(const std::optional<PickedFeature>& feature);
 std::string encode_forecast(const ForecastDescription& forecast);
 std::string encode_job(const JobDescription& job);
 std::string encode_jobs(const std::vector<JobDescription>& jobs);

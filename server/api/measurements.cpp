@@ -3,7 +3,6 @@
 #include "protocol/measurements.hpp"
 
 #include <array>
-#include <charconv>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -15,11 +14,11 @@
 #include <vector>
 
 #include "protocol/limits.hpp"
+#include "server/api/positions.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/model/measure.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
-#include "server/scene/place.hpp"
 #include "server/tasks/run_guarded.hpp"
 
 namespace windsplat::api {
@@ -60,143 +59,12 @@ Result<Subject> find_subject(tasks::Catalogue& catalogue, const std::string& id,
   return Subject{&catalogue, std::move(*dataset), *found, request.cancel};
 }
 
-Result<std::shared_ptr<const data::Volume>> load(tasks::Catalogue& catalogue,
-                                                 const data::Dataset& dataset,
-                                                 const std::string& field, std::size_t step,
-                                                 const CancelToken& cancel) {
-  auto volume = catalogue.load(
-      dataset, [&](data::Dataset& loading) { return loading.volume(field, step); }, cancel);
-  if (!volume)
-    return tasks::with_dataset_name(dataset.with_need(volume.error(), {field}), dataset.info().id,
-                                    field);
-  return volume;
-}
-
 Result<std::shared_ptr<const data::Volume>> load(const Subject& subject, std::size_t step) {
-  return load(*subject.catalogue, *subject.dataset, subject.field.name, step, subject.cancel);
+  return load_field(*subject.catalogue, *subject.dataset, subject.field.name, step, subject.cancel);
 }
 
 std::optional<int> read_step(http::QueryReader& query, const data::Dataset& dataset) {
   return query.integer("step", 0, static_cast<int>(dataset.info().steps.size()) - 1);
-}
-
-std::array<std::optional<double>, 3> read_place(http::QueryReader& query) {
-  return {query.number("x", -limits::coordinate_max, limits::coordinate_max),
-          query.number("y", -limits::coordinate_max, limits::coordinate_max),
-          query.number("z", -limits::coordinate_max, limits::coordinate_max)};
-}
-
-// A position, whose z is an absolute height if `height_field` names a field of heights; or the
-// indices of a sample.
-struct Position {
-  std::array<std::optional<double>, 3> at;
-  std::optional<std::array<int, 3>> index;
-  std::optional<std::string> height_field;
-};
-
-// "i,j,k"
-std::optional<std::array<int, 3>> indices_in(std::string_view text) {
-  std::array<int, 3> out{};
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (std::size_t a = 0; a < out.size(); ++a) {
-    if (a > 0 && (at == end || *at++ != ',')) return std::nullopt;
-    const auto [rest, fault] = std::from_chars(at, end, out.at(a));
-    if (fault != std::errc()) return std::nullopt;
-    at = rest;
-  }
-  return at == end ? std::optional(out) : std::nullopt;
-}
-
-// Errors: malformed or invalid, also those of other parameters of the query.
-Result<Position> read_position(http::QueryReader& query, const data::Grid& grid) {
-  Position out{read_place(query), {}, query.text("heightField")};
-  const auto index = query.text("index");
-  if (!index) return out;
-  if (out.at[0] || out.at[1] || out.at[2]) {
-    return make_error(ErrorKind::invalid,
-                      "query parameters 'index' and 'x', 'y', 'z' are mutually exclusive");
-  }
-  out.index = indices_in(*index);
-  if (!out.index) {
-    return make_error(ErrorKind::malformed, "query parameter 'index' must be three integers i,j,k");
-  }
-  for (std::size_t a = 0; a < 3; ++a) {
-    if (out.index->at(a) >= 0 && out.index->at(a) < grid.dims().at(a)) continue;
-    return make_error(ErrorKind::invalid, "query parameter 'index' must be below " +
-                                              std::to_string(grid.dims().at(a)) + " along " +
-                                              "xyz"[a] + " and not negative");
-  }
-  return out;
-}
-
-// The place of a sample. Errors: invalid if it has no height.
-Result<data::Place> place_of(const data::Grid& grid, const std::array<int, 3>& index,
-                             const std::optional<data::SampleHeights>& heights) {
-  data::Place out{index, {}};
-  for (std::size_t a = 0; a < 3; ++a) {
-    out.coordinates.at(a) = grid.axes.at(a).coordinates.at(static_cast<std::size_t>(index.at(a)));
-  }
-  if (grid.columns) {
-    const auto column =
-        static_cast<std::size_t>(index[1]) * static_cast<std::size_t>(grid.dims()[0]) +
-        static_cast<std::size_t>(index[0]);
-    out.coordinates[0] = grid.columns->longitude.at(column);
-    out.coordinates[1] = grid.columns->latitude.at(column);
-  }
-  if (!heights) return out;
-  const auto height = data::value_at(*heights->values, index);
-  if (!height) return make_error(ErrorKind::invalid, "the sample has no height");
-  out.coordinates[2] = height->front();
-  return out;
-}
-
-// The heights of the first step, at which views place samples.
-Result<std::optional<data::SampleHeights>> heights_for(tasks::Catalogue& catalogue,
-                                                       const data::Dataset& dataset,
-                                                       const Position& position,
-                                                       const CancelToken& cancel) {
-  if (!position.height_field) return std::optional<data::SampleHeights>();
-  const auto field =
-      scene::find_field(dataset.info(), *position.height_field, data::FieldKind::scalar, "");
-  if (!field) {
-    return make_error(field.error().kind,
-                      "query parameter 'heightField': " + field.error().message);
-  }
-  auto values = load(catalogue, dataset, (*field)->name, 0, cancel);
-  if (!values) return values.error();
-  return std::optional(data::SampleHeights{std::move(*values), (*field)->units});
-}
-
-struct Located {
-  data::Place place;
-  protocol::PositionDescription position;
-};
-
-protocol::PositionDescription describe(const data::Place& place, const data::Grid& grid) {
-  protocol::PositionDescription out;
-  out.index = place.index;
-  out.coordinates = place.coordinates;
-  for (std::size_t a = 0; a < 3; ++a) out.units[a] = grid.axes[a].units;
-  if (grid.columns) {
-    out.units[0] = "degrees_east";
-    out.units[1] = "degrees_north";
-  }
-  return out;
-}
-
-Result<Located> locate(tasks::Catalogue& catalogue, const data::Dataset& dataset,
-                       const Position& position, const CancelToken& cancel) {
-  const data::Grid& grid = dataset.info().grid;
-  const auto heights = heights_for(catalogue, dataset, position, cancel);
-  if (!heights) return heights.error();
-  const auto place = position.index
-                         ? place_of(grid, *position.index, *heights)
-                         : data::nearest_sample(grid, position.at, *heights ? &**heights : nullptr);
-  if (!place) return place.error();
-  Located out{*place, describe(*place, grid)};
-  if (*heights) out.position.units[2] = (*heights)->units;
-  return out;
 }
 
 protocol::ProbedField describe(const data::FieldInfo& field) {
@@ -326,7 +194,7 @@ http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& datase
     const auto at_step = static_cast<std::size_t>(step);
     // Derived fields only if a picture has needed them: computing all would take seconds.
     const auto volume = field.derived ? dataset.resident_only().volume(field.name, at_step)
-                                      : load(catalogue, dataset, field.name, at_step, cancel);
+                                      : load_field(catalogue, dataset, field.name, at_step, cancel);
     if (!volume && field.derived) continue;
     if (!volume) return http::problem_response(volume.error());
     out.fields.push_back(describe(field));
@@ -338,7 +206,7 @@ http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& datase
 // --- range --------------------------------------------------------------------------------------
 
 http::Response range_response(const data::FieldRange& range, const char* of) {
-  return json_response(protocol::encode_range({range.range, range.masked, of}));
+  return json_response(protocol::encode_range({range.range, range.masked, of, {}}));
 }
 
 http::Response step_range(const Subject& subject, std::size_t step) {
@@ -346,7 +214,12 @@ http::Response step_range(const Subject& subject, std::size_t step) {
   if (!volume) return http::problem_response(volume.error());
   data::FieldRange range;
   range.add(**volume);
-  return range_response(range, "step");
+  protocol::RangeDescription out{range.range, range.masked, "step", {}};
+  if (const auto places = data::extremes(**volume)) {
+    const data::Grid& grid = subject.dataset->info().grid;
+    out.places = {position_of(grid, places->least), position_of(grid, places->greatest)};
+  }
+  return json_response(protocol::encode_range(out));
 }
 
 void answer_range_of_all(tasks::Backend& backend, Subject subject, const http::Request& request,

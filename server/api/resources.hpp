@@ -67,6 +67,8 @@ void post_reference(tasks::Backend& backend, access::Admission& admission,
                     const std::string& base_path, const http::Request& request, http::Reply reply);
 http::Response get_reference(tasks::References& references, const std::string& name,
                              const http::Request& request);
+// What a pixel of a posted view shows.
+void post_pick(tasks::Backend& backend, const http::Request& request, http::Reply reply);
 // Estimated time and error of a picture of a posted view.
 void post_forecast(tasks::Backend& backend, const http::Request& request, http::Reply reply);
 

@@ -80,6 +80,7 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
 
       Route{"POST", "/v1/frames", later(post_frame, backend, admission), {}, Charge::valid_picture},
       Route{"POST", "/v1/forecasts", later(post_forecast, backend)},
+      Route{"POST", "/v1/picks", later(post_pick, backend), Query::taken, Charge::picture},
       Route{"POST", "/v1/references", later(post_reference, backend, admission, base_path),
             Query::refused, Charge::valid_picture},
       Route{"GET", "/v1/references/{id}", at_once(get_reference, backend.references)},

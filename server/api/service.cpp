@@ -103,6 +103,7 @@ http::Response get_service(const ServerOptions& options) {
                    {"frames", base + "v1/frames"},
                    {"references", base + "v1/references"},
                    {"forecasts", base + "v1/forecasts"},
+                   {"picks", base + "v1/picks"},
                    {"views", base + "v1/views"},
                    {"jobs", base + "v1/jobs"},
                    {"colormaps", base + "v1/colormaps"},

@@ -94,7 +94,8 @@ def requests():
     for i, field in enumerate(fields):
         yield "http", f"field-{i}", sizes.get(fields=[field])
         yield "http", f"posted-field-{i}", sizes.post(view, fields=[field])
-    for target in (b"/v1/frames", b"/v1/forecasts", b"/v1/views", b"/v1/datasets"):
+    for target in (b"/v1/frames", b"/v1/forecasts", b"/v1/picks?x=9&y=8", b"/v1/views",
+                   b"/v1/datasets"):
         body = b'{"path":"a.nc"}' if target.endswith(b"datasets") else view
         yield "http", "post-" + target.decode().replace("/", "-"), sizes.post(body, target=target)
     for name, body in (("entries", b'{"from":"a","selection":{"number":3,"run":"b"}}'),

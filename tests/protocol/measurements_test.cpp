@@ -66,9 +66,36 @@ TEST(Measurements, SeriesHistogramAndRangeHaveTheirShapes) {
   const Json told = Json::parse(encode_histogram(histogram));
   EXPECT_EQ(told["edges"], Json({1, 10, 100}));
   EXPECT_EQ(told["below"], 4);
-  expect_shape("fieldRange", encode_range({Range{-1, 2}, 5, "all"}));
-  EXPECT_EQ(Json::parse(encode_range({std::nullopt, 5, "step"})),
+  expect_shape("fieldRange", encode_range({Range{-1, 2}, 5, "all", {}}));
+  EXPECT_EQ(Json::parse(encode_range({std::nullopt, 5, "step", {}})),
             (Json{{"range", nullptr}, {"masked", 5}, {"rangeOf", "step"}}));
+  RangeDescription with_places{Range{-1, 2}, 5, "step", {}};
+  with_places.places.emplace();
+  (*with_places.places)[1].index = {3, 1, 2};
+  expect_shape("fieldRange", encode_range(with_places));
+  EXPECT_EQ(Json::parse(encode_range(with_places))["places"]["max"]["index"]["x"], 3);
+}
+
+TEST(Measurements, PickHasItsShape) {
+  expect_shape("pick", encode_pick(std::nullopt));
+  EXPECT_EQ(Json::parse(encode_pick(std::nullopt)), (Json{{"feature", nullptr}}));
+  PickedFeature feature;
+  feature.is_line = true;
+  feature.field = "wind";
+  feature.value = 57.25;
+  feature.units = "m/s";
+  feature.position.index = {5, 3, 2};
+  feature.share = 0.75;
+  feature.depth = 3.5;
+  feature.at = {120.5, 80};
+  expect_shape("pick", encode_pick(feature));
+  const Json told = Json::parse(encode_pick(feature))["feature"];
+  EXPECT_EQ(told["layer"], "lines");
+  EXPECT_EQ(told["value"], 57.25);
+  EXPECT_EQ(told["at"], Json({120.5, 80}));
+  EXPECT_EQ(told["position"]["index"]["z"], 2);
+  feature.is_line = false;
+  EXPECT_EQ(Json::parse(encode_pick(feature))["feature"]["layer"], "medium");
 }
 
 TEST(Measurements, ForecastHasItsShape) {

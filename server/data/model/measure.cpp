@@ -221,4 +221,36 @@ void FieldRange::add(const Volume& volume) {
       range ? std::array{std::min((*range)[0], added[0]), std::max((*range)[1], added[1])} : added;
 }
 
+std::optional<Extremes> extremes(const Volume& volume) {
+  std::optional<std::array<std::size_t, 2>> at;
+  std::array<double, 2> found{};  // squares of magnitudes
+  for (std::size_t n = 0; n < volume.samples(); ++n) {
+    double value = volume.component(0)[n];
+    if (volume.components > 1) value *= value;
+    for (int c = 1; c < volume.components; ++c) {
+      const double part = volume.component(c)[n];
+      value += part * part;
+    }
+    if (std::isnan(value)) continue;
+    if (!at) {
+      at = {n, n};
+      found = {value, value};
+    } else if (value < found[0]) {
+      (*at)[0] = n;
+      found[0] = value;
+    } else if (value > found[1]) {
+      (*at)[1] = n;
+      found[1] = value;
+    }
+  }
+  if (!at) return std::nullopt;
+  const auto index = [&](std::size_t n) {
+    const auto x = static_cast<std::size_t>(volume.dims[0]);
+    const auto y = static_cast<std::size_t>(volume.dims[1]);
+    return std::array<int, 3>{static_cast<int>(n % x), static_cast<int>(n / x % y),
+                              static_cast<int>(n / x / y)};
+  };
+  return Extremes{index((*at)[0]), index((*at)[1])};
+}
+
 }  // namespace windsplat::data

@@ -74,4 +74,12 @@ struct FieldRange {
   void add(const Volume& volume);
 };
 
+// The samples with the least and the greatest value, the first of equal ones in the order of the
+// samples; empty if all are masked.
+struct Extremes {
+  std::array<int, 3> least{};
+  std::array<int, 3> greatest{};
+};
+std::optional<Extremes> extremes(const Volume& volume);
+
 }  // namespace windsplat::data

@@ -9,6 +9,9 @@
 #include <numeric>
 #include <thread>
 
+#include "server/data/model/source.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/open/open.hpp"
 #include "tests/integration/server/test_server.hpp"
 
 namespace server_test {
@@ -84,39 +87,68 @@ TEST_F(Measures, ProbeReturnsEveryFieldAtTheNearestSample) {
   }
 }
 
-// Any scalar can be the heights of samples; z is then one of its values in the column.
-TEST_F(Measures, PositionsAreAtTheHeightsOfAField) {
-  const auto& heights = field(windsplat::data::FieldKind::scalar);
-  const auto there = volume(heights.name, 0);
-  const auto in_column = [&](int k) {
-    return static_cast<double>(there->component(0)[flat(5, 3, k)]);
-  };
-  // The middle of the column's box, which reaches half a step beyond its ends.
-  const double z = (in_column(0) - (in_column(1) - in_column(0)) / 2 + in_column(5) +
-                    (in_column(5) - in_column(4)) / 2) /
-                   2;
-  int nearest = 0;
-  for (int k = 0; k < 6; ++k) {
-    if (std::abs(in_column(k) - z) < std::abs(in_column(nearest) - z)) nearest = k;
+// A file whose first scalar is the height of each sample, which rises with the levels and with x.
+class RaisedSource : public windsplat::data::Source {
+ public:
+  explicit RaisedSource(std::unique_ptr<windsplat::data::Source> source)
+      : source_(std::move(source)) {}
+  [[nodiscard]] const windsplat::data::DatasetInfo& info() const override {
+    return source_->info();
   }
+  windsplat::Result<windsplat::data::Volume> read(std::size_t field, std::size_t step) override {
+    auto volume = source_->read(field, step);
+    if (!volume || &info().fields[field] != info().first(windsplat::data::FieldKind::scalar)) {
+      return volume;
+    }
+    const std::size_t x = static_cast<std::size_t>(volume->dims[0]);
+    const std::size_t layer = x * static_cast<std::size_t>(volume->dims[1]);
+    for (std::size_t n = 0; n < volume->samples(); ++n) {
+      volume->values[n] = static_cast<float>(500 * (n / layer) + 10 * (n % x));
+    }
+    windsplat::data::finish_volume(*volume);
+    return volume;
+  }
+
+ private:
+  std::unique_ptr<windsplat::data::Source> source_;
+};
+
+// z is then one of the heights in the column; what views refuse as heights is refused here too.
+TEST_F(Measures, PositionsAreAtTheHeightsOfAField) {
+  namespace data = windsplat::data;
+  TestServer raised(
+      {},
+      [](const data::Location& location,
+         const windsplat::CancelToken&) -> windsplat::Result<std::unique_ptr<data::Source>> {
+        auto source = data::open_dataset(data::direct_files(location));
+        if (!source) return source.error();
+        return std::unique_ptr<data::Source>(std::make_unique<RaisedSource>(std::move(*source)));
+      });
+  const auto at_raised = [&](const std::string& what) {
+    const Answer answer = get(raised.port(), "/v1/datasets/small/" + what);
+    EXPECT_EQ(answer.status, 200) << what << ' ' << answer.body;
+    return json_of(answer);
+  };
+  const auto& heights = field(data::FieldKind::scalar);
   std::string at = near(5, 3, 2);
-  at = at.substr(0, at.find("&z=")) + "&z=" + Json(z).dump() + "&heightField=" + heights.name;
+  at = at.substr(0, at.find("&z=")) + "&z=1640&heightField=" + heights.name;
   for (const std::string& query :
        {"probe" + at + "&step=1", "fields/" + heights.name + "/series" + at}) {
-    const Json position = ask(query)["position"];
-    EXPECT_EQ(position["index"], Json({{"x", 5}, {"y", 3}, {"z", nearest}}));
-    EXPECT_NEAR(position["z"].get<double>(), in_column(nearest), 1e-6);
+    const Json position = at_raised(query)["position"];
+    EXPECT_EQ(position["index"], Json({{"x", 5}, {"y", 3}, {"z", 3}}));  // 50 m, and 500 m each
+    EXPECT_EQ(position["z"], 1550);
     EXPECT_EQ(position["units"]["z"], heights.units);
   }
   // The page asks for the sample that it has drawn there.
-  const std::string sample = "?index=5,3," + std::to_string(nearest);
-  EXPECT_EQ(ask("probe" + sample + "&heightField=" + heights.name + "&step=1"),
-            ask("probe" + at + "&step=1"));
-  const std::string vector = field(windsplat::data::FieldKind::vector).name;
+  EXPECT_EQ(at_raised("probe?index=5,3,3&heightField=" + heights.name + "&step=1"),
+            at_raised("probe" + at + "&step=1"));
+  const std::string vector = field(data::FieldKind::vector).name;
   expect_problem_saying(refused("probe" + near(5, 3, 2) + "&heightField=" + vector), 422,
                         "is a vector, not a scalar");
   expect_problem_saying(refused("probe" + near(5, 3, 2) + "&heightField=none"), 422,
                         "'heightField'");
+  expect_problem_saying(refused("probe?index=5,3,2&heightField=" + heights.name), 422,
+                        "is not above the level below it on average");
 }
 
 TEST_F(Measures, SamplesAreProbedByTheirIndices) {
@@ -240,6 +272,27 @@ TEST_F(Measures, RangeOfAllStepsIsReadOnce) {
   EXPECT_EQ(server_.loads(), 3U) << "cached though evicted";
   expect_problem_saying(refused("fields/" + name + "/range?of=most"), 422);
   expect_problem_saying(refused("fields/" + name + "/range?of=all&step=1"), 422);
+}
+
+// Samples are named by which the values of the range are read again.
+TEST_F(Measures, RangeOfAStepNamesTheSamplesOfItsEnds) {
+  for (const auto& info : dataset_->info().fields) {
+    const Json told = ask("fields/" + info.name + "/range?step=1");
+    for (const char* end : {"min", "max"}) {
+      const Json& index = told["places"][end]["index"];
+      const auto there = volume(info.name, 1);
+      double square = 0;
+      for (int c = 0; c < there->components; ++c) {
+        square += std::pow(there->component(c)[flat(index["x"], index["y"], index["z"])], 2);
+      }
+      const double expected = told["range"][end == std::string("max") ? 1 : 0].get<double>();
+      EXPECT_NEAR(std::sqrt(square), std::abs(expected), 1e-5 * std::abs(expected)) << info.name;
+      const auto& x = dataset_->info().grid.axes[0].coordinates;
+      EXPECT_EQ(told["places"][end]["x"], x[index["x"].get<std::size_t>()]);
+    }
+  }
+  EXPECT_FALSE(ask("fields/" + field(windsplat::data::FieldKind::scalar).name + "/range?of=all")
+                   .contains("places"));
 }
 
 TEST_F(Measures, RangeOfAllStepsIsTheUnionOfTheSteps) {

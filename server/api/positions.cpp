@@ -1,0 +1,155 @@
+// A position -> the nearest sample, with the heights of a view.
+#include "server/api/positions.hpp"
+
+#include <charconv>
+#include <string_view>
+#include <utility>
+
+#include "protocol/limits.hpp"
+#include "server/scene/bend.hpp"
+#include "server/scene/place.hpp"
+
+namespace windsplat::api {
+
+namespace limits = protocol::limits;
+
+Result<std::shared_ptr<const data::Volume>> load_field(tasks::Catalogue& catalogue,
+                                                       const data::Dataset& dataset,
+                                                       const std::string& field, std::size_t step,
+                                                       const CancelToken& cancel) {
+  auto volume = catalogue.load(
+      dataset, [&](data::Dataset& loading) { return loading.volume(field, step); }, cancel);
+  if (!volume)
+    return tasks::with_dataset_name(dataset.with_need(volume.error(), {field}), dataset.info().id,
+                                    field);
+  return volume;
+}
+
+namespace {
+
+std::array<std::optional<double>, 3> read_place(http::QueryReader& query) {
+  return {query.number("x", -limits::coordinate_max, limits::coordinate_max),
+          query.number("y", -limits::coordinate_max, limits::coordinate_max),
+          query.number("z", -limits::coordinate_max, limits::coordinate_max)};
+}
+
+// "i,j,k"
+std::optional<std::array<int, 3>> indices_in(std::string_view text) {
+  std::array<int, 3> out{};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (std::size_t a = 0; a < out.size(); ++a) {
+    if (a > 0 && (at == end || *at++ != ',')) return std::nullopt;
+    const auto [rest, fault] = std::from_chars(at, end, out.at(a));
+    if (fault != std::errc()) return std::nullopt;
+    at = rest;
+  }
+  return at == end ? std::optional(out) : std::nullopt;
+}
+
+}  // namespace
+
+Result<Position> read_position(http::QueryReader& query, const data::Grid& grid) {
+  Position out{read_place(query), {}, query.text("heightField")};
+  const auto index = query.text("index");
+  if (!index) return out;
+  if (out.at[0] || out.at[1] || out.at[2]) {
+    return make_error(ErrorKind::invalid,
+                      "query parameters 'index' and 'x', 'y', 'z' are mutually exclusive");
+  }
+  out.index = indices_in(*index);
+  if (!out.index) {
+    return make_error(ErrorKind::malformed, "query parameter 'index' must be three integers i,j,k");
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (out.index->at(a) >= 0 && out.index->at(a) < grid.dims().at(a)) continue;
+    return make_error(ErrorKind::invalid, "query parameter 'index' must be below " +
+                                              std::to_string(grid.dims().at(a)) + " along " +
+                                              "xyz"[a] + " and not negative");
+  }
+  return out;
+}
+
+namespace {
+
+// The place of a sample.
+data::Place place_of(const data::Grid& grid, const std::array<int, 3>& index) {
+  data::Place out{index, {}};
+  for (std::size_t a = 0; a < 3; ++a) {
+    out.coordinates.at(a) = grid.axes.at(a).coordinates.at(static_cast<std::size_t>(index.at(a)));
+  }
+  if (grid.columns) {
+    const auto column =
+        static_cast<std::size_t>(index[1]) * static_cast<std::size_t>(grid.dims()[0]) +
+        static_cast<std::size_t>(index[0]);
+    out.coordinates[0] = grid.columns->longitude.at(column);
+    out.coordinates[1] = grid.columns->latitude.at(column);
+  }
+  return out;
+}
+
+// Errors: invalid if it has no height.
+Result<data::Place> place_of(const data::Grid& grid, const std::array<int, 3>& index,
+                             const std::optional<data::SampleHeights>& heights) {
+  data::Place out = place_of(grid, index);
+  if (!heights) return out;
+  const auto height = data::value_at(*heights->values, index);
+  if (!height) return make_error(ErrorKind::invalid, "the sample has no height");
+  out.coordinates[2] = height->front();
+  return out;
+}
+
+// The heights of the first step, at which views place samples. Errors: those of the view for what
+// are no heights.
+Result<std::optional<data::SampleHeights>> heights_for(tasks::Catalogue& catalogue,
+                                                       const data::Dataset& dataset,
+                                                       const Position& position,
+                                                       const CancelToken& cancel) {
+  if (!position.height_field) return std::optional<data::SampleHeights>();
+  const auto field =
+      scene::find_field(dataset.info(), *position.height_field, data::FieldKind::scalar, "");
+  const auto refused = [](const Error& error) {
+    return make_error(error.kind, "query parameter 'heightField': " + error.message);
+  };
+  if (!field) return refused(field.error());
+  auto values = load_field(catalogue, dataset, (*field)->name, 0, cancel);
+  if (!values) return values.error();
+  const scene::Heights heights{(*field)->name, (*field)->units, *values};
+  const auto raised = scene::grid_with_heights(dataset.info().grid, heights);
+  if (!raised) return refused(raised.error());
+  return std::optional(data::SampleHeights{std::move(*values), (*field)->units});
+}
+
+protocol::PositionDescription describe(const data::Place& place, const data::Grid& grid) {
+  protocol::PositionDescription out;
+  out.index = place.index;
+  out.coordinates = place.coordinates;
+  for (std::size_t a = 0; a < 3; ++a) out.units[a] = grid.axes[a].units;
+  if (grid.columns) {
+    out.units[0] = "degrees_east";
+    out.units[1] = "degrees_north";
+  }
+  return out;
+}
+
+}  // namespace
+
+protocol::PositionDescription position_of(const data::Grid& grid, const std::array<int, 3>& index) {
+  return describe(place_of(grid, index), grid);
+}
+
+Result<Located> locate(tasks::Catalogue& catalogue, const data::Dataset& dataset,
+                       const Position& position, const CancelToken& cancel) {
+  const data::Grid& grid = dataset.info().grid;
+  const auto heights = heights_for(catalogue, dataset, position, cancel);
+  if (!heights) return heights.error();
+  const auto place = position.index
+                         ? place_of(grid, *position.index, *heights)
+                         : data::nearest_sample(grid, position.at, *heights ? &**heights : nullptr);
+  if (!place) return place.error();
+  Located out{*place, describe(*place, grid)};
+  if (*heights) out.position.units[2] = (*heights)->units;
+  return out;
+}
+
+}  // namespace windsplat::api

@@ -1,0 +1,37 @@
+// A pixel of a picture -> the sample that contributes most to its light.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "server/base/cancel.hpp"
+#include "server/base/error.hpp"
+#include "server/engine/reference/kernels.hpp"
+#include "server/scene/scene.hpp"
+
+namespace windsplat::frame {
+
+// The line of a sample, or its part of one medium.
+struct Picked {
+  std::optional<std::size_t> medium;  // the number of the layer in scene.scalars; empty: the lines
+  std::array<int, 3> sample{};        // in scene.lattice
+  engine::reference::Vec place{};     // of the sample, world units
+  double value = 0;                   // of the field of the layer; of vectors the magnitude
+  double share = 0;                   // of the pixel's opacity, which includes the body's
+  double depth = 0;                   // of its light: view depth, world units
+  std::array<double, 2> at{};  // in the picture, pixels: the middle of the line, or the sample
+};
+
+// What contributes less to the opacity of a pixel is not seen: half a step of 8 bits.
+inline constexpr double picked_least = 1.0 / 512;
+
+// The sample whose line or medium contributes most to the opacity of the pixel that contains (x,
+// y): its own opacity times the transmittance before it, along the ray of the pixel's middle, by
+// the formulas of method `reference` (an overlapping medium is divided by extinction). Nothing if
+// no sample contributes picked_least. The scene is at the level of the data. Visits the rows of
+// samples that the ray may meet, on a curved lattice every sample. Errors: cancelled.
+Result<std::optional<Picked>> pick(const scene::Scene& scene, double x, double y,
+                                   const CancelToken& cancel);
+
+}  // namespace windsplat::frame
