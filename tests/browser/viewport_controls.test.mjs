@@ -119,12 +119,81 @@ test("undo of the camera preserves the played step, and a resize adds no entry",
 
 // --- the value under the cursor --------------------------------------------------------------
 
-test("the value under the cursor equals the probe of the server", () =>
+const probeText = /^([\d.]+) °([EW]), ([\d.]+) °([NS])(?: · level|, level) ([\d.]+) hPa$/;
+
+// The server's probe at the place that the text names.
+async function probed(place) {
+  const [, east, ew, north, ns, z] = place.match(probeText);
+  const [x, y] = [ew === "E" ? east : -east, ns === "N" ? north : -north];
+  const answer = await fetch(
+    `${shared.daemon.url}v1/datasets/climate/probe?x=${x}&y=${y}&z=${z}&step=0`,
+  ).then((response) => response.json());
+  for (const axis of ["x", "y", "z"]) {
+    const shown = Number({ x, y, z }[axis]);
+    assert.ok(Math.abs(answer.position[axis] - shown) <= 1e-3 * Math.abs(shown), axis);
+  }
+  return answer;
+}
+
+test("the value under the cursor is that of the sample which the picture shows there", () =>
+  withPage(async (page) => {
+    const hover = page.locator("#hover");
+    const box = await pictureBox(page);
+    const answered = page.waitForResponse(/\/picks\?/);
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.55 * box.height);
+    await hover.waitFor();
+    const { feature } = await (await answered).json();
+    const [value, place] = (await hover.innerText()).split("\n");
+    const answer = await probed(place);
+    const told = answer.values[feature.field].value;
+    const size = Array.isArray(told) ? Math.hypot(...told) : told;
+    const shown = Number(value.match(/^\w+ ([-\d.e]+)/)[1]);
+    assert.ok(Math.abs(shown - size) <= 1e-3 * size, `${shown} is not ${size}`);
+    // The ring is where the server says that the sample is.
+    const ring = await page.locator("#hover-ring").boundingBox();
+    const { width } = await pixels(page);
+    const at = feature.at.map((place) => (place * box.width) / width);
+    assert.ok(Math.abs(ring.x + ring.width / 2 - box.x - at[0]) < 2);
+    assert.ok(Math.abs(ring.y + ring.height / 2 - box.y - at[1]) < 2);
+    await shot(page, "hover");
+    await page.mouse.move(5, 5);
+    await hover.waitFor({ state: "hidden" });
+    assert.equal(await page.locator("#hover-ring").isVisible(), false);
+  }));
+
+test("alt + click goes to the sample that is seen, and a button to the maximum", () =>
+  withPage(async (page) => {
+    const box = await pictureBox(page);
+    const answered = page.waitForResponse(/\/picks\?/);
+    await page.locator("#picture").click({
+      modifiers: ["Alt"],
+      position: { x: 0.5 * box.width, y: 0.55 * box.height },
+    });
+    const { position } = (await (await answered).json()).feature;
+    const close = async (axis, value) => {
+      const input = page.locator(`#probe-${axis}`);
+      await page.waitForFunction(
+        ([id, expected]) =>
+          Math.abs(Number(document.querySelector(id).value) - expected) < 1e-3 * Math.abs(expected),
+        [`#probe-${axis}`, value],
+      );
+      return input;
+    };
+    for (const axis of ["x", "y", "z"]) await close(axis, position[axis]);
+    const range = page.waitForResponse(/\/fields\/wind\/range\?/);
+    await page.getByRole("button", { name: "Go to maximum" }).click();
+    const { places } = await (await range).json();
+    for (const axis of ["x", "y", "z"]) await close(axis, places.max[axis]);
+  }));
+
+test("by choice the value under the cursor is the one in the probe's level", () =>
   withPage(async (page) => {
     const asked = [];
     page.on("request", (request) => {
       if (request.url().includes("/probe?")) asked.push(request.url());
     });
+    await unfold(page, "Probe");
+    await page.getByLabel("in the probe's level").check();
     const answered = page.waitForResponse(/\/probe\?/);
     const hover = page.locator("#hover");
     const box = await pictureBox(page);
@@ -132,23 +201,12 @@ test("the value under the cursor equals the probe of the server", () =>
     await hover.waitFor();
     await answered;
     const [values, place] = (await hover.innerText()).split("\n");
-    const [, east, ew, north, ns, z] = place.match(
-      /^([\d.]+) °([EW]), ([\d.]+) °([NS]) · level ([\d.]+) hPa$/,
-    );
-    const [x, y] = [ew === "E" ? east : -east, ns === "N" ? north : -north];
-    const answer = await fetch(
-      `${shared.daemon.url}v1/datasets/climate/probe?x=${x}&y=${y}&z=${z}&step=0`,
-    ).then((response) => response.json());
-    for (const axis of ["x", "y", "z"]) {
-      const shown = Number({ x, y, z }[axis]);
-      assert.ok(Math.abs(answer.position[axis] - shown) <= 1e-3 * Math.abs(shown), axis);
-    }
+    const answer = await probed(place);
     const size = Math.hypot(...answer.values.wind.value);
     const [, wind] = values.match(/^wind ([-\d.e]+) m s⁻¹/);
     assert.ok(Math.abs(Number(wind) - size) < 1e-3 * size, `${wind} is not ${size}`);
     const [, cloud] = values.match(/cloud ([-\d.e]+)/);
     assert.ok(Math.abs(Number(cloud) - answer.values.cloud.value) < 1e-3);
-    await shot(page, "hover");
     // At most about eight requests a second are sent, however fast the mouse moves.
     const before = asked.length;
     const start = Date.now();
@@ -169,7 +227,7 @@ test("no hover requests during a drag or when switched off", () =>
     await page.mouse.move(...at);
     await hover.waitFor();
     let asked = 0;
-    page.on("request", (request) => (asked += Number(request.url().includes("/probe?"))));
+    page.on("request", (request) => (asked += Number(request.url().includes("/picks?"))));
     await page.mouse.down();
     await hover.waitFor({ state: "hidden" });
     await page.mouse.move(at[0] + 60, at[1], { steps: 20 });
@@ -194,15 +252,15 @@ test("no hover requests during a drag or when switched off", () =>
     await hover.waitFor();
   }));
 
-test("a refused hover probe raises no alert", () =>
+test("a refused pick raises no alert", () =>
   withPage(async (page) => {
     let refused = 0;
-    await page.route(/\/probe\?/, (route) => {
+    await page.route(/\/picks\?/, (route) => {
       refused += 1;
       return route.fulfill({ status: 200, json: { nothing: true } });
     });
     const box = await pictureBox(page);
-    const asked = page.waitForRequest(/\/probe\?/);
+    const asked = page.waitForRequest(/\/picks\?/);
     await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.55 * box.height);
     await asked;
     await page.keyboard.press("]");

@@ -84,6 +84,7 @@ const panels = new Panels(panelBox, host, {
 
 const probe = new Probe(
   {
+    api: app.api,
     camera: () => app.cameras.camera(),
     view: () => app.view(),
     dataset: () => app.dataset(),
@@ -95,10 +96,12 @@ const probe = new Probe(
 );
 
 const reference = makeReference(canvas, () => app.view());
-const hover = new HoverView(canvas, byId("hover", HTMLElement), {
-  ...host,
-  find: (at) => probe.find(at),
-});
+const hover = new HoverView(
+  canvas,
+  byId("hover", HTMLElement),
+  document.querySelector<SVGSVGElement>("#hover-ring")!,
+  { ...host, find: (at) => probe.find(at) },
+);
 const list = new DatasetList(byId("dataset", HTMLSelectElement));
 const cards = new Cards(byId("datasets", HTMLDialogElement), byId("cards", HTMLElement), {
   api: app.api,

@@ -3,7 +3,8 @@
 import type GUI from "lil-gui";
 import { failureText, type Series } from "../wire/api";
 import { checkLabel, debounced, make, makeSvg, numberBox } from "../base/dom";
-import { hoverOn } from "../view/hover_setting";
+import { hoverOf, hoverOn } from "../view/hover_setting";
+import { sampleOf } from "../view/feature";
 import { unitText } from "../view/legend_entries";
 import type { PanelKit } from "./panel_kit";
 import {
@@ -47,6 +48,7 @@ export class ProbePanel {
     axisNames.forEach((_, axis) => this.addAxis(axis));
     this.message.setAttribute("role", "status");
     this.box.append(this.message, this.values);
+    this.addMaximum();
     this.addSeries();
     this.addHover();
     this.folder.$children.append(this.box);
@@ -138,6 +140,44 @@ export class ProbePanel {
     this.kit.onRefresh(() => (box.checked = hoverOn.value));
     const title = "Shown beside the mouse on the picture (shift + i)";
     this.box.append(checkLabel(box, "values under the cursor", title));
+    const level = make("input");
+    level.checked = hoverOf.value === "level";
+    level.addEventListener("change", () => hoverOf.set(level.checked ? "level" : "feature"));
+    const why =
+      "Read the slice or the level of the probe under the cursor, not what the picture shows there";
+    this.box.append(checkLabel(level, "in the probe's level", why));
+  }
+
+  // Moves the probe to the sample with the greatest value of a field at this step.
+  private addMaximum(): void {
+    const { fields } = this.kit.host.dataset();
+    const drawn = this.kit.host.view().vector?.field;
+    const field = make("select");
+    field.append(...fields.map(({ name }) => new Option(name, name)));
+    if (fields.some(({ name }) => name === drawn)) field.value = drawn!;
+    field.setAttribute("aria-label", "Field whose maximum to go to");
+    const button = make("button", "", "Go to maximum");
+    button.title = "Move the probe to the greatest value of this step; of vectors, the fastest";
+    button.addEventListener("click", () => {
+      button.disabled = true;
+      void this.goToMaximum(field.value).finally(() => (button.disabled = false));
+    });
+    const row = make("div", "histogram-row");
+    row.append(field, button);
+    this.box.append(row);
+  }
+
+  private async goToMaximum(field: string): Promise<void> {
+    const { host } = this.kit;
+    try {
+      const step = host.view().step ?? 0;
+      const { places } = await host.api.range(host.dataset().id, field, step);
+      const sample = places === undefined ? null : sampleOf(places.max);
+      if (sample === null) this.showMessage(`${field} has no value at this step`, true);
+      else this.moveTo(sample);
+    } catch (failure) {
+      this.showMessage(failureText(failure), true);
+    }
   }
 
   private addSeries(): void {

@@ -79,7 +79,7 @@ export const axisUnit = (units: string): string =>
   ({ degrees_east: "°E", degrees_north: "°N" })[units] ?? unitText(units);
 
 // A coordinate as text: "23.5 °W", "x 12 km". own: its unit if it is not that of the axis.
-function coordinateText(
+export function coordinateText(
   dataset: Dataset,
   n: number,
   value: number,

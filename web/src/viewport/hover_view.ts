@@ -1,12 +1,15 @@
-// The value under the cursor on the page: mouse position on the picture -> text beside the cursor.
-// It can be switched on or off for the session; on touch screens a tap probes instead.
+// The value under the cursor on the page: mouse position on the picture -> text beside the cursor,
+// and a ring around the sample that it is read from. It is the sample that the picture shows there,
+// which the server finds, or by choice the one in the probe's level. It can be switched on or off
+// for the session; on touch screens a tap probes instead.
 import type { Api } from "../wire/api";
 import { make } from "../base/dom";
 import { Hover } from "./hover";
+import { featureLines, pixelAt, ringAt } from "../view/feature";
 import { hoverLines } from "../view/sample_position";
 import type { Found } from "./probe";
 import type { Dataset, View } from "../wire/protocol";
-import { hoverOn } from "../view/hover_setting";
+import { hoverOf, hoverOn } from "../view/hover_setting";
 
 export interface HoverViewHost {
   api: Api;
@@ -17,16 +20,22 @@ export interface HoverViewHost {
 }
 
 const gap = 14; // pixels between the cursor and the text
+const apart = 3; // CSS pixels between cursor positions of different values
+
+// Where the value is sought: in a plane, or at a pixel of the picture.
+type Target = Found | { pixel: [number, number] };
 
 export class HoverView {
-  private readonly hover: Hover<Found>;
+  private readonly hover: Hover<Target>;
+  private marked: [number, number] | null = null; // the ring of the newest answer
 
   constructor(
     private readonly canvas: HTMLElement,
     private readonly element: HTMLElement,
+    private readonly ring: SVGElement,
     private readonly host: HoverViewHost,
   ) {
-    this.hover = new Hover<Found>({
+    this.hover = new Hover<Target>({
       now: () => performance.now(),
       setTimeout: (run, ms) => window.setTimeout(run, ms),
       clearTimeout: (timer) => window.clearTimeout(timer),
@@ -36,7 +45,7 @@ export class HoverView {
         host.playing() ||
         canvas.classList.contains("dragging"),
       find: (at) => this.find(at),
-      request: (found, signal) => this.request(found, signal),
+      request: (target, signal) => this.request(target, signal),
       show: (lines, at) => this.show(lines, at),
     });
     for (const type of ["pointermove", "pointerdown", "pointerup"] as const) {
@@ -44,7 +53,7 @@ export class HoverView {
     }
     canvas.addEventListener("pointerleave", () => this.hover.leave());
     document.addEventListener("visibilitychange", () => this.hover.poke());
-    hoverOn.watch(() => this.hover.poke());
+    for (const setting of [hoverOn, hoverOf]) setting.watch(() => this.hover.poke());
   }
 
   // Call when the view may have changed.
@@ -61,6 +70,7 @@ export class HoverView {
   }
 
   private find(at: [number, number]) {
+    if (hoverOf.value === "feature") return this.pixel(at);
     const found = this.host.find(at);
     if (found === null) return null;
     const { dataset, step = 0, vector, scalars, geometry } = this.host.view();
@@ -71,9 +81,26 @@ export class HoverView {
     };
   }
 
-  private async request({ sample, axis }: Found, signal: AbortSignal): Promise<string[]> {
+  // Positions that are a few pixels apart have the same target.
+  private pixel(at: [number, number]) {
+    const [x, y] = at;
+    if (!(x >= 0 && y >= 0 && x < 1 && y < 1)) return null;
+    const view = this.host.view();
+    const box = [this.canvas.clientWidth, this.canvas.clientHeight];
+    const near = at.map((place, n) => Math.round((place * box[n]!) / apart));
+    return { sample: { pixel: pixelAt(view, at) }, key: JSON.stringify([view, near]) };
+  }
+
+  private async request(target: Target, signal: AbortSignal): Promise<string[]> {
     const { api } = this.host;
     const [dataset, view] = [this.host.dataset(), this.host.view()];
+    this.marked = null;
+    if ("pixel" in target) {
+      const feature = await api.pick(view, target.pixel, signal);
+      this.marked = feature === null ? null : ringAt(view, feature);
+      return feature === null ? [] : featureLines(dataset, feature);
+    }
+    const { sample, axis } = target;
     const heights = view.geometry?.heightField ?? null;
     const probe = await api.probe(dataset.id, sample, heights, view.step ?? 0, signal);
     return hoverLines(dataset, view, probe, axis);
@@ -82,7 +109,12 @@ export class HoverView {
   private show(lines: string[], [x, y]: [number, number]): void {
     const { element } = this;
     element.hidden = lines.length === 0;
+    this.ring.toggleAttribute("hidden", element.hidden || this.marked === null);
     if (element.hidden) return;
+    if (this.marked !== null) {
+      this.ring.style.left = `${(100 * this.marked[0]).toFixed(2)}%`;
+      this.ring.style.top = `${(100 * this.marked[1]).toFixed(2)}%`;
+    }
     element.replaceChildren(
       ...lines.map((line, n) => make("div", n > 0 ? "hover-place" : "", line)),
     );

@@ -1,7 +1,11 @@
 // The probe on the picture: clicks -> probe position, probe position -> a mark. The probe is on
-// while its folder in the panel is open.
+// while its folder in the panel is open. A click moves it to the sample that the picture shows
+// there, or by choice to the one in the slice or in its own level.
 import { cameraFrame, degree, pointInPlane, project, type Camera } from "../view/camera";
 import { axisNames, sampleAt, worldOf, type Sample } from "../view/sample_position";
+import { pixelAt, sampleOf } from "../view/feature";
+import { hoverOf } from "../view/hover_setting";
+import type { Api } from "../wire/api";
 import type { Dataset, View } from "../wire/protocol";
 
 // below this angle positions in a horizontal plane are too inaccurate
@@ -22,6 +26,7 @@ export interface ProbeControls {
 }
 
 export interface ProbeHost {
+  api: Pick<Api, "pick">;
   controls(): ProbeControls | null; // null: no dataset is open
   camera(): Camera | null;
   view(): View;
@@ -30,6 +35,8 @@ export interface ProbeHost {
 }
 
 export class Probe {
+  private clicks = 0; // so that an earlier answer does not follow a later one
+
   constructor(
     private readonly host: ProbeHost,
     private readonly mark: SVGElement,
@@ -80,10 +87,23 @@ export class Probe {
   pick(at: [number, number], deliberate: boolean): void {
     const controls = this.host.controls();
     if (controls === null || !(controls.on || deliberate)) return;
-    const found = this.find(at);
-    if (found === null) return;
-    controls.moveTo(found.sample);
-    if (!controls.on) this.toggle();
+    const click = ++this.clicks;
+    void this.sampleAt(at).then((sample) => {
+      if (sample === null || click !== this.clicks || controls !== this.host.controls()) return;
+      controls.moveTo(sample);
+      if (!controls.on) this.toggle();
+    });
+  }
+
+  // In the probe's level also where the picture is empty.
+  private async sampleAt(at: [number, number]): Promise<Sample | null> {
+    const view = this.host.view();
+    const seen =
+      hoverOf.value === "level"
+        ? null
+        : await this.host.api.pick(view, pixelAt(view, at)).catch(() => null);
+    const sample = seen === null ? null : sampleOf(seen.position);
+    return sample ?? this.find(at)?.sample ?? null;
   }
 
   show(): void {

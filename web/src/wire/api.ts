@@ -20,6 +20,7 @@ export interface FieldRange {
   range: Range | null; // null: every sample is masked
   masked: number;
   rangeOf: "step" | "all";
+  places?: { min: Position; max: Position }; // of a step with a value
 }
 
 export interface Position {
@@ -27,6 +28,7 @@ export interface Position {
   y: number;
   z: number;
   units: { x: string; y: string; z: string };
+  index?: { x: number; y: number; z: number }; // of the sample
 }
 
 export type Value = number | (number | null)[] | null; // null: masked
@@ -34,6 +36,17 @@ export type Value = number | (number | null)[] | null; // null: masked
 export interface Probe {
   position: Position; // position of the sample that was read
   values: Record<string, { value: Value; units: string }>;
+}
+
+// The sample that contributes most to a pixel.
+export interface Feature {
+  layer: "lines" | "medium";
+  field: string;
+  value: number; // of a vector the magnitude
+  units: string;
+  position: Position;
+  share: number; // of the pixel's opacity
+  at: [number, number]; // in the picture, pixels
 }
 
 export interface SeriesTime {
@@ -128,6 +141,14 @@ export class Api {
   ): Promise<Probe> {
     const path = `${this.dataset(id)}/probe?${place(of, heights)}&step=${step}`;
     return this.get<Probe>(path, (a) => isObject(a.position) && isObject(a.values), { signal });
+  }
+
+  // What the pixel at (x, y) of a view shows; null: nothing of the data.
+  async pick(view: View, [x, y]: [number, number], signal?: AbortSignal): Promise<Feature | null> {
+    type Answer = { feature: Feature | null };
+    const path = `v1/picks?x=${x}&y=${y}`;
+    const looksRight = (a: Record<string, unknown>) => a.feature === null || isObject(a.feature);
+    return (await this.get<Answer>(path, looksRight, { ...posted(view), signal })).feature;
   }
 
   // Reads every step, so it may take a long time.
