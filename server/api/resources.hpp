@@ -41,6 +41,9 @@ void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
                   tasks::Backend& backend, const http::Request& request, http::Reply reply);
 http::Response delete_dataset(tasks::Catalogue& catalogue, const std::string& id,
                               const http::Request& request);
+// What can be opened below that root, one folder and page at a time. Reads names and first bytes.
+void get_files(const ServerOptions& options, tasks::TaskExecutor& look_ups,
+               const http::Request& request, http::Reply reply);
 // 202 with the location of the job, or the error.
 http::Response job_response(metrics::Metrics& metrics, const std::string& base_path,
                             const Result<protocol::JobDescription>& job);

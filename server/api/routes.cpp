@@ -95,6 +95,7 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
       Route{"GET", "/v1/jobs/{id}", at_once(get_job, jobs)},
       Route{"DELETE", "/v1/jobs/{id}", at_once(delete_job, jobs)},
 
+      Route{"GET", "/v1/files", later(get_files, options, look_ups), Query::taken},
       Route{"GET", "/v1/datasets", at_once(get_datasets, catalogue)},
       Route{"POST", "/v1/datasets", later(post_dataset, options, look_ups, backend)},
       Route{"GET", "/v1/datasets/{id}", later(get_dataset, catalogue, loads)},

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "protocol/codec.hpp"
+#include "protocol/folder.hpp"
 #include "protocol/limits.hpp"
 #include "support.hpp"
 
@@ -150,6 +151,22 @@ TEST(Measurements, JobsHaveTheirShape) {
   EXPECT_EQ(Json::parse(encode_job(job))["result"]["error"]["psnr"], nullptr);
   expect_shape("jobs", encode_jobs({job, job}));
   expect_shape("jobs", encode_jobs({}));
+}
+
+TEST(Measurements, FoldersHaveTheirShape) {
+  FolderDescription folder;
+  expect_shape("folder", encode_folder(folder));
+  folder.folder = "runs";
+  folder.entries = {{"may", true, 0, ""}, {"a.nc", false, 12, "netCDF"}, {"b.txt", false, 3, ""}};
+  folder.groups = {{"s_*.nc", 24}};
+  folder.next = "b.txt";
+  folder.omitted = 2;
+  folder.cut = true;
+  expect_shape("folder", encode_folder(folder));
+  const Json told = Json::parse(encode_folder(folder));
+  EXPECT_EQ(told["entries"][0]["bytes"], nullptr);
+  EXPECT_EQ(told["entries"][1]["bytes"], 12);
+  EXPECT_EQ(told["entries"][2]["format"], nullptr);
 }
 
 TEST(Measurements, DatasetRequestIsAPathOrEntries) {

@@ -82,7 +82,7 @@ void add_access_options(CLI::App& command, ServeArguments& arguments) {
 void add_data_options(CLI::App& command, ServeArguments& arguments) {
   command
       .add_option("--data-root", arguments.data_root,
-                  "Let clients open files below this folder by POST /v1/datasets")
+                  "Let clients list and open the files below this folder")
       ->envname("WINDSPLAT_DATA_ROOT")
       ->type_name("DIR");
   command

@@ -17,6 +17,7 @@
 #include <system_error>
 #include <utility>
 
+#include "server/data/files/beneath.hpp"
 #include "server/data/files/descriptor.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
@@ -29,16 +30,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int open_beneath(int root, const std::string& path, std::uint64_t flags) {
+Error refused(const std::string& path, const std::string& why) {
+  return make_error(ErrorKind::invalid, in_quotes(path) + ' ' + why);
+}
+
+}  // namespace
+
+namespace beneath {
+
+Result<Descriptor> open_root(const std::string& root) {
+  Descriptor top(::open(root.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+  if (top) return top;
+  return make_error(ErrorKind::internal,
+                    "the data root cannot be opened: " + std::generic_category().message(errno));
+}
+
+int open(int root, const std::string& path, std::uint64_t flags) {
   open_how how{};
   how.flags = flags | O_CLOEXEC;
   how.resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS;
   return static_cast<int>(::syscall(SYS_openat2, root, path.c_str(), &how, sizeof how));
 }
 
-Error refused(const std::string& path, const std::string& why) {
-  return make_error(ErrorKind::invalid, in_quotes(path) + ' ' + why);
-}
+bool leads_nowhere(int reason) { return reason == EXDEV || reason == ELOOP || reason == ENOENT; }
 
 Error not_reached(const std::string& path, int reason) {
   if (reason == ENOENT || reason == ENOTDIR) {
@@ -48,7 +62,6 @@ Error not_reached(const std::string& path, int reason) {
   return refused(path, "cannot be reached: " + std::generic_category().message(reason));
 }
 
-// Checks the text alone, before the file system is accessed.
 Result<void> check_letters(const std::string& path) {
   if (path.empty() || path.find('\0') != std::string::npos) {
     return make_error(ErrorKind::invalid, "no path given");
@@ -66,6 +79,12 @@ Result<void> check_letters(const std::string& path) {
   if (!names_something) return refused(path, "is the data root itself");
   return {};
 }
+
+}  // namespace beneath
+
+namespace {
+
+using beneath::not_reached;
 
 // The path of an open descriptor, all links resolved.
 Result<std::string> path_of(const Descriptor& descriptor, const std::string& path) {
@@ -103,7 +122,7 @@ Result<Location> located(const Descriptor& found, const std::string& path) {
 // Names in a folder that match a pattern, unsorted.
 Result<std::vector<std::string>> matches_in(int root, const std::string& folder,
                                             const std::string& pattern) {
-  const int descriptor = open_beneath(root, folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
+  const int descriptor = beneath::open(root, folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
   if (descriptor < 0) return not_reached(folder, errno);
   const std::unique_ptr<DIR, int (*)(DIR*)> directory(::fdopendir(descriptor), ::closedir);
   if (!directory) {
@@ -130,7 +149,7 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
   const std::string folder = fs::path(path).parent_path().native();
   const auto names = matches_in(root, folder, pattern);
   if (!names) return names.error();
-  const Descriptor at(open_beneath(root, folder.empty() ? "." : folder, O_PATH | O_DIRECTORY));
+  const Descriptor at(beneath::open(root, folder.empty() ? "." : folder, O_PATH | O_DIRECTORY));
   if (!at) return not_reached(folder, errno);
   auto plain_folder = path_of(at, path);
   if (!plain_folder) return plain_folder.error();
@@ -144,9 +163,9 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
   std::size_t left_out = 0;
   for (const std::string& name : *names) {
     const std::string below = (fs::path(folder) / name).native();
-    const Descriptor found(open_beneath(root, below, O_PATH));
+    const Descriptor found(beneath::open(root, below, O_PATH));
     // A link that is dangling or leads out of the root is not part of the series.
-    const bool no_member = !found && (errno == EXDEV || errno == ELOOP || errno == ENOENT);
+    const bool no_member = !found && beneath::leads_nowhere(errno);
     left_out += no_member ? 1U : 0U;
     if (no_member) continue;
     if (!found) return not_reached(below, errno);
@@ -169,7 +188,7 @@ Result<Location> series(int root, const std::string& root_path, const std::strin
 }
 
 Result<Location> find_plain(int top, const std::string& root, const std::string& path) {
-  const Descriptor found(open_beneath(top, path, O_PATH));
+  const Descriptor found(beneath::open(top, path, O_PATH));
   if (found) return located(found, path);
   const int reason = errno;
   if (reason == ENOENT && has_wildcard(fs::path(path).filename().native())) {
@@ -181,7 +200,7 @@ Result<Location> find_plain(int top, const std::string& root, const std::string&
 // "path#/group" denotes a group unless a file has this name.
 Result<Location> find_inside(int top, const std::string& root, const std::string& path) {
   const auto mark = path.rfind("#/");
-  if (mark == std::string::npos || mark == 0 || Descriptor(open_beneath(top, path, O_PATH))) {
+  if (mark == std::string::npos || mark == 0 || Descriptor(beneath::open(top, path, O_PATH))) {
     return find_plain(top, root, path);
   }
   auto out = find_plain(top, root, path.substr(0, mark));
@@ -196,7 +215,7 @@ Result<Location> find_inside(int top, const std::string& root, const std::string
 // "path?name=value" has a selection unless a file has this name.
 Result<Location> find(int top, const std::string& root, const std::string& path) {
   const std::size_t mark = selection_mark(path);
-  if (mark == std::string::npos || Descriptor(open_beneath(top, path, O_PATH))) {
+  if (mark == std::string::npos || Descriptor(beneath::open(top, path, O_PATH))) {
     return find_inside(top, root, path);
   }
   auto selection = parse_selection(std::string_view(path).substr(mark + 1));
@@ -212,13 +231,10 @@ Result<Location> find(int top, const std::string& root, const std::string& path)
 
 Result<Location> locate_beneath(const std::string& root, const std::string& path_or_pattern) {
   const std::string& path = path_or_pattern;
-  if (const auto ok = check_letters(path); !ok) return ok.error();
-  const Descriptor top(::open(root.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
-  if (!top) {
-    return make_error(ErrorKind::internal,
-                      "the data root cannot be opened: " + std::generic_category().message(errno));
-  }
-  return find(top.number(), root, path);
+  if (const auto ok = beneath::check_letters(path); !ok) return ok.error();
+  const auto top = beneath::open_root(root);
+  if (!top) return top.error();
+  return find(top->number(), root, path);
 }
 
 }  // namespace windsplat::data

@@ -39,6 +39,7 @@
 #include "server/data/model/axis_check.hpp"
 #include "server/data/model/source.hpp"
 #include "server/data/open/cases.hpp"
+#include "server/data/open/content.hpp"
 
 namespace windsplat::data {
 
@@ -59,13 +60,6 @@ constexpr auto array_formats = std::to_array<ArrayFormat>({
     {dx::looks_like, dx::open},
 });
 
-bool is_known(std::string_view head) {
-  return head.starts_with("\x89HDF") || head.starts_with("CDF") || head.starts_with("GRIB") ||
-         vtk::is_vtk(head) || list::looks_like(head) ||
-         std::any_of(array_formats.begin(), array_formats.end(),
-                     [&](const ArrayFormat& format) { return format.looks_like(head); });
-}
-
 // The first bytes of the file, or of the first file of a series whose format they tell; those of
 // the first file if there is none.
 Result<std::string> first_bytes(Files& files) {
@@ -76,7 +70,7 @@ Result<std::string> first_bytes(Files& files) {
   for (std::size_t m = 0; m < std::min(members.size(), looked_at_max); ++m) {
     const auto input = files.open(members[m].name);
     auto head = input ? (*input)->head(4096) : Result<std::string>(input.error());
-    if (head && is_known(*head)) return head;
+    if (head && !format_of_head(*head).empty()) return head;
     if (m == 0) first = std::move(head);
   }
   return first;

@@ -8,6 +8,8 @@ import type { DatasetSummary } from "../wire/protocol";
 export interface CardsHost {
   api: Api;
   list: DatasetList;
+  files: { show(): void; hide(): void };
+  current(): string | undefined; // id of the dataset that is shown
   open(id: string): void;
 }
 
@@ -50,7 +52,10 @@ export class Cards {
     private readonly host: CardsHost,
   ) {
     box.addEventListener("keydown", (event) => this.key(event));
-    whenClosed(dialog, () => this.clear());
+    whenClosed(dialog, () => {
+      this.clear();
+      host.files.hide();
+    });
   }
 
   // Refreshes the list first: files may have been added since the hello message.
@@ -61,6 +66,7 @@ export class Cards {
     this.dialog.showModal();
     this.seen = this.observe();
     this.fill(list.all);
+    this.host.files.show();
     api.datasets().then(
       (datasets) => {
         list.set(datasets);
@@ -101,6 +107,10 @@ export class Cards {
         return [dataset.id, { face, element: this.card(dataset) }];
       }),
     );
+    const current = this.host.current();
+    for (const [id, { element }] of this.cards) {
+      element.setAttribute("aria-current", String(id === current));
+    }
     const { children } = this.box;
     const elements: HTMLElement[] = [...this.cards.values()].map(({ element }) => element);
     if (elements.length === 0) elements.push(make("p", "", "The server has no dataset yet."));

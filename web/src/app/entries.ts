@@ -1,6 +1,6 @@
 // Other entries of the dimensions of a dataset (members, bands, reference times): ids and choices
 // -> a request to the server -> the opened dataset.
-import { Refusal, type Api } from "../wire/api";
+import { Refusal, type Api, type OpeningJob } from "../wire/api";
 import type { Dataset } from "../wire/protocol";
 
 export interface Entry {
@@ -34,15 +34,25 @@ export const entryText = ({ selection }: Entry): string =>
 const firstPollMs = 40;
 const pollMsMax = 1000;
 
-// Returns null, and cancels the request, once the entry is no longer wanted. A refused request
-// fails with a Refusal.
 export async function openEntry(
   api: EntryApi,
   entry: Entry,
   wanted: () => boolean,
   sleep: (ms: number) => Promise<void>,
 ): Promise<Dataset | null> {
-  let job = await api.openEntry(entry);
+  const id = await resultOf(api, await api.openEntry(entry), wanted, sleep);
+  return id === null ? null : api.describe(id);
+}
+
+// The id of the dataset that the job opens. Returns null, and cancels the request, once it is no
+// longer wanted. A refused request fails with a Refusal.
+export async function resultOf(
+  api: Pick<Api, "job" | "cancelJob">,
+  started: OpeningJob,
+  wanted: () => boolean,
+  sleep: (ms: number) => Promise<void>,
+): Promise<string | null> {
+  let job = started;
   for (let ms = firstPollMs; job.state === "queued" || job.state === "running"; ms *= 2) {
     if (!wanted()) {
       await api.cancelJob(job.id).catch(() => {}); // it may have finished
@@ -55,5 +65,5 @@ export async function openEntry(
   if (job.result === null) {
     throw new Refusal(job.problem?.detail ?? job.state, job.problem?.status ?? 0);
   }
-  return api.describe(job.result);
+  return job.result;
 }

@@ -8,6 +8,7 @@ import { DatasetList } from "./dataset_list";
 import { EntryPicker } from "./entry_picker";
 import { byId, make } from "../base/dom";
 import { toggleErrorMetric } from "../base/error_text";
+import { FileBrowser } from "./file_browser";
 import { Gizmo, looks } from "../viewport/gizmo";
 import { hoverOn } from "../view/hover_setting";
 import { HoverView } from "../viewport/hover_view";
@@ -103,14 +104,26 @@ const hover = new HoverView(
   { ...host, find: (at) => probe.find(at) },
 );
 const list = new DatasetList(byId("dataset", HTMLSelectElement));
-const cards = new Cards(byId("datasets", HTMLDialogElement), byId("cards", HTMLElement), {
+const datasets = byId("datasets", HTMLDialogElement);
+const files = new FileBrowser({
+  api: app.api,
+  sleep: (ms) => new Promise((done) => window.setTimeout(done, ms)),
+  opened: async (id) => {
+    list.set(await app.api.datasets());
+    datasets.close();
+    app.open(id);
+  },
+});
+const cards = new Cards(datasets, byId("cards", HTMLElement), {
   api: app.api,
   list,
+  files,
+  current: () => (app.isOpen() ? app.dataset().id : undefined),
   open: (id) => app.open(id),
 });
 const help = byId("help", HTMLDialogElement);
 const status = new Status();
-const files: FileTarget = {
+const pictures: FileTarget = {
   open: (view) => app.openView(view),
   refuse: (text) => status.error("picture", text),
 };
@@ -124,11 +137,11 @@ const openSaving = saveDialog(
     maps: app.maps,
     size: () => [canvas.clientWidth, canvas.clientHeight],
     pixelsMax: () => viewport.pixelsMax,
-    files,
+    files: pictures,
   },
   document.baseURI,
 );
-takeDrops(byId("drop-hint", HTMLElement), files);
+takeDrops(byId("drop-hint", HTMLElement), pictures);
 
 function togglePanel(): void {
   const hidden = document.documentElement.classList.toggle("no-panel");

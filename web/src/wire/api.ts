@@ -1,5 +1,6 @@
 // HTTP requests besides the stream: datasets, fields, forecasts -> typed answers. fetch is
 // injected, so that tests can simulate the server.
+import type { Folder } from "./folder";
 import type { Dataset, DatasetSummary, View } from "./protocol";
 import { notUnderstood, posted, refusalText } from "./requests";
 import { isObject } from "../base/values";
@@ -174,6 +175,17 @@ export class Api {
   // Opens the files of a listed dataset at other entries of its choices.
   async openEntry(entry: { from: string; selection: Record<string, string> }): Promise<OpeningJob> {
     return this.get<OpeningJob>("v1/datasets", isJob, posted(entry));
+  }
+
+  // Opens a file, folder or pattern below the data root.
+  async openPath(path: string): Promise<OpeningJob> {
+    return this.get<OpeningJob>("v1/datasets", isJob, posted({ path }));
+  }
+
+  // A page of a folder below the data root: what follows the name `after`.
+  async folder(folder: string, after: string): Promise<Folder> {
+    const query = new URLSearchParams({ folder, ...(after === "" ? {} : { after }) }).toString();
+    return this.get<Folder>(`v1/files?${query}`, (a) => Array.isArray(a.entries));
   }
 
   async job(id: string): Promise<OpeningJob> {

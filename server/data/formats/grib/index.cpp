@@ -121,13 +121,16 @@ Result<void> split(const InputFile& input, const Part& message, std::vector<Fiel
 
 bool is_grib(const InputFile& input) {
   const auto head = input.head(heading_max + 8);
-  if (!head) return false;
-  const auto at = head->find("GRIB");
-  if (at >= heading_max || at + 8 > head->size()) return false;  // npos is also beyond these limits
+  return head && is_grib(std::string_view(*head));
+}
+
+bool is_grib(std::string_view head) {
+  const auto at = head.find("GRIB");
+  if (at >= heading_max || at + 8 > head.size()) return false;  // npos is also beyond these limits
   const bool is_heading = std::all_of(
-      head->begin(), head->begin() + static_cast<long>(at),
+      head.begin(), head.begin() + static_cast<long>(at),
       [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == 1 || c == 3; });
-  return is_heading && ((*head)[at + 7] == 1 || (*head)[at + 7] == 2);
+  return is_heading && (head[at + 7] == 1 || head[at + 7] == 2);
 }
 
 Result<std::vector<FieldPlace>> find_fields(const InputFile& input) {

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "server/base/error.hpp"
 #include "server/data/cf/array_file.hpp"
@@ -12,6 +13,8 @@ namespace windsplat::data::grib {
 
 // Whether a file begins with a GRIB message, optionally after a WMO heading.
 bool is_grib(const InputFile& input);
+// The same for the first bytes of a file.
+bool is_grib(std::string_view head);
 
 // The folders of tables that ecCodes reads at run time, separated by ':'. Empty without ecCodes.
 std::string definitions_folder();
