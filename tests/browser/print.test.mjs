@@ -1,5 +1,5 @@
-// What leaves the page on paper: printing shows picture, caption and legend on white, saved pictures
-// have a size in print, and the camera is copied and pasted as numbers.
+// What leaves the page on paper: printing shows picture, caption and legend on white; saved
+// pictures have a size in print; the camera is copied and pasted as numbers.
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { test } from "node:test";

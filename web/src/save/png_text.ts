@@ -1,6 +1,6 @@
-// Text and size in print of PNG files: (bytes of a PNG, keywords and strings) -> bytes with one iTXt
-// chunk for each, and back; (bytes, dots per inch) -> bytes with a pHYs chunk. Pure. Source: PNG
-// specification (ISO/IEC 15948), chunks 5.3, iTXt 11.3.4.5, pHYs 11.3.5.3, CRC annex D.
+// Text and size in print of PNG files: (bytes of a PNG, keywords and strings) -> bytes with one
+// iTXt chunk for each, and back; (bytes, dots per inch) -> bytes with a pHYs chunk. Pure. Source:
+// PNG specification (ISO/IEC 15948), chunks 5.3, iTXt 11.3.4.5, pHYs 11.3.5.3, CRC annex D.
 
 export type Bytes = Uint8Array<ArrayBuffer>;
 
