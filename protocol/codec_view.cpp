@@ -5,6 +5,7 @@
 #include "protocol/codec_annotations.hpp"
 #include "protocol/codec_json.hpp"
 #include "protocol/codec_names.hpp"
+#include "protocol/codec_region.hpp"
 #include "protocol/limits.hpp"
 
 namespace windsplat::protocol {
@@ -441,6 +442,7 @@ View read_view(const Json& document, Faults& faults) {
   object("method", read_method, view.method);
   object("quality", read_quality, view.quality);
   object("annotations", read_annotations, view.annotations);
+  object("region", read_region, view.region);
   reader.finish();
   return view;
 }
@@ -481,7 +483,8 @@ Json view_to_json(const View& view) {
                {{"budgetMs", number_or_null(view.quality.budget_ms)},
                 {"maxError", number_or_null(view.quality.max_error)},
                 {"lossless", view.quality.lossless}}},
-              {"annotations", annotations_to_json(view.annotations)}};
+              {"annotations", annotations_to_json(view.annotations)},
+              {"region", region_to_json(view.region)}};
 }
 
 std::string encode_view(const View& view) { return dump(view_to_json(view)); }

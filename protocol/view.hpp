@@ -181,6 +181,27 @@ struct AnnotationsView {
   bool operator==(const AnnotationsView&) const = default;
 };
 
+// What a filter of a region applies to.
+enum class FilterOf { lines, media, all };
+
+// Samples where a field is beyond the range, or masked, are left out.
+struct FilterView {
+  std::string field;
+  Range range{0, 0};  // both ends included
+  FilterOf of = FilterOf::lines;
+  bool operator==(const FilterView&) const = default;
+};
+
+// The samples that are drawn: those that satisfy every part. Ranges in the coordinates of the axes.
+struct RegionView {
+  std::optional<Range> x, y, z;
+  std::optional<Range> longitude, latitude;  // of columns, degrees
+  std::vector<FilterView> where;
+  // Polygons of closed rings, the first of each the outer one: longitude and latitude, or x and y.
+  std::vector<std::vector<std::vector<std::array<double, 2>>>> polygon;  // empty: no polygon
+  bool operator==(const RegionView&) const = default;
+};
+
 struct View {
   std::string dataset;
   int step = 0;
@@ -193,6 +214,7 @@ struct View {
   MethodView method;
   QualityView quality;
   AnnotationsView annotations;
+  RegionView region;
   bool operator==(const View&) const = default;
 };
 

@@ -114,6 +114,9 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, double dept
   to.jitter_stride = static_cast<float>(from.jitter_stride);
   to.seed = from.seed;
   to.epoch = from.epoch;
+  for (std::size_t a = 0; a < 3; ++a) {
+    to.first[a] = static_cast<std::uint32_t>(from.first_sample[a]);
+  }
   for (int a = 0; a < 3; ++a) to.keep[a] = scene.slice && scene.slice->axis == a ? 0.0F : 1.0F;
   to.moving = from.moving ? 1 : 0;
   to.motion_cycles = from.motion_cycles;

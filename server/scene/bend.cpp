@@ -197,28 +197,6 @@ void thin_axes(Lattice& lattice) {
   }
 }
 
-// The bounding box of all cells, each the parallelepiped of its edges. The edge along an axis of
-// one sample is extended in every direction.
-void set_box(Lattice& lattice) {
-  const Cells cells(lattice);
-  glm::dvec3 low(std::numeric_limits<double>::infinity());
-  glm::dvec3 high(-std::numeric_limits<double>::infinity());
-  for_samples(lattice.dims, [&](std::size_t n, const std::array<int, 3>& at) {
-    glm::dvec3 reach(0);
-    for (std::size_t a = 0; a < 3; ++a) {
-      if (lattice.dims[a] > 1) {
-        reach += 0.5 * glm::abs(cells.edge(n, a, at[a]));
-      } else {
-        reach = glm::max(reach, glm::dvec3(0.5 * lattice.spacing[a][0]));
-      }
-    }
-    low = glm::min(low, cells.place(n) - reach);
-    high = glm::max(high, cells.place(n) + reach);
-  });
-  lattice.box_min = low;
-  lattice.box_max = high;
-}
-
 // Translates and scales so that the box is centred on the origin and its longest edge is 2.
 void settle(Lattice& lattice, std::vector<std::array<float, 3>>& places) {
   const glm::dvec3 centre = 0.5 * (lattice.box_min + lattice.box_max);
@@ -386,6 +364,26 @@ Result<void> check_cells(const Lattice& lattice) {
 }
 
 }  // namespace
+
+void set_box(Lattice& lattice) {
+  const Cells cells(lattice);
+  glm::dvec3 low(std::numeric_limits<double>::infinity());
+  glm::dvec3 high(-std::numeric_limits<double>::infinity());
+  for_samples(lattice.dims, [&](std::size_t n, const std::array<int, 3>& at) {
+    glm::dvec3 reach(0);
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (lattice.dims[a] > 1) {
+        reach += 0.5 * glm::abs(cells.edge(n, a, at[a]));
+      } else {
+        reach = glm::max(reach, glm::dvec3(0.5 * lattice.spacing[a][0]));
+      }
+    }
+    low = glm::min(low, cells.place(n) - reach);
+    high = glm::max(high, cells.place(n) + reach);
+  });
+  lattice.box_min = low;
+  lattice.box_max = high;
+}
 
 Result<void> check_mapping(const data::Grid& grid, GeometryMapping mapping) {
   if (mapping == GeometryMapping::flat || grid.columns) return {};

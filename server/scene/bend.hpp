@@ -25,6 +25,10 @@ Result<Lattice> place_straight(const data::Grid& grid, const protocol::GeometryV
 Result<Lattice> bend_lattice(const data::Grid& grid, const protocol::GeometryView& geometry,
                              const Heights* heights);
 
+// Sets the box of a curved lattice: the bounding box of all cells, each the parallelepiped of its
+// edges. The edge along an axis of one sample is extended in every direction.
+void set_box(Lattice& lattice);
+
 // Errors: invalid at /geometry/mapping if the grid lacks the necessary longitudes and latitudes.
 Result<void> check_mapping(const data::Grid& grid, protocol::GeometryMapping mapping);
 

@@ -11,6 +11,8 @@
 #include "server/scene/colormap.hpp"
 #include "server/scene/detail.hpp"
 #include "server/scene/rates.hpp"
+#include "server/scene/region/crop.hpp"
+#include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
 
 namespace windsplat::scene {
@@ -116,23 +118,51 @@ data::Coarsening drawn(data::Coarsening how) {
   return how;
 }
 
+// Of a field of that many components on the lattice, reduced in that way.
+std::uint64_t level_bytes(const Lattice& lattice, std::size_t components,
+                          const data::Coarsening& how) {
+  auto values = static_cast<int>(components);
+  if (how.halvings != std::array{0, 0, 0}) values = reduced_components(values, how.reduction);
+  std::uint64_t bytes = sizeof(float) * static_cast<std::uint64_t>(values);
+  for (std::size_t a = 0; a < 3; ++a) {
+    bytes *= static_cast<std::uint64_t>(data::halved(lattice.dims[a], how.halvings[a]));
+  }
+  return bytes;
+}
+
 // Fields of the level or section that is rendered. Media have two values per sample. Lines are
 // those of samples, and so is the scalar that colours them: the mean of vectors that differ is
 // shorter than each of them, and would be held against a least magnitude of the samples.
 struct Fields {
   const data::Dataset& dataset;
+  const CompletedView& completed;
   data::Coarsening coarsening;
   const Section* section;  // null: the samples of the data
-  [[nodiscard]] Needed of_medium(const std::string& name) const { return find(name, coarsening); }
+  [[nodiscard]] Needed of_medium(const std::string& name) const {
+    return find(name, coarsening, kept_of(name, protocol::FilterOf::media));
+  }
   [[nodiscard]] Needed of_lines(const std::string& name) const {
-    return find(name, drawn(coarsening));
+    return find(name, drawn(coarsening), kept_of(name, protocol::FilterOf::lines));
+  }
+  // Samples of the data without those that the region leaves out.
+  [[nodiscard]] data::Derivation kept_of(const std::string& name, protocol::FilterOf of) const {
+    return kept_part(*completed.placed(), components_of(name),
+                     filters_of(completed.view().region, of));
   }
 
  private:
-  [[nodiscard]] Needed find(const std::string& name, const data::Coarsening& how) const {
-    if (section == nullptr) return {name, dataset.reduction(name, how)};
-    const std::size_t components = dataset.info().find(name)->components.size();
-    return {name, sampled(*section, static_cast<int>(components))};
+  [[nodiscard]] std::size_t components_of(const std::string& name) const {
+    return dataset.info().find(name)->components.size();
+  }
+  [[nodiscard]] Needed find(const std::string& name, const data::Coarsening& how,
+                            const data::Derivation& kept) const {
+    if (section == nullptr) {
+      data::Derivation level = dataset.reduction(name, how);
+      level.bytes = level_bytes(completed.lattice(), components_of(name), how);
+      return {name, computed_from(kept, std::move(level))};
+    }
+    const auto components = static_cast<int>(components_of(name));
+    return {name, computed_from(kept, sampled(*section, components))};
   }
 };
 
@@ -201,15 +231,20 @@ std::vector<Shown> shown_at(const View& view, const data::Coarsening& how) {
 }
 
 // Whether the levels of all fields fit into memory beside the largest volume from which one is
-// reduced. It depends on sizes alone, so that a view has the same level whatever is resident.
-bool are_within_limit(const std::vector<Shown>& shown, const data::Dataset& dataset) {
+// reduced, and what a region keeps of it. It depends on sizes alone, so that a view has the same
+// level whatever is resident.
+bool are_within_limit(const std::vector<Shown>& shown, const View& view, const Lattice& lattice,
+                      const data::Dataset& dataset) {
+  const bool kept = is_cropped(view.region) || !view.region.where.empty();
   std::set<std::pair<std::string, data::Reduction>> counted;
   std::uint64_t levels = 0;
   std::uint64_t largest = 0;
   for (const auto& [field, how] : shown) {
     if (!counted.emplace(field, how.reduction).second) continue;
-    levels += dataset.level_bytes(field, how);
-    largest = std::max(largest, dataset.level_bytes(field, {}));
+    const std::size_t components = dataset.info().find(field)->components.size();
+    levels += level_bytes(lattice, components, how);
+    const std::uint64_t part = kept ? level_bytes(lattice, components, {}) : 0;
+    largest = std::max(largest, dataset.level_bytes(field, {}) + part);
   }
   return dataset.is_within_limit(levels + largest);
 }
@@ -224,21 +259,22 @@ std::array<int, 3> level_for(const View& view, const Camera& camera, const Latti
   const auto level = coarser_level(
       lattice, slice, choose_level(camera, lattice, slice, merge_limits(view)), coarser);
   if (level == full) return full;
-  return are_within_limit(shown_at(view, coarsening_of(lattice, level)), dataset) ? level : full;
+  const auto shown = shown_at(view, coarsening_of(lattice, level));
+  return are_within_limit(shown, view, lattice, dataset) ? level : full;
 }
 
 // The lines of a plane, whose vectors and colours do not depend on the axes of the grid.
-void set_plane(const Section& plane, const std::string& field, const ComponentFactors& factors,
-               NeededLines& lines) {
+void set_plane(const Section& plane, const std::string& field, const data::Derivation& kept,
+               const ComponentFactors& factors, NeededLines& lines) {
   VectorLayer& layer = lines.layer;
   const bool by_axes = layer.color_by == LineColor::world_z || layer.color_by == LineColor::rise ||
                        layer.color_by == LineColor::direction;
   if (by_axes) {
-    lines.colors = Needed{field, sampled_colors(plane, factors, layer)};
+    lines.colors = Needed{field, computed_from(kept, sampled_colors(plane, factors, layer))};
     if (layer.color_by == LineColor::rise) layer.color.range = {0, 1};
     layer.color_by = LineColor::scalar;
   }
-  lines.vectors = {field, sampled_vectors(plane, factors)};
+  lines.vectors = {field, computed_from(kept, sampled_vectors(plane, factors))};
 }
 
 void set_factors(const ComponentFactors& factors, const Fields& fields, VectorLayer& layer) {
@@ -276,7 +312,8 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
                      (view.geometry.slice || view.geometry.plane);
   if (layer.color_by == LineColor::scalar) lines.colors = fields.of_lines(*from.color.field);
   if (view.geometry.plane) {
-    set_plane(*fields.section, from.field.name, *factors, lines);
+    const auto kept = fields.kept_of(from.field.name, protocol::FilterOf::lines);
+    set_plane(*fields.section, from.field.name, kept, *factors, lines);
   } else {
     set_factors(*factors, fields, layer);
     lines.vectors = fields.of_lines(from.field.name);
@@ -304,7 +341,7 @@ Result<NeededScene> needed_scene(const CompletedView& completed, const std::arra
     section->owner = placed;
     needed.section = std::move(*section);
   }
-  const Fields fields{dataset, coarsening_of(placed->lattice, level),
+  const Fields fields{dataset, completed, coarsening_of(placed->lattice, level),
                       needed.section ? &*needed.section : nullptr};
   if (shows_lines(view)) {
     auto lines = needed_lines(view, *placed, fields);

@@ -12,6 +12,7 @@
 
 #include "server/scene/angles.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/place.hpp"
 
 namespace windsplat::scene {
 
@@ -253,6 +254,7 @@ double front_elevation(const Lattice& lattice, const protocol::ImageView& image)
 }
 
 double front_azimuth(const Lattice& lattice) {
+  if (!(lattice.inner_radius > 0)) return default_azimuth;
   const glm::dvec3 centre = 0.5 * (lattice.box_min + lattice.box_max);
   if (std::hypot(centre.x, centre.y) < aside_min) return default_azimuth;
   return std::atan2(centre.x, -centre.y) / radians_per_degree;
@@ -300,11 +302,12 @@ std::optional<Face> face_of(const protocol::GeometryView& geometry, const Lattic
   if (!slice || !(flat || level)) return std::nullopt;
   const auto axis = static_cast<int>(slice->axis);
   const std::vector<double>& positions = lattice.positions[axis];
-  const auto below = static_cast<std::size_t>(slice->index);
+  const double index = slice_index(*slice, lattice);
+  const auto below = static_cast<std::size_t>(index);
   const std::size_t above = std::min(below + 1, positions.size() - 1);
   Face face{0.5 * (lattice.box_min + lattice.box_max), glm::dvec3(0)};
   face.normal[axis] = 1;
-  face.point[axis] = std::lerp(positions[below], positions[above], slice->index - below);
+  face.point[axis] = std::lerp(positions[below], positions[above], index - below);
   return face;
 }
 

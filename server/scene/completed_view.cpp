@@ -18,6 +18,8 @@
 #include "server/scene/lattice.hpp"
 #include "server/scene/rates.hpp"
 #include "server/scene/refusal.hpp"
+#include "server/scene/region/crop.hpp"
+#include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
 
 namespace windsplat::scene {
@@ -75,18 +77,24 @@ Result<void> check_color_field(const protocol::VectorColorView& color,
 }
 
 // Numbers that follow from a field at the first step and from `arguments`: computed once, so that
-// later steps do not need the first step resident.
+// later steps do not need the first step resident. `placed`: where it is part of the grid, they
+// follow from the samples of that part.
 template <class Make>
 Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* what,
                                             const std::string& field,
-                                            const std::vector<double>& arguments,
-                                            const Make& make) {
+                                            const std::vector<double>& arguments, const Make& make,
+                                            const Placed* placed = nullptr) {
   std::string key = what;
   key += '/' + field + '/';
   key += data::digest_of(
       {reinterpret_cast<const char*>(arguments.data()), arguments.size() * sizeof(double)});
+  data::Derivation part;
+  if (placed != nullptr && placed->crop) {
+    part = kept_part(*placed, dataset.info().find(field)->components.size(), {});
+    key += data::digest_of(placed->region);
+  }
   return dataset.remembered(key, [&]() -> Result<std::vector<double>> {
-    auto volume = dataset.volume(field, 0);
+    auto volume = dataset.derived(field, 0, part);
     if (!volume) return volume.error();
     return make(**volume);
   });
@@ -106,8 +114,9 @@ std::vector<double> numbers_of(const Lattice& lattice, const std::optional<Slice
   return out;
 }
 
-Result<void> complete_magnitudes(View& view, const Lattice& lattice,
+Result<void> complete_magnitudes(View& view, const Placed& placed,
                                  const std::optional<Slice>& slice, data::Dataset& dataset) {
+  const Lattice& lattice = placed.lattice;
   protocol::VectorView& vector = view.vector;
   const bool named = vector.field.kind == FieldChoice::Kind::named;
   const std::string& field = vector.field.name;
@@ -129,9 +138,11 @@ Result<void> complete_magnitudes(View& view, const Lattice& lattice,
     std::vector<double> arguments = numbers_of(lattice, slice);
     arguments.insert(arguments.end(), {range[0], range[1], *plain.length});
     const auto least = from_first_step(
-        dataset, "least magnitude", field, arguments, [&](const data::Volume& volume) {
+        dataset, "least magnitude", field, arguments,
+        [&](const data::Volume& volume) {
           return std::vector{default_min_magnitude(plain, volume, lattice, slice)};
-        });
+        },
+        &placed);
     if (!least) return least.error();
     vector.min_magnitude = least->front();
   }
@@ -170,9 +181,11 @@ Result<Range> first_rise_range(const View& view, const Placed& placed, data::Dat
     arguments.insert(arguments.end(), rates->z.begin(), rates->z.end());
   }
   const auto range = from_first_step(
-      dataset, "rises", vector.field.name, arguments, [&](const data::Volume& volume) {
+      dataset, "rises", vector.field.name, arguments,
+      [&](const data::Volume& volume) {
         return numbers_of(default_rise_range(vector, *factors, volume, slice));
-      });
+      },
+      &placed);
   if (!range) return range.error();
   return Range{(*range)[0], (*range)[1]};
 }
@@ -189,9 +202,11 @@ Result<Range> default_color_range(const View& view, const Placed& placed,
       std::vector<double> arguments = numbers_of(lattice, std::nullopt);
       arguments.push_back(*vector.min_magnitude);
       const auto range = from_first_step(
-          dataset, "heights", vector.field.name, arguments, [&](const data::Volume& volume) {
+          dataset, "heights", vector.field.name, arguments,
+          [&](const data::Volume& volume) {
             return numbers_of(default_height_range(vector, volume, lattice));
-          });
+          },
+          &placed);
       if (!range) return range.error();
       return Range{(*range)[0], (*range)[1]};
     }
@@ -280,6 +295,11 @@ Result<void> check(const View& view, const data::DatasetInfo& info) {
   if (view.depth_cue.near >= view.depth_cue.far) {
     return invalid_at("/depthCue/near", "is not less than far");
   }
+  for (std::size_t n = 0; n < view.region.where.size(); ++n) {
+    const auto field = find_field(info, view.region.where[n].field, data::FieldKind::scalar,
+                                  "/region/where/" + std::to_string(n) + "/field");
+    if (!field) return field.error();
+  }
   return check_geometry(view.geometry, info);
 }
 
@@ -308,7 +328,7 @@ Result<void> complete_from_data(View& view, const Camera& camera, const Placed& 
                                 data::Dataset& dataset) {
   const Lattice& lattice = placed.lattice;
   const std::optional<Slice> slice = slice_of(view.geometry, lattice);
-  if (auto ok = complete_magnitudes(view, lattice, slice, dataset); !ok) return ok;
+  if (auto ok = complete_magnitudes(view, placed, slice, dataset); !ok) return ok;
   if (!view.vector.color.range) {
     auto range = default_color_range(view, placed, view_depths(camera, lattice), dataset);
     if (!range) return range.error();
@@ -320,8 +340,17 @@ Result<void> complete_from_data(View& view, const Camera& camera, const Placed& 
   return {};
 }
 
-// Errors: invalid at /geometry/plane.
+// Errors: invalid at /geometry/plane, or a slice beyond the region.
 Result<void> check_section(const View& view, const Lattice& lattice) {
+  if (const auto& slice = view.geometry.slice) {
+    const auto axis = static_cast<std::size_t>(slice->axis);
+    const double index = slice_index(*slice, lattice);
+    if (!(index >= 0 && index <= lattice.dims[axis] - 1)) {
+      return invalid_at("/geometry/slice/index",
+                        "the region keeps layers " + std::to_string(lattice.first[axis]) + " to " +
+                            std::to_string(lattice.first[axis] + lattice.dims[axis] - 1));
+    }
+  }
   if (!is_section(view.geometry)) return {};
   const auto section = make_section(view.geometry, lattice);
   return section ? Result<void>() : section.error();
@@ -343,7 +372,7 @@ Result<CompletedView> complete(const View& view, data::Dataset& dataset) {
   View full = view;
   if (full.dataset.empty()) full.dataset = info.id;
   if (auto ok = check(full, info); !ok) return ok.error();
-  auto placed = place_dataset(full.geometry, dataset);
+  auto placed = place_dataset(full.geometry, dataset, full.region);
   if (!placed) return placed.error();
   const Lattice& lattice = (*placed)->lattice;
   if (auto ok = check_section(full, lattice); !ok) return ok.error();
@@ -367,6 +396,19 @@ Result<ViewOutline> outline(const View& view, const data::DatasetInfo& info) {
   auto lattice = place_lattice(info.grid, out.view.geometry);
   if (!lattice) return lattice.error();
   out.lattice = std::move(*lattice);
+  if (is_cropped(view.region)) {
+    // Columns are sought with the data.
+    protocol::RegionView ranges;
+    ranges.x = view.region.x;
+    ranges.y = view.region.y;
+    ranges.z = view.region.z;
+    auto crop = crop_of(ranges, info.grid, 0);
+    if (!crop) return crop.error();
+    auto whole = std::make_shared<Placed>();
+    whole->grid = info.grid;
+    whole->lattice = std::move(out.lattice);
+    out.lattice = cropped_place(whole, ranges, std::move(*crop)).lattice;
+  }
   if (auto ok = check_section(out.view, out.lattice); !ok) return ok.error();
   const auto camera = complete_from_description(out.view, info, out.lattice);
   if (!camera) return camera.error();
@@ -395,6 +437,7 @@ std::vector<std::string> fields_of(const View& view, const data::DatasetInfo& in
     for (const std::string& name : default_scalars(info)) add(name);
   }
   if (view.geometry.height_field) add(*view.geometry.height_field);
+  for (const protocol::FilterView& filter : view.region.where) add(filter.field);
   return fields;
 }
 

@@ -138,6 +138,7 @@ void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pi
                  VectorLayer& layer) {
   layer.halvings = level;
   layer.data_dims = fine.dims;
+  layer.first_sample = fine.first;
   double lines = 1;
   double apart_px = 0;  // first to last sample of a group, at the nearest point of the box
   for (std::size_t a = 0; a < 3; ++a) {

@@ -19,6 +19,8 @@
 #include "server/scene/bend.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/refusal.hpp"
+#include "server/scene/region/crop.hpp"
+#include "server/scene/region/select.hpp"
 #include "server/terrain/lower_boundary.hpp"
 
 namespace windsplat::scene {
@@ -29,6 +31,7 @@ namespace {
 struct Kept {
   protocol::GeometryView geometry;  // without slice, plane and body, which do not change
                                     // positions
+  protocol::RegionView region;      // without filters
   std::shared_ptr<const Placed> placed;
 };
 using KeptPtr = std::shared_ptr<const Kept>;
@@ -221,13 +224,13 @@ std::shared_ptr<const terrain::Terrain> make_terrain(const protocol::GeometryVie
 }
 
 // Whatever the placement depends on.
-std::string terrain_key(const protocol::GeometryView& geometry) {
+std::string terrain_key(const protocol::GeometryView& geometry, const std::string& region) {
   std::ostringstream key;
   key << "terrain " << static_cast<int>(geometry.mapping) << ' '
       << static_cast<int>(geometry.vertical) << std::hexfloat;
   for (const double scale : geometry.scale) key << ' ' << scale;
   key << ' ' << geometry.height_field.value_or("");
-  return key.str();
+  return key.str() + region;
 }
 
 // Kept also where there is nothing to draw, so that this is found once.
@@ -243,11 +246,12 @@ Result<std::shared_ptr<const terrain::Terrain>> terrain_of(const protocol::Geome
   if (placed.ground == GroundFrom::none) return std::shared_ptr<const terrain::Terrain>();
   const std::array<int, 3>& dims = placed.lattice.dims;
   const std::uint64_t bytes = terrain::bytes_of(dims[0] + 2, dims[1] + 2);
-  auto kept = dataset.auxiliary(terrain_key(geometry), bytes, [&]() -> data::Resident {
-    auto made = make_terrain(geometry, placed);
-    if (placed.ground == GroundFrom::levels && !has_relief(*made)) made.reset();
-    return std::make_shared<const KeptTerrain>(KeptTerrain{std::move(made)});
-  });
+  auto kept =
+      dataset.auxiliary(terrain_key(geometry, placed.region), bytes, [&]() -> data::Resident {
+        auto made = make_terrain(geometry, placed);
+        if (placed.ground == GroundFrom::levels && !has_relief(*made)) made.reset();
+        return std::make_shared<const KeptTerrain>(KeptTerrain{std::move(made)});
+      });
   if (!kept) return kept.error();
   return std::static_pointer_cast<const KeptTerrain>(*kept)->terrain;
 }
@@ -289,8 +293,16 @@ Result<void> check_plane(const protocol::GeometryView& geometry) {
 std::optional<Slice> slice_of(const protocol::GeometryView& geometry, const Lattice& lattice) {
   if (geometry.plane) return layer_near(*geometry.plane, lattice);
   if (!geometry.slice) return std::nullopt;
-  return Slice{static_cast<int>(geometry.slice->axis),
-               static_cast<int>(std::lround(geometry.slice->index))};
+  const int axis = static_cast<int>(geometry.slice->axis);
+  const auto nearest = static_cast<int>(std::lround(slice_index(*geometry.slice, lattice)));
+  const int last = lattice.dims[static_cast<std::size_t>(axis)] - 1;
+  return Slice{axis, std::clamp(nearest, 0, last)};
+}
+
+double slice_index(const protocol::SliceView& slice, const Lattice& lattice) {
+  const auto axis = static_cast<std::size_t>(slice.axis);
+  const double index = slice.index - lattice.first[axis];
+  return axis == 0 && index < 0 && lattice.turn > 0 ? index + lattice.turn : index;
 }
 
 Result<void> check_geometry(const protocol::GeometryView& geometry, const data::DatasetInfo& info) {
@@ -316,19 +328,11 @@ Result<void> check_geometry(const protocol::GeometryView& geometry, const data::
   return {};
 }
 
-Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView& geometry,
-                                                    data::Dataset& dataset) {
+namespace {
+
+Result<std::shared_ptr<const Placed>> place_whole(const protocol::GeometryView& geometry,
+                                                  data::Dataset& dataset) {
   const data::DatasetInfo& info = dataset.info();
-  const bool bent = is_bent(geometry);
-  protocol::GeometryView unsliced = geometry;
-  unsliced.slice.reset();
-  unsliced.plane.reset();
-  unsliced.body = {};
-  if (bent) {
-    const std::any any = dataset.kept(kept_key);
-    const auto* kept = std::any_cast<KeptPtr>(&any);
-    if (kept != nullptr && (*kept)->geometry == unsliced) return (*kept)->placed;
-  }
   auto placed = std::make_shared<Placed>();
   placed->grid = info.grid;
   std::optional<Heights> heights;
@@ -350,8 +354,45 @@ Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView
   if (!lattice) return lattice.error();
   placed->lattice = std::move(*lattice);
   placed->ground = ground_from(info, of_heights, heights ? &*heights : nullptr, *placed);
-  std::shared_ptr<const Placed> out = std::move(placed);
-  if (bent) dataset.keep(kept_key, KeptPtr(std::make_shared<Kept>(Kept{unsliced, out})));
+  return std::shared_ptr<const Placed>(std::move(placed));
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView& geometry,
+                                                    data::Dataset& dataset,
+                                                    const protocol::RegionView& region) {
+  protocol::GeometryView unsliced = geometry;
+  unsliced.slice.reset();
+  unsliced.plane.reset();
+  unsliced.body = {};
+  protocol::RegionView unfiltered = region;
+  unfiltered.where.clear();
+  const bool cropped = is_cropped(region);
+  const bool keeps = is_bent(geometry) || cropped;
+  std::shared_ptr<const Placed> whole;
+  if (keeps) {
+    const std::any any = dataset.kept(kept_key);
+    const auto* kept = std::any_cast<KeptPtr>(&any);
+    if (kept != nullptr && (*kept)->geometry == unsliced) {
+      const std::shared_ptr<const Placed>& placed = (*kept)->placed;
+      if ((*kept)->region == unfiltered) return placed;
+      whole = placed->whole ? placed->whole : placed;
+    }
+  }
+  if (!whole) {
+    auto placed = place_whole(geometry, dataset);
+    if (!placed) return placed.error();
+    whole = std::move(*placed);
+  }
+  std::shared_ptr<const Placed> out = whole;
+  if (cropped) {
+    auto crop = crop_of(region, dataset.info().grid, whole->lattice.around);
+    if (!crop) return crop.error();
+    out = std::make_shared<const Placed>(cropped_place(whole, region, std::move(*crop)));
+  }
+  if (keeps)
+    dataset.keep(kept_key, KeptPtr(std::make_shared<Kept>(Kept{unsliced, unfiltered, out})));
   return out;
 }
 

@@ -9,6 +9,7 @@
 
 #include "server/data/cf/units.hpp"
 #include "server/scene/angles.hpp"
+#include "server/scene/region/crop.hpp"
 
 namespace windsplat::scene {
 
@@ -188,9 +189,10 @@ Result<ComponentFactors> component_factors(const protocol::View& view, const Pla
   const protocol::VectorView& vector = view.vector;
   factors.scale = {vector.scale[0], vector.scale[1], vector.scale[2]};
   if (vector.space == protocol::VectorSpace::world) {
-    auto rates = world_rates(placed.grid, field, view.geometry, placed.lattice);
+    const Placed& whole = placed.whole ? *placed.whole : placed;
+    auto rates = world_rates(whole.grid, field, view.geometry, whole.lattice);
     if (!rates) return rates.error();
-    factors.rates = std::move(*rates);
+    factors.rates = placed.crop ? cropped_rates(*rates, *placed.crop) : std::move(*rates);
   } else if (rises_where_negative(placed.grid, field)) {
     // Omega is positive downward, so drawing it unchanged would show rising air as sinking.
     factors.scale.z = -factors.scale.z;

@@ -41,6 +41,7 @@ struct Camera {
 // remain those of the uncurved lattice; colours by height use positions[2].
 struct Lattice {
   std::array<int, 3> dims{1, 1, 1};
+  std::array<int, 3> first{0, 0, 0};  // index of the first sample among those of the data
   std::array<std::vector<double>, 3> positions;
   std::array<std::vector<double>, 3> spacing;
   std::shared_ptr<const std::vector<std::array<float, 3>>> places;  // x fastest; null: rectilinear
@@ -50,6 +51,9 @@ struct Lattice {
   // Number of samples along x that close a circle around the globe; 0: x does not close. Those
   // beyond repeat the first ones, and only a slice of such a column draws them.
   int around = 0;
+  // Samples along x after which the data repeat, where the lattice is part of them and may go on
+  // beyond their end; 0: it does not.
+  int turn = 0;
   // Number of samples along an axis that are drawn, unless it is that of a slice.
   [[nodiscard]] int drawn(int axis) const { return axis == 0 && around > 0 ? around : dims[axis]; }
 };
@@ -88,6 +92,9 @@ struct VectorLayer {
   // and kernel box that it has at full detail.
   std::array<int, 3> halvings{0, 0, 0};
   std::array<int, 3> data_dims{1, 1, 1};
+  // Jitter follows from the index of a sample among those of the data: of the lattice's first one,
+  // at full detail. Along x later samples may lie beyond a seam, and count on.
+  std::array<int, 3> first_sample{0, 0, 0};
   double r1 = 0.6;  // pixels of this picture (already scaled with its height)
   double r2 = 1.4;
   double opacity = 0.8;

@@ -15,6 +15,7 @@
 #include "server/base/check.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/place.hpp"
 #include "server/scene/refusal.hpp"
 
 namespace windsplat::scene {
@@ -326,9 +327,11 @@ std::string key_of(const char* what, const std::vector<double>& numbers) {
 }
 
 // What determines the places of the samples of a dataset, and the plane.
-std::vector<double> placement_of(const protocol::GeometryView& geometry) {
+std::vector<double> placement_of(const protocol::GeometryView& geometry, const Lattice& whole) {
   std::vector<double> out{static_cast<double>(geometry.mapping),
                           static_cast<double>(geometry.vertical)};
+  out.insert(out.end(), whole.first.begin(), whole.first.end());
+  out.insert(out.end(), whole.dims.begin(), whole.dims.end());
   out.insert(out.end(), geometry.scale.begin(), geometry.scale.end());
   if (geometry.plane) {
     out.insert(out.end(), geometry.plane->point.begin(), geometry.plane->point.end());
@@ -355,15 +358,15 @@ bool is_section(const protocol::GeometryView& geometry) {
 Result<Section> make_section(const protocol::GeometryView& geometry, const Lattice& whole) {
   if (geometry.plane) {
     auto plane = make_plane(*geometry.plane, whole);
-    if (plane) plane->placement = placement_of(geometry);
+    if (plane) plane->placement = placement_of(geometry, whole);
     return plane;
   }
   Section section;
   section.whole = &whole;
-  section.placement = placement_of(geometry);
+  section.placement = placement_of(geometry, whole);
   section.heights = geometry.height_field.value_or("");
   section.axis = static_cast<int>(geometry.slice->axis);
-  section.index = geometry.slice->index;
+  section.index = slice_index(*geometry.slice, whole);
   section.dims = whole.dims;
   section.dims[section.axis] = 1;
   for (std::size_t a = 0; a < 3; ++a) section.pitch[a] = cell_size(whole, a);

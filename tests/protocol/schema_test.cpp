@@ -141,7 +141,11 @@ TEST(Schema, RangesInsideArraysMatchTheCodec) {
         const auto bound = schema["items"].at(keyword).get<double>();
         Json value = Json::array();
         for (std::size_t k = 0; k < count; ++k) value.push_back(0.25 * static_cast<double>(k + 1));
-        if (count == 2) value[1 - i] = i == 0 ? 9e37 : -9e37;  // keeps a range ascending
+        // Keeps a range ascending.
+        if (count == 2) {
+          const char* const other = i == 0 ? "maximum" : "minimum";
+          value[1 - i] = 0.9 * schema["items"].at(other).get<double>();
+        }
         if (count == 2 && (i == 0) == (outward > 0)) continue;
         value[i] = bound;
         EXPECT_TRUE(accepted(view_with(at, value))) << at << " " << keyword;
@@ -213,6 +217,26 @@ TEST(Schema, ListLengthsMatchTheLimits) {
   };
   EXPECT_TRUE(accepted(points(limits::extinction_points_max)));
   EXPECT_EQ(first_pointer(points(limits::extinction_points_max + 1)), "/scalars/0/extinction");
+}
+
+TEST(Schema, PolygonsHaveAtMostTheLimitOfPositionsInAllRings) {
+  const auto ring = [](std::size_t positions) {
+    Json out = Json::array();
+    for (std::size_t n = 0; n + 1 < positions; ++n) out.push_back({n % 7, n});
+    out.push_back(out.front());
+    return out;
+  };
+  const auto view = [&](std::size_t positions) {
+    const Json rings{ring(positions - 500), ring(500)};
+    return Json{{"region", {{"polygon", {{"type", "Polygon"}, {"coordinates", rings}}}}}};
+  };
+  EXPECT_TRUE(accepted(view(limits::polygon_points_max)));
+  EXPECT_EQ(first_pointer(view(limits::polygon_points_max + 1)), "/region/polygon");
+  Json filters = Json::array();
+  for (std::size_t n = 0; n <= limits::filters_max; ++n) {
+    filters.push_back({{"field", "q"}, {"range", {0, 1}}});
+  }
+  EXPECT_EQ(first_pointer({{"region", {{"where", filters}}}}), "/region/where");
 }
 
 TEST(Schema, NamesAreMeasuredInCharacters) {

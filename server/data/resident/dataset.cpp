@@ -7,13 +7,13 @@
 #include <map>
 #include <mutex>
 #include <new>
-#include <set>
 #include <utility>
 
 #include "server/base/log.hpp"
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/data/model/packed.hpp"
+#include "server/data/resident/sizes.hpp"
 #include "server/data/resident/turnstile.hpp"
 
 namespace windsplat::data {
@@ -27,48 +27,6 @@ constexpr std::size_t remembered_max = 256;
 Result<VolumePtr> as_volume(const Result<Resident>& kept) {
   if (!kept) return kept.error();
   return std::static_pointer_cast<const Volume>(*kept);
-}
-
-// Bytes of the dataset description that grow with the file.
-std::uint64_t bytes_of(const DatasetInfo& info) {
-  std::uint64_t bytes = 0;
-  for (const Axis& axis : info.grid.axes) bytes += axis.coordinates.size() * sizeof(double);
-  if (const auto& columns = info.grid.columns) {
-    bytes += (columns->longitude.size() + columns->latitude.size()) * sizeof(double);
-  }
-  if (info.grid.ground) bytes += info.grid.ground->heights.size() * sizeof(float);
-  for (const TimeStep& step : info.steps) bytes += sizeof step + step.text.capacity();
-  return bytes;
-}
-
-std::uint64_t values_of(const DatasetInfo& info, std::size_t field) {
-  return info.grid.samples() * info.fields[field].components.size();
-}
-
-// Fields without duplicates.
-std::uint64_t bytes_at_a_step(const DatasetInfo& info, const std::vector<std::string>& fields) {
-  std::set<std::string> counted;
-  std::uint64_t bytes = 0;
-  for (const std::string& name : fields) {
-    const FieldInfo* const field = info.find(name);
-    if (field == nullptr || !counted.insert(name).second) continue;
-    bytes += info.grid.samples() * field->components.size() * sizeof(float);
-  }
-  return bytes;
-}
-
-// Measured upper bound on the memory of a loader, in addition to the volumes, while it reads
-// these fields. Chunks that are needed again are cached, up to 128 MiB or one chunk.
-std::uint64_t reading_bytes(const DatasetInfo& info, const std::vector<std::string>& fields) {
-  constexpr std::uint64_t mib = std::uint64_t{1} << 20;
-  std::uint64_t bytes = 32 * mib;
-  for (const std::string& name : fields) {
-    const FieldInfo* const field = info.find(name);
-    if (field == nullptr || field->chunk_bytes <= sizeof(double)) continue;  // no chunks
-    const std::uint64_t kept = std::min(128 * mib, field->decoded_bytes / field->components.size());
-    bytes = std::max(bytes, 64 * mib + std::max(kept, 2 * field->chunk_bytes));
-  }
-  return bytes;
 }
 
 // Runs a function that makes a volume; exceptions become errors.
@@ -311,15 +269,32 @@ Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
     if (*there && own_) own_->insert((*there)->get());
     return as_volume(*there);
   }
-  // Keep a reference, so that the volume is not evicted before the result is computed from it.
-  const auto fine = volume(field, step);
-  if (!fine) return fine.error();
+  // Keep references, so that no volume is evicted before the result is computed from it.
+  std::vector<VolumePtr> others;
+  const auto fine = inputs(field, step, how, others);
+  if (!fine) return fine;
   const auto made = get(key, how.bytes, [&] {
-    return guarded(state_->info.fields[*index],
-                   [&]() -> Result<Volume> { return how.make(**fine); });
+    return guarded(state_->info.fields[*index], [&]() -> Result<Volume> {
+      return how.others.empty() ? how.make(**fine) : how.make_with(**fine, others);
+    });
   });
-  if (own_) own_->erase(own_->find(fine->get()));  // the volume is not yet shared
+  // The volume is not yet shared.
+  if (own_) own_->erase(own_->find(fine->get()));
+  for (const VolumePtr& other : others) {
+    if (own_) own_->erase(own_->find(other.get()));
+  }
   return as_volume(made);
+}
+
+// What a volume is computed from: that of its own field, and those of others.
+Result<VolumePtr> Dataset::inputs(const std::string& field, std::size_t step, const Derivation& how,
+                                  std::vector<VolumePtr>& others) {
+  for (const auto& [other, its] : how.others) {
+    auto one = its ? derived(other, step, *its) : volume(other, step);
+    if (!one) return one;
+    others.push_back(std::move(*one));
+  }
+  return how.from ? derived(field, step, *how.from) : volume(field, step);
 }
 
 Result<Resident> Dataset::auxiliary(const std::string& variant, std::uint64_t bytes,

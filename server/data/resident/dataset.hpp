@@ -29,6 +29,17 @@ struct Derivation {
   std::string variant;      // identifies it among those of the field; empty: the field itself
   std::uint64_t bytes = 0;  // of the volume
   std::function<Volume(const Volume&)> make;
+  // What it is computed from in place of the field; null: the field.
+  std::shared_ptr<const Derivation> from = nullptr;
+  // Other fields at the same step, or what is derived from them, from which it is computed too, by
+  // make_with() in place of make().
+  struct Input {
+    std::string field;
+    std::shared_ptr<const Derivation> how;
+  };
+  std::vector<Input> others = {};
+  std::function<Volume(const Volume&, const std::vector<std::shared_ptr<const Volume>>& others)>
+      make_with = nullptr;
 };
 
 // One opened dataset. A handle: copies refer to the same dataset. Thread-safe.
@@ -166,6 +177,9 @@ class Dataset {
 
   [[nodiscard]] Urgency urgency() const;
   Result<Resident> get(const ResidentKey& key, std::uint64_t bytes, const Budget::Make& make);
+  Result<std::shared_ptr<const Volume>> inputs(const std::string& field, std::size_t step,
+                                               const Derivation& how,
+                                               std::vector<std::shared_ptr<const Volume>>& others);
 
   std::shared_ptr<State> state_;
   Manner manner_ = Manner::demand;

@@ -80,7 +80,11 @@ struct BrickMaker {
         pass(of_pass),
         tile(of_tile),
         out(into),
-        key(hash_key(of_pass.line.seed, of_pass.line.epoch)) {}
+        key(hash_key(of_pass.line.seed, of_pass.line.epoch)) {
+    key.x += of_pass.line.first[0];
+    key.y += of_pass.line.first[1];
+    key.z += of_pass.line.first[2];
+  }
 
   // Prepares the lines of a vector of kernel positions. Returns which of `bits` have one.
   KERNEL_INLINE std::uint32_t make_lines(const CellLanes<Curved>& cell, int i, int l,

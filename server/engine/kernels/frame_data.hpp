@@ -81,8 +81,9 @@ struct LineStyle {
   float rise_scale, height_scale, rise_shift;
   float jitter_center, jitter_stride;
   std::uint32_t seed, epoch;
-  float keep[3];  // times the drawn extent: 0 along a slice's axis
-  int moving;     // phase motion
+  std::uint32_t first[3];  // indices of the lattice's first sample among those of the data
+  float keep[3];           // times the drawn extent: 0 along a slice's axis
+  int moving;              // phase motion
   double motion_cycles;
 };
 

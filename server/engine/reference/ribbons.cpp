@@ -29,9 +29,12 @@ struct Jitter {
 
 Jitter jitter_of(const VectorLayer& layer, const std::array<int, 3>& sample) {
   const Hash key = pcg3d({layer.seed, layer.epoch, 0x9e3779b9U});
-  const Hash first = pcg3d({static_cast<std::uint32_t>(sample[0]) + key[0],
-                            static_cast<std::uint32_t>(sample[1]) + key[1],
-                            static_cast<std::uint32_t>(sample[2]) + key[2]});
+  Hash own = key;
+  for (std::size_t a = 0; a < 3; ++a) {
+    own[a] +=
+        static_cast<std::uint32_t>(layer.first_sample[a]) + static_cast<std::uint32_t>(sample[a]);
+  }
+  const Hash first = pcg3d(own);
   const Hash second = pcg3d(first);
   Jitter jitter;
   for (int a = 0; a < 3; ++a) {

@@ -268,7 +268,10 @@ std::optional<Line> line_of(const Scene& scene, const VectorLayer& layer, const 
   if (!arrow) return {};
   const Hash key = hash({layer.seed, layer.epoch, 0x9e3779b9U});
   Hash own = key;
-  for (int a = 0; a < 3; ++a) own[a] += static_cast<std::uint32_t>(cell.sample[a]);
+  for (int a = 0; a < 3; ++a) {
+    own[a] += static_cast<std::uint32_t>(layer.first_sample[a]) +
+              static_cast<std::uint32_t>(cell.sample[a]);
+  }
   const Hash first = hash(own);
   const Hash second = hash(first);
   const Vec in_box = layer.jitter_center * centred(second);

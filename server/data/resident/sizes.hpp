@@ -1,0 +1,59 @@
+// Description of a dataset -> bytes that it and its fields take.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/data/model/dataset_info.hpp"
+
+namespace windsplat::data {
+
+// Bytes of the dataset description that grow with the file.
+inline std::uint64_t bytes_of(const DatasetInfo& info) {
+  std::uint64_t bytes = 0;
+  for (const Axis& axis : info.grid.axes) bytes += axis.coordinates.size() * sizeof(double);
+  if (const auto& columns = info.grid.columns) {
+    bytes += (columns->longitude.size() + columns->latitude.size()) * sizeof(double);
+  }
+  if (info.grid.ground) bytes += info.grid.ground->heights.size() * sizeof(float);
+  for (const TimeStep& step : info.steps) bytes += sizeof step + step.text.capacity();
+  return bytes;
+}
+
+inline std::uint64_t values_of(const DatasetInfo& info, std::size_t field) {
+  return info.grid.samples() * info.fields[field].components.size();
+}
+
+// Fields without duplicates.
+inline std::uint64_t bytes_at_a_step(const DatasetInfo& info,
+                                     const std::vector<std::string>& fields) {
+  std::set<std::string> counted;
+  std::uint64_t bytes = 0;
+  for (const std::string& name : fields) {
+    const FieldInfo* const field = info.find(name);
+    if (field == nullptr || !counted.insert(name).second) continue;
+    bytes += info.grid.samples() * field->components.size() * sizeof(float);
+  }
+  return bytes;
+}
+
+// Measured upper bound on the memory of a loader, in addition to the volumes, while it reads
+// these fields. Chunks that are needed again are cached, up to 128 MiB or one chunk.
+inline std::uint64_t reading_bytes(const DatasetInfo& info,
+                                   const std::vector<std::string>& fields) {
+  constexpr std::uint64_t mib = std::uint64_t{1} << 20;
+  std::uint64_t bytes = 32 * mib;
+  for (const std::string& name : fields) {
+    const FieldInfo* const field = info.find(name);
+    if (field == nullptr || field->chunk_bytes <= sizeof(double)) continue;  // no chunks
+    const std::uint64_t kept = std::min(128 * mib, field->decoded_bytes / field->components.size());
+    bytes = std::max(bytes, 64 * mib + std::max(kept, 2 * field->chunk_bytes));
+  }
+  return bytes;
+}
+
+}  // namespace windsplat::data
