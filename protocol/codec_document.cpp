@@ -16,6 +16,13 @@ bool keeps_null(const std::string& pointer, const std::string& key) {
   return key == kept_null_key && pointer == kept_null_parent;
 }
 
+// An object whose absence means something else than its defaults.
+constexpr std::string_view kept_object_key = "light";
+
+bool keeps_empty(const std::string& pointer, const std::string& key) {
+  return key == kept_object_key && pointer.empty();
+}
+
 // Removes redundant parts: nulls that mean a default, and empty objects.
 void remove_unsaid(Json& value, const std::string& pointer) {
   if (value.is_array()) {
@@ -25,8 +32,9 @@ void remove_unsaid(Json& value, const std::string& pointer) {
   if (!value.is_object()) return;
   for (auto member = value.begin(); member != value.end();) {
     remove_unsaid(*member, join_pointer(pointer, member.key()));
-    const bool unsaid = (member->is_null() && !keeps_null(pointer, member.key())) ||
-                        (member->is_object() && member->empty());
+    const bool unsaid =
+        (member->is_null() && !keeps_null(pointer, member.key())) ||
+        (member->is_object() && member->empty() && !keeps_empty(pointer, member.key()));
     member = unsaid ? value.erase(member) : std::next(member);
   }
 }

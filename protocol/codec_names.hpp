@@ -49,5 +49,9 @@ inline constexpr std::array<Name<Compositing>, 5> compositing_names{
      {Compositing::cd_euler, "cd-euler"}}};
 inline constexpr std::array<Name<Detail>, 2> detail_names{
     {{Detail::automatic, "auto"}, {Detail::full, "full"}}};
+inline constexpr std::array<Name<MediumShading>, 3> shading_names{
+    {{MediumShading::scatter, "scatter"},
+     {MediumShading::gradient, "gradient"},
+     {MediumShading::none, "none"}}};
 
 }  // namespace windsplat::protocol

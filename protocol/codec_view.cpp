@@ -4,6 +4,7 @@
 #include "protocol/codec.hpp"
 #include "protocol/codec_annotations.hpp"
 #include "protocol/codec_json.hpp"
+#include "protocol/codec_light.hpp"
 #include "protocol/codec_names.hpp"
 #include "protocol/codec_region.hpp"
 #include "protocol/limits.hpp"
@@ -269,6 +270,7 @@ ScalarView read_scalar(const Json& json, const std::string& pointer, Faults& fau
   }
   reader.number("minOpticalDepth", scalar.min_optical_depth, {0, limits::optical_depth_max});
   reader.integer("stride", scalar.stride, stride_range);
+  reader.choice("shading", scalar.shading, shading_names);
   reader.finish();
   return scalar;
 }
@@ -418,7 +420,8 @@ Json scalar_to_json(const ScalarView& scalar) {
        {{"map", text_or_null(scalar.color.map)}, {"range", numbers_or_null(scalar.color.range)}}},
       {"extinction", std::move(extinction)},
       {"minOpticalDepth", canonical_number(scalar.min_optical_depth)},
-      {"stride", scalar.stride}};
+      {"stride", scalar.stride},
+      {"shading", name_of(scalar.shading, shading_names)}};
 }
 
 }  // namespace
@@ -443,6 +446,9 @@ View read_view(const Json& document, Faults& faults) {
   object("quality", read_quality, view.quality);
   object("annotations", read_annotations, view.annotations);
   object("region", read_region, view.region);
+  if (const Json* light = reader.child("light", Presence::optional, Null::is_default)) {
+    view.light = read_light(*light, reader.at("light"), faults);
+  }
   reader.finish();
   return view;
 }
@@ -484,7 +490,8 @@ Json view_to_json(const View& view) {
                 {"maxError", number_or_null(view.quality.max_error)},
                 {"lossless", view.quality.lossless}}},
               {"annotations", annotations_to_json(view.annotations)},
-              {"region", region_to_json(view.region)}};
+              {"region", region_to_json(view.region)},
+              {"light", light_to_json(view.light)}};
 }
 
 std::string encode_view(const View& view) { return dump(view_to_json(view)); }

@@ -26,6 +26,7 @@ enum class MotionMode { still, phase };
 enum class MethodName { kernel, slab, reference };
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
 enum class Detail { automatic, full };
+enum class MediumShading { scatter, gradient, none };
 
 struct CameraView {
   Projection projection = Projection::perspective;
@@ -140,6 +141,7 @@ struct ScalarView {
   std::optional<std::vector<std::array<double, 2>>> extinction;
   double min_optical_depth = 1e-4;  // splats below it are skipped
   int stride = 1;
+  MediumShading shading = MediumShading::scatter;  // in a lit view
   bool operator==(const ScalarView&) const = default;
 };
 
@@ -202,6 +204,26 @@ struct RegionView {
   bool operator==(const RegionView&) const = default;
 };
 
+// Time and place that determine where the sun is.
+struct SunAtView {
+  std::string utc = "2000-01-01T12:00:00Z";
+  double longitude = 0;  // degrees
+  double latitude = 0;
+  bool operator==(const SunAtView&) const = default;
+};
+
+// Light of a sun that media scatter.
+struct LightView {
+  double azimuth = 225;             // degrees clockwise from north (+y)
+  double elevation = 40;            // degrees above the horizon
+  std::optional<SunAtView> sun_at;  // empty: azimuth and elevation
+  double ambient = 0.2;
+  double brightness = 2;  // of the sun
+  double anisotropy = 0;  // of the phase function
+  double shadows = 5;     // factor of the extinctions on the way of the light
+  bool operator==(const LightView&) const = default;
+};
+
 struct View {
   std::string dataset;
   int step = 0;
@@ -215,6 +237,7 @@ struct View {
   QualityView quality;
   AnnotationsView annotations;
   RegionView region;
+  std::optional<LightView> light;  // empty: colours as in the legend
   bool operator==(const View&) const = default;
 };
 

@@ -35,6 +35,8 @@ windsplat_bench(bench_estimates ${bench_dir}/scenes/scene_set.cpp
   ${naive_dir}/trial_fields.cpp
   ${naive_dir}/family/family.cpp)
 windsplat_bench(bench_pool)
+add_executable(bench_light ${bench_dir}/scenes/bench_light.cpp)
+target_link_libraries(bench_light PRIVATE bench_support)
 windsplat_bench(bench_picture)
 windsplat_bench(bench_load)
 target_link_libraries(bench_load PRIVATE PkgConfig::NETCDF PkgConfig::ZSTD PkgConfig::BLOSC)
@@ -55,6 +57,7 @@ windsplat_smoke(stages bench_stages --smoke)
 windsplat_smoke(estimates bench_estimates --measure=bench_estimates.csv --list=bench_estimates.csv
   --members=1 --scenes=1 --views=1)
 windsplat_smoke(left_out bench_left_out --trials=24 --field=front)
+windsplat_smoke(light bench_light --smoke)
 windsplat_smoke(picture bench_picture --benchmark_filter=640x480 --benchmark_min_time=0.001)
 file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"height\":24}}\n")
 windsplat_smoke(path bench_path tornado bench_views.jsonl bench_view.png)

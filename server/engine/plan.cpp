@@ -9,6 +9,7 @@
 
 #include "server/base/check.hpp"
 #include "server/engine/body.hpp"
+#include "server/engine/light.hpp"
 #include "server/engine/line_style.hpp"
 
 namespace windsplat::engine {
@@ -325,6 +326,7 @@ void finish_pass(const Scene& scene, double depth_origin, int major, const Sampl
   if (scene.lattice.places) bend_pass(scene, ways, pass);
   if (pass.vector != nullptr) add_lines(scene, depth_origin, pass);
   add_medium(scene, pass);
+  if (scene.light) add_light(scene, pass);
 }
 
 bool is_inside(const Camera& camera, const Lattice& lattice) {

@@ -161,7 +161,8 @@ class Sampling {
     }
     if (layer.color_by == LineColor::scalar) value = layer.color_field->values[samples_.number(i)];
     const double k = layer.magnitude_intensity;
-    out.color = (1 - k + k * out.magnitude) * color_at(layer.color, value);
+    const double bright = samples_.line_brightness(i) * (1 - k + k * out.magnitude);
+    out.color = bright * color_at(layer.color, value);
     return out;
   }
 

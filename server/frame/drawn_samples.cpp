@@ -4,6 +4,7 @@
 #include <glm/geometric.hpp>
 
 #include "server/data/model/volume.hpp"
+#include "server/light/shade.hpp"
 
 namespace windsplat::frame {
 
@@ -51,20 +52,32 @@ double DrawnSamples::edge(const Index& i, std::size_t a) const {
   return glm::length(place(*next) - place(i));
 }
 
+double DrawnSamples::brightness(const scene::ScalarLayer& layer, const Index& i) const {
+  if (!scene_.light) return 1;
+  const glm::dvec3 from_eye = place(i) - scene_.camera.eye;
+  const double sun = light::sun_seen(scene_, {from_eye.x, from_eye.y, from_eye.z});
+  return light::medium_light(*scene_.light, layer, number(i), sun);
+}
+
+double DrawnSamples::line_brightness(const Index& i) const {
+  return scene_.light ? light::line_light(*scene_.light, number(i)) : 1;
+}
+
 Medium DrawnSamples::medium(const Index& i) const {
   using Two = data::TwoValues;
   Medium out;
   const std::size_t n = number(i);
   for (const scene::ScalarLayer& layer : scene_.scalars) {
     const data::Volume& field = *layer.field;
+    const double bright = brightness(layer, i);
     if (field.components == 1) {
-      out.add(layer, field.values[n], 1);
+      out.add(layer, field.values[n], 1, bright);
       continue;
     }
     const double low = field.component(Two::low_share)[n];
     const double high = field.component(Two::high_share)[n];
-    if (low > 0) out.add(layer, field.component(Two::low)[n], low);
-    if (high > 0) out.add(layer, field.component(Two::high)[n], high);
+    if (low > 0) out.add(layer, field.component(Two::low)[n], low, bright);
+    if (high > 0) out.add(layer, field.component(Two::high)[n], high, bright);
   }
   return out;
 }

@@ -33,10 +33,11 @@ struct Medium {
   [[nodiscard]] glm::dvec3 color() const {
     return extinction > 0 ? emission / extinction : emission;
   }
-  void add(const scene::ScalarLayer& layer, double value, double share) {
+  // bright: factor of the colour.
+  void add(const scene::ScalarLayer& layer, double value, double share, double bright) {
     const double rho = share * extinction_at(layer, value);
     extinction += rho;
-    emission += rho * color_at(layer.color, value);
+    emission += rho * bright * color_at(layer.color, value);
   }
 };
 
@@ -66,6 +67,9 @@ class DrawnSamples {
   [[nodiscard]] std::optional<Index> neighbour(const Index& i, std::size_t a, int step) const;
   [[nodiscard]] double edge(const Index& i, std::size_t a) const;  // of its cell, world units
   [[nodiscard]] Medium medium(const Index& i) const;
+  // Factors of colours at a sample by the light of the scene.
+  [[nodiscard]] double brightness(const scene::ScalarLayer& layer, const Index& i) const;
+  [[nodiscard]] double line_brightness(const Index& i) const;
 
  private:
   const scene::Scene& scene_;

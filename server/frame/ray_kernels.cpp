@@ -208,7 +208,8 @@ Medium RayKernels::medium(const Group& group, const Index& i) const {
   if (group.layers->media.size() == scene_.scalars.size()) return samples_.medium(sample);
   Medium out;  // with strides samples are not merged
   for (const scene::ScalarLayer* layer : group.layers->media) {
-    out.add(*layer, layer->field->values[samples_.number(sample)], 1);
+    out.add(*layer, layer->field->values[samples_.number(sample)], 1,
+            samples_.brightness(*layer, sample));
   }
   return out;
 }

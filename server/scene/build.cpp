@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "server/light/lit_scene.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/detail.hpp"
@@ -321,12 +322,25 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
   return lines;
 }
 
+Shading shading_of(protocol::MediumShading shading) {
+  switch (shading) {
+    case protocol::MediumShading::scatter:
+      return Shading::scatter;
+    case protocol::MediumShading::gradient:
+      return Shading::gradient;
+    case protocol::MediumShading::none:
+      return Shading::none;
+  }
+  return Shading::none;
+}
+
 NeededMedium needed_medium(const protocol::ScalarView& from, const Fields& fields) {
   ScalarLayer layer;
   layer.color = make_table(from.color.map.value(), from.color.range.value());
   layer.extinction = from.extinction.value();
   layer.min_optical_depth = from.min_optical_depth;
   layer.stride = from.stride;
+  layer.shading = shading_of(from.shading);
   return {std::move(layer), fields.of_medium(from.field)};
 }
 
@@ -403,12 +417,17 @@ Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& co
     merge_lines(whole, scene.level, pixels_per_unit(scene.camera, whole), layer);
     scene.vector = std::move(layer);
   }
+  std::vector<std::string> media;  // identify the volumes
   for (auto& [layer, values] : needed.media) {
     if (auto ok = load(values, step, dataset, layer.field); !ok) return ok.error();
     scene.scalars.push_back(std::move(layer));
+    media.push_back(values.field + '\n' + std::to_string(step) + '\n' + values.how.variant);
   }
   if (!needed.section) {
     scene.lattice = coarsen_lattice(whole, scene.level);
+    if (auto lit = light::light_scene(completed.view(), media, dataset, scene); !lit) {
+      return lit.error();
+    }
     return scene;
   }
   auto lattice = lattice_of(*needed.section, dataset);

@@ -121,12 +121,37 @@ struct VectorLayer {
   double motion_cycles = 0;
 };
 
+// One factor for each sample of the lattice, x fastest; full_factor is 1.
+using SampleFactors = std::vector<std::uint16_t>;
+constexpr double full_factor = 65535;
+
+// What the light of a scene does to the colour of a medium. scatter: it is multiplied by the
+// sunlight that arrives at each sample and is scattered towards the eye; gradient: by a factor for
+// each sample that follows from the gradient of the field; none: nothing.
+enum class Shading { scatter, gradient, none };
+
 struct ScalarLayer {
   std::shared_ptr<const data::Volume> field;
   ColorTable color;
   std::vector<std::array<double, 2>> extinction;  // (value, extinction per world unit)
   double min_optical_depth = 1e-4;
   int stride = 1;
+  Shading shading = Shading::scatter;
+  std::shared_ptr<const SampleFactors> relief;  // of `gradient` in a lit scene
+};
+
+// Single scattering of sunlight. The colour of a splat is multiplied by
+//   ambient + (1 - ambient) min(1, strength P T)
+// and that of a line by the same with P = 1, so that no colour exceeds that of its table. T is the
+// transmittance from the sun to the sample, P the phase function of Henyey and Greenstein between
+// the ray to the splat and the direction of the sun, with a mean of 1 over the sphere.
+struct Light {
+  glm::dvec3 sun{0, 0, 1};  // unit vector towards it
+  double ambient = 0.3;
+  double strength = 1;                            // 0: it is below the horizon
+  double anisotropy = 0;                          // -1 < g < 1; positive: forward
+  double shadows = 1;                             // factor of the extinctions in T
+  std::shared_ptr<const SampleFactors> sunlight;  // T; null: 1 everywhere
 };
 
 struct DepthCue {
@@ -171,6 +196,7 @@ struct Scene {
   std::array<int, 3> level{0, 0, 0};  // how often each axis of the data was halved
   std::optional<VectorLayer> vector;
   std::vector<ScalarLayer> scalars;
+  std::optional<Light> light;
   DepthCue depth_cue;
   std::optional<Slice> slice;
   std::optional<Body> body;

@@ -185,7 +185,7 @@ class Renderer {
   // A splat whose optical depth is below the tolerance of every layer, for all view directions, is
   // omitted.
   Medium<Real> make_medium(const Group& group) const {
-    const auto density = engine::reference::make_density(group.layers.media, position_);
+    const auto density = engine::reference::make_density(scene_, group.layers.media, position_);
     if (density.rho <= 0) return {};
     double tolerance = 1e300;
     for (const auto* layer : group.layers.media) {

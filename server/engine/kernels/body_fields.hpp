@@ -243,11 +243,52 @@ KERNEL_INLINE Extinctions read_extinctions(const Pass& pass, const Rows& rows, i
           hn::And(hn::Ge(depth, all<Kernel>(medium.min_optical_depth)), hn::Gt(total, zero))};
 }
 
-// The colour of all layers together, weighted by their extinctions.
-void color_density(const Pass& pass, std::int64_t offset, float* color) {
+// ---- light of the sun: factors of colours (scene::Light) ----
+
+// Strength of the sun times the phase function of Henyey and Greenstein towards the eye,
+// (1 - g^2) / (1 + g^2 - 2 g cos)^(3/2) with the cosine between the ray and the direction of the
+// sun.
+template <bool Perspective>
+inline float sun_seen(const Sunlight& light, const KernelPositions& positions, int l) {
+  if (!Perspective || light.anisotropy == 0) return light.media_strength;
+  const float x = positions.x[l];
+  const float y = positions.y[l];
+  const float z = positions.z[l];
+  const float way = square_root(larger(x * x + y * y + z * z, 1e-30F));
+  const float cosine = (x * light.sun[0] + y * light.sun[1] + z * light.sun[2]) / way;
+  const float g = light.anisotropy;
+  const float least = (1.0F - larger(g, -g)) * (1.0F - larger(g, -g));
+  const float square = larger(1.0F + g * g - 2.0F * g * cosine, least);
+  return light.media_strength * (1.0F - g * g) / (square * square_root(square));
+}
+
+inline float lit(const Sunlight& light, float sun) {
+  return light.ambient + (1.0F - light.ambient) * smaller(sun, 1.0F);
+}
+
+constexpr float factor_unit = 1.0F / 65535.0F;
+
+inline float medium_light(const Sunlight& light, const MediumLayer& layer, std::int64_t offset,
+                          float sun) {
+  if (layer.light == nullptr) return layer.scatters != 0 ? lit(light, sun) : 1.0F;
+  const float factor = factor_unit * static_cast<float>(layer.light[offset]);
+  return lit(light, layer.scatters != 0 ? sun * factor : factor);
+}
+
+inline float line_light(const Sunlight& light, std::int64_t offset) {
+  if (light.sunlight == nullptr) return lit(light, light.strength);
+  return lit(light, light.strength * factor_unit * static_cast<float>(light.sunlight[offset]));
+}
+
+// The colour of all layers together, weighted by their extinctions. `sun`: strength of the light.
+template <bool Lit>
+void color_density(const Pass& pass, std::int64_t offset, float sun, float* color) {
   const Medium& medium = pass.medium;
   if (medium.layers == 1) {
     look_up(medium.layer[0].color, medium.layer[0].values[offset], color);
+    if (!Lit) return;
+    const float bright = medium_light(pass.light, medium.layer[0], offset, sun);
+    for (int c = 0; c < 3; ++c) color[c] *= bright;
     return;
   }
   color[0] = color[1] = color[2] = 0;
@@ -261,7 +302,8 @@ void color_density(const Pass& pass, std::int64_t offset, float* color) {
     if (rho <= 0) continue;
     float layer_color[3];
     look_up(layer.color, value, layer_color);
-    for (int c = 0; c < 3; ++c) color[c] += rho * layer_color[c];
+    const float bright = Lit ? medium_light(pass.light, layer, offset, sun) : 1.0F;
+    for (int c = 0; c < 3; ++c) color[c] += rho * bright * layer_color[c];
     total += rho;
   }
   const float inverse = 1.0F / total;

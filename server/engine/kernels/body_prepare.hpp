@@ -93,8 +93,18 @@ struct BrickMaker {
     const Kernel least = all<Kernel>(least_magnitude(pass.line));
     const std::uint32_t lines = bits & bits_of<Kernel>(hn::Ge(vectors.magnitude, least));
     if (lines == 0) return 0;
-    return lines & prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.positions, cell,
-                                                        vectors, key, i, l, shades, out.ribbons);
+    const std::uint32_t shown =
+        lines & prepare_ribbons<Perspective, Curved>(camera, pass, rows, out.positions, cell,
+                                                     vectors, key, i, l, shades, out.ribbons);
+    if (pass.light.lit != 0) light_lines(shown, i, l);
+    return shown;
+  }
+
+  void light_lines(std::uint32_t lines, int i, int l) {
+    for (; lines != 0; lines &= lines - 1U) {
+      const int k = __builtin_ctz(lines);
+      shades.dim[l + k] *= line_light(pass.light, offset_of(rows, i + k));
+    }
   }
 
   KERNEL_INLINE std::uint32_t make_splats(const CellLanes<Curved>& cell, int i, int l,
@@ -126,15 +136,21 @@ struct BrickMaker {
       if (Medium) {
         const std::uint64_t splats = make_splats(cell, i, l, here);
         out.positions.splats |= splats << static_cast<unsigned>(l);
-        color_splats(splats, i, l);
+        if (pass.light.lit != 0) {
+          color_splats<true>(splats, i, l);
+        } else {
+          color_splats<false>(splats, i, l);
+        }
       }
     }
   }
 
+  template <bool Lit>
   void color_splats(std::uint64_t splats, int i, int l) {
     for (; splats != 0; splats &= splats - 1U) {
       const int k = __builtin_ctzll(splats);
-      color_density(pass, offset_of(rows, i + k), out.densities.color[l + k]);
+      const float sun = Lit ? sun_seen<Perspective>(pass.light, out.positions, l + k) : 1.0F;
+      color_density<Lit>(pass, offset_of(rows, i + k), sun, out.densities.color[l + k]);
     }
   }
 

@@ -102,6 +102,19 @@ struct MediumLayer {
   const float* share;  // times the extinction: part of the sample that has this value; null: 1
   Extinction extinction;
   ColorTable color;
+  const std::uint16_t* light;  // factor by sample, 65535 is 1; null: its colour is not lit
+  int scatters;                // the factor is sunlight, which Sunlight::strength multiplies
+};
+
+// See scene::Light.
+struct Sunlight {
+  int lit;                        // 0: the scene has no light
+  const std::uint16_t* sunlight;  // by sample, 65535 is 1; null: 1
+  float ambient;
+  float strength;
+  float media_strength;  // in orthographic views times the phase function
+  float anisotropy;
+  float sun[3];  // right, down and forward of the unit vector towards the sun
 };
 
 struct Medium {
@@ -149,6 +162,7 @@ struct Pass {
   int has_medium;
   LineStyle line;
   Medium medium;
+  Sunlight light;
   float cell_max[3];    // widest cell along each axis; curved: largest extent of a cell
   int dims[3];          // dimensions of the fields
   int around;           // scene::Lattice::around

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "server/light/shade.hpp"
+
 namespace windsplat::engine::reference {
 
 namespace {
@@ -66,16 +68,19 @@ Vec table_color(const ColorTable& table, double value) {
   return color;
 }
 
-Density make_density(const std::vector<const ScalarLayer*>& layers,
+Density make_density(const Scene& scene, const std::vector<const ScalarLayer*>& layers,
                      const KernelPosition& position) {
   Density density;
+  const double sun = scene.light ? light::sun_seen(scene, position.from_eye) : 0;
   for (const ScalarLayer* layer : layers) {
     const auto value = static_cast<double>(layer->field->values[position.index]);
     if (std::isnan(value)) continue;
     const double rho = table_extinction(*layer, value);
     if (rho <= 0) continue;
     density.rho += rho;
-    density.color = plus(density.color, rho, table_color(layer->color, value));
+    const double bright =
+        scene.light ? light::medium_light(*scene.light, *layer, position.index, sun) : 1;
+    density.color = plus(density.color, rho * bright, table_color(layer->color, value));
   }
   if (density.rho > 0) density.color = scaled(density.color, 1 / density.rho);
   return density;
@@ -147,7 +152,7 @@ void list_kernels(const Scene& scene, const View& view, const CancelToken& cance
             if (ribbon) kernels.ribbons.push_back(*ribbon);
           }
           if (group.media.empty() || !lies_beyond_near(view, position)) continue;
-          const Density density = make_density(group.media, position);
+          const Density density = make_density(scene, group.media, position);
           if (density.rho <= 0) continue;
           kernels.splats.push_back(
               {position.from_eye, position.inverse, density.rho, density.color});

@@ -164,7 +164,8 @@ struct Density {
   double rho = 0;
   Vec color{};
 };
-Density make_density(const std::vector<const scene::ScalarLayer*>& layers,
+Density make_density(const scene::Scene& scene,
+                     const std::vector<const scene::ScalarLayer*>& layers,
                      const KernelPosition& position);
 
 // Extinction of a value, at most 1e30. At a step, that of the second point.

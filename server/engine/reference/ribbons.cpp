@@ -6,6 +6,7 @@
 
 #include "server/base/pcg3d.hpp"
 #include "server/engine/reference/kernels.hpp"
+#include "server/light/shade.hpp"
 
 namespace windsplat::engine::reference {
 
@@ -213,7 +214,8 @@ std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const Ve
   const double far = ramp(p[2], scene.depth_cue.near, scene.depth_cue.far);
   const double dim =
       (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
-  line.color = scaled(undimmed_color(scene, layer, position, *drawn, seen), dim);
+  const double lit = scene.light ? light::line_light(*scene.light, position.index) : 1;
+  line.color = scaled(undimmed_color(scene, layer, position, *drawn, seen), dim * lit);
   if (layer.moving) {
     const double full = layer.magnitude_range[1];
     const double speed = full > 0 ? std::min(drawn->magnitude / full, 1.0) : 1.0;

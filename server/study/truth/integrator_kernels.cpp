@@ -7,6 +7,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "server/study/truth/sunlight.hpp"
+
 namespace windsplat::truth {
 
 namespace {
@@ -305,7 +307,12 @@ std::optional<Line> line_of(const Scene& scene, const VectorLayer& layer, const 
 
 std::vector<Splat> splats_of(const Scene& scene) {
   static const Real volume = footprint_volume();
+  struct Origin {
+    const scene::ScalarLayer* layer;
+    std::array<int, 3> sample;
+  };
   std::vector<Splat> splats;
+  std::vector<Origin> origins;
   for (const scene::ScalarLayer& layer : scene.scalars) {
     each_cell(scene, layer.stride, [&](const Cell& cell) {
       const float value = layer.field->values[cell.index];
@@ -313,7 +320,13 @@ std::vector<Splat> splats_of(const Scene& scene) {
       const Real rho = extinction(layer, value);
       if (rho <= 0) return;
       splats.push_back({cell.centre, cell.normal, rho / volume, table_color(layer.color, value)});
+      origins.push_back({&layer, cell.sample});
     });
+  }
+  if (!scene.light) return splats;
+  const Sunlight light(scene, splats);
+  for (std::size_t n = 0; n < splats.size(); ++n) {
+    splats[n].color = light.of_medium(*origins[n].layer, origins[n].sample) * splats[n].color;
   }
   return splats;
 }
@@ -321,8 +334,17 @@ std::vector<Splat> splats_of(const Scene& scene) {
 std::vector<Line> lines_of(const Scene& scene) {
   std::vector<Line> lines;
   if (!scene.vector) return lines;
+  std::optional<Sunlight> light;
+  if (scene.light) {
+    Scene unlit = scene;
+    unlit.light.reset();
+    light.emplace(scene, splats_of(unlit));
+  }
   each_cell(scene, scene.vector->stride, [&](const Cell& cell) {
-    if (const auto line = line_of(scene, *scene.vector, cell)) lines.push_back(*line);
+    auto line = line_of(scene, *scene.vector, cell);
+    if (!line) return;
+    if (light) line->color = light->of_line(cell.sample) * line->color;
+    lines.push_back(*line);
   });
   return lines;
 }

@@ -1,0 +1,103 @@
+// The light of views: what a dataset keeps of it.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+
+#include "server/data/samples/samples.hpp"
+#include "server/scene/build.hpp"
+
+namespace windsplat::test {
+namespace {
+
+class LightOfAView : public ::testing::Test {
+ protected:
+  LightOfAView() {
+    auto source = data::open_sample("climate", {40, 24, 10}, 2);
+    dataset = std::make_unique<data::Dataset>(std::move(*source), "climate", 64U << 20U);
+    view.dataset = "climate";
+    view.image.width = 400;
+    view.image.height = 300;
+    view.light.emplace();
+  }
+  scene::Scene built() const { return scene::build_scene(view, *dataset).value(); }
+  // Whether the sunlight of the changed view is that of the view.
+  bool keeps(const std::function<void(protocol::View&)>& change) {
+    const auto before = built().light->sunlight;
+    protocol::View changed = view;
+    change(changed);
+    const auto after = scene::build_scene(changed, *dataset).value();
+    return after.light->sunlight == before;
+  }
+
+  std::unique_ptr<data::Dataset> dataset;
+  protocol::View view;
+};
+
+TEST_F(LightOfAView, IsKeptWhileCameraSizeAndMethodChange) {
+  EXPECT_TRUE(keeps([](protocol::View& v) { v.camera.eye = protocol::Vec3{1, -3, 1}; }));
+  EXPECT_TRUE(keeps([](protocol::View& v) { v.method.name = protocol::MethodName::kernel; }));
+  EXPECT_TRUE(keeps([](protocol::View& v) { v.vector.opacity = 0.1; }));
+  EXPECT_TRUE(keeps([](protocol::View& v) { v.light->ambient = 0.9; }));
+  EXPECT_TRUE(keeps([](protocol::View& v) { v.light->anisotropy = 0.5; }));
+  const auto levels = dataset->levels();
+  view.camera.eye = protocol::Vec3{2, -3, 1};
+  const std::uint64_t bytes = dataset->resident_bytes();
+  built();
+  EXPECT_EQ(dataset->levels(), levels);
+  EXPECT_EQ(dataset->resident_bytes(), bytes);
+}
+
+TEST_F(LightOfAView, FollowsTheSunTheStepTheMediaAndTheGeometry) {
+  EXPECT_FALSE(keeps([](protocol::View& v) { v.light->azimuth = 10; }));
+  EXPECT_FALSE(keeps([](protocol::View& v) { v.light->shadows = 1; }));
+  EXPECT_FALSE(keeps([](protocol::View& v) { v.step = 1; }));
+  EXPECT_FALSE(keeps([](protocol::View& v) { v.geometry.scale = {1, 1, 2}; }));
+  const auto scene = scene::complete(view, *dataset).value();
+  EXPECT_FALSE(keeps([&](protocol::View& v) {
+    v.scalars = scene.view().scalars;
+    for (auto& point : *v.scalars->front().extinction) point[1] *= 2;
+  }));
+}
+
+TEST_F(LightOfAView, CountsTowardsTheMemoryOfTheDataset) {
+  view.light.reset();
+  built();
+  const std::uint64_t before = dataset->resident_bytes();
+  view.light.emplace();
+  built();
+  EXPECT_EQ(dataset->resident_bytes(), before + 2U * 40 * 24 * 10);
+}
+
+TEST_F(LightOfAView, IsAbsentWithoutItAndInSlices) {
+  view.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 2};
+  EXPECT_FALSE(built().light.has_value());
+  view.geometry.slice.reset();
+  EXPECT_TRUE(built().light.has_value());
+  view.light.reset();
+  EXPECT_FALSE(built().light.has_value());
+}
+
+TEST_F(LightOfAView, BelowTheHorizonIsAmbientAndNeedsNoVolume) {
+  view.light->elevation = -1;
+  const auto scene = built();
+  EXPECT_EQ(scene.light->strength, 0);
+  EXPECT_EQ(scene.light->sunlight, nullptr);
+}
+
+// Noon at the equator on the day of an equinox.
+TEST_F(LightOfAView, StandsWhereTheSunIsAtATimeAndPlace) {
+  view.light->sun_at = protocol::SunAtView{"2024-03-20T12:07:00Z", 0, 0};
+  EXPECT_GT(built().light->sun.z, 0.999);
+  view.light->sun_at->longitude = 180;
+  EXPECT_EQ(built().light->strength, 0);
+  // A globe is lit from one direction: longitude 0 faces -y.
+  view.geometry.mapping = protocol::GeometryMapping::sphere;
+  const auto globe = built();
+  EXPECT_LT(globe.light->sun.y, -0.999);
+  EXPECT_GT(globe.light->strength, 0);
+  EXPECT_NE(globe.light->sunlight, nullptr);
+}
+
+}  // namespace
+}  // namespace windsplat::test
