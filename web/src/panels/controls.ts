@@ -240,6 +240,7 @@ export function controlStates(view: View) {
     fovY: view.camera?.projection !== "orthographic",
     errorLimit: hasErrorLimit(view),
     depthCue: lines && view.depthCue?.strength !== 0,
+    light: (view.light ?? null) !== null,
   };
 }
 

@@ -151,6 +151,17 @@ class MediaPanel {
       },
       units,
     );
+    const shading = this.controls.choice(
+      folder,
+      "sunlight",
+      {
+        pointer: "/scalars/shading",
+        get: () => this.viewOf(index).shading,
+        set: (shading) => this.update(index, { shading: shading as ScalarView["shading"] }),
+      },
+      { scatters: "scatter", "shades slopes": "gradient", "has no effect": "none" },
+    );
+    this.controls.showWhen((states) => states.light, shading);
   }
 
   private addCurve(parent: GUI, index: number): void {

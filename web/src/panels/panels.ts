@@ -14,6 +14,7 @@ import {
 import { errorMetric } from "../base/error_text";
 import { ForecastPlot } from "./forecast_plot";
 import { addAnnotations } from "./panel_annotations";
+import { addLight } from "./panel_light";
 import { addLines, type FlowSwitch } from "./panel_lines";
 import { addMedia } from "./panel_media";
 import { cameraNumbersTitle } from "./panel_camera";
@@ -48,6 +49,7 @@ export class Panels {
     "Camera and depth",
     cameraNumbersTitle,
     "Annotations",
+    "Light",
     "Method",
     "Quality",
   ]);
@@ -72,6 +74,7 @@ export class Panels {
     this.kit = kit;
     addLines(gui, kit, this.actions);
     addMedia(gui, kit);
+    addLight(gui, kit);
     addGeometry(gui, kit);
     addCamera(gui, kit, this.actions);
     addAnnotations(gui, kit);
