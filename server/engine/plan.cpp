@@ -355,6 +355,7 @@ Variant variant_of(const Scene& scene, const RenderPlan& plan) {
   variant.slabs = plan.slabs;
   variant.curved = plan.curved;
   variant.body = scene.body.has_value();
+  variant.surfaces = !scene.surfaces.empty();
   variant.passes = static_cast<int>(plan.passes.size());
   return variant;
 }
@@ -464,7 +465,7 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   }
   plan.slab_depth = 1;
   if (plan.slabs || plan.curved) plan_slabs(scene, plan);
-  if (scene.body) {
+  if (scene.body || !scene.surfaces.empty()) {
     for (PassPlan& pass : plan.passes) pass.kernel.by_depth = 1;
   }
   plan.tile_pixels = tile_pixels(scene.camera.width, scene.camera.height);

@@ -17,6 +17,7 @@ struct RenderSpace::Parts {
   RenderPlan plan;  // plan of the last frame; its scene may have been destroyed
   BinSpace bins;
   TileSpace tiles;
+  surface::Pixels surfaces;
 };
 
 RenderSpace::RenderSpace() : parts_(std::make_unique<Parts>()) {}
@@ -65,10 +66,16 @@ Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const Can
   WorkReport work;
   work.variant = plan.variant;
   work.variant.target = (*table)->name;
-  if ((!plan.passes.empty() || scene.body) && !cancel.cancelled()) {
+  const bool surfaces = !scene.surfaces.empty();
+  if (surfaces) {
+    parts.surfaces.list(scene.surfaces, surface_view(scene.camera), scene.camera.width,
+                        scene.camera.height, pool, cancel);
+  }
+  if ((!plan.passes.empty() || scene.body || surfaces) && !cancel.cancelled()) {
     const Bins& bins = make_bins(plan, **table, pool, cancel, parts.bins, work);
     if (!cancel.cancelled()) {
-      draw_tiles(plan, bins, **table, pool, cancel, parts.tiles, sink, work);
+      draw_tiles(plan, bins, surfaces ? &parts.surfaces : nullptr, **table, pool, cancel,
+                 parts.tiles, sink, work);
     }
   }
   if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "frame cancelled");

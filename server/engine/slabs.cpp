@@ -364,9 +364,14 @@ class SlabSweep {
     }
   }
 
-  // The open blocks of a row that the body enters before `depth`, as bits.
+  // The open blocks of a row that the body or a layer enters before `depth`, as bits.
   [[nodiscard]] std::uint32_t blocks_at_body(int row, float depth) const {
-    const kernels::TileBody& body = *tile_.body;
+    std::uint32_t found = blocks_at(*tile_.body, row, depth);
+    for (int n = 0; n < tile_.layers; ++n) found |= blocks_at(tile_.layer[n], row, depth);
+    return found;
+  }
+
+  [[nodiscard]] std::uint32_t blocks_at(const kernels::TileBody& body, int row, float depth) const {
     if (body.nearest >= depth) return 0;
     std::uint32_t found = 0;
     for (std::uint32_t left = body.seen[row] & tile_.open[row]; left != 0; left &= left - 1U) {

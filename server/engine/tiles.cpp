@@ -24,12 +24,12 @@ constexpr std::size_t row_floats = std::size_t{4} * kernels::tile_side;
 constexpr int rows_delivered = 8;  // number of rows per call of the sink; even
 
 // Reserves the storage of every worker, including those that draw no tile this time.
-void make_room(const RenderPlan& plan, std::vector<Workspace>& spaces) {
+void make_room(const RenderPlan& plan, bool surfaces, std::vector<Workspace>& spaces) {
   for (Workspace& space : spaces) {
     space.blocks.resize(blocks_of_tile * block_floats);
     space.rows.resize(row_floats * rows_delivered);
     if (plan.perspective_medium) space.rays.resize(blocks_of_tile * block_pixels);
-    if (plan.body.shape != kernels::body_none) space.body.resize(blocks_of_tile);
+    if (surfaces || plan.body.shape != kernels::body_none) space.body.resize(blocks_of_tile);
   }
 }
 
@@ -141,12 +141,11 @@ bool has_bricks(const Bins& bins, std::size_t tile) {
 }
 
 // Tiles with bricks, most expensive first, so that the frame does not end with one long tile; in a
-// scene with a body all tiles.
-void busy_tiles(const RenderPlan& plan, const Bins& bins, std::vector<std::uint32_t>& order) {
+// scene with a body or surfaces all tiles.
+void busy_tiles(bool all, const Bins& bins, std::vector<std::uint32_t>& order) {
   order.clear();
   for (std::size_t t = 0; t + 1 < bins.first.size(); ++t) {
-    if (plan.body.shape != kernels::body_none || has_bricks(bins, t))
-      order.push_back(static_cast<std::uint32_t>(t));
+    if (all || has_bricks(bins, t)) order.push_back(static_cast<std::uint32_t>(t));
   }
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return bins.load[a] != bins.load[b] ? bins.load[a] > bins.load[b] : a < b;
@@ -163,6 +162,9 @@ void level(std::vector<Workspace>& spaces) {
     for (Workspace& space : spaces) member(space.sweep).reserve(most);
   };
   each_vector(each);
+  std::size_t layers = 0;
+  for (const Workspace& space : spaces) layers = std::max(layers, space.surfaces.blocks.size());
+  for (Workspace& space : spaces) space.surfaces.blocks.resize(layers);
   std::size_t slots = 0;
   bool prepared = false;
   for (const Workspace& space : spaces) {
@@ -213,14 +215,15 @@ bool all_closed(const Tile& tile, const Brick& brick) {
   return true;
 }
 
-void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
-                WorkReport& work) {
-  busy_tiles(plan, bins, space.order);
+void draw_tiles(const RenderPlan& plan, const Bins& bins, const surface::Pixels* surfaces,
+                const kernels::Table& table, ThreadPool& pool, const CancelToken& cancel,
+                TileSpace& space, TileSink sink, WorkReport& work) {
+  const bool has_body = plan.body.shape != kernels::body_none;
+  busy_tiles(has_body || surfaces != nullptr, bins, space.order);
   const std::vector<std::uint32_t>& order = space.order;
   if (space.workers.size() < pool.size()) space.workers.resize(pool.size());
   std::vector<Workspace>& spaces = space.workers;
-  make_room(plan, spaces);
+  make_room(plan, surfaces != nullptr, spaces);
   std::vector<TileWork>& done = space.done;
   done.assign(order.size(), TileWork());
   pool.run(order.size(), [&](std::size_t i, unsigned worker) {
@@ -229,9 +232,12 @@ void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& 
     Tile tile{};
     kernels::TileBody body{};
     open_tile(plan, bins, table, order[i], spaces[worker], tile);
-    if (plan.body.shape != kernels::body_none) {
+    if (has_body || surfaces != nullptr) {
       body.blocks = spaces[worker].body.data();
-      if (table.open_body(plan.camera, plan.body, tile, body)) tile.body = &body;
+      if (has_body && table.open_body(plan.camera, plan.body, tile, body)) tile.body = &body;
+      if (surfaces != nullptr) {
+        add_surfaces(*surfaces, plan.camera, spaces[worker].surfaces, body, tile);
+      }
       if (tile.body == nullptr && !has_bricks(bins, order[i])) return;
     }
     done[i].drawn = true;

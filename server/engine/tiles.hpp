@@ -7,6 +7,7 @@
 #include "server/base/thread_pool.hpp"
 #include "server/engine/bins.hpp"
 #include "server/engine/render.hpp"
+#include "server/engine/surfaces.hpp"
 #include "server/engine/sweep.hpp"
 
 namespace windsplat::engine {
@@ -17,6 +18,7 @@ struct Workspace {
   AlignedVector<float> rays;
   AlignedVector<float> rows;  // rows of a finished tile
   AlignedVector<kernels::BodyBlock> body;
+  SurfaceSpace surfaces;
   SweepSpace sweep;
 };
 
@@ -35,10 +37,11 @@ struct TileSpace {
   std::vector<TileWork> done;
 };
 
-// Delivers every pixel of a tile with bricks or the body to `sink` once and adds the counts to
-// `work`. After cancellation the delivered pixels are invalid.
-void draw_tiles(const RenderPlan& plan, const Bins& bins, const kernels::Table& table,
-                ThreadPool& pool, const CancelToken& cancel, TileSpace& space, TileSink sink,
-                WorkReport& work);
+// Delivers every pixel of a tile with bricks, the body or a surface to `sink` once and adds the
+// counts to `work`. After cancellation the delivered pixels are invalid. surfaces: null, or those
+// of the scene.
+void draw_tiles(const RenderPlan& plan, const Bins& bins, const surface::Pixels* surfaces,
+                const kernels::Table& table, ThreadPool& pool, const CancelToken& cancel,
+                TileSpace& space, TileSink sink, WorkReport& work);
 
 }  // namespace windsplat::engine

@@ -9,13 +9,14 @@ std::string chosen(const Variant& variant) {
   std::string text;
   if (variant.vector) text = "vector";
   if (variant.scalar) text += variant.vector ? "+scalar" : "scalar";
-  if (text.empty()) return variant.body ? "body" : "empty";
+  if (text.empty()) return variant.surfaces ? "surfaces" : variant.body ? "body" : "empty";
   text += variant.perspective ? " perspective" : " orthographic";
   if (variant.heads) text += " heads";
   if (variant.moving) text += " moving";
   if (variant.slabs) text += " slabs";
   if (variant.curved) text += " curved";
   if (variant.body) text += " body";
+  if (variant.surfaces) text += " surfaces";
   if (variant.passes > 1) {
     text += " passes=";
     text += std::to_string(variant.passes);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "server/data/model/volume.hpp"
+#include "server/surface/shown.hpp"
 #include "server/terrain/terrain.hpp"
 
 namespace windsplat::scene {
@@ -200,6 +201,7 @@ struct Scene {
   DepthCue depth_cue;
   std::optional<Slice> slice;
   std::optional<Body> body;
+  std::vector<surface::Shown> surfaces;  // isosurfaces and sections
   Method method = Method::kernel;
   Compositing compositing = Compositing::analytic;
   double slab_thickness = 1;  // thickness in cells along the line of sight

@@ -142,8 +142,8 @@ void draw(benchmark::State& state, const Table& table, const Workload& workload)
   time_items(state, [&] {
     image.rgba.assign(4 * static_cast<std::size_t>(image.width) * image.height, 0.0F);
     work = ready.work;
-    engine::draw_tiles(ready.plan, *ready.bins, table, ready.pool, CancelToken(), ready.tile_space,
-                       engine::sink_into(image), work);
+    engine::draw_tiles(ready.plan, *ready.bins, nullptr, table, ready.pool, CancelToken(),
+                       ready.tile_space, engine::sink_into(image), work);
     benchmark::DoNotOptimize(image.rgba.data());
     return work.samples;
   });

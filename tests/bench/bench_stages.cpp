@@ -94,7 +94,7 @@ void staged_frame(const protocol::View& asked, const Workload& workload, ThreadP
   const auto to_planes = [&kept](const engine::TilePixels& tile) {
     kept.planes.put({tile.x, tile.y, tile.width, tile.height, tile.rgba, tile.stride});
   };
-  engine::draw_tiles(plan, bins, table, pool, cancel, kept.tiles, to_planes, work);
+  engine::draw_tiles(plan, bins, nullptr, table, pool, cancel, kept.tiles, to_planes, work);
   lap();
   image::Bytes jpeg;
   if (auto done = kept.jpeg.encode(kept.planes, jpeg_quality, pool, jpeg); !done) {

@@ -168,12 +168,15 @@ engine::Rendered render_with(const engine::kernels::Table& table, const scene::S
   engine::make_plan(scene, plan);
   engine::BinSpace bin_space;
   engine::TileSpace tile_space;
+  surface::Pixels surfaces;
+  surfaces.list(scene.surfaces, engine::surface_view(scene.camera), scene.camera.width,
+                scene.camera.height, pool, cancel);
   const engine::Bins& bins = engine::make_bins(plan, table, pool, cancel, bin_space, out.work);
   out.image.width = scene.camera.width;
   out.image.height = scene.camera.height;
   out.image.rgba.assign(4 * static_cast<std::size_t>(scene.camera.width) * scene.camera.height, 0);
-  engine::draw_tiles(plan, bins, table, pool, cancel, tile_space, engine::sink_into(out.image),
-                     out.work);
+  engine::draw_tiles(plan, bins, scene.surfaces.empty() ? nullptr : &surfaces, table, pool, cancel,
+                     tile_space, engine::sink_into(out.image), out.work);
   return out;
 }
 

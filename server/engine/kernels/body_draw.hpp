@@ -263,19 +263,20 @@ inline KernelDepths depths_of(const Prepared& p, int l) {
   return depths;
 }
 
-// Whether the body hides a part of a kernel.
+// Whether a surface divides or hides a kernel.
 inline bool meets_body(const Prepared& p, const KernelDepths& depths, int l, const Tile& tile) {
-  if (depths.last <= tile.body->nearest) return false;
+  const bool layered = tile.layers > 0 && depths.last > tile.layer[0].nearest;
+  if (depths.last <= tile.body->nearest && !layered) return false;
   bool meets = false;
   each_window(p.footing, l, has(p.positions.lines, l), has(p.positions.splats, l),
               [&](int row, int column, std::uint64_t lines, std::uint64_t splats) {
-                const BodyWindow found = at_body(*tile.body, depths, {row, column, lines | splats});
+                const BodyWindow found = at_body(tile, depths, {row, column, lines | splats});
                 meets = meets || (found.hidden | found.divided) != 0;
               });
   return meets;
 }
 
-// Draws a kernel of which the body hides a part.
+// Draws a kernel that a surface divides or hides.
 template <bool Perspective>
 void draw_at_body(const Prepared& p, const Compositor& with, const KernelDepths& depths, int l,
                   Tile& tile) {
@@ -294,7 +295,7 @@ void draw_at_body(const Prepared& p, const Compositor& with, const KernelDepths&
               [&](int row, int column, std::uint64_t lines, std::uint64_t splats) {
                 std::uint64_t open = lines | splats;
                 if (tile.any_closed != 0) open &= open_window(tile, row, column);
-                const BodyWindow found = at_body(*tile.body, depths, {row, column, open});
+                const BodyWindow found = at_body(tile, depths, {row, column, open});
                 const std::uint64_t before = open & ~(found.hidden | found.divided);
                 kernel.draw(row, column, lines & before, splats & before);
                 draw_divided<Perspective>(divided, p.pass->compositing, row, column,

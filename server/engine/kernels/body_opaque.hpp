@@ -173,8 +173,7 @@ bool open_body(const Camera& camera, const Body& body, const Tile& tile, TileBod
   return to.nearest < body_nowhere;
 }
 
-void close_body(Tile& tile) {
-  const TileBody& body = *tile.body;
+void close_surface(const TileBody& body, Tile& tile) {
   for (int row = 0; row < tile_blocks; ++row) {
     for (std::uint32_t left = body.seen[row]; left != 0; left &= left - 1U) {
       const int column = __builtin_ctz(left);
@@ -194,33 +193,64 @@ void close_body(Tile& tile) {
   }
 }
 
+void close_body(Tile& tile) {
+  for (int n = 0; n < tile.layers; ++n) close_surface(tile.layer[n], tile);
+  close_surface(*tile.body, tile);
+}
+
+inline bool sees(const TileBody& body, int row, int column) {
+  return (body.seen[row] >> static_cast<unsigned>(column) & 1U) != 0;
+}
+
+// Layers and body of a block, nearest first.
+struct Surfaces {
+  BodyBlock* of[layers_max + 1];
+  int count;
+};
+
+inline Surfaces surfaces_at(const Tile& tile, int row, int column) {
+  Surfaces found;
+  found.count = 0;
+  const int at = row * tile_blocks + column;
+  for (int n = 0; n < tile.layers; ++n) {
+    if (sees(tile.layer[n], row, column)) found.of[found.count++] = &tile.layer[n].blocks[at];
+  }
+  if (sees(*tile.body, row, column)) found.of[found.count++] = &tile.body->blocks[at];
+  return found;
+}
+
 // Depths from the camera's depth origin between which a kernel lies.
 struct KernelDepths {
   float first, last;
 };
 
-// The blocks of a window in which the body hides all of a kernel, and those in which it may hide a
-// part.
+// The blocks of a window in which the body hides all of a kernel, and those in which a surface may
+// divide it.
 struct BodyWindow {
   std::uint64_t hidden, divided;
 };
 
-inline BodyWindow at_body(const TileBody& body, const KernelDepths& depths, const Window& window) {
+inline BodyWindow at_body(const Tile& tile, const KernelDepths& depths, const Window& window) {
+  const TileBody& body = *tile.body;
   BodyWindow found = {0, 0};
   for (std::uint64_t blocks = window.blocks; blocks != 0; blocks &= blocks - 1U) {
     const int at = __builtin_ctzll(blocks);
     const int row = window.row + at / window_side;
     const int column = window.column + at % window_side;
-    const BodyBlock& block = body.blocks[row * tile_blocks + column];
-    const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(column);
-    if ((body.seen[row] & bit) == 0 || depths.last <= block.nearest) continue;
-    const bool all = (body.opaque[row] & bit) != 0 && depths.first >= block.farthest;
+    const int index = row * tile_blocks + column;
+    const BodyBlock& block = body.blocks[index];
+    const bool behind = sees(body, row, column) && depths.last > block.nearest;
+    const bool layered = tile.layers > 0 && sees(tile.layer[0], row, column) &&
+                         depths.last > tile.layer[0].blocks[index].nearest;
+    if (!behind && !layered) continue;
+    const bool opaque = (body.opaque[row] >> static_cast<unsigned>(column) & 1U) != 0;
+    const bool all = behind && !layered && opaque && depths.first >= block.farthest;
     (all ? found.hidden : found.divided) |= std::uint64_t{1} << static_cast<unsigned>(at);
   }
   return found;
 }
 
-// A kernel that the body may divide.
+// A kernel that surfaces may divide.
 struct DividedKernel {
   const Ribbon* line;  // or null
   const Splat* splat;  // or null
@@ -279,68 +309,79 @@ KERNEL_INLINE DividedSplat divided_splat(const DividedKernel& kernel, const Divi
   return divided_from<Perspective, From::eye>(*kernel.splat, at, px, py, length);
 }
 
-// Composites the part of a kernel before the body, and separately, where pixels at the limb let
-// light through, the part behind it. The body divides a splat as a line does: as if it were
+// Composites the part of a kernel before the first surface, and separately, where pixels let light
+// through, the parts behind each one. A surface divides a splat as a line does: as if it were
 // homogeneous over one cell or, if it may reach the near plane, exactly.
 template <bool Perspective, int Compositing>
 Light divided_block(const DividedKernel& kernel, float x, float y, const float* ray,
-                    BodyBlock& body, float* block) {
-  const Channels to = channels_of(block);
+                    const Surfaces& surfaces, float* block) {
   const Pixel zero = hn::Zero(PixelTag());
   const Pixel one = all<Pixel>(1.0F);
+  const Pixel least = all<Pixel>(1e-6F);
   Light light;
   for (int l = 0; l < block_pixels; l += pixel_lanes) {
     const Pixel px = all<Pixel>(x) + load<Pixel>(lane_x + l);
     const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
-    const Pixel surface = load<Pixel>(body.depth + l) - all<Pixel>(kernel.centre);
     DividedLine line = {zero, zero, {zero, zero, zero}};
     if (kernel.line != nullptr) {
       line = divided_line<Perspective>(*kernel.line, kernel.moving, px, py);
     }
+    const Pixel length = kernel.splat != nullptr && Perspective ? load<Pixel>(ray + l) : one;
     DividedSplat splat = {zero, one, zero};
     Pixel color[3] = {zero, zero, zero};
-    if (kernel.splat != nullptr) {
-      const Pixel length = Perspective ? load<Pixel>(ray + l) : one;
-      splat = divided_splat<Perspective>(kernel, {surface, line.depth}, px, py, length);
-      for (int c = 0; c < 3; ++c) color[c] = all<Pixel>(kernel.splat->color[c]);
+    for (int c = 0; c < 3 && kernel.splat != nullptr; ++c) {
+      color[c] = all<Pixel>(kernel.splat->color[c]);
     }
-    const auto before = hn::Lt(line.depth, surface);
-    if (Compositing == compositing_or) {
-      light.see(add_or(hn::IfThenElseZero(before, line.opacity), line.color, one, to, l));
-      const Channels beyond = {body.behind, {body.light[0], body.light[1], body.light[2]}};
-      add_or(hn::IfThenZeroElse(before, line.opacity), line.color,
-             one - load<Pixel>(body.opacity + l), beyond, l);
-      continue;
-    }
-    const Pixel least = all<Pixel>(1e-6F);
-    const auto add = [&](Pixel part, Pixel opacity, Pixel place, Pixel t, const Channels& into) {
+    Pixel begin = all<Pixel>(-__builtin_inff());  // depth of the last surface
+    Pixel before = zero;                          // the fraction of the splat before it
+    for (int n = 0; n <= surfaces.count; ++n) {
+      const bool last = n == surfaces.count;
+      const Pixel end = last ? all<Pixel>(__builtin_inff())
+                             : load<Pixel>(surfaces.of[n]->depth + l) - all<Pixel>(kernel.centre);
+      if (kernel.splat != nullptr && !last) {
+        splat = divided_splat<Perspective>(kernel, {end, line.depth}, px, py, length);
+      }
+      const Pixel until = last ? one : splat.x_body;
+      const auto within = hn::And(hn::Ge(line.depth, begin), hn::Lt(line.depth, end));
+      const Pixel opacity = hn::IfThenElseZero(within, line.opacity);
+      BodyBlock* const nearer = n > 0 ? surfaces.of[n - 1] : nullptr;
+      const Channels into =
+          nearer == nullptr
+              ? channels_of(block)
+              : Channels{nearer->behind, {nearer->light[0], nearer->light[1], nearer->light[2]}};
+      const Pixel part = until - before;
+      const Pixel place = splat.x_line - before;
+      begin = end;
+      before = until;
+      if (Compositing == compositing_or) {
+        const Pixel base = nearer == nullptr ? one : one - load<Pixel>(nearer->opacity + l);
+        const auto left = add_or(opacity, line.color, base, into, l);
+        if (nearer == nullptr) light.see(left);
+        continue;
+      }
+      const Pixel t = load<Pixel>(into.transmittance + l);
+      if (nearer != nullptr && hn::AllTrue(PixelTag(), hn::Eq(t, zero))) break;
       const Pixel here = splat.tau * part;
+      Pixel left = t;
       if (kernel.line == nullptr) {
         const Attenuation<Pixel> medium = attenuation_by<Compositing>(here);
         for (int c = 0; c < 3; ++c) add_product(into.rgb[c] + l, t * medium.absorbed, color[c]);
-        return bounded_light<Compositing>(t * medium.transmitted);
+        left = bounded_light<Compositing>(t * medium.transmitted);
+      } else {
+        const Pixel x_here = clamped(place / hn::Max(part, least), 0.0F, 1.0F);
+        const CellLight cell = {here,  opacity,   x_here, attenuation_by<Compositing>(here),
+                                color, line.color};
+        left = bounded_light<Compositing>(t * add_cell<Compositing>(cell, t, into, l));
       }
-      const Pixel x_here = clamped(place / hn::Max(part, least), 0.0F, 1.0F);
-      const CellLight cell = {here,  opacity,   x_here, attenuation_by<Compositing>(here),
-                              color, line.color};
-      return bounded_light<Compositing>(t * add_cell<Compositing>(cell, t, into, l));
-    };
-    const Pixel left = add(splat.x_body, hn::IfThenElseZero(before, line.opacity), splat.x_line,
-                           load<Pixel>(to.transmittance + l), to);
-    store(left, to.transmittance + l);
-    see_light<Compositing>(left, light);
-    const Pixel behind = load<Pixel>(body.behind + l);
-    if (hn::AllTrue(PixelTag(), hn::Eq(behind, zero))) continue;
-    const Channels farther = {body.behind, {body.light[0], body.light[1], body.light[2]}};
-    store(add(one - splat.x_body, hn::IfThenZeroElse(before, line.opacity),
-              splat.x_line - splat.x_body, behind, farther),
-          body.behind + l);
+      store(left, into.transmittance + l);
+      if (nearer == nullptr) see_light<Compositing>(left, light);
+    }
   }
   return light;
 }
 
 using DividedFunction = Light (*)(const DividedKernel& kernel, float x, float y, const float* ray,
-                                  BodyBlock& body, float* block);
+                                  const Surfaces& surfaces, float* block);
 
 template <bool Perspective>
 inline DividedFunction divided_function(int compositing) {
@@ -373,8 +414,8 @@ void draw_divided(const DividedKernel& kernel, int compositing, int row, int col
     if ((lines >> static_cast<unsigned>(at) & 1U) == 0) here.line = nullptr;
     if ((splats >> static_cast<unsigned>(at) & 1U) == 0) here.splat = nullptr;
     const float* ray = here.splat != nullptr && Perspective ? rays_at(tile, r, c) : nullptr;
-    const Light light = draw(here, left_of(tile, c), top_of(tile, r), ray,
-                             tile.body->blocks[r * tile_blocks + c], block_at(tile, r, c));
+    const Light light = draw(here, left_of(tile, c), top_of(tile, r), ray, surfaces_at(tile, r, c),
+                             block_at(tile, r, c));
     note_light(light, r, std::uint32_t{1} << static_cast<unsigned>(c), tile);
   }
   tile.counters.pixel_updates += std::int64_t{__builtin_popcountll(lines | splats)} * block_pixels;

@@ -130,6 +130,8 @@ struct Closing {
   float stop;
   const float* transmittance;  // transmittance in front of the slab
   BodyBlock* body;             // null: no pixel meets the body in the slab
+  int layers;                  // number of those that pixels meet in the slab
+  BodyBlock* layer[layers_max];
 };
 
 // Stable rank sort of a few lines by depth: the number of predecessors is the index.
@@ -211,6 +213,11 @@ Outcome pass_sorted(const Closing& with, Between part, Passage* passage) {
   int held = 0;
   bool body = with.body != nullptr;
   if (body) open_share(with.slab, *with.body, share);
+  for (int n = 0; n < with.layers; ++n) {
+    take_body(with.slab, *with.layer[n], hits[held]);
+    if (body) scale_hit(share, hits[held]);
+    ++held;
+  }
   for (int h = 0; h < with.count || body;) {
     if (body && (h == with.count || with.met[h].depth >= with.body->nearest)) {
       take_body(with.slab, *with.body, hits[held]);
@@ -243,7 +250,7 @@ Outcome pass_sorted(const Closing& with, Between part, Passage* passage) {
 template <bool Perspective, int Compositing>
 Outcome pass_parts(const Closing& with, Passage* passage) {
   constexpr int lines_of_part = block_hits_max / 2;
-  const bool many = with.count > block_hits_max && with.body == nullptr;
+  const bool many = with.count > block_hits_max && with.body == nullptr && with.layers == 0;
   const int parts = many ? (with.count + lines_of_part - 1) / lines_of_part : 1;
   const float length = (with.slab.back - with.slab.front) / static_cast<float>(parts);
   Between part = {with.slab.front, with.slab.front};
@@ -268,7 +275,7 @@ void close_block(const Closing& with, const float* gathered, int row, int column
   open();
   Outcome outcome = Outcome::out_of_order;
   constexpr int in_order_max = 8;  // more lines are seldom in one order in every pixel
-  if (with.body == nullptr && with.count <= in_order_max) {
+  if (with.body == nullptr && with.layers == 0 && with.count <= in_order_max) {
     outcome = pass_in_order<Perspective, Compositing>(with, passage);
   }
   if (outcome == Outcome::out_of_order) {
@@ -324,11 +331,20 @@ void close_slab(const Camera& camera, int compositing, const Slab& slab, const R
                   top_of(tile, row),
                   tile.stop,
                   block_at(tile, row, column),
-                  nullptr};
+                  nullptr,
+                  0,
+                  {}};
   const std::uint32_t bit = std::uint32_t{1} << static_cast<unsigned>(column);
   if (tile.body != nullptr && (tile.body->seen[row] & bit) != 0) {
     BodyBlock& body = tile.body->blocks[index];
     if (body.nearest < slab.back) with.body = &body;
+  }
+  TileBody* layer_of[layers_max];
+  for (int n = 0; n < tile.layers; ++n) {
+    TileBody& layer = tile.layer[n];
+    if (!sees(layer, row, column) || layer.blocks[index].nearest >= slab.back) continue;
+    layer_of[with.layers] = &layer;
+    with.layer[with.layers++] = &layer.blocks[index];
   }
   if (camera.perspective != 0) {
     close_slab_on<true>(compositing, with, gathered, row, column, tile);
@@ -336,6 +352,9 @@ void close_slab(const Camera& camera, int compositing, const Slab& slab, const R
     close_slab_on<false>(compositing, with, gathered, row, column, tile);
   }
   if (with.body != nullptr && !awaits_body(*with.body)) tile.body->seen[row] &= ~bit;
+  for (int n = 0; n < with.layers; ++n) {
+    if (!awaits_body(*with.layer[n])) layer_of[n]->seen[row] &= ~bit;
+  }
   const int own = medium && compositing != compositing_cd_euler ? 1 : 0;
   const int each = medium && compositing == compositing_analytic ? count : 0;
   tile.counters.pixel_updates += std::int64_t{1 + count} * block_pixels;

@@ -204,8 +204,10 @@ struct Counters {
   std::int64_t occluded;
 };
 
-// The body at the pixels of a block. Where a pixel does not see it: opacity 0, behind 1, depth
-// body_nowhere.
+constexpr int layers_max = 16;  // translucent surfaces of a pixel
+
+// The body, or one of the translucent surfaces before it, at the pixels of a block. Where a pixel
+// does not see it: opacity 0, behind 1, depth body_nowhere.
 struct BodyBlock {
   alignas(64) float depth[block_pixels];    // from the camera's depth origin, world units
   alignas(64) float opacity[block_pixels];  // part of the pixel that it covers
@@ -244,7 +246,11 @@ struct Tile {
   float stop;                       // a block is closed when no transmittance exceeds this
   std::uint32_t open[tile_blocks];  // bit set: the block is open
   int any_closed;
-  TileBody* body;  // null: no pixel of the tile sees the body
+  TileBody* body;  // null: no pixel of the tile sees the body or a layer
+  // Translucent surfaces, in every pixel nearest first and before the body. They divide kernels as
+  // the body does.
+  TileBody* layer;
+  int layers;
   Counters counters;
 };
 

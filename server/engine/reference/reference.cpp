@@ -15,6 +15,7 @@
 #include "server/engine/reference/profile.hpp"
 #include "server/engine/reference/ray.hpp"
 #include "server/engine/reference/screen_grid.hpp"
+#include "server/engine/surfaces.hpp"
 
 namespace windsplat::engine::reference {
 
@@ -149,6 +150,7 @@ struct Frame {
   const ScreenGrid& ribbons;
   const Rules& rules;
   double tolerance = 0;
+  const surface::Pixels* surfaces = nullptr;  // null: none
 };
 
 class Painter {
@@ -158,11 +160,11 @@ class Painter {
   // Storage for a pixel that `splats` and `ribbons` may cover; sorting surfaces needs a second
   // copy.
   static std::uint64_t bytes_for(std::uint64_t splats, std::uint64_t ribbons) {
-    return SplatMedium::bytes_for(splats) + 2 * (ribbons + 3) * sizeof(Surface);
+    return SplatMedium::bytes_for(splats) + 2 * (ribbons + others) * sizeof(Surface);
   }
   void make_room(std::size_t splats, std::size_t ribbons) {
     medium_.make_room(splats);
-    surfaces_.reserve(ribbons + 3);
+    surfaces_.reserve(ribbons + others);
   }
 
   Light pixel(int x, int y, RayCount& count) {
@@ -178,6 +180,8 @@ class Painter {
 
  private:
   static constexpr double lowest = std::numeric_limits<double>::lowest();
+  // The body and fragments of surfaces, and the lines combined by `or` around them.
+  static constexpr std::size_t others = 2 * (surface::fragments_max + 1) + 1;
 
   [[nodiscard]] Ray make_ray(double px, double py) const {
     const View& view = frame_.view;
@@ -191,27 +195,64 @@ class Painter {
     return ray;
   }
 
-  // The lines that are combined by `or`, before the body and behind it, as one surface each: before
-  // the medium, and next to the body.
+  static void sort(std::vector<Surface>& surfaces) {
+    // Stable: equal depths stay in order of id.
+    std::stable_sort(surfaces.begin(), surfaces.end(),
+                     [](const Surface& a, const Surface& b) { return a.depth < b.depth; });
+  }
+
+  // The body and the fragments of surfaces.
+  void gather_solid(int x, int y, double px, double py) {
+    if (frame_.body) {
+      const Surface body = body_surface(*frame_.body, frame_.view, px, py);
+      if (body.opacity > 0) surfaces_.push_back(body);
+    }
+    if (frame_.surfaces == nullptr) return;
+    constexpr int side = surface::cell_side;
+    const int column = x / side;
+    const int row = y / side;
+    if (column != column_ || row != row_) frame_.surfaces->look(column, row, cell_);
+    column_ = column;
+    row_ = row;
+    const auto pixel =
+        static_cast<std::size_t>(y % side) * side + static_cast<std::size_t>(x % side);
+    for (std::uint32_t n = cell_.first.at(pixel); n < cell_.first.at(pixel + 1); ++n) {
+      const surface::Fragment& from = cell_.fragments[n];
+      surfaces_.push_back({from.depth,
+                           static_cast<double>(from.opacity),
+                           {static_cast<double>(from.rgb[0]), static_cast<double>(from.rgb[1]),
+                            static_cast<double>(from.rgb[2])}});
+    }
+  }
+
+  // The lines that are combined by `or`, between one of the other surfaces and the next, as one
+  // surface each: before the medium, and next to that surface.
   void gather_or_surfaces(int x, int y, double px, double py) {
-    Surface body;
-    if (frame_.body) body = body_surface(*frame_.body, frame_.view, px, py);
-    Surface before{lowest};
-    Surface behind{body.depth};
+    gather_solid(x, y, px, py);
+    sort(surfaces_);
+    const std::size_t solid = surfaces_.size();
+    for (std::size_t n = 0; n <= solid; ++n) {
+      surfaces_.push_back({n == 0 ? lowest : surfaces_[n - 1].depth});
+    }
+    Surface* const lines = surfaces_.data() + solid;
     for (const std::uint32_t id : frame_.ribbons.at(x, y)) {
       const auto hit = hit_ribbon(frame_.kernels.ribbons[id], px, py);
-      Surface& all = body.opacity > 0 && hit.depth >= body.depth ? behind : before;
+      std::size_t before = 0;
+      while (before < solid && surfaces_[before].depth <= hit.depth) ++before;
+      Surface& all = lines[before];
       all.opacity = std::max(all.opacity, hit.opacity);
       for (int c = 0; c < 3; ++c) {
         all.color[c] = std::max(all.color[c], hit.opacity * hit.color[c]);  // premultiplied
       }
     }
-    for (Surface* all : {&before, &behind}) {
-      for (double& color : all->color) color /= std::max(all->opacity, 1e-300);
+    for (std::size_t n = 0; n <= solid; ++n) {
+      for (double& color : lines[n].color) color /= std::max(lines[n].opacity, 1e-300);
     }
-    for (const Surface& surface : {before, body, behind}) {
-      if (surface.opacity > 0) surfaces_.push_back(surface);
-    }
+    // Those next to a surface come after it.
+    sort(surfaces_);
+    surfaces_.erase(std::remove_if(surfaces_.begin(), surfaces_.end(),
+                                   [](const Surface& s) { return !(s.opacity > 0); }),
+                    surfaces_.end());
   }
 
   void gather_surfaces(int x, int y, double px, double py) {
@@ -221,18 +262,15 @@ class Painter {
       const auto hit = hit_ribbon(frame_.kernels.ribbons[id], px, py);
       if (hit.opacity > 0) surfaces_.push_back({hit.depth, hit.opacity, hit.color});
     }
-    if (frame_.body) {
-      const Surface body = body_surface(*frame_.body, frame_.view, px, py);
-      if (body.opacity > 0) surfaces_.push_back(body);
-    }
-    // Stable: equal depths stay in order of id.
-    std::stable_sort(surfaces_.begin(), surfaces_.end(),
-                     [](const Surface& a, const Surface& b) { return a.depth < b.depth; });
+    gather_solid(x, y, px, py);
+    sort(surfaces_);
   }
 
   const Frame& frame_;
   SplatMedium medium_;
   std::vector<Surface> surfaces_;
+  surface::Cell cell_;  // of the last pixel
+  int column_ = -1, row_ = -1;
 };
 
 Error cancelled_error() { return make_error(ErrorKind::cancelled, "reference cancelled"); }
@@ -253,6 +291,24 @@ struct Painting::State {
     auto held = reserve(bytes);
     if (!held) return held.error();
     reserved.push_back(std::move(*held));
+    return {};
+  }
+
+  Result<void> list_surfaces(const scene::Scene& scene, const CancelToken& cancel,
+                             const Reserve& reserve) {
+    if (scene.surfaces.empty()) return {};
+    std::uint64_t bytes = 0;
+    for (const surface::Shown& shown : scene.surfaces) {
+      bytes += surface::Pixels::bytes_for(*shown.mesh);
+    }
+    if (reserve) {
+      if (auto held = reserve_bytes(bytes, reserve); !held) return held;
+    }
+    ThreadPool alone(1);
+    surfaces.list(scene.surfaces, surface_view(scene.camera), scene.camera.width,
+                  scene.camera.height, alone, cancel);
+    frame.surfaces = &surfaces;
+    if (cancel.cancelled()) return cancelled_error();
     return {};
   }
 
@@ -295,6 +351,7 @@ struct Painting::State {
   ScreenGrid splats, ribbons;
   Rules rules;
   Profile profile;
+  surface::Pixels surfaces;
   Frame frame;
   std::vector<Painter> painters;
   std::vector<RayCount> counts;  // per worker
@@ -314,6 +371,7 @@ Result<std::unique_ptr<Painting>> Painting::begin(const scene::Scene& scene, uns
   list_kernels(scene, state->view, cancel, state->kernels);
   if (cancel.cancelled()) return cancelled_error();
   if (auto listed = state->list_by_tile(workers, cancel, reserve); !listed) return listed.error();
+  if (auto listed = state->list_surfaces(scene, cancel, reserve); !listed) return listed.error();
   state->counts.resize(workers);
   state->painters.reserve(workers);
   for (unsigned worker = 0; worker < workers; ++worker) {
