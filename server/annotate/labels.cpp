@@ -150,28 +150,102 @@ std::vector<Tick> uneven_ticks(double low, double high, double gap,
   return ticks;
 }
 
+namespace {
+
+// A unit that is written out, in lower case -> its symbol.
+struct UnitName {
+  std::string_view name;
+  const char* symbol;
+};
+constexpr std::array unit_names{UnitName{"meter", "m"},
+                                UnitName{"metre", "m"},
+                                UnitName{"kilometer", "km"},
+                                UnitName{"kilometre", "km"},
+                                UnitName{"second", "s"},
+                                UnitName{"sec", "s"},
+                                UnitName{"minute", "min"},
+                                UnitName{"hour", "h"},
+                                UnitName{"kelvin", "K"},
+                                UnitName{"degk", "K"},
+                                UnitName{"deg_k", "K"},
+                                UnitName{"degree_kelvin", "K"},
+                                UnitName{"degc", "\u00b0C"},
+                                UnitName{"deg_c", "\u00b0C"},
+                                UnitName{"celsius", "\u00b0C"},
+                                UnitName{"degree_c", "\u00b0C"},
+                                UnitName{"degree_celsius", "\u00b0C"},
+                                UnitName{"degree", "\u00b0"},
+                                UnitName{"pascal", "Pa"},
+                                UnitName{"hectopascal", "hPa"},
+                                UnitName{"millibar", "mbar"},
+                                UnitName{"kilogram", "kg"},
+                                UnitName{"gram", "g"},
+                                UnitName{"joule", "J"},
+                                UnitName{"watt", "W"},
+                                UnitName{"newton", "N"},
+                                UnitName{"volt", "V"},
+                                UnitName{"percent", "%"}};
+
+// The symbol of a unit that is written out, also in the plural; others are unchanged.
+std::string symbol_of(std::string_view word) {
+  std::string name;
+  for (const char c : word) {
+    name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  const auto found = [&name](const UnitName& one) {
+    std::string plural(one.name);
+    const std::size_t first = plural.find("degree_") == 0 ? std::size_t{6} : plural.size();
+    plural.insert(first, "s");
+    return name == one.name || name == plural;
+  };
+  const auto* const known = std::find_if(unit_names.begin(), unit_names.end(), found);
+  return known == unit_names.end() ? std::string(word) : known->symbol;
+}
+
+// The length of the power that follows a unit, as in "-1", "2", "**-1", "^2", and its digits.
+struct Power {
+  std::size_t length = 0;
+  std::string_view digits;
+};
+
+Power power_at(std::string_view text) {
+  const std::size_t sign = text.starts_with("**") ? 2 : text.starts_with('^') ? 1 : 0;
+  std::size_t end = sign;
+  if (end < text.size() && text[end] == '-') ++end;
+  const std::size_t digits = end;
+  while (end < text.size() && is_digit(text[end])) ++end;
+  const bool ends =
+      end == text.size() || std::string_view(" ./*").find(text[end]) != std::string_view::npos;
+  if (end == digits || !ends) return {};
+  return {end, text.substr(sign, end - sign)};
+}
+
+}  // namespace
+
 std::string unit_text(std::string_view units) {
   if (units == "1" || units == "(0 - 1)") return {};  // the latter of ECMWF
   std::string out;
+  bool per = false;
   for (std::size_t i = 0; i < units.size();) {
-    const char c = units[i];
-    out += c;
-    ++i;
-    if (!is_letter(c)) continue;
-    std::size_t at = i;
-    if (units.substr(at, 2) == "**") {
-      at += 2;
-    } else if (units.substr(at, 1) == "^") {
-      at += 1;
+    std::size_t end = i;
+    while (end < units.size() && (is_letter(units[end]) || units[end] == '_')) ++end;
+    if (end == i) {
+      out += units[i++];
+      continue;
     }
-    std::size_t end = at < units.size() && units[at] == '-' ? at + 1 : at;
-    const std::size_t digits = end;
-    while (end < units.size() && is_digit(units[end])) ++end;
-    const bool ends =
-        end == units.size() || std::string_view(" ./*").find(units[end]) != std::string_view::npos;
-    if (end == digits || !ends) continue;
-    out += superscript(units.substr(at, end - at));
+    const std::string_view word = units.substr(i, end - i);
     i = end;
+    if (word == "per" && !out.empty() && out.back() == ' ' && i < units.size() && units[i] == ' ') {
+      per = true;
+      ++i;
+      continue;
+    }
+    out += symbol_of(word);
+    const Power power = power_at(units.substr(i));
+    i += power.length;
+    if (per) out += superscript("-" + std::string(power.length > 0 ? power.digits : "1"));
+    if (!per) out += superscript(power.digits);
+    per = false;
   }
   return out;
 }

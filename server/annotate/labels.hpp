@@ -39,7 +39,9 @@ std::vector<Tick> ticks_of_step(double low, double high, double step);
 std::vector<Tick> uneven_ticks(double low, double high, double gap,
                                const std::function<double(double)>& place);
 
-// "m s-1", "m s**-1" and "m s^-1" -> "m s⁻¹"; "" for "1".
+// As people write it: "m s-1", "m s**-1", "m s^-1", "meter second-1", "meters per second" -> "m
+// s⁻¹";
+// "" for "1".
 std::string unit_text(std::string_view units);
 
 // A coordinate of an axis: "10°E", "45°N", "500".

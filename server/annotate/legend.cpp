@@ -27,7 +27,17 @@ struct Entry {
   std::vector<Tick> ticks;
   std::vector<Point> opacity;
   std::vector<std::string> notes;
+  // Whether values lie beyond the left and the right end, which have their colours.
+  std::array<bool, 2> beyond{false, false};
 };
+
+// `values`: least and greatest value shown.
+std::array<bool, 2> beyond_ends(const Range& range, const std::array<float, 2>& values) {
+  const double slack = 1e-6 * std::abs(range[1] - range[0]);
+  const bool less = static_cast<double>(values[0]) < std::min(range[0], range[1]) - slack;
+  const bool more = static_cast<double>(values[1]) > std::max(range[0], range[1]) + slack;
+  return range[0] <= range[1] ? std::array{less, more} : std::array{more, less};
+}
 
 std::vector<Color> colors_of(const scene::ColorTable& table) {
   constexpr std::size_t shown = 64;
@@ -75,15 +85,20 @@ std::vector<Tick> compass_ticks(const Range& range) {
   return ticks;
 }
 
+// What the ends of a strip mean whose values are world units, which say nothing of the data.
+std::string ends_text(const Range& range, const std::string& low, const std::string& high) {
+  const bool ascends = range[0] <= range[1];
+  return "from " + (ascends ? low : high) + " to " + (ascends ? high : low);
+}
+
 // Colours by world height: the coordinates of the vertical axis where it has some.
 void set_heights(const Subject& subject, const Range& range, Entry& entry) {
   const auto map = axis_map(subject, 2);
   const data::Axis axis = drawn_axis(subject, 2);
   entry.ticks.clear();
   if (!map || map->single()) {
-    entry.units = "world units";
     entry.title += "height";
-    entry.ticks = even_ticks(range[0], range[1], strip_parts);
+    entry.notes.push_back(ends_text(range, "low", "high"));
     return;
   }
   constexpr double gap = 0.17;
@@ -100,6 +115,12 @@ void set_heights(const Subject& subject, const Range& range, Entry& entry) {
                  : axis.kind == data::AxisKind::height ? "height"
                                                        : spaced(axis.name);
   entry.units = unit_text(axis.units);
+}
+
+// Of the lines that are drawn.
+std::array<float, 2> drawn_magnitudes(const scene::VectorLayer& layer) {
+  const auto [least, most] = layer.field->range;
+  return {std::max(least, static_cast<float>(layer.min_magnitude)), most};
 }
 
 Entry lines_entry(const Subject& subject) {
@@ -119,12 +140,16 @@ Entry lines_entry(const Subject& subject) {
       break;
     case LineColor::screen_z:
       entry.title += "distance from the eye";
-      entry.units = "world units";
+      entry.ticks.clear();
+      entry.notes.push_back(ends_text(range, "near", "far"));
       break;
     case LineColor::rise: {
       const auto percent = static_cast<int>(std::lround(100 * layer.rise_weight));
       entry.title += percent == 100 ? "rise" : "height and rise";
-      entry.units = "world units";
+      entry.ticks.clear();
+      entry.notes.push_back(percent == 100
+                                ? ends_text(range, "sinking", "rising")
+                                : ends_text(range, "low and sinking", "high and rising"));
       if (percent < 100) {
         entry.notes.push_back(std::to_string(percent) + " % rise, " +
                               std::to_string(100 - percent) + " % height in the box");
@@ -134,6 +159,7 @@ Entry lines_entry(const Subject& subject) {
     case LineColor::magnitude:
       entry.title += "magnitude";
       entry.units = units;
+      entry.beyond = beyond_ends(range, drawn_magnitudes(layer));
       break;
     case LineColor::direction:
       entry.title += "direction";
@@ -145,6 +171,7 @@ Entry lines_entry(const Subject& subject) {
       const data::FieldInfo* const scalar = subject.info.find(name);
       entry.title += field_title(scalar, name);
       entry.units = scalar == nullptr ? std::string() : unit_text(scalar->units);
+      if (layer.color_field) entry.beyond = beyond_ends(range, layer.color_field->range);
       break;
     }
     case LineColor::constant:
@@ -180,6 +207,16 @@ std::vector<Point> opacity_curve(const scene::ScalarLayer& layer, double most) {
   return curve;
 }
 
+// The values of the field, without those that are transparent at an end of the opacity curve.
+std::array<float, 2> drawn_values(const scene::ScalarLayer& layer) {
+  auto [least, most] = layer.field->range;
+  const auto& curve = layer.extinction;
+  if (curve.empty()) return {least, most};
+  if (curve.front()[1] <= 0) least = std::max(least, static_cast<float>(curve.front()[0]));
+  if (curve.back()[1] <= 0) most = std::min(most, static_cast<float>(curve.back()[0]));
+  return {least, most};
+}
+
 Entry medium_entry(const Subject& subject, const scene::ScalarLayer& layer,
                    const std::string& name) {
   const data::FieldInfo* const field = subject.info.find(name);
@@ -188,6 +225,7 @@ Entry medium_entry(const Subject& subject, const scene::ScalarLayer& layer,
   entry.units = field == nullptr ? std::string() : unit_text(field->units);
   entry.colors = colors_of(layer.color);
   entry.ticks = even_ticks(layer.color.range[0], layer.color.range[1], strip_parts);
+  entry.beyond = beyond_ends(layer.color.range, drawn_values(layer));
   double most = 0;
   for (const auto& [value, extinction] : layer.extinction) most = std::max(most, extinction);
   if (most > 0) {
@@ -235,6 +273,22 @@ void write(const std::string& text, const Point& at, double size, double align, 
   figure.above.emplace_back(Text{text, at, fitted, align, color, {0, 0, 0, 0}});
 }
 
+// Triangles in the colours of the ends: more values lie beyond them, as in the legends of maps.
+void add_arrows(const Entry& entry, const Point& corner, double width, double em, Figure& figure) {
+  constexpr double tip = 0.65 * pad;
+  const double middle = corner.y + 0.5 * strip_height * em;
+  const double bottom = corner.y + strip_height * em;
+  if (entry.beyond[0]) {
+    figure.above.emplace_back(
+        Area{{corner, {corner.x - tip * em, middle}, {corner.x, bottom}}, entry.colors.front()});
+  }
+  if (entry.beyond[1]) {
+    const double right = corner.x + width;
+    figure.above.emplace_back(Area{{{right, corner.y}, {right + tip * em, middle}, {right, bottom}},
+                                   entry.colors.back()});
+  }
+}
+
 void add_opacity(const Entry& entry, const Point& corner, double width, double height, double em,
                  const Style& style, Figure& figure) {
   if (entry.opacity.empty()) return;
@@ -278,6 +332,7 @@ void add_card(const Entry& entry, const Point& corner, double em, const Style& s
   }
   const Point strip{left, corner.y + (pad + title_height) * em};
   figure.above.emplace_back(Strip{strip, inner, strip_height * em, entry.colors});
+  add_arrows(entry, strip, inner, em, figure);
   add_opacity(entry, strip, inner, strip_height * em, em, style, figure);
   line = strip.y + strip_height * em;
   for (const Tick& tick : entry.ticks) {

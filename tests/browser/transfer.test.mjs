@@ -151,7 +151,9 @@ test("arrow keys move the focused point, finer with shift, and not the volume", 
     assert.ok(Math.abs(moved[0] - 0.171) < 1e-6, `${moved}`);
     assert.ok(Math.abs(moved[1] - 0.06 * 7.5) < 0.01, `${moved}`);
     const label = await points(page).nth(1).getAttribute("aria-label");
-    assert.equal(label, `point 2: 0.171 → ${moved[1]} per world unit`);
+    const percent = -100 * Math.expm1(-0.02 * moved[1]);
+    assert.match(label, /^point 2: 0.171 → [\d.]+ % opaque in 1 % of the box$/);
+    assert.ok(Math.abs(Number(label.match(/→ ([\d.]+)/)[1]) - percent) < 0.06 * percent, label);
     assert.equal(await page.locator("#picture").getAttribute("data-azimuth"), azimuth);
   }));
 

@@ -98,7 +98,8 @@ def requests():
     for target in (b"/v1/frames", b"/v1/forecasts", b"/v1/picks?x=9&y=8", b"/v1/views",
                    b"/v1/datasets"):
         body = b'{"path":"a.nc"}' if target.endswith(b"datasets") else view
-        yield "http", "post-" + target.decode().replace("/", "-"), sizes.post(body, target=target)
+        name = target.partition(b"?")[0].decode().replace("/", "-")
+        yield "http", "post-" + name, sizes.post(body, target=target)
     for name, body in (("entries", b'{"from":"a","selection":{"number":3,"run":"b"}}'),
                        ("list", b'{"files":["a_*.nc","b.nc"],"title":"A","group":"/g"}')):
         yield "http", "post-datasets-" + name, sizes.post(body, target=b"/v1/datasets")

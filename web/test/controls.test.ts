@@ -228,7 +228,10 @@ test("the legend of colour by rise has its own range and tells the share of the 
   assert.equal(rise(1).title, "wind: rise");
   assert.deepEqual(rise(1).range, [-0.02, 0.02]);
   assert.equal(rise(0.7).title, "wind: height and rise");
-  assert.match(rise(0.7).note, /^70 % rise of a line, 30 % height in the box/);
+  assert.match(
+    rise(0.7).note,
+    /^from low and sinking to high and rising, 70 % rise of a line, 30 % height in the box/,
+  );
 });
 
 test("levels are at their axis positions unless the grid is curved", () => {

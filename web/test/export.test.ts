@@ -356,6 +356,7 @@ const entry = (notes: number, range: [number, number] | null = [0, 1]): LegendEn
   kind: "lines",
   title: "wind",
   units: "",
+  beyond: [false, false],
   range,
   map: "viridis",
   color: null,

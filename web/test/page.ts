@@ -275,7 +275,7 @@ export class Page {
 
   private parts(): AppParts {
     const { app } = this;
-    const ignore = { show: () => {}, setGeographic: () => {}, mark: () => {}, steps: () => {} };
+    const ignore = { show: () => {}, setAxes: () => {}, mark: () => {}, steps: () => {} };
     return {
       viewport: { canvas: new Element(), size: () => [800, 600], newSession: () => {} },
       hud: ignore,

@@ -123,8 +123,8 @@ test("the table rounds values relative to the domain width", () => {
 });
 
 test("a point is formatted as text", () => {
-  assert.equal(pointText([0.2, 4], ""), "0.2 → 4 per world unit");
-  assert.equal(pointText([5e-8, 1e30], "J m⁻³"), "5e-8 J m⁻³ → 1e30 per world unit");
+  assert.equal(pointText([0.2, 4], ""), "0.2 → 7.69 % opaque in 1 % of the box");
+  assert.equal(pointText([5e-8, 1e30], "J m⁻³"), "5e-8 J m⁻³ → 100 % opaque in 1 % of the box");
 });
 
 // --- ranges -----------------------------------------------------------------------------------

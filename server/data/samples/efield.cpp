@@ -294,7 +294,7 @@ class ElectricField final : public SampleSource {
     for (int i = 0; i < size.steps; ++i) {
       const double time_ns = period_ns * i / size.steps;
       std::array<char, 32> text{};
-      std::snprintf(text.data(), text.size(), "%.4f ns", time_ns);
+      std::snprintf(text.data(), text.size(), "%.4g ns", time_ns);
       info_.steps.push_back({time_ns, text.data()});
     }
   }

@@ -79,6 +79,20 @@ TEST(UnitText, RaisesPowersInEveryUsualSpelling) {
   EXPECT_EQ(unit_text("O3x"), "O3x") << "no power";
 }
 
+TEST(UnitText, WritesNamesAsSymbols) {
+  for (const char* units :
+       {"meter second-1", "Metres second^-1", "meters per second", "m per sec"}) {
+    EXPECT_EQ(unit_text(units), "m s\u207b\u00b9") << units;
+  }
+  EXPECT_EQ(unit_text("watts per meter2"), "W m\u207b\u00b2");
+  EXPECT_EQ(unit_text("meter/second"), "m/s");
+  EXPECT_EQ(unit_text("Kelvin"), "K");
+  EXPECT_EQ(unit_text("degrees_Celsius"), "\u00b0C");
+  EXPECT_EQ(unit_text("percent"), "%");
+  EXPECT_EQ(unit_text("per mille"), "per mille");
+  EXPECT_EQ(unit_text("meteors"), "meteors");
+}
+
 TEST(CoordinateText, TellsHemispheres) {
   data::Axis axis;
   axis.kind = data::AxisKind::longitude;

@@ -296,6 +296,71 @@ TEST(Legend, TellsHeightsInTheCoordinatesOfTheData) {
   EXPECT_THAT(written, Not(Contains("world units")));
 }
 
+TEST(Legend, NeverTellsWorldUnits) {
+  using protocol::ColorBy;
+  for (const ColorBy by : {ColorBy::screen_z, ColorBy::rise, ColorBy::world_z}) {
+    std::vector<data::FieldInfo> fields{scene::wind_info()};
+    const Shown shown(scene::atmosphere_grid(), fields, [&](protocol::View& view) {
+      view.vector.color.by = by;
+      view.geometry.vertical = protocol::VerticalPlacement::index;
+    });
+    Figure figure = empty_figure(shown);
+    add_legend(shown.subject(), style_of(shown.subject()), figure);
+    EXPECT_THAT(texts(figure.above), Not(Contains(HasSubstr("world unit"))));
+    if (by == ColorBy::screen_z) {
+      EXPECT_THAT(texts(figure.above), Contains(HasSubstr("from near to far")));
+    }
+  }
+}
+
+// Triangles at the ends of a strip, left and right, beyond which values lie.
+std::array<int, 2> arrows(const Figure& figure) {
+  std::array<int, 2> out{};
+  double strip = 0;
+  for (const Item& item : figure.above) {
+    if (const Strip* colors = std::get_if<Strip>(&item)) strip = colors->corner.x;
+    const Area* area = std::get_if<Area>(&item);
+    if (area == nullptr || area->points.size() != 3) continue;
+    ++out.at(area->points[1].x < strip ? 0 : 1);
+  }
+  return out;
+}
+
+// Issue 22: a legend ended at 50 where the jet is 84 and did not say that larger values exist.
+TEST(Legend, MarksTheEndsBeyondWhichValuesLie) {
+  const auto marked = [](double low, double high) {
+    std::vector<data::FieldInfo> fields{scene::wind_info()};
+    const Shown shown(scene::atmosphere_grid(), fields, [&](protocol::View& view) {
+      view.vector.min_magnitude = 0;
+      view.vector.color.by = protocol::ColorBy::magnitude;
+      view.vector.color.range = protocol::Range{low, high};
+    });
+    Figure figure = empty_figure(shown);
+    add_legend(shown.subject(), style_of(shown.subject()), figure);
+    return arrows(figure);
+  };
+  EXPECT_EQ(marked(0, 1e-3), (std::array{0, 1}));
+  EXPECT_EQ(marked(1e-3, 0), (std::array{0, 1})) << "its colours are reversed, not the strip";
+  EXPECT_EQ(marked(0, 1e6), (std::array{0, 0}));
+}
+
+// Values that are transparent at that end are not drawn.
+TEST(Legend, MarksNoEndBeyondWhichAMediumIsTransparent) {
+  const auto marked = [](double low_extinction) {
+    const Shown shown(scene::atmosphere_grid(), one_scalar(), [&](protocol::View& view) {
+      view.scalars.emplace().push_back({});
+      view.scalars->front().field = "cloud";
+      view.scalars->front().color.range = protocol::Range{1e6, 2e6};
+      view.scalars->front().extinction = {{1e6, low_extinction}, {2e6, 5}};
+    });
+    Figure figure = empty_figure(shown);
+    add_legend(shown.subject(), style_of(shown.subject()), figure);
+    return arrows(figure);
+  };
+  EXPECT_EQ(marked(1), (std::array{1, 0}));
+  EXPECT_EQ(marked(0), (std::array{0, 0}));
+}
+
 TEST(Style, ContrastsWithTheBackground) {
   const auto style_on = [](const std::string& background) {
     const Shown shown(scene::atmosphere_grid(), one_scalar(),

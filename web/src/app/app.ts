@@ -403,7 +403,7 @@ export class App {
     const { timeBar, gizmo, facts, entries } = this.parts;
     entries.show(choices);
     timeBar.setDataset(this.dataset());
-    gizmo.setGeographic(axes.x.kind === "longitude");
+    gizmo.setAxes(axes);
     const { count } = steps;
     const { x, y, z } = dims;
     facts.textContent = `${x} × ${y} × ${z} · ${count} step${count === 1 ? "" : "s"}`;

@@ -29,6 +29,26 @@ export function formatNumber(value: number, digits = 4): string {
   return String(Number(value.toPrecision(digits)));
 }
 
+// A value with as many decimals as a step between neighbouring values has.
+export function stepNumber(value: number, step: number): string {
+  if (value === 0 || !(step > 0)) return formatNumber(value);
+  const first = Math.floor(Math.log10(Math.abs(value)) + 1e-9);
+  const last = Math.floor(Math.log10(step) + 1e-9);
+  const digits = Math.max(first - last + 1, 1);
+  if (first >= 6 || last < -5) return formatNumber(value, Math.max(digits, 2) + 1);
+  return String(Number(value.toFixed(Math.max(-last, 0))));
+}
+
+// Texts of distinct values: in four digits, or as many as tell them apart.
+export function distinctNumbers(values: number[]): string[] {
+  const texts = (digits: number) => values.map((value) => formatNumber(value, digits));
+  const count = new Set(values).size;
+  for (let digits = 4; digits < 15; digits++) {
+    if (new Set(texts(digits)).size === count) return texts(digits);
+  }
+  return values.map(String);
+}
+
 export function formatBytes(bytes: number): string {
   if (bytes < 1000) return `${bytes} B`;
   if (bytes < 1e6) return `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)} kB`;
@@ -43,9 +63,11 @@ export interface LegendTick {
 // Ticks of a strip from range[0] (left) to range[1] (right).
 export function linearTicks(range: readonly [number, number], count = 5): LegendTick[] {
   const [low, high] = range;
-  return niceTicks(low, high, count).map((value) => ({
+  const values = niceTicks(low, high, count);
+  const step = Math.abs((values[1] ?? 0) - (values[0] ?? 0));
+  return values.map((value) => ({
     at: (value - low) / (high - low),
-    text: formatNumber(value),
+    text: values.length > 1 ? stepNumber(value, step) : formatNumber(value),
   }));
 }
 
@@ -89,10 +111,12 @@ export function axisTicks(
     .map((value, n) => ({ value, at: (places[n]! - low) / (high - low) }))
     .filter(({ at }) => at >= -1e-6 && at <= 1 + 1e-6)
     .sort((a, b) => roughness(a.value) - roughness(b.value));
-  const ticks: LegendTick[] = [];
-  for (const { value, at } of samples) {
-    if (ticks.some((tick) => Math.abs(tick.at - at) < gap)) continue;
-    ticks.push({ at, text: formatNumber(value) });
+  const chosen: { value: number; at: number }[] = [];
+  for (const sample of samples) {
+    if (chosen.some(({ at }) => Math.abs(at - sample.at) < gap)) continue;
+    chosen.push(sample);
   }
-  return ticks.sort((a, b) => a.at - b.at);
+  chosen.sort((a, b) => a.at - b.at);
+  const texts = distinctNumbers(chosen.map(({ value }) => value));
+  return chosen.map(({ at }, n) => ({ at, text: texts[n]! }));
 }

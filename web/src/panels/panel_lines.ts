@@ -2,6 +2,7 @@
 import type GUI from "lil-gui";
 import { colorByPatch, colorField, fieldOptions } from "./controls";
 import type { Range } from "../wire/api";
+import { colorScale } from "../view/color_scale";
 import { unitText } from "../view/legend_entries";
 import { keyAccess, type PanelKit } from "./panel_kit";
 
@@ -105,7 +106,29 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
     kit.showWhen((states) => states.colorField, field);
   }
   const map = kit.map(folder, "map", keyAccess("/vector/color/map"));
-  const ends = kit.range(folder, "colours", keyAccess("/vector/color/range"), "");
+  const scale = () => colorScale(host.dataset(), host.view());
+  type Ends = [number, number] | null | undefined;
+  const ends = kit.range(
+    folder,
+    "colours",
+    {
+      pointer: "/vector/color/range",
+      get: (view) => {
+        const range = view.vector?.color?.range as Ends;
+        return range ? [scale().shown(range[0]), scale().shown(range[1])] : range;
+      },
+      set: ([from, to]) => ({
+        vector: { color: { range: [scale().stored(from), scale().stored(to)] } },
+      }),
+    },
+    "",
+  );
+  kit.onRefresh(() => {
+    const { units } = scale();
+    ends.forEach((end, n) => {
+      end.name(`colours ${n === 0 ? "from" : "to"}${units === "" ? "" : ` (${units})`}`);
+    });
+  });
   const auto = kit.action(folder, "Default range", "Colour range back to the default", () =>
     host.change({ vector: { color: { range: null } } }),
   );

@@ -105,6 +105,13 @@ export const shownPoint = ([value, extinction]: Curve[0], [low, high]: Range): C
   Number(extinction.toPrecision(6)),
 ];
 
+// What an extinction does over a hundredth of the longest edge of the box, which is 2 world units.
+export function opacityText(extinction: number): string {
+  const percent = -100 * Math.expm1(-0.02 * extinction);
+  const text =
+    percent > 99.9 && percent < 100 ? "99.9" : formatNumber(percent, percent < 1 ? 1 : 3);
+  return `${text} % opaque in 1 % of the box`;
+}
+
 export const pointText = ([value, extinction]: [number, number], units: string): string =>
-  `${formatNumber(value)}${units === "" ? "" : ` ${units}`} → ` +
-  `${formatNumber(extinction)} per world unit`;
+  `${formatNumber(value)}${units === "" ? "" : ` ${units}`} → ` + opacityText(extinction);

@@ -214,7 +214,8 @@ export class TransferView {
   private addScale(): void {
     const { log, top } = this;
     const topLabel = make("label", "histogram-check", "top");
-    topLabel.title = "Extinction at the upper edge of the plot, per world unit";
+    topLabel.title =
+      "Extinction at the upper edge of the plot; the longest edge of the box counts as 2";
     topLabel.append(top);
     this.scaleRow.append(checkLabel(log, "log opacity"), topLabel);
     log.addEventListener("change", () => {

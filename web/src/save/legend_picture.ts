@@ -144,6 +144,18 @@ function drawStrip(
   context.fillRect(x - 1, y - 1, width + 2, stripHeight + 2);
   context.fillStyle = entry.map === null ? (entry.color ?? "") : colors;
   context.fillRect(x, y, width, stripHeight);
+  // Triangles at the ends beyond which values lie; the gradient continues with the end's colour.
+  for (const [n, at, tip] of [
+    [0, x, -8],
+    [1, x + width, 8],
+  ] as const) {
+    if (!entry.beyond[n] || entry.map === null) continue;
+    context.beginPath();
+    context.moveTo(at, y);
+    context.lineTo(at + tip, y + stripHeight / 2);
+    context.lineTo(at, y + stripHeight);
+    context.fill();
+  }
   if (entry.extinction.length > 0) {
     const at = curvePoints(entry.extinction).map(
       ([u, v]) => [x + u * width, y + v * stripHeight] as const,

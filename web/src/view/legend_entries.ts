@@ -14,6 +14,7 @@ export interface LegendEntry {
   ticks: LegendTick[];
   extinction: [number, number][]; // (position 0..1, fraction of the maximum), medium only
   note: string;
+  beyond: [boolean, boolean]; // whether values lie beyond the left and the right end
   leftOut: string; // text about values that are not drawn; empty: none
 }
 
@@ -30,12 +31,32 @@ export function fieldTitle(field: Field | undefined, name: string): string {
 const raised: Record<string, string> = { "-": "⁻" };
 [..."⁰¹²³⁴⁵⁶⁷⁸⁹"].forEach((sign, digit) => (raised[String(digit)] = sign));
 
-// "m s-1", "m s**-1", "m s^-1" -> "m s⁻¹". In CF, "1" means dimensionless, as "(0 - 1)" of ECMWF.
+// Units that are written out, in the singular and lower case -> their symbols.
+const symbols: Record<string, string> = {
+  ...{ meter: "m", metre: "m", kilometer: "km", kilometre: "km" },
+  ...{ second: "s", sec: "s", minute: "min", hour: "h" },
+  ...{ kelvin: "K", degk: "K", deg_k: "K", degree_kelvin: "K" },
+  ...{ degc: "°C", deg_c: "°C", celsius: "°C", degree_c: "°C", degree_celsius: "°C", degree: "°" },
+  ...{ pascal: "Pa", hectopascal: "hPa", millibar: "mbar", kilogram: "kg", gram: "g" },
+  ...{ joule: "J", watt: "W", newton: "N", volt: "V", percent: "%" },
+};
+
+function symbolOf(word: string): string {
+  const name = word.toLowerCase();
+  const singular = name.startsWith("degrees_") ? name.replace("s_", "_") : name.replace(/s$/, "");
+  return symbols[name] ?? symbols[singular] ?? word;
+}
+
+// As people write it: "m s-1", "m s**-1", "m s^-1", "meter second-1", "meters per second" ->
+// "m s⁻¹". In CF, "1" means dimensionless, as "(0 - 1)" of ECMWF.
 export function unitText(units: string | undefined): string {
   if (units === undefined || units === "1" || units === "(0 - 1)") return "";
-  return units.replace(/(?<=[A-Za-z])(?:\*\*|\^)?(-?\d+)(?=$|[ ./*])/g, (_, power: string) =>
-    [...power].map((sign) => raised[sign]).join(""),
-  );
+  const parts = /( per )?([A-Za-z_]+)(?:(?:\*\*|\^)?(-?\d+)(?=$|[ ./*]))?/g;
+  return units.replace(parts, (_, per: string | undefined, word: string, power = "") => {
+    const signed = per === undefined ? power : `-${power === "" ? "1" : power}`;
+    const high = [...signed].map((sign) => raised[sign] ?? "").join("");
+    return `${per === undefined ? "" : " "}${symbolOf(word)}${high}`;
+  });
 }
 
 // World heights of the samples under a view's geometry; null unless the geometry only stretches the
@@ -59,12 +80,31 @@ const verticalTitles: Record<string, string> = {
 
 function heightEntry(dataset: Dataset, view: View, range: [number, number]) {
   const axis = dataset.axes.z;
-  const heights = axis.kind === "cartesian" ? null : sampleHeights(dataset, view);
+  const heights = sampleHeights(dataset, view);
   const ticks = heights === null ? [] : axisTicks(range, heights, axis.coordinates);
   if (ticks.length < 2) {
-    return { what: "height", units: "world units", ticks: linearTicks(range) };
+    return { what: "height", units: "", ticks: [], note: endsText(range, "low", "high") };
   }
-  return { what: verticalTitles[axis.kind] ?? axis.name, units: unitText(axis.units), ticks };
+  const what = verticalTitles[axis.kind] ?? axis.name;
+  return { what, units: unitText(axis.units), ticks, note: "" };
+}
+
+// What the ends of a strip mean whose values are world units, which say nothing of the data.
+const endsText = ([left, right]: readonly [number, number], low: string, high: string): string =>
+  `from ${left <= right ? low : high} to ${left <= right ? high : low}`;
+
+const joined = (...notes: string[]): string => notes.filter((note) => note !== "").join(", ");
+
+// Whether values lie beyond the left and the right end of a strip. values: null: not known.
+export function beyondEnds(
+  [left, right]: readonly [number, number],
+  values: readonly [number, number] | null | undefined,
+): [boolean, boolean] {
+  if (!values) return [false, false];
+  const slack = 1e-6 * Math.abs(right - left);
+  const less = values[0] < Math.min(left, right) - slack;
+  const more = values[1] > Math.max(left, right) + slack;
+  return left <= right ? [less, more] : [more, less];
 }
 
 const speeds = /^([ckm]?m|mi|ft) ?(s⁻¹|h⁻¹|\/ ?s|\/ ?h)$|^knots?$|^kt$/i;
@@ -80,11 +120,13 @@ function leftOutText(least: number, units: string): string {
 function riseEntry(entry: LegendEntry, name: string, weight: number): LegendEntry {
   const percent = Math.round(100 * weight);
   const note = `${percent} % rise of a line, ${100 - percent} % height in the box`;
+  const range = entry.range ?? [0, 1];
+  const [low, high] = weight === 1 ? ["sinking", "rising"] : ["low and sinking", "high and rising"];
   return {
     ...entry,
     title: weight === 1 ? `${name}: rise` : `${name}: height and rise`,
-    units: "world units",
-    note: weight === 1 ? entry.note : [note, entry.note].filter((part) => part !== "").join(", "),
+    ticks: [],
+    note: joined(endsText(range, low!, high!), weight === 1 ? "" : note, entry.note),
   };
 }
 
@@ -108,7 +150,8 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
     color: null,
     ticks: linearTicks(range),
     extinction: [],
-    note: [longest, heads].filter((part) => part !== "").join(", "),
+    note: joined(longest, heads),
+    beyond: [false, false],
     leftOut: leftOutText(vector.minMagnitude ?? 0, units),
   };
   switch (color.by) {
@@ -119,10 +162,16 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
         title: `${name}: ${height.what}`,
         units: height.units,
         ticks: height.ticks,
+        note: joined(height.note, entry.note),
       };
     }
     case "screenZ":
-      return { ...entry, title: `${name}: distance from the eye`, units: "world units" };
+      return {
+        ...entry,
+        title: `${name}: distance from the eye`,
+        ticks: [],
+        note: joined(endsText(range, "near", "far"), entry.note),
+      };
     case "rise":
       return riseEntry(entry, name, color.riseWeight ?? 0.5);
     case "direction":
@@ -138,13 +187,34 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
         ...entry,
         title: `${name}: ${fieldTitle(scalar, color.field ?? "")}`,
         units: unitText(scalar?.units),
+        beyond: beyondEnds(range, scalar?.range),
       };
     }
     case "constant":
       return { ...entry, range: null, map: null, color: color.constant ?? "#ffffff", ticks: [] };
     default:
-      return { ...entry, title: `${name}: magnitude`, units };
+      return {
+        ...entry,
+        title: `${name}: magnitude`,
+        units,
+        beyond: beyondEnds(range, drawnMagnitudes(field, vector.minMagnitude ?? 0)),
+      };
   }
+}
+
+function drawnMagnitudes(field: Field | undefined, least: number): [number, number] | null {
+  return field?.range ? [Math.max(field.range[0]!, least), field.range[1]!] : null;
+}
+
+// Without the values that are transparent at an end of the opacity curve.
+function drawnValues(field: Field | undefined, curve: [number, number][]): [number, number] | null {
+  if (!field?.range) return null;
+  const [first, last] = [curve[0], curve.at(-1)];
+  const clear = (point: [number, number] | undefined) => point !== undefined && point[1] <= 0;
+  return [
+    clear(first) ? Math.max(field.range[0]!, first![0]) : field.range[0]!,
+    clear(last) ? Math.min(field.range[1]!, last![0]) : field.range[1]!,
+  ];
 }
 
 function mediumEntry(dataset: Dataset, layer: ScalarView): LegendEntry {
@@ -165,7 +235,8 @@ function mediumEntry(dataset: Dataset, layer: ScalarView): LegendEntry {
       (value - range[0]) / width,
       most > 0 ? extinction / most : 0,
     ]),
-    note: most > 0 ? `opacity up to ${formatNumber(most, 3)} per world unit` : "clear",
+    note: most > 0 ? "curve: opacity, from none to the greatest" : "transparent",
+    beyond: beyondEnds(range, drawnValues(field, points)),
     leftOut: "",
   };
 }

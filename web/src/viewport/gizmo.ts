@@ -3,6 +3,7 @@
 import { cameraFrame, type Angles, type Camera } from "../view/camera";
 import { dot, type Vec3 } from "../base/vec3";
 import { make, makeSvg } from "../base/dom";
+import type { Dataset } from "../wire/protocol";
 
 const reach = 36; // length of the longest arm, percent of the gizmo's size
 
@@ -68,6 +69,10 @@ export const gizmoArms = (camera: Camera): GizmoArm[] =>
     .map((way) => armOf(camera, way))
     .sort((a, b) => b.depth - a.depth);
 
+// Whether x points east and y north: longitudes, or axes that are named so, as those of WRF.
+export const isGeographic = (axes: Dataset["axes"]): boolean =>
+  axes.x.kind === "longitude" || (/east/i.test(axes.x.name) && /north/i.test(axes.y.name));
+
 export class Gizmo {
   private readonly lines = makeSvg("svg", { viewBox: "-50 -50 100 100", "aria-hidden": "true" });
   private readonly ends: { look: Look; button: HTMLButtonElement }[] = [];
@@ -83,10 +88,14 @@ export class Gizmo {
       element.append(button);
       this.ends.push({ look, button });
     }
-    this.setGeographic(true);
+    this.setNames(true);
   }
 
-  setGeographic(on: boolean): void {
+  setAxes(axes: Dataset["axes"]): void {
+    this.setNames(isGeographic(axes));
+  }
+
+  private setNames(on: boolean): void {
     this.ends.forEach(({ look, button }, n) => {
       const [name, sign] = on ? [look.name, look.sign] : plain[n]!;
       button.setAttribute("aria-label", `View ${name}`);

@@ -31,7 +31,9 @@ export class Legend {
     strip.style.background =
       entry.map === null ? (entry.color ?? "") : this.maps.gradient(entry.map);
     if (entry.extinction.length > 0) strip.append(extinctionCurve(entry.extinction));
-    box.append(title, strip);
+    const row = make("div", "legend-row");
+    row.append(strip, ...this.arrows(entry));
+    box.append(title, row);
     if (entry.range !== null) {
       const ticks = make("div", "legend-ticks");
       for (const tick of entry.ticks) {
@@ -46,13 +48,30 @@ export class Legend {
       box.append(make("div", "legend-note legend-left-out", entry.leftOut));
     }
     const tickTexts = entry.ticks.map((tick) => tick.text).join(", ");
-    const leftOut = entry.leftOut === "" ? "" : `; ${entry.leftOut}`;
+    const ends = ["smaller", "greater"].filter((_, n) => entry.beyond[n]);
+    const more =
+      ends.length === 0 ? "" : `; ${ends.join(" and ")} values have the colour of the end`;
+    const leftOut = `${more}${entry.leftOut === "" ? "" : `; ${entry.leftOut}`}`;
     box.setAttribute("role", "img");
     box.setAttribute(
       "aria-label",
       `Legend: ${entry.title} ${entry.units}; ticks ${tickTexts}${leftOut}`,
     );
     return box;
+  }
+
+  // Triangles in the colours of the ends beyond which values lie.
+  private arrows({ beyond, map }: LegendEntry): HTMLElement[] {
+    if (map === null) return [];
+    return (["low", "high"] as const)
+      .filter((_, n) => beyond[n])
+      .map((end) => {
+        const arrow = make("span", `legend-arrow legend-arrow-${end}`);
+        // one colour: the rest of the gradient lies beside the arrow
+        arrow.style.background =
+          end === "low" ? this.maps.gradient(map, 100, 200) : this.maps.gradient(map, -100, 0);
+        return arrow;
+      });
   }
 }
 
