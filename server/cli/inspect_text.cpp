@@ -212,6 +212,7 @@ std::string steps_text(const protocol::DatasetDescription& dataset) {
   const std::size_t count = dataset.steps.size();
   std::string out = "steps: " + std::to_string(count);
   if (!dataset.time_units.empty()) out += "  (" + word(dataset.time_units) + ')';
+  if (count > 1) out += "; the first is /step=0";
   out += '\n';
   std::vector<Row> rows;
   for (std::size_t i = 0; i < count; ++i) {

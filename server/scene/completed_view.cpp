@@ -58,7 +58,7 @@ Result<void> choose_vector_field(View& view, const data::DatasetInfo& info) {
     return {};
   }
   if (choice.kind == FieldChoice::Kind::none) return {};
-  const data::FieldInfo* first = info.first(data::FieldKind::vector);
+  const data::FieldInfo* first = default_vector(info);
   choice = first == nullptr ? FieldChoice{FieldChoice::Kind::none, ""}
                             : FieldChoice{FieldChoice::Kind::named, first->name};
   return {};
@@ -270,14 +270,14 @@ Result<void> outline_scalars(View& view, const data::DatasetInfo& info) {
 }
 
 Result<void> complete_scalar(protocol::ScalarView& scalar, const Lattice& lattice,
-                             const std::optional<Slice>& slice, data::Dataset& dataset) {
+                             const std::optional<Slice>& slice, bool map, data::Dataset& dataset) {
   if (scalar.color.range && scalar.extinction) return {};
   const data::FieldInfo& field = *dataset.info().find(scalar.field);
   const auto range = first_scalar_range(field, dataset);
   if (!range) return range.error();
   if (!scalar.color.range) scalar.color.range = *range;
   if (!scalar.extinction) {
-    scalar.extinction = default_extinction(field, *range, lattice, slice, is_map(dataset.info()));
+    scalar.extinction = default_extinction(field, *range, lattice, slice, map);
   }
   return {};
 }
@@ -334,8 +334,9 @@ Result<void> complete_from_data(View& view, const Camera& camera, const Placed& 
     if (!range) return range.error();
     view.vector.color.range = *range;
   }
+  const bool map = draws_map(view, dataset.info());
   for (protocol::ScalarView& scalar : *view.scalars) {
-    if (auto ok = complete_scalar(scalar, lattice, slice, dataset); !ok) return ok;
+    if (auto ok = complete_scalar(scalar, lattice, slice, map, dataset); !ok) return ok;
   }
   return {};
 }
@@ -425,7 +426,7 @@ std::vector<std::string> fields_of(const View& view, const data::DatasetInfo& in
   const FieldChoice& lines = view.vector.field;
   if (lines.kind == FieldChoice::Kind::named) add(lines.name);
   if (lines.kind == FieldChoice::Kind::dataset_default) {
-    const data::FieldInfo* const first = info.first(data::FieldKind::vector);
+    const data::FieldInfo* const first = default_vector(info);
     if (first != nullptr) add(first->name);
   }
   if (view.vector.color.by == ColorBy::scalar && view.vector.color.field) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <string_view>
@@ -389,6 +390,33 @@ protocol::Range default_scalar_range(const data::FieldInfo& field, const data::V
   return sound_range(std::floor(middle[0] / grain) * grain, std::ceil(middle[1] / grain) * grain);
 }
 
+const data::FieldInfo* default_vector(const data::DatasetInfo& info) {
+  const data::FieldInfo* const first = info.first(data::FieldKind::vector);
+  const auto is_mixed = [](const data::FieldInfo& field) {
+    const auto& units = field.component_units;
+    return std::adjacent_find(units.begin(), units.end(), std::not_equal_to<>()) != units.end();
+  };
+  if (first == nullptr || !is_mixed(*first)) return first;
+  const auto converts = [&](const data::FieldInfo& field) {
+    return field.kind == data::FieldKind::vector && !is_mixed(field) &&
+           field.components.size() == first->components.size() &&
+           std::equal(field.components.begin(), field.components.begin() + 2,
+                      first->components.begin());
+  };
+  const auto found = std::find_if(info.fields.begin(), info.fields.end(), converts);
+  return found == info.fields.end() ? first : &*found;
+}
+
+bool draws_map(const protocol::View& view, const data::DatasetInfo& info) {
+  if (is_map(info)) return true;
+  if (!view.geometry.slice && !view.geometry.plane) return false;
+  using Kind = protocol::FieldChoice::Kind;
+  const Kind kind = view.vector.field.kind;
+  const bool lines =
+      kind == Kind::named || (kind == Kind::dataset_default && default_vector(info) != nullptr);
+  return !lines || view.vector.combine == protocol::LineCombination::either;
+}
+
 std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& field,
                                                       const protocol::Range& range,
                                                       const Lattice& lattice,
@@ -429,9 +457,8 @@ double default_length(const Lattice& lattice, int stride, const std::optional<Sl
 protocol::ColorBy default_color_by(const data::Grid& grid, const std::optional<Slice>& slice) {
   const data::Axis& z = grid.axes[2];
   const bool own_kind = z.kind != data::AxisKind::cartesian;
-  const bool horizontal = slice && slice->axis == 2;
-  return own_kind && !horizontal && z.coordinates.size() >= 4 ? protocol::ColorBy::world_z
-                                                              : protocol::ColorBy::magnitude;
+  return own_kind && !slice && z.coordinates.size() >= 4 ? protocol::ColorBy::world_z
+                                                         : protocol::ColorBy::magnitude;
 }
 
 }  // namespace windsplat::scene

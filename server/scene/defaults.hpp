@@ -60,6 +60,11 @@ struct ScalarStyle {
 };
 ScalarStyle scalar_style(const data::FieldInfo& field);
 
+// The vector field shown by default: the first one, or in its place the conversion that has its
+// horizontal components and the same unit for all: magnitudes of m/s and Pa/s mean nothing. Null:
+// there is none.
+const data::FieldInfo* default_vector(const data::DatasetInfo& info);
+
 // Whether a dataset is a map: one layer of scalars, without a vector field.
 bool is_map(const data::DatasetInfo& info);
 
@@ -79,13 +84,17 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
                                                       const Lattice& lattice,
                                                       const std::optional<Slice>& slice, bool map);
 
+// Whether the media of a view are drawn as a map: those of a map, and of a slice or plane in which
+// they hide no lines, because it has none or they are laid over the media.
+bool draws_map(const protocol::View& view, const data::DatasetInfo& info);
+
 // The default length of lines at full magnitude: about five grid spacings per stride, for a slice
 // those of the axes in its plane.
 double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice);
 
 // The default: by height if the unit of the vertical axis differs from that of the horizontal ones
-// (as in the atmosphere), otherwise by magnitude. By magnitude in a horizontal slice, all of whose
-// lines have the same height.
+// (as in the atmosphere), otherwise by magnitude. By magnitude in a slice or plane, whose lines are
+// seen where they are.
 protocol::ColorBy default_color_by(const data::Grid& grid, const std::optional<Slice>& slice);
 
 }  // namespace windsplat::scene

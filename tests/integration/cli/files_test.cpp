@@ -119,6 +119,7 @@ TEST(CliFiles, InspectTextNamesAxesFieldsStepsAndSize) {
     EXPECT_THAT(told.out, HasSubstr(units));
   }
   EXPECT_THAT(told.out, HasSubstr("steps: 2"));
+  EXPECT_THAT(told.out, HasSubstr("the first is /step=0"));
   for (const char* word : {"longitude", "latitude", "even", "masked", "KiB"}) {
     EXPECT_THAT(told.out, HasSubstr(word));
   }

@@ -208,15 +208,17 @@ TEST(CompleteView, AtmospheresAreColoredByHeightOthersByMagnitude) {
   EXPECT_EQ(completed(View{}, *tornado).vector.color.by, ColorBy::magnitude);
 }
 
-TEST(CompleteView, HorizontalSlicesAreColoredByMagnitude) {
+TEST(CompleteView, SlicesAndPlanesAreColoredByMagnitude) {
   auto climate = sample_dataset("climate", {24, 16, 12});
   View view;
   view.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 4};
   EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::magnitude)
       << "all lines of the layer have the same height";
   view.geometry.slice->axis = protocol::GridAxis::y;
-  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::world_z);
-  view.geometry.slice->axis = protocol::GridAxis::z;
+  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::magnitude);
+  view.geometry.slice.reset();
+  view.geometry.plane = protocol::PlaneView{{0, 0, 0}, {1, 1, 0.2}};
+  EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::magnitude);
   view.vector.color.by = ColorBy::world_z;
   EXPECT_EQ(completed(view, *climate).vector.color.by, ColorBy::world_z) << "as given";
 }
