@@ -14,14 +14,14 @@ import { button, Jobs, part } from "./save_jobs";
 import { animationJob, pictureJob, type SaveHost, type SaveSetting } from "./save_work";
 import { openFile } from "./saved_picture";
 import { clamp } from "../base/values";
-import { canRecord } from "./video";
+import { hasVideoEncoder } from "./video";
 
 const pictureScaleMax = 4;
 const animationScaleMax = 2;
 const centimetresToTheInch = 2.54;
 const about: Record<string, string> = {
   zip: "Every frame lossless, with its view inside.",
-  webm: "One file for players, not lossless. Recorded in real time: keep this page visible.",
+  webm: "One file for players, not lossless; every frame at its time.",
 };
 
 const input = (id: string) => byId(`save-${id}`, HTMLInputElement);
@@ -119,7 +119,9 @@ export function saveDialog(host: SaveHost, baseUri: string): () => void {
     );
   };
 
-  select("as").options[1]!.hidden = !canRecord();
+  const webm = select("as").options[1]!;
+  webm.disabled = !hasVideoEncoder();
+  if (webm.disabled) webm.text += " (needs WebCodecs: https or localhost)";
   fields("choices").addEventListener("change", show);
   button("save-picture").addEventListener("click", () => void savePicture());
   button("save-animation").addEventListener("click", () => void saveAnimation());

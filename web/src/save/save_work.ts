@@ -15,7 +15,7 @@ import { drawFrame, inOrder } from "../wire/frame_request";
 import type { Dataset, View } from "../wire/protocol";
 import type { Job } from "./save_jobs";
 import { finishPicture, type FileTarget, type Shown } from "./saved_picture";
-import { recordVideo } from "./video";
+import { VideoFile } from "./video";
 import { Zip } from "./zip";
 
 export interface SaveHost {
@@ -66,12 +66,13 @@ export function animationJob(setting: SaveSetting, chosen: Animation, video: boo
   const camera = host.camera()!;
   const count = frameCount(chosen);
   const zip = new Zip(new Date());
-  const frames: Blob[] = [];
+  const film = video ? new VideoFile(chosen.fps) : null;
   const name = safeName(`${whole.dataset}-${chosen.over}`);
   const viewOf = (n: number): View => frameView(whole, camera, chosen, n);
   const work: Job["work"] = async (signal, report) => {
     if (count > framesMax) throw new Error(`At most ${framesMax} frames.`);
     const start = performance.now();
+    signal.addEventListener("abort", () => film?.close(), { once: true });
     const reportFrame = (n: number) =>
       report(progressText(n, count, performance.now() - start), n / count);
     reportFrame(0);
@@ -81,15 +82,12 @@ export function animationJob(setting: SaveSetting, chosen: Animation, video: boo
       async (drawn, n) => {
         const picture = await finishPicture(drawn, viewOf(n), pixels, legend, dotsPerInch);
         signal.throwIfAborted();
-        if (video) frames.push(new Blob([picture], { type: "image/png" }));
+        if (film !== null) await film.add(new Blob([picture], { type: "image/png" }));
         else zip.add(`${name}-${String(n).padStart(4, "0")}.png`, picture);
         reportFrame(n + 1);
       },
     );
-    if (!video) return zip.finish();
-    return recordVideo(frames, chosen.fps, signal, (n) =>
-      report(`recording ${n} of ${count}`, n / count),
-    );
+    return film === null ? zip.finish() : await film.finish();
   };
   return { name: `${name}.${video ? "webm" : "zip"}`, work };
 }
