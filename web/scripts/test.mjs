@@ -19,7 +19,9 @@ await generateTypes();
 run([join(web, "node_modules/typescript/bin/tsc"), "--noEmit"]);
 rmSync(out, { recursive: true, force: true });
 mkdirSync(out, { recursive: true });
-const tests = readdirSync(join(web, "test")).filter((name) => name.endsWith(".test.ts"));
+const tests = readdirSync(join(web, "test"), { recursive: true }).filter((name) =>
+  name.endsWith(".test.ts"),
+);
 await build({
   entryPoints: tests.map((name) => join(web, "test", name)),
   bundle: true,
@@ -29,6 +31,7 @@ await build({
   packages: "external",
   sourcemap: "inline",
   outdir: out,
+  outbase: join(web, "test"),
   outExtension: { ".js": ".mjs" },
   logLevel: "warning",
 });

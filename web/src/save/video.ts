@@ -1,5 +1,5 @@
-// Pictures -> a WebM video by the browser's encoder (WebCodecs): every picture once, at its time, as
-// fast as the browser encodes. Only pages from https or localhost have an encoder.
+// Pictures -> a WebM video by the browser's encoder (WebCodecs): every picture once, at its time,
+// as fast as the browser encodes. Only pages from https or localhost have an encoder.
 import { clamp } from "../base/values";
 import { webmFile, type EncodedPicture, type VideoTrack } from "./webm";
 

@@ -1,5 +1,5 @@
-// Encoded pictures with their times -> the bytes of a WebM file. Pure. Sources: RFC 8794 (EBML), RFC
-// 9559 (Matroska: elements by their ids), the WebM container guidelines (times in milliseconds,
+// Encoded pictures with their times -> the bytes of a WebM file. Pure. Sources: RFC 8794 (EBML),
+// RFC 9559 (Matroska: elements by their ids), the WebM container guidelines (times in milliseconds,
 // cues), ITU-T H.273 (numbers of colour spaces).
 import { join, utf8, type Bytes } from "./png_text";
 

@@ -1,8 +1,8 @@
 // The rows of the file browser for folders as the server lists them.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bytesText, folderNote, folderRows, folderTrail } from "../src/app/folder_rows";
-import type { Folder } from "../src/wire/folder";
+import { bytesText, folderNote, folderRows, folderTrail } from "../../src/app/folder_rows";
+import type { Folder } from "../../src/wire/folder";
 
 const folder: Folder = {
   folder: "runs",

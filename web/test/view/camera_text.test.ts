@@ -1,10 +1,10 @@
 // The camera as text that is copied and pasted.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Camera } from "../src/view/camera";
-import { cameraPatch, cameraText } from "../src/view/camera_text";
-import { pictureCaption } from "../src/view/caption";
-import { described } from "./page";
+import type { Camera } from "../../src/view/camera";
+import { cameraPatch, cameraText } from "../../src/view/camera_text";
+import { pictureCaption } from "../../src/view/caption";
+import { described } from "../page";
 
 const camera: Camera = {
   projection: "perspective",

@@ -1,7 +1,7 @@
 // WebM files, read again by an EBML reader of this test (RFC 8794, RFC 9559).
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { pictureMs, webmFile, type EncodedPicture, type VideoTrack } from "../src/save/webm";
+import { pictureMs, webmFile, type EncodedPicture, type VideoTrack } from "../../src/save/webm";
 
 const containers = new Set([
   0x1a45dfa3, 0x18538067, 0x1549a966, 0x1654ae6b, 0xae, 0xe0, 0x55b0, 0x1f43b675, 0x1c53bb6b, 0xbb,
