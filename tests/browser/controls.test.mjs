@@ -228,13 +228,69 @@ test("the default camera faces a slice or plane, and a globe ends the plane", ()
     await faces(0, 35);
   }));
 
+test("a region is given by ranges, a filter and the polygon of a file", () =>
+  withPage(async (page) => {
+    await unfold(page, "Region");
+    await type(page, "lon from \\(°E\\)", -30);
+    await type(page, "lon to \\(°E\\)", 40);
+    const [low, high] = await lastPatch(page, "region", "x");
+    assert.deepEqual([low, high], [-30, 40]);
+    await finalPicture(page);
+    await choose(page, "winds only where", /^cloud$/);
+    await page.locator("#panel .panel-note", { hasText: /^Winds where cloud is/ }).waitFor();
+    const [filter] = await lastPatch(page, "region", "where");
+    assert.equal(filter.field, "cloud");
+    assert.ok(filter.range[0] < filter.range[1], `${filter.range}`);
+    const ring = [
+      [-30, 0],
+      [40, 0],
+      [40, 60],
+      [-30, 0],
+    ];
+    const polygon = { type: "Polygon", coordinates: [ring] };
+    const file = (value) => ({
+      name: "land.geojson",
+      mimeType: "application/geo+json",
+      buffer: Buffer.from(JSON.stringify(value)),
+    });
+    const chosen = page.locator('#panel input[type="file"]');
+    await chosen.setInputFiles(file({ type: "Point", coordinates: [0, 0] }));
+    await page.locator("#panel .panel-note", { hasText: /land.geojson: .*no Polygon/ }).waitFor();
+    await chosen.setInputFiles(file({ type: "Feature", geometry: polygon }));
+    await page.locator("#panel .panel-note", { hasText: /^Within a polygon/ }).waitFor();
+    assert.deepEqual(await lastPatch(page, "region", "polygon"), polygon);
+    await finalPicture(page);
+    await page.locator("#panel button", { hasText: /^everything$/ }).click();
+    assert.equal(await lastPatch(page, "region"), null);
+    await page.waitForFunction(() => !location.hash.includes("region"));
+  }));
+
+test("the probe tells distance and bearing from a position that is kept", () =>
+  withPage(async (page) => {
+    await unfold(page, "Probe");
+    const values = page.locator("#panel .probe-values dd").first();
+    await values.waitFor();
+    await page.locator("#panel button", { hasText: /^Measure from here$/ }).click();
+    const before = Number(await page.locator("#probe-y").inputValue());
+    await page.locator("#probe-y").fill(String(before + 10));
+    await page.locator("#probe-y").press("Enter");
+    const way = page.locator("#panel .probe-words", { hasText: /towards/ });
+    await way.waitFor();
+    const [, km, bearing] = /([\d.]+) km towards ([\d.]+)°/.exec(await way.textContent());
+    const moved = Number(await page.locator("#probe-y").inputValue()) - before;
+    assert.ok(Math.abs(km - moved * 111.195) < 0.6, `${km} km for ${moved} degrees`);
+    assert.equal(Number(bearing), 0);
+    await page.locator("#panel button", { hasText: /^End measuring$/ }).click();
+    await way.waitFor({ state: "hidden" });
+  }));
+
 test("a globe is offered for longitudes, and heights replace the vertical axis", () =>
   withPage(async (page) => {
     await unfold(page, "Geometry");
     await choose(page, "shape", /^sphere/);
     assert.equal(await lastPatch(page, "geometry", "mapping"), "sphere");
     await choose(page, "shape", /^flat/);
-    await type(page, "vertical stretch", 3);
+    await type(page, "vertical exaggeration", 3);
     assert.deepEqual(await lastPatch(page, "geometry", "scale"), [1, 1, 3]);
     await type(page, "stretch in x", 2);
     assert.deepEqual(await lastPatch(page, "geometry", "scale"), [2, 1, 3]);

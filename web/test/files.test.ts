@@ -50,6 +50,22 @@ test("a view keeps what changed files still contain", () => {
     scalars: [{ field: "temperature", stride: 2 }],
     geometry: { scale: [1, 1, 3], slice: { axis: "z", index: 3 } },
   });
+  const filtered = fitView(
+    {
+      region: {
+        x: [1, 2],
+        where: [
+          { field: "humidity", range: [0, 1] },
+          { field: "fog", range: [0, 1] },
+        ],
+      },
+    },
+    same,
+  );
+  assert.deepEqual(filtered.region, {
+    x: [1, 2],
+    where: [{ field: "humidity", range: [0, 1] }],
+  });
   const calm = fitView({ ...view, vector: { field: null } }, described("storm", { fields: [] }));
   assert.deepEqual([calm.vector, calm.scalars], [{ field: null }, undefined]);
   assert.deepEqual(fitView({ scalars: [] }, same), { scalars: [] });

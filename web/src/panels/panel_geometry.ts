@@ -74,7 +74,7 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
 }
 
 function addStretch(folder: GUI, kit: PanelKit): void {
-  const edges = ["stretch in x", "stretch in y", "vertical stretch"] as const;
+  const edges = ["stretch in x", "stretch in y", "vertical exaggeration"] as const;
   edges.forEach((label, axis) => {
     kit.number(
       folder,

@@ -1,8 +1,9 @@
 // The probe panel: a position in the coordinates of the axes -> the values of all fields there, and
 // of one field over time. While the folder is open the probe is on and marked on the picture.
 import type GUI from "lil-gui";
-import { failureText, type Series } from "../wire/api";
+import { failureText, type Position, type Series } from "../wire/api";
 import { checkLabel, debounced, make, makeSvg, numberBox } from "../base/dom";
+import { wayText } from "../view/distance";
 import { hoverOf, hoverOn } from "../view/hover_setting";
 import { sampleOf } from "../view/feature";
 import { unitText } from "../view/legend_entries";
@@ -29,10 +30,13 @@ export class ProbePanel {
   private readonly box = make("div", "probe");
   private readonly rows: { slider: HTMLInputElement; number: HTMLInputElement }[] = [];
   private readonly message = make("p", "probe-words");
+  private readonly way = make("p", "probe-words"); // from the position that was kept to this one
   private readonly values = make("dl", "probe-values");
   private readonly picker = make("select");
   private readonly plot = makeSvg("svg", { class: "course", role: "img" });
   private series: Series | null = null;
+  private position: Position | null = null; // that was read last
+  private from: Position | null = null;
   private wanted = ""; // key of the last request
   private readonly readSoon = debounced(() => void this.read(), restMs);
 
@@ -47,7 +51,9 @@ export class ProbePanel {
     this.sample = place;
     axisNames.forEach((_, axis) => this.addAxis(axis));
     this.message.setAttribute("role", "status");
-    this.box.append(this.message, this.values);
+    this.way.setAttribute("role", "status");
+    this.box.append(this.message, this.way, this.values);
+    this.addWay();
     this.addMaximum();
     this.addSeries();
     this.addHover();
@@ -180,6 +186,29 @@ export class ProbePanel {
     }
   }
 
+  // Distance and direction to the next positions from the one that is kept.
+  private addWay(): void {
+    const button = make("button", "", "Measure from here");
+    button.title = "Distance and direction from this position to the next ones; again to end";
+    button.addEventListener("click", () => {
+      this.from = this.from === null ? this.position : null;
+      button.textContent = this.from === null ? "Measure from here" : "End measuring";
+      this.showWay();
+    });
+    const row = make("div", "histogram-row");
+    row.append(button);
+    this.box.append(row);
+    this.showWay();
+  }
+
+  private showWay(): void {
+    const { from, position } = this;
+    this.way.hidden = from === null || position === null;
+    if (from === null || position === null) return;
+    const way = wayText(this.kit.host.dataset(), from, position);
+    this.way.textContent = `from the first position: ${way}`;
+  }
+
   private addSeries(): void {
     const dataset = this.kit.host.dataset();
     if (dataset.steps.count < 2) return;
@@ -235,6 +264,8 @@ export class ProbePanel {
           make("dd", "", valueText(value, units)),
         ]),
       );
+      this.position = answer.position;
+      this.showWay();
       this.showMessage(placeText(dataset, answer));
     } catch (failure) {
       if (key !== this.wanted) return;

@@ -21,6 +21,7 @@ import { cameraNumbersTitle } from "./panel_camera";
 import { keyAccess, PanelKit, type PanelHost } from "./panel_kit";
 import { middleSample, sampleWithin, type Sample } from "../view/sample_position";
 import { ProbePanel, probeTitle } from "./panel_probe";
+import { addRegion } from "./panel_region";
 import { addCamera, addGeometry, type CameraSwitch } from "./panel_geometry";
 import type { RangeMode } from "./range_choice";
 import { videoUse, type VideoUse } from "../view/video_setting";
@@ -45,6 +46,7 @@ export class Panels {
     "Motion",
     "Histogram",
     probeTitle,
+    "Region",
     "Geometry",
     "Camera and depth",
     cameraNumbersTitle,
@@ -74,6 +76,7 @@ export class Panels {
     this.kit = kit;
     addLines(gui, kit, this.actions);
     addMedia(gui, kit);
+    addRegion(gui, kit);
     addLight(gui, kit);
     addGeometry(gui, kit);
     addCamera(gui, kit, this.actions);

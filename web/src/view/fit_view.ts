@@ -3,7 +3,7 @@
 import { clamp } from "../base/values";
 import { dot, subtract, type Vec3 } from "../base/vec3";
 import { scaledBox, type Box } from "./camera";
-import type { Dataset, View } from "../wire/protocol";
+import type { Dataset, RegionView, View } from "../wire/protocol";
 
 type Vector = NonNullable<View["vector"]>;
 type Geometry = NonNullable<View["geometry"]>;
@@ -21,6 +21,7 @@ export function fitView(view: View, dataset: Dataset): View {
     if (media.length > 0) fitted.scalars = media as View["scalars"];
     else delete fitted.scalars;
   }
+  if (view.region) fitted.region = fitRegion(view.region, dataset);
   return fitted;
 }
 
@@ -37,6 +38,11 @@ export const shapeOf = ({ id, dims, axes, mappings, fields, steps }: Dataset): s
 
 const has = (dataset: Dataset, kind: "scalar" | "vector", name: string): boolean =>
   dataset.fields.some((field) => field.kind === kind && field.name === name);
+
+function fitRegion(region: RegionView, dataset: Dataset): RegionView {
+  const where = region.where?.filter(({ field }) => has(dataset, "scalar", field));
+  return where === undefined ? region : { ...region, where: where as RegionView["where"] };
+}
 
 function fitVector(vector: Vector, dataset: Dataset): Vector {
   const fitted: Vector = { ...vector };
