@@ -189,6 +189,26 @@ TEST(MergePatch, KeepsOnlyTheNullThatMeansNoLines) {
   EXPECT_EQ(patched(named, R"({"vector":{"stride":null}})"), R"({"vector":{"field":"wind"}})");
 }
 
+// A region changes part by part, as a drag of one of its faces does, and as a whole.
+TEST(MergePatch, RegionsChangeKeyByKey) {
+  const std::string ranges = R"({"region":{"x":[0,9],"y":[1,2]}})";
+  EXPECT_EQ(patched(ranges, R"({"region":{"x":[3,9]}})"), R"({"region":{"x":[3,9],"y":[1,2]}})");
+  EXPECT_EQ(patched(ranges, R"({"region":{"y":null}})"), R"({"region":{"x":[0,9]}})");
+  EXPECT_EQ(patched(ranges, R"({"region":null})"), "{}");
+  const std::string one =
+      R"({"region":{"polygon":{"coordinates":[[[0,0],[1,0],[1,1],[0,0]]],"type":"Polygon"}}})";
+  const std::string two =
+      R"({"region":{"polygon":{"coordinates":[[[[0,0],[1,0],[1,1],[0,0]]]],"type":"MultiPolygon"}}})";
+  EXPECT_EQ(patched(one, two), two);
+  EXPECT_EQ(patched(two, one), one);
+  EXPECT_EQ(patched(one, R"({"region":{"polygon":null}})"), "{}");
+  EXPECT_THAT(patched(one, R"({"region":{"polygon":{"type":"MultiPolygon"}}})"),
+              HasSubstr("refused"));
+  EXPECT_EQ(patched(R"({"region":{"where":[{"field":"a","range":[0,1]}]}})",
+                    R"({"region":{"where":[]}})"),
+            R"({"region":{"where":[]}})");
+}
+
 TEST(MergePatch, ReplacesArraysWhole) {
   EXPECT_EQ(patched(R"({"camera":{"eye":[1,2,3]}})", R"({"camera":{"eye":[4,5,6]}})"),
             R"({"camera":{"eye":[4,5,6]}})");
