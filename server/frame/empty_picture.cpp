@@ -85,8 +85,10 @@ double largest_extinction(const std::vector<std::array<double, 2>>& table,
 }
 
 std::string all_masked(const std::string& field, const protocol::View& view, bool slice) {
+  const bool part = view.region != protocol::RegionView{};
   return "every sample of " + quoted(field) + (slice ? " in the slice" : "") +
-         " is masked at step " + std::to_string(view.step);
+         (part ? " in the region" : "") + " is masked at step " + std::to_string(view.step) +
+         (view.region.where.empty() ? "" : ", or left out by /region/where");
 }
 
 // Empty: values of the vectors do not explain it.

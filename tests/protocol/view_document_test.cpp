@@ -197,8 +197,8 @@ TEST(MergePatch, RegionsChangeKeyByKey) {
   EXPECT_EQ(patched(ranges, R"({"region":null})"), "{}");
   const std::string one =
       R"({"region":{"polygon":{"coordinates":[[[0,0],[1,0],[1,1],[0,0]]],"type":"Polygon"}}})";
-  const std::string two =
-      R"({"region":{"polygon":{"coordinates":[[[[0,0],[1,0],[1,1],[0,0]]]],"type":"MultiPolygon"}}})";
+  const std::string two = R"({"region":{"polygon":{"coordinates":[[[[0,0],[1,0],[1,1],[0,0]]]],)"
+                          R"("type":"MultiPolygon"}}})";
   EXPECT_EQ(patched(one, two), two);
   EXPECT_EQ(patched(two, one), one);
   EXPECT_EQ(patched(one, R"({"region":{"polygon":null}})"), "{}");

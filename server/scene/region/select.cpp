@@ -20,6 +20,7 @@ using data::AxisKind;
 using protocol::Range;
 using protocol::RegionView;
 
+constexpr double degrees_max = 720;      // of longitudes of polygons, either way
 constexpr double range_rounding = 1e-9;  // of the coordinates and ends of ranges
 
 std::string text_of(double low, double high) {
@@ -135,9 +136,10 @@ bool has_degrees(const data::Grid& grid) {
 bool contains(const Inside& inside, bool degrees, const std::array<double, 2>& at) {
   if (!degrees) return inside.contains(at[0], at[1]);
   const auto [low, high] = inside.extent();
-  double x = at[0] + turn_degrees * std::ceil((low - at[0]) / turn_degrees);
-  for (; x <= high; x += turn_degrees) {
-    if (inside.contains(x, at[1])) return true;
+  const auto first = static_cast<int>(std::ceil((low - at[0]) / turn_degrees));
+  const auto last = static_cast<int>(std::floor((high - at[0]) / turn_degrees));
+  for (int turn = first; turn <= last; ++turn) {
+    if (inside.contains(at[0] + turn_degrees * turn, at[1])) return true;
   }
   return false;
 }
@@ -165,6 +167,12 @@ Result<void> crop_columns(const RegionView& region, const data::Grid& grid, Crop
                       "requires longitudes and latitudes, which this dataset lacks: use x and y");
   }
   const Inside inside(region.polygon);
+  const auto [west, east] = inside.extent();
+  if (places.degrees && !region.polygon.empty() && !(west >= -degrees_max && east <= degrees_max)) {
+    return invalid_at("/region/polygon", "has longitudes from " + text_of(west, east) +
+                                             ", beyond the limit of " +
+                                             text_of(-degrees_max, degrees_max) + " degrees");
+  }
   const auto [width, height, levels] = crop.count;
   std::vector<unsigned char> kept(static_cast<std::size_t>(width) *
                                   static_cast<std::size_t>(height));

@@ -135,6 +135,13 @@ TEST(EmptyPicture, MaskedSamplesAreNamed) {
   ASSERT_TRUE(slice) << slice.error().message;
   EXPECT_EQ(slice->empty.rfind("every sample of \"wind\" in the slice is masked at step 0", 0), 0U)
       << slice->empty;
+  view.geometry.slice.reset();
+  view.region.where = {{"cloud", {0, 1}}};
+  const auto filtered = produce(view, *dataset, {}, pool, {});
+  ASSERT_TRUE(filtered) << filtered.error().message;
+  EXPECT_THAT(filtered->empty,
+              ::testing::HasSubstr("in the region is masked at step 0, or left out "
+                                   "by /region/where"));
 }
 
 // Mean coverage must not depend on the resolution.

@@ -120,6 +120,15 @@ TEST(Polygon, LongitudesAreThoseOfAnyTurnAndMayCrossTheSeam) {
   }
 }
 
+TEST(Polygon, LongitudesBeyondTwoTurnsAreRefused) {
+  RegionView region;
+  region.polygon = {{{{0, 0}, {1e30, 0}, {10, 20}, {0, 0}}}};
+  const auto crop = crop_of(region, whole_earth(), 0);
+  ASSERT_FALSE(crop);
+  EXPECT_EQ(crop.error().at.front().pointer, "/region/polygon");
+  EXPECT_THAT(crop.error().message, ::testing::HasSubstr("-720 to 720"));
+}
+
 // Two islands on both sides of the antimeridian, cut as RFC 7946 (section 3.1.9) recommends.
 TEST(Polygon, SeveralPolygonsAreUnited) {
   RegionView region;
