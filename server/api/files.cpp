@@ -61,9 +61,9 @@ void get_files(const ServerOptions& options, tasks::TaskExecutor& look_ups,
     reply(http::problem_response(page.error()));
     return;
   }
+  // No error: the page asks in order to know, and browsers report errors to their users.
   if (options.data_root.empty()) {
-    reply(http::problem_response(403, "Forbidden",
-                                 "listing files is disabled: start the server with --data-root"));
+    reply({204, "", {{"Cache-Control", "no-store"}}, {}});
     return;
   }
   run_later(look_ups, request, std::move(reply), "a list of files", nullptr,

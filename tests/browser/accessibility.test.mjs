@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { test } from "node:test";
-import { finalPicture, pixels, sharedDaemon, state } from "./support.mjs";
+import { finalPicture, pixels, sharedDaemon, shot, state } from "./support.mjs";
 
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
@@ -17,7 +17,11 @@ async function violations(page) {
     Promise.allSettled(document.getAnimations().map(({ finished }) => finished)),
   );
   const found = await page.evaluate(() =>
-    window.axe.run(document, { resultTypes: ["violations"] }),
+    window.axe.run(document, {
+      resultTypes: ["violations"],
+      // An experimental rule: who speaks a command says what is written.
+      rules: { "label-content-name-mismatch": { enabled: true } },
+    }),
   );
   assert.ok(found.passes.length > 15, "axe has checked the page");
   return found.violations.map(({ id, nodes }) => [
@@ -221,3 +225,48 @@ test("with reduced motion there is no animation", () =>
     },
     { reducedMotion: "reduce" },
   ));
+
+// The distinct colours along the middle of an element, as it is on the screen.
+async function colorsAlong(page, selector) {
+  const clip = await page.locator(selector).first().boundingBox();
+  const shot = await page.screenshot({ clip });
+  return page.evaluate(async (text) => {
+    const file = new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))]);
+    const bitmap = await createImageBitmap(file);
+    const { width, height } = bitmap;
+    const context = new OffscreenCanvas(width, height).getContext("2d");
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, Math.floor(height / 2), width, 1);
+    return new Set(new Uint32Array(data.buffer)).size;
+  }, shot.toString("base64"));
+}
+
+test("colour bars, curves and marks keep their colours where the system forces its own", () =>
+  withPage(
+    async (page) => {
+      for (const bar of [".legend-lines .legend-strip", "#panel .map-strip"]) {
+        await page.locator(bar).first().scrollIntoViewIfNeeded();
+        const colors = await colorsAlong(page, bar);
+        assert.ok(colors > 30, `${colors} colours in ${bar}`);
+      }
+      const ramp = await colorsAlong(page, ".legend-medium .legend-strip");
+      assert.ok(ramp > 10, `${ramp} colours of the volume's bar`);
+      await shot(page, "forced-colors");
+      assert.deepEqual(await violations(page), []);
+    },
+    { forcedColors: "active" },
+  ));
+
+test("the card of the dataset that is shown is marked", () =>
+  withPage(async (page) => {
+    await page.locator("#dataset").selectOption("tornado");
+    await finalPicture(page);
+    await openers.datasets(page);
+    const marked = page.locator('.card[aria-current="true"]');
+    assert.deepEqual(await marked.locator(".card-title").allInnerTexts(), [
+      "Tornado test function",
+    ]);
+    const frame = (card) => card.evaluate((element) => getComputedStyle(element).borderColor);
+    const other = page.locator('.card[aria-current="false"]').first();
+    assert.notEqual(await frame(marked), await frame(other));
+  }));

@@ -2,7 +2,7 @@
 // dataset that is opened. Without a data root the server lists nothing, and a hint says how to add
 // data.
 import { byId, make } from "../base/dom";
-import { failureText, Refusal, type Api } from "../wire/api";
+import { failureText, type Api } from "../wire/api";
 import type { Folder } from "../wire/folder";
 import { resultOf } from "./entries";
 import { folderNote, folderRows, folderTrail, type FolderRow } from "./folder_rows";
@@ -12,8 +12,6 @@ export interface FileBrowserHost {
   opened(id: string): Promise<void>; // the dataset is ready to be shown
   sleep(ms: number): Promise<void>;
 }
-
-const forbidden = 403; // there is no data root
 
 export class FileBrowser {
   private readonly section = byId("files", HTMLElement);
@@ -46,13 +44,13 @@ export class FileBrowser {
     const asked = ++this.asked;
     try {
       const found = await this.host.api.folder(folder, after);
-      if (asked === this.asked) this.fill(found, after !== "");
+      if (asked !== this.asked) return;
+      this.section.hidden = found === null;
+      this.hint.hidden = found !== null;
+      if (found !== null) this.fill(found, after !== "");
     } catch (failure) {
       if (asked !== this.asked) return;
-      const disabled = failure instanceof Refusal && failure.status === forbidden;
-      this.section.hidden = disabled;
-      this.hint.hidden = !disabled;
-      if (disabled) return;
+      this.section.hidden = false;
       if (folder !== "") {
         this.folder = ""; // the folder may have been removed
         await this.read("", "");
@@ -62,8 +60,6 @@ export class FileBrowser {
   }
 
   private fill(found: Folder, further: boolean): void {
-    this.section.hidden = false;
-    this.hint.hidden = true;
     this.folder = found.folder;
     this.next = found.next;
     this.fail("");

@@ -98,7 +98,9 @@ export class Gizmo {
   private setNames(on: boolean): void {
     this.ends.forEach(({ look, button }, n) => {
       const [name, sign] = on ? [look.name, look.sign] : plain[n]!;
-      button.setAttribute("aria-label", `View ${name}`);
+      // What is written on the button is part of its name, so that it can be spoken.
+      const written = name.toLowerCase().includes(sign.toLowerCase()) ? "" : ` (${sign})`;
+      button.setAttribute("aria-label", `View ${name}${written}`);
       button.title = `View ${name} (${look.key})`;
       button.firstElementChild!.textContent = sign;
     });

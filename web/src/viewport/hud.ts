@@ -37,6 +37,7 @@ function write(element: HTMLElement, { text, title }: LabelText, before = ""): v
 
 export class Hud {
   private readonly element = byId("hud", HTMLElement);
+  private readonly button = byId("hud-button", HTMLButtonElement);
   private readonly rate = new FrameRate();
   private readonly markElement = byId("mark", HTMLElement);
   private readonly fps = byId("fps", HTMLElement);
@@ -62,6 +63,7 @@ export class Hud {
   // Folded until the user asks for them: they cover the data. The browser remembers.
   toggle(): boolean {
     const shown = !this.element.classList.toggle("folded");
+    this.button.setAttribute("aria-expanded", String(shown));
     orNull(() => window.localStorage.setItem(key, shown ? "shown" : "folded"));
     return shown;
   }

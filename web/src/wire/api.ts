@@ -182,10 +182,13 @@ export class Api {
     return this.get<OpeningJob>("v1/datasets", isJob, posted({ path }));
   }
 
-  // A page of a folder below the data root: what follows the name `after`.
-  async folder(folder: string, after: string): Promise<Folder> {
+  // A page of a folder below the data root: what follows the name `after`. null: the server has no
+  // data root.
+  async folder(folder: string, after: string): Promise<Folder | null> {
     const query = new URLSearchParams({ folder, ...(after === "" ? {} : { after }) }).toString();
-    return this.get<Folder>(`v1/files?${query}`, (a) => Array.isArray(a.entries));
+    const answer = await this.answer(`v1/files?${query}`);
+    if (answer.status === noContent) return null;
+    return understood<Folder>(answer, (a) => Array.isArray(a.entries));
   }
 
   async job(id: string): Promise<OpeningJob> {
@@ -215,11 +218,7 @@ export class Api {
     looksRight: (answer: Record<string, unknown>) => boolean,
     init?: RequestInit,
   ): Promise<T> {
-    const answer = await (await this.answer(path, init)).json().catch(() => null);
-    if (!isObject(answer) || !looksRight(answer)) {
-      throw new Error(notUnderstood);
-    }
-    return answer as T;
+    return understood<T>(await this.answer(path, init), looksRight);
   }
 
   private async answer(path: string, init?: RequestInit): Promise<Answer> {
@@ -227,6 +226,17 @@ export class Api {
     if (response.ok) return response;
     throw new Refusal(await refusalText(response), response.status);
   }
+}
+
+const noContent = 204;
+
+async function understood<T>(
+  answer: Answer,
+  looksRight: (answer: Record<string, unknown>) => boolean,
+): Promise<T> {
+  const content = await answer.json().catch(() => null);
+  if (!isObject(content) || !looksRight(content)) throw new Error(notUnderstood);
+  return content as T;
 }
 
 const isJob = (a: Record<string, unknown>): boolean =>
