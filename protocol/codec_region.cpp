@@ -182,8 +182,8 @@ RegionView read_region(const Json& json, const std::string& pointer, Faults& fau
   reader.numbers("x", region.x, any_coordinate);
   reader.numbers("y", region.y, any_coordinate);
   reader.numbers("z", region.z, any_coordinate);
-  reader.numbers("longitude", region.longitude, degrees_east);
-  reader.numbers("latitude", region.latitude, degrees_north);
+  reader.numbers("longitudes", region.longitudes, degrees_east);
+  reader.numbers("latitudes", region.latitudes, degrees_north);
   if (const Json* where = reader.child("where")) {
     region.where = read_filters(*where, reader.at("where"), faults);
   }
@@ -204,8 +204,8 @@ Json region_to_json(const RegionView& region) {
   return Json{{"x", range_or_null(region.x)},
               {"y", range_or_null(region.y)},
               {"z", range_or_null(region.z)},
-              {"longitude", range_or_null(region.longitude)},
-              {"latitude", range_or_null(region.latitude)},
+              {"longitudes", range_or_null(region.longitudes)},
+              {"latitudes", range_or_null(region.latitudes)},
               {"where", std::move(where)},
               {"polygon", polygons_json(region.polygon)}};
 }

@@ -197,7 +197,7 @@ struct FilterView {
 // The samples that are drawn: those that satisfy every part. Ranges in the coordinates of the axes.
 struct RegionView {
   std::optional<Range> x, y, z;
-  std::optional<Range> longitude, latitude;  // of columns, degrees
+  std::optional<Range> longitudes, latitudes;  // of columns, degrees
   std::vector<FilterView> where;
   // Polygons of closed rings, the first of each the outer one: longitude and latitude, or x and y.
   std::vector<std::vector<std::vector<std::array<double, 2>>>> polygon;  // empty: no polygon

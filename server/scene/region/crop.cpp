@@ -155,8 +155,8 @@ std::string key_of(const protocol::RegionView& region, const Crop& crop) {
   append(crop.count, key);
   append(crop.turn, key);
   if (!crop.columns) return key;
-  append(region.longitude, key);
-  append(region.latitude, key);
+  append(region.longitudes, key);
+  append(region.latitudes, key);
   for (const auto& polygon : region.polygon) {
     append(polygon.size(), key);
     for (const auto& ring : polygon) {

@@ -147,7 +147,7 @@ bool contains(const Inside& inside, bool degrees, const std::array<double, 2>& a
 // The key that a message names: the one that a column is most likely to fail.
 const char* key_of_columns(const RegionView& region) {
   if (!region.polygon.empty()) return "/region/polygon";
-  return region.longitude ? "/region/longitude" : "/region/latitude";
+  return region.longitudes ? "/region/longitudes" : "/region/latitudes";
 }
 
 std::string text_of_columns(const data::Grid& grid) {
@@ -162,8 +162,8 @@ std::string text_of_columns(const data::Grid& grid) {
 // Narrows the crop to the columns within the region, and masks the others in it.
 Result<void> crop_columns(const RegionView& region, const data::Grid& grid, Crop& crop) {
   const ColumnPlaces places{grid, has_degrees(grid)};
-  if ((region.longitude || region.latitude) && !places.degrees) {
-    return invalid_at(region.longitude ? "/region/longitude" : "/region/latitude",
+  if ((region.longitudes || region.latitudes) && !places.degrees) {
+    return invalid_at(region.longitudes ? "/region/longitudes" : "/region/latitudes",
                       "requires longitudes and latitudes, which this dataset lacks: use x and y");
   }
   const Inside inside(region.polygon);
@@ -182,8 +182,8 @@ Result<void> crop_columns(const RegionView& region, const data::Grid& grid, Crop
   for (int j = 0; j < height; ++j) {
     for (int i = 0; i < width; ++i, ++n) {
       const auto at = places.at(crop.x_of(i), crop.first[1] + j);
-      const bool is_kept = (!region.longitude || is_between_longitudes(at[0], *region.longitude)) &&
-                           (!region.latitude || is_between(at[1], *region.latitude)) &&
+      const bool is_kept = (!region.longitudes || is_between_longitudes(at[0], *region.longitudes)) &&
+                           (!region.latitudes || is_between(at[1], *region.latitudes)) &&
                            (region.polygon.empty() || contains(inside, places.degrees, at));
       if (!is_kept) continue;
       kept[n] = in_x[static_cast<std::size_t>(i)] = in_y[static_cast<std::size_t>(j)] = 1;
@@ -218,7 +218,7 @@ Result<void> crop_columns(const RegionView& region, const data::Grid& grid, Crop
 }  // namespace
 
 bool is_cropped(const RegionView& region) {
-  return region.x || region.y || region.z || region.longitude || region.latitude ||
+  return region.x || region.y || region.z || region.longitudes || region.latitudes ||
          !region.polygon.empty();
 }
 
@@ -247,7 +247,7 @@ Result<Crop> crop_of(const RegionView& region, const data::Grid& grid, int aroun
   crop.first = {x->first, y->first, z->first};
   crop.count = {x->count, y->count, z->count};
   crop.turn = turn;
-  if (region.longitude || region.latitude || !region.polygon.empty()) {
+  if (region.longitudes || region.latitudes || !region.polygon.empty()) {
     if (auto ok = crop_columns(region, grid, crop); !ok) return ok.error();
   }
   if (turn > 0) crop.first[0] %= turn;

@@ -263,8 +263,8 @@ TEST(Region, ColumnsAreMaskedByTheirOwnLongitudeAndLatitude) {
     auto dataset = dataset_of(source_of(turned_grid()));
     View view = with_cloud();
     view.geometry.mapping = mapping;
-    view.region.longitude = {9.8, 10.6};
-    view.region.latitude = {50.4, 51.3};
+    view.region.longitudes = {9.8, 10.6};
+    view.region.latitudes = {50.4, 51.3};
     const Scene scene = built(view, *dataset);
     const data::Grid grid = turned_grid();
     std::size_t wanted = 0;
@@ -309,11 +309,11 @@ TEST(Region, GeographicKeysNeedLongitudesAndLatitudes) {
   data::Grid grid = turned_grid();
   grid.columns.reset();
   RegionView region;
-  region.longitude = {0, 10};
+  region.longitudes = {0, 10};
   const auto crop = crop_of(region, grid, 0);
   ASSERT_FALSE(crop);
-  EXPECT_EQ(crop.error().at.front().pointer, "/region/longitude");
-  region.longitude.reset();
+  EXPECT_EQ(crop.error().at.front().pointer, "/region.longitudes");
+  region.longitudes.reset();
   region.polygon = {{{{1.5, 1.5}, {5.5, 1.5}, {5.5, 8.5}, {1.5, 1.5}}}};
   EXPECT_TRUE(crop_of(region, grid, 0)) << "polygons are in x and y without them";
   region.polygon = {{{{100, 100}, {105, 101}, {105, 108}, {100, 100}}}};
