@@ -19,7 +19,7 @@ double toward_one(double value, double low, double high) {
 }
 
 double magnitude_scale(const scene::VectorLayer& from) {
-  return toward_one(from.magnitude_range[1], 1e-15, 1e15);
+  return trace::Segments::scale_of(from.magnitude_range[1]);
 }
 
 void set_detail(const scene::VectorLayer& from, kernels::LineStyle& to) {

@@ -9,6 +9,7 @@
 
 #include "server/base/check.hpp"
 #include "server/engine/body.hpp"
+#include "server/engine/chains.hpp"
 #include "server/engine/light.hpp"
 #include "server/engine/line_style.hpp"
 
@@ -50,19 +51,6 @@ kernels::Camera make_camera(const Scene& scene) {
     to.depth_origin += (middle - from.eye[a]) * from.forward[a];
   }
   return to;
-}
-
-void clear(AxisArrays& axis) {
-  axis.position.clear();
-  axis.camera.clear();
-  axis.from_eye.clear();
-  axis.world.clear();
-  axis.cell.clear();
-  axis.inverse_cell.clear();
-  axis.sample.clear();
-  axis.group.clear();
-  axis.visit.clear();
-  axis.bricks.clear();
 }
 
 void add_kernel(const Scene& scene, int a, const AxisKernel& kernel, AxisArrays& axis) {
@@ -126,7 +114,7 @@ void add_lines(const Scene& scene, double depth_origin, PassPlan& pass) {
   }
   set_rates(from, pass.rate_x, pass.rate_z, to);
   style_lines(scene, from, depth_origin, to);
-  if (from.color_by == scene::LineColor::scalar) {
+  if (from.color_by == scene::LineColor::scalar && !from.streamlets) {
     WINDSPLAT_CHECK(from.color_field != nullptr);
     check_volume(*from.color_field, scene.lattice);
     to.color_values = from.color_field->values.data();
@@ -137,6 +125,7 @@ void add_lines(const Scene& scene, double depth_origin, PassPlan& pass) {
   to.color = make_table(from.color, pass.line_rgb, by_magnitude ? to.magnitude_scale : 1,
                         by_depth ? depth_origin : 0);
   if (from.color_by == scene::LineColor::rise) color_by_rise(scene, from, to);
+  if (from.streamlets) chain_lines(*from.streamlets, to);
   pass.kernel.has_lines = 1;
   pass.kernel.by_depth = 1;
 }
@@ -294,19 +283,36 @@ void plan_slabs(const Scene& scene, RenderPlan& plan) {
   plan.slab_depth = std::max(slab_depth_asked(scene), slab_depth_least(scene));
 }
 
-void finish_pass(const Scene& scene, double depth_origin, int major, const SampleWays& ways,
-                 PassPlan& pass) {
-  const auto& dims = scene.lattice.dims;
+void place_positions(const Scene& scene, int major, const SampleWays& ways, PassPlan& pass) {
   kernels::Pass& to = pass.kernel;
   to.major = major;
   to.u = major == 0 ? 1 : 0;
   to.v = major == 2 ? 1 : 2;
+  for (int a = 0; a < 3; ++a) {
+    AxisArrays& axis = pass.axis[a];
+    place_axis(scene, a, pass.stride, axis);
+    to.cell_max[a] = *std::max_element(axis.cell.begin(), axis.cell.end());
+  }
+  to.around = scene.lattice.around;
+  if (scene.lattice.places) bend_pass(scene, ways, pass);
+}
+
+void finish_pass(const Scene& scene, double depth_origin, int major, const SampleWays& ways,
+                 PassPlan& pass) {
+  const trace::Segments* const segments =
+      pass.vector != nullptr ? pass.vector->streamlets.get() : nullptr;
+  const auto& dims = segments != nullptr ? segments->dims : scene.lattice.dims;
+  kernels::Pass& to = pass.kernel;
+  if (segments != nullptr) {
+    place_chains(*segments, pass);
+  } else {
+    place_positions(scene, major, ways, pass);
+  }
   to.step[0] = 1;
   to.step[1] = dims[0];
   to.step[2] = static_cast<std::int64_t>(dims[0]) * dims[1];
   for (int a = 0; a < 3; ++a) {
-    AxisArrays& axis = pass.axis[a];
-    place_axis(scene, a, pass.stride, axis);
+    const AxisArrays& axis = pass.axis[a];
     to.axis[a] = {static_cast<int>(axis.sample.size()),
                   axis.camera.data(),
                   axis.from_eye.data(),
@@ -316,14 +322,11 @@ void finish_pass(const Scene& scene, double depth_origin, int major, const Sampl
                   axis.sample.data(),
                   axis.group.data(),
                   axis.visit.data()};
-    to.cell_max[a] = *std::max_element(axis.cell.begin(), axis.cell.end());
     to.dims[a] = dims[a];
   }
-  to.around = scene.lattice.around;
   to.compositing = pass.vector != nullptr && pass.vector->combine_or
                        ? kernels::compositing_or
                        : static_cast<int>(scene.compositing);
-  if (scene.lattice.places) bend_pass(scene, ways, pass);
   if (pass.vector != nullptr) add_lines(scene, depth_origin, pass);
   add_medium(scene, pass);
   if (scene.light) add_light(scene, pass);
@@ -371,11 +374,13 @@ void begin_pass(int stride, PassPlan& pass) {
   pass.kernel = kernels::Pass{};
 }
 
-// One pass per stride; the pass of the lines is the first. Lines combined by `or` have their own.
+// One pass per stride; the pass of the lines is the first. Lines combined by `or` and curved ones
+// have their own.
 void choose_passes(const Scene& scene, std::vector<PassPlan>& passes) {
   std::size_t used = 0;
   const auto with_stride = [&](int stride) -> PassPlan& {
-    for (std::size_t n = scene.vector && scene.vector->combine_or ? 1 : 0; n < used; ++n) {
+    const bool own = scene.vector && (scene.vector->combine_or || scene.vector->streamlets);
+    for (std::size_t n = own ? 1 : 0; n < used; ++n) {
       if (passes[n].stride == stride) return passes[n];
     }
     if (used == passes.size()) passes.emplace_back();
@@ -450,7 +455,8 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   plan.camera = make_camera(scene);
   plan.body = make_body(scene);
   plan.compositing = static_cast<int>(scene.compositing);
-  plan.curved = scene.lattice.places != nullptr;
+  const bool bent = scene.lattice.places != nullptr;
+  plan.curved = bent || (scene.vector && scene.vector->streamlets);
   plan.slabs = scene.method == scene::Method::slab;
   plan.stop_transmittance = static_cast<float>(scene.stop_transmittance);
   plan.perspective_medium = scene.camera.perspective && !scene.scalars.empty();
@@ -459,7 +465,7 @@ void make_plan(const Scene& scene, RenderPlan& plan) {
   const int major = major_axis(scene.camera, scene.lattice);
   plan.eye_inside = is_inside(scene.camera, scene.lattice);
   plan.eye_sample = eye_index(scene.camera, major, scene.lattice.positions[major]);
-  if (plan.curved) measure_ways(scene.lattice, plan.ways);
+  if (bent) measure_ways(scene.lattice, plan.ways);
   for (PassPlan& pass : plan.passes) {
     finish_pass(scene, plan.camera.depth_origin, major, plan.ways, pass);
   }

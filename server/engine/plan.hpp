@@ -89,9 +89,9 @@ struct RenderPlan {
   bool perspective_medium = false;  // pixel rays are needed
   bool slabs = false;               // the slab method
   bool or_lines = false;            // the first pass has lines that are combined by `or`
-  bool curved = false;              // visibility order by depth only
-  int compositing = 0;              // scene::Compositing
-  double slab_depth = 1;            // depth of a slab along the view, world units
+  bool curved = false;    // visibility order by depth only: a curved lattice, or curved lines
+  int compositing = 0;    // scene::Compositing
+  double slab_depth = 1;  // depth of a slab along the view, world units
   float stop_transmittance = 0;
   int tile_pixels = 0;  // along a tile's side, at most kernels::tile_side
   Variant variant;      // variant, without target and level

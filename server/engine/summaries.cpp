@@ -92,7 +92,12 @@ namespace {
 
 template <class Visit>
 void each_field(const PassPlan& pass, const Visit& visit) {
-  if (pass.vector != nullptr) visit(pass.vector->field);
+  if (pass.vector != nullptr) {
+    const auto& segments = pass.vector->streamlets;
+    // Of curved lines, the segments are what is read.
+    visit(segments ? std::shared_ptr<const data::Volume>(segments, pass.vector->field.get())
+                   : pass.vector->field);
+  }
   for (const scene::ScalarLayer* scalar : pass.scalars) visit(scalar->field);
 }
 

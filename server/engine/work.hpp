@@ -3,8 +3,11 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "server/trace/segments.hpp"
 
 namespace windsplat::engine {
 
@@ -50,6 +53,7 @@ struct WorkReport {
   std::vector<std::string> fields;  // set by the caller
   std::int64_t bytes = 0;           // size of the fields read
   Variant variant;
+  std::optional<trace::Tally> streamlets;  // set by the caller
 };
 
 }  // namespace windsplat::engine

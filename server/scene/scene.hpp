@@ -15,6 +15,7 @@
 #include "server/data/model/volume.hpp"
 #include "server/surface/shown.hpp"
 #include "server/terrain/terrain.hpp"
+#include "server/trace/segments.hpp"
 
 namespace windsplat::scene {
 
@@ -78,6 +79,9 @@ enum class LineColor { world_z, screen_z, rise, magnitude, direction, scalar, co
 // The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in docs/design/rendering-model.md).
 struct VectorLayer {
   std::shared_ptr<const data::Volume> field;
+  // Curved lines in place of straight ones, of all kernel positions; null: straight lines. Their
+  // values of colour lie in the range of `color`, scaled like their magnitudes by a power of two.
+  std::shared_ptr<const trace::Segments> streamlets;
   glm::dvec3 scale{1, 1, 1};  // factor of each component, applied first
   // Used for lines along trajectories in the world (space = world): world units per second per unit
   // of each component, by y index of the data for x (meridians converge), constant for y, by z

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
+#include <limits>
 
 namespace windsplat::trace {
 
@@ -125,25 +126,26 @@ double rate_at(std::span<const double> rates, const std::array<int, 2>& sample, 
          share * rates[static_cast<std::size_t>(sample[1])];
 }
 
-// False where every sample with a share is masked.
-bool interpolate(const Flow& flow, const Corners& at, glm::dvec3& vector) {
+// The means of some values at a place, without masked samples. False where every sample with a
+// share is masked.
+bool interpolate(const Flow& flow, const Corners& at, const std::array<const float*, 3>& values,
+                 glm::dvec3& out) {
   double total = 0;
-  vector = glm::dvec3(0);
+  out = glm::dvec3(0);
   each_corner(flow, at, [&](std::size_t sample, unsigned corner) {
     double share = 1;
     for (unsigned a = 0; a < 3; ++a) {
       share *= share_of(corner >> a & 1U, std::clamp(at.part[a], 0.0, 1.0));
     }
-    if (!(share > 0) || std::isnan(flow.components[0][sample])) return;
+    if (!(share > 0) || std::isnan(values[0][sample])) return;
     total += share;
     for (int c = 0; c < 3; ++c) {
-      if (flow.components[c] != nullptr) {
-        vector[c] += share * static_cast<double>(flow.components[c][sample]);
-      }
+      const float* const from = values[static_cast<std::size_t>(c)];
+      if (from != nullptr) out[c] += share * static_cast<double>(from[sample]);
     }
   });
   if (!(total > 0)) return false;
-  vector /= total;
+  out /= total;
   return true;
 }
 
@@ -172,7 +174,7 @@ glm::dvec3 Flow::place(const glm::dvec3& index) const {
 bool motion_at(const Flow& flow, const glm::dvec3& index, Motion& out) {
   constexpr double flattest = 1e-6;  // of an edge, relative to the longest
   const Corners at = corners_of(flow, index);
-  if (!interpolate(flow, at, out.vector)) return false;
+  if (!interpolate(flow, at, flow.components, out.vector)) return false;
   out.magnitude = glm::length(out.vector);
   glm::dvec3 drawn = out.vector * flow.scale;
   if (!flow.rate_x.empty()) {
@@ -180,9 +182,10 @@ bool motion_at(const Flow& flow, const glm::dvec3& index, Motion& out) {
                         rate_at(flow.rate_z, at.sample[2], at.part[2]));
   }
   out.speed = glm::length(drawn);
-  out.along = glm::dvec3(0);
+  out.along = out.drawn = glm::dvec3(0);
   if (!(out.speed > 0)) return true;
   drawn /= out.speed;
+  out.drawn = drawn;
   const Cell cell = cell_at(flow, index, at);
   glm::dvec3 width(0);
   for (int a = 0; a < 3; ++a) width[a] = glm::length(cell.edge[a]);
@@ -196,6 +199,12 @@ bool motion_at(const Flow& flow, const glm::dvec3& index, Motion& out) {
   if (!(length > 0)) return false;
   out.along = drawn / (width * length);
   return true;
+}
+
+double value_at(const Flow& flow, const float* values, const glm::dvec3& index) {
+  glm::dvec3 out(0);
+  const bool known = interpolate(flow, corners_of(flow, index), {values, nullptr, nullptr}, out);
+  return known ? out.x : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace windsplat::trace

@@ -38,9 +38,14 @@ struct Motion {
   glm::dvec3 vector{0, 0, 0};  // components of the data
   double magnitude = 0;        // of the data
   double speed = 0;            // length of the drawn vector; 0: no direction
+  glm::dvec3 drawn{0, 0, 0};   // unit vector along the edges of the cell
   glm::dvec3 along{0, 0, 0};   // change of index per unit of world length along the flow
 };
 // False where all samples with a share are masked, or the cell is degenerate (at a pole).
 bool motion_at(const Flow& flow, const glm::dvec3& index, Motion& out);
+
+// A scalar of the same lattice, interpolated in the same way; NaN where every sample with a share
+// is masked.
+double value_at(const Flow& flow, const float* values, const glm::dvec3& index);
 
 }  // namespace windsplat::trace

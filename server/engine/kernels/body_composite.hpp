@@ -407,6 +407,7 @@ struct Compositor {
 };
 
 inline int signature_of(const LineStyle& line) {
+  if (line.chains.q != nullptr) return style_chain;
   if (line.moving != 0) return style_moving;
   return line.head_desaturation > 0 ? style_head : style_plain;
 }
@@ -431,6 +432,12 @@ inline Compositor compositor_with() {
 // A plain line is drawn as one whose head equals its tail.
 template <bool Perspective, int Compositing>
 inline Compositor compositor_with(int style) {
+  if (style == style_chain) {
+    // Chains have a pass without splats.
+    Compositor with = compositor_with<Perspective, Compositing, style_head>();
+    with.line = line_window<Perspective, style_chain>;
+    return with;
+  }
   return style == style_moving ? compositor_with<Perspective, Compositing, style_moving>()
                                : compositor_with<Perspective, Compositing, style_head>();
 }

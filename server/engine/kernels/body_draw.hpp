@@ -85,6 +85,8 @@ void draw_styled(const Prepared& p, int style, int l, Tile& tile) {
     draw_line<Perspective, style_head>(p, l, tile);
   } else if (style == style_moving) {
     draw_line<Perspective, style_moving>(p, l, tile);
+  } else if (style == style_chain) {
+    draw_line<Perspective, style_chain>(p, l, tile);
   } else {
     draw_line<Perspective, style_plain>(p, l, tile);
   }
@@ -289,7 +291,7 @@ void draw_at_body(const Prepared& p, const Compositor& with, const KernelDepths&
     kernel.from = static_cast<int>(from_of<Perspective>(p, l));
   }
   const int near = kernel.from == static_cast<int>(From::near_plane) ? 1 : 0;
-  const DividedKernel divided = {&kernel.ribbon, &kernel.splat, p.pass->line.moving, near,
+  const DividedKernel divided = {&kernel.ribbon, &kernel.splat, motion_of(p.pass->line), near,
                                  p.positions.depth[l]};
   each_window(p.footing, l, lined, splatted,
               [&](int row, int column, std::uint64_t lines, std::uint64_t splats) {

@@ -184,6 +184,10 @@ inline void read_extremes(const LineStyle& line, const Three<Kernel>& rates, con
 // negative magnitude.
 KERNEL_INLINE Vectors read_vectors(const Pass& pass, const Rows& rows, int i) {
   const LineStyle& line = pass.line;
+  if (line.chains.q != nullptr) {
+    const Kernel zero = hn::Zero(KernelTag());
+    return {fetch(line.chains.magnitude, rows, i), {zero, zero, zero}};
+  }
   const Three<Kernel> all_sizes = fetch_vectors(pass, rows, i);
   const auto moderate = is_moderate(all_sizes);
   const Three<Kernel> v = {hn::IfThenElseZero(moderate, all_sizes.x),
@@ -329,6 +333,12 @@ inline float splat_cover(const Pass& pass, const Rows& rows, int i, float scale)
   return larger(larger(volume * scale * scale, section * scale), chord);
 }
 
+// The length of a line that is not drawn relative to LineStyle::length.
+inline float weak_part(const LineStyle& line, const Rows& rows, int i, float magnitude) {
+  if (line.chains.q != nullptr) return line.chains.q[offset_of(rows, i)];
+  return smaller(magnitude * line.inverse_full_magnitude, 1.0F);
+}
+
 // Adds the lines of a pair of rows to the summary. Returns the positions with a line.
 std::uint32_t summarise_lines(const Pass& pass, const Rows& rows, BrickSummary& summary) {
   const Kernel least = all<Kernel>(least_magnitude(pass.line));
@@ -346,7 +356,7 @@ std::uint32_t summarise_lines(const Pass& pass, const Rows& rows, BrickSummary& 
         summary.magnitude_max = larger(summary.magnitude_max, magnitude[k]);
       } else if ((here >> static_cast<unsigned>(k) & 1U) != 0 && magnitude[k] > 0) {
         ++summary.weak_lines;
-        summary.weak_parts += smaller(magnitude[k] * pass.line.inverse_full_magnitude, 1.0F);
+        summary.weak_parts += weak_part(pass.line, rows, i + k, magnitude[k]);
       }
     }
   }

@@ -24,10 +24,23 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
                 0,
                 line.reach,
                 line.steep,
-                line.opacity};
-  if (line.moving != 0) {
+                line.opacity,
+                0,
+                0,
+                0,
+                0,
+                1};
+  const int motion = motion_of(line);
+  if (motion != motion_none) {
     out.phase = r.phase[l];
     out.phase_rise = r.phase_rise[l];
+  }
+  if (motion == motion_chain) {
+    out.cut_x = r.cut_x[l];
+    out.cut_y = r.cut_y[l];
+    out.end_x = r.end_x[l];
+    out.end_y = r.end_y[l];
+    out.end_most = r.end_most[l];
   }
   return out;
 }

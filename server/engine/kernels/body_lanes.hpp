@@ -11,6 +11,17 @@ namespace {
 constexpr int style_plain = 0;
 constexpr int style_head = 1;
 constexpr int style_moving = 2;
+constexpr int style_chain = 3;  // the same, a segment of a chain
+
+// Straight lines without and with a moving texture, and segments of chains.
+constexpr int motion_none = 0;
+constexpr int motion_phase = 1;
+constexpr int motion_chain = 2;
+
+inline int motion_of(const LineStyle& line) {
+  if (line.chains.q != nullptr) return motion_chain;
+  return line.moving != 0 ? motion_phase : motion_none;
+}
 
 // Pixel centres of a block, relative to its corner.
 alignas(64) constexpr float lane_x[block_pixels] = {0.5F, 1.5F, 2.5F, 3.5F, 0.5F, 1.5F, 2.5F, 3.5F,
@@ -26,6 +37,7 @@ struct RibbonLanes {
   Pixel tail[3], rise[3];
   Pixel phase, phase_rise;
   Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
+  Pixel cut_x, cut_y, end_x, end_y, end_most;
 };
 
 KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
@@ -45,7 +57,12 @@ KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
           lanes(r.phase_rise),
           lanes(r.reach),
           lanes(r.steep),
-          lanes(r.opacity)};
+          lanes(r.opacity),
+          lanes(r.cut_x),
+          lanes(r.cut_y),
+          lanes(r.end_x),
+          lanes(r.end_y),
+          lanes(r.end_most)};
 }
 
 // The same from the arrays of a brick.
@@ -69,9 +86,18 @@ KERNEL_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l)
     out.rise[c] = one(rise[c]);
   }
   out.phase = out.phase_rise = hn::Zero(PixelTag());
-  if (line.moving != 0) {
+  const int motion = motion_of(line);
+  if (motion != motion_none) {
     out.phase = lanes(r.phase);
     out.phase_rise = lanes(r.phase_rise);
+  }
+  out.cut_x = out.cut_y = out.end_x = out.end_y = out.end_most = hn::Zero(PixelTag());
+  if (motion == motion_chain) {
+    out.cut_x = lanes(r.cut_x);
+    out.cut_y = lanes(r.cut_y);
+    out.end_x = lanes(r.end_x);
+    out.end_y = lanes(r.end_y);
+    out.end_most = lanes(r.end_most);
   }
   out.reach = one(line.reach);
   out.steep = one(line.steep);
@@ -107,10 +133,16 @@ KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   const Pixel ex = hn::NegMulAdd(w, r.ux, dx);
   const Pixel ey = hn::NegMulAdd(w, r.uy, dy);
   const Pixel distance = hn::Sqrt(hn::MulAdd(ex, ex, ey * ey));
-  const Pixel cover = clamped(hn::NegMulAdd(distance, r.steep, r.reach), zero, r.opacity);
+  Pixel cover = clamped(hn::NegMulAdd(distance, r.steep, r.reach), zero, r.opacity);
+  if (Style == style_chain) {
+    // The next segment computes its cut from the same numbers in the same order as this its end.
+    const Pixel from_cut = hn::MulAdd(r.cut_x, dx, r.cut_y * dy);
+    const Pixel to_end = hn::MulAdd(r.end_x, dx - r.ux, r.end_y * (dy - r.uy));
+    cover = hn::IfThenElseZero(hn::And(hn::Ge(from_cut, zero), hn::Lt(to_end, r.end_most)), cover);
+  }
   if (Style == style_plain) return {cover, zero};
   const Pixel f = along_ribbon<Along>(r, w);
-  if (Style == style_moving) {
+  if (Style == style_moving || Style == style_chain) {
     // W(frac(q + 1/2 - phase)), W(p) = 1 - |2 p - 1|.
     const Pixel one = all<Pixel>(1.0F);
     const Pixel shifted = hn::MulAdd(f, r.phase_rise, r.phase);

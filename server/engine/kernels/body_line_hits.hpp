@@ -8,7 +8,7 @@ namespace windsplat::engine::kernels {
 namespace {
 
 inline RibbonRecord ribbon_record(const LineStyle& line, const Prepared& p, int l) {
-  RibbonRecord out = {ribbon_at(line, p.ribbons, l), line.moving, 0};
+  RibbonRecord out = {ribbon_at(line, p.ribbons, l), motion_of(line), 0};
   out.ribbon.depth += p.positions.depth[l];
   out.bent = absolute(out.ribbon.bend) > series_bend_max ? 1 : 0;
   return out;
@@ -137,18 +137,18 @@ KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, Between slab, Pixel px
   return {here, hn::IfThenElseZero(here, opacity), depth, f};
 }
 
+template <Depth Along>
+KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, Between slab, Pixel px, Pixel py) {
+  if (line.motion == motion_chain) return hit_lanes<Along, style_chain>(line, slab, px, py);
+  return line.motion != motion_none ? hit_lanes<Along, style_moving>(line, slab, px, py)
+                                    : hit_lanes<Along, style_head>(line, slab, px, py);
+}
+
 template <bool Perspective>
 KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, Between slab, Pixel px, Pixel py) {
-  if (!Perspective) {
-    return line.moving != 0 ? hit_lanes<Depth::flat, style_moving>(line, slab, px, py)
-                            : hit_lanes<Depth::flat, style_head>(line, slab, px, py);
-  }
-  if (line.bent == 0) {
-    return line.moving != 0 ? hit_lanes<Depth::series, style_moving>(line, slab, px, py)
-                            : hit_lanes<Depth::series, style_head>(line, slab, px, py);
-  }
-  return line.moving != 0 ? hit_lanes<Depth::exact, style_moving>(line, slab, px, py)
-                          : hit_lanes<Depth::exact, style_head>(line, slab, px, py);
+  if (!Perspective) return hit_lanes<Depth::flat>(line, slab, px, py);
+  return line.bent == 0 ? hit_lanes<Depth::series>(line, slab, px, py)
+                        : hit_lanes<Depth::exact>(line, slab, px, py);
 }
 
 KERNEL_INLINE Pixel fraction_in(const Slab& slab, Pixel depth) {

@@ -238,6 +238,8 @@ KERNEL_INLINE Kernel bearing(Kernel x, Kernel y) {
 // one.
 KERNEL_INLINE Kernel color_value(const LineStyle& line, const Rows& rows, const Vectors& vectors,
                                  const Segments& s, Kernel depth, int i) {
+  // Of segments, the value is that in their middle.
+  if (line.chains.q != nullptr && line.color_by != 1) return fetch(line.chains.color, rows, i);
   const Kernel z =
       hn::MulAdd(s.lift, load<Kernel>(rows.cell[2] + i), load<Kernel>(rows.height + i));
   switch (line.color_by) {

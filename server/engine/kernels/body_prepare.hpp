@@ -3,6 +3,7 @@
 #pragma once
 
 #include "server/engine/kernels/body_footing.hpp"
+#include "server/engine/kernels/lines/body_chains.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
@@ -118,8 +119,25 @@ struct BrickMaker {
     return find_splat_blocks(outline, tile, l, splats, out.footing);
   }
 
+  // Prepares the segments of a pair.
+  void make_chain_pair(int pair, std::uint32_t bits) {
+    for (int i = 0; i < pair_kernels; i += kernel_lanes) {
+      const int l = pair_kernels * pair + i;
+      const Vectors vectors = read_vectors(pass, rows, i);
+      const Kernel least = all<Kernel>(least_magnitude(pass.line));
+      const std::uint32_t here =
+          lanes_at(bits, i) & bits_of<Kernel>(hn::Ge(vectors.magnitude, least));
+      if (here == 0) continue;
+      const std::uint64_t lines =
+          here & prepare_chains<Perspective>(camera, pass, rows, out.positions, vectors, i, l,
+                                             shades, out.ribbons);
+      out.positions.lines |= lines << static_cast<unsigned>(l);
+    }
+  }
+
   void make_pair(int pair, std::uint32_t bits) {
     set_pair(pass, pair, rows);
+    if (Lines && Curved && pass.line.chains.q != nullptr) return make_chain_pair(pair, bits);
     if (Curved) {
       fill_cells(camera, pass, rows, cells);
       bits &= cells.solid;

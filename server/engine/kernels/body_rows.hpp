@@ -149,13 +149,19 @@ inline double dot3(const double a[3], const double b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-// The same for a curved lattice, whose positions are stored by sample.
+// The same for a curved lattice, whose positions are stored by sample; of a chain, the middle of
+// each segment.
 void place_curved_pair(const Camera& camera, const Pass& pass, int pair, const Rows& rows,
                        KernelPositions& positions) {
   for (int i = 0; i < pair_kernels; ++i) {
     const float* position = pass.places + 3 * offset_of(rows, i);
     double at[3];
     for (int c = 0; c < 3; ++c) at[c] = static_cast<double>(position[c]) - camera.eye[c];
+    if (pass.line.chains.q != nullptr) {
+      for (int c = 0; c < 3; ++c) {
+        at[c] += 0.5 * (static_cast<double>(position[3 + c]) - static_cast<double>(position[c]));
+      }
+    }
     const double z = dot3(camera.world_forward, at);
     const int l = pair_kernels * pair + i;
     positions.x[l] = static_cast<float>(dot3(camera.world_right, at));

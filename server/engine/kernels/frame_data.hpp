@@ -45,7 +45,19 @@ struct ColorTable {
   float scale;  // entries - 1 over the range
 };
 
+// Segments of curved lines in place of a straight line for each sample (trace::Segments): arrays by
+// vertex, whose positions are Pass::places. Kernel position v is the segment from vertex v to the
+// next.
+struct Chains {
+  const float* q;  // null: straight lines
+  const float* magnitude;
+  const float* tangent[3];
+  const float* phase;
+  const float* color;
+};
+
 struct LineStyle {
+  Chains chains;
   const float* velocity[3];  // third null for a horizontal field
   float scale[3];
   const float* rate_x;  // by sample of the data along y; null: components are not scaled

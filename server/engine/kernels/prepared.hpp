@@ -38,6 +38,13 @@ struct Ribbons {
   // q + 3/2 - phase at f = 0, in [0, 2]; only with phase motion.
   alignas(64) float phase[brick_kernels];
   alignas(64) float phase_rise[brick_kernels];
+  // Segments of a chain: the pixel at (dx, dy) from f = 0 belongs to it where cut . d >= 0, and
+  // end . (d - u) < end_most, so that segments neither overlap nor leave a gap where they meet.
+  alignas(64) float cut_x[brick_kernels];
+  alignas(64) float cut_y[brick_kernels];
+  alignas(64) float end_x[brick_kernels];
+  alignas(64) float end_y[brick_kernels];
+  alignas(64) float end_most[brick_kernels];
   alignas(64) float tail[brick_kernels][color_floats];  // colour at f = 0
   alignas(64) float rise[brick_kernels][color_floats];  // colour at f = 1 minus tail
 };
@@ -148,6 +155,7 @@ struct Ribbon {
   float depth, depth_rise;
   float phase, phase_rise;
   float reach, steep, opacity;
+  float cut_x, cut_y, end_x, end_y, end_most;
 };
 
 // Constants of the form of one splat; see Splats.
@@ -185,8 +193,8 @@ struct SplatRecord {
 
 struct RibbonRecord {
   Ribbon ribbon;  // depth of its centre from the camera's depth origin
-  int moving;
-  int bent;  // too much perspective for the series approximation of depth
+  int motion;     // see motion_of
+  int bent;       // too much perspective for the series approximation of depth
 };
 
 // A line that may touch a block, with the range of depths of its pixels there.

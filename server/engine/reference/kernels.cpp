@@ -126,7 +126,10 @@ KernelBounds kernel_bounds(const Scene& scene) {
   for (const LayerGroup& group : group_layers(scene)) {
     std::uint64_t positions = 1;
     for (const auto& axis : group.axis) positions *= axis.size();
-    if (group.lines != nullptr) bounds.ribbons += positions;
+    if (group.lines != nullptr) {
+      const auto& segments = group.lines->streamlets;
+      bounds.ribbons += segments ? segments->vertices() : positions;
+    }
     if (!group.media.empty()) bounds.splats += positions;
   }
   return bounds;
@@ -141,13 +144,15 @@ Kernels list_kernels(const Scene& scene, const View& view, const CancelToken& ca
 void list_kernels(const Scene& scene, const View& view, const CancelToken& cancel,
                   Kernels& kernels) {
   for (const LayerGroup& group : group_layers(scene)) {
+    const bool curved = group.lines != nullptr && group.lines->streamlets;
+    if (curved) list_chains(scene, view, *group.lines, kernels);
     for (const AxisPosition& z : group.axis[2]) {
       for (const AxisPosition& y : group.axis[1]) {
         if (cancel.cancelled()) return;
         for (const AxisPosition& x : group.axis[0]) {
           const KernelPosition position = make_kernel_position(scene, view, {x, y, z});
           if (!position.has_cell) continue;
-          if (group.lines != nullptr) {
+          if (group.lines != nullptr && !curved) {
             const auto ribbon = make_ribbon(scene, view, *group.lines, position);
             if (ribbon) kernels.ribbons.push_back(*ribbon);
           }

@@ -110,6 +110,11 @@ struct BasicRibbon {
   bool perspective = false;
   bool moving = false;
   Real phase = 0;
+  // A segment of a curved line: it has the pixels p with cut . (p - start) >= 0 and
+  // end . (p - end of the line) < end_most.
+  bool chained = false;
+  std::array<Real, 2> cut{}, end{};
+  Real end_most = 1;
 };
 using Ribbon = BasicRibbon<double>;
 
@@ -134,6 +139,12 @@ RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
   const Real distance = std::hypot(px - w * ux, py - w * uy);
   RibbonHit<Real> hit;
   if (distance >= line.r2) return hit;
+  if (line.chained) {
+    if (line.cut[0] * px + line.cut[1] * py < 0) return hit;
+    const Real ex = x - line.x1;
+    const Real ey = y - line.y1;
+    if (line.end[0] * ex + line.end[1] * ey >= line.end_most) return hit;
+  }
   hit.opacity =
       line.opacity * (distance <= line.r1 ? Real(1) : (line.r2 - distance) / (line.r2 - line.r1));
   Real f = w;
@@ -197,6 +208,9 @@ struct Kernels {
   std::vector<ScreenBox> splat_boxes;
   std::vector<Ribbon> ribbons;
 };
+// Appends the segments of the layer's streamlets.
+void list_chains(const scene::Scene& scene, const View& view, const scene::VectorLayer& layer,
+                 Kernels& kernels);
 // The list is incomplete after cancellation.
 Kernels list_kernels(const scene::Scene& scene, const View& view, const CancelToken& cancel = {});
 // The same, appended to `kernels`; vectors with sufficient capacity do not reallocate.

@@ -1,0 +1,129 @@
+// Segments of curved lines -> lines on the screen.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "server/engine/reference/kernels.hpp"
+
+namespace windsplat::engine::reference {
+
+namespace {
+
+using scene::LineColor;
+using scene::Scene;
+using scene::VectorLayer;
+using trace::Segments;
+
+struct Joint {
+  Vec at{};                     // right, down, forward of the eye
+  double x = 0, y = 0;          // pixels, if it lies beyond the near plane
+  double way_x = 0, way_y = 0;  // the direction of its tangent on the screen
+  bool beyond = true;
+};
+
+void to_screen(const View& view, const Vec& p, double& x, double& y) {
+  const double z = view.perspective ? p[2] : 1;
+  x = view.half_width + p[0] / (z * view.pixel);
+  y = view.half_height + p[1] / (z * view.pixel);
+}
+
+Joint joint_at(const View& view, const Segments& from, std::size_t vertex) {
+  Joint joint;
+  Vec world{};
+  Vec along{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    world[c] = static_cast<double>(from.places[vertex][c]) - view.eye[c];
+    along[c] = static_cast<double>(from.tangents[c][vertex]);
+  }
+  joint.at = to_camera(view, world);
+  joint.beyond = !view.perspective || joint.at[2] >= view.near;
+  if (joint.beyond) to_screen(view, joint.at, joint.x, joint.y);
+  const Vec way = to_camera(view, along);
+  joint.way_x = view.perspective ? way[0] * joint.at[2] - joint.at[0] * way[2] : way[0];
+  joint.way_y = view.perspective ? way[1] * joint.at[2] - joint.at[1] * way[2] : way[1];
+  return joint;
+}
+
+double fraction_of(double v, double low, double high) {
+  if (high > low) return std::clamp((v - low) / (high - low), 0.0, 1.0);
+  return v > low ? 1 : 0;
+}
+
+// The value of a vertex as the colours of the layer count it; rise, on [0, 1].
+Vec color_at(const VectorLayer& layer, double value, double depth) {
+  if (layer.color_by == LineColor::screen_z) return table_color(layer.color, depth);
+  if (layer.color_by == LineColor::constant) return table_color(layer.color, 0);
+  if (std::isnan(value)) return {0.5, 0.5, 0.5};
+  if (layer.color_by == LineColor::rise) {
+    const auto [low, high] = layer.color.range;
+    return table_color(layer.color, low + value * (high - low));
+  }
+  return table_color(layer.color, value);
+}
+
+// Clips a segment to the near plane. Returns false if nothing remains.
+bool place_ends(const View& view, const Joint& from, const Joint& to, Ribbon& line) {
+  if (!from.beyond && !to.beyond) return false;
+  const Vec way = plus(to.at, -1, from.at);
+  const double part = from.beyond && to.beyond ? 0 : (view.near - from.at[2]) / way[2];
+  line.a = from.beyond ? from.at : plus(from.at, part, way);
+  line.b = to.beyond ? to.at : plus(from.at, part, way);
+  if (view.perspective) {
+    line.a[2] = std::max(line.a[2], view.near);
+    line.b[2] = std::max(line.b[2], view.near);
+  }
+  const double rise = line.q1 - line.q0;
+  if (!to.beyond) line.q1 = line.q0 + part * rise;
+  if (!from.beyond) line.q0 += part * rise;
+  to_screen(view, line.a, line.x0, line.y0);
+  to_screen(view, line.b, line.x1, line.y1);
+  const double ux = line.x1 - line.x0;
+  const double uy = line.y1 - line.y0;
+  if (from.beyond && from.way_x * ux + from.way_y * uy > 0) line.cut = {from.way_x, from.way_y};
+  if (to.beyond && to.way_x * ux + to.way_y * uy > 0) {
+    line.end = {to.way_x, to.way_y};
+    line.end_most = 0;
+  }
+  return true;
+}
+
+}  // namespace
+
+void list_chains(const Scene& scene, const View& view, const VectorLayer& layer, Kernels& kernels) {
+  const Segments& from = *layer.streamlets;
+  const double full = layer.magnitude_range[1];
+  // The scale of the magnitudes of the segments, a power of two.
+  const double scale = from.magnitude_scale;
+  for (std::size_t v = 0; v + 1 < from.vertices(); ++v) {
+    if (from.magnitudes[v] < 0 || from.magnitudes[v] == Segments::not_drawn) continue;
+    const Joint a = joint_at(view, from, v);
+    const Joint b = joint_at(view, from, v + 1);
+    Ribbon line;
+    line.q0 = static_cast<double>(from.q[v]);
+    line.q1 = static_cast<double>(from.q[v + 1]);
+    if (!place_ends(view, a, b, line)) continue;
+    line.chained = true;
+    line.r1 = layer.r1;
+    line.r2 = layer.r2;
+    line.opacity = layer.opacity;
+    line.desaturation = layer.head_desaturation;
+    line.perspective = view.perspective;
+    line.moving = layer.moving;
+    const double depth = 0.5 * (a.at[2] + b.at[2]);
+    const double magnitude = static_cast<double>(from.magnitudes[v]) / scale;
+    const double strong = fraction_of(magnitude, layer.magnitude_range[0], full);
+    const double far = fraction_of(depth, scene.depth_cue.near, scene.depth_cue.far);
+    const double dim =
+        (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
+    double value = static_cast<double>(from.colors[v]);
+    if (layer.color_by == LineColor::magnitude) value /= scale;
+    line.color = scaled(color_at(layer, value, depth), dim);
+    if (layer.moving) {
+      const double part = full > 0 ? std::min(magnitude / full, 1.0) : 1.0;
+      line.phase = static_cast<double>(from.phases[v]) + layer.motion_cycles * part;
+    }
+    kernels.ribbons.push_back(line);
+  }
+}
+
+}  // namespace windsplat::engine::reference
