@@ -208,6 +208,18 @@ Json frame_error_json(const FrameInfo& info) {
   return out;
 }
 
+Json streamlets_json(const StreamletCounts& counts) {
+  return {{"lines", counts.lines},
+          {"segments", counts.segments},
+          {"evaluations", counts.evaluations},
+          {"ends",
+           {{"length", counts.by_length},
+            {"boundary", counts.by_boundary},
+            {"mask", counts.by_mask},
+            {"stagnation", counts.by_stagnation},
+            {"steps", counts.by_steps}}}};
+}
+
 }  // namespace
 
 Json frame_info_json(const FrameInfo& info) {
@@ -237,6 +249,7 @@ Json frame_info_json(const FrameInfo& info) {
              {"fields", info.fields},
              {"bytes", info.bytes},
              {"variant", info.variant}}}};
+  if (info.streamlets) out["work"]["streamlets"] = streamlets_json(*info.streamlets);
   if (!info.empty.empty()) out["empty"] = info.empty;
   return out;
 }

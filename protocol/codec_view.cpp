@@ -7,6 +7,7 @@
 #include "protocol/codec_light.hpp"
 #include "protocol/codec_names.hpp"
 #include "protocol/codec_region.hpp"
+#include "protocol/codec_trace.hpp"
 #include "protocol/limits.hpp"
 
 namespace windsplat::protocol {
@@ -214,6 +215,9 @@ VectorView read_vector(const Json& json, const std::string& pointer, Faults& fau
   if (const Json* jitter = reader.child("jitter")) {
     vector.jitter = read_jitter(*jitter, reader.at("jitter"), faults);
   }
+  if (const Json* trace = reader.child("trace", Presence::optional, Null::is_default)) {
+    vector.trace = read_trace(*trace, reader.at("trace"), faults);
+  }
   reader.finish();
   check_magnitudes(vector, reader);
   return vector;
@@ -396,6 +400,7 @@ Json vector_to_json(const VectorView& vector) {
             {{"mode", name_of(vector.motion, motion_names)},
              {"rate", canonical_number(vector.motion_rate)},
              {"time", canonical_number(vector.motion_time)}}},
+           {"trace", vector.trace ? trace_to_json(*vector.trace) : Json(nullptr)},
            {"jitter",
             {{"center", canonical_number(vector.jitter.center)},
              {"stride", canonical_number(vector.jitter.stride)},

@@ -127,6 +127,13 @@ struct DatasetDescription {
   // omitted.
   std::shared_ptr<const std::string> encoded;
 };
+// Streamlets of a view, traced once for all frames that show them.
+struct StreamletCounts {
+  std::int64_t lines = 0, segments = 0;
+  std::int64_t evaluations = 0;  // of the field
+  // Ends of lines, two each, by what ended them.
+  std::int64_t by_length = 0, by_boundary = 0, by_mask = 0, by_stagnation = 0, by_steps = 0;
+};
 struct FrameInfo {
   std::string method = "kernel";
   std::string compositing = "analytic";
@@ -147,6 +154,7 @@ struct FrameInfo {
   std::vector<std::string> fields;
   std::int64_t bytes = 0;
   std::string variant;
+  std::optional<StreamletCounts> streamlets;  // absent in JSON without streamlets
   std::string empty;  // why the picture shows nothing of the data; absent in JSON if empty
 };
 // RFC 9457.

@@ -95,6 +95,13 @@ struct VectorColorView {
   bool operator==(const VectorColorView&) const = default;
 };
 
+// Curved lines that follow the flow in place of straight ones.
+struct TraceView {
+  int segments = 8;          // straight pieces of a line, at most
+  double step_error = 1e-3;  // of each step of the integration, grid cells
+  bool operator==(const TraceView&) const = default;
+};
+
 struct JitterView {
   double center = 0.5;  // displacement range of the line in its kernel, strides
   double stride = 0.3;  // displacement range of the kernel, strides
@@ -124,6 +131,7 @@ struct VectorView {
   MotionMode motion = MotionMode::still;
   double motion_rate = 1.0;  // cycles per step at the top of magnitude_range
   double motion_time = 0.0;  // steps, added to the step
+  std::optional<TraceView> trace;
   JitterView jitter;
   bool operator==(const VectorView&) const = default;
 };

@@ -271,7 +271,8 @@ class Sampling {
     const scene::VectorLayer& layer = *scene_.vector;
     const double whole = reference::length(drawn->extent);
     const double most = layer.span * layer.stride * widest;
-    const double kept = whole > most ? most / whole : 1;
+    // Streamlets are not clipped, and are as long.
+    const double kept = whole > most && !layer.streamlets ? most / whole : 1;
     const double across = std::hypot(reference::dot(drawn->extent, view_.right),
                                      reference::dot(drawn->extent, view_.down));
     out.length = scale * across * kept;

@@ -51,6 +51,7 @@ void name_fields(const scene::Scene& scene, const scene::CompletedView& view,
   work.fields.clear();
   work.bytes = 0;
   if (scene.vector) {
+    if (scene.vector->streamlets) work.streamlets = scene.vector->streamlets->tally;
     name_field(*scene.vector->field, completed.vector.field.name, work);
     if (scene.vector->color_field) {
       // On a plane the colours of other quantities are computed from the vectors.

@@ -39,6 +39,13 @@ int stride_of(const protocol::View& view) {
   return !lines && medium ? view.scalars->front().stride : view.vector.stride;
 }
 
+protocol::StreamletCounts counts_of(const trace::Tally& tally) {
+  using trace::End;
+  const auto ended = [&](End by) { return tally.ends.at(static_cast<std::size_t>(by)); };
+  return {tally.lines,          tally.segments,     tally.evaluations,      ended(End::length),
+          ended(End::boundary), ended(End::masked), ended(End::stagnation), ended(End::steps)};
+}
+
 }  // namespace
 
 protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
@@ -71,6 +78,7 @@ protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
   info.fields = work.fields;
   info.bytes = work.bytes;
   info.variant = engine::text_of(work.variant);
+  if (work.streamlets) info.streamlets = counts_of(*work.streamlets);
   info.empty = frame.empty;
   return info;
 }

@@ -423,6 +423,8 @@ Result<std::optional<double>> measured_error(const Prepared& prepared, data::Dat
 // and beside a medium up to 0.14. Measuring the error takes 3.3 to 27 pictures by `kernel`; slabs
 // of half the thickness 1.3 to 2.5.
 bool is_change_measured(const scene::Scene& scene, const engine::WorkReport& work) {
+  // Weak streamlets were not traced and cannot be drawn.
+  if (scene.vector && scene.vector->streamlets && scene.vector->min_magnitude > 0) return false;
   const bool slab = scene.method == scene::Method::slab;
   const double few = slab ? 0x1p18 : 0x1p20;  // take no longer than describing the view
   const double pictures_most = slab ? 2.5 : 5;

@@ -256,6 +256,7 @@ PixelTrials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough
   const Spread spread = spread_places(kernels, through);
   PixelTrials out = TryingPixels(scene, cancel).run(spread);
   const Tolerances skipped = tolerances_of(scene);
+  if (scene.vector && scene.vector->streamlets && skipped.magnitude > 0) return out;
   out.skipped_change = skipped.magnitude > 0 || skipped.optical_depth > 0
                            ? TryingSkipped(scene, cancel).run(spread)
                            : 0.0;

@@ -24,7 +24,8 @@ struct PixelTrials {
   int places = 0;                         // that drew something
   double work = 0;
   // Mean over the picture of the channel of linear premultiplied RGBA that changes most; empty: too
-  // few places could be tried. 0 without trying if the tolerances are 0.
+  // few places could be tried, or streamlets are left out, which nothing has traced. 0 without
+  // trying if the tolerances are 0.
   std::optional<double> skipped_change;
 };
 

@@ -15,6 +15,7 @@
 #include "server/scene/region/crop.hpp"
 #include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
+#include "server/scene/traced/streamlets.hpp"
 
 namespace windsplat::scene {
 
@@ -187,13 +188,15 @@ bool shows_lines(const View& view) {
   return view.vector.field.kind == protocol::FieldChoice::Kind::named && view.vector.opacity > 0;
 }
 
-// A stride counts samples of the data, the reference uses all of them, and a section has its own.
+// A stride counts samples of the data, the reference uses all of them, a section has its own, and
+// streamlets follow the field itself.
 bool is_drawn_in_full(const View& view) {
   const bool strided = (shows_lines(view) && view.vector.stride > 1) ||
                        std::any_of(view.scalars->begin(), view.scalars->end(),
                                    [](const auto& scalar) { return scalar.stride > 1; });
-  return view.method.detail == protocol::Detail::full || strided || is_section(view.geometry) ||
-         view.method.name == protocol::MethodName::reference;
+  const bool traced = shows_lines(view) && has_streamlets(view);
+  return view.method.detail == protocol::Detail::full || strided || traced ||
+         is_section(view.geometry) || view.method.name == protocol::MethodName::reference;
 }
 
 MergeLimits merge_limits(const View& view) {
@@ -415,6 +418,11 @@ Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& co
     }
     if (auto ok = load(vectors, step, dataset, layer.field); !ok) return ok.error();
     merge_lines(whole, scene.level, pixels_per_unit(scene.camera, whole), layer);
+    if (has_streamlets(completed.view())) {
+      auto segments = streamlets_of(completed.view(), *completed.placed(), layer, dataset);
+      if (!segments) return segments.error();
+      layer.streamlets = std::move(*segments);
+    }
     scene.vector = std::move(layer);
   }
   std::vector<std::string> media;  // identify the volumes

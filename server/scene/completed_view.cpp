@@ -311,6 +311,10 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
   if (!camera) return camera;
   protocol::VectorView& vector = view.vector;
   if (auto ok = choose_vector_field(view, info); !ok) return ok.error();
+  if (vector.trace && (view.geometry.slice || view.geometry.plane)) {
+    return invalid_at("/vector/trace",
+                      "streamlets leave a slice or plane: set it to null, or vector.trace");
+  }
   if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry, lattice));
   if (const auto& range = vector.magnitude_range; range && !((*range)[0] < (*range)[1])) {
     return invalid_at("/vector/magnitudeRange", "does not ascend");

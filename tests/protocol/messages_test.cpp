@@ -298,6 +298,17 @@ TEST(Shapes, FrameInfoContainsEveryCount) {
               "fields":["wind"],"bytes":3891200,"variant":"vector perspective"}})"));
 }
 
+TEST(Shapes, FrameInfoCountsStreamletsWhereTheyAreTraced) {
+  FrameInfo info = frame_info();
+  EXPECT_FALSE(Json::parse(encode_frame_info(info))["work"].contains("streamlets"));
+  info.streamlets = StreamletCounts{10, 40, 500, 12, 3, 2, 1, 2};
+  const std::string json = encode_frame_info(info);
+  expect_shape("frameInfo", json);
+  EXPECT_EQ(Json::parse(json)["work"]["streamlets"],
+            Json::parse(R"({"lines":10,"segments":40,"evaluations":500,
+                "ends":{"length":12,"boundary":3,"mask":2,"stagnation":1,"steps":2}})"));
+}
+
 TEST(Shapes, ErrorsSayWhatWasAskedAndWhetherItIsKept) {
   FrameInfo info = frame_info();
   info.error_asked = 0.001;
