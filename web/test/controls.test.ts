@@ -17,6 +17,7 @@ import {
   shapePatch,
   sliceIndexMax,
   sliceOptions,
+  endTrace,
   slicePatch,
   sliceText,
 } from "../src/panels/controls";
@@ -87,6 +88,17 @@ test("a plane keeps its other numbers, and a normal without a direction is not s
   assert.equal(planePatch(last, "normal", 1, 0), null);
   assert.equal(planePatch({}, "point", 0, 1), null);
   assert.equal(controlStates(plane).combined, true);
+});
+
+test("streamlets end where a slice begins, and are offered on the whole grid", () => {
+  const traced: View = { vector: { trace: {} } };
+  const layer = slicePatch(dataset, "z");
+  assert.deepEqual(endTrace(traced, layer), { ...layer, vector: { trace: null } });
+  assert.deepEqual(endTrace({}, layer), layer);
+  assert.deepEqual(endTrace(traced, slicePatch(dataset, "all")), slicePatch(dataset, "all"));
+  assert.deepEqual([controlStates(traced).traced, controlStates(traced).traceable], [true, true]);
+  const sliced = controlStates(layer as View);
+  assert.deepEqual([sliced.traced, sliced.traceable], [false, false]);
 });
 
 test("an oblique plane is offered on flat grids only, and ends where the server refuses it", () => {

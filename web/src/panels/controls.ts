@@ -122,6 +122,14 @@ export function slicePatch(dataset: Dataset, axis: string): Patch {
   return { geometry: { slice: { axis: known, index }, plane: null } };
 }
 
+// Streamlets end where a slice or plane begins, on which the server refuses them.
+export function endTrace(view: View, patch: Patch): Patch {
+  const { slice, plane } = (patch as View).geometry ?? {};
+  const whole = (slice ?? null) === null && (plane ?? null) === null;
+  const traced = (view.vector?.trace ?? null) !== null;
+  return whole || !traced ? patch : { ...patch, vector: { trace: null } };
+}
+
 // One number of the plane changed; null where its normal would have no direction.
 export function planePatch(view: View, key: "point" | "normal", at: number, to: number) {
   const plane = view.geometry?.plane;
@@ -235,6 +243,9 @@ export function controlStates(view: View) {
     slab: view.method?.name === "slab",
     slice: (view.geometry?.slice ?? null) !== null,
     plane: (view.geometry?.plane ?? null) !== null,
+    traced: lines && (vector.trace ?? null) !== null,
+    // A slice or plane has straight lines only.
+    traceable: lines && (view.geometry?.slice ?? view.geometry?.plane ?? null) === null,
     combined: lines && (view.geometry?.slice ?? view.geometry?.plane ?? null) !== null,
     body: showsBody(view),
     fovY: view.camera?.projection !== "orthographic",

@@ -8,6 +8,7 @@ import {
   fieldOptions,
   heightOptions,
   mappingOptions,
+  endTrace,
   ownHeight,
   obliquePlane,
   planePatch,
@@ -102,7 +103,7 @@ function addSlice(folder: GUI, kit: PanelKit): void {
     {
       pointer: "/geometry/slice",
       get: (view) => slice()?.axis ?? (view.geometry?.plane ? obliquePlane : wholeVolume),
-      set: (axis) => slicePatch(dataset, axis),
+      set: (axis) => endTrace(kit.host.view(), slicePatch(dataset, axis)),
     },
     (view) => sliceOptions(dataset, view),
   );

@@ -5,6 +5,7 @@ import type { Range } from "../wire/api";
 import { colorScale } from "../view/color_scale";
 import { unitText } from "../view/legend_entries";
 import { keyAccess, type PanelKit } from "./panel_kit";
+import { addTrace } from "./panel_trace";
 
 export interface FlowSwitch {
   flowing(): boolean;
@@ -54,6 +55,7 @@ function addMain(folder: GUI, kit: PanelKit, per: string): void {
     min: 0,
     max: Math.min(10, Number((5 * length).toPrecision(2))),
   });
+  addTrace(folder, kit);
   kit.number(folder, "opacity", keyAccess("/vector/opacity"));
   const combine = kit.choice(folder, "overlapping lines", keyAccess("/vector/combine"), {
     "nearer over farther": "over",
