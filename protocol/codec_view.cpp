@@ -6,7 +6,9 @@
 #include "protocol/codec_json.hpp"
 #include "protocol/codec_light.hpp"
 #include "protocol/codec_names.hpp"
+#include "protocol/codec_planes.hpp"
 #include "protocol/codec_region.hpp"
+#include "protocol/codec_surfaces.hpp"
 #include "protocol/codec_trace.hpp"
 #include "protocol/limits.hpp"
 
@@ -21,16 +23,7 @@ constexpr NumberRange world{-limits::world_max, limits::world_max};
 constexpr NumberRange field_value{-value_max, value_max};
 constexpr IntegerRange stride_range{1, limits::stride_max};
 
-std::string number_text(double value) { return dump(canonical_number(value)); }
-
 // --- reading ------------------------------------------------------------------------------------
-
-void check_direction(const Vec3& direction, const std::string& pointer, Faults& faults) {
-  if (std::hypot(direction[0], direction[1], direction[2]) < limits::up_length_min) {
-    faults.add(pointer,
-               "must be a direction of length " + number_text(limits::up_length_min) + " or more");
-  }
-}
 
 CameraView read_camera(const Json& json, const std::string& pointer, Faults& faults) {
   CameraView camera;
@@ -63,29 +56,6 @@ ImageView read_image(const Json& json, const std::string& pointer, Faults& fault
   return image;
 }
 
-SliceView read_slice(const Json& json, const std::string& pointer, Faults& faults) {
-  SliceView slice;
-  ObjectReader reader(json, pointer, faults);
-  reader.choice("axis", slice.axis, axis_names, Presence::required);
-  if (const Json* index = reader.child("index", Presence::required)) {
-    const auto read = read_number(*index, reader.at("index"),
-                                  {0, static_cast<double>(limits::slice_index_max)}, faults);
-    if (read) slice.index = *read;
-  }
-  reader.finish();
-  return slice;
-}
-
-PlaneView read_plane(const Json& json, const std::string& pointer, Faults& faults) {
-  PlaneView plane;
-  ObjectReader reader(json, pointer, faults);
-  if (reader.child("point", Presence::required)) reader.numbers("point", plane.point, world);
-  if (reader.child("normal", Presence::required)) reader.numbers("normal", plane.normal, world);
-  reader.finish();
-  check_direction(plane.normal, reader.at("normal"), faults);
-  return plane;
-}
-
 BodyView read_body(const Json& json, const std::string& pointer, Faults& faults) {
   BodyView body;
   ObjectReader reader(json, pointer, faults);
@@ -113,14 +83,6 @@ GeometryView read_geometry(const Json& json, const std::string& pointer, Faults&
   }
   reader.finish();
   return geometry;
-}
-
-// Descending ranges reverse the map. The ends must differ enough for the slope to be finite.
-void check_color_range(const std::optional<Range>& range, ObjectReader& reader) {
-  if (range && !(std::abs((*range)[1] - (*range)[0]) >= limits::range_width_min)) {
-    reader.faults().add(reader.at("range"), "must have ends that differ by at least " +
-                                                number_text(limits::range_width_min));
-  }
 }
 
 VectorColorView read_vector_color(const Json& json, const std::string& pointer, Faults& faults) {
@@ -336,39 +298,13 @@ QualityView read_quality(const Json& json, const std::string& pointer, Faults& f
 
 // --- writing ------------------------------------------------------------------------------------
 
-template <std::size_t N>
-Json numbers_to_json(const std::array<double, N>& values) {
-  Json out = Json::array();
-  for (const double value : values) out.push_back(canonical_number(value));
-  return out;
-}
-
-template <std::size_t N>
-Json numbers_or_null(const std::optional<std::array<double, N>>& values) {
-  return values ? numbers_to_json(*values) : Json(nullptr);
-}
-
-Json text_or_null(const std::optional<std::string>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
 Json geometry_to_json(const GeometryView& geometry) {
-  Json slice;
-  if (geometry.slice) {
-    slice = {{"axis", name_of(geometry.slice->axis, axis_names)},
-             {"index", canonical_number(geometry.slice->index)}};
-  }
-  Json plane;
-  if (geometry.plane) {
-    plane = {{"point", numbers_to_json(geometry.plane->point)},
-             {"normal", numbers_to_json(geometry.plane->normal)}};
-  }
   return Json{{"scale", numbers_to_json(geometry.scale)},
               {"vertical", name_of(geometry.vertical, vertical_names)},
               {"mapping", name_of(geometry.mapping, mapping_names)},
               {"heightField", text_or_null(geometry.height_field)},
-              {"slice", std::move(slice)},
-              {"plane", std::move(plane)},
+              {"slice", slice_to_json(geometry.slice)},
+              {"plane", plane_to_json(geometry.plane)},
               {"body",
                {{"show", name_of(geometry.body.show, body_show_names)},
                 {"surfaceColor", geometry.body.surface_color}}}};
@@ -454,6 +390,9 @@ View read_view(const Json& document, Faults& faults) {
   if (const Json* light = reader.child("light", Presence::optional, Null::is_default)) {
     view.light = read_light(*light, reader.at("light"), faults);
   }
+  if (const Json* surfaces = reader.child("surfaces", Presence::optional, Null::is_default)) {
+    view.surfaces = read_surfaces(*surfaces, reader.at("surfaces"), faults);
+  }
   reader.finish();
   return view;
 }
@@ -496,7 +435,8 @@ Json view_to_json(const View& view) {
                 {"lossless", view.quality.lossless}}},
               {"annotations", annotations_to_json(view.annotations)},
               {"region", region_to_json(view.region)},
-              {"light", light_to_json(view.light)}};
+              {"light", light_to_json(view.light)},
+              {"surfaces", surfaces_to_json(view.surfaces)}};
 }
 
 std::string encode_view(const View& view) { return dump(view_to_json(view)); }

@@ -232,6 +232,35 @@ struct LightView {
   bool operator==(const LightView&) const = default;
 };
 
+// Colours of a surface: those of a map by the values of a field, or one.
+struct SurfaceColorView {
+  std::string map = "viridis";
+  std::optional<std::string> field;  // empty: that of a section; an isosurface has one colour
+  std::optional<Range> range;
+  std::string constant = "#d8d8d8";  // sRGB, of an isosurface
+  bool operator==(const SurfaceColorView&) const = default;
+};
+
+// Lines of constant value of the field that colours a surface.
+struct ContoursView {
+  double interval = 1;                 // between values, in the unit of the field
+  double line_width = 1;               // pixels at a picture height of 720
+  std::string line_color = "#000000";  // sRGB
+  bool operator==(const ContoursView&) const = default;
+};
+
+// An isosurface of a field, or its section by a layer or a plane: exactly one of the three is set.
+struct SurfaceView {
+  std::string field;
+  std::optional<double> isovalue;
+  std::optional<SliceView> slice;
+  std::optional<PlaneView> plane;
+  double opacity = 1;
+  SurfaceColorView color;
+  std::optional<ContoursView> contours;
+  bool operator==(const SurfaceView&) const = default;
+};
+
 struct View {
   std::string dataset;
   int step = 0;
@@ -246,6 +275,7 @@ struct View {
   AnnotationsView annotations;
   RegionView region;
   std::optional<LightView> light;  // empty: colours as in the legend
+  std::vector<SurfaceView> surfaces;
   bool operator==(const View&) const = default;
 };
 

@@ -12,6 +12,7 @@
 #include "server/annotate/labels.hpp"
 #include "server/annotate/paint/type.hpp"
 #include "server/image/tone_map.hpp"
+#include "server/scene/surfaces/make_surfaces.hpp"
 
 namespace windsplat::annotate {
 namespace {
@@ -237,7 +238,38 @@ Entry medium_entry(const Subject& subject, const scene::ScalarLayer& layer,
   return entry;
 }
 
-// The layers of the scene correspond to those of the view, without media of zero extinction.
+Entry surface_entry(const Subject& subject, const surface::Shown& shown,
+                    const protocol::SurfaceView& view) {
+  const auto unit_of = [](const data::FieldInfo* field) {
+    return field == nullptr ? std::string() : unit_text(field->units);
+  };
+  const std::string name = scene::color_field_of(view);
+  const data::FieldInfo* const cut = subject.info.find(view.field);
+  const data::FieldInfo* const field = subject.info.find(name);
+  const std::string cut_title = field_title(cut, view.field);
+  Entry entry;
+  entry.title = name.empty() ? cut_title : field_title(field, name);
+  entry.colors = colors_of({shown.range, shown.colors});
+  if (!name.empty()) {
+    entry.units = unit_of(field);
+    entry.ticks = even_ticks(shown.range[0], shown.range[1], strip_parts);
+  }
+  if (view.isovalue) {
+    const std::string units = unit_of(cut);
+    entry.notes.push_back("surface where " + (name.empty() ? "it" : cut_title) + " is " +
+                          number_text_of(*view.isovalue, 4) + (units.empty() ? "" : " " + units));
+  } else {
+    entry.notes.emplace_back("on a section");
+  }
+  if (view.contours) {
+    entry.notes.push_back("contours every " + number_text_of(view.contours->interval, 3) +
+                          (entry.units.empty() ? "" : " " + entry.units));
+  }
+  return entry;
+}
+
+// The layers of the scene correspond to those of the view, without media of zero extinction and
+// surfaces that are not seen.
 std::vector<Entry> entries_of(const Subject& subject) {
   std::vector<Entry> entries;
   if (subject.scene.vector) entries.push_back(lines_entry(subject));
@@ -247,6 +279,11 @@ std::vector<Entry> entries_of(const Subject& subject) {
     if (layer->extinction != scalar.extinction.value()) continue;
     entries.push_back(medium_entry(subject, *layer, scalar.field));
     ++layer;
+  }
+  auto shown = subject.scene.surfaces.begin();
+  for (const protocol::SurfaceView& surface : subject.completed.view().surfaces) {
+    if (shown == subject.scene.surfaces.end()) break;
+    if (scene::is_seen(surface)) entries.push_back(surface_entry(subject, *shown++, surface));
   }
   return entries;
 }

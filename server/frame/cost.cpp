@@ -83,6 +83,12 @@ class Counting {
     for (std::size_t n = 0; n < view_.scalars->size(); ++n) {
       add_medium((*view_.scalars)[n], "/scalars/" + std::to_string(n));
     }
+    // A surface reads every sample, and its fragments may fill the picture.
+    for (std::size_t n = 0; n < view_.surfaces.size(); ++n) {
+      double samples = 1;
+      for (const int count : lattice_.dims) samples *= count;
+      add("/surfaces/" + std::to_string(n), samples + pixels_ / Cost::pixels_a_kernel);
+    }
     if (view_.method.name == protocol::MethodName::slab) {
       const double deep = std::hypot(samples_[0], samples_[1], samples_[2]);
       const double slabs = deep / view_.method.slab_thickness;

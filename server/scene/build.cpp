@@ -15,6 +15,7 @@
 #include "server/scene/region/crop.hpp"
 #include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
+#include "server/scene/surfaces/make_surfaces.hpp"
 #include "server/scene/traced/streamlets.hpp"
 
 namespace windsplat::scene {
@@ -488,6 +489,9 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   auto body = make_body(view.geometry, *completed.placed(), dataset);
   if (!body) return body.error();
   built->body = std::move(*body);
+  auto surfaces = make_surfaces(completed, dataset);
+  if (!surfaces) return surfaces.error();
+  built->surfaces = std::move(*surfaces);
   return built;
 }
 
@@ -507,6 +511,9 @@ Result<Needs> needs_of(const CompletedView& completed, const data::Dataset& data
     if (needed->lines->colors) needs.fields.push_back(std::move(*needed->lines->colors));
   }
   for (auto& [layer, values] : needed->media) needs.fields.push_back(std::move(values));
+  for (std::string& field : surface_fields(completed.view())) {
+    needs.fields.push_back({std::move(field), {}});
+  }
   if (needed->section) needs.places = places_of(*needed->section);
   return needs;
 }

@@ -21,6 +21,7 @@
 #include "server/scene/region/crop.hpp"
 #include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
+#include "server/scene/surfaces/make_surfaces.hpp"
 
 namespace windsplat::scene {
 
@@ -300,6 +301,7 @@ Result<void> check(const View& view, const data::DatasetInfo& info) {
                                   "/region/where/" + std::to_string(n) + "/field");
     if (!field) return field.error();
   }
+  if (auto ok = check_surfaces(view, info); !ok) return ok;
   return check_geometry(view.geometry, info);
 }
 
@@ -341,6 +343,13 @@ Result<void> complete_from_data(View& view, const Camera& camera, const Placed& 
   const bool map = draws_map(view, dataset.info());
   for (protocol::ScalarView& scalar : *view.scalars) {
     if (auto ok = complete_scalar(scalar, lattice, slice, map, dataset); !ok) return ok;
+  }
+  for (protocol::SurfaceView& surface : view.surfaces) {
+    const std::string field = color_field_of(surface);
+    if (field.empty() || surface.color.range) continue;
+    const auto range = first_scalar_range(*dataset.info().find(field), dataset);
+    if (!range) return range.error();
+    surface.color.range = *range;
   }
   return {};
 }
@@ -441,6 +450,7 @@ std::vector<std::string> fields_of(const View& view, const data::DatasetInfo& in
   } else {
     for (const std::string& name : default_scalars(info)) add(name);
   }
+  for (const std::string& name : surface_fields(view)) add(name);
   if (view.geometry.height_field) add(*view.geometry.height_field);
   for (const protocol::FilterView& filter : view.region.where) add(filter.field);
   return fields;

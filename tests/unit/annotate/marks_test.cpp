@@ -256,6 +256,32 @@ TEST(Legend, TellsUnitsLengthsAndWhatIsLeftOut) {
   for (const char* tick : {"0", "10", "20", "30", "40"}) EXPECT_THAT(written, Contains(tick));
 }
 
+TEST(Legend, TellsWhereSurfacesAreAndWhatTheirColoursMean) {
+  const Shown shown(scene::atmosphere_grid(), one_scalar(), [](protocol::View& view) {
+    view.scalars.emplace();
+    protocol::SurfaceView surface;
+    surface.field = "cloud";
+    surface.opacity = 0;
+    surface.isovalue = 3;
+    view.surfaces.push_back(surface);  // not seen
+    surface.opacity = 1;
+    surface.isovalue = 12.5;
+    view.surfaces.push_back(surface);
+    surface.isovalue.reset();
+    surface.slice = protocol::SliceView{protocol::GridAxis::z, 1};
+    surface.color.range = protocol::Range{0, 40};
+    surface.contours = protocol::ContoursView{5, 1, "#000000"};
+    view.surfaces.push_back(surface);
+  });
+  Figure figure = empty_figure(shown);
+  add_legend(shown.subject(), style_of(shown.subject()), figure);
+  const auto written = texts(figure.above);
+  EXPECT_THAT(written, Contains("surface where it is 12.5 kg m\u207b\u00b3"));
+  EXPECT_THAT(written, testing::Not(Contains(HasSubstr("is 3"))));
+  EXPECT_THAT(written, Contains("contours every 5 kg m\u207b\u00b3"));
+  for (const char* tick : {"0", "10", "20", "30", "40"}) EXPECT_THAT(written, Contains(tick));
+}
+
 // Units and names of any length keep their texts upright and within their card.
 TEST(Legend, LongUnitsLeaveTheirTextsReadable) {
   std::vector<data::FieldInfo> fields{scene::scalar_info(

@@ -1,0 +1,213 @@
+// Fields -> triangles, by the extraction of server/surface; colour maps and widths.
+#include "server/scene/surfaces/make_surfaces.hpp"
+
+#include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <sstream>
+#include <utility>
+
+#include "server/base/thread_pool.hpp"
+#include "server/scene/colormap.hpp"
+#include "server/scene/defaults.hpp"
+#include "server/scene/refusal.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using protocol::SurfaceView;
+
+constexpr int map_entries = 256;
+constexpr double contours_height = 720;  // pixels, for which a view gives the width of contours
+constexpr double isosurface_ambient = 0.3;
+
+std::string pointer_of(std::size_t surface, const char* key = "") {
+  return "/surfaces/" + std::to_string(surface) + key;
+}
+
+Result<void> check_surface(const SurfaceView& surface, std::size_t n,
+                           const data::DatasetInfo& info) {
+  auto field = find_field(info, surface.field, data::FieldKind::scalar, pointer_of(n, "/field"));
+  if (!field) return field.error();
+  if (surface.color.field) {
+    auto colors = find_field(info, *surface.color.field, data::FieldKind::scalar,
+                             pointer_of(n, "/color/field"));
+    if (!colors) return colors.error();
+  }
+  if (!has_color_map(surface.color.map)) {
+    return invalid_at(pointer_of(n, "/color/map"),
+                      "unknown colour map " + in_double_quotes(surface.color.map));
+  }
+  if (!parse_color(surface.color.constant)) {
+    return invalid_at(pointer_of(n, "/color/constant"),
+                      in_double_quotes(surface.color.constant) + " is not of the form #rrggbb");
+  }
+  if (surface.contours && !parse_color(surface.contours->line_color)) {
+    return invalid_at(
+        pointer_of(n, "/contours/lineColor"),
+        in_double_quotes(surface.contours->line_color) + " is not of the form #rrggbb");
+  }
+  const std::array<int, 3> dims = info.grid.dims();
+  for (const int samples : dims) {
+    if (samples < 2) {
+      return invalid_at(pointer_of(n), "requires a grid of at least two samples along every axis");
+    }
+  }
+  if (surface.slice) {
+    const int last = dims.at(static_cast<std::size_t>(surface.slice->axis)) - 1;
+    if (!(surface.slice->index <= last)) {
+      return invalid_at(pointer_of(n, "/slice/index"),
+                        "the grid has layers 0 to " + std::to_string(last) + " across this axis");
+    }
+  }
+  return {};
+}
+
+surface::Cut cut_of(const SurfaceView& from) {
+  surface::Cut cut;
+  if (from.isovalue) {
+    cut.level = *from.isovalue;
+  } else if (from.plane) {
+    cut.kind = surface::Cut::Kind::plane;
+    const auto& [px, py, pz] = from.plane->point;
+    const auto& [nx, ny, nz] = from.plane->normal;
+    cut.point = {px, py, pz};
+    cut.normal = glm::normalize(glm::dvec3(nx, ny, nz));
+  } else {
+    cut.kind = surface::Cut::Kind::layer;
+    cut.axis = static_cast<int>(from.slice->axis);
+    cut.index = from.slice->index;
+  }
+  return cut;
+}
+
+// Whatever the triangles and their values depend on.
+std::string key_of(const SurfaceView& surface, const protocol::View& view) {
+  const protocol::GeometryView& geometry = view.geometry;
+  const surface::Cut cut = cut_of(surface);
+  std::ostringstream key;
+  key << "surface " << view.step << ' ' << static_cast<int>(geometry.mapping) << ' '
+      << static_cast<int>(geometry.vertical) << ' ' << static_cast<int>(cut.kind) << ' ' << cut.axis
+      << std::hexfloat;
+  for (const double scale : geometry.scale) key << ' ' << scale;
+  for (const double number : {cut.level, cut.index, cut.point.x, cut.point.y, cut.point.z,
+                              cut.normal.x, cut.normal.y, cut.normal.z}) {
+    key << ' ' << number;
+  }
+  // Names may contain spaces, but no control characters.
+  key << '\n'
+      << geometry.height_field.value_or("") << '\n'
+      << surface.field << '\n'
+      << color_field_of(surface);
+  return key.str();
+}
+
+surface::Samples samples_of(const Lattice& lattice) {
+  surface::Samples samples;
+  samples.dims = lattice.dims;
+  for (std::size_t a = 0; a < 3; ++a) samples.positions.at(a) = lattice.positions.at(a).data();
+  if (lattice.places) samples.places = lattice.places->data();
+  samples.around = lattice.around;
+  return samples;
+}
+
+Result<std::shared_ptr<const surface::Mesh>> mesh_of(const SurfaceView& from, std::size_t n,
+                                                     const CompletedView& completed,
+                                                     data::Dataset& dataset) {
+  const auto step = static_cast<std::size_t>(completed.view().step);
+  auto volume = dataset.volume(from.field, step);
+  if (!volume) return volume.error();
+  std::shared_ptr<const data::Volume> colors;
+  if (const std::string name = color_field_of(from); !name.empty()) {
+    auto second = dataset.volume(name, step);
+    if (!second) return second.error();
+    colors = std::move(*second);
+  }
+  const surface::Samples samples = samples_of(completed.lattice());
+  surface::Cut cut = cut_of(from);
+  cut.values = (*volume)->component(0);
+  const std::string key = key_of(from, completed.view());
+  const auto numbers = dataset.remembered(key, [&]() -> Result<std::vector<double>> {
+    const auto pool = few_threads(static_cast<std::size_t>(samples.dims[2]));
+    const surface::MeshSize size = surface::measure(samples, cut, *pool);
+    return std::vector{static_cast<double>(size.vertices), static_cast<double>(size.triangles)};
+  });
+  if (!numbers) return numbers.error();
+  const surface::MeshSize size{static_cast<std::size_t>((*numbers)[0]),
+                               static_cast<std::size_t>((*numbers)[1])};
+  if (size.triangles > surface_triangles_max) {
+    return make_error_at(ErrorKind::too_large, pointer_of(n),
+                         "would have " + std::to_string(size.triangles) + " triangles; at most " +
+                             std::to_string(surface_triangles_max) + " are drawn");
+  }
+  auto kept = dataset.auxiliary(key, size.bytes(colors != nullptr), [&]() -> data::Resident {
+    const auto pool = few_threads(static_cast<std::size_t>(samples.dims[2]));
+    return std::make_shared<const surface::Mesh>(
+        surface::extract(samples, cut, colors ? colors->component(0) : nullptr, *pool));
+  });
+  if (!kept) return kept.error();
+  return std::static_pointer_cast<const surface::Mesh>(*kept);
+}
+
+}  // namespace
+
+Result<void> check_surfaces(const protocol::View& view, const data::DatasetInfo& info) {
+  for (std::size_t n = 0; n < view.surfaces.size(); ++n) {
+    if (auto ok = check_surface(view.surfaces[n], n, info); !ok) return ok;
+  }
+  return {};
+}
+
+std::string color_field_of(const SurfaceView& surface) {
+  if (surface.color.field) return *surface.color.field;
+  return surface.isovalue ? "" : surface.field;
+}
+
+bool is_seen(const SurfaceView& surface) { return surface.opacity > 0 || surface.contours; }
+
+std::vector<std::string> surface_fields(const protocol::View& view) {
+  std::vector<std::string> fields;
+  for (const SurfaceView& surface : view.surfaces) {
+    fields.push_back(surface.field);
+    if (surface.color.field) fields.push_back(*surface.color.field);
+  }
+  return fields;
+}
+
+Result<std::vector<surface::Shown>> make_surfaces(const CompletedView& completed,
+                                                  data::Dataset& dataset) {
+  const protocol::View& view = completed.view();
+  std::vector<surface::Shown> all;
+  for (std::size_t n = 0; n < view.surfaces.size(); ++n) {
+    const SurfaceView& from = view.surfaces[n];
+    if (!is_seen(from)) continue;
+    auto mesh = mesh_of(from, n, completed, dataset);
+    if (!mesh) return mesh.error();
+    surface::Shown shown;
+    shown.mesh = std::move(*mesh);
+    shown.opacity = from.opacity;
+    shown.ambient = from.isovalue ? isosurface_ambient : 1;
+    if (color_field_of(from).empty()) {
+      shown.colors = {parse_color(from.color.constant).value()};
+    } else {
+      const protocol::Range& range = from.color.range.value();
+      shown.colors = color_map_linear(from.color.map, map_entries);
+      shown.range = range;
+      if (range[0] > range[1]) {
+        std::swap(shown.range[0], shown.range[1]);
+        std::reverse(shown.colors.begin(), shown.colors.end());
+      }
+    }
+    if (from.contours) {
+      shown.contours = {from.contours->interval,
+                        from.contours->line_width * view.image.height / contours_height,
+                        parse_color(from.contours->line_color).value()};
+    }
+    all.push_back(std::move(shown));
+  }
+  return all;
+}
+
+}  // namespace windsplat::scene
