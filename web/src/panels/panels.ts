@@ -18,6 +18,7 @@ import { addLight } from "./panel_light";
 import { addLines, type FlowSwitch } from "./panel_lines";
 import { addMedia } from "./panel_media";
 import { cameraNumbersTitle } from "./panel_camera";
+import { addSurfaces } from "./panel_surfaces";
 import { keyAccess, PanelKit, type PanelHost } from "./panel_kit";
 import { middleSample, sampleWithin, type Sample } from "../view/sample_position";
 import { ProbePanel, probeTitle } from "./panel_probe";
@@ -52,6 +53,7 @@ export class Panels {
     cameraNumbersTitle,
     "Annotations",
     "Light",
+    "Surfaces",
     "Method",
     "Quality",
   ]);
@@ -78,6 +80,7 @@ export class Panels {
     addMedia(gui, kit);
     addRegion(gui, kit);
     addLight(gui, kit);
+    addSurfaces(gui, kit);
     addGeometry(gui, kit);
     addCamera(gui, kit, this.actions);
     addAnnotations(gui, kit);
