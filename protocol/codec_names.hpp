@@ -20,8 +20,8 @@ inline constexpr std::array<Name<GeometryMapping>, 3> mapping_names{
     {{GeometryMapping::flat, "flat"},
      {GeometryMapping::curvilinear, "curvilinear"},
      {GeometryMapping::sphere, "sphere"}}};
-inline constexpr std::array<Name<BodyShow>, 3> body_show_names{
-    {{BodyShow::automatic, "auto"}, {BodyShow::on, "on"}, {BodyShow::off, "off"}}};
+inline constexpr std::array<Name<GroundShow>, 3> ground_show_names{
+    {{GroundShow::automatic, "auto"}, {GroundShow::on, "on"}, {GroundShow::off, "off"}}};
 inline constexpr std::array<Name<GridAxis>, 3> axis_names{
     {{GridAxis::x, "x"}, {GridAxis::y, "y"}, {GridAxis::z, "z"}}};
 inline constexpr std::array<Name<VectorSpace>, 2> space_names{

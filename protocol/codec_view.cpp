@@ -3,6 +3,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/codec_annotations.hpp"
+#include "protocol/codec_ground.hpp"
 #include "protocol/codec_json.hpp"
 #include "protocol/codec_light.hpp"
 #include "protocol/codec_names.hpp"
@@ -56,15 +57,6 @@ ImageView read_image(const Json& json, const std::string& pointer, Faults& fault
   return image;
 }
 
-BodyView read_body(const Json& json, const std::string& pointer, Faults& faults) {
-  BodyView body;
-  ObjectReader reader(json, pointer, faults);
-  reader.choice("show", body.show, body_show_names);
-  reader.color("surfaceColor", body.surface_color);
-  reader.finish();
-  return body;
-}
-
 GeometryView read_geometry(const Json& json, const std::string& pointer, Faults& faults) {
   GeometryView geometry;
   ObjectReader reader(json, pointer, faults);
@@ -78,8 +70,8 @@ GeometryView read_geometry(const Json& json, const std::string& pointer, Faults&
   if (const Json* plane = reader.child("plane", Presence::optional, Null::is_default)) {
     geometry.plane = read_plane(*plane, reader.at("plane"), faults);
   }
-  if (const Json* body = reader.child("body")) {
-    geometry.body = read_body(*body, reader.at("body"), faults);
+  if (reader.child("body") != nullptr) {
+    faults.add(reader.at("body"), "has become /ground: its show and surfaceColor are keys of that");
   }
   reader.finish();
   return geometry;
@@ -304,10 +296,7 @@ Json geometry_to_json(const GeometryView& geometry) {
               {"mapping", name_of(geometry.mapping, mapping_names)},
               {"heightField", text_or_null(geometry.height_field)},
               {"slice", slice_to_json(geometry.slice)},
-              {"plane", plane_to_json(geometry.plane)},
-              {"body",
-               {{"show", name_of(geometry.body.show, body_show_names)},
-                {"surfaceColor", geometry.body.surface_color}}}};
+              {"plane", plane_to_json(geometry.plane)}};
 }
 
 Json vector_to_json(const VectorView& vector) {
@@ -378,6 +367,7 @@ View read_view(const Json& document, Faults& faults) {
   object("camera", read_camera, view.camera);
   object("image", read_image, view.image);
   object("geometry", read_geometry, view.geometry);
+  object("ground", read_ground, view.ground);
   object("vector", read_vector, view.vector);
   if (const Json* scalars = reader.child("scalars", Presence::optional, Null::is_default)) {
     view.scalars = read_scalars(*scalars, reader.at("scalars"), faults);
@@ -417,6 +407,7 @@ Json view_to_json(const View& view) {
                 {"height", view.image.height},
                 {"background", view.image.background}}},
               {"geometry", geometry_to_json(view.geometry)},
+              {"ground", ground_to_json(view.ground)},
               {"vector", vector_to_json(view.vector)},
               {"scalars", std::move(scalars)},
               {"depthCue",

@@ -17,7 +17,7 @@ using Range = std::array<double, 2>;
 enum class Projection { perspective, orthographic };
 enum class VerticalPlacement { automatic, linear, logp, index, metric };
 enum class GeometryMapping { flat, curvilinear, sphere };
-enum class BodyShow { automatic, on, off };
+enum class GroundShow { automatic, on, off };
 enum class GridAxis { x, y, z };
 enum class VectorSpace { components, world };
 enum class ColorBy { world_z, screen_z, rise, magnitude, direction, scalar, constant };
@@ -59,13 +59,6 @@ struct PlaneView {
   bool operator==(const PlaneView&) const = default;
 };
 
-// An opaque surface: a terrain, a globe within the shell of a sphere, or the bottom of the box.
-struct BodyView {
-  BodyShow show = BodyShow::automatic;    // automatic: on a sphere
-  std::string surface_color = "#2b3a4d";  // sRGB
-  bool operator==(const BodyView&) const = default;
-};
-
 struct GeometryView {
   Vec3 scale{1, 1, 1};
   VerticalPlacement vertical = VerticalPlacement::automatic;
@@ -73,7 +66,6 @@ struct GeometryView {
   std::optional<std::string> height_field;  // empty: use the vertical coordinate
   std::optional<SliceView> slice;           // empty: the whole grid
   std::optional<PlaneView> plane;           // empty: the whole grid, or the slice
-  BodyView body;
   bool operator==(const GeometryView&) const = default;
 };
 
@@ -261,12 +253,28 @@ struct SurfaceView {
   bool operator==(const SurfaceView&) const = default;
 };
 
+// An opaque surface: a terrain, a globe within the shell of a sphere, or the bottom of the box. The
+// rest of the keys have an effect only where its places on the Earth are known.
+struct GroundView {
+  GroundShow show = GroundShow::automatic;  // automatic: on a sphere
+  std::string surface_color = "#2b3a4d";    // sRGB, without `tint`
+  bool tint = true;
+  std::string land_color = "#3f4a3c";  // sRGB
+  std::string sea_color = "#22324a";   // sRGB
+  std::string line_color = "#b4c0c8";  // sRGB
+  bool coastlines = true;
+  bool borders = false;
+  bool graticule = false;
+  bool operator==(const GroundView&) const = default;
+};
+
 struct View {
   std::string dataset;
   int step = 0;
   CameraView camera;
   ImageView image;
   GeometryView geometry;
+  GroundView ground;
   VectorView vector;
   std::optional<std::vector<ScalarView>> scalars;
   DepthCueView depth_cue;

@@ -115,9 +115,9 @@ bool is_whole_globe(const protocol::DatasetDescription& dataset) {
 std::string ground_keys(const protocol::DatasetDescription& dataset) {
   for (const protocol::FieldDescription& field : dataset.fields) {
     if (field.standard_name != "geopotential_height" && field.standard_name != "altitude") continue;
-    return "(/geometry/heightField=" + word(field.name) + " with /geometry/body/show=on)";
+    return "(/geometry/heightField=" + word(field.name) + " with /ground/show=on)";
   }
-  return "(/geometry/body/show=on)";
+  return "(/ground/show=on)";
 }
 
 std::string grid_text(const protocol::DatasetDescription& dataset) {

@@ -5,7 +5,9 @@
 #include <array>
 #include <cstddef>
 #include <glm/geometric.hpp>
+#include <optional>
 
+#include "server/ground/paint.hpp"
 #include "server/terrain/terrain_pixel.hpp"
 
 namespace windsplat::engine {
@@ -27,6 +29,7 @@ kernels::Body make_body(const scene::Scene& scene) {
       break;
   }
   to.terrain = from.terrain.get();
+  to.paint = from.paint.get();
   to.centre[0] = -glm::dot(eye, scene.camera.right);
   to.centre[1] = glm::dot(eye, scene.camera.up);
   to.centre[2] = -glm::dot(eye, scene.camera.forward);
@@ -45,26 +48,66 @@ kernels::Body make_body(const scene::Scene& scene) {
 
 namespace kernels {
 
-void add_terrain(const Camera& camera, const Body& body, double left, double top,
-                 double depth[block_pixels], double coverage[block_pixels],
-                 double cosine[block_pixels]) {
-  const auto vector = [](const double from[3]) { return glm::dvec3(from[0], from[1], from[2]); };
-  const terrain::View view{vector(camera.eye),
-                           vector(camera.world_right),
-                           vector(camera.world_down),
-                           vector(camera.world_forward),
-                           body.pixel,
-                           static_cast<double>(camera.near),
-                           camera.perspective != 0};
+namespace {
+
+glm::dvec3 vector_of(const double from[3]) { return {from[0], from[1], from[2]}; }
+
+terrain::View view_of(const Camera& camera, const Body& body) {
+  return {vector_of(camera.eye),
+          vector_of(camera.world_right),
+          vector_of(camera.world_down),
+          vector_of(camera.world_forward),
+          body.pixel,
+          static_cast<double>(camera.near),
+          camera.perspective != 0};
+}
+
+}  // namespace
+
+void add_terrain(const Camera& camera, const Body& body, BodyPixels& pixels) {
   std::array<terrain::PixelSurface, block_pixels> seen;
   static_assert(block_side <= terrain::side_max);
-  terrain::look(*body.terrain, view, left - static_cast<double>(camera.half_width_px),
-                top - static_cast<double>(camera.half_height_px), block_side, seen.data());
+  terrain::look(*body.terrain, view_of(camera, body),
+                pixels.left - static_cast<double>(camera.half_width_px),
+                pixels.top - static_cast<double>(camera.half_height_px), block_side, seen.data());
   for (std::size_t l = 0; l < seen.size(); ++l) {
-    const auto one = terrain::combined(seen[l], {depth[l], coverage[l], cosine[l]});
-    depth[l] = one.depth;
-    coverage[l] = one.coverage;
-    cosine[l] = one.cosine;
+    const auto one =
+        terrain::combined(seen[l], {pixels.depth[l], pixels.coverage[l], pixels.cosine[l]});
+    pixels.depth[l] = one.depth;
+    pixels.coverage[l] = one.coverage;
+    pixels.cosine[l] = one.cosine;
+    pixels.relief[l] = one.relief;
+    for (int a = 0; a < 3; ++a) pixels.normal[l][a] = one.normal[a];
+  }
+}
+
+void paint_body(const Camera& camera, const Body& body, const BodyPixels& pixels,
+                float rgb[3][block_pixels]) {
+  const terrain::View view = view_of(camera, body);
+  const auto seen_at = [&](int l) {
+    const double x = pixels.left + l % block_side + 0.5 - static_cast<double>(camera.half_width_px);
+    const double y = pixels.top + l / block_side + 0.5 - static_cast<double>(camera.half_height_px);
+    return body.paint->seen(view, x, y, pixels.depth[l], vector_of(pixels.normal[l]));
+  };
+  const auto put = [&](int l, const ground::Color& color) {
+    for (int c = 0; c < 3; ++c)
+      rgb[c][l] = static_cast<float>(color.at(static_cast<std::size_t>(c)));
+  };
+  const double* const coverage = pixels.coverage;
+  const bool whole =
+      std::all_of(coverage, coverage + block_pixels, [](double c) { return c >= 1; });
+  std::optional<ground::Near> near;
+  constexpr int middle = block_side / 2;
+  if (whole) near = body.paint->near(seen_at(middle * block_side + middle), middle);
+  const bool even = near && near->is_even && body.terrain == nullptr;
+  for (int l = 0; l < block_pixels; ++l) {
+    if (even) {
+      put(l, body.paint->even_color(*near));
+    } else if (near) {
+      put(l, body.paint->color(seen_at(l), *near));
+    } else if (coverage[l] > 0) {
+      put(l, body.paint->color(seen_at(l)));
+    }
   }
 }
 

@@ -11,6 +11,7 @@
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/detail.hpp"
+#include "server/scene/earth/ground.hpp"
 #include "server/scene/rates.hpp"
 #include "server/scene/region/crop.hpp"
 #include "server/scene/region/select.hpp"
@@ -25,7 +26,6 @@ namespace {
 using protocol::View;
 
 constexpr int table_entries = 256;
-constexpr double reference_height = 720;  // pixels, for which a view gives r1 and r2
 
 // A reversed range reverses the colour map.
 ColorTable make_table(const std::string& map, const protocol::Range& range) {
@@ -372,32 +372,6 @@ Result<NeededScene> needed_scene(const CompletedView& completed, const std::arra
   return needed;
 }
 
-// The sphere lies slightly inside the lowest cells, so that lines in them are not cut off.
-constexpr double globe_share = 0.999;
-
-Result<std::optional<Body>> make_body(const protocol::GeometryView& geometry, const Placed& placed,
-                                      data::Dataset& dataset) {
-  const Lattice& lattice = placed.lattice;
-  const bool sphere = geometry.mapping == protocol::GeometryMapping::sphere;
-  const bool asked = geometry.body.show == protocol::BodyShow::on;
-  const bool shown = asked || (geometry.body.show == protocol::BodyShow::automatic && sphere);
-  if (!shown) return std::optional<Body>();
-  Body body;
-  // Not by default: moving frames cannot afford its rays.
-  if (asked) {
-    auto terrain = terrain_of(geometry, placed, dataset);
-    if (!terrain) return terrain.error();
-    body.terrain = std::move(*terrain);
-  }
-  body.shape = sphere ? BodyShape::sphere : body.terrain ? BodyShape::terrain : BodyShape::ground;
-  body.radius = globe_share * lattice.inner_radius;
-  body.low = {lattice.box_min.x, lattice.box_min.y};
-  body.high = {lattice.box_max.x, lattice.box_max.y};
-  body.height = lattice.box_min.z;
-  body.color = parse_color(geometry.body.surface_color).value();
-  return std::optional(std::move(body));
-}
-
 Result<void> load(const Needed& needed, std::size_t step, data::Dataset& dataset,
                   std::shared_ptr<const data::Volume>& to) {
   auto volume = dataset.derived(needed.field, step, needed.how);
@@ -486,7 +460,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   if (!needed) return needed.error();
   auto built = with_data(std::move(scene), std::move(*needed), completed, dataset);
   if (!built) return built;
-  auto body = make_body(view.geometry, *completed.placed(), dataset);
+  auto body = make_body(view, built->camera, *completed.placed(), dataset);
   if (!body) return body.error();
   built->body = std::move(*body);
   auto surfaces = make_surfaces(completed, dataset);

@@ -9,6 +9,9 @@
 
 namespace windsplat::scene {
 
+// The height of a picture for which a view gives the widths of lines, pixels.
+inline constexpr double reference_height = 720;
+
 inline constexpr double default_azimuth = 0;      // degrees: from the south, looking north
 inline constexpr double default_elevation = 35;   // degrees above the horizon
 inline constexpr double steepest_elevation = 50;  // of default views of flat boxes

@@ -15,6 +15,7 @@
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/earth/ground.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/rates.hpp"
 #include "server/scene/refusal.hpp"
@@ -290,8 +291,7 @@ Result<void> check(const View& view, const data::DatasetInfo& info) {
                                    std::to_string(info.steps.size() - 1));
   }
   if (auto ok = check_color(view.image.background, "/image/background"); !ok) return ok;
-  if (auto ok = check_color(view.geometry.body.surface_color, "/geometry/body/surfaceColor"); !ok)
-    return ok;
+  if (auto ok = check_ground(view.ground); !ok) return ok;
   if (auto ok = check_vector(view.vector); !ok) return ok;
   if (view.depth_cue.near >= view.depth_cue.far) {
     return invalid_at("/depthCue/near", "is not less than far");

@@ -29,8 +29,7 @@ namespace {
 
 // The cache entry of a dataset: a placement with the parameters that determine it.
 struct Kept {
-  protocol::GeometryView geometry;  // without slice, plane and body, which do not change
-                                    // positions
+  protocol::GeometryView geometry;  // without slice and plane, which do not change positions
   protocol::RegionView region;      // without filters
   std::shared_ptr<const Placed> placed;
 };

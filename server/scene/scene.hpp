@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "server/data/model/volume.hpp"
+#include "server/ground/paint.hpp"
 #include "server/surface/shown.hpp"
 #include "server/terrain/terrain.hpp"
 #include "server/trace/segments.hpp"
@@ -175,7 +176,8 @@ enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
 
 // An opaque surface that hides what lies behind it: a sphere about the origin, which an eye inside
 // it does not see, a horizontal rectangle, or a terrain. A sphere may have a terrain above it. Its
-// brightness is body_ambient + (1 - body_ambient) |cos(normal, ray)|.
+// brightness is body_ambient + (1 - body_ambient) |cos(normal, ray)|, and on terrain that times
+// terrain::relief_of(); colours are at most 1.
 enum class BodyShape { sphere, ground, terrain };
 struct Body {
   BodyShape shape = BodyShape::sphere;
@@ -184,6 +186,7 @@ struct Body {
   double height = 0;                                // ground: z
   std::shared_ptr<const terrain::Terrain> terrain;  // of shape terrain, or above a sphere; or null
   std::array<float, 3> color{0, 0, 0};              // linear
+  std::shared_ptr<const ground::Paint> paint;       // its colour by place; null: `color`
 };
 constexpr double body_ambient = 0.6;
 

@@ -29,6 +29,13 @@ double cosine_of(const Ray& ray, const Hit& hit) {
   return std::min(std::abs(glm::dot(ray.along, hit.normal)) / glm::length(ray.along), 1.0);
 }
 
+PixelSurface surface_at(const Terrain& terrain, const Ray& ray, const Hit& hit) {
+  const bool globe = terrain.base() == Base::globe;
+  const glm::dvec3 up =
+      globe ? glm::normalize(ray.from + hit.along * ray.along) : glm::dvec3(0, 0, 1);
+  return {hit.along, 1, cosine_of(ray, hit), relief_of(hit.normal, up, terrain.base()), hit.normal};
+}
+
 // A pixel that the terrain covers in part. `middle`: with or without a hit.
 PixelSurface silhouette(const Terrain& terrain, const View& view, double right, double down,
                         const Ray& ray, const Hit& middle) {
@@ -41,21 +48,44 @@ PixelSurface silhouette(const Terrain& terrain, const View& view, double right, 
         ray_at(view, right + (i + 0.5) / parts, down + (j + 0.5) / parts);
   }
   terrain.meet(rays.data(), static_cast<int>(rays.size()), hits.data());
-  PixelSurface sum;
+  PixelSurface sum{0, 0, 0, 0};
   double count = 0;
   for (std::size_t n = 0; n < rays.size(); ++n) {
     if (!is_met(hits[n])) continue;
-    sum.depth += hits[n].along;
-    sum.cosine += cosine_of(rays[n], hits[n]);
+    const PixelSurface one = surface_at(terrain, rays[n], hits[n]);
+    sum.depth += one.depth;
+    sum.cosine += one.cosine;
+    sum.relief += one.relief;
+    sum.normal += one.normal;
     ++count;
   }
   if (count == 0) return {};
   const double coverage = count / static_cast<double>(rays.size());
-  if (is_met(middle)) return {middle.along, coverage, cosine_of(ray, middle)};
-  return {sum.depth / count, coverage, sum.cosine / count};
+  if (is_met(middle)) {
+    PixelSurface seen = surface_at(terrain, ray, middle);
+    seen.coverage = coverage;
+    return seen;
+  }
+  const double length = glm::length(sum.normal);
+  const glm::dvec3 normal = length > 0 ? sum.normal / length : glm::dvec3(0);
+  return {sum.depth / count, coverage, sum.cosine / count, sum.relief / count, normal};
 }
 
 }  // namespace
+
+double relief_of(const glm::dvec3& normal, const glm::dvec3& up, Base base) {
+  constexpr double darkest = 0.5;
+  constexpr double brightest = 1.35;
+  glm::dvec3 east(1, 0, 0);
+  if (base == Base::globe) {
+    const double across = std::hypot(up.x, up.y);
+    if (!(across > 0)) return 1;
+    east = glm::dvec3(-up.y, up.x, 0) / across;
+  }
+  const glm::dvec3 north = glm::cross(up, east);
+  const double aside = glm::dot(normal, north) - glm::dot(normal, east);
+  return std::clamp(glm::dot(normal, up) + std::sqrt(0.5) * aside, darkest, brightest);
+}
 
 void look(const Terrain& terrain, const View& view, double right, double down, int side,
           PixelSurface* pixels) {
@@ -86,7 +116,7 @@ void look(const Terrain& terrain, const View& view, double right, double down, i
     }
     pixels[n] = {};
     if (met == 5) {
-      pixels[n] = {hits[middle].along, 1, cosine_of(rays[middle], hits[middle])};
+      pixels[n] = surface_at(terrain, rays[middle], hits[middle]);
     } else if (met > 0) {
       pixels[n] = silhouette(terrain, view, right + i, down + j, rays[middle], hits[middle]);
     }
@@ -101,6 +131,8 @@ PixelSurface combined(const PixelSurface& front, const PixelSurface& behind) {
   one.depth = front.coverage >= 0.5 ? front.depth : behind.depth;
   one.coverage = std::max(front.coverage, behind.coverage);
   one.cosine = front.coverage * front.cosine + (1 - front.coverage) * behind.cosine;
+  one.relief = front.coverage * front.relief + (1 - front.coverage) * behind.relief;
+  one.normal = front.coverage >= 0.5 ? front.normal : behind.normal;
   return one;
 }
 

@@ -1,5 +1,5 @@
-// Terrain -> depth, coverage and brightness of the opaque surface at the pixels of a picture, the
-// same for every rendering method.
+// Terrain -> depth, coverage, brightness and normal of the opaque surface at the pixels of a
+// picture, the same for every rendering method.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -17,17 +17,24 @@ struct View {
 };
 
 struct PixelSurface {
-  double depth = 0;     // view depth
-  double coverage = 0;  // part of the pixel that the surface covers
-  double cosine = 0;    // between ray and normal, absolute
+  double depth = 0;      // view depth
+  double coverage = 0;   // part of the pixel that the surface covers
+  double cosine = 0;     // between ray and normal, absolute
+  double relief = 1;     // factor of its brightness, as relief_of()
+  glm::dvec3 normal{0};  // of the terrain; 0: what is seen is not one
 };
+
+// Brightness of a slope in light from the north-west, halfway between level and straight down, over
+// that of level ground: sqrt(2) (normal, light), within [0.5, 1.35]. On a map north is along y. The
+// normal and `up` are unit vectors; up: on a globe the direction of the point, on a map z.
+double relief_of(const glm::dvec3& normal, const glm::dvec3& up, Base base);
 
 constexpr int side_max = 4;
 
 // The terrain at side x side pixels; the left upper corner of the first is `right` and `down`
 // pixels from the middle of the picture. A pixel of which the middle and the four corners see the
 // terrain is covered, one of which none does is not; of others the covered part is that of 4 x 4
-// rays. Depth and cosine are those in the middle, or, where it misses, the means of these rays.
+// rays. The rest is that in the middle, or, where it misses, the means of these rays.
 void look(const Terrain& terrain, const View& view, double right, double down, int side,
           PixelSurface* pixels);
 

@@ -136,12 +136,12 @@ void no_overlap(View& view) { view.vector.span = 1; }
 void flat_on(View& view) { view.camera.projection = protocol::Projection::orthographic; }
 void globe(View& view) {
   view.geometry.mapping = protocol::GeometryMapping::sphere;
-  view.geometry.body.show = protocol::BodyShow::off;
+  view.ground.show = protocol::GroundShow::off;
   view.camera.eye.reset();
   view.camera.target.reset();
   view.camera.height.reset();
 }
-void opaque(View& view) { view.geometry.body.show = protocol::BodyShow::on; }
+void opaque(View& view) { view.ground.show = protocol::GroundShow::on; }
 void one_layer(View& view) { view.geometry.slice = {protocol::GridAxis::z, 8}; }
 
 // Every wind is rendered except where omitting winds is the feature, as in the figures of the

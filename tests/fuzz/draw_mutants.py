@@ -233,7 +233,7 @@ def examine(process, path, model, seed):
         for method in METHODS:
             view = view_of(about, step, method, np.random.default_rng(seed))
             if empty:
-                view["geometry"]["body"] = {"show": "off"}
+                view["ground"] = {"show": "off"}
             data = picture(daemon, view)
             drawn.append(check_picture(data, method, empty))
             answers.append(data)

@@ -53,6 +53,13 @@ class Bill(unittest.TestCase):
         for one in self.bill["components"]:
             self.assertTrue(one["version"], one["name"])
 
+    def test_the_coastlines_are_listed_with_their_licence(self):
+        folder = ROOT / "server/ground/natural_earth"
+        package = self.required["world-atlas"]
+        self.assertIn(f"`world-atlas` {package['version']}", (folder / "README.md").read_text())
+        self.assertEqual(package["licenses"], [{"expression": "ISC"}])
+        self.assertTrue((folder / "LICENSE").is_file())
+
     def test_compiled_in_headers_are_listed(self):
         for name in ("libboost1.81-dev", "nlohmann-json3-dev", "libglm-dev", "libcli11-dev"):
             self.assertIn(name, self.required)

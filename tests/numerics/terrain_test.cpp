@@ -215,7 +215,9 @@ TEST(Terrain, PartsOfAPixelThatAnEdgeCoversFollowItsArea) {
     EXPECT_NEAR(area, 4 / (pixel * pixel), 8 / pixel / 4 / 2);
     const float* const middle = test::pixel(rendered.image, size / 2, size / 2);
     EXPECT_EQ(middle[3], 1);
-    const double shade = 0.6 + 0.4 / std::hypot(1, 0.5);
+    // The slope faces west, a light from the north-west.
+    const double relief = (1 + 0.5 * std::sqrt(0.5)) / std::hypot(1, 0.5);
+    const double shade = (0.6 + 0.4 / std::hypot(1, 0.5)) * relief;
     EXPECT_NEAR(middle[2], shade * 0.4, 1e-5);
   }
 }

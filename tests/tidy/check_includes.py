@@ -31,7 +31,7 @@ CONFINED = [
     ("ecCodes", r"eccodes\.h", r"server/data/formats/grib/.*|tests/.*"),
     ("PROJ", r"proj\.h",
      r"server/data/cf/grid/(proj_context\.hpp|(projected_columns|crs_wkt)\.cpp)|tests/.*"),
-    ("a compressor", r"(blosc|lz4|zlib|zstd)\.h", r"server/(data|vtk_loader)/.*|tests/.*"),
+    ("a compressor", r"(blosc|lz4|zlib|zstd)\.h", r"server/(data|ground|vtk_loader)/.*|tests/.*"),
     ("VTK", r"vtk\w+\.h", r"server/vtk_loader/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
     ("libcurl", r"curl/", r"server/data/fetch/http_client\.cpp"),

@@ -239,7 +239,7 @@ class GroundFinder {
     ground.heights = std::move(values);
     info_.grid.ground = std::make_shared<const Ground>(std::move(ground));
     for (LeftOut& left : info_.left_out) {
-      if (left.name == one.name) left.reason = "gives the height of the ground (geometry.body)";
+      if (left.name == one.name) left.reason = "gives the height of the ground (view.ground)";
     }
     return {};
   }

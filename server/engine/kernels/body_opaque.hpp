@@ -115,11 +115,13 @@ enum class BodyCover { none, part, whole };
 template <bool Perspective>
 BodyCover fill_body_block(const Camera& camera, const Body& body, double left, double top,
                           BodyBlock& to) {
-  alignas(64) double depth[block_pixels];
-  alignas(64) double coverage[block_pixels];
-  alignas(64) double cosine[block_pixels];
-  for (int l = 0; body.shape == body_terrain && l < block_pixels; ++l) {
-    depth[l] = coverage[l] = cosine[l] = 0;
+  BodyPixels at;
+  at.left = left;
+  at.top = top;
+  for (int l = 0; l < block_pixels; ++l) {
+    at.depth[l] = at.coverage[l] = at.cosine[l] = 0;
+    at.relief[l] = 1;
+    for (double& part : at.normal[l]) part = 0;
   }
   for (int l = 0; body.shape != body_terrain && l < block_pixels; l += wide_lanes) {
     const int row = l / block_side;
@@ -127,23 +129,28 @@ BodyCover fill_body_block(const Camera& camera, const Body& body, double left, d
     const double right = left + l % block_side + 0.5 - static_cast<double>(camera.half_width_px);
     const Wide x = (wide(right) + hn::Iota(WideTag(), 0)) * wide(body.pixel);
     const BodyLanes lanes = body_lanes<Perspective>(camera, body, x, wide(down * body.pixel));
-    hn::Store(lanes.depth, WideTag(), depth + l);
-    hn::Store(lanes.coverage, WideTag(), coverage + l);
-    hn::Store(lanes.cosine, WideTag(), cosine + l);
+    hn::Store(lanes.depth, WideTag(), at.depth + l);
+    hn::Store(lanes.coverage, WideTag(), at.coverage + l);
+    hn::Store(lanes.cosine, WideTag(), at.cosine + l);
   }
-  if (body.terrain != nullptr) add_terrain(camera, body, left, top, depth, coverage, cosine);
+  if (body.terrain != nullptr) add_terrain(camera, body, at);
+  for (int c = 0; c < 3; ++c) {
+    for (float& light : to.rgb[c]) light = body.rgb[c];
+  }
+  if (body.paint != nullptr) paint_body(camera, body, at, to.rgb);
   to.nearest = body_nowhere;
   to.farthest = -body_nowhere;
   int covered = 0;
   for (int l = 0; l < block_pixels; ++l) {
-    const bool sees = coverage[l] > 0;
-    const float here = static_cast<float>(depth[l] - camera.depth_origin);
+    const bool sees = at.coverage[l] > 0;
+    const float here = static_cast<float>(at.depth[l] - camera.depth_origin);
     to.depth[l] = sees ? here : body_nowhere;
-    to.opacity[l] = static_cast<float>(coverage[l]);
+    to.opacity[l] = static_cast<float>(at.coverage[l]);
     to.behind[l] = 1.0F - to.opacity[l];
     for (auto& channel : to.light) channel[l] = 0;
-    const float shade = body.ambient + (1.0F - body.ambient) * static_cast<float>(cosine[l]);
-    for (int c = 0; c < 3; ++c) to.rgb[c][l] = shade * body.rgb[c];
+    const float shade = (body.ambient + (1.0F - body.ambient) * static_cast<float>(at.cosine[l])) *
+                        static_cast<float>(at.relief[l]);
+    for (auto& channel : to.rgb) channel[l] = smaller(shade * channel[l], 1.0F);
     to.nearest = smaller(to.nearest, to.depth[l]);
     to.farthest = larger(to.farthest, sees ? here : to.farthest);
     covered += to.opacity[l] >= 1.0F ? 1 : 0;

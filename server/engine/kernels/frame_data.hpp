@@ -4,6 +4,9 @@
 
 #include <cstdint>
 
+namespace windsplat::ground {
+class Paint;
+}
 namespace windsplat::terrain {
 class Terrain;
 }
@@ -157,6 +160,7 @@ constexpr int body_terrain = 3;
 struct Body {
   int shape;
   const terrain::Terrain* terrain;  // of shape terrain, or above a sphere; or null
+  const ground::Paint* paint;       // its colour by place; null: rgb
   double pixel;                     // as Camera::pixel, without rounding to float
   double centre[3];                 // sphere: right, down and forward of the eye, world units
   double radius;                    // sphere
@@ -241,12 +245,23 @@ struct TileBody {
   std::uint32_t opaque[tile_blocks];  // bit set: the body covers every pixel of the block
 };
 
-// Adds the terrain of a body to the rest of the body at the pixels of a block, given as view depth,
-// part of the pixel covered and cosine between ray and normal; (left, top): its left upper corner.
-// The same code for every instruction set.
-void add_terrain(const Camera& camera, const Body& body, double left, double top,
-                 double depth[block_pixels], double coverage[block_pixels],
-                 double cosine[block_pixels]);
+// What the pixels of a block show of the body; see terrain::PixelSurface.
+struct BodyPixels {
+  double left, top;  // its left upper corner
+  alignas(64) double depth[block_pixels];
+  alignas(64) double coverage[block_pixels];
+  alignas(64) double cosine[block_pixels];
+  double relief[block_pixels];
+  double normal[block_pixels][3];
+};
+
+// Adds the terrain of a body to the rest of the body. The same code for every instruction set.
+void add_terrain(const Camera& camera, const Body& body, BodyPixels& pixels);
+
+// Sets the colours, without shade, of the pixels that see a body with paint. The same code for
+// every instruction set.
+void paint_body(const Camera& camera, const Body& body, const BodyPixels& pixels,
+                float rgb[3][block_pixels]);
 
 // Pixels of one tile as blocks of 4 x 4; see block_channels. Rays, for perspective media: the
 // length of the ray of each pixel at unit view depth.

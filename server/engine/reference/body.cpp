@@ -2,8 +2,11 @@
 #include "server/engine/reference/body.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 
+#include "server/ground/paint.hpp"
 #include "server/terrain/terrain_pixel.hpp"
 
 namespace windsplat::engine::reference {
@@ -74,13 +77,16 @@ Hit hit_ground(const scene::Body& body, const View& view, double x, double y) {
   return hit;
 }
 
-Hit hit_terrain(const terrain::Terrain& terrain, const View& view, double x, double y) {
+terrain::View terrain_view(const View& view) {
   const auto vector = [](const Vec& from) { return glm::dvec3(from[0], from[1], from[2]); };
+  return {vector(view.eye), vector(view.right), vector(view.down), vector(view.forward),
+          view.pixel,       view.near,          view.perspective};
+}
+
+Hit hit_terrain(const terrain::Terrain& terrain, const View& view, double x, double y) {
   Hit hit;
-  terrain::look(terrain,
-                {vector(view.eye), vector(view.right), vector(view.down), vector(view.forward),
-                 view.pixel, view.near, view.perspective},
-                x - 0.5 - view.half_width, y - 0.5 - view.half_height, 1, &hit);
+  terrain::look(terrain, terrain_view(view), x - 0.5 - view.half_width, y - 0.5 - view.half_height,
+                1, &hit);
   return hit;
 }
 
@@ -102,8 +108,14 @@ Surface body_surface(const scene::Body& body, const View& view, double x, double
   out.depth = hit.depth;
   if (!(hit.coverage > 0)) return out;
   out.opacity = hit.coverage;
-  const double shade = scene::body_ambient + (1 - scene::body_ambient) * hit.cosine;
-  for (int c = 0; c < 3; ++c) out.color[c] = shade * static_cast<double>(body.color[c]);
+  const double shade = (scene::body_ambient + (1 - scene::body_ambient) * hit.cosine) * hit.relief;
+  std::array<double, 3> color{};
+  std::copy(body.color.begin(), body.color.end(), color.begin());
+  if (body.paint) {
+    color = body.paint->color(body.paint->seen(terrain_view(view), x - view.half_width,
+                                               y - view.half_height, hit.depth, hit.normal));
+  }
+  for (std::size_t c = 0; c < 3; ++c) out.color[c] = std::min(shade * color[c], 1.0);
   return out;
 }
 

@@ -376,8 +376,8 @@ Samples map_samples() {
 }
 
 std::vector<Case> mappings(Projection projection) {
-  using protocol::BodyShow;
   using protocol::GeometryMapping;
+  using protocol::GroundShow;
   std::vector<Case> cases;
   const auto add = [&](const char* label, Samples samples) -> View& {
     Case made;
@@ -388,27 +388,27 @@ std::vector<Case> mappings(Projection projection) {
     return cases.back().view;
   };
   const auto add_globe = [&](const char* label, std::array<int, 3> dims, bool poles,
-                             BodyShow body) -> View& {
+                             GroundShow body) -> View& {
     View& view = add(label, waves(globe_grid(dims, poles)));
     view.geometry.mapping = GeometryMapping::sphere;
-    view.geometry.body.show = body;
+    view.ground.show = body;
     return view;
   };
   add("flat", waves(cube_grid()));
-  add("flat with ground", waves(cube_grid())).geometry.body.show = BodyShow::on;
+  add("flat with ground", waves(cube_grid())).ground.show = GroundShow::on;
   add("slice across x", waves(cube_grid())).geometry.slice = {protocol::GridAxis::x, 1};
   add("slice across z", waves(cube_grid())).geometry.slice = {protocol::GridAxis::z, 2};
   add("terrain", terrain_samples()).geometry.height_field = "height";
   View& ground = add("terrain with ground", terrain_samples());
   ground.geometry.height_field = "height";
-  ground.geometry.body.show = BodyShow::on;
+  ground.ground.show = GroundShow::on;
   add("curvilinear", map_samples()).geometry.mapping = GeometryMapping::curvilinear;
-  add_globe("sphere, no body", {10, 5, 3}, false, BodyShow::off);
-  add_globe("sphere with poles, no body", {10, 5, 3}, true, BodyShow::off);
-  add_globe("sphere", {10, 5, 3}, false, BodyShow::automatic);
-  add_globe("sphere, world vectors", {10, 5, 3}, false, BodyShow::automatic).vector.space =
+  add_globe("sphere, no body", {10, 5, 3}, false, GroundShow::off);
+  add_globe("sphere with poles, no body", {10, 5, 3}, true, GroundShow::off);
+  add_globe("sphere", {10, 5, 3}, false, GroundShow::automatic);
+  add_globe("sphere, world vectors", {10, 5, 3}, false, GroundShow::automatic).vector.space =
       protocol::VectorSpace::world;
-  add_globe("sphere of one layer", {10, 5, 1}, false, BodyShow::automatic);
+  add_globe("sphere of one layer", {10, 5, 1}, false, GroundShow::automatic);
   add("sphere of a box", waves(cube_grid())).geometry.mapping = GeometryMapping::sphere;
   cases.back().refused_by_design = "/geometry/mapping: sphere requires longitudes and latitudes";
   return cases;

@@ -90,7 +90,22 @@ Sight sight_of(const scene::Camera& camera, Real x, Real y) {
 struct Crossing {
   Real depth = 0;
   Vec normal;
+  bool terrain = false;
 };
+
+// The brightness of a slope over that of level ground: sqrt(2) (normal, light), between 0.5 and
+// 1.35, with the light from the north-west, as high above the horizon as below the zenith.
+Real relief(terrain::Base base, const Vec& at, const Vec& normal) {
+  Vec up{0, 0, 1};
+  Vec east{1, 0, 0};
+  if (base == terrain::Base::globe) {
+    up = (1 / length(at)) * at;
+    const Vec around = cross(Vec{0, 0, 1}, at);
+    east = (1 / length(around)) * around;
+  }
+  const Vec light = 0.5L * (cross(up, east) - east) + std::sqrt(0.5L) * up;
+  return std::clamp(std::sqrt(2.0L) * dot(normal, light), 0.5L, 1.35L);
+}
 
 // The nearest triangle of a terrain, of all of them (T. Moeller, B. Trumbore: Fast, Minimum Storage
 // Ray/Triangle Intersection, 1997).
@@ -119,7 +134,7 @@ std::optional<Crossing> meet_terrain(const terrain::Terrain& terrain, const Sigh
       return vec(terrain.normal(corners[n][0], corners[n][1]));
     };
     const Vec sum = (1 - u - v) * normal(0) + u * normal(1) + v * normal(2);
-    nearest = Crossing{depth, (1 / length(sum)) * sum};
+    nearest = Crossing{depth, (1 / length(sum)) * sum, true};
   };
   for (int y = 0; y + 1 < terrain.height(); ++y) {
     for (int x = 0; x + 1 < terrain.width(); ++x) {
@@ -165,8 +180,15 @@ std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera
     if (above && (!at || above->depth < at->depth)) at = above;
   }
   if (!at) return {};
-  const Real bright = 0.6L + 0.4L * std::abs(dot(at->normal, sight.way)) / length(sight.way);
-  return Surface{at->depth, 1, bright * Vec{body.color[0], body.color[1], body.color[2]}};
+  Real bright = 0.6L + 0.4L * std::abs(dot(at->normal, sight.way)) / length(sight.way);
+  if (at->terrain) {
+    bright *= relief(body.terrain->base(), sight.origin + at->depth * sight.way, at->normal);
+  }
+  const Vec light = bright * Vec{body.color[0], body.color[1], body.color[2]};
+  return Surface{
+      at->depth,
+      1,
+      {std::min(light.x, Real(1)), std::min(light.y, Real(1)), std::min(light.z, Real(1))}};
 }
 
 // A splat on a ray: the distance from its centre at view depth z is

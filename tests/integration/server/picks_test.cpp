@@ -107,12 +107,13 @@ TEST_F(Picks, TheValueIsThatOfTheSampleAndItsStep) {
 // Also where the page cannot compute positions: on the globe and in a slice between two levels.
 TEST_F(Picks, MediaArePickedInEveryGeometry) {
   for (const Json& geometry :
-       {Json::object(), Json{{"mapping", "sphere"}, {"body", {{"show", "off"}}}},
+       {Json::object(), Json{{"mapping", "sphere"}},
         Json{{"slice", {{"axis", "z"}, {"index", 1.5}}}}}) {
     Json view = view_of_lines();
     view.erase("scalars");
     view["vector"] = {{"field", nullptr}};
     view["geometry"] = geometry;
+    view["ground"] = {{"show", "off"}};
     const std::vector<float> lit = opacities(view);
     const auto most = std::max_element(lit.begin(), lit.end()) - lit.begin();
     ASSERT_GT(lit[static_cast<std::size_t>(most)], 0.02) << geometry;

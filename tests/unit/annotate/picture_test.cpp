@@ -143,8 +143,8 @@ TEST_F(AnnotatedPicture, AnOpaqueSurfaceHidesTheEdgesBehindIt) {
   view.camera.eye = protocol::Vec3{0, -0.5, -4};  // from below
   view.camera.up = protocol::Vec3{0, 1, 0};
   const auto shows = [&](bool surface) {
-    view.geometry.body.show = surface ? protocol::BodyShow::on : protocol::BodyShow::off;
-    view.geometry.body.surface_color = "#000000";
+    view.ground.show = surface ? protocol::GroundShow::on : protocol::GroundShow::off;
+    view.ground.surface_color = "#000000";
     const auto picture = test::decoded_png(produce(Format::png).bytes);
     return std::count_if(picture.rgb.begin(), picture.rgb.end(),
                          [](std::uint8_t code) { return code > 60; });

@@ -151,8 +151,8 @@ TEST(Inspect, NamesTheKeysThatDrawTheGround) {
         file.text(levels, "units", "m");
       }
     }
-    const std::string keys = heights ? "(/geometry/heightField=zz with /geometry/body/show=on)\n"
-                                     : "(/geometry/body/show=on)\n";
+    const std::string keys =
+        heights ? "(/geometry/heightField=zz with /ground/show=on)\n" : "(/ground/show=on)\n";
     EXPECT_THAT(run({"inspect", path}).out, HasSubstr("m above sea level " + keys));
   }
 }

@@ -204,12 +204,12 @@ TEST(BuildScene, OmegaOnNumberedLevelsIsNotTurned) {
 
 // The lowest level of the shell is half a cell above the inside, which the body nearly fills.
 TEST(BuildScene, AGlobeHasABodyUnlessItIsOff) {
-  using protocol::BodyShow;
+  using protocol::GroundShow;
   auto dataset = weather();
   View view;
   EXPECT_FALSE(built(view, *dataset).body);
   view.geometry.mapping = protocol::GeometryMapping::sphere;
-  view.geometry.body.surface_color = "#00ff00";
+  view.ground.surface_color = "#00ff00";
   const Scene scene = built(view, *dataset);
   ASSERT_TRUE(scene.body);
   EXPECT_EQ(scene.body->shape, BodyShape::sphere);
@@ -219,16 +219,16 @@ TEST(BuildScene, AGlobeHasABodyUnlessItIsOff) {
   const double inside = level - 0.5 * scene.lattice.spacing[2].front();
   EXPECT_LT(scene.body->radius, inside);
   EXPECT_GT(scene.body->radius, 0.998 * inside);
-  view.geometry.body.show = BodyShow::on;
+  view.ground.show = GroundShow::on;
   EXPECT_TRUE(built(view, *dataset).body);
-  view.geometry.body.show = BodyShow::off;
+  view.ground.show = GroundShow::off;
   EXPECT_FALSE(built(view, *dataset).body);
 }
 
 TEST(BuildScene, OtherMappingsHaveAGroundIfItIsOn) {
   auto dataset = weather();
   View view;
-  view.geometry.body.show = protocol::BodyShow::on;
+  view.ground.show = protocol::GroundShow::on;
   const Scene scene = built(view, *dataset);
   ASSERT_TRUE(scene.body);
   EXPECT_EQ(scene.body->shape, BodyShape::ground);
@@ -240,10 +240,10 @@ TEST(BuildScene, OtherMappingsHaveAGroundIfItIsOn) {
 TEST(BuildScene, TheColorOfTheBodyIsChecked) {
   auto dataset = weather();
   View view;
-  view.geometry.body.surface_color = "green";
+  view.ground.surface_color = "green";
   const auto refused = complete(view, *dataset);
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().at.at(0).pointer, "/geometry/body/surfaceColor");
+  EXPECT_EQ(refused.error().at.at(0).pointer, "/ground/surfaceColor");
 }
 
 TEST(WorldRates, HeightAxesUseMetersPerSecondUnchanged) {

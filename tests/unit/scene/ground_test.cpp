@@ -21,7 +21,7 @@ namespace windsplat::scene {
 namespace {
 
 using data::AxisKind;
-using protocol::BodyShow;
+using protocol::GroundShow;
 using protocol::View;
 
 // Heights "z" over 4 x 2 columns and three levels, the number of the sample or, if `step` is more
@@ -51,11 +51,11 @@ std::unique_ptr<FakeSource> relief_on_a_globe() {
   return source;
 }
 
-View with_heights(BodyShow show) {
+View with_heights(GroundShow show) {
   View view;
   view.scalars.emplace();
   view.geometry.height_field = "z";
-  view.geometry.body.show = show;
+  view.ground.show = show;
   return view;
 }
 
@@ -67,19 +67,19 @@ Scene built_of(const View& view, data::Dataset& dataset) {
 
 TEST(Ground, IsTheTerrainOfAHeightFieldIfItIsOn) {
   auto dataset = hills(axis(AxisKind::level, "", {0, 1, 2}));
-  const Scene scene = built_of(with_heights(BodyShow::on), *dataset);
+  const Scene scene = built_of(with_heights(GroundShow::on), *dataset);
   ASSERT_TRUE(scene.body);
   EXPECT_EQ(scene.body->shape, BodyShape::terrain);
   ASSERT_TRUE(scene.body->terrain);
-  const Scene again = built_of(with_heights(BodyShow::on), *dataset);
+  const Scene again = built_of(with_heights(GroundShow::on), *dataset);
   EXPECT_EQ(again.body->terrain, scene.body->terrain) << "it is made once";
-  EXPECT_FALSE(built_of(with_heights(BodyShow::automatic), *dataset).body);
-  EXPECT_FALSE(built_of(with_heights(BodyShow::off), *dataset).body);
+  EXPECT_FALSE(built_of(with_heights(GroundShow::automatic), *dataset).body);
+  EXPECT_FALSE(built_of(with_heights(GroundShow::off), *dataset).body);
 }
 
 TEST(Ground, IsARectangleBelowLevelsOfConstantHeight) {
   auto dataset = hills(axis(AxisKind::level, "", {0, 1, 2}), 8);
-  const Scene scene = built_of(with_heights(BodyShow::on), *dataset);
+  const Scene scene = built_of(with_heights(GroundShow::on), *dataset);
   ASSERT_TRUE(scene.body);
   EXPECT_EQ(scene.body->shape, BodyShape::ground);
   EXPECT_FALSE(scene.body->terrain);
@@ -88,13 +88,13 @@ TEST(Ground, IsARectangleBelowLevelsOfConstantHeight) {
 // Heights over a globe of 45 degrees, "z" rising from column to column.
 TEST(Ground, OfAGlobeHasATerrainOnlyIfItIsOn) {
   auto dataset = dataset_of(relief_on_a_globe());
-  View view = with_heights(BodyShow::automatic);
+  View view = with_heights(GroundShow::automatic);
   view.geometry.mapping = protocol::GeometryMapping::sphere;
   const Scene plain = built_of(view, *dataset);
   ASSERT_TRUE(plain.body);
   EXPECT_EQ(plain.body->shape, BodyShape::sphere);
   EXPECT_FALSE(plain.body->terrain);
-  view.geometry.body.show = BodyShow::on;
+  view.ground.show = GroundShow::on;
   const Scene scene = built_of(view, *dataset);
   ASSERT_TRUE(scene.body);
   EXPECT_EQ(scene.body->shape, BodyShape::sphere);
@@ -103,8 +103,8 @@ TEST(Ground, OfAGlobeHasATerrainOnlyIfItIsOn) {
 
 TEST(Ground, IsARectangleBelowLevelsOfPressure) {
   auto dataset = hills(axis(AxisKind::pressure, "hPa", {1000, 850, 700}));
-  EXPECT_FALSE(built_of(with_heights(BodyShow::automatic), *dataset).body);
-  const Scene scene = built_of(with_heights(BodyShow::on), *dataset);
+  EXPECT_FALSE(built_of(with_heights(GroundShow::automatic), *dataset).body);
+  const Scene scene = built_of(with_heights(GroundShow::on), *dataset);
   ASSERT_TRUE(scene.body);
   EXPECT_EQ(scene.body->shape, BodyShape::ground);
   EXPECT_FALSE(scene.body->terrain);
@@ -151,7 +151,7 @@ View shown(bool with_heights) {
   View view;
   view.scalars.emplace();
   if (with_heights) view.geometry.height_field = "z";
-  view.geometry.body.show = BodyShow::on;
+  view.ground.show = GroundShow::on;
   return view;
 }
 
@@ -295,7 +295,7 @@ TEST(Ground, IsOpenBelowMaskedColumns) {
     return masked ? std::nan("") : 10.0 * static_cast<double>(n / 8);
   };
   auto dataset = dataset_of(std::move(source));
-  const Scene scene = built_of(with_heights(BodyShow::on), *dataset);
+  const Scene scene = built_of(with_heights(GroundShow::on), *dataset);
   ASSERT_TRUE(scene.body && scene.body->terrain);
   const auto& places = *scene.lattice.places;
   for (std::size_t c = 0; c < 8; ++c) {
@@ -314,10 +314,10 @@ TEST(Ground, IsOpenBelowMaskedColumns) {
 TEST(Ground, CountsTowardTheMemoryLimit) {
   auto dataset = over_ground(axis(AxisKind::level, "", {0, 1, 2}), ground_of(relief), "altitude");
   View view = shown(true);
-  view.geometry.body.show = BodyShow::off;
+  view.ground.show = GroundShow::off;
   built_of(view, *dataset);
   const std::uint64_t before = dataset->resident_bytes();
-  view.geometry.body.show = BodyShow::on;
+  view.ground.show = GroundShow::on;
   const Scene scene = built_of(view, *dataset);
   const std::uint64_t bytes = terrain::bytes_of(6, 4);
   EXPECT_GE(bytes, scene.body->terrain->bytes());
@@ -329,9 +329,9 @@ TEST(Ground, CountsTowardTheMemoryLimit) {
 TEST(Ground, IsMadeByTheThreadThatLoads) {
   auto dataset = over_ground(axis(AxisKind::level, "", {0, 1, 2}), ground_of(relief), "altitude");
   View view = shown(true);
-  view.geometry.body.show = BodyShow::off;
+  view.ground.show = GroundShow::off;
   built_of(view, *dataset);
-  view.geometry.body.show = BodyShow::on;
+  view.ground.show = GroundShow::on;
   data::Dataset resident = dataset->resident_only();
   const auto early = build_scene(view, resident);
   ASSERT_FALSE(early);

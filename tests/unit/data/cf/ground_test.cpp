@@ -126,7 +126,7 @@ TEST(GroundOfAFile, OfSeveralIsTheOneWithAStandardName) {
   const auto source = opened(path);
   ASSERT_TRUE(source->info().grid.ground);
   EXPECT_EQ(source->info().grid.ground->name, "zs");
-  EXPECT_EQ(reason_of(source->info(), "zs"), "gives the height of the ground (geometry.body)");
+  EXPECT_EQ(reason_of(source->info(), "zs"), "gives the height of the ground (view.ground)");
 }
 
 TEST(GroundOfAFile, ThatDependsOnTimeMustNotChange) {

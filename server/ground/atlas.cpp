@@ -1,0 +1,171 @@
+// Deltas -> segments -> cells, and land by counting the coasts that are crossed.
+#include "server/ground/atlas.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/base/check.hpp"
+#include "server/ground/lines.hpp"
+
+namespace windsplat::ground {
+
+namespace {
+
+// Corners of cells and ends of segments lie on round degrees, and segments through a corner may
+// have any simple slope: places to count from lie beside, degrees to the east and the north.
+constexpr double beside_x = 0.001237;
+constexpr double beside_y = 0.002113;
+
+// Longitudes are moved by a multiple of 360 degrees to within 180 of `near`.
+double wrapped(double longitude, double near) {
+  return near + std::remainder(longitude - near, 360.0);
+}
+
+// The latitude at which a segment crosses a meridian, if it does.
+bool meets_meridian(const Ends& s, double x, double& y) {
+  if ((s.ax <= x) == (s.bx <= x)) return false;
+  y = s.ay + (s.by - s.ay) * ((x - s.ax) / (s.bx - s.ax));
+  return true;
+}
+
+// The longitude at which a segment crosses a parallel, if it does.
+bool meets_parallel(const Ends& s, double y, double& x) {
+  if ((s.ay <= y) == (s.by <= y)) return false;
+  x = s.ax + (s.bx - s.ax) * ((y - s.ay) / (s.by - s.ay));
+  return true;
+}
+
+bool is_between(double value, double a, double b) {
+  return value > std::min(a, b) && value <= std::max(a, b);
+}
+
+int floored(double value) { return static_cast<int>(std::floor(value)); }
+
+}  // namespace
+
+Ends ends_near(const Segment& segment, double longitude) {
+  const double ax = wrapped(static_cast<double>(segment.from[0]), longitude);
+  return {ax, static_cast<double>(segment.from[1]),
+          ax + (static_cast<double>(segment.to[0]) - static_cast<double>(segment.from[0])),
+          static_cast<double>(segment.to[1])};
+}
+
+bool separates(const Ends& ends, const Place& from, const Place& to) {
+  double at = 0;
+  bool odd =
+      meets_parallel(ends, from.latitude, at) && is_between(at, from.longitude, to.longitude);
+  if (meets_meridian(ends, to.longitude, at) && is_between(at, from.latitude, to.latitude)) {
+    odd = !odd;
+  }
+  return odd;
+}
+
+Level::Level(std::vector<Segment> segments, std::size_t coasts, int rows, double tolerance)
+    : segments_(std::move(segments)),
+      coasts_(coasts),
+      width_(2 * rows),
+      height_(rows),
+      cell_(180.0 / rows),
+      tolerance_(tolerance) {
+  WINDSPLAT_CHECK(rows > 0 && coasts <= segments_.size());
+  set_index();
+  set_corners();
+}
+
+std::size_t Level::cell_at(int x, int y) const {
+  const int column = ((x % width_) + width_) % width_;
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+         static_cast<std::size_t>(column);
+}
+
+Level::Cells Level::cells(double west, double east, double south, double north) const {
+  Cells of;
+  of.x = floored((west + 180) / cell_);
+  of.x_last = std::min(floored((east + 180) / cell_), of.x + width_ - 1);
+  of.y = std::clamp(floored((south + 90) / cell_), 0, height_ - 1);
+  of.y_last = std::clamp(floored((north + 90) / cell_), 0, height_ - 1);
+  return of;
+}
+
+// A segment is listed in all cells of its bounding box.
+void Level::set_index() {
+  const std::size_t count = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+  first_.assign(count + 1, 0);
+  const auto each_cell = [this](const Segment& s, const auto& use) {
+    const auto [west, east] = std::minmax(s.from[0], s.to[0]);
+    const auto [south, north] = std::minmax(s.from[1], s.to[1]);
+    const Cells in = cells(static_cast<double>(west), static_cast<double>(east),
+                           static_cast<double>(south), static_cast<double>(north));
+    for (int y = in.y; y <= in.y_last; ++y) {
+      for (int x = in.x; x <= in.x_last; ++x) use(cell_at(x, y));
+    }
+  };
+  for (const Segment& s : segments_) {
+    each_cell(s, [this](std::size_t cell) { ++first_[cell + 1]; });
+  }
+  for (std::size_t cell = 0; cell < count; ++cell) first_[cell + 1] += first_[cell];
+  index_.resize(first_.back());
+  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+  for (std::size_t n = 0; n < segments_.size(); ++n) {
+    each_cell(segments_[n],
+              [&](std::size_t cell) { index_[next[cell]++] = static_cast<std::uint32_t>(n); });
+  }
+}
+
+// Along the western edge of each column of cells from the north pole, which is sea.
+void Level::set_corners() {
+  std::vector<std::vector<double>> crossed(static_cast<std::size_t>(width_));
+  for (std::size_t n = 0; n < coasts_; ++n) {
+    const auto [west, east] = std::minmax(segments_[n].from[0], segments_[n].to[0]);
+    const int last = floored((static_cast<double>(east) + 180) / cell_);
+    for (int x = floored((static_cast<double>(west) + 180) / cell_); x <= last; ++x) {
+      const double meridian = -180.0 + x * cell_ + beside_x;
+      double latitude = 0;
+      if (!meets_meridian(ends_near(segments_[n], meridian), meridian, latitude)) continue;
+      crossed[cell_at(x, 0)].push_back(latitude);
+    }
+  }
+  land_.resize(first_.size() - 1);
+  for (int x = 0; x < width_; ++x) {
+    const std::vector<double>& at = crossed[static_cast<std::size_t>(x)];
+    for (int y = 0; y < height_; ++y) {
+      const double south = -90.0 + y * cell_ + beside_y;
+      const auto north_of =
+          std::count_if(at.begin(), at.end(), [&](double c) { return c > south; });
+      land_[cell_at(x, y)] = static_cast<std::uint8_t>(north_of % 2);
+    }
+  }
+}
+
+bool Level::is_land(const Place& place) const {
+  const double latitude = std::clamp(place.latitude, -90.0, 90.0);
+  const double longitude = wrapped(place.longitude, 0);
+  const Cells in = cells(longitude, longitude, latitude, latitude);
+  const Place corner{-180.0 + in.x * cell_ + beside_x, -90.0 + in.y * cell_ + beside_y};
+  bool land = land_[cell_at(in.x, in.y)] != 0;
+  each(in, false, [&](const Segment& segment, bool) {
+    if (separates(ends_near(segment, longitude), corner, {longitude, latitude})) land = !land;
+  });
+  return land;
+}
+
+std::size_t Level::bytes() const {
+  return segments_.size() * sizeof(Segment) +
+         (first_.size() + index_.size()) * sizeof(std::uint32_t) + land_.size();
+}
+
+const std::array<Level, levels>& atlas() {
+  static const std::array<Level, levels> all = read_levels();
+  return all;
+}
+
+const Level& level_for(double degrees_per_pixel) {
+  const auto& all = atlas();
+  for (std::size_t n = levels; n-- > 1;) {
+    if (all.at(n).tolerance() <= 0.5 * degrees_per_pixel) return all.at(n);
+  }
+  return all.front();
+}
+
+}  // namespace windsplat::ground

@@ -1,0 +1,86 @@
+// Coastlines and borders of the Earth (natural_earth/README.md) at three levels of detail: what
+// lies near a place, and whether it is land.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace windsplat::ground {
+
+// Degrees.
+struct Place {
+  double longitude = 0, latitude = 0;
+};
+
+// Degrees; a line may continue beyond 180, and its ends are less than 180 apart.
+struct Segment {
+  std::array<float, 2> from{}, to{};  // longitude, latitude
+};
+
+// A segment with longitudes within 180 degrees of a place, at least at its beginning.
+struct Ends {
+  double ax = 0, ay = 0, bx = 0, by = 0;
+};
+Ends ends_near(const Segment& segment, double longitude);
+
+// Whether a segment separates two places: a way along the parallel of the first and then along the
+// meridian of the second crosses it once.
+bool separates(const Ends& ends, const Place& from, const Place& to);
+
+// The lines of one level, by cells of equal degrees.
+class Level {
+ public:
+  // Segments of coasts first, of which there are `coasts`. rows: of cells from pole to pole.
+  Level(std::vector<Segment> segments, std::size_t coasts, int rows, double tolerance);
+
+  // Degrees by which lines may be moved from where the data have them.
+  [[nodiscard]] double tolerance() const { return tolerance_; }
+  [[nodiscard]] bool is_land(const Place& place) const;
+
+  // Columns and rows of cells, both ends included; columns may be beyond those of the map and then
+  // continue around it.
+  struct Cells {
+    int x = 0, x_last = 0;
+    int y = 0, y_last = 0;
+  };
+  [[nodiscard]] Cells cells(double west, double east, double south, double north) const;
+  // Calls see(segment, is_coast) for the segments in the cells, some of them more than once.
+  template <class See>
+  void each(const Cells& cells, bool borders, const See& see) const {
+    for (int y = cells.y; y <= cells.y_last; ++y) {
+      for (int x = cells.x; x <= cells.x_last; ++x) {
+        const std::size_t at = cell_at(x, y);
+        for (std::uint32_t n = first_[at]; n < first_[at + 1]; ++n) {
+          const bool coast = index_[n] < coasts_;
+          if (coast || borders) see(segments_[index_[n]], coast);
+        }
+      }
+    }
+  }
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  [[nodiscard]] std::size_t cell_at(int x, int y) const;
+  void set_index();
+  void set_corners();
+
+  std::vector<Segment> segments_;
+  std::size_t coasts_;
+  int width_, height_;
+  double cell_;  // degrees
+  double tolerance_;
+  std::vector<std::uint32_t> first_;  // of each cell, in index_; coasts before borders
+  std::vector<std::uint32_t> index_;
+  std::vector<std::uint8_t> land_;  // at the south-west corner of each cell
+};
+
+// The finest first. Read at the first call; takes some milliseconds and 5 MB.
+constexpr std::size_t levels = 3;
+const std::array<Level, levels>& atlas();
+
+// The coarsest level whose lines are moved by at most half of that many degrees, else the finest.
+const Level& level_for(double degrees_per_pixel);
+
+}  // namespace windsplat::ground
