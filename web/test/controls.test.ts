@@ -187,11 +187,13 @@ test("controls without effect are hidden or disabled", () => {
   assert.equal(off({ method: { name: "slab" } }).slab, true);
   assert.equal(off({ geometry: { slice: { axis: "x", index: 0 } } }).slice, true);
   assert.equal(off({ camera: { projection: "orthographic" } }).fovY, false);
-  assert.equal(off({ geometry: { mapping: "flat" } }).body, false);
-  assert.equal(off({ geometry: { mapping: "flat", body: { show: "on" } } }).body, true);
-  assert.equal(off({ geometry: { mapping: "sphere" } }).body, true);
-  assert.equal(off({ geometry: { mapping: "sphere", body: { show: "auto" } } }).body, true);
-  assert.equal(off({ geometry: { mapping: "sphere", body: { show: "off" } } }).body, false);
+  const globe = { mapping: "sphere" } as const;
+  assert.equal(off({ geometry: { mapping: "flat" } }).ground, false);
+  assert.equal(off({ ground: { show: "on" } }).ground, true);
+  assert.equal(off({ geometry: globe }).ground, true);
+  assert.equal(off({ geometry: globe, ground: { show: "auto" } }).ground, true);
+  assert.equal(off({ geometry: globe, ground: { show: "off" } }).ground, false);
+  assert.equal(off({ ground: { tint: false } }).tint, false);
   assert.equal(off({ depthCue: { strength: 0 } }).depthCue, false);
 });
 

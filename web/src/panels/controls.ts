@@ -214,15 +214,17 @@ export const qualityHint = (view: View): string =>
     ? "Moving frames: the fastest expected to meet the error limit, within the budget."
     : "Moving frames: the least error that the budget allows.";
 
-// The choices of geometry.body.show.
-export const bodyOptions: Options = { "on a globe": "auto", always: "on", never: "off" };
+// The choices of ground.show.
+export const groundOptions: Options = { "on a globe": "auto", always: "on", never: "off" };
 
-// Whether the view draws its opaque body.
-export function showsBody(view: View): boolean {
-  const { mapping = "flat", body } = view.geometry ?? {};
-  const show = body?.show ?? "auto";
-  return show === "auto" ? mapping === "sphere" : show === "on";
+// Whether the view draws its ground.
+export function showsGround(view: View): boolean {
+  const show = view.ground?.show ?? "auto";
+  return show === "auto" ? view.geometry?.mapping === "sphere" : show === "on";
 }
+
+// Whether the places of a dataset on the Earth are known: then it can be drawn as a globe.
+export const showsTheEarth = (dataset: Dataset): boolean => dataset.mappings.includes("sphere");
 
 // Which controls apply to a view; the others are hidden or disabled.
 export function controlStates(view: View) {
@@ -247,7 +249,8 @@ export function controlStates(view: View) {
     // A slice or plane has straight lines only.
     traceable: lines && (view.geometry?.slice ?? view.geometry?.plane ?? null) === null,
     combined: lines && (view.geometry?.slice ?? view.geometry?.plane ?? null) !== null,
-    body: showsBody(view),
+    ground: showsGround(view),
+    tint: view.ground?.tint !== false,
     fovY: view.camera?.projection !== "orthographic",
     errorLimit: hasErrorLimit(view),
     depthCue: lines && view.depthCue?.strength !== 0,

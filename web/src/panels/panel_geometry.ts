@@ -2,7 +2,6 @@
 import type GUI from "lil-gui";
 import { withProjection, type Camera } from "../view/camera";
 import {
-  bodyOptions,
   depthCuePatch,
   exaggerationText,
   fieldOptions,
@@ -69,9 +68,6 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
   }
   addStretch(folder, kit);
   kit.note(folder, () => exaggerationText(dataset, kit.host.view()));
-  kit.choice(folder, "opaque surface", keyAccess("/geometry/body/show"), bodyOptions);
-  const color = kit.color(folder, "surface colour", keyAccess("/geometry/body/surfaceColor"));
-  kit.showWhen((states) => states.body, color);
 }
 
 function addStretch(folder: GUI, kit: PanelKit): void {

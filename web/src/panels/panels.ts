@@ -1,5 +1,5 @@
-// The panels beside the picture: lines, media, geometry, camera, method and quality. Rebuilt for
-// each dataset.
+// The panels beside the picture: lines, media, geometry, ground, camera, method and quality. Rebuilt
+// for each dataset.
 import GUI from "lil-gui";
 import {
   compositingHints,
@@ -15,6 +15,7 @@ import { errorMetric } from "../base/error_text";
 import { ForecastPlot } from "./forecast_plot";
 import { addAnnotations } from "./panel_annotations";
 import { addLight } from "./panel_light";
+import { addGround } from "./panel_ground";
 import { addLines, type FlowSwitch } from "./panel_lines";
 import { addMedia } from "./panel_media";
 import { cameraNumbersTitle } from "./panel_camera";
@@ -49,6 +50,7 @@ export class Panels {
     probeTitle,
     "Region",
     "Geometry",
+    "Ground",
     "Camera and depth",
     cameraNumbersTitle,
     "Annotations",
@@ -82,6 +84,7 @@ export class Panels {
     addLight(gui, kit);
     addSurfaces(gui, kit);
     addGeometry(gui, kit);
+    addGround(gui, kit);
     addCamera(gui, kit, this.actions);
     addAnnotations(gui, kit);
     this.probe = new ProbePanel(gui, kit, () => this.actions.probed(), this.probePlace());
