@@ -1,5 +1,5 @@
-// The panels beside the picture: lines, media, geometry, ground, camera, method and quality. Rebuilt
-// for each dataset.
+// The panels beside the picture: lines, media, geometry, ground, camera, method and quality.
+// Rebuilt for each dataset.
 import GUI from "lil-gui";
 import {
   compositingHints,
