@@ -2,16 +2,16 @@
 #include <cmath>
 
 #include "protocol/codec.hpp"
-#include "protocol/codec_annotations.hpp"
-#include "protocol/codec_ground.hpp"
 #include "protocol/codec_json.hpp"
-#include "protocol/codec_light.hpp"
 #include "protocol/codec_names.hpp"
-#include "protocol/codec_planes.hpp"
-#include "protocol/codec_region.hpp"
-#include "protocol/codec_surfaces.hpp"
-#include "protocol/codec_trace.hpp"
 #include "protocol/limits.hpp"
+#include "protocol/view/codec_annotations.hpp"
+#include "protocol/view/codec_ground.hpp"
+#include "protocol/view/codec_light.hpp"
+#include "protocol/view/codec_planes.hpp"
+#include "protocol/view/codec_region.hpp"
+#include "protocol/view/codec_surfaces.hpp"
+#include "protocol/view/codec_trace.hpp"
 
 namespace windsplat::protocol {
 

@@ -8,10 +8,10 @@
 #include <span>
 
 #include "server/base/check.hpp"
-#include "server/engine/body.hpp"
-#include "server/engine/chains.hpp"
-#include "server/engine/light.hpp"
-#include "server/engine/line_style.hpp"
+#include "server/engine/layers/body.hpp"
+#include "server/engine/layers/chains.hpp"
+#include "server/engine/layers/light.hpp"
+#include "server/engine/layers/line_style.hpp"
 
 namespace windsplat::engine {
 

@@ -6,8 +6,8 @@
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/engine/bins.hpp"
+#include "server/engine/layers/surfaces.hpp"
 #include "server/engine/render.hpp"
-#include "server/engine/surfaces.hpp"
 #include "server/engine/sweep.hpp"
 
 namespace windsplat::engine {

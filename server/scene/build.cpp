@@ -494,8 +494,7 @@ Result<Needs> needs_of(const CompletedView& completed, const data::Dataset& data
 
 Result<Scene> build_scene(const View& view, data::Dataset& dataset) {
   const auto completed = complete(view, dataset);
-  if (!completed) return completed.error();
-  return build_scene(*completed, dataset);
+  return completed ? build_scene(*completed, dataset) : completed.error();
 }
 
 }  // namespace windsplat::scene

@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/engine/layers/surfaces.hpp"
 #include "server/engine/reference/body.hpp"
 #include "server/engine/reference/kernels.hpp"
 #include "server/engine/reference/profile.hpp"
 #include "server/engine/reference/ray.hpp"
 #include "server/engine/reference/screen_grid.hpp"
-#include "server/engine/surfaces.hpp"
 
 namespace windsplat::engine::reference {
 

@@ -182,9 +182,10 @@ Result<void> crop_columns(const RegionView& region, const data::Grid& grid, Crop
   for (int j = 0; j < height; ++j) {
     for (int i = 0; i < width; ++i, ++n) {
       const auto at = places.at(crop.x_of(i), crop.first[1] + j);
-      const bool is_kept = (!region.longitudes || is_between_longitudes(at[0], *region.longitudes)) &&
-                           (!region.latitudes || is_between(at[1], *region.latitudes)) &&
-                           (region.polygon.empty() || contains(inside, places.degrees, at));
+      const bool is_kept =
+          (!region.longitudes || is_between_longitudes(at[0], *region.longitudes)) &&
+          (!region.latitudes || is_between(at[1], *region.latitudes)) &&
+          (region.polygon.empty() || contains(inside, places.degrees, at));
       if (!is_kept) continue;
       kept[n] = in_x[static_cast<std::size_t>(i)] = in_y[static_cast<std::size_t>(j)] = 1;
     }

@@ -106,9 +106,8 @@ TEST_F(Picks, TheValueIsThatOfTheSampleAndItsStep) {
 
 // Also where the page cannot compute positions: on the globe and in a slice between two levels.
 TEST_F(Picks, MediaArePickedInEveryGeometry) {
-  for (const Json& geometry :
-       {Json::object(), Json{{"mapping", "sphere"}},
-        Json{{"slice", {{"axis", "z"}, {"index", 1.5}}}}}) {
+  for (const Json& geometry : {Json::object(), Json{{"mapping", "sphere"}},
+                               Json{{"slice", {{"axis", "z"}, {"index", 1.5}}}}}) {
     Json view = view_of_lines();
     view.erase("scalars");
     view["vector"] = {{"field", nullptr}};

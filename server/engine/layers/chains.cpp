@@ -1,4 +1,4 @@
-#include "server/engine/chains.hpp"
+#include "server/engine/layers/chains.hpp"
 
 #include <algorithm>
 

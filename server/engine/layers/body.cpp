@@ -1,5 +1,5 @@
 // The body relative to the camera.
-#include "server/engine/body.hpp"
+#include "server/engine/layers/body.hpp"
 
 #include <algorithm>
 #include <array>

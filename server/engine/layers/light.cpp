@@ -1,4 +1,4 @@
-#include "server/engine/light.hpp"
+#include "server/engine/layers/light.hpp"
 
 #include <cstddef>
 #include <glm/geometric.hpp>

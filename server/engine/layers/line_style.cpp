@@ -1,5 +1,5 @@
 // Appearance of lines and colours -> the numbers of the kernels.
-#include "server/engine/line_style.hpp"
+#include "server/engine/layers/line_style.hpp"
 
 #include <cmath>
 #include <cstddef>

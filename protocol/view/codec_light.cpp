@@ -1,4 +1,4 @@
-#include "protocol/codec_light.hpp"
+#include "protocol/view/codec_light.hpp"
 
 #include "protocol/utc_time.hpp"
 

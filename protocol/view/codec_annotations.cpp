@@ -1,4 +1,4 @@
-#include "protocol/codec_annotations.hpp"
+#include "protocol/view/codec_annotations.hpp"
 
 #include "protocol/limits.hpp"
 

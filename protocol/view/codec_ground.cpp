@@ -1,4 +1,4 @@
-#include "protocol/codec_ground.hpp"
+#include "protocol/view/codec_ground.hpp"
 
 #include "protocol/codec_names.hpp"
 

@@ -1,9 +1,9 @@
 // Distances and bearings against closed forms, and polygons of GeoJSON files.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { earthRadiusKm, greatCircleKm, initialBearing, wayText } from "../src/view/distance";
-import { polygonFrom, positionsMax } from "../src/view/geo_polygon";
-import { described } from "./page";
+import { earthRadiusKm, greatCircleKm, initialBearing, wayText } from "../../src/view/distance";
+import { polygonFrom, positionsMax } from "../../src/view/geo_polygon";
+import { described } from "../page";
 
 const near = (value: number | null, wanted: number, slack = 1e-9): void =>
   assert.ok(value !== null && Math.abs(value - wanted) < slack, `${value} is not ${wanted}`);

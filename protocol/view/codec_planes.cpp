@@ -1,4 +1,4 @@
-#include "protocol/codec_planes.hpp"
+#include "protocol/view/codec_planes.hpp"
 
 #include <cmath>
 

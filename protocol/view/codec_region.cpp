@@ -1,5 +1,5 @@
 // Polygons are geometries of GeoJSON (RFC 7946, sections 3.1.6 and 3.1.7), without foreign members.
-#include "protocol/codec_region.hpp"
+#include "protocol/view/codec_region.hpp"
 
 #include <array>
 

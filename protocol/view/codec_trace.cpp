@@ -1,4 +1,4 @@
-#include "protocol/codec_trace.hpp"
+#include "protocol/view/codec_trace.hpp"
 
 #include "protocol/limits.hpp"
 

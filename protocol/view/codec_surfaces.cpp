@@ -1,7 +1,7 @@
-#include "protocol/codec_surfaces.hpp"
+#include "protocol/view/codec_surfaces.hpp"
 
-#include "protocol/codec_planes.hpp"
 #include "protocol/limits.hpp"
+#include "protocol/view/codec_planes.hpp"
 
 namespace windsplat::protocol {
 

@@ -1,6 +1,6 @@
 // Fragments of pixels -> blocks of layers. In every pixel the body takes its place among them by
 // depth; the first that is opaque becomes the body.
-#include "server/engine/surfaces.hpp"
+#include "server/engine/layers/surfaces.hpp"
 
 #include <algorithm>
 #include <bit>
