@@ -272,7 +272,7 @@ Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
   // Keep references, so that no volume is evicted before the result is computed from it.
   std::vector<VolumePtr> others;
   const auto fine = inputs(field, step, how, others);
-  if (!fine) return fine;
+  if (!fine) return fine.error();
   const auto made = get(key, how.bytes, [&] {
     return guarded(state_->info.fields[*index], [&]() -> Result<Volume> {
       return how.others.empty() ? how.make(**fine) : how.make_with(**fine, others);
