@@ -129,6 +129,9 @@ Result<Feature> feature_of(const PickRequest& asked, data::Dataset& dataset,
   out.position.index = scene::is_section(view.geometry)
                            ? nearest_placed(exact->lattice(), found.place)
                            : found.sample;
+  const scene::Lattice& lattice = exact->lattice();
+  for (std::size_t a = 0; a < 3; ++a) out.position.index.at(a) += lattice.first.at(a);
+  if (lattice.turn > 0) out.position.index[0] %= lattice.turn;
   out.share = found.share;
   out.depth = found.depth;
   out.at = found.at;

@@ -55,6 +55,32 @@ void append(const std::string& text, std::string& key) {
   key += text;
 }
 
+void append(const std::optional<protocol::Range>& range, std::string& key) {
+  append(range ? 1.0 : 0.0, key);
+  if (!range) return;
+  for (const double end : *range) append(end, key);
+}
+
+// What masks samples besides the box of the lattice.
+void append(const protocol::RegionView& region, std::string& key) {
+  append(region.longitudes, key);
+  append(region.latitudes, key);
+  for (const protocol::FilterView& filter : region.where) {
+    append(filter.field, key);
+    append(std::optional(filter.range), key);
+    append(static_cast<double>(filter.of), key);
+  }
+  for (const auto& polygon : region.polygon) {
+    for (const auto& ring : polygon) {
+      append(static_cast<double>(ring.size()), key);
+      for (const auto& [x, y] : ring) {
+        append(x, key);
+        append(y, key);
+      }
+    }
+  }
+}
+
 // Identifies the places of the samples and the direction of the sun.
 std::string key_of(const char* what, const protocol::View& view, const Scene& scene,
                    const glm::dvec3& sun) {
@@ -63,6 +89,7 @@ std::string key_of(const char* what, const protocol::View& view, const Scene& sc
   append(static_cast<double>(geometry.mapping), key);
   append(static_cast<double>(geometry.vertical), key);
   append(geometry.height_field.value_or(""), key);
+  append(view.region, key);
   for (std::size_t a = 0; a < 3; ++a) {
     const auto c = static_cast<glm::length_t>(a);
     append(geometry.scale[a], key);

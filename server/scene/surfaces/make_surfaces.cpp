@@ -11,7 +11,9 @@
 #include "server/base/thread_pool.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/place.hpp"
 #include "server/scene/refusal.hpp"
+#include "server/scene/region/crop.hpp"
 
 namespace windsplat::scene {
 
@@ -65,7 +67,7 @@ Result<void> check_surface(const SurfaceView& surface, std::size_t n,
   return {};
 }
 
-surface::Cut cut_of(const SurfaceView& from) {
+surface::Cut cut_of(const SurfaceView& from, const Lattice& lattice) {
   surface::Cut cut;
   if (from.isovalue) {
     cut.level = *from.isovalue;
@@ -78,15 +80,15 @@ surface::Cut cut_of(const SurfaceView& from) {
   } else {
     cut.kind = surface::Cut::Kind::layer;
     cut.axis = static_cast<int>(from.slice->axis);
-    cut.index = from.slice->index;
+    cut.index = slice_index(*from.slice, lattice);
   }
   return cut;
 }
 
 // Whatever the triangles and their values depend on.
-std::string key_of(const SurfaceView& surface, const protocol::View& view) {
+std::string key_of(const SurfaceView& surface, const surface::Cut& cut, const protocol::View& view,
+                   const data::Derivation& kept) {
   const protocol::GeometryView& geometry = view.geometry;
-  const surface::Cut cut = cut_of(surface);
   std::ostringstream key;
   key << "surface " << view.step << ' ' << static_cast<int>(geometry.mapping) << ' '
       << static_cast<int>(geometry.vertical) << ' ' << static_cast<int>(cut.kind) << ' ' << cut.axis
@@ -100,7 +102,8 @@ std::string key_of(const SurfaceView& surface, const protocol::View& view) {
   key << '\n'
       << geometry.height_field.value_or("") << '\n'
       << surface.field << '\n'
-      << color_field_of(surface);
+      << color_field_of(surface) << '\n'
+      << kept.variant;
   return key.str();
 }
 
@@ -117,18 +120,26 @@ Result<std::shared_ptr<const surface::Mesh>> mesh_of(const SurfaceView& from, st
                                                      const CompletedView& completed,
                                                      data::Dataset& dataset) {
   const auto step = static_cast<std::size_t>(completed.view().step);
-  auto volume = dataset.volume(from.field, step);
+  const Placed& placed = *completed.placed();
+  const auto filters = filters_of(completed.view().region, protocol::FilterOf::all);
+  const data::Derivation kept_samples = kept_part(placed, 1, filters);
+  auto volume = dataset.derived(from.field, step, kept_samples);
   if (!volume) return volume.error();
   std::shared_ptr<const data::Volume> colors;
   if (const std::string name = color_field_of(from); !name.empty()) {
-    auto second = dataset.volume(name, step);
+    auto second = dataset.derived(name, step, kept_part(placed, 1, {}));
     if (!second) return second.error();
     colors = std::move(*second);
   }
   const surface::Samples samples = samples_of(completed.lattice());
-  surface::Cut cut = cut_of(from);
+  surface::Cut cut = cut_of(from, completed.lattice());
+  if (cut.kind == surface::Cut::Kind::layer &&
+      !(cut.index >= 0 && cut.index <= samples.dims.at(static_cast<std::size_t>(cut.axis)) - 1)) {
+    return make_error_at(ErrorKind::invalid, pointer_of(n, "/slice/index"),
+                         "is a layer that the region leaves out");
+  }
   cut.values = (*volume)->component(0);
-  const std::string key = key_of(from, completed.view());
+  const std::string key = key_of(from, cut, completed.view(), kept_samples);
   const auto numbers = dataset.remembered(key, [&]() -> Result<std::vector<double>> {
     const auto pool = few_threads(static_cast<std::size_t>(samples.dims[2]));
     const surface::MeshSize size = surface::measure(samples, cut, *pool);

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "server/scene/refusal.hpp"
+#include "server/scene/region/crop.hpp"
 #include "server/trace/streamlets.hpp"
 
 namespace windsplat::scene {
@@ -107,7 +108,8 @@ trace::Streamlets description_of(const protocol::View& view, const VectorLayer& 
 }
 
 // Everything that determines the segments, exactly.
-std::string segments_key(const protocol::View& view, const VectorLayer& layer) {
+std::string segments_key(const protocol::View& view, const Placed& placed,
+                         const VectorLayer& layer) {
   const protocol::GeometryView& geometry = view.geometry;
   const protocol::VectorView& vector = view.vector;
   std::ostringstream key;
@@ -129,6 +131,8 @@ std::string segments_key(const protocol::View& view, const VectorLayer& layer) {
   add(vector.field.name);
   add(geometry.height_field.value_or(""));
   if (layer.color_by == LineColor::scalar) add(*vector.color.field);
+  const auto components = static_cast<std::size_t>(layer.field->components);
+  add(kept_part(placed, components, filters_of(view.region, protocol::FilterOf::lines)).variant);
   return key.str();
 }
 
@@ -147,9 +151,10 @@ Result<std::shared_ptr<const trace::Segments>> streamlets_of(const protocol::Vie
                           " MiB, more than the memory limit permits: choose a larger "
                           "/vector/stride or fewer /vector/trace/segments");
   }
-  auto kept = dataset.auxiliary(segments_key(view, layer), bytes, [&of]() -> data::Resident {
-    return std::make_shared<const trace::Segments>(trace::make_segments(of));
-  });
+  auto kept =
+      dataset.auxiliary(segments_key(view, placed, layer), bytes, [&of]() -> data::Resident {
+        return std::make_shared<const trace::Segments>(trace::make_segments(of));
+      });
   if (!kept) return kept.error();
   return std::static_pointer_cast<const trace::Segments>(*kept);
 }
