@@ -7,7 +7,7 @@
 namespace windsplat::protocol {
 namespace {
 
-Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+Json null_if_empty(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 }  // namespace
 
@@ -17,7 +17,7 @@ std::string encode_folder(const FolderDescription& folder) {
     entries.push_back({{"name", entry.name},
                        {"kind", entry.is_folder ? "folder" : "file"},
                        {"bytes", entry.is_folder ? Json(nullptr) : Json(entry.bytes)},
-                       {"format", text_or_null(entry.format)}});
+                       {"format", null_if_empty(entry.format)}});
   }
   Json groups = Json::array();
   for (const FolderDescription::Group& group : folder.groups) {
@@ -26,7 +26,7 @@ std::string encode_folder(const FolderDescription& folder) {
   return dump(Json{{"folder", folder.folder},
                    {"entries", std::move(entries)},
                    {"groups", std::move(groups)},
-                   {"next", text_or_null(folder.next)},
+                   {"next", null_if_empty(folder.next)},
                    {"omitted", folder.omitted},
                    {"cut", folder.cut}});
 }

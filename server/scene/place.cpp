@@ -364,7 +364,6 @@ Result<std::shared_ptr<const Placed>> place_dataset(const protocol::GeometryView
   protocol::GeometryView unsliced = geometry;
   unsliced.slice.reset();
   unsliced.plane.reset();
-  unsliced.body = {};
   protocol::RegionView unfiltered = region;
   unfiltered.where.clear();
   const bool cropped = is_cropped(region);

@@ -140,7 +140,7 @@ class PixelLight {
     one.place = plus(position.from_eye, 1, view_.eye);
     if (group.lines != nullptr) add_line(position, one);
     if (group.media.empty() || !reference::lies_beyond_near(view_, position)) return;
-    const auto density = reference::make_density(group.media, position);
+    const auto density = reference::make_density(scene_, group.media, position);
     if (density.rho <= 0) return;
     const SplatOnRay on =
         splat_on_ray({position.from_eye, position.inverse, density.rho, density.color}, ray_);
