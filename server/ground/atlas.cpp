@@ -19,7 +19,8 @@ constexpr double beside_y = 0.002113;
 
 // Longitudes are moved by a multiple of 360 degrees to within 180 of `near`.
 double wrapped(double longitude, double near) {
-  return near + std::remainder(longitude - near, 360.0);
+  const double away = longitude - near;
+  return std::abs(away) <= 180 ? longitude : near + std::remainder(away, 360.0);
 }
 
 // The latitude at which a segment crosses a meridian, if it does.

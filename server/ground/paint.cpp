@@ -51,6 +51,7 @@ class Pixels {
         north_right_(glm::dot(at.north, seen.right)),
         north_down_(glm::dot(at.north, seen.down)) {
     determinant_ = east_right_ * north_down_ - east_down_ * north_right_;
+    if (is_regular()) inverse_ = 1 / determinant_;
   }
 
   [[nodiscard]] bool is_regular() const { return std::abs(determinant_) > 1e-30; }
@@ -83,14 +84,15 @@ class Pixels {
  private:
   [[nodiscard]] std::array<double, 2> pixels(double longitude, double north) const {
     const double east = longitude * shrink_;
-    return {(north_down_ * east - east_down_ * north) / determinant_,
-            (east_right_ * north - north_right_ * east) / determinant_};
+    return {(north_down_ * east - east_down_ * north) * inverse_,
+            (east_right_ * north - north_right_ * east) * inverse_};
   }
 
   Place at_;
   double shrink_;
   double east_right_, east_down_, north_right_, north_down_;
   double determinant_ = 0;
+  double inverse_ = 0;
 };
 
 void lay_over(const Color& line, double opacity, Color& to) {
@@ -249,7 +251,8 @@ bool Paint::is_near_graticule(const Place& place, double east, double north) con
 
 Color Paint::color(const Seen& seen, const Near& near) const {
   Located at = map_->locate(seen.point);
-  const double east = std::remainder(at.place.longitude - near.middle.longitude, 360.0);
+  double east = at.place.longitude - near.middle.longitude;
+  if (std::abs(east) > 180) east = std::remainder(east, 360.0);
   at.place.longitude = near.middle.longitude + east;
   const Pixels pixels(at, seen);
   const bool holds = std::abs(east) <= near.longitudes && pixels.is_regular() &&
