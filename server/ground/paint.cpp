@@ -203,8 +203,8 @@ std::optional<Near> Paint::near(const Seen& middle, double pixels) const {
   Near near;
   near.level = &level_for(to.degrees());
   near.middle = at.place;
-  // Along x and y both, and half of that again for the bend.
-  const double extent = 1.5 * std::sqrt(2.0) * pixels;
+  // Along x and y both, and a quarter of that again for the bend.
+  const double extent = 1.25 * std::sqrt(2.0) * pixels;
   near.longitudes = extent * to.longitudes();
   near.latitudes = extent * to.latitudes();
   const double east = near.longitudes + change * reach() * to.longitudes();
