@@ -28,7 +28,9 @@ class Field {
       return glm::dot(samples_.place(i, j, k) - cut_.point, cut_.normal);
     }
     const std::array<int, 3> at{i, j, k};
-    return at.at(static_cast<std::size_t>(cut_.axis)) - cut_.index;
+    // A sample on the surface is inside, so the first layer needs the others outside.
+    const double beyond = at.at(static_cast<std::size_t>(cut_.axis)) - cut_.index;
+    return cut_.index > 0 ? beyond : -beyond;
   }
 
   // In world coordinates: differences along the axes of the lattice, between both neighbours, by

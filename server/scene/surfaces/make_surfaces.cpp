@@ -77,6 +77,9 @@ surface::Cut cut_of(const SurfaceView& from, const Lattice& lattice) {
     const auto& [nx, ny, nz] = from.plane->normal;
     cut.point = {px, py, pz};
     cut.normal = glm::normalize(glm::dvec3(nx, ny, nz));
+    // Away from the centre: samples in the plane are inside, so that one at the end of the grid
+    // needs the others outside.
+    if (glm::dot(cut.point, cut.normal) < 0) cut.normal = -cut.normal;
   } else {
     cut.kind = surface::Cut::Kind::layer;
     cut.axis = static_cast<int>(from.slice->axis);

@@ -221,6 +221,25 @@ TEST(SurfaceMesh, PlaneThroughACubeHasTheAreaOfItsSection) {
   EXPECT_NEAR(area(mesh), 3 * std::sqrt(3.0), 1e-5);  // a regular hexagon of side sqrt(2)
 }
 
+TEST(SurfaceMesh, FirstMiddleAndLastLayersAreWhole) {
+  const Lattice lattice = cube(5, squared);
+  ThreadPool pool(1);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double index : {0.0, 1.0, 2.75, 4.0}) {
+      Cut cut;
+      cut.kind = Cut::Kind::layer;
+      cut.axis = axis;
+      cut.index = index;
+      cut.values = lattice.values.data();
+      const Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
+      EXPECT_NEAR(area(mesh), 4, 1e-6) << axis << ' ' << index;
+      for (const Point& p : mesh.places) {
+        EXPECT_NEAR(p.at(static_cast<std::size_t>(axis)), -1 + 0.5 * index, 1e-6);
+      }
+    }
+  }
+}
+
 TEST(SurfaceMesh, LayerOfAGlobeIsAShellOfConstantRadiusThatCloses) {
   Lattice lattice = globe(24);
   lattice.fill(squared);

@@ -115,6 +115,20 @@ TEST(SurfaceView, ASectionIsColouredByItsFieldOverTheDefaultRange) {
   EXPECT_EQ(shown.mesh->triangles.size(), 2U * 3 * 2);
 }
 
+TEST(SurfaceView, APlaneThroughAnOutermostLayerIsSeenFromBothSides) {
+  auto dataset = weather_of_t();
+  const Lattice lattice = built(View{}, *dataset).lattice;
+  for (const double z : {lattice.positions[2].front(), lattice.positions[2].back()}) {
+    for (const double up : {-1.0, 1.0}) {
+      SurfaceView surface;
+      surface.field = "t";
+      surface.plane = protocol::PlaneView{{0, 0, z}, {0, 0, up}};
+      const Scene scene = built(view_of(surface), *dataset);
+      EXPECT_EQ(scene.surfaces.at(0).mesh->triangles.size(), 2U * 3 * 2) << z << ' ' << up;
+    }
+  }
+}
+
 TEST(SurfaceView, ADescendingRangeReversesTheMap) {
   auto dataset = weather_of_t();
   SurfaceView surface = layer(protocol::GridAxis::z, 1);
