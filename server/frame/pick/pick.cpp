@@ -137,7 +137,7 @@ class PixelLight {
     one.group = &group;
     one.sample = position.sample;
     one.index = position.index;
-    one.place = plus(position.from_eye, 1, view_.eye);
+    one.place = reference::plus(position.from_eye, 1, view_.eye);
     if (group.lines != nullptr) add_line(position, one);
     if (group.media.empty() || !reference::lies_beyond_near(view_, position)) return;
     const auto density = reference::make_density(scene_, group.media, position);
