@@ -187,13 +187,15 @@ test("frames at rest refine the view until the final one", () =>
       "the final picture belongs to another view",
     );
     await between.show(page, { ...half, flags: 4, error: 0.031 });
-    assert.equal(await mark(), "moving 1/2");
+    assert.equal(await mark(), "preview, 1/2 size");
     const error = page.locator("#hud-error");
     assert.equal(await error.textContent(), "error 0.031 est.");
     const estimated = await error.getAttribute("title");
+    assert.equal(await page.locator("#hud-word").textContent(), " · visible");
     await between.show(page, { ...half, flags: 2, error: 0.012, jpegError: 3.2e-4 });
-    assert.equal(await mark(), "refining 1/2");
+    assert.equal(await mark(), "refining, 1/2 size");
     assert.equal(await error.textContent(), "error 0.012 measured");
+    assert.equal(await page.locator("#hud-word").textContent(), " · slight");
     assert.notEqual(await error.getAttribute("title"), estimated);
     await between.show(page, { width, height, flags: 2, error: 0.004 });
     assert.equal(await mark(), "refining");

@@ -96,7 +96,31 @@ test("the plot loads when visible and at rest, and describes each setting", () =
       page.asked[0].camera,
       "the request contains the current view",
     );
+    const entries = await page.locator(".plot-key li").allInnerTexts();
+    assert.deepEqual(entries.slice(0, 2), ["measured", "estimated"]);
+    assert.equal(entries.length, 8);
+    assert.match(
+      await page.locator(".forecast ~ .histogram-caption").textContent(),
+      /final [\d.]+ ms, error [\d.e-]+, (indistinguishable|slight|visible)/,
+    );
+    await page.locator(".plot-key").scrollIntoViewIfNeeded();
     await shot(page, "plot");
+  }));
+
+test("handles lie within the plot, at both ends of its axes", () =>
+  withPage(async (page) => {
+    await open(page);
+    await control(page, "limit the error", "input").check();
+    const box = await page.locator(".forecast").boundingBox();
+    for (const ms of [2, 500]) {
+      await type(page, "moving budget \\(ms\\)", ms);
+      for (const grip of await page.locator(".plot-handle path").all()) {
+        const at = await grip.boundingBox();
+        assert.ok(at.y >= box.y + 1, `${ms} ms: ${at.y} below ${box.y}`);
+        assert.ok(at.x >= box.x && at.x + at.width <= box.x + box.width - 1);
+        assert.ok(at.y + at.height <= box.y + box.height);
+      }
+    }
   }));
 
 test("an incomplete forecast at rest is requested once more only", () =>

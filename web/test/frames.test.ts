@@ -3,13 +3,14 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { errorMetric, toggleErrorMetric } from "../src/base/error_text";
+import { errorMetric, errorWord, toggleErrorMetric } from "../src/base/error_text";
 import {
   encodingLabel,
   errorLabel,
   FrameRate,
   frameState,
   networkMs,
+  markText,
   scaleText,
 } from "../src/viewport/frame_text";
 import { parseFrameHeader, type FrameHeader } from "../src/wire/protocol";
@@ -84,6 +85,19 @@ test("an error is also shown in dB, with the limit below it", () => {
   assert.equal(encodingLabel(header({ jpegError: 0.01 }), "psnr").text, "JPEG 40.0 dB");
 });
 
+// The slope of sRGB's curve at middle grey gives the light of one of 255 steps.
+test("an error has a word: below one step of grey, below five, or more", () => {
+  const light = (code: number) => ((code / 255 + 0.055) / 1.055) ** 2.4;
+  const step = light(128) - light(127);
+  assert.equal(errorWord(0), "indistinguishable");
+  assert.equal(errorWord(0.98 * step), "indistinguishable");
+  assert.equal(errorWord(1.02 * step), "slight");
+  assert.equal(errorWord(4.9 * step), "slight");
+  assert.equal(errorWord(5.1 * step), "visible");
+  assert.equal(errorWord(1), "visible");
+  assert.equal(errorWord(NaN), "");
+});
+
 test("the error metric applies to the page and notifies subscribers", () => {
   const metrics: string[] = [];
   errorMetric.watch((metric) => metrics.push(metric));
@@ -118,6 +132,12 @@ test("frame size is shown as full, half or a percentage", () => {
   for (const odd of [320, 319]) assert.equal(scaleText(odd, 1279), "1/4", "rounded up or down");
   assert.equal(scaleText(896, 1280), "70 %");
   assert.equal(scaleText(1, 1280), "1 %", "at least 1 %");
+  // A size is no progress.
+  assert.equal(markText("moving", "35 %"), "preview, 35 % size");
+  assert.equal(markText("refining", "1/2"), "refining, 1/2 size");
+  assert.equal(markText("moving", ""), "moving");
+  assert.equal(markText("final", "1/2"), "final");
+  assert.equal(markText("offline", "1/2"), "offline");
 });
 
 test("a frame refines when it shows a displayed view and is not final", () => {

@@ -16,6 +16,18 @@ export function errorText(rmse: number, metric: ErrorMetric): string {
   return decibels === Infinity ? "∞ dB" : `${decibels.toFixed(1)} dB`;
 }
 
+// One step of 8 bits of sRGB at middle grey, in linear light: the slope of IEC 61966-2-1 at 0.5 is
+// 0.925, and 0.925 / 255 = 0.0036.
+const greyStep = 0.0036;
+
+// A word for a linear RMSE: less than one step of grey cannot be told from the exact picture, five
+// can be seen side by side. It is that of the mean over the picture; parts may differ by more.
+export function errorWord(rmse: number): "" | "indistinguishable" | "slight" | "visible" {
+  if (!Number.isFinite(rmse)) return "";
+  if (rmse < greyStep) return "indistinguishable";
+  return rmse < 5 * greyStep ? "slight" : "visible";
+}
+
 // The name of the metric, to precede its value: "error 0.011", "PSNR 39.2 dB".
 export const errorName = (metric: ErrorMetric): string => (metric === "rmse" ? "error" : "PSNR");
 

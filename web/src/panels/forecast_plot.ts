@@ -3,7 +3,7 @@
 // the plot is visible and the view is at rest.
 import { failureText, type Forecast } from "../wire/api";
 import { debounced, make, makeSvg, setAttributes, svgText, observeVisibility } from "../base/dom";
-import { errorMetric, errorName, errorText } from "../base/error_text";
+import { errorMetric, errorName, errorText, errorWord } from "../base/error_text";
 import {
   axisOver,
   budgetAfter,
@@ -35,7 +35,7 @@ const restMs = 1000; // time without a change before the forecast is requested
 // interval of repeated requests, as calibration continues while the view is at rest
 const againMs = 5000;
 const errorMin = 5e-6; // the least quality.maxError of the server
-const [width, height, left, right, top, bottom] = [284, 176, 36, 8, 12, 30]; // drawing units
+const [width, height, left, right, top, bottom] = [284, 184, 36, 10, 20, 30]; // drawing units
 const [inner, tall] = [width - left - right, height - top - bottom];
 
 interface Handle {
@@ -44,6 +44,31 @@ interface Handle {
   across: boolean; // the handle moves along x
   set(place: number): void;
   step(way: 1 | -1, fine: boolean): void;
+}
+
+const keyEntries: [mark: SVGElement, text: string][] = [
+  [makeSvg("circle", { r: 3.5, class: "plot-measured" }), "measured"],
+  [makeSvg("circle", { r: 3.5, class: "plot-estimated" }), "estimated"],
+  [makeSvg("circle", { r: 3.5, class: "plot-estimated chosen" }), "chosen while moving"],
+  [makeSvg("path", { d: "M-7 0h14", class: "plot-line" }), "best at its time"],
+  [makeSvg("path", { d: "M0-6l6 6-6 6-6-6z", class: "plot-now" }), "this frame"],
+  [makeSvg("path", { d: "M0-6l6 6-6 6-6-6z", class: "plot-final" }), "final frame"],
+  [makeSvg("path", { d: "M-5-6h10v5l-5 6-5-6z", class: "key-handle" }), "time allowed: drag"],
+  [makeSvg("path", { d: "M5-5v10l-8-5z", class: "key-handle" }), "error allowed: drag"],
+];
+
+// What the marks of the plot mean.
+function plotKey(): HTMLElement {
+  const list = make("ul", "plot-key");
+  list.setAttribute("aria-label", "Key of the plot");
+  for (const [mark, text] of keyEntries) {
+    const entry = make("li");
+    const picture = makeSvg("svg", { viewBox: "-8 -8 16 16", "aria-hidden": "true" });
+    picture.append(mark.cloneNode());
+    entry.append(picture, text);
+    list.append(entry);
+  }
+  return list;
 }
 
 export class ForecastPlot {
@@ -72,7 +97,7 @@ export class ForecastPlot {
   constructor(private readonly host: ForecastHost) {
     this.svg.setAttribute("class", "forecast");
     this.svg.append(this.back, this.limit.element, this.budget.element);
-    this.element.append(this.svg, this.caption);
+    this.element.append(this.svg, plotKey(), this.caption);
     observeVisibility(this.element, (seen) => {
       this.seen = seen;
       this.refresh();
@@ -176,7 +201,8 @@ export class ForecastPlot {
       const [x, y] = this.at(frame.renderUs / 1000, frame.error);
       const what = frame.final ? "final" : "now";
       const mark = makeSvg("path", { d: `M${x} ${y - 6}l6 6-6 6-6-6z`, class: `plot-${what}` });
-      const text = `${what} ${spotText(frame.renderUs / 1000, frame.error, metric)}`;
+      const spot = spotText(frame.renderUs / 1000, frame.error, metric);
+      const text = `${what} ${spot}, ${errorWord(frame.error)}`;
       parts.push(this.titled(mark, text));
       return text;
     });
@@ -236,7 +262,7 @@ export class ForecastPlot {
     const hold = across
       ? { x: -12, y: 0, width: 24, height: height - bottom }
       : { x: left, y: -12, width: inner, height: 24 };
-    const d = across ? `M0 ${top}v${tall}M-6 0h12v6l-6 6-6-6z` : `M${left} 0h${inner}m0-5v10l-8-5z`;
+    const d = across ? `M0 ${top}v${tall}M-6 3h12v8l-6 6-6-6z` : `M${left} 0h${inner}m0-5v10l-8-5z`;
     element.append(makeSvg("rect", hold), makeSvg("path", { d }));
     const handle = { element, name, across, ...acts };
     this.bind(handle);

@@ -69,6 +69,12 @@ export function scaleText(width: number, full: number): string {
 
 export type FrameState = "moving" | "refining" | "final";
 
+// `scale` is that of scaleText: a size, which alone would be read as progress.
+export function markText(state: FrameState | "offline", scale: string): string {
+  if (scale === "" || state === "final" || state === "offline") return state;
+  return `${state === "moving" ? "preview" : state}, ${scale} size`;
+}
+
 // A non-final frame of a view that was already shown is "refining": the server improves it while
 // the view rests.
 export function frameState(header: FrameHeader, before: FrameHeader | null): FrameState {

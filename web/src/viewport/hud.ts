@@ -2,13 +2,14 @@
 // is not announced to screen readers.
 import { byId } from "../base/dom";
 import { orNull } from "../base/storage";
-import { errorMetric } from "../base/error_text";
+import { errorMetric, errorWord } from "../base/error_text";
 import {
   encodingLabel,
   errorLabel,
   FrameRate,
   methodText,
   networkMs,
+  markText,
   paceText,
   scaleText,
   stepsText,
@@ -30,6 +31,8 @@ const key = "windsplat.frame-times"; // in the browser's storage: "shown"
 
 const ms = (value: number): string => (value < 10 ? value.toFixed(1) : value.toFixed(0));
 
+const withDot = (word: string): string => (word === "" ? "" : ` · ${word}`);
+
 function write(element: HTMLElement, { text, title }: LabelText, before = ""): void {
   element.textContent = text === "" ? "" : before + text;
   if (element.title !== title) element.title = title;
@@ -44,6 +47,7 @@ export class Hud {
   private readonly bytes = byId("hud-bytes", HTMLElement);
   private readonly headline = byId("hud-head", HTMLElement);
   private readonly drawingError = byId("hud-error", HTMLElement);
+  private readonly errorWord = byId("hud-word", HTMLElement);
   private readonly encodingError = byId("hud-encoding", HTMLElement);
   private readonly times = byId("hud-times", HTMLElement);
   private readonly work = byId("hud-work", HTMLElement);
@@ -70,7 +74,7 @@ export class Hud {
 
   // `scale` is the text from scaleText; it is shown unless the picture is final.
   mark(state: FrameState | "offline", scale: string): void {
-    const text = state === "final" || scale === "" ? state : `${state} ${scale}`;
+    const text = markText(state, scale);
     if (this.markElement.textContent === text) return;
     this.markElement.textContent = text;
     this.markElement.classList.toggle("is-offline", state === "offline");
@@ -118,6 +122,8 @@ export class Hud {
     if (this.newest === null) return;
     const { header, limit } = this.newest;
     write(this.drawingError, errorLabel(header, limit, errorMetric.value));
+    const known = header.errorMeasured || header.errorEstimated;
+    this.errorWord.textContent = known ? withDot(errorWord(header.error)) : "";
     write(this.encodingError, encodingLabel(header, errorMetric.value), " · ");
   }
 
