@@ -27,10 +27,11 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
       ->check(CLI::Range(1, 100))
       ->type_name("N")
       ->capture_default_str();
-  command.add_option("--dpi", arguments.dots_per_inch, "Pixels to the inch of .pdf and .svg")
+  command
+      .add_option("--dpi", arguments.dots_per_inch,
+                  "Pixels to the inch of .pdf and .svg (300), and of .png if given")
       ->check(CLI::Range(10, 2400))
-      ->type_name("N")
-      ->capture_default_str();
+      ->type_name("N");
   add_memory_option(command, arguments.memory);
   add_data_host_options(command, arguments.data_hosts);
 }

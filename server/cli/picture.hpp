@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,7 @@ struct ViewArguments {
   std::string memory = "8G";
   DataHostArguments data_hosts;
   int quality = 95;  // JPEG: files favour detail over size
-  double dots_per_inch = 300;
+  std::optional<double> dots_per_inch;
 };
 
 // DATASET, --view, --size, --figure, --set, --quality, --dpi, --memory-limit and the options of

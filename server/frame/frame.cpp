@@ -24,6 +24,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr double document_dots_per_inch = 300;  // of pdf and svg without a value
+
 std::int64_t microseconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();
 }
@@ -252,13 +254,16 @@ Result<image::Bytes> bytes_of(Workspace& workspace, ThreadPool& pool, const Canc
   if (encoding.format == Format::npy) return image::encode_npy(rgba, width, height, cancel);
   if (workspace.overlay) annotate::composite(*workspace.overlay, pool, rgba);
   const image::Bytes rgb = image::tone_map(rgba, width, height, workspace.background, cancel);
-  if (encoding.format == Format::png) return image::encode_png(rgb, width, height, cancel);
+  if (encoding.format == Format::png) {
+    return image::encode_png(rgb, width, height, cancel, encoding.dots_per_inch);
+  }
   annotate::Figure plain;
   plain.width = width;
   plain.height = height;
   const annotate::Figure& figure = workspace.figure ? *workspace.figure : plain;
-  return encoding.format == Format::pdf ? annotate::encode_pdf(rgb, figure, encoding.dots_per_inch)
-                                        : annotate::encode_svg(rgb, figure, encoding.dots_per_inch);
+  const double dots_per_inch = encoding.dots_per_inch.value_or(document_dots_per_inch);
+  return encoding.format == Format::pdf ? annotate::encode_pdf(rgb, figure, dots_per_inch)
+                                        : annotate::encode_svg(rgb, figure, dots_per_inch);
 }
 
 // Errors: those of Overlay::of.

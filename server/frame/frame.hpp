@@ -55,7 +55,7 @@ struct Encoding {
   // one if `key` is set; if that fails, as JPEG.
   image::VideoEncoder* video = nullptr;
   bool key = false;
-  double dots_per_inch = 300;  // of pdf and svg
+  std::optional<double> dots_per_inch;  // of pdf and svg (300 without it) and png (none without it)
 };
 
 // How a picture was encoded.

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -22,9 +23,10 @@ enum class Subsampling { s444, s420 };
 // quality 1..100. Not divided into strips; input is rounded to 8 bits.
 Result<Bytes> encode_jpeg(std::span<const std::uint8_t> rgb, int width, int height, int quality,
                           Subsampling subsampling);
-// Errors: cancelled, checked every few rows.
+// dots_per_inch: the size in print, as a pHYs chunk (PNG, 11.3.5.3) in whole pixels to the metre;
+// without it the file tells none. Errors: cancelled, checked every few rows.
 Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height,
-                         const CancelToken& cancel = {});
+                         const CancelToken& cancel = {}, std::optional<double> dots_per_inch = {});
 // NPY 1.0, '<f4', shape (height, width, 4).
 // Errors: cancelled.
 Result<Bytes> encode_npy(std::span<const float> rgba, int width, int height,

@@ -2,6 +2,7 @@
 #include <png.h>
 
 #include <array>
+#include <cmath>
 #include <csetjmp>
 #include <new>
 #include <string>
@@ -13,8 +14,9 @@
 namespace windsplat::image {
 namespace {
 
-constexpr int compression_level = 1;                        // level of zlib
-constexpr int matches_of_runs = 3;                          // its strategy Z_RLE
+constexpr int compression_level = 1;  // level of zlib
+constexpr int matches_of_runs = 3;    // its strategy Z_RLE
+constexpr double metres_to_the_inch = 0.0254;
 constexpr std::size_t chunk_bytes = std::size_t{64} << 10;  // largest IDAT
 
 enum class Fate { done, cancelled, failed };
@@ -31,10 +33,12 @@ class PngWriter {
   PngWriter(const PngWriter&) = delete;
   PngWriter& operator=(const PngWriter&) = delete;
 
-  Fate write(const std::uint8_t* rgb, int width, int height, const CancelToken& cancel) {
+  // per_metre: pixels to the metre in print; 0: the file tells none.
+  Fate write(const std::uint8_t* rgb, int width, int height, png_uint_32 per_metre,
+             const CancelToken& cancel) {
     if (info_ == nullptr) return Fate::failed;
     if (setjmp(png_jmpbuf(png_)) != 0) return Fate::failed;  // NOLINT(cert-err52-cpp)
-    return write_chunks(rgb, width, height, cancel);
+    return write_chunks(rgb, width, height, per_metre, cancel);
   }
   [[nodiscard]] Error error() const {
     return make_error(out_of_memory_ ? ErrorKind::out_of_memory : ErrorKind::internal,
@@ -43,7 +47,8 @@ class PngWriter {
   [[nodiscard]] Bytes take() { return std::move(bytes_); }
 
  private:
-  Fate write_chunks(const std::uint8_t* rgb, int width, int height, const CancelToken& cancel) {
+  Fate write_chunks(const std::uint8_t* rgb, int width, int height, png_uint_32 per_metre,
+                    const CancelToken& cancel) {
     png_set_write_fn(png_, this, &append, nullptr);
     png_set_compression_level(png_, compression_level);
     png_set_compression_buffer_size(png_, chunk_bytes);
@@ -56,6 +61,7 @@ class PngWriter {
                  PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE,
                  PNG_FILTER_TYPE_BASE);
     png_set_sRGB(png_, info_, PNG_sRGB_INTENT_RELATIVE);
+    if (per_metre > 0) png_set_pHYs(png_, info_, per_metre, per_metre, PNG_RESOLUTION_METER);
     png_write_info(png_, info_);
     const std::size_t row_bytes = 3 * static_cast<std::size_t>(width);
     for (int row = 0; row < height; ++row, rgb += row_bytes) {
@@ -110,7 +116,7 @@ class PngWriter {
 }  // namespace
 
 Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int height,
-                         const CancelToken& cancel) {
+                         const CancelToken& cancel, std::optional<double> dots_per_inch) {
   if (width < 1 || height < 1) {
     return make_error(ErrorKind::invalid, "a PNG has at least one pixel a side, not " +
                                               std::to_string(width) + " x " +
@@ -118,8 +124,10 @@ Result<Bytes> encode_png(std::span<const std::uint8_t> rgb, int width, int heigh
   }
   WINDSPLAT_CHECK(rgb.size() ==
                   3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const auto per_metre =
+      static_cast<png_uint_32>(std::lround(dots_per_inch.value_or(0) / metres_to_the_inch));
   PngWriter writer;
-  switch (writer.write(rgb.data(), width, height, cancel)) {
+  switch (writer.write(rgb.data(), width, height, per_metre, cancel)) {
     case Fate::cancelled:
       return make_error(ErrorKind::cancelled, "request cancelled");
     case Fate::failed:

@@ -117,23 +117,46 @@ TEST(Png, IsLossless) {
   }
 }
 
+struct Chunk {
+  std::string name;
+  Bytes data;
+};
+
+std::vector<Chunk> chunks_of(const Bytes& png) {
+  std::vector<Chunk> chunks;
+  for (std::size_t at = 8; at + 12 <= png.size();) {
+    const std::uint8_t* chunk = png.data() + at;
+    const std::size_t size =
+        std::size_t{chunk[0]} << 24 | std::size_t{chunk[1]} << 16 | chunk[2] << 8 | chunk[3];
+    chunks.push_back({std::string(chunk + 4, chunk + 8), Bytes(chunk + 8, chunk + 8 + size)});
+    at += size + 12;
+  }
+  return chunks;
+}
+
 // The picture declares sRGB with relative colorimetric intent.
 TEST(Png, HasTheExpectedChunks) {
   const auto bytes = encode_png(busy_picture(200, 200).rgb, 200, 200);
   ASSERT_TRUE(bytes) << bytes.error().message;
   std::vector<std::string> names;
-  for (std::size_t at = 8; at + 12 <= bytes->size();) {
-    const std::uint8_t* chunk = bytes->data() + at;
-    const std::size_t size =
-        std::size_t{chunk[0]} << 24 | std::size_t{chunk[1]} << 16 | chunk[2] << 8 | chunk[3];
-    const std::string name(chunk + 4, chunk + 8);
-    if (name == "sRGB") {
-      EXPECT_EQ(chunk[8], 1);
+  for (const Chunk& chunk : chunks_of(*bytes)) {
+    if (chunk.name == "sRGB") {
+      EXPECT_EQ(chunk.data, Bytes{1});
     }
-    if (names.empty() || names.back() != name) names.push_back(name);
-    at += size + 12;
+    if (names.empty() || names.back() != chunk.name) names.push_back(chunk.name);
   }
   EXPECT_EQ(names, (std::vector<std::string>{"IHDR", "sRGB", "IDAT", "IEND"}));
+}
+
+// PNG, 11.3.5.3: pixels to the metre of both axes, and 1 for metres. 300 / 0.0254 = 11811.02.
+TEST(Png, TellsItsSizeInPrint) {
+  const auto bytes = encode_png(busy_picture(20, 10).rgb, 20, 10, {}, 300);
+  ASSERT_TRUE(bytes) << bytes.error().message;
+  const auto chunks = chunks_of(*bytes);
+  ASSERT_GE(chunks.size(), 3U);
+  EXPECT_EQ(chunks[2].name, "pHYs");
+  EXPECT_EQ(chunks[2].data, (Bytes{0, 0, 0x2e, 0x23, 0, 0, 0x2e, 0x23, 1}));
+  EXPECT_EQ(test::decoded_png(*bytes).rgb, busy_picture(20, 10).rgb);
 }
 
 TEST(Png, CompressesAUniformPicture) {
