@@ -359,6 +359,7 @@ Variant variant_of(const Scene& scene, const RenderPlan& plan) {
   variant.curved = plan.curved;
   variant.body = scene.body.has_value();
   variant.surfaces = !scene.surfaces.empty();
+  variant.lit = scene.light.has_value();
   variant.passes = static_cast<int>(plan.passes.size());
   return variant;
 }

@@ -17,6 +17,7 @@ std::string chosen(const Variant& variant) {
   if (variant.curved) text += " curved";
   if (variant.body) text += " body";
   if (variant.surfaces) text += " surfaces";
+  if (variant.lit) text += " lit";
   if (variant.passes > 1) {
     text += " passes=";
     text += std::to_string(variant.passes);

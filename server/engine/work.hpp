@@ -24,6 +24,7 @@ struct Variant {
   bool curved = false;
   bool body = false;
   bool surfaces = false;
+  bool lit = false;
   int passes = 0;
   const char* target = "";            // instruction set of the kernels; a string literal
   std::array<int, 3> level{0, 0, 0};  // how often each axis was halved; set by the caller

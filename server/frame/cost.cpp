@@ -89,6 +89,10 @@ class Counting {
       for (const int count : lattice_.dims) samples *= count;
       add("/surfaces/" + std::to_string(n), samples + pixels_ / Cost::pixels_a_kernel);
     }
+    // The sunlight of a sample takes about as long as half a kernel, once for each sun.
+    if (view_.light && !view_.scalars->empty()) {
+      add("/light", 0.5 * samples_[0] * samples_[1] * samples_[2]);
+    }
     if (view_.method.name == protocol::MethodName::slab) {
       const double deep = std::hypot(samples_[0], samples_[1], samples_[2]);
       const double slabs = deep / view_.method.slab_thickness;

@@ -207,7 +207,7 @@ std::vector<float> spread(const Lattice& lattice, const Cells& cells,
   std::vector<float> out;
   out.reserve(points.size());
   for (const Weighted& point : points) {
-    out.push_back(point.weight >= 0.5F ? point.extinction / point.weight : 0.0F);
+    out.push_back(point.extinction / std::max(point.weight, 1.0F));
   }
   if (!(lattice.inner_radius > 0)) return out;
   double widest = 0;

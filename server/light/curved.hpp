@@ -11,12 +11,12 @@ namespace windsplat::light {
 
 // As sunlight(), by way of a rectilinear grid around the lattice, whose cells are as wide along
 // each axis as those of the lattice on average, or wider, so that it has at most twice as many
-// points as the lattice has samples (but at least 32768). The extinction at a point is the mean of
-// that of the samples near it, with weights that fall linearly over a cell; where the weights add
-// up to less than 1/2 there is no medium. The sunlight at the points is interpolated at the
-// samples. The errors are of second order in the size of the cells inside, of first order at the
-// edges. A globe throws its own shadow, with a radius two cells of the grid below the lowest edge
-// of the shell.
+// points as the lattice has samples (but at least 32768). The extinction at a point is the sum of
+// those of the samples near it, with weights that fall linearly over a cell, over the sum of the
+// weights where that exceeds 1: at the edges the medium ends over a cell, with its optical depth.
+// The sunlight at the points is interpolated at the samples. The errors are of first order in the
+// size of the cells. A globe throws its own shadow, with a radius two cells of the grid below the
+// lowest edge of the shell.
 scene::SampleFactors curved_sunlight(const scene::Lattice& lattice,
                                      const std::vector<float>& extinctions, const glm::dvec3& sun);
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "server/light/ground_light.hpp"
 #include "server/light/lit_scene.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
@@ -327,15 +328,8 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
 }
 
 Shading shading_of(protocol::MediumShading shading) {
-  switch (shading) {
-    case protocol::MediumShading::scatter:
-      return Shading::scatter;
-    case protocol::MediumShading::gradient:
-      return Shading::gradient;
-    case protocol::MediumShading::none:
-      return Shading::none;
-  }
-  return Shading::none;
+  if (shading == protocol::MediumShading::scatter) return Shading::scatter;
+  return shading == protocol::MediumShading::gradient ? Shading::gradient : Shading::none;
 }
 
 NeededMedium needed_medium(const protocol::ScalarView& from, const Fields& fields) {
@@ -466,6 +460,7 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   auto surfaces = make_surfaces(completed, dataset);
   if (!surfaces) return surfaces.error();
   built->surfaces = std::move(*surfaces);
+  light::light_ground(*built);
   return built;
 }
 

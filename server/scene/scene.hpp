@@ -18,6 +18,10 @@
 #include "server/terrain/terrain.hpp"
 #include "server/trace/segments.hpp"
 
+namespace windsplat::light {
+class GroundLight;
+}
+
 namespace windsplat::scene {
 
 // right, up and forward are orthonormal; forward points from the eye to the target.
@@ -187,6 +191,7 @@ struct Body {
   std::shared_ptr<const terrain::Terrain> terrain;  // of shape terrain, or above a sphere; or null
   std::array<float, 3> color{0, 0, 0};              // linear
   std::shared_ptr<const ground::Paint> paint;       // its colour by place; null: `color`
+  std::shared_ptr<const light::GroundLight> light;  // factor of its colour by place; null: 1
 };
 constexpr double body_ambient = 0.6;
 

@@ -131,6 +131,7 @@ void with_vorticity(View& view) {
 }
 
 void moving(View& view) { view.vector.motion = protocol::MotionMode::phase; }
+void sunlit(View& view) { view.light.emplace(); }
 void headless(View& view) { view.vector.head_desaturation = 0; }
 void no_overlap(View& view) { view.vector.span = 1; }
 void flat_on(View& view) { view.camera.projection = protocol::Projection::orthographic; }
@@ -156,6 +157,7 @@ std::vector<Feature> features() {
       {"lines", "tornado", all, no_lines},
       {"heads", "climate", all, then(all, headless)},
       {"motion", "climate", then(all, moving), all},
+      {"light", "climate", then(all, sunlit), all},
       {"perspective", "climate", all, then(all, flat_on)},
       {"second exponential: analytic to cd", "climate", all,
        then(all, compositing(Compositing::cd))},

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "server/engine/reference/reference.hpp"
+#include "server/light/ground_light.hpp"
 #include "server/light/sunlight.hpp"
 #include "server/study/truth/integrator.hpp"
 #include "tests/numerics/scenes.hpp"
@@ -111,6 +112,50 @@ TEST(LitPicture, OfASmoothCloudIsThatOfTheBruteForceTruth) {
           << perspective << " method " << static_cast<int>(method);
     }
   }
+}
+
+// A cloud above the ground, seen from above: its shadow lies beside it.
+TEST(LitPicture, OfTheGroundHasTheShadowsOfClouds) {
+  Scene scene;
+  scene.lattice = even_lattice({20, 20, 16}, {0.1, 0.1, 0.1});
+  const auto cloud = make_volume(scene.lattice, 1, [](int, double x, double y, double z) {
+    const double off = (x - 0.3) * (x - 0.3) + y * y + (z - 0.2) * (z - 0.2);
+    return static_cast<float>(12 * std::exp(-12 * off));
+  });
+  scene.scalars = {medium(cloud, {1, 1, 1})};
+  scene.camera = look({0, 0, 0}, {0, 0, -1}, 3, 20, 20, false, 1);
+  scene.body.emplace();
+  scene.body->shape = scene::BodyShape::ground;
+  scene.body->height = scene.lattice.box_min.z;
+  scene.body->color = {0.6F, 0.6F, 0.6F};
+  light_up(scene, {0.8, 0, 1}, 0.2, 1, 0);
+  light::light_ground(scene);
+  const auto truth = truth::integrate(scene, 2);
+  for (const Method method : {Method::kernel, Method::slab, Method::reference}) {
+    scene.method = method;
+    const auto lit = picture(scene);
+    const auto red = [&](int x, int y) { return lit[4 * static_cast<std::size_t>(20 * y + x)]; };
+    EXPECT_LT(red(5, 10), 0.35) << "in the shadow";
+    EXPECT_GT(red(2, 3), 0.59) << "beside it";
+    EXPECT_LT(truth::largest_error(lit, truth), 0.06) << static_cast<int>(method);
+  }
+}
+
+TEST(LitPicture, OfAGlobeHasADayAndANightSide) {
+  Scene scene;
+  scene.lattice = even_lattice({4, 4, 4}, {0.5, 0.5, 0.5});
+  scene.lattice.inner_radius = 0.8;
+  scene.camera = look({0, 0, 0}, {0, 1, 0}, 3, 16, 16, false, 1);
+  scene.body.emplace();
+  scene.body->radius = 0.8;
+  scene.body->color = {1, 1, 1};
+  scene.light = scene::Light{{1, 0, 0}, 0.1, 1, 0, 1, {}};
+  const auto unlit = picture(scene);
+  light::light_ground(scene);
+  const auto lit = picture(scene);
+  const std::size_t row = 16 * 8;
+  EXPECT_NEAR(lit[4 * (row + 4)], 0.1 * unlit[4 * (row + 4)], 1e-6);
+  EXPECT_GT(lit[4 * (row + 12)], 0.6 * unlit[4 * (row + 12)]);
 }
 
 // Only rounding differs from an unlit scene where all light is ambient.

@@ -62,7 +62,10 @@ double slab_error(int n, bool uneven, const glm::dvec3& sun, double sigma) {
     const double way = (lattice.box_max.z - place.z) / sun.z;
     const glm::dvec3 enters = place + way * sun;
     constexpr double margin = 0.3;
-    if (std::max(std::abs(enters.x), std::abs(enters.y)) > 1 - margin) return;
+    for (int a = 0; a < 2; ++a) {
+      const double way_in = sun[a] > 0 ? enters[a] : -enters[a];
+      if (sun[a] != 0 && way_in > 1 - margin) return;
+    }
     if (lattice.box_max.z - place.z < margin) return;
     most = std::max(most, std::abs(factor(factors, at) - std::exp(-sigma * way)));
     ++judged;

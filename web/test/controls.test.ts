@@ -195,6 +195,9 @@ test("controls without effect are hidden or disabled", () => {
   assert.equal(off({ geometry: globe, ground: { show: "off" } }).ground, false);
   assert.equal(off({ ground: { tint: false } }).tint, false);
   assert.equal(off({ depthCue: { strength: 0 } }).depthCue, false);
+  assert.equal(off({}).light, false);
+  assert.equal(off({ light: null }).light, false);
+  assert.equal(off({ light: {} }).light, true);
 });
 
 test("every offered method and operator is explained, and the reference is not offered", () => {

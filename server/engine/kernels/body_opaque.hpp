@@ -138,6 +138,9 @@ BodyCover fill_body_block(const Camera& camera, const Body& body, double left, d
     for (float& light : to.rgb[c]) light = body.rgb[c];
   }
   if (body.paint != nullptr) paint_body(camera, body, at, to.rgb);
+  alignas(64) float bright[block_pixels];
+  for (float& factor : bright) factor = 1;
+  if (body.light != nullptr) light_body(camera, body, left, top, at.depth, at.coverage, bright);
   to.nearest = body_nowhere;
   to.farthest = -body_nowhere;
   int covered = 0;
@@ -149,7 +152,7 @@ BodyCover fill_body_block(const Camera& camera, const Body& body, double left, d
     to.behind[l] = 1.0F - to.opacity[l];
     for (auto& channel : to.light) channel[l] = 0;
     const float shade = (body.ambient + (1.0F - body.ambient) * static_cast<float>(at.cosine[l])) *
-                        static_cast<float>(at.relief[l]);
+                        static_cast<float>(at.relief[l]) * bright[l];
     for (auto& channel : to.rgb) channel[l] = smaller(shade * channel[l], 1.0F);
     to.nearest = smaller(to.nearest, to.depth[l]);
     to.farthest = larger(to.farthest, sees ? here : to.farthest);

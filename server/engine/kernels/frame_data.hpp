@@ -7,6 +7,9 @@
 namespace windsplat::ground {
 class Paint;
 }
+namespace windsplat::light {
+class GroundLight;
+}
 namespace windsplat::terrain {
 class Terrain;
 }
@@ -167,6 +170,7 @@ struct Body {
   double low[3], high[3];  // ground: corners relative to the eye, world axes; both at its height
   float rgb[3];
   float ambient;
+  const light::GroundLight* light;  // factor of its colour by place; null: 1
 };
 
 // Kernel positions of one stride, with their lines and media.
@@ -262,6 +266,12 @@ void add_terrain(const Camera& camera, const Body& body, BodyPixels& pixels);
 // every instruction set.
 void paint_body(const Camera& camera, const Body& body, const BodyPixels& pixels,
                 float rgb[3][block_pixels]);
+
+// Factors of the colour of a body with light at the pixels of a block that see it. The same code
+// for every instruction set.
+void light_body(const Camera& camera, const Body& body, double left, double top,
+                const double depth[block_pixels], const double coverage[block_pixels],
+                float bright[block_pixels]);
 
 // Pixels of one tile as blocks of 4 x 4; see block_channels. Rays, for perspective media: the
 // length of the ray of each pixel at unit view depth.

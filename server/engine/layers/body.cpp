@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "server/ground/paint.hpp"
+#include "server/light/ground_light.hpp"
 #include "server/terrain/terrain_pixel.hpp"
 
 namespace windsplat::engine {
@@ -29,6 +30,7 @@ kernels::Body make_body(const scene::Scene& scene) {
       break;
   }
   to.terrain = from.terrain.get();
+  to.light = from.light.get();
   to.paint = from.paint.get();
   to.centre[0] = -glm::dot(eye, scene.camera.right);
   to.centre[1] = glm::dot(eye, scene.camera.up);
@@ -108,6 +110,25 @@ void paint_body(const Camera& camera, const Body& body, const BodyPixels& pixels
     } else if (coverage[l] > 0) {
       put(l, body.paint->color(seen_at(l)));
     }
+  }
+}
+
+void light_body(const Camera& camera, const Body& body, double left, double top,
+                const double depth[block_pixels], const double coverage[block_pixels],
+                float bright[block_pixels]) {
+  const auto vector = [](const double from[3]) { return glm::dvec3(from[0], from[1], from[2]); };
+  const glm::dvec3 eye = vector(camera.eye);
+  const glm::dvec3 right = body.pixel * vector(camera.world_right);
+  const glm::dvec3 down = body.pixel * vector(camera.world_down);
+  for (int l = 0; l < block_pixels; ++l) {
+    if (!(coverage[l] > 0)) continue;
+    const double x = left + l % block_side + 0.5 - static_cast<double>(camera.half_width_px);
+    const double row = l / block_side;  // NOLINT(bugprone-integer-division): a row of pixels
+    const double y = top + row + 0.5 - static_cast<double>(camera.half_height_px);
+    const double scale = camera.perspective != 0 ? depth[l] : 1;
+    const glm::dvec3 place =
+        eye + depth[l] * vector(camera.world_forward) + scale * (x * right + y * down);
+    bright[l] = static_cast<float>(body.light->factor(place));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "server/ground/paint.hpp"
+#include "server/light/ground_light.hpp"
 #include "server/terrain/terrain_pixel.hpp"
 
 namespace windsplat::engine::reference {
@@ -108,12 +109,17 @@ Surface body_surface(const scene::Body& body, const View& view, double x, double
   out.depth = hit.depth;
   if (!(hit.coverage > 0)) return out;
   out.opacity = hit.coverage;
-  const double shade = (scene::body_ambient + (1 - scene::body_ambient) * hit.cosine) * hit.relief;
+  double shade = (scene::body_ambient + (1 - scene::body_ambient) * hit.cosine) * hit.relief;
   std::array<double, 3> color{};
   std::copy(body.color.begin(), body.color.end(), color.begin());
   if (body.paint) {
     color = body.paint->color(body.paint->seen(terrain_view(view), x - view.half_width,
                                                y - view.half_height, hit.depth, hit.normal));
+  }
+  if (body.light) {
+    const SurfaceRay ray = ray_of(view, x, y);
+    const Vec place = plus(ray.from, hit.depth, ray.along);
+    shade *= body.light->factor({place[0], place[1], place[2]});
   }
   for (std::size_t c = 0; c < 3; ++c) out.color[c] = std::min(shade * color[c], 1.0);
   return out;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/study/truth/integrator_kernels.hpp"
+#include "server/study/truth/sunlight.hpp"
 
 namespace windsplat::truth {
 
@@ -170,7 +171,8 @@ std::optional<Crossing> meet_plain(const scene::Body& body, const Sight& sight) 
   return Crossing{depth, normal};
 }
 
-std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera, Real x, Real y) {
+std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera,
+                            const Sunlight* light, Real x, Real y) {
   const Sight sight = sight_of(camera, x, y);
   const Real least = camera.perspective ? static_cast<Real>(camera.near) : -1e300L;
   std::optional<Crossing> at = meet_plain(body, sight);
@@ -184,11 +186,12 @@ std::optional<Surface> meet(const scene::Body& body, const scene::Camera& camera
   if (at->terrain) {
     bright *= relief(body.terrain->base(), sight.origin + at->depth * sight.way, at->normal);
   }
-  const Vec light = bright * Vec{body.color[0], body.color[1], body.color[2]};
+  if (light != nullptr) bright *= light->of_ground(sight.origin + at->depth * sight.way);
+  const Vec color = bright * Vec{body.color[0], body.color[1], body.color[2]};
   return Surface{
       at->depth,
       1,
-      {std::min(light.x, Real(1)), std::min(light.y, Real(1)), std::min(light.z, Real(1))}};
+      {std::min(color.x, Real(1)), std::min(color.y, Real(1)), std::min(color.z, Real(1))}};
 }
 
 // A splat on a ray: the distance from its centre at view depth z is
@@ -332,6 +335,8 @@ double kernel(double r) {
 std::vector<Light> integrate(const Scene& scene, std::span<const Pixel> pixels, int steps) {
   const std::vector<Splat> splats = splats_of(scene);
   const std::vector<Line> lines = lines_of(scene);
+  std::optional<Sunlight> sunlight;
+  if (scene.light && scene.body) sunlight.emplace(scene, splats);
   std::vector<Light> out;
   for (const Pixel& pixel : pixels) {
     const Real x = pixel.x + 0.5L;
@@ -342,7 +347,7 @@ std::vector<Light> integrate(const Scene& scene, std::span<const Pixel> pixels, 
       if (surface && surface->opacity > 0) surfaces.push_back(*surface);
     }
     std::optional<Surface> body;
-    if (scene.body) body = meet(*scene.body, scene.camera, x, y);
+    if (scene.body) body = meet(*scene.body, scene.camera, sunlight ? &*sunlight : nullptr, x, y);
     if (body) {
       std::erase_if(surfaces, [&](const Surface& one) { return one.depth >= body->depth; });
     }

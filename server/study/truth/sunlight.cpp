@@ -107,4 +107,8 @@ Real Sunlight::of_line(const std::array<int, 3>& sample) const {
   return lit(*scene_.light, scene_.light->strength * transmittance(sample));
 }
 
+Real Sunlight::of_ground(const Vec& at) const {
+  return lit(*scene_.light, scene_.light->strength * std::exp(-depth(at)));
+}
+
 }  // namespace windsplat::truth

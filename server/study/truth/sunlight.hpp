@@ -25,6 +25,8 @@ class Sunlight {
   [[nodiscard]] Real of_medium(const scene::ScalarLayer& layer,
                                const std::array<int, 3>& sample) const;
   [[nodiscard]] Real of_line(const std::array<int, 3>& sample) const;
+  // Factor of the colour of the ground at a place.
+  [[nodiscard]] Real of_ground(const Vec& at) const;
 
  private:
   [[nodiscard]] Vec place(const std::array<int, 3>& sample) const;

@@ -1,0 +1,34 @@
+// Sunlight on the opaque body of a scene.
+#pragma once
+
+#include <array>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <vector>
+
+#include "server/scene/scene.hpp"
+
+namespace windsplat::light {
+
+// On a rectilinear lattice the transmittance of the samples, interpolated linearly, and that of the
+// nearest ones beyond the outermost: shadows of media lie on the ground. On a globe the cosine
+// between the sun and the vertical, 0 at night. On other curved lattices full sunlight.
+class GroundLight {
+ public:
+  explicit GroundLight(const scene::Scene& scene);  // with light
+
+  // Factor of the colour of the body at a place in the world, at most 1.
+  [[nodiscard]] double factor(const glm::dvec3& place) const;
+
+ private:
+  [[nodiscard]] double transmittance(const glm::dvec3& place) const;
+
+  scene::Light light_;
+  bool globe_ = false;
+  std::array<std::vector<double>, 3> positions_;
+};
+
+// Lights the body of a scene that has a body and light.
+void light_ground(scene::Scene& scene);
+
+}  // namespace windsplat::light
