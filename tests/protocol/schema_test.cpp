@@ -33,6 +33,8 @@ bool in_slice(const std::string& pointer) { return pointer.starts_with("/geometr
 
 bool in_plane(const std::string& pointer) { return pointer.starts_with("/geometry/plane/"); }
 
+bool in_sun_at(const std::string& pointer) { return pointer.starts_with("/light/sunAt/"); }
+
 Json with_scalar() { return Json{{"scalars", {{{"field", "q"}}}}}; }
 
 // A view with one value set, and others that it requires.
@@ -47,6 +49,9 @@ Json view_with(const std::string& pointer, const Json& value) {
   if (in_slice(pointer)) view["geometry"]["slice"] = {{"axis", "y"}, {"index", 0}};
   if (in_plane(pointer)) {
     view["geometry"]["plane"] = {{"point", {0, 0, 0}}, {"normal", {0, 0, 1}}};
+  }
+  if (in_sun_at(pointer)) {
+    view["light"]["sunAt"] = {{"utc", "2024-06-21T12:00:00Z"}, {"longitude", 0}, {"latitude", 0}};
   }
   view[Json::json_pointer(pointer)] = value;
   return view;
@@ -69,10 +74,14 @@ TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
   View view;
   view.scalars = std::vector<ScalarView>(1);
   view.scalars->front().field = "q";
-  const Json encoded = Json::parse(encode_view(view));
+  const Json unlit = Json::parse(encode_view(view));
+  view.light = LightView{};
+  const Json lit = Json::parse(encode_view(view));
   int compared = 0;
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
     const Json::json_pointer pointer(at);
+    const Json& encoded = at.starts_with("/light/") ? lit : unlit;
+    if (in_sun_at(at)) return;
     if (schema.contains("default")) {
       ASSERT_TRUE(encoded.contains(pointer)) << at;
       EXPECT_EQ(encoded.at(pointer), schema["default"]) << at;
@@ -100,6 +109,8 @@ TEST(Schema, EncodedViewsHoldExactlyTheSchemasKeys) {
   view.geometry.plane = PlaneView{};
   view.scalars = std::vector<ScalarView>(1);
   view.scalars->front().field = "q";
+  view.light = LightView{};
+  view.light->sun_at = SunAtView{};
   const Json encoded = Json::parse(encode_view(view));
   EXPECT_THAT(schema_complaints("view.schema.json", "", encoded), IsEmpty());
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json&) {
@@ -274,6 +285,7 @@ TEST(Schema, NullMeansTheDefaultExactlyWhereTheSchemaAllowsIt) {
     EXPECT_EQ(accepted(view), may_be_null(schema)) << at;
     if (!may_be_null(schema) || at == "/vector/field") return;
     Json silent = at.starts_with("/scalars/") ? with_scalar() : Json::object();
+    if (at.starts_with("/light/")) silent["light"] = Json::object();
     EXPECT_EQ(ViewDocument::parse(view.dump())->canonical(), silent.dump()) << at;
   });
 }

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <regex>
 #include <set>
 #include <sstream>
 
@@ -138,7 +139,10 @@ class Validator {
       return;
     }
     const bool upper = rule == "^#[0-9a-fA-F]{6}$";
-    if (!upper && rule != "^#[0-9a-f]{6}$") return complain(at, "an unknown pattern");
+    if (!upper && rule != "^#[0-9a-f]{6}$") {
+      if (!std::regex_search(text, std::regex(rule.get<std::string>()))) complain(at, "pattern");
+      return;
+    }
     const std::string digits = upper ? "0123456789abcdefABCDEF" : "0123456789abcdef";
     if (text.size() != 7 || text[0] != '#' ||
         text.find_first_not_of(digits, 1) != std::string::npos) {
