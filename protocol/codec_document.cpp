@@ -16,11 +16,9 @@ bool keeps_null(const std::string& pointer, const std::string& key) {
   return key == kept_null_key && pointer == kept_null_parent;
 }
 
-// An object whose absence means something else than its defaults.
-constexpr std::string_view kept_object_key = "light";
-
+// Objects whose absence means something else than their defaults.
 bool keeps_empty(const std::string& pointer, const std::string& key) {
-  return key == kept_object_key && pointer.empty();
+  return (key == "light" && pointer.empty()) || (key == "trace" && pointer == "/vector");
 }
 
 // Removes redundant parts: nulls that mean a default, and empty objects.

@@ -55,7 +55,8 @@ struct Encoding {
   // one if `key` is set; if that fails, as JPEG.
   image::VideoEncoder* video = nullptr;
   bool key = false;
-  std::optional<double> dots_per_inch;  // of pdf and svg (300 without it) and png (none without it)
+  std::optional<double> dots_per_inch =
+      std::nullopt;  // of pdf and svg (300 without it) and png (none without it)
 };
 
 // How a picture was encoded.

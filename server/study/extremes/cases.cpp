@@ -33,6 +33,7 @@ data::Grid cube_grid() { return box_grid({side, side, side}, {1, 1, 1}); }
 // drawn.
 View base_view(Projection projection, double extinction = 0.5) {
   View view;
+  view.ground.tint = view.ground.coastlines = false;  // the truth has one colour of the ground
   view.dataset = "extremes";
   view.camera.projection = projection;
   view.image.width = picture_width;

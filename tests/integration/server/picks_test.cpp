@@ -61,7 +61,7 @@ class Picks : public testing::Test {
   TestServer server_;
 };
 
-void expect_refused(const Answer& answer, int status, const std::string& words) {
+void expect_pick_refused(const Answer& answer, int status, const std::string& words) {
   EXPECT_EQ(answer.status, status) << answer.body;
   EXPECT_EQ(answer.header("content-type"), "application/problem+json");
   EXPECT_THAT(answer.body, HasSubstr(words));
@@ -138,19 +138,19 @@ TEST_F(Picks, AnEmptyPixelHasNoFeature) {
 
 TEST_F(Picks, RefusalsNameTheirReason) {
   const Json view = view_of_lines();
-  expect_refused(post(view, "?x=1"), 400, "'x' and 'y' are required");
-  expect_refused(post(view, "?x=1&y=1&z=1"), 400, "'z'");
-  expect_refused(post(view, "?x=160&y=1"), 422, "below 160 and 120");
-  expect_refused(post(view, "?x=-1&y=1"), 422, "'x'");
-  expect_refused(post(view, "?x=1&y=1", {{"Content-Type", "text/plain"}}), 415, "");
-  expect_refused(request(port(), "POST", "/v1/picks?x=1&y=1", json_type, "{"), 400, "");
-  expect_refused(post(Json::object(), "?x=1&y=1"), 422, "/dataset");
+  expect_pick_refused(post(view, "?x=1"), 400, "'x' and 'y' are required");
+  expect_pick_refused(post(view, "?x=1&y=1&z=1"), 400, "'z'");
+  expect_pick_refused(post(view, "?x=160&y=1"), 422, "below 160 and 120");
+  expect_pick_refused(post(view, "?x=-1&y=1"), 422, "'x'");
+  expect_pick_refused(post(view, "?x=1&y=1", {{"Content-Type", "text/plain"}}), 415, "");
+  expect_pick_refused(request(port(), "POST", "/v1/picks?x=1&y=1", json_type, "{"), 400, "");
+  expect_pick_refused(post(Json::object(), "?x=1&y=1"), 422, "/dataset");
   Json other = view;
   other["dataset"] = "none";
-  expect_refused(post(other, "?x=1&y=1"), 404, "none");
+  expect_pick_refused(post(other, "?x=1&y=1"), 404, "none");
   other = view;
   other["scalars"] = Json::array({Json{{"field", "none"}}});
-  expect_refused(post(other, "?x=1&y=1"), 422, "/scalars/0/field");
+  expect_pick_refused(post(other, "?x=1&y=1"), 422, "/scalars/0/field");
 }
 
 }  // namespace

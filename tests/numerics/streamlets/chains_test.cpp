@@ -293,7 +293,7 @@ trace::Streamlets streamlets_of(const scene::Scene& scene) {
   of.jitter_stride = layer.jitter_stride;
   of.stride = layer.stride;
   of.seed = layer.seed;
-  of.color = [&](const dvec3& index, const trace::Motion& motion) {
+  of.color = [&](const dvec3&, const trace::Motion& motion) {
     switch (layer.color_by) {
       case scene::LineColor::magnitude:
         return motion.magnitude;

@@ -84,7 +84,7 @@ std::vector<double> picture_of(Scene scene, Method method) {
   return {image.rgba.begin(), image.rgba.end()};
 }
 
-constexpr std::array methods{Method::reference, Method::slab, Method::kernel};
+constexpr std::array drawing_methods{Method::reference, Method::slab, Method::kernel};
 
 // Looks down on a square of 2 x 2, without perspective.
 scene::Camera from_above(int size) { return look({0, 0, 0}, {0, 0, -1}, 3, size, size, false, 1); }
@@ -115,7 +115,7 @@ TEST(Surfaces, ASphereAloneCoversItsDiscAndIsLitByItsNormals) {
     const double pixel = 2 * half_height / size;
     const double limb =
         (perspective ? radius / std::sqrt(distance * distance - radius * radius) : radius) / pixel;
-    for (const Method method : methods) {
+    for (const Method method : drawing_methods) {
       const std::vector<double> rgba = picture_of(scene, method);
       double area = 0;
       for (int y = 0; y < size; ++y) {
@@ -123,7 +123,9 @@ TEST(Surfaces, ASphereAloneCoversItsDiscAndIsLitByItsNormals) {
           const double* const at = rgba.data() + 4 * (static_cast<std::size_t>(y) * size + x);
           const double off = std::hypot(x + 0.5 - size / 2.0, y + 0.5 - size / 2.0);
           area += at[3];
-          if (off > limb + 1) EXPECT_EQ(at[3], 0);
+          if (off > limb + 1) {
+            EXPECT_EQ(at[3], 0);
+          }
           if (off >= limb - 1.5) continue;
           EXPECT_NEAR(at[3], 1, 1e-6);
           if (perspective || off > 0.95 * limb) continue;
@@ -141,7 +143,7 @@ TEST(Surfaces, ASphereAloneCoversItsDiscAndIsLitByItsNormals) {
 TEST(Surfaces, ATranslucentSphereIsSeenTwiceThroughItself) {
   Scene scene = empty_scene(40);
   scene.surfaces = {ball(0.7, 0.3, green)};
-  for (const Method method : methods) {
+  for (const Method method : drawing_methods) {
     const std::vector<double> rgba = picture_of(scene, method);
     EXPECT_NEAR(rgba[4 * (20 * 40 + 20) + 3], 1 - 0.7 * 0.7, 1e-4);
   }
@@ -159,8 +161,8 @@ TEST(Surfaces, HalfATransparentMediumLiesBehindASurfaceInItsMiddle) {
   ASSERT_LT(through, 0.5);
   scene.surfaces = {square(0, opacity, green)};
   constexpr std::array tolerance{1e-8, 2e-3, 6e-2};
-  for (std::size_t n = 0; n < methods.size(); ++n) {
-    const std::vector<double> rgba = picture_of(scene, methods.at(n));
+  for (std::size_t n = 0; n < drawing_methods.size(); ++n) {
+    const std::vector<double> rgba = picture_of(scene, drawing_methods.at(n));
     EXPECT_NEAR(1 - rgba[middle + 3], through * through * (1 - opacity), n == 0 ? 1e-8 : 1e-5);
     for (std::size_t c = 0; c < 3; ++c) {
       const auto cloud = static_cast<double>(blue.at(c)) * (1 - through);
@@ -192,7 +194,7 @@ TEST(Surfaces, LinesAreSeenBeforeASurfaceAndThroughIt) {
   for (const double z : {0.3, -0.3}) {
     Scene scene = line_scene(z, size);
     scene.surfaces = {square(0, 0.5, green)};
-    for (const Method method : methods) {
+    for (const Method method : drawing_methods) {
       const std::vector<double> rgba = picture_of(scene, method);
       for (std::size_t c = 0; c < 3; ++c) {
         const auto line = static_cast<double>(red.at(c));
@@ -208,10 +210,13 @@ TEST(Surfaces, LiePerPixelInOrderOfDepthWithLinesAndTheBodyBetween) {
   constexpr int size = 40;
   constexpr std::size_t middle = 4 * (20 * size + 20);
   Scene scene = line_scene(0.1, size);
-  scene.body = scene::Body{scene::BodyShape::ground, 1, {-1, -1}, {1, 1}, -0.2, nullptr, {1, 1, 1}};
+  scene.body.emplace();
+  scene.body->shape = scene::BodyShape::ground;
+  scene.body->height = -0.2;
+  scene.body->color = {1, 1, 1};
   // The last one lies below the body.
   scene.surfaces = {square(-0.1, 0.25, red), square(0.3, 0.5, green), square(-0.5, 1, red)};
-  for (const Method method : methods) {
+  for (const Method method : drawing_methods) {
     const std::vector<double> rgba = picture_of(scene, method);
     for (std::size_t c = 0; c < 3; ++c) {
       const auto line = static_cast<double>(red.at(c));
@@ -235,7 +240,7 @@ TEST(Surfaces, MoreThanTheLayersOfAPixelKeepTheirLight) {
       light.at(c) += left * 0.1 * static_cast<double>(color.at(c));
     left *= 0.9;
   }
-  for (const Method method : methods) {
+  for (const Method method : drawing_methods) {
     const std::vector<double> rgba = picture_of(scene, method);
     const std::size_t middle = 4 * (4 * size + 4);
     for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(rgba[middle + c], light.at(c), 1e-5);
@@ -252,7 +257,7 @@ TEST(Surfaces, EdgesCoverPartsOfPixels) {
   EXPECT_NEAR(alone[4 * (10 * size + 4) + 3], 0.25, 1e-5);
   EXPECT_NEAR(alone[4 * (4 * size + 4) + 3], 0.0625, 1e-5);
   scene.surfaces.push_back(square(-0.5, 1, red));
-  for (const Method method : methods) {
+  for (const Method method : drawing_methods) {
     const std::vector<double> rgba = picture_of(scene, method);
     for (std::size_t p = 0; p < rgba.size(); p += 4) EXPECT_NEAR(rgba[p + 3], 1, 1e-5);
     const double edge = 0.25 * static_cast<double>(green[0]) + 0.75 * static_cast<double>(red[0]);
@@ -267,7 +272,7 @@ TEST(Surfaces, ColoursAndContoursFollowTheValuesOfPixels) {
   shown.colors = {{0, 0, 0}, {1, 0, 0.5F}};
   shown.range = {-1, 1};
   scene.surfaces = {shown};
-  for (const Method method : methods) {
+  for (const Method method : drawing_methods) {
     const std::vector<double> rgba = picture_of(scene, method);
     for (int x = 0; x < size; ++x) {
       EXPECT_NEAR(rgba[4 * static_cast<std::size_t>(7 * size + x)], (x + 0.5) / size, 1e-5);
@@ -289,7 +294,7 @@ TEST(Surfaces, APlaneBesideTheEyeEndsAtTheHorizon) {
   scene.camera = look({0, 0, 0}, {0, 1, 0}, 0, size, size, true, 0.5);
   scene.camera.near = 0.01;
   scene.surfaces = {square(-0.1, 1, green, 1e5)};
-  for (const Method method : methods) {
+  for (const Method method : drawing_methods) {
     const std::vector<double> rgba = picture_of(scene, method);
     for (int y = 0; y < size; ++y) {
       for (const int x : {0, 17, size - 1}) {

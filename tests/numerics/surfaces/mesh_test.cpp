@@ -226,14 +226,14 @@ TEST(SurfaceMesh, FirstMiddleAndLastLayersAreWhole) {
   ThreadPool pool(1);
   for (int axis = 0; axis < 3; ++axis) {
     for (const double index : {0.0, 1.0, 2.75, 4.0}) {
-      Cut cut;
-      cut.kind = Cut::Kind::layer;
+      surface::Cut cut;
+      cut.kind = surface::Cut::Kind::layer;
       cut.axis = axis;
       cut.index = index;
       cut.values = lattice.values.data();
-      const Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
+      const surface::Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
       EXPECT_NEAR(area(mesh), 4, 1e-6) << axis << ' ' << index;
-      for (const Point& p : mesh.places) {
+      for (const surface::Point& p : mesh.places) {
         EXPECT_NEAR(p.at(static_cast<std::size_t>(axis)), -1 + 0.5 * index, 1e-6);
       }
     }
