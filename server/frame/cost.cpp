@@ -89,6 +89,12 @@ class Counting {
       for (const int count : lattice_.dims) samples *= count;
       add("/surfaces/" + std::to_string(n), samples + pixels_ / Cost::pixels_a_kernel);
     }
+    // Every column is compared with every edge, a sixteenth of a kernel each.
+    double points = 0;
+    for (const auto& rings : view_.region.polygon) {
+      for (const auto& ring : rings) points += static_cast<double>(ring.size());
+    }
+    if (points > 0) add("/region/polygon", points * lattice_.dims[0] * lattice_.dims[1] / 16);
     // The sunlight of a sample takes about as long as half a kernel, once for each sun.
     if (view_.light && !view_.scalars->empty()) {
       add("/light", 0.5 * samples_[0] * samples_[1] * samples_[2]);
@@ -125,11 +131,12 @@ class Counting {
   void add_lines(const protocol::VectorView& vector) {
     double widest = 0;
     for (std::size_t a = 0; a < 3; ++a) widest = std::max(widest, scene::cell_size(lattice_, a));
-    const double length =
-        std::min(*vector.length, std::max(vector.span, 1.0) * vector.stride * widest * 2);
+    const double box = std::max(vector.span, 1.0) * vector.stride * widest * 2;
+    const double length = vector.trace ? *vector.length : std::min(*vector.length, box);
+    const double parts = vector.trace ? vector.trace->segments : 1;  // each is drawn as a line
     const double wide = 2 * std::max(1.0, vector.r2 * view_.image.height / reference_height);
-    const double longish = length * visible_.px;
-    const double count = stops(vector.stride);
+    const double longish = length * visible_.px / parts;
+    const double count = parts * stops(vector.stride);
     const double covering = count * drawn((longish + wide) * wide);
     add("/vector/stride", count);
     add(wide > longish ? "/vector/r2" : "/vector/length", covering);

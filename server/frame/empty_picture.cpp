@@ -151,11 +151,11 @@ std::string reasons(const scene::Scene& scene, const protocol::View& view,
 
 std::string why_empty(const scene::Scene& scene, const protocol::View& view,
                       const engine::WorkReport& work, bool transparent) {
-  // Surfaces without lines and media are no data of the report.
-  const bool drawn = work.variant.reference                         ? !transparent
-                     : !scene.surfaces.empty() && work.samples == 0 ? true
-                     : scene.body ? work.culled + work.skipped_both < work.samples
-                                  : work.pixel_updates > 0;
+  // Surfaces are no data of the report.
+  const bool drawn = work.variant.reference    ? !transparent
+                     : !scene.surfaces.empty() ? true
+                     : scene.body              ? work.culled + work.skipped_both < work.samples
+                                               : work.pixel_updates > 0;
   return drawn ? "" : reasons(scene, view, work);
 }
 

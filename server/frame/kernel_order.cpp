@@ -40,7 +40,8 @@ KernelOrder::Rank KernelOrder::rank(std::size_t axis, int index) const {
 
 OrderKey KernelOrder::key(const std::array<int, 3>& index,
                           const engine::reference::KernelPosition& position) const {
-  if (scene_.lattice.places) return {position.centre[2]};
+  const bool by_depth = scene_.lattice.places || (scene_.vector && scene_.vector->streamlets);
+  if (by_depth) return {position.centre[2]};
   const auto& axis = layers_.axis[major_];
   const int ahead = axis[static_cast<std::size_t>(index[major_])].sample - eye_sample_;
   const double distance = std::abs(ahead);

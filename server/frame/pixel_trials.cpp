@@ -252,6 +252,7 @@ scene::Scene without_tolerances(scene::Scene scene) {
 
 PixelTrials pixel_trials(const scene::Scene& scene, const std::vector<RayThrough>& through,
                          const CancelToken& cancel) {
+  if (!scene.surfaces.empty()) return {};  // which the rays of the trials do not meet
   const RayKernels kernels(scene);
   const Spread spread = spread_places(kernels, through);
   PixelTrials out = TryingPixels(scene, cancel).run(spread);

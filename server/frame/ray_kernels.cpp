@@ -119,6 +119,10 @@ RayKernels::RayKernels(const scene::Scene& scene, const Tolerances& marked)
       layers_(reference::group_layers(scene)) {
   if (scene.vector && !scene.vector->combine_or) {
     lines_ = scene.vector;
+    if (lines_->streamlets) {  // which are not clipped
+      lines_->overlap = true;
+      lines_->span = 1e9;
+    }
     thin(lines_->rate_x, lines_->halvings[1], scene.lattice.positions[1].size());
     thin(lines_->rate_z, lines_->halvings[2], scene.lattice.positions[2].size());
   }

@@ -97,7 +97,7 @@ struct RayAxis {
 // The faces of the cells along an axis.
 std::vector<double> edges_of(const Lattice& lattice, int a) {
   const auto& spacing = lattice.spacing[index(a)];
-  std::vector<double> edges{lattice.positions[index(a)].front() - 0.5 * spacing.front()};
+  std::vector<double> edges{lattice.box_min[a]};  // samples need not be in the middle of cells
   for (const double width : spacing) edges.push_back(edges.back() + width);
   return edges;
 }
@@ -241,7 +241,7 @@ class Band {
     const auto& positions = *u_.positions;
     for (std::size_t i = 0; i < positions.size(); ++i) {
       const double at = u_.ray_at(positions[i], layer.middle);
-      const auto p = static_cast<std::size_t>(at);
+      const auto p = std::min(static_cast<std::size_t>(std::max(at, 0.0)), index(u_.count) - 2);
       const auto along = static_cast<float>(at - static_cast<double>(p));
       const float first = near[p] + along * (near[p + 1] - near[p]);
       const float second = far[p] + along * (far[p + 1] - far[p]);

@@ -480,8 +480,8 @@ Result<Needs> needs_of(const CompletedView& completed, const data::Dataset& data
     if (needed->lines->colors) needs.fields.push_back(std::move(*needed->lines->colors));
   }
   for (auto& [layer, values] : needed->media) needs.fields.push_back(std::move(values));
-  for (std::string& field : surface_fields(completed.view())) {
-    needs.fields.push_back({std::move(field), {}});
+  for (auto& [field, how] : needed_by_surfaces(completed)) {
+    needs.fields.push_back({std::move(field), std::move(how)});
   }
   if (needed->section) needs.places = places_of(*needed->section);
   return needs;

@@ -287,6 +287,7 @@ std::optional<protocol::SliceView> sheet_of(const Lattice& lattice) {
   if (thin != 1) return std::nullopt;
   protocol::SliceView sheet;
   sheet.axis = static_cast<protocol::GridAxis>(at);
+  sheet.index = lattice.first.at(static_cast<std::size_t>(at));  // slices count in the whole grid
   return sheet;
 }
 
@@ -302,7 +303,8 @@ std::optional<Face> face_of(const protocol::GeometryView& geometry, const Lattic
   if (!slice || !(flat || level)) return std::nullopt;
   const auto axis = static_cast<int>(slice->axis);
   const std::vector<double>& positions = lattice.positions[axis];
-  const double index = slice_index(*slice, lattice);
+  const double last = static_cast<double>(positions.size()) - 1;
+  const double index = std::clamp(slice_index(*slice, lattice), 0.0, last);
   const auto below = static_cast<std::size_t>(index);
   const std::size_t above = std::min(below + 1, positions.size() - 1);
   Face face{0.5 * (lattice.box_min + lattice.box_max), glm::dvec3(0)};

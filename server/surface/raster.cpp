@@ -328,6 +328,7 @@ void merge_tail(std::vector<Fragment>& fragments, std::size_t first) {
     }
     left *= 1 - static_cast<double>(fragments[n].opacity);
   }
+  if (!(left < 1)) return fragments.resize(first);  // opacities that vanish beside 1
   fragments.resize(first + 1);
   fragments[first].opacity = static_cast<float>(1 - left);
   for (std::size_t c = 0; c < 3; ++c) {

@@ -167,6 +167,18 @@ bool Flow::holds(const glm::dvec3& index) const {
   return !std::isnan(components[0][number_of(*this, nearest[0], nearest[1], nearest[2])]);
 }
 
+std::uint32_t Flow::nearest(const glm::dvec3& index) const {
+  std::uint32_t number = 0;
+  for (std::size_t a = 3; a-- > 0;) {
+    const int count = dims[a];
+    int at = static_cast<int>(std::lround(index[static_cast<glm::length_t>(a)]));
+    if (a == 0 && around > 0) at = (at % around + around) % around;
+    number = number * static_cast<std::uint32_t>(count) +
+             static_cast<std::uint32_t>(std::clamp(at, 0, count - 1));
+  }
+  return number;
+}
+
 glm::dvec3 Flow::place(const glm::dvec3& index) const {
   return cell_at(*this, index, corners_of(*this, index)).place;
 }

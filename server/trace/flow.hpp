@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
 
@@ -31,6 +32,8 @@ struct Flow {
   [[nodiscard]] bool bounds(const glm::dvec3& index) const;
   // World position.
   [[nodiscard]] glm::dvec3 place(const glm::dvec3& index) const;
+  // Number of the nearest sample, x fastest.
+  [[nodiscard]] std::uint32_t nearest(const glm::dvec3& index) const;
 };
 
 // The flow at a place.

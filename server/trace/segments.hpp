@@ -33,9 +33,10 @@ struct Segments {
   // Magnitude of the sample times magnitude_scale; below 0: no segment begins; not_drawn: a line
   // below the least magnitude.
   std::vector<float> magnitudes;
-  double magnitude_scale = 1;  // a power of two, as the engine chooses it
-  std::vector<float> phases;   // [0, 1), for phase motion
-  std::vector<float> colors;   // the value that determines the colour; NaN: unknown
+  double magnitude_scale = 1;          // a power of two, as the engine chooses it
+  std::vector<float> phases;           // [0, 1), for phase motion
+  std::vector<float> colors;           // the value that determines the colour; NaN: unknown
+  std::vector<std::uint32_t> samples;  // number of the sample nearest to the middle, x fastest
   Tally tally;
 
   // 2^-e for a full magnitude of the order of 2^e beyond [1e-15, 1e15], where squares and inverses
@@ -51,7 +52,7 @@ struct Segments {
 
   [[nodiscard]] std::size_t vertices() const { return magnitudes.size(); }
   // Bytes of each vertex.
-  static constexpr std::size_t vertex_bytes = 10 * sizeof(float);
+  static constexpr std::size_t vertex_bytes = 11 * sizeof(float);
 };
 
 }  // namespace windsplat::trace

@@ -40,6 +40,7 @@ struct Vertex {
   float magnitude = Segments::none;
   float phase = 0;
   float color = 0;
+  std::uint32_t sample = 0;
 };
 
 std::array<float, 3> rounded(const dvec3& v) {
@@ -64,9 +65,10 @@ class Maker {
   explicit Maker(const Streamlets& of) : of_(of), key_(pcg3d({of.seed, of.epoch, 0x9e3779b9U})) {}
 
   void add_line(const std::array<Position, 3>& at, Row& row) {
-    const std::array<std::uint32_t, 3> sample{static_cast<std::uint32_t>(at[0].sample),
-                                              static_cast<std::uint32_t>(at[1].sample),
-                                              static_cast<std::uint32_t>(at[2].sample)};
+    std::array<std::uint32_t, 3> sample{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      sample.at(a) = static_cast<std::uint32_t>(of_.first_sample.at(a) + at.at(a).sample);
+    }
     const dvec3 centre(at[0].sample, at[1].sample, at[2].sample);
     if (!of_.flow.holds(centre)) return;
     Motion motion;
@@ -154,6 +156,7 @@ class Maker {
         Motion motion;
         motion_at(of_.flow, middle, motion);
         vertex.color = as_float(of_.color(middle, motion));
+        vertex.sample = of_.flow.nearest(middle);
       }
       row.vertices.push_back(vertex);
     }
@@ -191,6 +194,7 @@ void copy(const Vertex& from, std::size_t to, Segments& out) {
   out.magnitudes[to] = from.magnitude;
   out.phases[to] = from.phase;
   out.colors[to] = from.color;
+  out.samples[to] = from.sample;
 }
 
 // Sheets of 16 bricks of 8 x 8 vertices.
@@ -207,6 +211,7 @@ void resize(std::size_t vertices, Segments& out) {
   out.magnitudes.assign(count, Segments::none);
   out.phases.assign(count, 0);
   out.colors.assign(count, 0);
+  out.samples.assign(count, 0);
   out.places.assign(count, {0, 0, 0});
 }
 

@@ -21,6 +21,7 @@ struct Streamlets {
   int segments_max = 8;               // of a line
   double jitter_center = 0;
   double jitter_stride = 0;
+  std::array<int, 3> first_sample{0, 0, 0};  // index among those of the data, for the jitter
   std::uint32_t seed = 1;
   std::uint32_t epoch = 0;
   // The value that determines the colour at a place of the lattice.

@@ -157,6 +157,10 @@ Result<FolderList> list_beneath(const std::string& root, const std::string& fold
   if (!names) return names.error();
   FolderList out;
   out.cut = names->cut;
+  // Names that are no text cannot be asked for, and none could follow them.
+  const auto untold =
+      std::erase_if(names->all, [](const std::string& name) { return printable(name) != name; });
+  if (after.empty()) out.omitted += untold;
   if (after.empty()) out.groups = groups_of(names->all);
   const auto begin = std::find_if(
       names->all.begin(), names->all.end(),

@@ -344,12 +344,19 @@ Light divided_block(const DividedKernel& kernel, float x, float y, const float* 
     for (int c = 0; c < 3 && kernel.splat != nullptr; ++c) {
       color[c] = all<Pixel>(kernel.splat->color[c]);
     }
+    // Where each surface ends what is before it: at itself or, in pixels that do not see it, at the
+    // next one, so that nothing lies between them.
+    Pixel ends[layers_max + 1];
+    Pixel next = all<Pixel>(__builtin_inff());
+    for (int n = surfaces.count; n-- > 0;) {
+      next = hn::Min(next, load<Pixel>(surfaces.of[n]->depth + l) - all<Pixel>(kernel.centre));
+      ends[n] = next;
+    }
     Pixel begin = all<Pixel>(-__builtin_inff());  // depth of the last surface
     Pixel before = zero;                          // the fraction of the splat before it
     for (int n = 0; n <= surfaces.count; ++n) {
       const bool last = n == surfaces.count;
-      const Pixel end = last ? all<Pixel>(__builtin_inff())
-                             : load<Pixel>(surfaces.of[n]->depth + l) - all<Pixel>(kernel.centre);
+      const Pixel end = last ? all<Pixel>(__builtin_inff()) : ends[n];
       if (kernel.splat != nullptr && !last) {
         splat = divided_splat<Perspective>(kernel, {end, line.depth}, px, py, length);
       }

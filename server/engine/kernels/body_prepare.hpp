@@ -132,6 +132,15 @@ struct BrickMaker {
           here & prepare_chains<Perspective>(camera, pass, rows, out.positions, vectors, i, l,
                                              shades, out.ribbons);
       out.positions.lines |= lines << static_cast<unsigned>(l);
+      if (pass.light.lit != 0) light_chains(static_cast<std::uint32_t>(lines), i, l);
+    }
+  }
+
+  void light_chains(std::uint32_t lines, int i, int l) {
+    for (; lines != 0; lines &= lines - 1U) {
+      const int k = __builtin_ctz(lines);
+      const std::uint32_t sample = pass.line.chains.sample[offset_of(rows, i + k)];
+      shades.dim[l + k] *= line_light(pass.light, static_cast<std::int64_t>(sample));
     }
   }
 

@@ -60,6 +60,7 @@ struct Chains {
   const float* tangent[3];
   const float* phase;
   const float* color;
+  const std::uint32_t* sample;  // of the lattice
 };
 
 struct LineStyle {

@@ -22,7 +22,8 @@ void chain_lines(const trace::Segments& from, kernels::LineStyle& to) {
                from.magnitudes.data(),
                {from.tangents[0].data(), from.tangents[1].data(), from.tangents[2].data()},
                from.phases.data(),
-               from.colors.data()};
+               from.colors.data(),
+               from.samples.data()};
   // No vertex of a segment is farther from the other than half of this: a whole line may be one.
   to.length *= 2;
   to.half_span = 1e9F;

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "server/engine/reference/kernels.hpp"
+#include "server/light/shade.hpp"
 
 namespace windsplat::engine::reference {
 
@@ -113,8 +114,9 @@ void list_chains(const Scene& scene, const View& view, const VectorLayer& layer,
     const double magnitude = static_cast<double>(from.magnitudes[v]) / scale;
     const double strong = fraction_of(magnitude, layer.magnitude_range[0], full);
     const double far = fraction_of(depth, scene.depth_cue.near, scene.depth_cue.far);
+    const double lit = scene.light ? light::line_light(*scene.light, from.samples[v]) : 1;
     const double dim =
-        (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
+        lit * (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
     double value = static_cast<double>(from.colors[v]);
     if (layer.color_by == LineColor::magnitude) value /= scale;
     line.color = scaled(color_at(layer, value, depth), dim);

@@ -23,6 +23,8 @@ constexpr double lowest = std::numeric_limits<double>::lowest();
 constexpr double hidden_below = 1e-4;
 // A splat is divided into so many pieces, and where other splats begin or end.
 constexpr int pieces_each = 8;
+// Samples that may meet the pixel, about 150 bytes each.
+constexpr std::size_t candidates_max = std::size_t{1} << 22U;
 
 // A line or a splat on the ray.
 struct Candidate {
@@ -126,6 +128,8 @@ class PixelLight {
     return out;
   }
 
+  [[nodiscard]] bool is_full() const { return candidates_.size() >= candidates_max; }
+
  private:
   struct Part {
     std::optional<std::size_t> medium;
@@ -133,6 +137,7 @@ class PixelLight {
   };
 
   void add(const reference::LayerGroup& group, const reference::KernelPosition& position) {
+    if (candidates_.size() >= candidates_max) return;
     Candidate one;
     one.group = &group;
     one.sample = position.sample;
@@ -276,7 +281,12 @@ Result<std::optional<Picked>> pick(const scene::Scene& scene, double x, double y
                                    const CancelToken& cancel) {
   const std::vector<reference::LayerGroup> groups = reference::group_layers(scene);
   PixelLight light(scene, x, y);
-  if (!light.gather(groups, cancel) || !light.pass(cancel)) {
+  const bool gathered = light.gather(groups, cancel);
+  if (light.is_full()) {
+    return make_error(ErrorKind::too_large, "more than " + std::to_string(candidates_max) +
+                                                " samples meet the pixel: look from nearer");
+  }
+  if (!gathered || !light.pass(cancel)) {
     return make_error(ErrorKind::cancelled, "request cancelled");
   }
   return light.strongest();

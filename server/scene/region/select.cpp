@@ -79,7 +79,7 @@ Run run_of(const std::vector<unsigned char>& marked, int turn) {
     gap = empty;
     next = i + 1;
   }
-  if (turn - gap < run.count && gap > 0 && next < turn) return {next, turn - gap};
+  if (turn - gap < run.count && gap > 0) return {next % turn, turn - gap};
   return run;
 }
 

@@ -77,9 +77,10 @@ surface::Cut cut_of(const SurfaceView& from, const Lattice& lattice) {
     const auto& [nx, ny, nz] = from.plane->normal;
     cut.point = {px, py, pz};
     cut.normal = glm::normalize(glm::dvec3(nx, ny, nz));
-    // Away from the centre: samples in the plane are inside, so that one at the end of the grid
-    // needs the others outside.
-    if (glm::dot(cut.point, cut.normal) < 0) cut.normal = -cut.normal;
+    // Away from the middle of the box: samples in the plane are inside, so that one at the end of
+    // the grid needs the others outside.
+    const glm::dvec3 middle = 0.5 * (lattice.box_min + lattice.box_max);
+    if (glm::dot(cut.point - middle, cut.normal) < 0) cut.normal = -cut.normal;
   } else {
     cut.kind = surface::Cut::Kind::layer;
     cut.axis = static_cast<int>(from.slice->axis);
@@ -124,6 +125,12 @@ Result<std::shared_ptr<const surface::Mesh>> mesh_of(const SurfaceView& from, st
                                                      data::Dataset& dataset) {
   const auto step = static_cast<std::size_t>(completed.view().step);
   const Placed& placed = *completed.placed();
+  for (const int count : placed.lattice.dims) {
+    if (count < 2) {
+      return invalid_at(pointer_of(n),
+                        "requires at least two samples of the region along every axis");
+    }
+  }
   const auto filters = filters_of(completed.view().region, protocol::FilterOf::all);
   const data::Derivation kept_samples = kept_part(placed, 1, filters);
   auto volume = dataset.derived(from.field, step, kept_samples);
@@ -188,6 +195,20 @@ std::vector<std::string> surface_fields(const protocol::View& view) {
     if (surface.color.field) fields.push_back(*surface.color.field);
   }
   return fields;
+}
+
+std::vector<std::pair<std::string, data::Derivation>> needed_by_surfaces(
+    const CompletedView& completed) {
+  const Placed& placed = *completed.placed();
+  const auto filters = filters_of(completed.view().region, protocol::FilterOf::all);
+  std::vector<std::pair<std::string, data::Derivation>> needed;
+  for (const SurfaceView& surface : completed.view().surfaces) {
+    if (!is_seen(surface)) continue;
+    needed.emplace_back(surface.field, kept_part(placed, 1, filters));
+    const std::string colors = color_field_of(surface);
+    if (!colors.empty()) needed.emplace_back(colors, kept_part(placed, 1, {}));
+  }
+  return needed;
 }
 
 Result<std::vector<surface::Shown>> make_surfaces(const CompletedView& completed,

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "protocol/view.hpp"
@@ -24,6 +25,10 @@ std::string color_field_of(const protocol::SurfaceView& surface);
 bool is_seen(const protocol::SurfaceView& surface);
 // The fields that surfaces are made from, which may repeat.
 std::vector<std::string> surface_fields(const protocol::View& view);
+
+// The same, with the part of a region that is kept of them.
+std::vector<std::pair<std::string, data::Derivation>> needed_by_surfaces(
+    const CompletedView& completed);
 
 // The triangles follow from field, step, cut and placement; they are kept by the dataset, counted,
 // shared and evicted like a level of a volume. Errors: too_large with a pointer (more than

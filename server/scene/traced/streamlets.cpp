@@ -99,6 +99,7 @@ trace::Streamlets description_of(const protocol::View& view, const VectorLayer& 
   of.magnitude_least = drawn_least;
   of.jitter_center = layer.jitter_center;
   of.jitter_stride = layer.jitter_stride;
+  of.first_sample = layer.first_sample;
   of.seed = layer.seed;
   of.epoch = layer.epoch;
   of.color = [&layer, &lattice, flow = of.flow](const glm::dvec3& index, const Motion& motion) {

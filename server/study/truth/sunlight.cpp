@@ -77,7 +77,7 @@ Real Sunlight::transmittance(const std::array<int, 3>& sample) const {
     if (passed[a] > passed[across]) across = a;
   }
   const auto& spacing = lattice.spacing[across];
-  Real low = lattice.positions[across].front() - spacing.front() / 2;
+  Real low = lattice.box_min[across];
   for (int k = 0; k < sample[across]; ++k) low += spacing[k];
   const Vec at = place(sample);
   Real sum = 0;

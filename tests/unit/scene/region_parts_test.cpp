@@ -39,6 +39,24 @@ double place_of(double index) {
   return x[0] + index * (x[1] - x[0]);
 }
 
+TEST(RegionParts, OneLayerIsFacedAndHasNoSurfaces) {
+  auto dataset = eastward();
+  View view = of_region();
+  const auto& levels = dataset->info().grid.axes[2].coordinates;
+  view.region.z = {levels[1], levels[1]};
+  const Scene scene = built(view, *dataset);
+  EXPECT_NEAR(scene.camera.forward.z, -1, 1e-12);
+  view.geometry.mapping = protocol::GeometryMapping::sphere;
+  EXPECT_TRUE(complete(view, *dataset));
+  view.geometry.mapping = protocol::GeometryMapping::flat;
+  view.surfaces.emplace_back().field = "cloud";
+  view.surfaces.back().isovalue = 14.25;
+  const auto refused = build_scene(view, *dataset);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::invalid);
+  EXPECT_EQ(refused.error().at.at(0).pointer, "/surfaces/0");
+}
+
 TEST(RegionParts, SurfacesLieWhereTheirSamplesAre) {
   auto dataset = eastward();
   View view = of_region();

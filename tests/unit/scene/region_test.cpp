@@ -184,6 +184,11 @@ TEST(Region, AColumnThatRepeatsTheFirstIsNotDrawnTwice) {
   ASSERT_TRUE(crop);
   EXPECT_EQ(crop->first[0], 35);
   EXPECT_EQ(crop->count[0], 3);
+  region.x = {0, 90};  // both ends of the axis are in it
+  const auto from_the_seam = crop_of(region, grid, 0);
+  ASSERT_TRUE(from_the_seam);
+  EXPECT_EQ(from_the_seam->first[0], 0);
+  EXPECT_EQ(from_the_seam->count[0], 10);
   region.x = {0, 360};
   EXPECT_EQ(crop_of(region, grid, 0)->count[0], 37) << "a full turn keeps the picture of the whole";
 }
@@ -312,7 +317,7 @@ TEST(Region, GeographicKeysNeedLongitudesAndLatitudes) {
   region.longitudes = {0, 10};
   const auto crop = crop_of(region, grid, 0);
   ASSERT_FALSE(crop);
-  EXPECT_EQ(crop.error().at.front().pointer, "/region.longitudes");
+  EXPECT_EQ(crop.error().at.front().pointer, "/region/longitudes");
   region.longitudes.reset();
   region.polygon = {{{{1.5, 1.5}, {5.5, 1.5}, {5.5, 8.5}, {1.5, 1.5}}}};
   EXPECT_TRUE(crop_of(region, grid, 0)) << "polygons are in x and y without them";
