@@ -35,6 +35,10 @@ inline constexpr std::array<Name<ColorBy>, 7> color_by_names{{{ColorBy::world_z,
                                                               {ColorBy::constant, "constant"}}};
 inline constexpr std::array<Name<LineCombination>, 2> combination_names{
     {{LineCombination::over, "over"}, {LineCombination::either, "or"}}};
+inline constexpr std::array<Name<MarkShape>, 4> mark_shape_names{{{MarkShape::line, "line"},
+                                                                  {MarkShape::taper, "taper"},
+                                                                  {MarkShape::arrow, "arrow"},
+                                                                  {MarkShape::comet, "comet"}}};
 inline constexpr std::array<Name<MotionMode>, 2> motion_names{
     {{MotionMode::still, "still"}, {MotionMode::phase, "phase"}}};
 inline constexpr std::array<Name<MethodName>, 3> method_names{

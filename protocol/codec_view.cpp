@@ -8,6 +8,7 @@
 #include "protocol/view/codec_annotations.hpp"
 #include "protocol/view/codec_ground.hpp"
 #include "protocol/view/codec_light.hpp"
+#include "protocol/view/codec_mark.hpp"
 #include "protocol/view/codec_planes.hpp"
 #include "protocol/view/codec_region.hpp"
 #include "protocol/view/codec_surfaces.hpp"
@@ -157,6 +158,9 @@ VectorView read_vector(const Json& json, const std::string& pointer, Faults& fau
   reader.number("opacity", vector.opacity, fraction);
   reader.choice("combine", vector.combine, combination_names);
   reader.number("headDesaturation", vector.head_desaturation, fraction);
+  if (const Json* mark = reader.child("mark")) {
+    vector.mark = read_mark(*mark, reader.at("mark"), faults);
+  }
   if (const Json* color = reader.child("color")) {
     vector.color = read_vector_color(*color, reader.at("color"), faults);
   }
@@ -317,6 +321,7 @@ Json vector_to_json(const VectorView& vector) {
            {"opacity", canonical_number(vector.opacity)},
            {"combine", name_of(vector.combine, combination_names)},
            {"headDesaturation", canonical_number(vector.head_desaturation)},
+           {"mark", mark_to_json(vector.mark)},
            {"color", std::move(color)},
            {"magnitudeRange", numbers_or_null(vector.magnitude_range)},
            {"minMagnitude", number_or_null(vector.min_magnitude)},

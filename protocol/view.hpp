@@ -22,6 +22,7 @@ enum class GridAxis { x, y, z };
 enum class VectorSpace { components, world };
 enum class ColorBy { world_z, screen_z, rise, magnitude, direction, scalar, constant };
 enum class LineCombination { over, either };  // either: "or"
+enum class MarkShape { line, taper, arrow, comet };
 enum class MotionMode { still, phase };
 enum class MethodName { kernel, slab, reference };
 enum class Compositing { simple, cd_naive, cd, analytic, cd_euler };
@@ -103,6 +104,17 @@ struct JitterView {
   bool operator==(const JitterView&) const = default;
 };
 
+// How lines show their direction and their order in depth. Lengths in pixels at a picture height of
+// 720.
+struct MarkView {
+  MarkShape shape = MarkShape::line;
+  double head_width = 7;                 // arrow: across its base
+  double head_length = 10;               // arrow
+  std::optional<double> tail_darkening;  // 0..1; default: 0.85 of a comet, otherwise 0
+  double halo = 0;                       // width of the dark rim; 0: none
+  bool operator==(const MarkView&) const = default;
+};
+
 struct VectorView {
   FieldChoice field;
   VectorSpace space = VectorSpace::components;
@@ -115,6 +127,7 @@ struct VectorView {
   double opacity = 0.8;
   LineCombination combine = LineCombination::over;  // of a slice or plane
   double head_desaturation = 0.7;
+  MarkView mark;
   VectorColorView color;
   std::optional<Range> magnitude_range;
   std::optional<double> min_magnitude;

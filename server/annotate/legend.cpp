@@ -57,6 +57,22 @@ std::string spaced(std::string name) {
   return name;
 }
 
+// How the legend says which end of a line is its head.
+std::string end_ahead(const scene::VectorLayer& layer) {
+  switch (layer.mark.shape) {
+    case scene::LineShape::comet:
+      return ", bright end ahead";
+    case scene::LineShape::taper:
+      return ", pointed end ahead";
+    case scene::LineShape::arrow:
+      return "";
+    case scene::LineShape::line:
+      break;
+  }
+  if (layer.head_desaturation > 0) return ", white end ahead";
+  return layer.mark.tail_light < 1 ? ", bright end ahead" : "";
+}
+
 std::string field_title(const data::FieldInfo* field, const std::string& name) {
   constexpr std::size_t longest = 40;  // characters that fit over a strip
   if (field == nullptr || field->long_name.empty() || field->long_name.size() > longest) {
@@ -184,7 +200,7 @@ Entry lines_entry(const Subject& subject) {
     return number_text_of(value, 3) + (units.empty() ? "" : " " + units);
   };
   std::string note = "longest line " + with_units(layer.magnitude_range[1]);
-  if (layer.head_desaturation > 0) note += ", white end ahead";
+  note += end_ahead(layer);
   entry.notes.push_back(note);
   if (layer.min_magnitude > 0) {
     entry.notes.push_back("below " + with_units(layer.min_magnitude) + " not drawn");

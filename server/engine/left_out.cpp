@@ -53,10 +53,11 @@ std::array<double, 3> widest_cells(const Pass& pass, const LatticeRange& range) 
   return edges;
 }
 
-// A line covers its length times r1 + r2 and two half discs, a splat its extinction times its
-// volume. All are assumed at the nearest depth. The sampling factors bound the ratio of the sum
-// over pixels to the area, over all positions and rotations, for shapes and line ramps no narrower
-// than a pixel.
+// A line covers its length times r1 + r2 and twice the width of its halo, two half discs as large
+// as its mark reaches, and at most a rectangle around the head of an arrow; a splat covers its
+// extinction times its volume. All are assumed at the nearest depth. The sampling factors bound the
+// ratio of the sum over pixels to the area, over all positions and rotations, for shapes and line
+// ramps no narrower than a pixel.
 double left_out_alphas(const RenderPlan& plan, const PassPlan& pass,
                        const std::array<double, 3>& edges, const LeftOut& left_out, double depth) {
   constexpr double line_sampling = 1.2;
@@ -72,9 +73,14 @@ double left_out_alphas(const RenderPlan& plan, const PassPlan& pass,
   }
   const double r1 = line.r1;
   const double r2 = std::max<double>(line.r2, r1 + 1);
-  const double discs = std::numbers::pi * (r1 * r1 + r1 * r2 + r2 * r2) / 3;
+  const double wider = std::max<double>(line.outer - line.r2, 0);
+  const double d1 = r1 + wider;
+  const double d2 = r2 + wider;
+  double ends = std::numbers::pi * (d1 * d1 + d1 * d2 + d2 * d2) / 3;
+  if (line.head_length > 0) ends += 2 * d2 * (line.head_length + d2);
+  const double halo = line.steep > 0 ? static_cast<double>(line.halo / line.steep) : 0.0;
   const double length = line.length * left_out.parts * scale * oblique;
-  const double covered = line_sampling * (length * (r1 + r2) + left_out.lines * discs);
+  const double covered = line_sampling * (length * (r1 + r2 + 2 * halo) + left_out.lines * ends);
   const double cover = left_out.medium > 0 ? splat_cover(pass.kernel, edges, scale) : 0;
   return line.opacity * covered + splat_sampling * left_out.medium * cover * oblique;
 }

@@ -353,7 +353,9 @@ Variant variant_of(const Scene& scene, const RenderPlan& plan) {
   variant.vector = scene.vector.has_value();
   variant.scalar = !scene.scalars.empty();
   variant.perspective = scene.camera.perspective;
-  variant.heads = variant.vector && scene.vector->head_desaturation > 0;
+  variant.heads =
+      variant.vector && (scene.vector->head_desaturation > 0 || scene.vector->mark.tail_light < 1);
+  variant.marks = variant.vector && !scene.vector->mark.plain();
   variant.moving = variant.vector && scene.vector->moving;
   variant.slabs = plan.slabs;
   variant.curved = plan.curved;

@@ -85,7 +85,7 @@ Projected Projector::operator()(const PassPlan& plan, const Box& box,
   const double nearest = *first;
   const double farthest = *last;
   if (camera_.perspective != 0 && farthest < camera_.near) return {};
-  const double margin = 1.0 + (plan.kernel.has_lines != 0 ? plan.kernel.line.r2 : 0.0);
+  const double margin = 1.0 + (plan.kernel.has_lines != 0 ? plan.kernel.line.outer : 0.0);
   const Span x = screen_span(corners, 0, camera_, camera_.half_width_px, margin);
   const Span y = screen_span(corners, 1, camera_, camera_.half_height_px, margin);
   if (x.low > x.high || y.low > y.high) return {};

@@ -72,7 +72,7 @@ bool Shadow::hides(const PassPlan& pass, const kernels::Brick& brick, double lin
                    bool splats) const {
   if (body_.shape != kernels::body_sphere || pass.kernel.places == nullptr) return false;
   // Lines are wider than their segments, and pixels at the limb are not covered entirely.
-  const double wide = line_reach >= 0 ? static_cast<double>(pass.kernel.line.r2) : 0.0;
+  const double wide = line_reach >= 0 ? static_cast<double>(pass.kernel.line.outer) : 0.0;
   const double margin = (2.0 + wide) * body_.pixel;
   const double radius = kernel_radius(pass, line_reach, splats);
   const double* centre = body_.centre;

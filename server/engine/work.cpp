@@ -12,6 +12,7 @@ std::string chosen(const Variant& variant) {
   if (text.empty()) return variant.surfaces ? "surfaces" : variant.body ? "body" : "empty";
   text += variant.perspective ? " perspective" : " orthographic";
   if (variant.heads) text += " heads";
+  if (variant.marks) text += " marks";
   if (variant.moving) text += " moving";
   if (variant.slabs) text += " slabs";
   if (variant.curved) text += " curved";

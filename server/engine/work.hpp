@@ -19,6 +19,7 @@ struct Variant {
   bool scalar = false;
   bool perspective = false;
   bool heads = false;
+  bool marks = false;
   bool moving = false;
   bool slabs = false;
   bool curved = false;

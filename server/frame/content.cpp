@@ -313,7 +313,8 @@ class Sampling {
 
   // Of merged lines: what the merged ones would have (scene/detail, merge_lines).
   [[nodiscard]] double width() const {
-    return (scene_.vector->r1 + scene_.vector->r2) / scene_.camera.height;
+    const scene::VectorLayer& layer = *scene_.vector;
+    return (layer.r1 + layer.r2 + 2 * layer.mark.halo) / scene_.camera.height;
   }
   [[nodiscard]] double layer_opacity() const { return scene_.vector->opacity / merged_; }
 

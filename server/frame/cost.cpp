@@ -11,6 +11,7 @@
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/lines/mark.hpp"
 #include "server/scene/section.hpp"
 
 namespace windsplat::frame {
@@ -134,7 +135,10 @@ class Counting {
     const double box = std::max(vector.span, 1.0) * vector.stride * widest * 2;
     const double length = vector.trace ? *vector.length : std::min(*vector.length, box);
     const double parts = vector.trace ? vector.trace->segments : 1;  // each is drawn as a line
-    const double wide = 2 * std::max(1.0, vector.r2 * view_.image.height / reference_height);
+    const double scale = view_.image.height / reference_height;
+    const double wide =
+        2 * std::max(1.0, scene::outer_radius(scene::mark_of(vector, view_.image.height),
+                                              vector.r1 * scale, vector.r2 * scale));
     const double longish = length * visible_.px / parts;
     const double count = parts * stops(vector.stride);
     const double covering = count * drawn((longish + wide) * wide);

@@ -126,7 +126,7 @@ class TryingPixels {
   std::optional<Squares> differences_at(const Place& place) {
     // Errors of lines are in few pixels, those of a medium in many.
     take_block(scene_.camera, kernels_.view(), place, scene_.scalars.empty(), rays_);
-    const double wide = scene_.vector ? scene_.vector->r2 : 0;
+    const double wide = scene_.vector ? scene::outer_radius(*scene_.vector) : 0;
     const RayKernelList* const around = kernels_.around(place.near, rays_, wide);
     if (around == nullptr) return std::nullopt;
     const RayKernelList& found = *around;
@@ -217,7 +217,7 @@ class TryingSkipped {
     const PictureRay middle = picture_ray(kernels_.view(), place.x + 0.5, place.y + 0.5);
     if (!place.inside || !kernels_.meets(place.near, middle)) return 0.0;
     take_block(scene_.camera, kernels_.view(), place, false, rays_);
-    const double wide = scene_.vector ? scene_.vector->r2 : 0;
+    const double wide = scene_.vector ? scene::outer_radius(*scene_.vector) : 0;
     const RayKernelList* const found = kernels_.around(place.near, rays_, wide);
     if (found == nullptr) return std::nullopt;
     met_ += static_cast<double>(rays_.size()) * static_cast<double>(found->size());

@@ -87,7 +87,7 @@ SceneSignature signature_of(const protocol::View& completed) {
   SceneSignature signature;
   signature.kind.lines = completed.vector.field.kind != protocol::FieldChoice::Kind::none;
   signature.kind.medium = !completed.scalars || !completed.scalars->empty();
-  signature.kind.radius = completed.vector.r2;
+  signature.kind.radius = completed.vector.r2 + completed.vector.mark.halo;
   signature.kind.thickness = completed.method.slab_thickness;
   if (signature.kind.medium) {
     signature.kind.rule = error_of_rule(completed.method.compositing);

@@ -13,6 +13,7 @@
 #include "server/scene/colormap.hpp"
 #include "server/scene/detail.hpp"
 #include "server/scene/earth/ground.hpp"
+#include "server/scene/lines/mark.hpp"
 #include "server/scene/rates.hpp"
 #include "server/scene/region/crop.hpp"
 #include "server/scene/region/select.hpp"
@@ -88,21 +89,6 @@ Compositing engine_compositing(protocol::Compositing compositing) {
   return Compositing::analytic;
 }
 
-// Line radii in pixels of this picture. A line thinner than the pixel filter is drawn with the
-// width of the filter and less opacity: with the half width h = (r1 + r2) / 2, r1 = max(0, h -
-// 1/2), r2 = max(1, h + 1/2), opacity times min(1, 2 h).
-void set_radii(const protocol::VectorView& from, int height, VectorLayer& layer) {
-  const double scale = height / reference_height;
-  layer.r1 = from.r1 * scale;
-  layer.r2 = from.r2 * scale;
-  layer.opacity = from.opacity;
-  if (layer.r2 >= 1) return;
-  const double half = 0.5 * (layer.r1 + layer.r2);
-  layer.r1 = std::max(0.0, half - 0.5);
-  layer.r2 = std::max(1.0, half + 0.5);
-  layer.opacity *= std::min(1.0, 2.0 * half);
-}
-
 void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.color_by = line_color(from.color.by.value());
   layer.color = make_table(from.color.map, from.color.range.value());
@@ -111,7 +97,8 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
     layer.color.entries.assign(table_entries, parse_color(from.color.constant).value());
   }
   layer.rise_weight = from.color.rise_weight;
-  layer.head_desaturation = from.head_desaturation;
+  const bool comet = from.mark.shape == protocol::MarkShape::comet;  // keeps the hue of the map
+  layer.head_desaturation = comet ? 0 : from.head_desaturation;
   layer.magnitude_range = from.magnitude_range.value();
   layer.min_magnitude = from.min_magnitude.value();
   layer.magnitude_intensity = from.magnitude_intensity;
@@ -306,6 +293,7 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
   layer.span = from.span;
   layer.stride = from.stride;
   set_radii(from, view.image.height, layer);
+  layer.mark = mark_of(from, view.image.height);
   set_colors(from, layer);
   layer.jitter_center = from.jitter.center;
   layer.jitter_stride = from.jitter.stride;

@@ -17,6 +17,7 @@
 #include "server/scene/defaults.hpp"
 #include "server/scene/earth/ground.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/lines/mark.hpp"
 #include "server/scene/rates.hpp"
 #include "server/scene/refusal.hpp"
 #include "server/scene/region/crop.hpp"
@@ -27,6 +28,8 @@
 namespace windsplat::scene {
 
 namespace {
+
+constexpr double comet_darkening = 0.85;
 
 using protocol::ColorBy;
 using protocol::FieldChoice;
@@ -318,6 +321,13 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
                       "streamlets leave a slice or plane: set it to null, or vector.trace");
   }
   if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry, lattice));
+  const bool comet = vector.mark.shape == protocol::MarkShape::comet;
+  if (!vector.mark.tail_darkening) vector.mark.tail_darkening = comet ? comet_darkening : 0.0;
+  if (vector.trace && is_marked(vector.mark)) {
+    return invalid_at("/vector/mark",
+                      "streamlets have no marks: use the shape \"line\" without tailDarkening and "
+                      "halo, or set vector.trace to null");
+  }
   if (const auto& range = vector.magnitude_range; range && !((*range)[0] < (*range)[1])) {
     return invalid_at("/vector/magnitudeRange", "does not ascend");
   }

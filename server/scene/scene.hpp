@@ -3,11 +3,13 @@
 // centre at +0.5 with row 0 on top.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -81,6 +83,39 @@ struct ColorTable {
 // and w rise_weight. scalar: the value of a second field, mid-grey where it is masked.
 enum class LineColor { world_z, screen_z, rise, magnitude, direction, scalar, constant };
 
+// line: constant width. taper: twice the mean width at the tail, a point at the head. arrow: a line
+// with a triangular head. comet: a line with a dark tail, whose head is not whitened.
+enum class LineShape { line, taper, arrow, comet };
+
+// Lengths in pixels of this picture. The formulas are in docs/design/rendering-model.md, "Marks".
+struct LineMark {
+  LineShape shape = LineShape::line;
+  double head_width = 0;   // arrow: of the base of its head
+  double head_length = 0;  // arrow: from the base to the point
+  double tail_light = 1;   // light of the tail over that of the head
+  double halo = 0;         // width of the rim without light
+  // Of constant width, without a halo.
+  [[nodiscard]] bool plain() const {
+    return (shape == LineShape::line || shape == LineShape::comet) && halo <= 0;
+  }
+};
+
+// The change of the half width from the middle of a line to its head, for a mean half width;
+// shorter lines narrow less. All lengths in pixels.
+inline double narrowing(const LineMark& mark, double half_width) {
+  return mark.shape == LineShape::taper ? half_width : 0;
+}
+
+// The distance from the segment of a line beyond which it is not drawn. r2 bounds one of constant
+// width.
+inline double outer_radius(const LineMark& mark, double r1, double r2) {
+  const double edge = 0.5 * (r2 - r1) + mark.halo;  // half the ramp, and the halo
+  const double half = 0.5 * (r1 + r2);
+  const double shaft = half + narrowing(mark, half) + edge;
+  if (mark.shape != LineShape::arrow) return shaft;
+  return std::max(shaft, 0.5 * mark.head_width + std::numbers::sqrt2 * edge);  // square corners
+}
+
 // The vector kernel (Crawfis & Max, "Vector Kernels"; formulas in docs/design/rendering-model.md).
 struct VectorLayer {
   std::shared_ptr<const data::Volume> field;
@@ -109,6 +144,7 @@ struct VectorLayer {
   double r2 = 1.4;
   double opacity = 0.8;
   double head_desaturation = 0.7;
+  LineMark mark;
   LineColor color_by = LineColor::world_z;
   ColorTable color;
   std::shared_ptr<const data::Volume> color_field;  // color_by scalar only
@@ -130,6 +166,11 @@ struct VectorLayer {
   bool moving = false;
   double motion_cycles = 0;
 };
+
+// The distance from the segment of a line beyond which it is not drawn, pixels.
+inline double outer_radius(const VectorLayer& layer) {
+  return outer_radius(layer.mark, layer.r1, layer.r2);
+}
 
 // One factor for each sample of the lattice, x fastest; full_factor is 1.
 using SampleFactors = std::vector<std::uint16_t>;

@@ -58,6 +58,7 @@ Line<Real> cast(const engine::reference::Ribbon& from) {
   line.r2 = static_cast<Real>(from.r2);
   line.opacity = static_cast<Real>(from.opacity);
   line.desaturation = static_cast<Real>(from.desaturation);
+  line.mark = from.mark;
   line.perspective = from.perspective;
   line.moving = from.moving;
   line.phase = static_cast<Real>(from.phase);

@@ -191,6 +191,12 @@ TEST(Schema, LimitsOfTheViewMatchTheLimitsFile) {
   EXPECT_EQ(at("/properties/geometry/properties/scale/items/maximum"), limits::geometry_scale_max);
   EXPECT_EQ(at("/properties/vector/properties/r1/maximum"), limits::radius_max);
   EXPECT_EQ(at("/properties/vector/properties/r2/maximum"), limits::radius_max);
+  const std::string mark = "/properties/vector/properties/mark/properties";
+  for (const char* head : {"/headWidth", "/headLength"}) {
+    EXPECT_EQ(at((mark + head + "/minimum").c_str()), limits::mark_head_min);
+    EXPECT_EQ(at((mark + head + "/maximum").c_str()), limits::mark_head_max);
+  }
+  EXPECT_EQ(at((mark + "/halo/maximum").c_str()), limits::halo_max);
   EXPECT_EQ(at("/properties/vector/properties/span/minimum"), limits::span_min);
   EXPECT_EQ(at("/properties/vector/properties/span/maximum"), limits::span_max);
   EXPECT_EQ(at("/properties/vector/properties/stride/maximum"), limits::stride_max);

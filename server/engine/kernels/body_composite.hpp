@@ -199,7 +199,7 @@ KERNEL_INLINE Light or_block(const RibbonLanes& r, const BlockPixels& corner,
         ribbon_lane<Along, Style>(r, corner.x + load<Pixel>(lane_x + l) + offset.x,
                                   corner.y + load<Pixel>(lane_y + l) + offset.y);
     Pixel color[3];
-    for (int c = 0; c < 3; ++c) color[c] = hn::MulAdd(lane.f, r.rise[c], r.tail[c]);
+    for (int c = 0; c < 3; ++c) color[c] = line_color<Style>(r, lane, c);
     light.see(add_or(lane.opacity, color, all<Pixel>(1.0F), to, l));
   }
   return light;
@@ -216,11 +216,7 @@ KERNEL_INLINE Light line_block(const RibbonLanes& r, const BlockPixels& corner,
                                   corner.y + load<Pixel>(lane_y + l) + offset.y);
     const Pixel t = load<Pixel>(to.transmittance + l);
     const Pixel a = t * lane.opacity;
-    for (int c = 0; c < 3; ++c) {
-      const Pixel color =
-          Style != style_plain ? hn::MulAdd(lane.f, r.rise[c], r.tail[c]) : r.tail[c];
-      add_product(to.rgb[c] + l, a, color);
-    }
+    for (int c = 0; c < 3; ++c) add_product(to.rgb[c] + l, a, line_color<Style>(r, lane, c));
     const Pixel left = hn::NegMulAdd(t, lane.opacity, t);
     store(left, to.transmittance + l);
     light.see(left);
@@ -322,10 +318,10 @@ KERNEL_INLINE Light both_block(const RibbonLanes& r, Pixel depth, Pixel depth_ri
     const Pixel tau = depth_beyond<Start>(lane);
     const Attenuation<Pixel> medium = attenuation_by<Compositing>(tau);
     const Pixel x_line = fraction_before(s, lane, hn::MulAdd(line.f, depth_rise, depth));
-    Pixel line_color[3];
-    for (int c = 0; c < 3; ++c) line_color[c] = hn::MulAdd(line.f, r.rise[c], r.tail[c]);
+    Pixel color[3];
+    for (int c = 0; c < 3; ++c) color[c] = line_color<Style>(r, line, c);
     const Pixel t = load<Pixel>(to.transmittance + l);
-    const CellLight cell = {tau, line.opacity, x_line, medium, s.color, line_color};
+    const CellLight cell = {tau, line.opacity, x_line, medium, s.color, color};
     const Pixel left = bounded_light<Compositing>(t * add_cell<Compositing>(cell, t, to, l));
     store(left, to.transmittance + l);
     see_light<Compositing>(left, light);
@@ -408,8 +404,8 @@ struct Compositor {
 
 inline int signature_of(const LineStyle& line) {
   if (line.chains.q != nullptr) return style_chain;
-  if (line.moving != 0) return style_moving;
-  return line.head_desaturation > 0 ? style_head : style_plain;
+  if (line.moving != 0 || line.marked != 0) return style_general;
+  return line.head_desaturation > 0 || line.tail_light < 1 ? style_head : style_plain;
 }
 
 template <bool Perspective, int Compositing, int Style>
@@ -438,16 +434,16 @@ inline Compositor compositor_with(int style) {
     with.line = line_window<Perspective, style_chain>;
     return with;
   }
-  return style == style_moving ? compositor_with<Perspective, Compositing, style_moving>()
-                               : compositor_with<Perspective, Compositing, style_head>();
+  return style == style_general ? compositor_with<Perspective, Compositing, style_general>()
+                                : compositor_with<Perspective, Compositing, style_head>();
 }
 
 // Lines combined by `or` have a pass without splats.
 template <bool Perspective>
 inline Compositor or_compositor(int style) {
   Compositor with = compositor_with<Perspective, compositing_analytic>(style);
-  with.line = style == style_moving ? or_window<Perspective, style_moving>
-                                    : or_window<Perspective, style_head>;
+  with.line = style == style_general ? or_window<Perspective, style_general>
+                                     : or_window<Perspective, style_head>;
   return with;
 }
 

@@ -83,8 +83,8 @@ template <bool Perspective>
 void draw_styled(const Prepared& p, int style, int l, Tile& tile) {
   if (style == style_head) {
     draw_line<Perspective, style_head>(p, l, tile);
-  } else if (style == style_moving) {
-    draw_line<Perspective, style_moving>(p, l, tile);
+  } else if (style == style_general) {
+    draw_line<Perspective, style_general>(p, l, tile);
   } else if (style == style_chain) {
     draw_line<Perspective, style_chain>(p, l, tile);
   } else {
@@ -291,8 +291,7 @@ void draw_at_body(const Prepared& p, const Compositor& with, const KernelDepths&
     kernel.from = static_cast<int>(from_of<Perspective>(p, l));
   }
   const int near = kernel.from == static_cast<int>(From::near_plane) ? 1 : 0;
-  const DividedKernel divided = {&kernel.ribbon, &kernel.splat, motion_of(p.pass->line), near,
-                                 p.positions.depth[l]};
+  const DividedKernel divided = {&kernel.ribbon, &kernel.splat, near, p.positions.depth[l]};
   each_window(p.footing, l, lined, splatted,
               [&](int row, int column, std::uint64_t lines, std::uint64_t splats) {
                 std::uint64_t open = lines | splats;

@@ -40,7 +40,7 @@ struct LineSpans {
 
 KERNEL_INLINE LineSpans line_spans(const LineStyle& line, const Ribbons& r, const Tile& tile,
                                    int l) {
-  const Kernel radius = all<Kernel>(line.r2);
+  const Kernel radius = all<Kernel>(line.outer);
   LineSpans s;
   s.x = load<Kernel>(r.x + l) - all<Kernel>(static_cast<float>(tile.x));
   s.y = load<Kernel>(r.y + l) - all<Kernel>(static_cast<float>(tile.y));
@@ -82,12 +82,13 @@ KERNEL_INLINE std::uint32_t find_line_rows(const LineStyle& line, const Ribbons&
 }
 
 // Computes the columns of blocks that lines may touch in each of their rows, up to `most` after the
-// first: those of the part of the segment within r2 of the pixel centres of the row, widened by r2.
+// first: those of the part of the segment within `outer` of the pixel centres of the row, widened
+// by it.
 KERNEL_INLINE void find_line_columns(const LineStyle& line, const Ribbons& r, const Tile& tile,
                                      int l, int most, Footing& f) {
   const LineSpans s = line_spans(line, r, tile, l);
   const int columns = blocks_of(tile.width);
-  const Kernel radius = all<Kernel>(line.r2);
+  const Kernel radius = all<Kernel>(line.outer);
   const Kernel zero = hn::Zero(KernelTag());
   const Kernel one = all<Kernel>(1.0F);
   // A horizontal line uses its whole length in every row.

@@ -22,20 +22,18 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
                 r.depth_rise[l],
                 0,
                 0,
-                line.reach,
-                line.steep,
-                line.opacity,
                 0,
                 0,
                 0,
                 0,
-                1};
-  const int motion = motion_of(line);
-  if (motion != motion_none) {
+                1,
+                &line};
+  const int style = style_of(line);
+  if (style == style_chain || line.moving != 0) {
     out.phase = r.phase[l];
     out.phase_rise = r.phase_rise[l];
   }
-  if (motion == motion_chain) {
+  if (style == style_chain) {
     out.cut_x = r.cut_x[l];
     out.cut_y = r.cut_y[l];
     out.end_x = r.end_x[l];

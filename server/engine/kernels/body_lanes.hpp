@@ -2,25 +2,23 @@
 #pragma once
 
 #include "server/engine/kernels/body_partial.hpp"
+#include "server/engine/kernels/lines/body_marks.hpp"
 #include "server/engine/kernels/prepared.hpp"
 
 namespace windsplat::engine::kernels {
 namespace {
 
-// Style of a line: uniform colour, with a head, or with a head and a moving texture.
+// Style of a line: uniform colour, with a head, or with a head and, decided for each line, a moving
+// texture, a mark or both.
 constexpr int style_plain = 0;
 constexpr int style_head = 1;
-constexpr int style_moving = 2;
-constexpr int style_chain = 3;  // the same, a segment of a chain
+constexpr int style_general = 2;
+constexpr int style_chain = 3;  // a segment of a chain, with a head and a moving texture
 
-// Straight lines without and with a moving texture, and segments of chains.
-constexpr int motion_none = 0;
-constexpr int motion_phase = 1;
-constexpr int motion_chain = 2;
-
-inline int motion_of(const LineStyle& line) {
-  if (line.chains.q != nullptr) return motion_chain;
-  return line.moving != 0 ? motion_phase : motion_none;
+// The style that draws a line of any colours.
+inline int style_of(const LineStyle& line) {
+  if (line.chains.q != nullptr) return style_chain;
+  return line.moving != 0 || line.marked != 0 ? style_general : style_head;
 }
 
 // Pixel centres of a block, relative to its corner.
@@ -37,32 +35,45 @@ struct RibbonLanes {
   Pixel tail[3], rise[3];
   Pixel phase, phase_rise;
   Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
-  Pixel cut_x, cut_y, end_x, end_y, end_most;
+  int moving, marked;
+  MarkLanes mark;                              // set if marked
+  Pixel cut_x, cut_y, end_x, end_y, end_most;  // of a segment of a chain
 };
+
+KERNEL_INLINE void spread_style(const LineStyle& line, float ux, float uy, RibbonLanes& to) {
+  to.reach = all<Pixel>(line.reach);
+  to.steep = all<Pixel>(line.steep);
+  to.opacity = all<Pixel>(line.opacity);
+  to.moving = line.moving;
+  to.marked = line.marked;
+  if (line.marked != 0) to.mark = spread_mark(line, ux, uy);
+}
 
 KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
   const auto lanes = [](float v) { return all<Pixel>(v); };
-  return {lanes(r.x),
-          lanes(r.y),
-          lanes(r.ux),
-          lanes(r.uy),
-          lanes(r.wx),
-          lanes(r.wy),
-          lanes(r.w0),
-          lanes(r.depth_ratio),
-          lanes(r.bend),
-          {lanes(r.tail[0]), lanes(r.tail[1]), lanes(r.tail[2])},
-          {lanes(r.rise[0]), lanes(r.rise[1]), lanes(r.rise[2])},
-          lanes(r.phase),
-          lanes(r.phase_rise),
-          lanes(r.reach),
-          lanes(r.steep),
-          lanes(r.opacity),
-          lanes(r.cut_x),
-          lanes(r.cut_y),
-          lanes(r.end_x),
-          lanes(r.end_y),
-          lanes(r.end_most)};
+  RibbonLanes out;
+  out.x = lanes(r.x);
+  out.y = lanes(r.y);
+  out.ux = lanes(r.ux);
+  out.uy = lanes(r.uy);
+  out.wx = lanes(r.wx);
+  out.wy = lanes(r.wy);
+  out.w0 = lanes(r.w0);
+  out.ratio = lanes(r.depth_ratio);
+  out.bend = lanes(r.bend);
+  for (int c = 0; c < 3; ++c) {
+    out.tail[c] = lanes(r.tail[c]);
+    out.rise[c] = lanes(r.rise[c]);
+  }
+  out.phase = lanes(r.phase);
+  out.phase_rise = lanes(r.phase_rise);
+  out.cut_x = lanes(r.cut_x);
+  out.cut_y = lanes(r.cut_y);
+  out.end_x = lanes(r.end_x);
+  out.end_y = lanes(r.end_y);
+  out.end_most = lanes(r.end_most);
+  spread_style(*r.style, r.ux, r.uy, out);
+  return out;
 }
 
 // The same from the arrays of a brick.
@@ -86,28 +97,27 @@ KERNEL_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l)
     out.rise[c] = one(rise[c]);
   }
   out.phase = out.phase_rise = hn::Zero(PixelTag());
-  const int motion = motion_of(line);
-  if (motion != motion_none) {
+  const int style = style_of(line);
+  if (style == style_chain || line.moving != 0) {
     out.phase = lanes(r.phase);
     out.phase_rise = lanes(r.phase_rise);
   }
   out.cut_x = out.cut_y = out.end_x = out.end_y = out.end_most = hn::Zero(PixelTag());
-  if (motion == motion_chain) {
+  if (style == style_chain) {
     out.cut_x = lanes(r.cut_x);
     out.cut_y = lanes(r.cut_y);
     out.end_x = lanes(r.end_x);
     out.end_y = lanes(r.end_y);
     out.end_most = lanes(r.end_most);
   }
-  out.reach = one(line.reach);
-  out.steep = one(line.steep);
-  out.opacity = one(line.opacity);
+  spread_style(line, r.ux[l], r.uy[l], out);
   return out;
 }
 
 struct RibbonLane {
   Pixel opacity;
   Pixel f;
+  Pixel light;  // part of the opacity that has light: less than 1 in a halo; of style_general
 };
 
 // How f is computed from w, the position along the line on the screen, where 1/z is linear. The
@@ -129,27 +139,44 @@ KERNEL_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
 template <Depth Along, int Style>
 KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   const Pixel zero = hn::Zero(PixelTag());
-  const Pixel w = clamped(hn::MulAdd(dx, r.wx, hn::MulAdd(dy, r.wy, r.w0)), zero, all<Pixel>(1.0F));
-  const Pixel ex = hn::NegMulAdd(w, r.ux, dx);
-  const Pixel ey = hn::NegMulAdd(w, r.uy, dy);
-  const Pixel distance = hn::Sqrt(hn::MulAdd(ex, ex, ey * ey));
-  Pixel cover = clamped(hn::NegMulAdd(distance, r.steep, r.reach), zero, r.opacity);
+  const Pixel one = all<Pixel>(1.0F);
+  const Pixel along = hn::MulAdd(dx, r.wx, hn::MulAdd(dy, r.wy, r.w0));
+  const Pixel w = clamped(along, zero, one);
+  Pixel light = one;
+  Pixel cover = zero;
+  if (Style == style_general && r.marked != 0) {
+    const MarkCover found = mark_cover(r.mark, {r.ux, r.uy, r.steep, r.opacity}, along, w, dx, dy);
+    cover = found.whole;
+    light = found.line / hn::Max(found.whole, all<Pixel>(1e-30F));
+  } else {
+    const Pixel ex = hn::NegMulAdd(w, r.ux, dx);
+    const Pixel ey = hn::NegMulAdd(w, r.uy, dy);
+    const Pixel distance = hn::Sqrt(hn::MulAdd(ex, ex, ey * ey));
+    cover = clamped(hn::NegMulAdd(distance, r.steep, r.reach), zero, r.opacity);
+  }
   if (Style == style_chain) {
     // The next segment computes its cut from the same numbers in the same order as this its end.
     const Pixel from_cut = hn::MulAdd(r.cut_x, dx, r.cut_y * dy);
     const Pixel to_end = hn::MulAdd(r.end_x, dx - r.ux, r.end_y * (dy - r.uy));
     cover = hn::IfThenElseZero(hn::And(hn::Ge(from_cut, zero), hn::Lt(to_end, r.end_most)), cover);
   }
-  if (Style == style_plain) return {cover, zero};
+  if (Style == style_plain) return {cover, zero, one};
   const Pixel f = along_ribbon<Along>(r, w);
-  if (Style == style_moving || Style == style_chain) {
+  if (Style == style_chain || (Style == style_general && r.moving != 0)) {
     // W(frac(q + 1/2 - phase)), W(p) = 1 - |2 p - 1|.
-    const Pixel one = all<Pixel>(1.0F);
     const Pixel shifted = hn::MulAdd(f, r.phase_rise, r.phase);
     const Pixel p = hn::IfThenElse(hn::Ge(shifted, one), shifted - one, shifted);
-    return {cover * (one - hn::Abs(hn::MulSub(all<Pixel>(2.0F), p, one))), f};
+    cover = cover * (one - hn::Abs(hn::MulSub(all<Pixel>(2.0F), p, one)));
   }
-  return {cover, f};
+  return {cover, f, light};
+}
+
+// One channel of the straight colour of a line at a vector of pixels.
+template <int Style>
+KERNEL_INLINE Pixel line_color(const RibbonLanes& r, const RibbonLane& lane, int c) {
+  if (Style == style_plain) return r.tail[c];
+  const Pixel color = hn::MulAdd(lane.f, r.rise[c], r.tail[c]);
+  return Style == style_general ? color * lane.light : color;
 }
 
 // Constants of a splat, broadcast to all lanes.

@@ -8,7 +8,7 @@ namespace windsplat::engine::kernels {
 namespace {
 
 inline RibbonRecord ribbon_record(const LineStyle& line, const Prepared& p, int l) {
-  RibbonRecord out = {ribbon_at(line, p.ribbons, l), motion_of(line), 0};
+  RibbonRecord out = {ribbon_at(line, p.ribbons, l), style_of(line), 0};
   out.ribbon.depth += p.positions.depth[l];
   out.bent = absolute(out.ribbon.bend) > series_bend_max ? 1 : 0;
   return out;
@@ -111,6 +111,7 @@ struct LaneHit {
   Pixel opacity;       // 0 elsewhere
   Pixel depth;
   Pixel f;
+  Pixel light;  // part of the opacity that has light
 };
 
 // A slab or a part of it.
@@ -131,17 +132,17 @@ KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, Between slab, Pixel px
   const auto inside =
       hn::And(hn::Ge(depth, all<Pixel>(slab.front)), hn::Lt(depth, all<Pixel>(slab.back)));
   // Early exit: most candidates pass the block in another slab.
-  if (hn::AllFalse(PixelTag(), inside)) return {inside, zero, depth, f};
-  const Pixel opacity = ribbon_lane<Along, Style>(r, px - r.x, py - r.y).opacity;
-  const auto here = hn::And(inside, hn::Gt(opacity, zero));
-  return {here, hn::IfThenElseZero(here, opacity), depth, f};
+  if (hn::AllFalse(PixelTag(), inside)) return {inside, zero, depth, f, zero};
+  const RibbonLane lane = ribbon_lane<Along, Style>(r, px - r.x, py - r.y);
+  const auto here = hn::And(inside, hn::Gt(lane.opacity, zero));
+  return {here, hn::IfThenElseZero(here, lane.opacity), depth, f, lane.light};
 }
 
 template <Depth Along>
 KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, Between slab, Pixel px, Pixel py) {
-  if (line.motion == motion_chain) return hit_lanes<Along, style_chain>(line, slab, px, py);
-  return line.motion != motion_none ? hit_lanes<Along, style_moving>(line, slab, px, py)
-                                    : hit_lanes<Along, style_head>(line, slab, px, py);
+  if (line.style == style_chain) return hit_lanes<Along, style_chain>(line, slab, px, py);
+  return line.style == style_general ? hit_lanes<Along, style_general>(line, slab, px, py)
+                                     : hit_lanes<Along, style_head>(line, slab, px, py);
 }
 
 template <bool Perspective>
@@ -149,6 +150,12 @@ KERNEL_INLINE LaneHit hit_lanes(const RibbonRecord& line, Between slab, Pixel px
   if (!Perspective) return hit_lanes<Depth::flat>(line, slab, px, py);
   return line.bent == 0 ? hit_lanes<Depth::series>(line, slab, px, py)
                         : hit_lanes<Depth::exact>(line, slab, px, py);
+}
+
+// One channel of the straight colour of a line where it is met.
+KERNEL_INLINE Pixel hit_color(const RibbonRecord& line, const LaneHit& at, int c) {
+  return at.light *
+         hn::MulAdd(at.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c]));
 }
 
 KERNEL_INLINE Pixel fraction_in(const Slab& slab, Pixel depth) {
@@ -168,10 +175,7 @@ KERNEL_INLINE bool hit_block(const RibbonRecord& line, const Slab& slab, Between
     any = any || !hn::AllFalse(PixelTag(), at.here);
     store(fraction_in(slab, at.depth), m.x_line + l);
     store(at.opacity, m.opacity + l);
-    for (int c = 0; c < 3; ++c) {
-      store(hn::MulAdd(at.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c])),
-            m.color[c] + l);
-    }
+    for (int c = 0; c < 3; ++c) store(hit_color(line, at, c), m.color[c] + l);
   }
   return any;
 }

@@ -264,7 +264,6 @@ inline BodyWindow at_body(const Tile& tile, const KernelDepths& depths, const Wi
 struct DividedKernel {
   const Ribbon* line;  // or null
   const Splat* splat;  // or null
-  int motion;          // see motion_of
   int near;            // the splat has the near form
   float centre;        // depth of its position from the camera's depth origin
 };
@@ -276,17 +275,16 @@ struct DividedLine {
 };
 
 template <bool Perspective>
-KERNEL_INLINE DividedLine divided_line(const Ribbon& ribbon, int motion, Pixel px, Pixel py) {
+KERNEL_INLINE DividedLine divided_line(const Ribbon& ribbon, Pixel px, Pixel py) {
   constexpr Depth along = Perspective ? Depth::exact : Depth::flat;
   const RibbonLanes r = spread(ribbon);
-  const RibbonLane lane =
-      motion == motion_chain  ? ribbon_lane<along, style_chain>(r, px - r.x, py - r.y)
-      : motion != motion_none ? ribbon_lane<along, style_moving>(r, px - r.x, py - r.y)
-                              : ribbon_lane<along, style_head>(r, px - r.x, py - r.y);
+  const RibbonLane lane = style_of(*ribbon.style) == style_chain
+                              ? ribbon_lane<along, style_chain>(r, px - r.x, py - r.y)
+                              : ribbon_lane<along, style_general>(r, px - r.x, py - r.y);
   DividedLine line;
   line.opacity = lane.opacity;
   line.depth = hn::MulAdd(lane.f, all<Pixel>(ribbon.depth_rise), all<Pixel>(ribbon.depth));
-  for (int c = 0; c < 3; ++c) line.color[c] = hn::MulAdd(lane.f, r.rise[c], r.tail[c]);
+  for (int c = 0; c < 3; ++c) line.color[c] = line_color<style_general>(r, lane, c);
   return line;
 }
 
@@ -336,7 +334,7 @@ Light divided_block(const DividedKernel& kernel, float x, float y, const float* 
     const Pixel py = all<Pixel>(y) + load<Pixel>(lane_y + l);
     DividedLine line = {zero, zero, {zero, zero, zero}};
     if (kernel.line != nullptr) {
-      line = divided_line<Perspective>(*kernel.line, kernel.motion, px, py);
+      line = divided_line<Perspective>(*kernel.line, px, py);
     }
     const Pixel length = kernel.splat != nullptr && Perspective ? load<Pixel>(ray + l) : one;
     DividedSplat splat = {zero, one, zero};

@@ -197,7 +197,7 @@ struct BrickMaker {
       if (lanes_at(touching, l) == 0) continue;
       find_line_columns(pass.line, out.ribbons, tile, l, rows_most, out.footing);
     }
-    color_ribbons(pass.line.color, shades, touching, out.ribbons);
+    color_ribbons(pass.line, shades, touching, out.ribbons);
   }
 };
 
@@ -215,7 +215,8 @@ void prepare_brick(const Camera& camera, const Pass& pass, const Brick& brick, T
   open_rows(pass, brick, maker.rows);
   float reach[3];
   brick_reach(camera, pass, brick, maker.rows, reach);
-  const Frustum frustum = frustum_of<Perspective>(camera, tile, reach, Lines ? pass.line.r2 : 0.0F);
+  const Frustum frustum =
+      frustum_of<Perspective>(camera, tile, reach, Lines ? pass.line.outer : 0.0F);
   const std::uint64_t seen = compute_positions<Perspective, Curved>(camera, pass, brick, frustum,
                                                                     maker.rows, tile, positions);
   maker.shades.unknown = 0;

@@ -186,10 +186,7 @@ KERNEL_INLINE Outcome pass_in_order(const Closing& with, Passage* passage) {
       }
       far = hn::IfThenElse(hit.here, hit.depth, far);
       Pixel color[3];
-      for (int c = 0; c < 3; ++c) {
-        color[c] =
-            hn::MulAdd(hit.f, all<Pixel>(line.ribbon.rise[c]), all<Pixel>(line.ribbon.tail[c]));
-      }
+      for (int c = 0; c < 3; ++c) color[c] = hit_color(line, hit, c);
       pass_line<Compositing>(hit.opacity, fraction_in(with.slab, hit.depth), color, p);
     }
     passage[v] = p;

@@ -90,6 +90,15 @@ struct LineStyle {
   float opacity;
   float reach, steep;  // opacity of a pixel: clamp(reach - steep distance, 0, opacity)
   float head_desaturation;
+  float tail_light;  // light of the tail over that of the head
+  // Shapes of other than constant width, and halos: see body_marks.hpp.
+  int marked;                    // 0: constant width without a halo
+  float half_width;              // mean, pixels
+  float narrowing;               // from the middle to the head, pixels; negative: to the tail
+  float head_length;             // of an arrow, pixels; 0: none
+  float head_slope, head_steep;  // half width over length; steep times the cosine of that angle
+  float halo;                    // steep times the width of the halo
+  float outer;                   // no pixel farther from the segment is touched
   float intensity_low, intensity_scale, intensity;
   float cue_near, cue_scale, cue_strength;  // from the camera's depth origin
   int color_by;                             // scene::LineColor

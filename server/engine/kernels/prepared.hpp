@@ -154,8 +154,8 @@ struct Ribbon {
   float tail[3], rise[3];
   float depth, depth_rise;
   float phase, phase_rise;
-  float reach, steep, opacity;
   float cut_x, cut_y, end_x, end_y, end_most;
+  const LineStyle* style;
 };
 
 // Constants of the form of one splat; see Splats.
@@ -193,7 +193,7 @@ struct SplatRecord {
 
 struct RibbonRecord {
   Ribbon ribbon;  // depth of its centre from the camera's depth origin
-  int motion;     // see motion_of
+  int style;      // see style_of
   int bent;       // too much perspective for the series approximation of depth
 };
 

@@ -35,6 +35,22 @@ void set_detail(const scene::VectorLayer& from, kernels::LineStyle& to) {
   }
 }
 
+void set_mark(const scene::VectorLayer& from, kernels::LineStyle& to) {
+  const scene::LineMark& mark = from.mark;
+  const double half = 0.5 * (from.r1 + from.r2);
+  to.tail_light = static_cast<float>(mark.tail_light);
+  to.marked = mark.plain() ? 0 : 1;
+  to.half_width = static_cast<float>(half);
+  to.narrowing = static_cast<float>(scene::narrowing(mark, half));
+  const bool arrow = mark.shape == scene::LineShape::arrow && mark.head_length > 0;
+  const double slope = arrow ? 0.5 * mark.head_width / mark.head_length : 0;
+  to.head_length = arrow ? static_cast<float>(mark.head_length) : 0.0F;
+  to.head_slope = static_cast<float>(slope);
+  to.head_steep = static_cast<float>(static_cast<double>(to.steep) / std::hypot(1.0, slope));
+  to.halo = static_cast<float>(static_cast<double>(to.steep) * mark.halo);
+  to.outer = mark.plain() ? to.r2 : static_cast<float>(scene::outer_radius(mark, from.r1, from.r2));
+}
+
 }  // namespace
 
 void to_floats(const std::vector<double>& from, std::vector<float>& to) {
@@ -103,6 +119,7 @@ void style_lines(const Scene& scene, const scene::VectorLayer& from, double dept
   to.steep = to.inverse_ramp * to.opacity;
   to.reach = to.r2 * to.steep;
   to.head_desaturation = static_cast<float>(from.head_desaturation);
+  set_mark(from, to);
   to.intensity_low = bounded(scale * from.magnitude_range[0]);
   to.intensity_scale = ramp_scale(scale * from.magnitude_range[0], scale * from.magnitude_range[1]);
   to.intensity = static_cast<float>(from.magnitude_intensity);

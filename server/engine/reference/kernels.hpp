@@ -107,6 +107,7 @@ struct BasicRibbon {
   Real q0 = 0, q1 = 0;
   std::array<Real, 3> color{};
   Real r1 = 0, r2 = 0, opacity = 0, desaturation = 0;
+  scene::LineMark mark;
   bool perspective = false;
   bool moving = false;
   Real phase = 0;
@@ -126,6 +127,53 @@ struct RibbonHit {
   std::array<Real, 3> color{};
 };
 
+// Opacities of a marked line over that of its middle, with r1 < r2: without and with its halo.
+template <class Real>
+struct MarkCover {
+  Real line = 0;
+  Real whole = 0;
+};
+
+// A shape of width 2 `half` at the signed distance `inside` its edge, over a ramp of width `edge`.
+template <class Real>
+MarkCover<Real> cover_within(Real inside, Real half, Real halo, Real edge) {
+  const auto at = [&](Real wider) {
+    const Real most = std::clamp(2 * (half + wider) / edge, Real(0), Real(1));
+    return std::clamp(Real(0.5) + (inside + wider) / edge, Real(0), most);
+  };
+  return {at(0), at(halo)};
+}
+
+// Pixel (px, py) from the tail of a line along (ux, uy); w is the nearest position along it.
+template <class Real>
+MarkCover<Real> mark_cover(const BasicRibbon<Real>& line, Real px, Real py, Real w) {
+  const Real ux = line.x1 - line.x0;
+  const Real uy = line.y1 - line.y0;
+  const Real length = std::hypot(ux, uy);
+  const Real edge = std::max(line.r2 - line.r1, Real(1e-6));
+  const Real middle = (line.r1 + line.r2) / 2;
+  const Real halo = static_cast<Real>(line.mark.halo);
+  const Real most = length / 4;
+  const Real change = std::clamp(
+      static_cast<Real>(scene::narrowing(line.mark, static_cast<double>(middle))), -most, most);
+  const bool arrow = line.mark.shape == scene::LineShape::arrow && line.mark.head_length > 0;
+  const Real head = arrow ? std::min(static_cast<Real>(line.mark.head_length), length / 2) : 0;
+  const Real least = Real(1e-6) * line.r2;
+  const Real at = std::min(w, 1 - head / std::max(length, least));
+  const Real half = middle + change * (1 - 2 * at);
+  MarkCover<Real> cover =
+      cover_within(half - std::hypot(px - at * ux, py - at * uy), half, halo, edge);
+  if (!(head > 0) || length <= least) return cover;
+  const Real slope = static_cast<Real>(line.mark.head_width / line.mark.head_length / 2);
+  const Real cosine = 1 / std::hypot(Real(1), slope);
+  const Real from_point = length - (px * ux + py * uy) / length;
+  const Real across = std::abs(px * uy - py * ux) / length;
+  const Real inside = std::min(std::min(cosine * (slope * from_point - across), from_point),
+                               std::min(head - from_point, slope * head - across));
+  const auto tip = cover_within(inside, cosine * slope * from_point, halo, edge);
+  return {std::max(cover.line, tip.line), std::max(cover.whole, tip.whole)};
+}
+
 template <class Real>
 RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
   const Real ux = line.x1 - line.x0;
@@ -138,15 +186,23 @@ RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
                                         Real(-0.5), Real(0.5));
   const Real distance = std::hypot(px - w * ux, py - w * uy);
   RibbonHit<Real> hit;
-  if (distance >= line.r2) return hit;
   if (line.chained) {
     if (line.cut[0] * px + line.cut[1] * py < 0) return hit;
     const Real ex = x - line.x1;
     const Real ey = y - line.y1;
     if (line.end[0] * ex + line.end[1] * ey >= line.end_most) return hit;
   }
-  hit.opacity =
-      line.opacity * (distance <= line.r1 ? Real(1) : (line.r2 - distance) / (line.r2 - line.r1));
+  Real light = 1;
+  if (!line.mark.plain()) {
+    const MarkCover<Real> cover = mark_cover(line, px, py, w);
+    if (!(cover.whole > 0)) return hit;
+    hit.opacity = line.opacity * cover.whole;
+    light = cover.line / cover.whole;
+  } else {
+    if (distance >= line.r2) return hit;
+    hit.opacity =
+        line.opacity * (distance <= line.r1 ? Real(1) : (line.r2 - distance) / (line.r2 - line.r1));
+  }
   Real f = w;
   if (line.perspective) {
     const Real inverse_z = (1 - w) / line.a[2] + w / line.b[2];
@@ -158,9 +214,14 @@ RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
     const Real turn = q + Real(0.5) - line.phase;
     hit.opacity *= 1 - std::abs(2 * (turn - std::floor(turn)) - 1);
   }
-  const Real grey = line.desaturation * (q + Real(0.5));
   const Real top = std::max({line.color[0], line.color[1], line.color[2]});
-  for (int c = 0; c < 3; ++c) hit.color[c] = line.color[c] + grey * (top - line.color[c]);
+  const auto lit = [&](int c, Real at) {
+    return line.color[c] + line.desaturation * (at + Real(0.5)) * (top - line.color[c]);
+  };
+  const auto dark = static_cast<Real>(1 - line.mark.tail_light);
+  for (int c = 0; c < 3; ++c) {
+    hit.color[c] = light * (lit(c, q) - dark * (1 - f) * lit(c, line.q0));
+  }
   return hit;
 }
 

@@ -206,6 +206,7 @@ std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const Ve
   line.r2 = layer.r2;
   line.opacity = layer.opacity;
   line.desaturation = layer.head_desaturation;
+  line.mark = layer.mark;
   line.perspective = view.perspective;
   line.moving = layer.moving;
   const double lift = in_box[2] + layer.jitter_stride * jitter.stride[2];
@@ -225,8 +226,9 @@ std::optional<Ribbon> make_ribbon(const Scene& scene, const View& view, const Ve
 }
 
 ScreenBox ribbon_box(const Ribbon& line) {
-  return {std::min(line.x0, line.x1) - line.r2, std::max(line.x0, line.x1) + line.r2,
-          std::min(line.y0, line.y1) - line.r2, std::max(line.y0, line.y1) + line.r2};
+  const double outer = scene::outer_radius(line.mark, line.r1, line.r2);
+  return {std::min(line.x0, line.x1) - outer, std::max(line.x0, line.x1) + outer,
+          std::min(line.y0, line.y1) - outer, std::max(line.y0, line.y1) + outer};
 }
 
 }  // namespace windsplat::engine::reference

@@ -45,7 +45,7 @@ Reach reach_of(const scene::Scene& scene, const reference::View& view,
   out.cells = std::max(out.cells, std::numbers::sqrt3 * jitter);
   const double half_line = 0.5 * layers.lines->length;
   const double depth = view.perspective ? farthest(scene) + half_line : 1;
-  out.beyond = half_line + layers.lines->r2 * view.pixel * depth;
+  out.beyond = half_line + scene::outer_radius(*layers.lines) * view.pixel * depth;
   return out;
 }
 

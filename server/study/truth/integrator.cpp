@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/study/truth/integrator_kernels.hpp"
+#include "server/study/truth/integrator_marks.hpp"
 #include "server/study/truth/sunlight.hpp"
 
 namespace windsplat::truth {
@@ -43,9 +44,17 @@ std::optional<Surface> meet(const Scene& scene, const Line& line, Real x, Real y
       std::clamp(dot(p - 0.5L * u, u) / std::max(dot(u, u), eps * eps), Real(-0.5L), Real(0.5L));
   const Real w = q + 0.5L;
   const Real distance = length(p - w * u);
-  if (distance >= layer.r2) return {};
   Surface surface;
-  surface.opacity = layer.opacity * (1 - ramp(distance, layer.r1, layer.r2));
+  Real lit = 1;  // part of the opacity that has light
+  if (layer.mark.plain()) {
+    if (distance >= layer.r2) return {};
+    surface.opacity = layer.opacity * (1 - ramp(distance, layer.r1, layer.r2));
+  } else {
+    const MarkShare share = mark_share(layer, u, p, w);
+    if (!(share.with_halo > 0)) return {};
+    surface.opacity = layer.opacity * share.with_halo;
+    lit = share.lit / share.with_halo;
+  }
   const Real f = camera.perspective ? w * line.a.z / (w * line.a.z + (1 - w) * line.b.z) : w;
   surface.depth = line.a.z + f * (line.b.z - line.a.z);
   const Real at = line.q0 + f * (line.q1 - line.q0) + 0.5L;
@@ -54,8 +63,13 @@ std::optional<Surface> meet(const Scene& scene, const Line& line, Real x, Real y
     surface.opacity *= 1 - std::abs(2 * (turn - std::floor(turn)) - 1);
   }
   const Real top = std::max({line.color.x, line.color.y, line.color.z});
-  const Real grey = layer.head_desaturation * at;
-  surface.color = (1 - grey) * line.color + grey * Vec{top, top, top};
+  const auto whitened = [&](Real q) {
+    const Real grey = layer.head_desaturation * q;
+    return (1 - grey) * line.color + grey * Vec{top, top, top};
+  };
+  const Vec tail = layer.mark.tail_light * whitened(line.q0 + 0.5L);
+  const Vec head = whitened(line.q1 + 0.5L);
+  surface.color = lit * ((1 - f) * tail + f * head);
   return surface;
 }
 

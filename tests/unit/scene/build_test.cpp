@@ -108,6 +108,33 @@ TEST(BuildScene, RadiiScaleWithThePictureHeight) {
   EXPECT_NEAR(scene.vector->opacity, 0.8, 1e-12);
 }
 
+TEST(BuildScene, MarksScaleWithThePictureHeight) {
+  auto dataset = weather();
+  View view;
+  view.image.height = 1440;
+  view.vector.mark = {protocol::MarkShape::arrow, 7, 10, 0.25, 1.5};
+  const LineMark arrow = built(view, *dataset).vector->mark;
+  EXPECT_EQ(arrow.shape, LineShape::arrow);
+  EXPECT_NEAR(arrow.head_width, 14, 1e-12);
+  EXPECT_NEAR(arrow.head_length, 20, 1e-12);
+  EXPECT_NEAR(arrow.halo, 3, 1e-12);
+  EXPECT_NEAR(arrow.tail_light, 0.75, 1e-12);
+}
+
+// Whitening changes the hue; the other shapes keep the light of their tails unless asked.
+TEST(BuildScene, CometsHaveDarkTailsInsteadOfWhiteHeads) {
+  auto dataset = weather();
+  View view;
+  EXPECT_EQ(built(view, *dataset).vector->mark.tail_light, 1);
+  EXPECT_NEAR(built(view, *dataset).vector->head_desaturation, 0.7, 1e-12);
+  view.vector.mark.shape = protocol::MarkShape::comet;
+  const Scene comets = built(view, *dataset);
+  EXPECT_NEAR(comets.vector->mark.tail_light, 0.15, 1e-12);
+  EXPECT_EQ(comets.vector->head_desaturation, 0);
+  view.vector.mark.tail_darkening = 0.4;
+  EXPECT_NEAR(built(view, *dataset).vector->mark.tail_light, 0.6, 1e-12);
+}
+
 TEST(BuildScene, ReversedColorRangesReverseTheMap) {
   auto dataset = weather();
   View view;

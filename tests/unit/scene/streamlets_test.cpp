@@ -118,6 +118,34 @@ TEST(StreamletScene, IsRefusedOnSlicesAndPlanes) {
   }
 }
 
+TEST(StreamletScene, IsRefusedWithMarks) {
+  auto dataset = sample_dataset("tornado", {12, 12, 12});
+  const auto marked = [](const auto& change) {
+    View view = traced();
+    change(view.vector.mark);
+    return view;
+  };
+  using protocol::MarkShape;
+  using protocol::MarkView;
+  for (const View& view : {marked([](MarkView& m) { m.shape = MarkShape::taper; }),
+                           marked([](MarkView& m) { m.shape = MarkShape::arrow; }),
+                           marked([](MarkView& m) { m.shape = MarkShape::comet; }),
+                           marked([](MarkView& m) { m.tail_darkening = 0.5; }),
+                           marked([](MarkView& m) { m.halo = 1; })}) {
+    const auto refused = complete(view, *dataset);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().kind, ErrorKind::invalid);
+    ASSERT_FALSE(refused.error().at.empty());
+    EXPECT_EQ(refused.error().at[0].pointer, "/vector/mark");
+    View straight = view;
+    straight.vector.trace.reset();
+    EXPECT_TRUE(complete(straight, *dataset));
+  }
+  // Keys without effect are no mark.
+  EXPECT_TRUE(complete(marked([](MarkView& m) { m.head_width = 9; }), *dataset));
+  EXPECT_TRUE(complete(marked([](MarkView& m) { m.tail_darkening = 0; }), *dataset));
+}
+
 TEST(StreamletScene, BeyondTheMemoryLimitIsRefusedWithTheRemedy) {
   auto source = data::open_sample("tornado", {64, 64, 64});
   data::Dataset dataset(std::move(*source), "tornado", std::uint64_t{40} << 20U);
