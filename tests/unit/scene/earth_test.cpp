@@ -55,7 +55,9 @@ TEST(Earth, EveryColumnIsFoundAtItsOwnPlace) {
       geometry.scale = {1, 1.5, 2};
       auto lattice = place_lattice(grid, geometry);
       ASSERT_TRUE(lattice);
-      const Placed placed{grid, std::move(*lattice), GroundFrom::none, {}};
+      Placed placed;
+      placed.grid = grid;
+      placed.lattice = std::move(*lattice);
       const auto map = map_of(geometry, placed);
       ASSERT_TRUE(map);
       const auto [width, height, levels] = grid.dims();
