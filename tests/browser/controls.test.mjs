@@ -47,6 +47,8 @@ const numbers = [
   ["Line shape", "core radius r1", 0.9, "vector", "r1"],
   ["Line shape", "edge radius r2", 2.5, "vector", "r2"],
   ["Line shape", "head whitening", 0.1, "vector", "headDesaturation"],
+  ["Line shape", "tail darkening", 0.3, "vector", "mark", "tailDarkening"],
+  ["Line shape", "halo", 1.5, "vector", "mark", "halo"],
   ["Line shape", "brightness by speed", 0, "vector", "magnitudeIntensity"],
   ["Kernels and jitter", "span \\(strides\\)", 3, "vector", "span"],
   ["Kernels and jitter", "jitter of centre", 0.9, "vector", "jitter", "center"],

@@ -248,6 +248,8 @@ export function controlStates(view: View) {
     traced: lines && (vector.trace ?? null) !== null,
     // A slice or plane has straight lines only.
     traceable: lines && (view.geometry?.slice ?? view.geometry?.plane ?? null) === null,
+    arrow: lines && vector.mark?.shape === "arrow",
+    whitened: lines && vector.mark?.shape !== "comet",
     combined: lines && (view.geometry?.slice ?? view.geometry?.plane ?? null) !== null,
     ground: showsGround(view),
     tint: view.ground?.tint !== false,

@@ -6,6 +6,7 @@ import { colorScale } from "../view/color_scale";
 import { unitText } from "../view/legend_entries";
 import { keyAccess, type PanelKit } from "./panel_kit";
 import { addTrace } from "./panel_trace";
+import { addMark } from "./panel_mark";
 
 export interface FlowSwitch {
   flowing(): boolean;
@@ -160,7 +161,7 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
 function addShape(parent: GUI, kit: PanelKit, per: string): GUI {
   const folder = parent.addFolder("Line shape");
   addWidth(folder, kit);
-  kit.number(folder, "head whitening", keyAccess("/vector/headDesaturation"));
+  addMark(folder, kit);
   kit.number(folder, "brightness by speed", keyAccess("/vector/magnitudeIntensity"));
   addMagnitudes(folder, kit, per);
   kit.choice(folder, "direction", keyAccess("/vector/space"), {

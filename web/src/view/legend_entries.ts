@@ -130,6 +130,16 @@ function riseEntry(entry: LegendEntry, name: string, weight: number): LegendEntr
   };
 }
 
+// Which end of a line is its head.
+function endAhead(vector: NonNullable<View["vector"]>): string {
+  const mark = vector.mark ?? {};
+  if (mark.shape === "comet") return "bright end ahead";
+  if (mark.shape === "taper") return "pointed end ahead";
+  if (mark.shape === "arrow") return "";
+  if ((vector.headDesaturation ?? 0) > 0) return "white end ahead";
+  return (mark.tailDarkening ?? 0) > 0 ? "bright end ahead" : "";
+}
+
 function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const vector = view.vector;
   if (!vector?.field) return null;
@@ -140,7 +150,7 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const units = unitText(field?.units);
   const top = vector.magnitudeRange?.[1];
   const longest = top === undefined ? "" : `longest line ${formatNumber(top)} ${units}`.trim();
-  const heads = (vector.headDesaturation ?? 0) > 0 ? "white end ahead" : "";
+  const heads = endAhead(vector);
   const entry: LegendEntry = {
     kind: "lines",
     title: name,
