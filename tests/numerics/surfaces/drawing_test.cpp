@@ -70,7 +70,7 @@ Shown ball(double radius, double opacity, Color color) {
   return shown;
 }
 
-std::vector<double> truth_of(const Scene& scene) {
+std::vector<double> reference_values(const Scene& scene) {
   ThreadPool pool(2);
   auto picture = engine::reference::render(scene, pool, CancelToken(), {});
   if (!picture) throw std::runtime_error(picture.error().message);
@@ -78,7 +78,7 @@ std::vector<double> truth_of(const Scene& scene) {
 }
 
 std::vector<double> picture_of(Scene scene, Method method) {
-  if (method == Method::reference) return truth_of(scene);
+  if (method == Method::reference) return reference_values(scene);
   scene.method = method;
   const engine::Image image = render(scene).image;
   return {image.rgba.begin(), image.rgba.end()};
@@ -157,7 +157,7 @@ TEST(Surfaces, HalfATransparentMediumLiesBehindASurfaceInItsMiddle) {
   scene.lattice = even_lattice({24, 24, 16}, {0.2, 0.2, 0.1});
   scene.scalars.push_back(medium(uniform(scene.lattice, 1.2F), blue));
   const std::size_t middle = 4 * (6 * size + 6);
-  const double through = std::sqrt(1 - truth_of(scene)[middle + 3]);
+  const double through = std::sqrt(1 - reference_values(scene)[middle + 3]);
   ASSERT_LT(through, 0.5);
   scene.surfaces = {square(0, opacity, green)};
   constexpr std::array tolerance{1e-8, 2e-3, 6e-2};
@@ -311,7 +311,7 @@ TEST(Surfaces, SlabsAndKernelsStayAsCloseToTheReferenceAsWithoutThem) {
   std::array<double, 2> before{};
   std::array<double, 2> after{};
   const auto measure = [&](std::array<double, 2>& to) {
-    const std::vector<double> truth = truth_of(scene);
+    const std::vector<double> truth = reference_values(scene);
     to = {rms(picture_of(scene, Method::slab), truth),
           rms(picture_of(scene, Method::kernel), truth)};
   };
