@@ -10,7 +10,7 @@ const shapes = {
 };
 
 export function addMark(folder: GUI, kit: PanelKit): void {
-  kit.choice(folder, "shape", keyAccess("/vector/mark/shape"), shapes);
+  kit.choice(folder, "mark of lines", keyAccess("/vector/mark/shape"), shapes);
   const head = { min: 1, max: 30, step: 0.5 };
   const width = kit.number(folder, "head width", keyAccess("/vector/mark/headWidth"), head);
   const length = kit.number(folder, "head length", keyAccess("/vector/mark/headLength"), head);
