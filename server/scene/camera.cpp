@@ -372,7 +372,7 @@ void complete_camera(protocol::View& view, const Lattice& lattice) {
   const OrbitFrame frame =
       orbit_frame(front_azimuth(lattice), front_elevation(lattice, view.image));
   if (!camera.eye && !camera.target) {
-    const auto [framing, target] = place_box(lattice, frame, view, 1, true);
+    const auto [framing, target] = place_box(lattice, frame, view, 1, lattice.inner_radius == 0);
     camera.target = from_glm(target);
     camera.eye = from_glm(target - frame.forward * framing.distance);
     if (!camera.height) camera.height = std::max(framing.height, 1e-6);

@@ -145,6 +145,7 @@ TEST_F(AnnotatedPicture, AnOpaqueSurfaceHidesTheEdgesBehindIt) {
   const auto shows = [&](bool surface) {
     view.ground.show = surface ? protocol::GroundShow::on : protocol::GroundShow::off;
     view.ground.surface_color = "#000000";
+    view.ground.tint = view.ground.coastlines = false;
     const auto picture = test::decoded_png(produce(Format::png).bytes);
     return std::count_if(picture.rgb.begin(), picture.rgb.end(),
                          [](std::uint8_t code) { return code > 60; });
