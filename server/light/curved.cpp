@@ -271,7 +271,8 @@ SampleFactors curved_sunlight(const Lattice& lattice, const std::vector<float>& 
   pool->run(blocks, [&](std::size_t number, unsigned) {
     const std::size_t end = std::min(out.size(), (number + 1) * block);
     for (std::size_t n = number * block; n < end; ++n) {
-      out[n] = static_cast<std::uint16_t>(interpolated(grid, at_points, cells.place(n)) + 0.5);
+      out[n] =
+          static_cast<std::uint16_t>(std::lround(interpolated(grid, at_points, cells.place(n))));
     }
   });
   return out;

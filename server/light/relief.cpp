@@ -121,7 +121,8 @@ scene::SampleFactors relief(const scene::Lattice& lattice, const scene::ScalarLa
     Index at{0, static_cast<int>(row % ny), static_cast<int>(row / ny)};
     for (std::size_t i = 0; i < nx; ++i) {
       at[0] = static_cast<int>(i);
-      out[nx * row + i] = static_cast<std::uint16_t>(scene::full_factor * slopes.factor(at) + 0.5);
+      out[nx * row + i] =
+          static_cast<std::uint16_t>(std::lround(scene::full_factor * slopes.factor(at)));
     }
   });
   return out;

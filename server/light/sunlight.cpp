@@ -247,7 +247,7 @@ class Band {
       const float second = far[p] + along * (far[p + 1] - far[p]);
       const float factor = first + beside * (second - first);
       out[i * steps_.u] = static_cast<std::uint16_t>(
-          static_cast<float>(scene::full_factor) * std::clamp(factor, 0.0F, 1.0F) + 0.5F);
+          std::lround(static_cast<float>(scene::full_factor) * std::clamp(factor, 0.0F, 1.0F)));
     }
   }
 

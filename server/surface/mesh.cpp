@@ -229,7 +229,8 @@ class Filler {
       for (int t = 0; t < found.triangles; ++t) {
         auto& to = mesh_.triangles[triangle++];
         for (std::size_t n = 0; n < 3; ++n) {
-          const int edge = found.edges.at(static_cast<std::size_t>(t)).at(n);
+          const int edge =
+              static_cast<unsigned char>(found.edges.at(static_cast<std::size_t>(t)).at(n));
           const int corner = cell_edge(edge)[0];
           const std::size_t at = layers_.at((corner & 1) != 0 ? right : i, j + (corner >> 1 & 1));
           const auto axis = static_cast<std::size_t>(edge / 4);

@@ -88,7 +88,8 @@ void paint_body(const Camera& camera, const Body& body, const BodyPixels& pixels
   const terrain::View view = view_of(camera, body);
   const auto seen_at = [&](int l) {
     const double x = pixels.left + l % block_side + 0.5 - static_cast<double>(camera.half_width_px);
-    const double y = pixels.top + l / block_side + 0.5 - static_cast<double>(camera.half_height_px);
+    const int row = l / block_side;
+    const double y = pixels.top + row + 0.5 - static_cast<double>(camera.half_height_px);
     return body.paint->seen(view, x, y, pixels.depth[l], vector_of(pixels.normal[l]));
   };
   const auto put = [&](int l, const ground::Color& color) {
