@@ -68,7 +68,8 @@ test("dragging a point up increases opacity, down decreases it", () =>
     assert.ok(raised[1] > 3 && raised[1] < 6 && Math.abs(raised[0] - 0.12) < 0.02, `${raised}`);
     const opaque = await pixels(page);
     assert.ok(opaque.mean > before.mean * 1.03, `${before.mean} -> ${opaque.mean}`);
-    assert.match(await page.locator(".legend-medium .legend-note").textContent(), /^curve: opacity/);
+    const note = await page.locator(".legend-medium .legend-note").textContent();
+    assert.match(note, /^curve: opacity/);
     await dragPoint(page, 1, 0, 200);
     await dragPoint(page, 2, 0, 70);
     const thin = await pixels(page);
