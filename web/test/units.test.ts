@@ -90,7 +90,7 @@ test("colours by height are set in coordinates of the vertical axis", () => {
   assert.equal(colorScale(pressure, colored({ by: "direction" })).units, "°");
 });
 
-test("an extinction is told by what it does in a hundredth of the box", () => {
+test("an extinction is given as the opacity of 1 % of the box", () => {
   assert.equal(opacityText(0), "0 % opaque in 1 % of the box");
   assert.equal(opacityText(50), "63.2 % opaque in 1 % of the box");
   assert.equal(opacityText(500), "99.9 % opaque in 1 % of the box");

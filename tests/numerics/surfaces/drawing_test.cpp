@@ -188,6 +188,19 @@ Scene line_scene(double z, int size) {
   return scene;
 }
 
+// Blocks of pixels at the edge hold both surfaces, some of their pixels only the opaque one.
+TEST(Surfaces, AnOpaqueOneHidesLinesAlsoAtTheEdgesOfAnother) {
+  Scene scene = line_scene(-0.3, 40);
+  scene.surfaces = {square(0, 1, green), square(0.3, 0.5, green, 0.33)};
+  for (const Method method : drawing_methods) {
+    Scene without = scene;
+    without.vector.reset();
+    const std::vector<double> rgba = picture_of(scene, method);
+    const std::vector<double> expected = picture_of(without, method);
+    for (std::size_t n = 0; n < rgba.size(); ++n) EXPECT_NEAR(rgba[n], expected[n], 1e-6) << n;
+  }
+}
+
 TEST(Surfaces, LinesAreSeenBeforeASurfaceAndThroughIt) {
   constexpr int size = 40;
   constexpr std::size_t middle = 4 * (20 * size + 20);

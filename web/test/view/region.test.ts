@@ -53,7 +53,7 @@ test("bearings are those of meridians, the equator and a triangle of right angle
   assert.equal(initialBearing([3, 4], [3, 4]), null);
 });
 
-test("the way between positions is told in kilometres, or in the unit of the axes", () => {
+test("distances are in kilometres, or in the unit of the axes", () => {
   const geographic = { x: "degrees_east", y: "degrees_north", z: "hPa" };
   const dataset = described("storm");
   assert.equal(
