@@ -96,6 +96,17 @@ TEST(NetcdfFields, WindsByStandardNameWhateverTheirNames) {
             (Expected{{"wind", {"ua", "va", "wa"}}}));
 }
 
+TEST(NetcdfFields, AVelocityOfAirOrWaterKeepsItsWord) {
+  FileVariable u = variable("urot", "centimeter/s");
+  FileVariable v = variable("vrot", "centimeter/s");
+  u.long_name = "Zonal Velocity";
+  v.long_name = "Meridional Velocity";
+  EXPECT_EQ(vectors({u, v}, AxisKind::cartesian), (Expected{{"velocity", {"urot", "vrot"}}}));
+  EXPECT_EQ(vectors({u, v}, AxisKind::pressure), (Expected{{"wind", {"urot", "vrot"}}}));
+  u.long_name = "zonal wind velocity";
+  EXPECT_EQ(vectors({u, v}, AxisKind::cartesian), (Expected{{"wind", {"urot", "vrot"}}}));
+}
+
 TEST(NetcdfFields, Currents) {
   EXPECT_EQ(vectors({variable("a", "m s-1", "eastward_sea_water_velocity"),
                      variable("b", "m s-1", "northward_sea_water_velocity"),
