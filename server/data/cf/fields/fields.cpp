@@ -113,6 +113,18 @@ class FieldNames {
   std::unordered_map<std::string, std::size_t> numbers_;  // those tried, by name
 };
 
+// The name of a flow by the long name of its first component, in lower case, and what is left of
+// the component's name. A "zonal velocity" may be of air or of water: unless the levels are
+// pressures, the vector takes the word of the file.
+std::string flow_name(const std::string& long_name, const std::string& rest, AxisKind vertical) {
+  if (vertical == AxisKind::depth || rest == "o" || contains(long_name, "current") ||
+      contains(long_name, "sea water")) {
+    return "current";
+  }
+  const bool of_either = contains(long_name, "velocity") && !contains(long_name, "wind");
+  return of_either && vertical != AxisKind::pressure ? "velocity" : "wind";
+}
+
 class FieldFinder {
  public:
   FieldFinder(const FileContents& contents, const std::vector<int>& variables, AxisKind vertical,
@@ -340,21 +352,9 @@ class FieldFinder {
     }
     const int z = vertical_partner(v, y, rest);
     const std::string shown = is_velocity(variable(v).units)
-                                  ? flow_name(lower(variable(v).long_name), rest)
+                                  ? flow_name(lower(variable(v).long_name), rest, vertical_)
                                   : "uv" + rest;
     add_vector(shown, z >= 0 ? std::vector<int>{v, y, z} : std::vector<int>{v, y});
-  }
-
-  // The name of a flow by the long name of its first component, in lower case. A "zonal velocity"
-  // may be of air or of water: unless the levels are pressures, the vector takes the word of the
-  // file.
-  [[nodiscard]] std::string flow_name(const std::string& long_name, const std::string& rest) const {
-    if (vertical_ == AxisKind::depth || rest == "o" || contains(long_name, "current") ||
-        contains(long_name, "sea water")) {
-      return "current";
-    }
-    const bool of_either = contains(long_name, "velocity") && !contains(long_name, "wind");
-    return of_either && vertical_ != AxisKind::pressure ? "velocity" : "wind";
   }
 
   // w... with the same rest, otherwise a common name of vertical velocity. second: the other
