@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/annotate/labels.hpp"
 #include "server/base/check.hpp"
 
 namespace windsplat::annotate {
@@ -78,7 +79,7 @@ std::optional<AxisMap> axis_map(const Subject& subject, std::size_t axis) {
     const data::Columns& columns = *placed.grid.columns;
     return map_of_columns(lattice, axis == 0 ? columns.longitude : columns.latitude, axis);
   }
-  const data::Axis& own = placed.grid.axes.at(axis);
+  const data::Axis own = drawn_axis(subject, axis);
   const bool positive = std::all_of(own.coordinates.begin(), own.coordinates.end(),
                                     [](double value) { return value > 0; });
   using protocol::VerticalPlacement;
@@ -94,6 +95,15 @@ data::Axis drawn_axis(const Subject& subject, std::size_t axis) {
   if (is_map_of_columns(subject, axis)) {
     own.kind = axis == 0 ? data::AxisKind::longitude : data::AxisKind::latitude;
     own.units = axis == 0 ? "degrees_east" : "degrees_north";
+  }
+  // Coordinates of a map projection: metres have too many digits.
+  constexpr double far = 1e5;
+  constexpr double kilometre = 1000;
+  const bool in_metres = unit_text(own.units) == "m" && own.kind == data::AxisKind::cartesian;
+  const auto is_far = [](double value) { return std::abs(value) >= far; };
+  if (in_metres && std::any_of(own.coordinates.begin(), own.coordinates.end(), is_far)) {
+    own.units = "km";
+    for (double& value : own.coordinates) value /= kilometre;
   }
   return own;
 }

@@ -34,7 +34,7 @@ class AxisMap {
 std::optional<AxisMap> axis_map(const Subject& subject, std::size_t axis);
 
 // The axis as drawn: longitudes and latitudes where a map places columns by them, a height field
-// as the vertical one.
+// as the vertical one, kilometres for metres that reach 100 km.
 data::Axis drawn_axis(const Subject& subject, std::size_t axis);
 
 }  // namespace windsplat::annotate

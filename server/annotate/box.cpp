@@ -54,6 +54,26 @@ class Box {
     }
     return count;
   }
+  // The lines at a position along an axis on the sides behind the data, two for each.
+  [[nodiscard]] std::vector<std::array<Point, 2>> lines_at(std::size_t axis, double along) const {
+    std::vector<std::array<Point, 2>> out;
+    for (std::size_t n = 0; n < 2; ++n) {
+      const int across = static_cast<int>((axis + 1 + n) % 3);
+      const int normal_axis = static_cast<int>((axis + 2 - n) % 3);
+      for (const bool high : {false, true}) {
+        glm::dvec3 from = low_;
+        from[static_cast<int>(axis)] = along;
+        from[normal_axis] = high ? high_[normal_axis] : low_[normal_axis];
+        glm::dvec3 normal(0);
+        normal[normal_axis] = high ? 1 : -1;
+        if (projector_.faces(from, normal)) continue;
+        glm::dvec3 to = from;
+        to[across] = high_[across];
+        if (const auto ends = projector_.edge(from, to)) out.push_back(*ends);
+      }
+    }
+    return out;
+  }
   [[nodiscard]] std::optional<std::array<Point, 2>> pixels(const Edge& edge) const {
     const auto [from, to] = range(edge.axis);
     return projector_.edge(on(edge, from), on(edge, to));
@@ -89,8 +109,11 @@ double room_of_tick(const std::array<Point, 2>& ends, double em) {
   return em * (width * across + height * down) / length_of(ends);
 }
 
-// The edge of the outline on which an axis is labelled: one with room for two ticks in the picture.
+// The edge of the outline on which an axis is labelled: one with room for two ticks in the picture,
+// a vertical one for those of its ends.
 std::optional<Edge> labelled(const Box& box, std::size_t axis, double em, const Figure& figure) {
+  constexpr double room_of_ends = 0.7;  // of a tick
+  const double least = axis == 2 ? room_of_ends : 2;
   std::optional<Edge> chosen;
   double best = 0;
   for (const Edge& edge : edges_along(axis)) {
@@ -98,7 +121,7 @@ std::optional<Edge> labelled(const Box& box, std::size_t axis, double em, const 
     const auto whole = box.pixels(edge);
     const auto ends = whole ? visible_part(figure, *whole, 0) : std::nullopt;
     if (!ends || !(length_of(*ends) > 0)) continue;
-    if (length_of(*ends) < 2 * room_of_tick(*ends, em)) continue;
+    if (length_of(*ends) < least * room_of_tick(*ends, em)) continue;
     const double score = axis == 2 ? -((*ends)[0].x + (*ends)[1].x) : (*ends)[0].y + (*ends)[1].y;
     if (!chosen || score > best) {
       chosen = edge;
@@ -147,8 +170,30 @@ std::vector<Tick> ticks_of(const data::Axis& axis, const AxisMap& map,
     const double gap = (range[1] - range[0]) / (most + 1);
     ticks = uneven_ticks(first, last, gap, [&map](double value) { return map.position(value); });
   }
+  if (ticks.size() < 2 &&
+      !map.single()) {  // too short for round ones: those of the outermost samples
+    const auto [least, greatest] =
+        std::minmax_element(axis.coordinates.begin(), axis.coordinates.end());
+    constexpr int digits = 3;
+    ticks.clear();
+    for (const double end : {first, last}) {
+      const double value = std::clamp(end, *least, *greatest);
+      ticks.push_back({value, 0, number_text_of(value, digits)});
+    }
+  }
   for (Tick& tick : ticks) tick.at = map.position(tick.value);
   return ticks;
+}
+
+// Lines behind the data that continue a tick: they lead from the outline to where the data are.
+void add_lines(const std::vector<std::array<Point, 2>>& lines, const Style& style, Figure& figure) {
+  Color color = style.quiet;
+  constexpr double share = 0.25;  // fainter than the box
+  color.alpha *= share;
+  for (const auto& whole : lines) {
+    const auto ends = visible_part(figure, whole, 4 * style.line);
+    if (ends) figure.below.emplace_back(Line{{(*ends)[0], (*ends)[1]}, style.line, color});
+  }
 }
 
 void add_axis(const Subject& subject, std::size_t axis, const Box& box, const Style& style,
@@ -161,6 +206,7 @@ void add_axis(const Subject& subject, std::size_t axis, const Box& box, const St
   const auto ends = *visible_part(figure, whole, 0);
   const Point out = outward(whole, *centre);
   const data::Axis drawn = drawn_axis(subject, axis);
+  const bool with_lines = subject.completed.view().annotations.box;
   // As many in the picture as have room there, up to 10.
   constexpr double ticks_most = 90;
   const double shown = std::clamp(length_of(ends) / room_of_tick(ends, style.text), 1.0, 10.0);
@@ -174,6 +220,7 @@ void add_axis(const Subject& subject, std::size_t axis, const Box& box, const St
     if (!at) continue;
     const Point end{at->x + mark * out.x, at->y + mark * out.y};
     if (!visible_part(figure, {*at, end}, 0)) continue;
+    if (with_lines) add_lines(box.lines_at(axis, tick.at), style, figure);
     if (is_taken(figure, *at) || is_taken(figure, end)) continue;
     figure.above.emplace_back(Line{{*at, end}, style.line, style.color});
     const Text text = beside(tick.text, {end.x + gap * out.x, end.y + gap * out.y}, out, style.text,

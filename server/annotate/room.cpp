@@ -66,9 +66,10 @@ bool move_inside(const Figure& figure, Text& text) {
   const Rectangle box = bounds_of(text);
   const double width = box.high.x - box.low.x;
   const double height = box.high.y - box.low.y;
-  if (width > figure.width || height > figure.height) return false;
-  text.at.x += std::clamp(box.low.x, 0.0, figure.width - width) - box.low.x;
-  text.at.y += std::clamp(box.low.y, 0.0, figure.height - height) - box.low.y;
+  const double margin = 0.5 * text.size;
+  if (width + 2 * margin > figure.width || height + 2 * margin > figure.height) return false;
+  text.at.x += std::clamp(box.low.x, margin, figure.width - margin - width) - box.low.x;
+  text.at.y += std::clamp(box.low.y, margin, figure.height - margin - height) - box.low.y;
   return true;
 }
 

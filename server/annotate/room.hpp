@@ -21,7 +21,7 @@ std::string fitted(std::string text, double size, double room);
 // The rectangle of a text, from its ascent to its descent.
 Rectangle bounds_of(const Text& text);
 
-// Moves a text so that it lies within the picture. False: it is larger than the picture.
+// Moves a text so that it lies within the picture, half an em from its edges. False: no room.
 bool move_inside(const Figure& figure, Text& text);
 
 // Whether something else is written at a point.

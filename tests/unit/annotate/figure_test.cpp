@@ -189,6 +189,67 @@ TEST(Axes, HaveNoTicksWhereSomethingElseIsWritten) {
   EXPECT_THAT(figure.above, IsEmpty());
 }
 
+// Seen from the south and above, latitudes are labelled at the top of the box; a line on the side
+// behind the data leads from each label to the bottom, where the ground is.
+TEST(Axes, LinesLeadFromTheirTicksToTheGround) {
+  const auto from_south = [](bool box) {
+    return [box](protocol::View& view) {
+      view.annotations.axes = true;
+      view.annotations.box = box;
+      view.camera.eye = protocol::Vec3{0, -3, 2};
+    };
+  };
+  const Shown shown(scene::atmosphere_grid(), one_scalar(), from_south(true));
+  const scene::Lattice& lattice = shown.scene().lattice;
+  const double equator = lattice.positions[1][1];  // of the latitudes -10, 0, 10
+  for (const double side : {lattice.box_min.x, lattice.box_max.x}) {
+    const auto top = shown.projector().pixel({side, equator, lattice.box_max.z});
+    const auto bottom = shown.projector().pixel({side, equator, lattice.box_min.z});
+    ASSERT_TRUE(top && bottom);
+    const auto leads = [&](const Line& line) {
+      const auto near = [](const Point& a, const Point& b) {
+        return std::hypot(a.x - b.x, a.y - b.y) < 1e-6;
+      };
+      return line.points.size() == 2 && near(line.points[0], *bottom) && near(line.points[1], *top);
+    };
+    EXPECT_THAT(lines(figure_of(shown.subject()).below), Contains(testing::Truly(leads)));
+  }
+  const Shown bare(scene::atmosphere_grid(), one_scalar(), from_south(false));
+  EXPECT_THAT(figure_of(bare.subject()).below, IsEmpty()) << "without a box";
+}
+
+// An edge of 30 pixels has no room for round values: it has those of its outermost samples.
+TEST(Axes, AShortVerticalOneHasItsEnds) {
+  data::Grid grid = scene::atmosphere_grid();
+  grid.axes[2] = scene::axis(data::AxisKind::height, "m", {120, 340, 870});
+  const Shown shown(grid, one_scalar(), [](protocol::View& view) {
+    view.annotations.axes = true;
+    view.camera.eye = protocol::Vec3{-1, -5, 1};
+    view.geometry.scale = {1, 1, 0.5};
+  });
+  const auto written = texts(figure_of(shown.subject()).above);
+  EXPECT_THAT(written, Contains("120"));
+  EXPECT_THAT(written, Contains("870"));
+  EXPECT_THAT(written, Contains("height (m)"));
+}
+
+TEST(Axes, OfMapProjectionsAreInKilometres) {
+  data::Grid grid = scene::atmosphere_grid();
+  grid.axes[0] = scene::axis(data::AxisKind::cartesian, "m", {-4e6, -2e6, 0, 2e6});
+  grid.axes[1] = scene::axis(data::AxisKind::cartesian, "m", {0, 40e3, 80e3});
+  const Shown shown(grid, one_scalar(), [](protocol::View& view) {
+    view.annotations.axes = true;
+    view.camera.eye = protocol::Vec3{-2, -5, 2};
+    view.geometry.scale = {1, 40, 1};
+  });
+  const auto written = texts(figure_of(shown.subject()).above);
+  EXPECT_THAT(written, Contains("\u22122000"));
+  EXPECT_THAT(written, Contains(HasSubstr("(km)")));
+  EXPECT_THAT(written, Contains(HasSubstr("(m)"))) << "samples within 100 km";
+  const auto map = axis_map(shown.subject(), 0);
+  EXPECT_NEAR(map->position(-2000), shown.scene().lattice.positions[0][1], 1e-12);
+}
+
 bool overlap(const Rectangle& a, const Rectangle& b) {
   return a.low.x < b.high.x && b.low.x < a.high.x && a.low.y < b.high.y && b.low.y < a.high.y;
 }
