@@ -87,6 +87,7 @@ VectorColorView read_vector_color(const Json& json, const std::string& pointer, 
   reader.numbers("range", color.range, field_value);
   reader.number("riseWeight", color.rise_weight, fraction);
   reader.color("constant", color.constant);
+  reader.boolean("trueColors", color.true_colors);
   reader.finish();
   check_color_range(color.range, reader);
   return color;
@@ -309,7 +310,8 @@ Json vector_to_json(const VectorView& vector) {
              {"field", text_or_null(vector.color.field)},
              {"range", numbers_or_null(vector.color.range)},
              {"riseWeight", canonical_number(vector.color.rise_weight)},
-             {"constant", vector.color.constant}};
+             {"constant", vector.color.constant},
+             {"trueColors", vector.color.true_colors}};
   if (vector.color.by) color["by"] = name_of(*vector.color.by, color_by_names);
   Json out{{"space", name_of(vector.space, space_names)},
            {"scale", numbers_to_json(vector.scale)},

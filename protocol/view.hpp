@@ -85,6 +85,8 @@ struct VectorColorView {
   std::optional<Range> range;        // values of the quantity `by` at the ends of the map
   double rise_weight = 0.5;          // 0..1, `rise` only: 0 height only, 1 rise only
   std::string constant = "#ffffff";  // sRGB, `constant` only
+  // Lines have the hues of the map: no whitening of heads, dimming by magnitude or depth cue.
+  bool true_colors = false;
   bool operator==(const VectorColorView&) const = default;
 };
 
@@ -110,7 +112,7 @@ struct MarkView {
   MarkShape shape = MarkShape::line;
   double head_width = 7;                 // arrow: across its base
   double head_length = 10;               // arrow
-  std::optional<double> tail_darkening;  // 0..1; default: 0.85 of a comet, otherwise 0
+  std::optional<double> tail_darkening;  // 0..1; its default follows shape and colours
   double halo = 0;                       // width of the dark rim; 0: none
   bool operator==(const MarkView&) const = default;
 };

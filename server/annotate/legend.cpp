@@ -134,6 +134,15 @@ void set_heights(const Subject& subject, const Range& range, Entry& entry) {
   entry.units = unit_text(axis.units);
 }
 
+// How lines differ from the colours of the strip besides their heads; empty: they do not.
+std::string fading_text(const scene::Scene& scene) {
+  std::vector<std::string> by;
+  if (scene.vector->magnitude_intensity > 0) by.emplace_back("weaker");
+  if (scene.depth_cue.strength > 0) by.emplace_back("farther");
+  if (by.empty()) return {};
+  return (by.size() == 1 ? by[0] : by[0] + " and " + by[1]) + " lines are darker";
+}
+
 // Of the lines that are drawn.
 std::array<float, 2> drawn_magnitudes(const scene::VectorLayer& layer) {
   const auto [least, most] = layer.field->range;
@@ -202,6 +211,10 @@ Entry lines_entry(const Subject& subject) {
   std::string note = "longest line " + with_units(layer.magnitude_range[1]);
   note += end_ahead(layer);
   entry.notes.push_back(note);
+  if (!vector.color.true_colors && layer.color_by != LineColor::constant) {
+    const std::string why = fading_text(subject.scene);
+    if (!why.empty()) entry.notes.push_back(why);
+  }
   if (layer.min_magnitude > 0) {
     entry.notes.push_back("below " + with_units(layer.min_magnitude) + " not drawn");
   }

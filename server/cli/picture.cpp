@@ -19,7 +19,8 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
       ->type_name("F");
   command.add_option("--size", arguments.size, "Pixels, for example 1280x720")->type_name("WxH");
   command.add_flag("--figure", arguments.figure,
-                   "Draw box, axes, north arrow, scale bar, legend, title and time");
+                   "Draw box, axes, north arrow, scale bar, legend, title and time, and lines in "
+                   "the colours of the legend");
   command.add_option("--set", arguments.settings, "Change one key of the view; may be repeated")
       ->allow_extra_args(false)
       ->type_name("/json/pointer=value");
@@ -60,6 +61,7 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
     for (const char* shown : {"box", "axes", "north", "scaleBar", "legend", "title", "stepTime"}) {
       changes.emplace_back(std::string("/annotations/") + shown, "true");
     }
+    changes.emplace_back("/vector/color/trueColors", "true");
   }
   for (const std::string& setting : arguments.settings) {
     const std::size_t equals = setting.find('=');

@@ -97,11 +97,12 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
     layer.color.entries.assign(table_entries, parse_color(from.color.constant).value());
   }
   layer.rise_weight = from.color.rise_weight;
-  const bool comet = from.mark.shape == protocol::MarkShape::comet;  // keeps the hue of the map
-  layer.head_desaturation = comet ? 0 : from.head_desaturation;
+  // A comet keeps the hue of the map.
+  const bool hued = from.color.true_colors || from.mark.shape == protocol::MarkShape::comet;
+  layer.head_desaturation = hued ? 0 : from.head_desaturation;
   layer.magnitude_range = from.magnitude_range.value();
   layer.min_magnitude = from.min_magnitude.value();
-  layer.magnitude_intensity = from.magnitude_intensity;
+  layer.magnitude_intensity = from.color.true_colors ? 0 : from.magnitude_intensity;
 }
 
 data::Coarsening drawn(data::Coarsening how) {
@@ -430,7 +431,9 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   scene.camera = completed.camera();
   const auto depths = view_depths(scene.camera, lattice);
   const double depth = depths[1] - depths[0];
-  scene.depth_cue = {view.depth_cue.strength, depths[0] + view.depth_cue.near * depth,
+  // It applies to lines only.
+  const double cue = view.vector.color.true_colors ? 0 : view.depth_cue.strength;
+  scene.depth_cue = {cue, depths[0] + view.depth_cue.near * depth,
                      depths[0] + view.depth_cue.far * depth};
   scene.method = engine_method(view.method.name);
   scene.compositing = engine_compositing(view.method.compositing);

@@ -29,8 +29,6 @@ namespace windsplat::scene {
 
 namespace {
 
-constexpr double comet_darkening = 0.85;
-
 using protocol::ColorBy;
 using protocol::FieldChoice;
 using protocol::Range;
@@ -321,8 +319,7 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
                       "streamlets leave a slice or plane: set it to null, or vector.trace");
   }
   if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry, lattice));
-  const bool comet = vector.mark.shape == protocol::MarkShape::comet;
-  if (!vector.mark.tail_darkening) vector.mark.tail_darkening = comet ? comet_darkening : 0.0;
+  if (!vector.mark.tail_darkening) vector.mark.tail_darkening = default_darkening(vector);
   if (vector.trace && is_marked(vector.mark)) {
     return invalid_at("/vector/mark",
                       "streamlets have no marks: use the shape \"line\" without tailDarkening and "

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "server/scene/camera.hpp"
+#include "server/scene/lines/mark.hpp"
 
 namespace windsplat::scene {
 
@@ -33,6 +34,7 @@ Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
     protocol::AnnotationsView& shown = completed.annotations;
     shown.box = shown.axes = shown.north = shown.scale_bar = true;
     shown.legend = shown.title = shown.step_time = true;
+    draw_true_colors(completed.vector);
     look_by_default(completed, lattice);  // with room for texts
   } else if (preset == "winds") {
     completed.scalars.emplace();

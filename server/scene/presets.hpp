@@ -11,11 +11,11 @@
 namespace windsplat::scene {
 
 // "default", "winds" (no medium), "clouds" (no lines), "top", "south", "figure" (the
-// default camera and every annotation).
+// default camera, every annotation, and lines in the colours of the legend).
 std::vector<std::string> preset_names();
 
-// Changes a completed view's camera or annotations, or removes a kind of layer. Errors: invalid at
-// /preset.
+// Changes a completed view's camera, annotations or colours of lines, or removes a kind of layer.
+// Errors: invalid at /preset.
 Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
                           const std::string& preset);
 

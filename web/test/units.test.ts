@@ -132,3 +132,17 @@ test("east, north and up are named where they are known", () => {
   assert.ok(isGeographic(axes("cartesian", "west_east", "south_north")));
   assert.ok(!isGeographic(axes("cartesian", "x", "y")));
 });
+
+test("the legend tells how lines differ from its colours, unless they are true", () => {
+  const faded = (trueColors: boolean) => {
+    const view = colored({ by: "magnitude", range: [0, 30], trueColors });
+    const vector = { ...view.vector, headDesaturation: 0.7, magnitudeIntensity: 0.6 };
+    return legendEntries(pressure, { ...view, vector, depthCue: { strength: 0.3 } } as View)[0]!
+      .note;
+  };
+  assert.equal(
+    faded(false),
+    "longest line 30 m s⁻¹, white end ahead, weaker and farther lines are darker",
+  );
+  assert.equal(faded(true), "longest line 30 m s⁻¹");
+});

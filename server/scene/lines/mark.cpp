@@ -29,6 +29,21 @@ bool is_marked(const protocol::MarkView& mark) {
          mark.halo > 0;
 }
 
+double default_darkening(const protocol::VectorView& vector) {
+  constexpr double darkening = 0.85;
+  const bool plain = vector.mark.shape == protocol::MarkShape::line && !vector.trace;
+  const bool comet = vector.mark.shape == protocol::MarkShape::comet;
+  return comet || (plain && vector.color.true_colors) ? darkening : 0.0;
+}
+
+void draw_true_colors(protocol::VectorView& completed) {
+  if (completed.color.true_colors) return;
+  completed.color.true_colors = true;
+  if (completed.mark.tail_darkening == 0.0) {
+    completed.mark.tail_darkening = default_darkening(completed);
+  }
+}
+
 void set_radii(const protocol::VectorView& from, int height, VectorLayer& layer) {
   const double scale = height / reference_height;
   layer.r1 = from.r1 * scale;

@@ -339,6 +339,24 @@ TEST(Legend, NeverTellsWorldUnits) {
   }
 }
 
+// Lines that are dimmed or whitened do not have the colours of the strip.
+TEST(Legend, TellsHowLinesDifferFromTheirColors) {
+  const auto written = [](bool true_colors) {
+    std::vector<data::FieldInfo> fields{scene::wind_info()};
+    const Shown shown(scene::atmosphere_grid(), fields, [&](protocol::View& view) {
+      view.vector.color.by = protocol::ColorBy::magnitude;
+      view.vector.color.true_colors = true_colors;
+    });
+    Figure figure = empty_figure(shown);
+    add_legend(shown.subject(), style_of(shown.subject()), figure);
+    return texts(figure.above);
+  };
+  EXPECT_THAT(written(false), Contains("weaker and farther lines are darker"));
+  EXPECT_THAT(written(false), Contains(HasSubstr("white end ahead")));
+  EXPECT_THAT(written(true), Not(Contains(HasSubstr("darker"))));
+  EXPECT_THAT(written(true), Not(Contains(HasSubstr("white end ahead"))));
+}
+
 // Triangles at the ends of a strip, left and right, beyond which values lie.
 std::array<int, 2> arrows(const Figure& figure) {
   std::array<int, 2> out{};

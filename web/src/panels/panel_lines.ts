@@ -151,6 +151,11 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
     choose: (range) => host.change({ vector: { color: { range } } }),
   });
   kit.showWhen((states) => states.counted, histogram);
+  kit.toggle(folder, "true colours", {
+    pointer: "/vector/color/trueColors",
+    get: (view) => view.vector?.color?.trueColors === true,
+    set: (on) => ({ vector: { color: { trueColors: on ? true : null } } }),
+  });
   const weight = kit.number(folder, "share of rise", keyAccess("/vector/color/riseWeight"));
   kit.showWhen((states) => states.rise, weight);
   const constant = kit.color(folder, "colour", keyAccess("/vector/color/constant"));

@@ -140,6 +140,15 @@ function endAhead(vector: NonNullable<View["vector"]>): string {
   return (mark.tailDarkening ?? 0) > 0 ? "bright end ahead" : "";
 }
 
+// How lines differ from the colours of the strip besides their heads; empty: they do not.
+function fadingText({ vector, depthCue }: View): string {
+  const by = [
+    (vector?.magnitudeIntensity ?? 0) > 0 ? "weaker" : "",
+    (depthCue?.strength ?? 0) > 0 ? "farther" : "",
+  ].filter((word) => word !== "");
+  return by.length === 0 ? "" : `${by.join(" and ")} lines are darker`;
+}
+
 function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const vector = view.vector;
   if (!vector?.field) return null;
@@ -150,7 +159,9 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const units = unitText(field?.units);
   const top = vector.magnitudeRange?.[1];
   const longest = top === undefined ? "" : `longest line ${formatNumber(top)} ${units}`.trim();
+  const mapped = color.trueColors !== true;
   const heads = endAhead(vector);
+  const darker = mapped && color.by !== "constant" ? fadingText(view) : "";
   const entry: LegendEntry = {
     kind: "lines",
     title: name,
@@ -160,7 +171,7 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
     color: null,
     ticks: linearTicks(range),
     extinction: [],
-    note: joined(longest, heads),
+    note: joined(longest, heads, darker),
     beyond: [false, false],
     leftOut: leftOutText(vector.minMagnitude ?? 0, units),
   };
