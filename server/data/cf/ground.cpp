@@ -287,6 +287,9 @@ class GroundFinder {
       for (std::size_t n = 0; n < heights.size(); ++n) {
         if (mask[n] == (by_land ? 1.0F : 0.0F)) heights[n] = std::fmax(heights[n], 0.0F);
       }
+      for (LeftOut& left : info_.left_out) {
+        if (left.name == one.name) left.reason = "gives the land of the ground (geometry.body)";
+      }
       return;
     }
   }

@@ -163,9 +163,15 @@ TEST(GroundOfAFile, OfAnOceanIsBelowTheSeaAndItsLandIsNot) {
           if (with_mask) made.variable("mask_rho", NC_DOUBLE, {y, x}, {1, 1, 0, 0, 0, 1});
         },
         true);
-    const auto ground = opened(path)->info().grid.ground;
+    const auto source = opened(path);
+    const auto ground = source->info().grid.ground;
     ASSERT_TRUE(ground);
     EXPECT_EQ(ground->kind, GroundKind::sea_floor);
+    std::string reason;
+    for (const LeftOut& left : source->info().left_out) {
+      if (left.name == "mask_rho") reason = left.reason;
+    }
+    EXPECT_EQ(reason, with_mask ? "gives the land of the ground (geometry.body)" : "");
     if (with_mask) {
       expect_heights(*ground, {-4000, -30, 0, 2, 0, open});
     } else {
