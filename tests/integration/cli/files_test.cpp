@@ -267,6 +267,21 @@ TEST(CliFiles, OptionsOverrideTheViewFile) {
   EXPECT_NE(draw({"--set", "/image/background=#00ff00"}), draw({}));
 }
 
+TEST(CliFiles, FigureDrawsLinesInTheColorsOfTheLegendUnlessSetOtherwise) {
+  const Folder folder;
+  const std::string path = synth(folder, "tornado", "8x8x8");
+  const auto draw = [&](const Words& more) {
+    Words words{"render", path, "--size", "64x48", "-o", "-"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.out;
+  };
+  const std::string figure = draw({"--figure"});
+  EXPECT_EQ(figure, draw({"--figure", "--set", "/vector/color/trueColors=true"}));
+  EXPECT_NE(figure, draw({"--figure", "--set", "/vector/color/trueColors=false"}));
+}
+
 TEST(CliFiles, StepSelectsAnotherPicture) {
   const Folder folder;
   const std::string path = synth(folder, "climate", "32x16x6");

@@ -330,6 +330,8 @@ TEST(Presets, ChangeTheNamedProperties) {
   view = start;
   ASSERT_TRUE(apply_preset(view, lattice, "figure"));
   EXPECT_TRUE(view.annotations.legend && view.annotations.axes && view.annotations.step_time);
+  EXPECT_TRUE(view.vector.color.true_colors);
+  EXPECT_EQ(view.vector.mark.tail_darkening, 0.85);
   View with_texts;
   with_texts.annotations = view.annotations;
   EXPECT_EQ(view.camera, complete(with_texts, *dataset)->view().camera);

@@ -136,7 +136,8 @@ function endAhead(vector: NonNullable<View["vector"]>): string {
   if (mark.shape === "comet") return "bright end ahead";
   if (mark.shape === "taper") return "pointed end ahead";
   if (mark.shape === "arrow") return "";
-  if ((vector.headDesaturation ?? 0) > 0) return "white end ahead";
+  const whitened = (vector.headDesaturation ?? 0) > 0 && vector.color?.trueColors !== true;
+  if (whitened) return "white end ahead";
   return (mark.tailDarkening ?? 0) > 0 ? "bright end ahead" : "";
 }
 
