@@ -17,7 +17,7 @@ const labels = [
 
 test("each annotation changes the picture, and the server's legend replaces the page's", () =>
   withPage(async (page) => {
-    await unfold(page, "Annotations");
+    await unfold(page, "Axes and labels");
     await finalPicture(page);
     assert.equal(await page.locator(".legend-entry").first().isVisible(), true);
     const plain = (await pixels(page)).hash;

@@ -41,9 +41,9 @@ async function linkSays(page, ...pathAndValue) {
 
 // Number boxes and sliders: folder, label, value, pointer in the view.
 const numbers = [
-  ["Lines", "length", 0.08, "vector", "length"],
-  ["Lines", "opacity", 0.4, "vector", "opacity"],
-  ["Lines", "sampling stride", 2, "vector", "stride"],
+  ["Winds", "length", 0.08, "vector", "length"],
+  ["Winds", "opacity", 0.4, "vector", "opacity"],
+  ["Winds", "sampling stride", 2, "vector", "stride"],
   ["Line shape", "core radius r1", 0.9, "vector", "r1"],
   ["Line shape", "edge radius r2", 2.5, "vector", "r2"],
   ["Line shape", "head whitening", 0.1, "vector", "headDesaturation"],
@@ -54,9 +54,9 @@ const numbers = [
   ["Kernels and jitter", "jitter of centre", 0.9, "vector", "jitter", "center"],
   ["Kernels and jitter", "jitter of stride", 0.8, "vector", "jitter", "stride"],
   ["Kernels and jitter", "pattern", 17, "vector", "jitter", "seed"],
-  ["Camera and depth", "depth cue", 0.9, "depthCue", "strength"],
-  ["Camera and depth", "darkens from", 0.3, "depthCue", "near"],
-  ["Camera and depth", "darkest at", 0.6, "depthCue", "far"],
+  ["Depth and background", "depth cue", 0.9, "depthCue", "strength"],
+  ["Depth and background", "darkens from", 0.3, "depthCue", "near"],
+  ["Depth and background", "darkest at", 0.6, "depthCue", "far"],
   ["Method", "stop transmittance", 0.04, "method", "stopTransmittance"],
   ["Quality", "moving budget \\(ms\\)", 60, "quality", "budgetMs"],
 ];
@@ -73,14 +73,14 @@ test("every number is sent under its key and kept in the link", () =>
 
 // These settings change the picture with every method.
 const visible = [
-  ["Lines", "length", 0.1],
-  ["Lines", "opacity", 0.2],
-  ["Lines", "sampling stride", 3],
+  ["Winds", "length", 0.1],
+  ["Winds", "opacity", 0.2],
+  ["Winds", "sampling stride", 3],
   ["Line shape", "edge radius r2", 4],
   ["Line shape", "head whitening", 0],
   ["Kernels and jitter", "jitter of centre", 0],
   ["Kernels and jitter", "pattern", 5],
-  ["Camera and depth", "depth cue", 1],
+  ["Depth and background", "depth cue", 1],
 ];
 
 test("line settings change the picture", () =>
@@ -98,7 +98,7 @@ test("line settings change the picture", () =>
 
 test("near and far of the depth cue cannot cross", () =>
   withPage(async (page) => {
-    await unfold(page, "Camera and depth");
+    await unfold(page, "Depth and background");
     await type(page, "darkens from", 1.5);
     const { near, far } = await lastPatch(page, "depthCue");
     assert.equal(near, 1.5);
@@ -114,6 +114,7 @@ test("near and far of the depth cue cannot cross", () =>
 test("stride and minimum optical depth of a medium are sent", () =>
   withPage(async (page) => {
     const first = await pixels(page);
+    await unfold(page, "Volume: cloud > More");
     await type(page, "min optical depth", 0.02);
     assert.equal((await lastPatch(page, "scalars"))[0].minOpticalDepth, 0.02);
     await finalPicture(page);
@@ -130,6 +131,9 @@ test("lines that are switched off hide their controls", () =>
     await shown.check();
     assert.equal(await isShown(page, "length", "input"), true);
     assert.equal(await isShown(page, "colour by"), true);
+    assert.equal(await isShown(page, "pieces of a line", "input"), false);
+    await control(page, "follow the flow", "input").check();
+    await control(page, "pieces of a line", "input").waitFor();
   }));
 
 test("the span control needs overlap, and the pattern control needs jitter", () =>
@@ -185,7 +189,7 @@ test("slab thickness is offered for slabs only, and each compositing operator is
 
 test("a slice is selected by axis and layer and can be removed", () =>
   withPage(async (page) => {
-    await unfold(page, "Geometry");
+    await unfold(page, "Section");
     assert.equal(await isShown(page, "layer", "input"), false);
     const { x, y, z } = await page.evaluate(() => {
       const [a, b, c] = document.querySelector("#facts").textContent.match(/\d+/g).map(Number);
@@ -212,7 +216,7 @@ test("the default camera faces a slice or plane, and a globe ends the plane", ()
         },
         [azimuth, elevation],
       );
-    await unfold(page, "Geometry");
+    await unfold(page, "Section", "Place");
     await choose(page, "slice", /^across z/);
     await faces(0, 90);
     await choose(page, "slice", /^across x/);
@@ -288,7 +292,7 @@ test("the probe tells distance and bearing from a position that is kept", () =>
 
 test("a globe is offered for longitudes, and heights replace the vertical axis", () =>
   withPage(async (page) => {
-    await unfold(page, "Geometry");
+    await unfold(page, "Place > More");
     await choose(page, "shape", /^sphere/);
     assert.equal(await lastPatch(page, "geometry", "mapping"), "sphere");
     await choose(page, "shape", /^flat/);
@@ -307,7 +311,7 @@ test("a globe is offered for longitudes, and heights replace the vertical axis",
     await page.locator("#dataset").selectOption("tornado");
     await page.waitForFunction(() => location.hash.includes("%22tornado%22"));
     await finalPicture(page);
-    await unfold(page, "Geometry");
+    await unfold(page, "Place");
     assert.equal(await isShown(page, "shape"), false);
   }));
 
@@ -344,7 +348,7 @@ const moves = (page) =>
 
 test("line motion follows the frame rate, and the link is updated when it stops", () =>
   withPage(async (page) => {
-    await unfold(page, "Motion");
+    await unfold(page, "Time");
     assert.equal(await isShown(page, "cycles a step", "input"), false);
     const flow = control(page, "animate lines", "input");
     await flow.check();
@@ -369,7 +373,7 @@ test("line motion follows the frame rate, and the link is updated when it stops"
 
 test("a hidden page stops line motion", () =>
   withPage(async (page) => {
-    await unfold(page, "Motion");
+    await unfold(page, "Time");
     await control(page, "animate lines", "input").check();
     await page.waitForFunction(
       () => window.patches.filter(({ patch }) => patch.vector?.motion?.time > 0).length >= 3,
@@ -403,9 +407,11 @@ test("screenshots of the open panel", async () => {
   const folders = [
     "Line shape",
     "Kernels and jitter",
-    "Motion",
-    "Geometry",
-    "Camera and depth",
+    "Section",
+    "Place",
+    "Camera",
+    "Depth and background",
+    "Time",
     "Method",
     "Quality",
   ];
@@ -425,7 +431,7 @@ test("screenshots of the open panel", async () => {
       assert.ok(wide <= 0, `the panel is ${wide} px too wide`);
       for (const [part, title] of [
         ["lines", "Line shape"],
-        ["geometry", "Geometry"],
+        ["place", "Place"],
         ["method", "Method"],
       ]) {
         await page

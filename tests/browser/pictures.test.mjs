@@ -65,7 +65,7 @@ test("every compositing method changes the picture", () =>
 test("a slice faces the viewer, and another layer is another picture", () =>
   withPage(async (page) => {
     const whole = await pixels(page);
-    await unfold(page, "Geometry");
+    await unfold(page, "Section");
     for (const axis of ["x", "y", "z"]) {
       await choose(page, "slice", new RegExp(`^across ${axis}`));
       const middle = await picture(page, `slice-${axis}`);
@@ -83,7 +83,7 @@ test("a slice faces the viewer, and another layer is another picture", () =>
 
 test("a globe is about as high as wide", () =>
   withPage(async (page) => {
-    await unfold(page, "Geometry");
+    await unfold(page, "Place");
     await choose(page, "shape", /^sphere/);
     const globe = await picture(page, "globe");
     const box = await page.evaluate(() => {
@@ -124,7 +124,7 @@ test("line colours show direction and scalars", () =>
 test("the texture follows its phase, moves during motion and stops with it", () =>
   withPage(async (page) => {
     const still = await pixels(page);
-    await unfold(page, "Motion");
+    await unfold(page, "Time");
     await choose(page, "texture", /^moves/);
     const begun = await picture(page, "phase-0");
     await type(page, "time \\(steps\\)", 0.4);

@@ -237,7 +237,7 @@ const lastRange = (page) =>
 test("a histogram loads when visible, and a drag over its colours sets their range", async () => {
   await withPage(
     async (page) => {
-      const medium = page.locator("#panel .lil-gui", { hasText: /^Medium/ }).last();
+      const medium = page.locator("#panel .lil-gui", { hasText: /^Volume: / }).last();
       await medium.locator(".histogram").scrollIntoViewIfNeeded();
       const svg = medium.locator(".histogram svg");
       await page.waitForFunction(() =>
@@ -276,7 +276,7 @@ test("a histogram loads when visible, and a drag over its colours sets their ran
 test("the range of all steps is added to the view and removed from it", async () => {
   await withPage(
     async (page) => {
-      const medium = page.locator("#panel .lil-gui", { hasText: /^Medium/ }).last();
+      const medium = page.locator("#panel .lil-gui", { hasText: /^Volume: / }).last();
       const range = medium.locator(".range-choice select");
       await range.selectOption("all");
       await page.waitForFunction(() =>

@@ -83,7 +83,7 @@ test("a saved picture has the chosen dots per inch", () =>
 
 test("the camera is read and set in numbers, copied and pasted", () =>
   withPage(async (page) => {
-    await unfold(page, "Camera and depth", "Camera in numbers");
+    await unfold(page, "Camera in numbers");
     const box = page.locator(".camera-text");
     const first = { ...JSON.parse(await box.inputValue()), fovY: 30 };
     const paste = async (camera) => {

@@ -339,14 +339,31 @@ export const movingOf = (frames) =>
     ({ final, rev }, n) => !final && frames.findIndex((frame) => frame.rev === rev) === n,
   );
 
-// Opens folders of the panel.
+// Opens folders of the panel with those around them. A folder whose title others have, too, is
+// named after one around it: "Winds > More".
 export async function unfold(page, ...titles) {
   for (const title of titles) {
-    const button = page
-      .locator("#panel .lil-title")
-      .filter({ hasText: new RegExp(`^${title}$`) })
-      .first();
-    if ((await button.getAttribute("aria-expanded")) !== "true") await button.click();
+    // The title of the outermost closed folder around it.
+    const closed = () =>
+      page.evaluateHandle((parts) => {
+        let folder = document.querySelector("#panel");
+        for (const part of parts) {
+          const found = [...folder.querySelectorAll(".lil-title")].find(
+            ({ textContent }) => textContent === part,
+          );
+          if (found === undefined) throw new Error(`no folder ${part}`);
+          folder = found.closest(".lil-gui");
+        }
+        let outermost = null;
+        for (let at = folder; at !== null; at = at.parentElement.closest(".lil-gui")) {
+          const title = at.querySelector(".lil-title");
+          if (title.ariaExpanded !== "true") outermost = title;
+        }
+        return outermost;
+      }, title.split(" > "));
+    for (let at = await closed(); at.asElement() !== null; at = await closed()) {
+      await at.asElement().click();
+    }
   }
 }
 

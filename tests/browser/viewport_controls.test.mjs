@@ -340,13 +340,13 @@ test("shortcuts work after using a control but not while typing", () =>
     await until(page, "step", "2");
     await page
       .locator("#panel .lil-title")
-      .filter({ hasText: /^Lines$/ })
+      .filter({ hasText: /^Winds$/ })
       .click();
     await page.keyboard.press("[");
     await until(page, "step", "1");
     await page
       .locator("#panel .lil-title")
-      .filter({ hasText: /^Lines$/ })
+      .filter({ hasText: /^Winds$/ })
       .click();
     const box = control(page, "length", "input");
     const { azimuth } = await state(page);

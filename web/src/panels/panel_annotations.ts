@@ -12,8 +12,8 @@ const parts: readonly [label: string, key: string][] = [
   ["time", "stepTime"],
 ];
 
-export function addAnnotations(gui: GUI, kit: PanelKit): void {
-  const folder = gui.addFolder("Annotations");
+export function addAnnotations(parent: GUI, kit: PanelKit): void {
+  const folder = kit.folder(parent, "Axes and labels");
   for (const [label, key] of parts) {
     kit.toggle(folder, label, keyAccess<boolean>(`/annotations/${key}`));
   }

@@ -9,10 +9,8 @@ import type { PanelKit } from "./panel_kit";
 
 const axes = ["x", "y", "z"] as const;
 
-export const cameraNumbersTitle = "Camera in numbers";
-
 export function addCameraNumbers(parent: GUI, kit: PanelKit, camera: () => Camera | null): void {
-  const folder = parent.addFolder(cameraNumbersTitle);
+  const folder = kit.folder(parent, "Camera in numbers");
   for (const point of ["eye", "target"] as const) {
     axes.forEach((axis, at) => {
       kit.number(

@@ -1,8 +1,7 @@
-// The geometry panels (mapping, heights, slice) and the camera panel.
+// The section of the data that is drawn, the place of the data in the world, and the camera.
 import type GUI from "lil-gui";
 import { withProjection, type Camera } from "../view/camera";
 import {
-  depthCuePatch,
   exaggerationText,
   fieldOptions,
   heightOptions,
@@ -18,7 +17,9 @@ import {
   sliceText,
   wholeVolume,
 } from "./controls";
+import { addAnnotations } from "./panel_annotations";
 import { addCameraNumbers } from "./panel_camera";
+import { addGround } from "./panel_ground";
 import { keyAccess, type PanelKit } from "./panel_kit";
 import type { Dataset } from "../wire/protocol";
 
@@ -29,10 +30,16 @@ export interface CameraSwitch {
   setCamera(camera: Camera): void;
 }
 
-export function addGeometry(gui: GUI, kit: PanelKit): void {
-  const folder = gui.addFolder("Geometry");
+export function addPlace(gui: GUI, kit: PanelKit, camera: CameraSwitch): void {
+  const folder = kit.folder(gui, "Place");
+  addShape(folder, kit);
+  addGround(folder, kit);
+  addAnnotations(folder, kit);
+  addCamera(folder, kit, camera);
+}
+
+function addShape(folder: GUI, kit: PanelKit): void {
   const dataset = kit.host.dataset();
-  addSlice(folder, kit);
   const mappings = mappingOptions(dataset);
   const mapping = kit.choice(
     folder,
@@ -46,6 +53,8 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
   if (Object.keys(mappings).length < 2) {
     kit.showWhen(() => kit.host.view().geometry?.mapping !== "flat", mapping);
   }
+  addStretch(folder, kit, "vertical exaggeration", 2);
+  kit.note(folder, () => exaggerationText(dataset, kit.host.view()));
   kit.choice(folder, "vertical axis", keyAccess("/geometry/vertical"), {
     automatic: "auto",
     linear: "linear",
@@ -66,31 +75,30 @@ export function addGeometry(gui: GUI, kit: PanelKit): void {
       heightOptions(dataset),
     );
   }
-  addStretch(folder, kit);
-  kit.note(folder, () => exaggerationText(dataset, kit.host.view()));
+  const more = kit.more(folder);
+  addStretch(more, kit, "stretch in x", 0);
+  addStretch(more, kit, "stretch in y", 1);
 }
 
-function addStretch(folder: GUI, kit: PanelKit): void {
-  const edges = ["stretch in x", "stretch in y", "vertical exaggeration"] as const;
-  edges.forEach((label, axis) => {
-    kit.number(
-      folder,
-      label,
-      {
-        pointer: "/geometry/scale",
-        get: (view) => view.geometry?.scale?.[axis],
-        set: (factor) => {
-          const scale = [...(kit.host.view().geometry?.scale ?? [1, 1, 1])];
-          scale[axis] = factor;
-          return { geometry: { scale } };
-        },
+function addStretch(folder: GUI, kit: PanelKit, label: string, axis: 0 | 1 | 2): void {
+  kit.number(
+    folder,
+    label,
+    {
+      pointer: "/geometry/scale",
+      get: (view) => view.geometry?.scale?.[axis],
+      set: (factor) => {
+        const scale = [...(kit.host.view().geometry?.scale ?? [1, 1, 1])];
+        scale[axis] = factor;
+        return { geometry: { scale } };
       },
-      { min: 0.1, max: 10 },
-    );
-  });
+    },
+    { min: 0.1, max: 10 },
+  );
 }
 
-function addSlice(folder: GUI, kit: PanelKit): void {
+export function addSection(parent: GUI, kit: PanelKit): void {
+  const folder = kit.folder(parent, "Section");
   const dataset = kit.host.dataset();
   const slice = () => kit.host.view().geometry?.slice ?? null;
   kit.choice(
@@ -165,8 +173,8 @@ function addPlane(folder: GUI, kit: PanelKit): void {
   kit.showWhen((states) => states.plane, ...numbers);
 }
 
-export function addCamera(gui: GUI, kit: PanelKit, camera: CameraSwitch): void {
-  const folder = gui.addFolder("Camera and depth");
+function addCamera(parent: GUI, kit: PanelKit, camera: CameraSwitch): void {
+  const folder = kit.folder(parent, "Camera");
   kit.choice(
     folder,
     "projection",
@@ -187,21 +195,5 @@ export function addCamera(gui: GUI, kit: PanelKit, camera: CameraSwitch): void {
     max: 120,
   });
   kit.showWhen((states) => states.fovY, fovY);
-  const strength = kit.number(folder, "depth cue", keyAccess("/depthCue/strength"));
-  const ends = (["near", "far"] as const).map((end) =>
-    kit.number(
-      folder,
-      end === "near" ? "darkens from" : "darkest at",
-      {
-        pointer: `/depthCue/${end}`,
-        get: (view) => view.depthCue?.[end],
-        set: (value) => depthCuePatch(kit.host.view(), end, value),
-      },
-      { min: -1, max: 2, step: 0.01 },
-    ),
-  );
-  kit.enableWhen((states) => states.lines, strength);
-  kit.enableWhen((states) => states.depthCue, ...ends);
-  kit.color(folder, "background", keyAccess("/image/background"));
   addCameraNumbers(folder, kit, () => camera.camera());
 }

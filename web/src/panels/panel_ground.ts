@@ -3,8 +3,8 @@ import type GUI from "lil-gui";
 import { groundOptions, showsTheEarth } from "./controls";
 import { keyAccess, type PanelKit } from "./panel_kit";
 
-export function addGround(gui: GUI, kit: PanelKit): void {
-  const folder = gui.addFolder("Ground");
+export function addGround(parent: GUI, kit: PanelKit): void {
+  const folder = kit.folder(parent, "Ground");
   kit.choice(folder, "show", keyAccess("/ground/show"), groundOptions);
   const color = kit.color(folder, "surface colour", keyAccess("/ground/surfaceColor"));
   if (!showsTheEarth(kit.host.dataset())) {

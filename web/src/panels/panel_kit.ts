@@ -7,6 +7,7 @@ import type { Api, Range } from "../wire/api";
 import type { ColorMaps } from "../wire/color_maps";
 import { controlStates, type ControlStates, type Options } from "./controls";
 import { make } from "../base/dom";
+import { Folders, type FolderOptions } from "./panel_folders";
 import { histogramBins, HistogramView } from "./histogram_view";
 import { unitText } from "../view/legend_entries";
 import type { RangeMode } from "./range_choice";
@@ -31,6 +32,7 @@ export interface PanelHost {
 export interface HistogramOptions {
   key: string; // key of the range, unique within the panel
   folder?: string; // title of the folder
+  open?: boolean; // at first
   field(): string | null; // null: no field at present
   title(): string;
   range(): Range | null;
@@ -45,6 +47,12 @@ export interface NumberOptions {
   max?: number;
   step?: number;
   field?: boolean; // a number box without a slider
+}
+
+// What is preserved when panels are rebuilt.
+export class Kept {
+  readonly modes = new Map<string, RangeMode>();
+  readonly folders = new Folders();
 }
 
 export function valueAt(view: unknown, pointer: string): unknown {
@@ -114,11 +122,24 @@ class ColorBox extends Controller {
 export class PanelKit {
   private readonly refreshers: (() => void)[] = [];
 
-  // modes: range modes, preserved when panels are rebuilt.
   constructor(
     readonly host: PanelHost,
-    readonly modes: Map<string, RangeMode>,
+    private readonly kept: Kept,
   ) {}
+
+  // For controls that are replaced on their own.
+  again(): PanelKit {
+    return new PanelKit(this.host, this.kept);
+  }
+
+  folder(parent: GUI, title: string, options?: FolderOptions): GUI {
+    return this.kept.folders.add(parent, title, options);
+  }
+
+  // A folder for what is rarely needed.
+  more(parent: GUI): GUI {
+    return this.folder(parent, "More");
+  }
 
   refresh(): void {
     for (const refresh of this.refreshers) refresh();
@@ -259,14 +280,14 @@ export class PanelKit {
 
   // A separate folder, so that the histogram is computed only while visible.
   histogram(parent: GUI, options: HistogramOptions): GUI {
-    const folder = parent.addFolder(options.folder ?? "Histogram");
+    const folder = this.folder(parent, options.folder ?? "Histogram", { open: options.open });
     const { host } = this;
     const dataset = host.dataset();
     const step = () => (host.playing() ? null : (host.view().step ?? 0));
     const view: HistogramView = new HistogramView({
       ...options,
       key: `${dataset.id} ${options.key}`,
-      modes: this.modes,
+      modes: this.kept.modes,
       units: () => {
         const named = dataset.fields.find((one) => one.name === options.field());
         return unitText(named?.units);

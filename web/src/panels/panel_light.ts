@@ -1,12 +1,13 @@
 // The sun of the view: where it is, how bright, and how media scatter its light.
 import type GUI from "lil-gui";
+import { depthCuePatch } from "./controls";
 import { keyAccess, type PanelKit } from "./panel_kit";
 import type { View } from "../wire/protocol";
 
 type Light = NonNullable<View["light"]>;
 
 export function addLight(gui: GUI, kit: PanelKit): void {
-  const folder = gui.addFolder("Light");
+  const folder = kit.folder(gui, "Light");
   let last: Light = {}; // before it was switched off
   kit.toggle(folder, "sunlight", {
     pointer: "/light",
@@ -22,6 +23,7 @@ export function addLight(gui: GUI, kit: PanelKit): void {
     get: (view: View) => view.light?.[key],
     set: (value: number) => ({ light: { [key]: value, sunAt: null } }),
   });
+  const more = kit.folder(folder, "Scattering and shadows");
   const controls = [
     kit.number(folder, "sun from (°)", angle("azimuth"), { min: 0, max: 360, step: 1 }),
     kit.number(folder, "sun height (°)", angle("elevation"), { min: -10, max: 90, step: 1 }),
@@ -30,11 +32,33 @@ export function addLight(gui: GUI, kit: PanelKit): void {
       max: 5,
       step: 0.05,
     }),
-    kit.number(folder, "shadows", keyAccess<number>("/light/shadows"), { max: 30, step: 0.1 }),
-    kit.number(folder, "ambient", keyAccess<number>("/light/ambient"), { step: 0.01 }),
-    kit.number(folder, "forward scattering", keyAccess<number>("/light/anisotropy"), {
+    kit.number(more, "shadows", keyAccess<number>("/light/shadows"), { max: 30, step: 0.1 }),
+    kit.number(more, "ambient", keyAccess<number>("/light/ambient"), { step: 0.01 }),
+    kit.number(more, "forward scattering", keyAccess<number>("/light/anisotropy"), {
       step: 0.01,
     }),
   ];
-  kit.showWhen((states) => states.light, ...controls);
+  kit.showWhen((states) => states.light, more, ...controls);
+  addDepth(folder, kit);
+}
+
+// Light that does not come from the sun.
+function addDepth(parent: GUI, kit: PanelKit): void {
+  const folder = kit.folder(parent, "Depth and background");
+  const strength = kit.number(folder, "depth cue", keyAccess("/depthCue/strength"));
+  const ends = (["near", "far"] as const).map((end) =>
+    kit.number(
+      folder,
+      end === "near" ? "darkens from" : "darkest at",
+      {
+        pointer: `/depthCue/${end}`,
+        get: (view) => view.depthCue?.[end],
+        set: (value) => depthCuePatch(kit.host.view(), end, value),
+      },
+      { min: -1, max: 2, step: 0.01 },
+    ),
+  );
+  kit.enableWhen((states) => states.lines, strength);
+  kit.enableWhen((states) => states.depthCue, ...ends);
+  kit.color(folder, "background", keyAccess("/image/background"));
 }

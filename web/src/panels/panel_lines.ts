@@ -1,31 +1,27 @@
 // The lines panel: field, length and opacity; colour, profile, kernels and motion.
 import type GUI from "lil-gui";
+import type { Controller } from "lil-gui";
 import { colorByPatch, colorField, fieldOptions } from "./controls";
 import type { Range } from "../wire/api";
 import { colorScale } from "../view/color_scale";
 import { unitText } from "../view/legend_entries";
 import { keyAccess, type PanelKit } from "./panel_kit";
+import { vectorsTitle } from "../view/words";
 import { addTrace } from "./panel_trace";
 import { addMark } from "./panel_mark";
 
-export interface FlowSwitch {
-  flowing(): boolean;
-  flow(on: boolean): void;
-}
-
-export function addLines(gui: GUI, kit: PanelKit, flow: FlowSwitch): void {
+export function addLines(gui: GUI, kit: PanelKit): void {
   const dataset = kit.host.dataset();
   const options = fieldOptions(dataset, "vector");
   if (Object.keys(options).length === 0) return;
-  const folder = gui.addFolder("Lines");
+  const folder = kit.folder(gui, vectorsTitle(dataset), { open: true, key: "Vectors" });
   let named = Object.values(options)[0]!;
   kit.toggle(folder, "shown", {
     pointer: "/vector/field",
     get: (view) => view.vector?.field !== null,
     set: (on) => ({ vector: { field: on ? named : null } }),
   });
-  const start = folder.controllers.length;
-  kit.choice(
+  const field = kit.choice(
     folder,
     "field",
     {
@@ -37,42 +33,40 @@ export function addLines(gui: GUI, kit: PanelKit, flow: FlowSwitch): void {
   );
   const units = unitText(dataset.fields.find((field) => field.name === named)?.units);
   const per = units === "" ? "" : ` (${units})`;
-  addMain(folder, kit, per);
-  kit.showWhen((states) => states.lines, ...folder.controllers.slice(start));
   const parts = [
+    field,
+    ...addMain(folder, kit, per),
     addLineColor(folder, kit, per),
-    addShape(folder, kit, per),
-    addKernels(folder, kit),
-    addMotion(folder, kit, flow),
+    addShape(folder, kit),
+    addMore(folder, kit, per),
   ];
   kit.showWhen((states) => states.lines, ...parts);
 }
 
-function addMain(folder: GUI, kit: PanelKit, per: string): void {
+function addMain(folder: GUI, kit: PanelKit, per: string): Controller[] {
   const { vector } = kit.host.view();
   const top = vector?.magnitudeRange?.[1] ?? 1;
   const length = vector?.length ?? 0.05;
-  kit.number(folder, "length", keyAccess("/vector/length"), {
+  const long = kit.number(folder, "length", keyAccess("/vector/length"), {
     min: 0,
     max: Math.min(10, Number((5 * length).toPrecision(2))),
   });
   addTrace(folder, kit);
-  kit.number(folder, "opacity", keyAccess("/vector/opacity"));
-  const combine = kit.choice(folder, "overlapping lines", keyAccess("/vector/combine"), {
-    "nearer over farther": "over",
-    "largest of all (or)": "or",
+  const opacity = kit.number(folder, "opacity", keyAccess("/vector/opacity"));
+  const least = kit.number(folder, `min |v|${per}`, keyAccess("/vector/minMagnitude"), {
+    min: 0,
+    max: top,
   });
-  kit.showWhen((states) => states.combined, combine);
-  kit.number(folder, `min |v|${per}`, keyAccess("/vector/minMagnitude"), { min: 0, max: top });
-  kit.number(folder, "sampling stride", keyAccess("/vector/stride"), {
+  const stride = kit.number(folder, "sampling stride", keyAccess("/vector/stride"), {
     min: 1,
     max: 16,
     step: 1,
   });
+  return [long, opacity, least, stride];
 }
 
 function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
-  const folder = parent.addFolder("Line colour");
+  const folder = kit.folder(parent, "Line colour", { open: true });
   const { host } = kit;
   const scalars = fieldOptions(host.dataset(), "scalar");
   const hasScalars = Object.keys(scalars).length > 0;
@@ -163,11 +157,21 @@ function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {
   return folder;
 }
 
-function addShape(parent: GUI, kit: PanelKit, per: string): GUI {
-  const folder = parent.addFolder("Line shape");
+function addShape(parent: GUI, kit: PanelKit): GUI {
+  const folder = kit.folder(parent, "Line shape");
   addWidth(folder, kit);
   addMark(folder, kit);
   kit.number(folder, "brightness by speed", keyAccess("/vector/magnitudeIntensity"));
+  return folder;
+}
+
+function addMore(parent: GUI, kit: PanelKit, per: string): GUI {
+  const folder = kit.more(parent);
+  const combine = kit.choice(folder, "overlapping lines", keyAccess("/vector/combine"), {
+    "nearer over farther": "over",
+    "largest of all (or)": "or",
+  });
+  kit.showWhen((states) => states.combined, combine);
   addMagnitudes(folder, kit, per);
   kit.choice(folder, "direction", keyAccess("/vector/space"), {
     "by components": "components",
@@ -189,6 +193,7 @@ function addShape(parent: GUI, kit: PanelKit, per: string): GUI {
       { field: true },
     );
   });
+  addKernels(folder, kit);
   return folder;
 }
 
@@ -254,8 +259,8 @@ function addMagnitudes(folder: GUI, kit: PanelKit, per: string): void {
   });
 }
 
-function addKernels(parent: GUI, kit: PanelKit): GUI {
-  const folder = parent.addFolder("Kernels and jitter");
+function addKernels(parent: GUI, kit: PanelKit): void {
+  const folder = kit.folder(parent, "Kernels and jitter");
   kit.toggle(folder, "kernels overlap", keyAccess("/vector/jitter/overlap"));
   const span = kit.number(folder, "span (strides)", keyAccess("/vector/span"), {
     min: 0.5,
@@ -271,31 +276,4 @@ function addKernels(parent: GUI, kit: PanelKit): GUI {
   });
   const perStep = kit.toggle(folder, "new each step", keyAccess("/vector/jitter/perStep"));
   kit.enableWhen((states) => states.pattern, seed, perStep);
-  return folder;
-}
-
-function addMotion(parent: GUI, kit: PanelKit, flow: FlowSwitch): GUI {
-  const folder = parent.addFolder("Motion");
-  kit.choice(folder, "texture", keyAccess("/vector/motion/mode"), {
-    still: "still",
-    "moves along the lines": "phase",
-  });
-  const rate = kit.number(folder, "cycles a step", keyAccess("/vector/motion/rate"), {
-    min: -4,
-    max: 4,
-    step: 0.05,
-  });
-  const time = kit.number(folder, "time (steps)", keyAccess("/vector/motion/time"), {
-    field: true,
-  });
-  kit.showWhen((states) => states.motion, rate, time);
-  kit.toggle(folder, "animate lines", {
-    pointer: "/vector/motion/time",
-    get: () => flow.flowing(),
-    set: (on) => {
-      flow.flow(on);
-      return null;
-    },
-  });
-  return folder;
 }

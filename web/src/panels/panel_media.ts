@@ -2,6 +2,7 @@
 import type GUI from "lil-gui";
 import type { Range } from "../wire/api";
 import { fieldOptions } from "./controls";
+import { volumesTitle } from "../view/words";
 import { unitText } from "../view/legend_entries";
 import {
   curveOf,
@@ -14,7 +15,7 @@ import {
   type Curve,
   type Layer,
 } from "./media";
-import { PanelKit, type Access } from "./panel_kit";
+import type { Access, PanelKit } from "./panel_kit";
 import type { ScalarView } from "../wire/protocol";
 import { isRamp } from "./transfer";
 
@@ -23,7 +24,8 @@ const layersMax = 4;
 export function addMedia(gui: GUI, kit: PanelKit): void {
   const options = fieldOptions(kit.host.dataset(), "scalar");
   if (Object.keys(options).length === 0) return;
-  const folder = gui.addFolder("Volumes");
+  const title = volumesTitle(kit.host.dataset());
+  const folder = kit.folder(gui, title, { open: true, key: "Volumes" });
   new MediaPanel(folder, kit, options);
 }
 
@@ -31,8 +33,6 @@ class MediaPanel {
   private layers: Layer[] = [];
   private shape = ""; // fields and switches for which the controls were built
   private controls: PanelKit;
-  private readonly folded = new Set<string>(); // fields whose curve editor is collapsed
-
   private readonly forms = new Map<string, Curve>(); // curves by field before density scaling
 
   constructor(
@@ -40,7 +40,7 @@ class MediaPanel {
     private readonly kit: PanelKit,
     private readonly options: Record<string, string>,
   ) {
-    this.controls = new PanelKit(kit.host, kit.modes);
+    this.controls = kit.again();
     kit.onRefresh(() => this.refresh());
     this.refresh();
   }
@@ -65,7 +65,7 @@ class MediaPanel {
 
   private build(): void {
     for (const child of [...this.folder.children]) child.destroy();
-    this.controls = new PanelKit(this.kit.host, this.kit.modes);
+    this.controls = this.kit.again();
     this.layers.forEach((_, index) => this.addLayer(index));
     if (this.layers.length >= layersMax) return;
     const used = new Set(this.layers.map((layer) => layer.view.field));
@@ -90,14 +90,14 @@ class MediaPanel {
     const name = this.viewOf(index).field;
     const info = this.kit.host.dataset().fields.find((field) => field.name === name);
     const units = unitText(info?.units);
-    const folder = this.folder.addFolder(`Medium: ${name}`);
+    const folder = this.controls.folder(this.folder, `Volume: ${name}`, { open: true });
     folder.domElement.title = info?.longName ?? "";
     this.addField(folder, index);
     this.addOpacity(folder, index, units);
     this.addColors(folder, index, units);
     this.addCurve(folder, index);
     this.addSampling(folder, index);
-    this.controls.action(folder, "Remove", "Take this medium out of the view", () => {
+    this.controls.action(folder, "Remove", "Take this volume out of the view", () => {
       this.layers.splice(index, 1);
       this.send();
     });
@@ -169,9 +169,10 @@ class MediaPanel {
     const color = () => this.viewOf(index).color;
     const { defaultView } = this.kit.host.dataset();
     const known = defaultView?.scalars?.find((medium) => medium.field === field);
-    const folder = this.controls.histogram(parent, {
+    this.controls.histogram(parent, {
       key: `medium ${field}`,
       folder: "Opacity curve",
+      open: true,
       title: () => field,
       field: () => field,
       range: () => (color()?.range ?? null) as Range | null,
@@ -188,18 +189,14 @@ class MediaPanel {
             },
           }),
     });
-    if (this.folded.has(field)) folder.close();
-    folder.onOpenClose(() => {
-      if (folder._closed) this.folded.add(field);
-      else this.folded.delete(field);
-    });
   }
 
   private setCurve(index: number, curve: Curve): null {
     return this.update(index, { extinction: curve as ScalarView["extinction"] });
   }
 
-  private addSampling(folder: GUI, index: number): void {
+  private addSampling(parent: GUI, index: number): void {
+    const folder = this.controls.more(parent);
     this.controls.number(
       folder,
       "sampling stride",

@@ -22,7 +22,6 @@ import { timeEnds, drawSeries } from "./series_plot";
 import { formatNumber } from "../base/ticks";
 
 const restMs = 150;
-export const probeTitle = "Probe";
 
 export class ProbePanel {
   private readonly folder: GUI;
@@ -41,13 +40,13 @@ export class ProbePanel {
   private readonly readSoon = debounced(() => void this.read(), restMs);
 
   constructor(
-    gui: GUI,
+    private readonly parent: GUI,
     private readonly kit: PanelKit,
     // the position changed, or the probe was switched on or off
     private readonly changed: () => void,
     place: Sample,
   ) {
-    this.folder = gui.addFolder(probeTitle);
+    this.folder = kit.folder(parent, "Probe");
     this.sample = place;
     axisNames.forEach((_, axis) => this.addAxis(axis));
     this.message.setAttribute("role", "status");
@@ -67,6 +66,7 @@ export class ProbePanel {
   }
 
   open(): void {
+    this.parent.open();
     this.folder.open();
     this.folder.domElement.scrollIntoView({ block: "nearest" });
   }

@@ -4,6 +4,7 @@ import type { Controller } from "lil-gui";
 import { make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
 import { fieldOptions } from "./controls";
+import { vectorsTitle } from "../view/words";
 import { unitText } from "../view/legend_entries";
 import { axisNames, axisUnit } from "../view/sample_position";
 import { polygonFrom } from "../view/geo_polygon";
@@ -49,7 +50,7 @@ function addFilter(folder: GUI, kit: PanelKit): void {
   const first = () => kit.host.view().region?.where?.[0];
   kit.choice(
     folder,
-    "winds only where",
+    `${vectorsTitle(dataset).toLowerCase()} only where`,
     {
       pointer: "/region/where",
       get: () => first()?.field ?? everywhere,
@@ -87,7 +88,9 @@ function addFilter(folder: GUI, kit: PanelKit): void {
     if (filter === undefined) return "";
     const units = unitText(dataset.fields.find(({ name }) => name === filter.field)?.units);
     const [low, high] = filter.range.map((value) => formatNumber(value));
-    return `Winds where ${filter.field} is ${low} to ${high} ${units}`.trim() + ".";
+    return (
+      `${vectorsTitle(dataset)} where ${filter.field} is ${low} to ${high} ${units}`.trim() + "."
+    );
   });
   kit.showWhen(() => first() !== undefined, ...ends);
 }
@@ -126,8 +129,8 @@ function addPolygon(folder: GUI, kit: PanelKit): void {
   });
 }
 
-export function addRegion(gui: GUI, kit: PanelKit): void {
-  const folder = gui.addFolder("Region");
+export function addRegion(parent: GUI, kit: PanelKit): void {
+  const folder = kit.folder(parent, "Region");
   addRanges(folder, kit);
   addFilter(folder, kit);
   addPolygon(folder, kit);

@@ -3,7 +3,7 @@ import type GUI from "lil-gui";
 import type { SurfaceView } from "../../generated/view";
 import { unitText } from "../view/legend_entries";
 import { fieldOptions } from "./controls";
-import { PanelKit, type Access } from "./panel_kit";
+import type { Access, PanelKit } from "./panel_kit";
 
 const surfacesMax = 8;
 const ownColor = ""; // the choice of colours that needs no field
@@ -25,7 +25,7 @@ export function addSurfaces(gui: GUI, kit: PanelKit): void {
   const { axes } = kit.host.dataset();
   const flat = [axes.x, axes.y, axes.z].some((axis) => axis.world.length < 2);
   if (Object.keys(options).length === 0 || flat) return;
-  new SurfacesPanel(gui.addFolder("Surfaces"), kit, options);
+  new SurfacesPanel(kit.folder(gui, "Surfaces"), kit, options);
 }
 
 class SurfacesPanel {
@@ -37,7 +37,7 @@ class SurfacesPanel {
     private readonly kit: PanelKit,
     private readonly options: Record<string, string>,
   ) {
-    this.controls = new PanelKit(kit.host, kit.modes);
+    this.controls = kit.again();
     kit.onRefresh(() => this.refresh());
     this.refresh();
   }
@@ -65,7 +65,7 @@ class SurfacesPanel {
 
   private build(): void {
     for (const child of [...this.folder.children]) child.destroy();
-    this.controls = new PanelKit(this.kit.host, this.kit.modes);
+    this.controls = this.kit.again();
     this.surfaces().forEach((_, index) => this.addSurface(index));
     if (this.surfaces().length >= surfacesMax) return;
     const field = Object.values(this.options)[0]!;
@@ -121,7 +121,8 @@ class SurfacesPanel {
 
   private addSurface(index: number): void {
     const surface = this.surfaces()[index]!;
-    const folder = this.folder.addFolder(`Surface ${index + 1}: ${surface.field}`);
+    const title = `Surface ${index + 1}: ${surface.field}`;
+    const folder = this.controls.folder(this.folder, title, { open: true });
     this.controls.choice(
       folder,
       "field",

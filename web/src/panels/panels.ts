@@ -1,5 +1,5 @@
-// The panels beside the picture: lines, media, geometry, ground, camera, method and quality.
-// Rebuilt for each dataset.
+// The panels beside the picture, ordered by task: data, vectors, volumes, surfaces, place, light,
+// time and quality, each only where the dataset can use it. Rebuilt for each dataset.
 import GUI from "lil-gui";
 import {
   compositingHints,
@@ -13,19 +13,16 @@ import {
 } from "./controls";
 import { errorMetric } from "../base/error_text";
 import { ForecastPlot } from "./forecast_plot";
-import { addAnnotations } from "./panel_annotations";
+import { addSection, addPlace, type CameraSwitch } from "./panel_geometry";
+import { Kept, keyAccess, PanelKit, type PanelHost } from "./panel_kit";
 import { addLight } from "./panel_light";
-import { addGround } from "./panel_ground";
-import { addLines, type FlowSwitch } from "./panel_lines";
+import { addLines } from "./panel_lines";
 import { addMedia } from "./panel_media";
-import { cameraNumbersTitle } from "./panel_camera";
-import { addSurfaces } from "./panel_surfaces";
-import { keyAccess, PanelKit, type PanelHost } from "./panel_kit";
-import { middleSample, sampleWithin, type Sample } from "../view/sample_position";
-import { ProbePanel, probeTitle } from "./panel_probe";
+import { ProbePanel } from "./panel_probe";
 import { addRegion } from "./panel_region";
-import { addCamera, addGeometry, type CameraSwitch } from "./panel_geometry";
-import type { RangeMode } from "./range_choice";
+import { addSurfaces } from "./panel_surfaces";
+import { addTime, type FlowSwitch } from "./panel_time";
+import { middleSample, sampleWithin, type Sample } from "../view/sample_position";
 import { videoUse, type VideoUse } from "../view/video_setting";
 
 const streamBudgetMs = 33; // for streams whose view names no budget
@@ -40,25 +37,8 @@ export class Panels {
   private gui: GUI | null = null;
   private kit: PanelKit | null = null;
   probe: ProbePanel | null = null;
-  private readonly rangeModes = new Map<string, RangeMode>();
+  private readonly kept = new Kept();
   private of = ""; // id of the dataset for which the panels were built
-  private readonly closed = new Set<string>([
-    "Line shape",
-    "Kernels and jitter",
-    "Motion",
-    "Histogram",
-    probeTitle,
-    "Region",
-    "Geometry",
-    "Ground",
-    "Camera and depth",
-    cameraNumbersTitle,
-    "Annotations",
-    "Light",
-    "Surfaces",
-    "Method",
-    "Quality",
-  ]);
 
   constructor(
     private readonly container: HTMLElement,
@@ -75,31 +55,24 @@ export class Panels {
       title: "View",
       injectStyles: false, // the page's style sheet includes lil-gui's styles
     });
-    const kit = new PanelKit(this.host, this.rangeModes);
+    const kit = new PanelKit(this.host, this.kept);
     this.gui = gui;
     this.kit = kit;
-    addLines(gui, kit, this.actions);
+    const data = kit.folder(gui, "Data");
+    addSection(data, kit);
+    addRegion(data, kit);
+    this.probe = new ProbePanel(data, kit, () => this.actions.probed(), this.probePlace());
+    addLines(gui, kit);
     addMedia(gui, kit);
-    addRegion(gui, kit);
-    addLight(gui, kit);
     addSurfaces(gui, kit);
-    addGeometry(gui, kit);
-    addGround(gui, kit);
-    addCamera(gui, kit, this.actions);
-    addAnnotations(gui, kit);
-    this.probe = new ProbePanel(gui, kit, () => this.actions.probed(), this.probePlace());
-    addMethod(gui, kit);
+    addPlace(gui, kit, this.actions);
+    addLight(gui, kit);
+    addTime(gui, kit, this.actions);
     addQuality(gui, kit);
     kit.action(gui, "All defaults", "Everything back to the dataset's defaults", () =>
       this.actions.reset(),
     );
-    gui.onOpenClose((folder) => {
-      if (folder._closed) this.closed.add(folder._title);
-      else this.closed.delete(folder._title);
-    });
-    for (const folder of gui.foldersRecursive()) {
-      if (this.closed.has(folder._title)) folder.close();
-    }
+    this.kept.folders.watch(gui);
   }
 
   // The last probe position in this dataset.
@@ -115,8 +88,8 @@ export class Panels {
   }
 }
 
-function addMethod(gui: GUI, kit: PanelKit): void {
-  const folder = gui.addFolder("Method");
+function addMethod(parent: GUI, kit: PanelKit): void {
+  const folder = kit.folder(parent, "Method");
   const { host } = kit;
   kit.choice(folder, "method", keyAccess("/method/name"), methodOptions);
   kit.note(folder, () => methodHints[host.view().method?.name ?? ""] ?? "");
@@ -138,7 +111,7 @@ function addMethod(gui: GUI, kit: PanelKit): void {
 }
 
 function addQuality(gui: GUI, kit: PanelKit): void {
-  const folder = gui.addFolder("Quality");
+  const folder = kit.folder(gui, "Quality");
   const { host } = kit;
   const budget = () => host.view().quality?.budgetMs ?? streamBudgetMs;
   kit.number(
@@ -185,4 +158,5 @@ function addQuality(gui: GUI, kit: PanelKit): void {
     .add(video, "value", ["auto", "never"] satisfies VideoUse[])
     .name("video for slow links")
     .onChange((use: VideoUse) => videoUse.set(use));
+  addMethod(folder, kit);
 }

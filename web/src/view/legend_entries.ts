@@ -109,6 +109,9 @@ export function beyondEnds(
 
 const speeds = /^([ckm]?m|mi|ft) ?(s⁻¹|h⁻¹|\/ ?s|\/ ?h)$|^knots?$|^kt$/i;
 
+// Whether a unit of a file is one of speed.
+export const isSpeed = (units: string): boolean => speeds.test(unitText(units));
+
 // Text about vectors that are too short to be drawn.
 function leftOutText(least: number, units: string): string {
   if (!(least > 0)) return "";
