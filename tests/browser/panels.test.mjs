@@ -1,7 +1,8 @@
 // The folders of the panel: their order, which of them a dataset has, headings, and what is kept.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { control, finalPicture, sharedDaemon, unfold } from "./support.mjs";
+import { assertDrawn, control, drag, finalPicture, pixels } from "./support.mjs";
+import { sharedDaemon, shot, unfold } from "./support.mjs";
 
 const { withPage } = sharedDaemon();
 
@@ -61,3 +62,132 @@ test("the probe opens the folder around it", () =>
     await page.locator("#panel .probe-values dd").first().waitFor();
     assert.equal(await page.locator("#probe-x").isVisible(), true);
   }));
+
+// --- presets ------------------------------------------------------------------------------------
+
+const preset = (page, title) =>
+  page.locator(".preset", { has: page.locator(".preset-title", { hasText: title }) });
+
+// Waits until every preset that is offered has its picture.
+const allPictures = (page) =>
+  page.waitForFunction(() => {
+    const images = [...document.querySelectorAll(".preset:not([hidden]) img")];
+    return images.length > 0 && images.every((one) => one.naturalWidth > 0);
+  });
+
+// Counts requests for pictures.
+const countPictures = (page) => {
+  const asked = [];
+  page.on("request", (request) => request.url().endsWith("/v1/frames") && asked.push(request));
+  return asked;
+};
+
+test("each preset has a picture of its own, and a click draws it", () =>
+  withPage(async (page) => {
+    for (const dataset of ["climate", "tornado", "efield"]) {
+      if (dataset !== "climate") await openDataset(page, dataset);
+      await allPictures(page);
+      await shot(page, `presets-${dataset}`);
+      const shown = await page.locator(".preset:visible .preset-title").allTextContents();
+      assert.ok(shown.length >= 8, `${shown}`);
+      const hashes = new Set();
+      for (const title of shown) {
+        await preset(page, new RegExp(`^${title}$`)).click();
+        await finalPicture(page);
+        const stats = await pixels(page);
+        assertDrawn(stats);
+        hashes.add(stats.hash);
+      }
+      assert.equal(hashes.size, shown.length, dataset);
+    }
+  }));
+
+test("a preset keeps step and region, and undo restores the view before it", () =>
+  withPage(
+    async (page) => {
+      const before = await pixels(page);
+      const { hash } = new URL(page.url());
+      await preset(page, /^Streamlets$/).click();
+      await finalPicture(page);
+      assert.notEqual((await pixels(page)).hash, before.hash);
+      await page.waitForFunction(() => location.hash.includes("trace"));
+      const view = JSON.parse(decodeURIComponent(new URL(page.url()).hash.slice(2)));
+      assert.deepEqual(
+        [view.step, view.region, view.vector.trace, view.camera, view.depthCue],
+        [2, { x: [0, 180] }, {}, undefined, undefined],
+      );
+      await page.keyboard.press("Control+z");
+      await finalPicture(page);
+      assert.equal((await pixels(page)).hash, before.hash);
+      await page.waitForFunction((link) => location.hash === link, hash);
+    },
+    {
+      path: `#!${JSON.stringify({
+        dataset: "climate",
+        step: 2,
+        region: { x: [0, 180] },
+        depthCue: { strength: 0.9 },
+      })}`,
+    },
+  ));
+
+test("pictures of presets are asked for at rest only, and once for each step", () =>
+  withPage(
+    async (page) => {
+      const asked = countPictures(page);
+      await drag(page, 60, 20, 20);
+      assert.equal(asked.length, 0, "not while the view moves");
+      await finalPicture(page);
+      await allPictures(page);
+      const count = asked.length;
+      assert.equal(count, await page.locator(".preset:visible").count());
+      await drag(page, 60, 20, 4);
+      await finalPicture(page);
+      await openDataset(page, "tornado");
+      await allPictures(page);
+      await openDataset(page, "climate");
+      await allPictures(page);
+      const others = asked.slice(count).filter((one) => one.postData().includes('"climate"'));
+      assert.deepEqual(others.length, 0, "known pictures are not asked for again");
+    },
+    { path: '#!{"dataset":"climate","vector":{"stride":3}}' },
+  ));
+
+test("a change of the view ends a request for a picture, and a folded list asks for none", () =>
+  withPage(
+    async (page) => {
+      const asked = await page.waitForEvent("request", (one) => one.url().endsWith("/v1/frames"));
+      const ended = page.waitForEvent("requestfailed", (one) => one === asked);
+      await page.keyboard.press("ArrowLeft");
+      await ended;
+      await page.unroute("**/v1/frames");
+      await page
+        .locator(top, { hasText: /^Views to start from$/ })
+        .locator("button")
+        .click();
+      await page.locator(".presets").waitFor({ state: "hidden" });
+      const later = countPictures(page);
+      await finalPicture(page);
+      await page.waitForTimeout(2000);
+      assert.equal(later.length, 0);
+    },
+    { settle: false, prepare: (page) => page.route("**/v1/frames", () => {}) },
+  ));
+
+test("a preset that the server does not draw is not offered", () =>
+  withPage(
+    async (page) => {
+      await preset(page, /^Globe$/).waitFor({ state: "hidden" });
+      await allPictures(page);
+      assert.equal(await preset(page, /^Winds$/).isVisible(), true);
+    },
+    {
+      faulty: true, // the browser logs the refusal
+      prepare: (page) =>
+        page.route("**/v1/frames", (route) =>
+          route.request().postData().includes('"sphere"')
+            ? route.fulfill({ status: 422, json: { title: "no", status: 422, detail: "no" } })
+            : route.continue(),
+        ),
+    },
+  ));

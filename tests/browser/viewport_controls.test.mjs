@@ -67,7 +67,9 @@ test("one slider movement is one undo entry, and the panel follows undo", () =>
     const before = await hashOf(page);
     const number = control(page, "opacity", "input");
     const value = await number.inputValue();
-    const slider = await control(page, "opacity", ".lil-slider").boundingBox();
+    const bar = control(page, "opacity", ".lil-slider");
+    await bar.scrollIntoViewIfNeeded();
+    const slider = await bar.boundingBox();
     const y = slider.y + slider.height / 2;
     await page.mouse.move(slider.x + 0.7 * slider.width, y);
     await page.mouse.down();

@@ -66,6 +66,8 @@ const about = new About();
 const panelBox = byId("panel", HTMLElement);
 const host = {
   view: () => app.view(),
+  explicitView: () => app.explicitView(),
+  atRest: () => isSettled(canvas.dataset) && !app.playback.running,
   change: (patch: Record<string, unknown>) => app.change(patch),
   quietly: (run: () => void) => app.undoControl.quietly(run),
   dataset: () => app.dataset(),
@@ -76,6 +78,7 @@ const host = {
 };
 const panels = new Panels(panelBox, host, {
   reset: () => app.resetAll(),
+  openView: (view) => app.openView(view),
   camera: () => app.cameras.camera(),
   setCamera: (camera) => app.cameras.setCamera(camera),
   probed: () => probe.show(),
@@ -142,6 +145,11 @@ const openSaving = saveDialog(
   document.baseURI,
 );
 takeDrops(byId("drop-hint", HTMLElement), pictures);
+
+// Whether the canvas shows the final picture of the newest view.
+function isSettled({ state, rev, wanted }: DOMStringMap): boolean {
+  return state === "final" && rev === wanted;
+}
 
 function togglePanel(): void {
   const hidden = document.documentElement.classList.toggle("no-panel");

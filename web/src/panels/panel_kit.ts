@@ -7,6 +7,7 @@ import type { Api, Range } from "../wire/api";
 import type { ColorMaps } from "../wire/color_maps";
 import { controlStates, type ControlStates, type Options } from "./controls";
 import { make } from "../base/dom";
+import { PictureStore } from "../base/picture_store";
 import { Folders, type FolderOptions } from "./panel_folders";
 import { histogramBins, HistogramView } from "./histogram_view";
 import { unitText } from "../view/legend_entries";
@@ -19,6 +20,8 @@ import { clamp } from "../base/values";
 
 export interface PanelHost {
   view(): View; // with all known defaults
+  explicitView(): View; // without them
+  atRest(): boolean; // the picture is the final one of the view, and nothing moves
   change(patch: Patch): void;
   quietly(run: () => void): void; // runs changes that add no undo entry
   dataset(): Dataset;
@@ -53,6 +56,7 @@ export interface NumberOptions {
 export class Kept {
   readonly modes = new Map<string, RangeMode>();
   readonly folders = new Folders();
+  readonly pictures = new PictureStore();
 }
 
 export function valueAt(view: unknown, pointer: string): unknown {
@@ -126,6 +130,10 @@ export class PanelKit {
     readonly host: PanelHost,
     private readonly kept: Kept,
   ) {}
+
+  get pictures(): PictureStore {
+    return this.kept.pictures;
+  }
 
   // For controls that are replaced on their own.
   again(): PanelKit {

@@ -19,6 +19,7 @@ import { addLight } from "./panel_light";
 import { addLines } from "./panel_lines";
 import { addMedia } from "./panel_media";
 import { ProbePanel } from "./panel_probe";
+import { addPresets, type PresetSwitch } from "./panel_presets";
 import { addRegion } from "./panel_region";
 import { addSurfaces } from "./panel_surfaces";
 import { addTime, type FlowSwitch } from "./panel_time";
@@ -28,7 +29,7 @@ import { videoUse, type VideoUse } from "../view/video_setting";
 const streamBudgetMs = 33; // for streams whose view names no budget
 const firstLimit = 0.01; // initial error limit when one is switched on; linear RMSE
 
-export interface PanelActions extends CameraSwitch, FlowSwitch {
+export interface PanelActions extends CameraSwitch, FlowSwitch, PresetSwitch {
   reset(): void; // restores the dataset's defaults
   probed(): void; // the probe was moved or switched
 }
@@ -58,6 +59,7 @@ export class Panels {
     const kit = new PanelKit(this.host, this.kept);
     this.gui = gui;
     this.kit = kit;
+    addPresets(gui, kit, this.actions);
     const data = kit.folder(gui, "Data");
     addSection(data, kit);
     addRegion(data, kit);

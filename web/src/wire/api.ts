@@ -205,6 +205,12 @@ export class Api {
     return (await this.answer(path)).blob();
   }
 
+  // A picture of a view, after the requests of the stream.
+  async picture(view: View, signal: AbortSignal): Promise<Blob> {
+    const init = { ...posted(view, { Accept: "image/jpeg" }), signal, priority: "low" as const };
+    return (await this.answer("v1/frames", init)).blob();
+  }
+
   private dataset(id: string): string {
     return `v1/datasets/${encodeURIComponent(id)}`;
   }
