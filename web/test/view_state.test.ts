@@ -2,7 +2,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { View } from "../src/wire/protocol";
-import { mergePatch, mergeView, ViewState, withDefaults, type Patch } from "../src/view/view_state";
+import { completeView, mergePatch, mergeView } from "../src/view/view_state";
+import { ViewState, withDefaults, type Patch } from "../src/view/view_state";
 
 test("merge patches follow RFC 7396", () => {
   const rows: [unknown, unknown, unknown][] = [
@@ -152,4 +153,32 @@ test("replacement transforms any view into any other", () => {
       assert.deepEqual(reached, after, JSON.stringify({ before, after, known }));
     }
   }
+});
+
+test("colours of a surface are completed while it shows the same fields", () => {
+  const slice = { axis: "z", index: 3 } as const;
+  const drawn: View = {
+    surfaces: [
+      {
+        field: "cloud",
+        isovalue: 0.5,
+        slice: null,
+        plane: null,
+        color: { field: null, map: "magma", range: [0, 1], constant: "#d8d8d8" },
+      },
+    ],
+  };
+  const complete = (surface: NonNullable<View["surfaces"]>[number]) =>
+    completeView(drawn, { surfaces: [surface] }).surfaces![0]!.color;
+  assert.deepEqual(complete({ field: "cloud", isovalue: 0.7 })?.range, [0, 1]);
+  const unset = { range: null };
+  assert.deepEqual(complete({ field: "cloud", isovalue: 0.7, color: unset })?.range, [0, 1]);
+  assert.deepEqual(complete({ field: "cloud", isovalue: 0.7, color: { range: [2, 3] } }), {
+    ...drawn.surfaces![0]!.color,
+    range: [2, 3],
+  });
+  assert.equal(complete({ field: "cloud", slice }), undefined, "a section");
+  assert.equal(complete({ field: "wet", isovalue: 0.7 }), undefined, "another field");
+  const other = { field: "wet", range: null };
+  assert.deepEqual(complete({ field: "cloud", isovalue: 0.7, color: other }), other);
 });

@@ -1,7 +1,7 @@
 // The surfaces panel: isosurfaces and sections of scalar fields, each with colours and opacity.
 import type GUI from "lil-gui";
-import type { SurfaceView } from "../../generated/view";
-import { unitText } from "../view/legend_entries";
+import { surfaceColors, unitText } from "../view/legend_entries";
+import type { SurfaceView } from "../wire/protocol";
 import { fieldOptions } from "./controls";
 import type { Access, PanelKit } from "./panel_kit";
 
@@ -237,7 +237,7 @@ class SurfacesPanel {
       ),
       { [isosurface ? "one colour" : "its own values"]: ownColor, ...this.options },
     );
-    const name = surface.color?.field ?? (isosurface ? null : surface.field);
+    const name = surfaceColors(surface);
     if (name === null) {
       this.controls.color(
         folder,

@@ -1,11 +1,11 @@
 // Legend of a drawn view: title, unit, range and ticks of each colour strip.
 // Pure: (complete view, dataset) -> entries.
-import type { Dataset, Field, ScalarView, View } from "../wire/protocol";
+import type { Dataset, Field, ScalarView, SurfaceView, View } from "../wire/protocol";
 import { axisTicks, compassTicks, formatNumber, linearTicks, type LegendTick } from "../base/ticks";
 import { clamp } from "../base/values";
 
 export interface LegendEntry {
-  kind: "lines" | "medium";
+  kind: "lines" | "medium" | "surface";
   title: string;
   units: string;
   range: [number, number] | null; // null: a single colour
@@ -266,6 +266,44 @@ function mediumEntry(dataset: Dataset, layer: ScalarView): LegendEntry {
   };
 }
 
+// The field whose values colour a surface; null: one colour.
+export const surfaceColors = ({ field, isovalue, color }: SurfaceView): string | null =>
+  color?.field ?? ((isovalue ?? null) === null ? field : null);
+
+// Whether anything of a surface is drawn.
+const isSeen = ({ opacity = 1, contours = null }: SurfaceView): boolean =>
+  opacity > 0 || contours !== null;
+
+// In the words of the server's legend.
+function surfaceEntry(dataset: Dataset, surface: SurfaceView): LegendEntry {
+  const cut = fieldNamed(dataset, surface.field);
+  const cutTitle = fieldTitle(cut, surface.field);
+  const name = surfaceColors(surface);
+  const field = name === null ? undefined : fieldNamed(dataset, name);
+  const units = unitText(field?.units);
+  const range = (surface.color?.range ?? field?.range ?? [0, 1]) as [number, number];
+  const { isovalue = null, contours = null } = surface;
+  const where = name === null ? "it" : cutTitle;
+  return {
+    kind: "surface",
+    title: name === null ? cutTitle : fieldTitle(field, name),
+    units,
+    range: name === null ? null : range,
+    map: name === null ? null : (surface.color?.map ?? "viridis"),
+    color: name === null ? (surface.color?.constant ?? "#d8d8d8") : null,
+    ticks: name === null ? [] : linearTicks(range),
+    extinction: [],
+    note: joined(
+      isovalue === null
+        ? "on a section"
+        : `surface where ${where} is ${formatNumber(isovalue)} ${unitText(cut?.units)}`.trim(),
+      contours === null ? "" : `contours every ${formatNumber(contours.interval)} ${units}`.trim(),
+    ),
+    beyond: [false, false],
+    leftOut: "",
+  };
+}
+
 // The extinction curve of a medium on its strip, as fractions of the strip's width and of its
 // height from the top.
 export function curvePoints(points: [number, number][]): [x: number, y: number][] {
@@ -284,5 +322,8 @@ export function legendEntries(dataset: Dataset, view: View): LegendEntry[] {
   if (view.annotations?.legend === true) return [];
   const lines = linesEntry(dataset, view);
   const media = (view.scalars ?? []).map((layer) => mediumEntry(dataset, layer));
-  return lines === null ? media : [lines, ...media];
+  const surfaces = (view.surfaces ?? [])
+    .filter(isSeen)
+    .map((surface) => surfaceEntry(dataset, surface));
+  return [...(lines === null ? [] : [lines]), ...media, ...surfaces];
 }

@@ -150,10 +150,11 @@ function ofSurfaces(dataset: Dataset): Preset[] {
     const magnitude = magnitudeField(dataset);
     const coloured = magnitude !== undefined && magnitude !== field;
     const color = coloured ? { color: { field: magnitude.name } } : {};
+    const colors = coloured ? `, in colours of ${magnitude.name}` : "";
     found.push({
       key: "isosurface",
       title: "Isosurface",
-      about: `Where ${field.name} is ${isovalue}${coloured ? `, in colours of ${magnitude.name}` : ""}`,
+      about: `Where ${field.name} is ${isovalue}${colors}`,
       view: { ...alone, surfaces: [{ field: field.name, isovalue, ...color }] },
     });
   }

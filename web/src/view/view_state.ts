@@ -1,6 +1,6 @@
 // The page's view document: explicit keys only, no defaults. Changes are entered as merge patches,
 // are pending until a frame or an error answers them, and are sent as (rev, patch).
-import type { View } from "../wire/protocol";
+import type { SurfaceView, View } from "../wire/protocol";
 import { isObject } from "../base/values";
 
 export type Patch = Record<string, unknown>;
@@ -36,12 +36,30 @@ export function withDefaults(defaults: unknown, explicit: unknown): unknown {
 // The same for a view; its media are merged if field and position in the list agree.
 export function completeView(defaults: View, explicit: View): View {
   const view = withDefaults(defaults, explicit) as View;
+  if (explicit.surfaces && defaults.surfaces) {
+    view.surfaces = completeSurfaces(defaults.surfaces, explicit.surfaces) as View["surfaces"];
+  }
   if (!explicit.scalars || !defaults.scalars) return view;
   const scalars = explicit.scalars.map((medium, index) => {
     const known = defaults.scalars?.[index];
     return known?.field === medium.field ? (withDefaults(known, medium) as typeof medium) : medium;
   }) as View["scalars"];
   return { ...view, scalars };
+}
+
+const kindOf = ({ isovalue, slice, plane }: SurfaceView): boolean[] =>
+  [isovalue, slice, plane].map((value) => (value ?? null) !== null);
+
+// Of a surface only the colours have defaults that depend on the data: known ones are added if the
+// surface at this position still shows the same fields.
+function completeSurfaces(defaults: SurfaceView[], explicit: SurfaceView[]): SurfaceView[] {
+  const shows = (s: SurfaceView) => JSON.stringify([s.field, s.color?.field ?? null, kindOf(s)]);
+  return explicit.map((surface, index) => {
+    const known = defaults[index];
+    if (known === undefined || shows(known) !== shows(surface)) return surface;
+    const own = Object.entries(surface.color ?? {}).filter(([, value]) => value !== null);
+    return { ...surface, color: { ...known.color, ...Object.fromEntries(own) } };
+  });
 }
 
 // The merge patch that turns `old`, or any part of it, into `next`: null for each key to remove,

@@ -18,7 +18,7 @@ export type {
   StatsMessage,
   UnchangedMessage,
 } from "../../generated/messages";
-export type { RegionView, ScalarView, View } from "../../generated/view";
+export type { RegionView, ScalarView, SurfaceView, View } from "../../generated/view";
 
 export const subprotocol = "windsplat.v1";
 export const frameHeaderBytes = 64;

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { legendEntries } from "../../src/view/legend_entries";
+import type { View } from "../../src/wire/protocol";
 import { described } from "../page";
 
 test("the legend names the end of a line that is ahead", () => {
@@ -16,4 +17,57 @@ test("the legend names the end of a line that is ahead", () => {
   assert.match(note({ ...white, mark: { shape: "comet" } }), /, bright end ahead$/);
   assert.doesNotMatch(note({ ...white, mark: { shape: "arrow" } }), /ahead/);
   assert.match(note({ headDesaturation: 0, mark: { tailDarkening: 0.5 } }), /, bright end ahead$/);
+});
+
+const surfaceLegend = (surfaces: View["surfaces"]) =>
+  legendEntries(described("gcm", { fields: ["wind", "temperature", "humidity"] }), {
+    vector: { field: null },
+    scalars: [],
+    surfaces,
+  }).map(({ kind, title, units, range, map, color, note }) => {
+    assert.equal(kind, "surface");
+    return { title, units, range, map, color, note };
+  });
+
+test("the legend of an isosurface tells its value, and its colour or that of another field", () => {
+  const [plain, coloured] = surfaceLegend([
+    { field: "temperature", isovalue: 273.2, color: { constant: "#123456" } },
+    {
+      field: "temperature",
+      isovalue: 250,
+      color: { field: "humidity", map: "magma", range: [200, 300] },
+    },
+  ]);
+  assert.deepEqual(plain, {
+    title: "temperature",
+    units: "",
+    range: null,
+    map: null,
+    color: "#123456",
+    note: "surface where it is 273.2 K",
+  });
+  assert.deepEqual(coloured, {
+    title: "humidity",
+    units: "K",
+    range: [200, 300],
+    map: "magma",
+    color: null,
+    note: "surface where temperature is 250 K",
+  });
+});
+
+test("the legend of a section has its own colours and its contours; unseen ones have none", () => {
+  const slice = { axis: "z", index: 1 } as const;
+  const entries = surfaceLegend([
+    { field: "temperature", slice, color: { range: [0, 30] }, contours: { interval: 2.5 } },
+    { field: "temperature", slice, opacity: 0 },
+    { field: "humidity", slice, opacity: 0, contours: { interval: 1 } },
+  ]);
+  assert.deepEqual(
+    entries.map(({ title, units, range, note }) => [title, units, range, note]),
+    [
+      ["temperature", "K", [0, 30], "on a section, contours every 2.5 K"],
+      ["humidity", "K", [0, 30], "on a section, contours every 1 K"],
+    ],
+  );
 });
