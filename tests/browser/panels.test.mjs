@@ -1,8 +1,8 @@
 // The folders of the panel: their order, which of them a dataset has, headings, and what is kept.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { assertDrawn, control, drag, finalPicture, pixels } from "./support.mjs";
-import { sharedDaemon, shot, unfold } from "./support.mjs";
+import { assertDrawn, choose, control, drag, finalPicture, pixels } from "./support.mjs";
+import { sharedDaemon, shot, type, unfold } from "./support.mjs";
 
 const { withPage } = sharedDaemon();
 
@@ -191,3 +191,64 @@ test("a preset that the server does not draw is not offered", () =>
         ),
     },
   ));
+
+// --- light and surfaces -------------------------------------------------------------------------
+
+const lightOf = (page) =>
+  page.evaluate(() => JSON.parse(decodeURIComponent(location.hash.slice(2))).light);
+
+test("the sun stands at a time and place, or in a direction", () =>
+  withPage(async (page) => {
+    await unfold(page, "Light");
+    await control(page, "sunlight", "input").check();
+    await choose(page, "sun by", /^time and place$/);
+    await page.waitForFunction(() => location.hash.includes("sunAt"));
+    const { sunAt } = await lightOf(page);
+    assert.equal(sunAt.utc, "2001-01-01T00:00Z", "at the time of the step");
+    assert.equal(await control(page, "sun from \\(°\\)", "input").isVisible(), false);
+    await finalPicture(page);
+    const night = await pixels(page);
+    await control(page, "time \\(UTC\\)", "input").fill("2001-06-21T12:00");
+    await control(page, "time \\(UTC\\)", "input").blur();
+    await type(page, "longitude \\(°\\)", 10);
+    await finalPicture(page);
+    assert.notEqual((await pixels(page)).hash, night.hash);
+    await page.waitForFunction(() => location.hash.includes("06-21T12:00Z"));
+    const { utc, longitude } = (await lightOf(page)).sunAt;
+    assert.deepEqual([utc, longitude], ["2001-06-21T12:00Z", 10]);
+    await page.locator("#panel button", { hasText: /^At the time of the step$/ }).click();
+    await page.waitForFunction(() => location.hash.includes("01-01T00:00Z"));
+    await choose(page, "sun by", /^direction$/);
+    await page.waitForFunction(() => !location.hash.includes("sunAt"));
+    assert.equal(await control(page, "time \\(UTC\\)", "input").isVisible(), false);
+    assert.equal(await control(page, "sun from \\(°\\)", "input").isVisible(), true);
+  }));
+
+test("the legend shows surfaces, and the range of their colours can be set", () =>
+  withPage(async (page) => {
+    await unfold(page, "Surfaces");
+    await page.locator("#panel button", { hasText: /^Add a section$/ }).click();
+    const card = page.locator(".legend-surface");
+    await card.locator(".legend-note", { hasText: /^on a section$/ }).waitFor();
+    await finalPicture(page);
+    const surface = (label) =>
+      page
+        .locator("#panel .lil-gui", { hasText: /^Surface 1/ })
+        .last()
+        .locator(".lil-controller", { hasText: new RegExp(`^${label}`) })
+        .locator("input");
+    const high = Number(await surface("colours to").inputValue());
+    assert.ok(high > Number(await surface("colours from").inputValue()), "the default range");
+    const ticks = () => card.locator(".legend-tick").allTextContents();
+    const largest = Number((await ticks()).at(-1));
+    assert.ok(largest > high / 2 && largest <= high, `${largest} of ${high}`);
+    await surface("colours to").fill(String(3 * high));
+    await surface("colours to").press("Enter");
+    await finalPicture(page);
+    assert.ok(Number((await ticks()).at(-1)) > high, `${await ticks()}`);
+    await shot(page, "legend-surface");
+    await page.keyboard.press("Escape");
+    await page.locator("#undo-button").click();
+    await page.locator("#undo-button").click();
+    await card.waitFor({ state: "detached" });
+  }));

@@ -257,6 +257,8 @@ export function controlStates(view: View) {
     errorLimit: hasErrorLimit(view),
     depthCue: lines && view.depthCue?.strength !== 0,
     light: (view.light ?? null) !== null,
+    sunByAngles: (view.light ?? null) !== null && (view.light?.sunAt ?? null) === null,
+    sunAt: (view.light?.sunAt ?? null) !== null,
   };
 }
 

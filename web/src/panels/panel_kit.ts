@@ -104,15 +104,18 @@ function shortenSmall(controller: NumberController): void {
   controller.updateDisplay();
 }
 
-// A colour, edited by the browser's own picker.
-class ColorBox extends Controller {
+// A colour or a time, edited by the browser's own picker.
+class PickerBox extends Controller {
   private readonly input = make("input");
 
-  constructor(folder: GUI, model: { value: string }, key: "value") {
-    super(folder, model, key, "color-box");
-    this.input.type = "color";
+  constructor(folder: GUI, model: { value: string }, type: "color" | "datetime-local") {
+    super(folder, model, "value", type === "color" ? "color-box" : "time-box");
+    this.input.type = type;
     this.input.setAttribute("aria-labelledby", this.$name.id);
-    this.input.addEventListener("input", () => this.setValue(this.input.value));
+    this.input.addEventListener(type === "color" ? "input" : "change", () => {
+      if (this.input.value === "") this.updateDisplay();
+      else this.setValue(this.input.value);
+    });
     this.$widget.append(this.input);
     this.updateDisplay();
   }
@@ -239,7 +242,13 @@ export class PanelKit {
 
   color(folder: GUI, label: string, access: Access<string>): Controller {
     const model = { value: access.get(this.host.view()) ?? "#000000" };
-    return this.bind(new ColorBox(folder, model, "value"), label, model, access);
+    return this.bind(new PickerBox(folder, model, "color"), label, model, access);
+  }
+
+  // A time to the minute, without its time zone: 2024-06-21T12:00.
+  time(folder: GUI, label: string, access: Access<string>): Controller {
+    const model = { value: access.get(this.host.view()) ?? "" };
+    return this.bind(new PickerBox(folder, model, "datetime-local"), label, model, access);
   }
 
   // A colour map picker that displays the map itself.

@@ -153,7 +153,7 @@ class MediaPanel {
     );
     const shading = this.controls.choice(
       folder,
-      "sunlight",
+      "effect of sunlight",
       {
         pointer: "/scalars/shading",
         get: () => this.viewOf(index).shading,
