@@ -175,3 +175,14 @@ test("differences are per leaf, arrays are replaced whole", () => {
     { path: ["e"], before: undefined, after: null },
   ]);
 });
+
+test("a part that is switched on without keys of its own is an entry of its own", () => {
+  const desk = new Desk();
+  desk.history.begin(false);
+  desk.change({ annotations: { axes: true } });
+  desk.history.begin(false);
+  desk.change({ light: {} });
+  assert.equal(desk.undo(), "light");
+  assert.deepEqual(desk.view, { dataset: "storm", annotations: { axes: true } });
+  assert.equal(desk.undo(), "axes and labels");
+});

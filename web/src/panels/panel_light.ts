@@ -31,14 +31,15 @@ export function addLight(gui: GUI, kit: PanelKit): void {
     kit.number(folder, "sun height (°)", angle("elevation"), { min: -10, max: 90, step: 1 }),
   ];
   kit.showWhen((states) => states.sunByAngles, ...angles);
+  const brightness = kit.number(folder, "brightness", keyAccess<number>("/light/brightness"), {
+    min: 0,
+    max: 5,
+    step: 0.05,
+  });
   const more = kit.folder(folder, "Scattering and shadows");
   const controls = [
     by,
-    kit.number(folder, "brightness", keyAccess<number>("/light/brightness"), {
-      min: 0,
-      max: 5,
-      step: 0.05,
-    }),
+    brightness,
     kit.number(more, "shadows", keyAccess<number>("/light/shadows"), { max: 30, step: 0.1 }),
     kit.number(more, "ambient", keyAccess<number>("/light/ambient"), { step: 0.01 }),
     kit.number(more, "forward scattering", keyAccess<number>("/light/anisotropy"), {

@@ -53,7 +53,7 @@ const apply = (view: View, changes: Difference[], side: "before" | "after"): Vie
 // Paths of all changed leaves, including those of added and removed objects.
 function leavesOf({ path, before, after }: Difference): string[] {
   const part = isObject(after) ? after : before;
-  if (!isObject(part)) return [path.join("/")];
+  if (!isObject(part) || Object.keys(part).length === 0) return [path.join("/")];
   return Object.keys(part).flatMap((key) =>
     leavesOf({ path: [...path, key], before: undefined, after: part[key] }),
   );
@@ -66,6 +66,8 @@ const partNames: Record<string, string> = {
   scalars: "volumes",
   depthCue: "depth cue",
   step: "time step",
+  geometry: "place",
+  annotations: "axes and labels",
   image: "background",
 };
 
