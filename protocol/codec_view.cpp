@@ -322,7 +322,7 @@ Json vector_to_json(const VectorView& vector) {
            {"r2", canonical_number(vector.r2)},
            {"opacity", canonical_number(vector.opacity)},
            {"combine", name_of(vector.combine, combination_names)},
-           {"headDesaturation", canonical_number(vector.head_desaturation)},
+           {"headDesaturation", number_or_null(vector.head_desaturation)},
            {"mark", mark_to_json(vector.mark)},
            {"color", std::move(color)},
            {"magnitudeRange", numbers_or_null(vector.magnitude_range)},

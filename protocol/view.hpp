@@ -128,7 +128,7 @@ struct VectorView {
   double r2 = 1.4;
   double opacity = 0.8;
   LineCombination combine = LineCombination::over;  // of a slice or plane
-  double head_desaturation = 0.7;
+  std::optional<double> head_desaturation;  // 0..1; its default follows colours and background
   MarkView mark;
   VectorColorView color;
   std::optional<Range> magnitude_range;

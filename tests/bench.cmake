@@ -35,6 +35,11 @@ windsplat_bench(bench_estimates ${bench_dir}/scenes/scene_set.cpp
   ${naive_dir}/trial_fields.cpp
   ${naive_dir}/family/family.cpp)
 windsplat_bench(bench_pool)
+add_executable(bench_direction ${bench_dir}/direction/bench_direction.cpp
+  ${bench_dir}/direction/cues.cpp ${bench_dir}/direction/fields.cpp
+  ${bench_dir}/direction/tally.cpp ${bench_dir}/direction/truth.cpp
+  ${naive_dir}/trial_fields.cpp)
+target_link_libraries(bench_direction PRIVATE bench_support)
 add_executable(bench_light ${bench_dir}/scenes/bench_light.cpp)
 target_link_libraries(bench_light PRIVATE bench_support)
 windsplat_bench(bench_picture)
@@ -56,6 +61,7 @@ windsplat_smoke(kernels bench_kernels --smoke)
 windsplat_smoke(stages bench_stages --smoke)
 windsplat_smoke(estimates bench_estimates --measure=bench_estimates.csv --list=bench_estimates.csv
   --members=1 --scenes=1 --views=1)
+windsplat_smoke(direction bench_direction --smoke)
 windsplat_smoke(left_out bench_left_out --trials=24 --field=front)
 windsplat_smoke(light bench_light --smoke)
 windsplat_smoke(picture bench_picture --benchmark_filter=640x480 --benchmark_min_time=0.001)

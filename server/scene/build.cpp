@@ -99,7 +99,7 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.rise_weight = from.color.rise_weight;
   // A comet keeps the hue of the map.
   const bool hued = from.color.true_colors || from.mark.shape == protocol::MarkShape::comet;
-  layer.head_desaturation = hued ? 0 : from.head_desaturation;
+  layer.head_desaturation = hued ? 0 : from.head_desaturation.value();
   layer.magnitude_range = from.magnitude_range.value();
   layer.min_magnitude = from.min_magnitude.value();
   layer.magnitude_intensity = from.color.true_colors ? 0 : from.magnitude_intensity;

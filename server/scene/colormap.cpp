@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 
@@ -217,6 +218,21 @@ std::vector<std::array<unsigned char, 3>> color_map_srgb(std::string_view name, 
     }
     return code;
   });
+}
+
+double desaturation_contrast(const std::vector<std::array<float, 3>>& colors, double part) {
+  std::vector<double> contrasts;
+  for (const auto& color : colors) {
+    const Rgb plain{color[0], color[1], color[2]};
+    const double top = std::max({plain[0], plain[1], plain[2]});
+    Rgb white = plain;
+    for (double& channel : white) channel += part * (top - channel);
+    contrasts.push_back(distance(oklab_from_linear(plain), oklab_from_linear(white)));
+  }
+  if (contrasts.empty()) return 0;
+  const auto tenth = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() / 10);
+  std::nth_element(contrasts.begin(), tenth, contrasts.end());
+  return *tenth;
 }
 
 std::optional<std::array<float, 3>> parse_color(std::string_view text) {

@@ -22,6 +22,11 @@ std::vector<std::array<float, 3>> color_map_linear(std::string_view name, int co
 // The same as sRGB codes, for legends.
 std::vector<std::array<unsigned char, 3>> color_map_srgb(std::string_view name, int count);
 
+// How far in OKLab nine tenths of the colours (linear RGB) are at least from themselves,
+// desaturated by `part` towards their greatest channel; 0.02 is about the least difference that is
+// seen.
+double desaturation_contrast(const std::vector<std::array<float, 3>>& colors, double part);
+
 // "#rrggbb" to linear RGB; nullopt if malformed.
 std::optional<std::array<float, 3>> parse_color(std::string_view text);
 float srgb_from_linear(float linear);

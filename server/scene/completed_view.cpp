@@ -319,18 +319,18 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
                       "streamlets leave a slice or plane: set it to null, or vector.trace");
   }
   if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry, lattice));
-  if (!vector.mark.tail_darkening) vector.mark.tail_darkening = default_darkening(vector);
-  if (vector.trace && is_marked(vector.mark)) {
-    return invalid_at("/vector/mark",
-                      "streamlets have no marks: use the shape \"line\" without tailDarkening and "
-                      "halo, or set vector.trace to null");
-  }
   if (const auto& range = vector.magnitude_range; range && !((*range)[0] < (*range)[1])) {
     return invalid_at("/vector/magnitudeRange", "does not ascend");
   }
   if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
   if (!vector.color.by) {
     vector.color.by = default_color_by(info.grid, slice_of(view.geometry, lattice));
+  }
+  complete_heads(vector, view.image.background);
+  if (vector.trace && is_marked(vector.mark)) {
+    return invalid_at("/vector/mark",
+                      "streamlets have no marks: use the shape \"line\" without tailDarkening and "
+                      "halo, or set vector.trace to null");
   }
   if (auto ok = outline_scalars(view, info); !ok) return ok.error();
   return camera;

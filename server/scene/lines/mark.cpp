@@ -1,8 +1,11 @@
 #include "server/scene/lines/mark.hpp"
 
 #include <algorithm>
+#include <optional>
+#include <vector>
 
 #include "server/scene/camera.hpp"
+#include "server/scene/colormap.hpp"
 
 namespace windsplat::scene {
 
@@ -22,6 +25,15 @@ LineShape shape_of(protocol::MarkShape shape) {
   return LineShape::line;
 }
 
+constexpr double default_desaturation = 0.7;
+constexpr double default_darkening = 0.85;
+
+// Darker than middle grey, L* = 50.
+bool is_dark(const std::string& background) {
+  const auto [red, green, blue] = parse_color(background).value();
+  return 0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.184;
+}
+
 }  // namespace
 
 bool is_marked(const protocol::MarkView& mark) {
@@ -29,18 +41,36 @@ bool is_marked(const protocol::MarkView& mark) {
          mark.halo > 0;
 }
 
-double default_darkening(const protocol::VectorView& vector) {
-  constexpr double darkening = 0.85;
+// docs/benchmarks/direction.md has the measurements behind the limit.
+bool shows_white_heads(const protocol::VectorColorView& color) {
+  constexpr double least_contrast = 0.045;
+  constexpr int count = 64;
+  const bool constant = color.by == protocol::ColorBy::constant;
+  const auto colors = constant ? std::vector{parse_color(color.constant).value()}
+                               : color_map_linear(color.map, count);
+  return desaturation_contrast(colors, default_desaturation) >= least_contrast;
+}
+
+void complete_heads(protocol::VectorView& vector, const std::string& background) {
+  std::optional<double>& white = vector.head_desaturation;
+  std::optional<double>& dark = vector.mark.tail_darkening;
   const bool plain = vector.mark.shape == protocol::MarkShape::line && !vector.trace;
+  bool hued = plain && vector.color.true_colors;
+  if (plain && !white && !dark && is_dark(background) && !shows_white_heads(vector.color)) {
+    white = 0;
+    hued = true;
+  }
   const bool comet = vector.mark.shape == protocol::MarkShape::comet;
-  return comet || (plain && vector.color.true_colors) ? darkening : 0.0;
+  if (!white) white = default_desaturation;
+  if (!dark) dark = comet || hued ? default_darkening : 0.0;
 }
 
 void draw_true_colors(protocol::VectorView& completed) {
   if (completed.color.true_colors) return;
   completed.color.true_colors = true;
-  if (completed.mark.tail_darkening == 0.0) {
-    completed.mark.tail_darkening = default_darkening(completed);
+  const bool plain = completed.mark.shape == protocol::MarkShape::line && !completed.trace;
+  if (plain && completed.mark.tail_darkening == 0.0) {
+    completed.mark.tail_darkening = default_darkening;
   }
 }
 

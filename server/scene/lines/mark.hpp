@@ -1,6 +1,8 @@
 // Widths and marks of lines in pixels; marks show their direction and their order in depth.
 #pragma once
 
+#include <string>
+
 #include "protocol/view.hpp"
 #include "server/scene/scene.hpp"
 
@@ -9,9 +11,13 @@ namespace windsplat::scene {
 // Whether a completed view asks for more than lines of constant width and light.
 bool is_marked(const protocol::MarkView& mark);
 
-// The darkening of the tails of lines whose view gives none: lines that keep the hue of the map
-// have dark tails if nothing else tells their heads.
-double default_darkening(const protocol::VectorView& vector);
+// Whether nine tenths of the colours of lines change visibly if they are whitened as by default.
+bool shows_white_heads(const protocol::VectorColorView& color);
+
+// Fills in how heads and tails are told apart: white heads, or dark tails where lines keep the hue
+// of the map. Plain lines do so by default over a dark background in colours that hardly change if
+// they are whitened. The colours of the lines must be known.
+void complete_heads(protocol::VectorView& vector, const std::string& background);
 
 // Changes the lines of a completed view to the colours of the map.
 void draw_true_colors(protocol::VectorView& completed);

@@ -5,7 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "server/scene/colormap.hpp"
@@ -133,6 +135,53 @@ TEST(BuildScene, CometsHaveDarkTailsInsteadOfWhiteHeads) {
   EXPECT_EQ(comets.vector->head_desaturation, 0);
   view.vector.mark.tail_darkening = 0.4;
   EXPECT_NEAR(built(view, *dataset).vector->mark.tail_light, 0.6, 1e-12);
+}
+
+// Part that heads are whitened and tails darkened.
+std::array<double, 2> heads_and_tails(data::Dataset& dataset,
+                                      const std::function<void(View&)>& change) {
+  View view;
+  change(view);
+  const auto completed = complete(view, dataset);
+  EXPECT_TRUE(completed);
+  const protocol::VectorView& lines = completed->view().vector;
+  return {lines.head_desaturation.value(), lines.mark.tail_darkening.value()};
+}
+
+TEST(BuildScene, PlainLinesHaveDarkTailsInColorsThatWhiteningHardlyChanges) {
+  auto dataset = weather();
+  constexpr std::array<double, 2> white_heads{0.7, 0};
+  constexpr std::array<double, 2> dark_tails{0, 0.85};
+  for (const char* map :
+       {"viridis", "magma", "inferno", "plasma", "ice", "sunset", "compass", "coolwarm"}) {
+    EXPECT_EQ(heads_and_tails(*dataset, [&](View& v) { v.vector.color.map = map; }), white_heads)
+        << map;
+  }
+  for (const char* map : {"cividis", "clouds", "tealrose", "moss", "grays"}) {
+    const auto told = [&](const auto& change) {
+      return heads_and_tails(*dataset, [&](View& view) {
+        view.vector.color.map = map;
+        change(view);
+      });
+    };
+    EXPECT_EQ(told([](View&) {}), dark_tails) << map;
+    // White heads vanish in a white background, and dark tails do not.
+    EXPECT_EQ(told([](View& v) { v.image.background = "#ffffff"; }), white_heads) << map;
+    // Other shapes tell their heads themselves; streamlets have no marks.
+    EXPECT_EQ(told([](View& v) { v.vector.mark.shape = protocol::MarkShape::taper; }), white_heads);
+    EXPECT_EQ(told([](View& v) { v.vector.trace.emplace(); }), white_heads);
+    // What is given stays.
+    EXPECT_EQ(told([](View& v) { v.vector.head_desaturation = 0.7; }), white_heads);
+    EXPECT_EQ(told([](View& v) { v.vector.mark.tail_darkening = 0; }), white_heads);
+  }
+  const auto of_one_color = [&](const char* color) {
+    return heads_and_tails(*dataset, [&](View& view) {
+      view.vector.color.by = protocol::ColorBy::constant;
+      view.vector.color.constant = color;
+    });
+  };
+  EXPECT_EQ(of_one_color("#ffffff"), dark_tails);
+  EXPECT_EQ(of_one_color("#2040c0"), white_heads);
 }
 
 TEST(BuildScene, ReversedColorRangesReverseTheMap) {

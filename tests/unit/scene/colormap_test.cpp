@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <string>
@@ -137,6 +138,21 @@ TEST(Color, TransferCurveIsInvertible) {
     EXPECT_NEAR(static_cast<double>(linear_from_srgb(srgb_from_linear(v))), static_cast<double>(v),
                 1e-6);
   }
+}
+
+// Ottosson's values of red: L 0.62796, a 0.22486, b 0.12585; white: L 1, a and b 0.
+TEST(ColorMap, DesaturationContrastIsExceededByNineTenths) {
+  const std::array<float, 3> red{1, 0, 0};
+  const std::array<float, 3> grey{0.5F, 0.5F, 0.5F};
+  std::vector<std::array<float, 3>> colors(10, red);
+  const double contrast = std::hypot(1 - 0.62796, 0.22486, 0.12585);
+  EXPECT_NEAR(desaturation_contrast(colors, 1), contrast, 1e-4);
+  EXPECT_EQ(desaturation_contrast(colors, 0), 0);
+  colors[7] = grey;
+  EXPECT_NEAR(desaturation_contrast(colors, 1), contrast, 1e-4);
+  colors[2] = grey;
+  EXPECT_NEAR(desaturation_contrast(colors, 1), 0, 1e-9);
+  EXPECT_EQ(desaturation_contrast({}, 1), 0);
 }
 
 }  // namespace
