@@ -288,7 +288,7 @@ class GroundFinder {
         if (mask[n] == (by_land ? 1.0F : 0.0F)) heights[n] = std::fmax(heights[n], 0.0F);
       }
       for (LeftOut& left : info_.left_out) {
-        if (left.name == one.name) left.reason = "gives the land of the ground (geometry.body)";
+        if (left.name == one.name) left.reason = "gives the land of the ground (view.ground)";
       }
       return;
     }

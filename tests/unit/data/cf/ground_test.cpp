@@ -171,7 +171,7 @@ TEST(GroundOfAFile, OfAnOceanIsBelowTheSeaAndItsLandIsNot) {
     for (const LeftOut& left : source->info().left_out) {
       if (left.name == "mask_rho") reason = left.reason;
     }
-    EXPECT_EQ(reason, with_mask ? "gives the land of the ground (geometry.body)" : "");
+    EXPECT_EQ(reason, with_mask ? "gives the land of the ground (view.ground)" : "");
     if (with_mask) {
       expect_heights(*ground, {-4000, -30, 0, 2, 0, open});
     } else {
