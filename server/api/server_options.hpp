@@ -42,6 +42,8 @@ struct ServerOptions {
   int idle_timeout_s = 300;
   // Limit on the waiting time of requests for pictures, milliseconds; further ones are refused.
   double requests_waiting_ms_max = 30'000;
+  // Of the grounds that the renderer keeps between frames.
+  std::uint64_t ground_bytes = std::uint64_t{64} << 20;
   std::vector<std::string> allow_origins;      // besides the origin of the server
   std::shared_ptr<const access::Token> token;  // null: no authentication
   std::shared_ptr<transport::TlsContext> tls;  // null: plain TCP

@@ -32,7 +32,11 @@ class LimitedPictures {
   // The dataset and the pool must outlive this object. The pictures are measured if the encoding
   // says so, or if their error is limited.
   LimitedPictures(data::Dataset& dataset, const frame::Encoding& encoding, ThreadPool& pool)
-      : dataset_(dataset), encoding_(encoding), pool_(pool) {}
+      : dataset_(dataset), encoding_(encoding), pool_(pool) {
+    // A smaller limit has no room for grounds (ground_bytes_of() in cli/open_store.hpp).
+    constexpr std::uint64_t roomy = std::uint64_t{2} << 30U;
+    if (!dataset.is_within_limit(roomy)) workspace_.space.limit_grounds(0);
+  }
 
   // Errors: those of frame::complete(), frame::prepare() and frame::produce(); invalid at
   // /quality/budgetMs for a reference, whose time cannot be limited.

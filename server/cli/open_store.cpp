@@ -36,6 +36,16 @@ std::uint64_t data_bytes_of(std::uint64_t memory_bytes) {
   return memory_bytes - program_bytes - memory_bytes / data_bytes_a_summary_byte;
 }
 
+}  // namespace
+
+std::uint64_t ground_bytes_of(std::uint64_t memory_bytes) {
+  constexpr std::uint64_t summaries = std::uint64_t{64} << 20;
+  const std::uint64_t part = memory_bytes / data_bytes_a_summary_byte;
+  return std::min(std::max(part, summaries) - summaries, summaries);
+}
+
+namespace {
+
 data::LimitName limit_name(std::uint64_t memory_bytes) {
   data::LimitName name;
   name.text = "--memory-limit " + bytes_text(memory_bytes);

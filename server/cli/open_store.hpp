@@ -17,6 +17,9 @@ namespace windsplat::cli {
 constexpr std::uint64_t program_bytes = std::uint64_t{112} << 20;
 // What the renderer caches about the samples of a frame: 16 bytes per 64 samples.
 constexpr std::uint64_t data_bytes_a_summary_byte = 16;
+// For the grounds that the renderer keeps between frames: what its summaries, of which it keeps at
+// most 64 MiB, leave of their part of the limit; at most as much again.
+std::uint64_t ground_bytes_of(std::uint64_t memory_bytes);
 // Below this limit too little would remain for fields and a loader.
 constexpr std::uint64_t memory_bytes_min = std::uint64_t{192} << 20;
 // The address space of a process on x86-64; that of arm64 is twice as large.

@@ -7,6 +7,7 @@
 #include "server/base/trim_storage.hpp"
 #include "server/engine/bins.hpp"
 #include "server/engine/kernels/dispatch.hpp"
+#include "server/engine/layers/kept_ground.hpp"
 #include "server/engine/plan.hpp"
 #include "server/engine/tiles.hpp"
 
@@ -18,6 +19,7 @@ struct RenderSpace::Parts {
   BinSpace bins;
   TileSpace tiles;
   surface::Pixels surfaces;
+  KeptGrounds grounds;
 };
 
 RenderSpace::RenderSpace() : parts_(std::make_unique<Parts>()) {}
@@ -26,6 +28,10 @@ RenderSpace::RenderSpace(RenderSpace&&) noexcept = default;
 RenderSpace& RenderSpace::operator=(RenderSpace&&) noexcept = default;
 
 Image& RenderSpace::image() { return parts_->image; }
+
+void RenderSpace::limit_grounds(std::size_t bytes) { parts_->grounds.set_limit(bytes); }
+
+std::size_t RenderSpace::ground_bytes() const { return parts_->grounds.bytes(); }
 
 void TileCopier::operator()(const TilePixels& tile) const {
   const auto columns = static_cast<std::size_t>(image_->width);
@@ -63,6 +69,7 @@ Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const Can
   RenderSpace::Parts& parts = *space.parts_;
   const RenderPlan& plan = parts.plan;
   make_plan(scene, parts.plan);
+  parts.plan.body.kept = parts.grounds.of(scene, plan.tile_pixels, *table);
   WorkReport work;
   work.variant = plan.variant;
   work.variant.target = (*table)->name;

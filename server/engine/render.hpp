@@ -70,7 +70,8 @@ struct Rendered {
 
 // Storage kept between frames, so that consecutive frames of the same kind allocate nothing. Used
 // by one frame at a time. Holds the last plan, the brick summaries of the last few scenes
-// (summaries.hpp), the tile of each worker and the last picture that was not delivered to a sink.
+// (summaries.hpp), what the last few pictures show of a ground (layers/kept_ground.hpp), the tile
+// of each worker and the last picture that was not delivered to a sink.
 // Memory for more than retained_pixels is released by the next smaller frame.
 class RenderSpace {
  public:
@@ -83,6 +84,10 @@ class RenderSpace {
 
   // Picture of the last frame drawn without a sink; the caller may move from it.
   [[nodiscard]] Image& image();
+  // Limit on the bytes of grounds that are kept; 64 MiB if it is not set.
+  void limit_grounds(std::size_t bytes);
+  // Of the grounds that are kept.
+  [[nodiscard]] std::size_t ground_bytes() const;
 
  private:
   friend Result<WorkReport> render(const scene::Scene&, ThreadPool&, const CancelToken&,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "server/base/check.hpp"
@@ -52,14 +53,23 @@ Ends ends_near(const Segment& segment, double longitude) {
           static_cast<double>(segment.to[1])};
 }
 
-bool separates(const Ends& ends, const Place& from, const Place& to) {
+double crossing_of(const Ends& ends, double latitude) {
   double at = 0;
-  bool odd =
-      meets_parallel(ends, from.latitude, at) && is_between(at, from.longitude, to.longitude);
+  return meets_parallel(ends, latitude, at) ? at : std::numeric_limits<double>::quiet_NaN();
+}
+
+// No comparison with NaN holds.
+bool separates(const Ends& ends, double crossing, const Place& from, const Place& to) {
+  bool odd = is_between(crossing, from.longitude, to.longitude);
+  double at = 0;
   if (meets_meridian(ends, to.longitude, at) && is_between(at, from.latitude, to.latitude)) {
     odd = !odd;
   }
   return odd;
+}
+
+bool separates(const Ends& ends, const Place& from, const Place& to) {
+  return separates(ends, crossing_of(ends, from.latitude), from, to);
 }
 
 Level::Level(std::vector<Segment> segments, std::size_t coasts, int rows, double tolerance)

@@ -21,13 +21,17 @@ struct Segment {
 
 // A segment with longitudes within 180 degrees of a place, at least at its beginning.
 struct Ends {
-  double ax = 0, ay = 0, bx = 0, by = 0;
+  double ax, ay, bx, by;
 };
 Ends ends_near(const Segment& segment, double longitude);
 
 // Whether a segment separates two places: a way along the parallel of the first and then along the
 // meridian of the second crosses it once.
 bool separates(const Ends& ends, const Place& from, const Place& to);
+// The same in two parts: the longitude at which it crosses the parallel of the first, NaN if it
+// does not, and what follows from it.
+double crossing_of(const Ends& ends, double latitude);
+bool separates(const Ends& ends, double crossing, const Place& from, const Place& to);
 
 // The lines of one level, by cells of equal degrees.
 class Level {

@@ -66,6 +66,25 @@ glm::dvec3 Globe::up(const glm::dvec3& point) const {
   return radius > 0 ? point / radius : glm::dvec3(0, 0, 1);
 }
 
+// The first number is that of the kind of map.
+void Globe::identify(Identity& to) const { to.numbers.push_back(1); }
+
+void AxesMap::identify(Identity& to) const {
+  to.numbers.push_back(2);
+  for (const Axis* axis : {&x_, &y_}) {
+    to.add(axis->degrees);
+    to.add(axis->positions);
+  }
+}
+
+void ColumnsMap::identify(Identity& to) const {
+  to.numbers.push_back(3);
+  to.add(columns_.x);
+  to.add(columns_.y);
+  to.shared.emplace_back(columns_.longitudes);
+  to.shared.emplace_back(columns_.latitudes);
+}
+
 AxesMap::AxesMap(Axis x, Axis y) : x_(std::move(x)), y_(std::move(y)) {
   WINDSPLAT_CHECK(is_axis(x_.positions) && x_.degrees.size() == x_.positions.size());
   WINDSPLAT_CHECK(is_axis(y_.positions) && y_.degrees.size() == y_.positions.size());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/ground/atlas.hpp"
+#include "server/ground/identity.hpp"
 
 namespace windsplat::ground {
 
@@ -25,6 +26,10 @@ class Map {
   [[nodiscard]] virtual Located locate(const glm::dvec3& point) const = 0;
   // The unit vector away from the ground.
   [[nodiscard]] virtual glm::dvec3 up(const glm::dvec3& /*point*/) const { return {0, 0, 1}; }
+  // Whether a degree of longitude is as long at every latitude: meridians do not converge.
+  [[nodiscard]] virtual bool has_parallel_meridians() const { return false; }
+  // Adds what distinguishes it from other maps.
+  virtual void identify(Identity& to) const = 0;
 };
 
 // About the origin; longitude 0 lies towards -y, longitude 90 towards +x, the north pole towards
@@ -33,6 +38,7 @@ class Globe : public Map {
  public:
   [[nodiscard]] Located locate(const glm::dvec3& point) const override;
   [[nodiscard]] glm::dvec3 up(const glm::dvec3& point) const override;
+  void identify(Identity& to) const override;
 };
 
 // Degrees of samples and their positions, at least two of each; linear between them and beyond.
@@ -45,7 +51,9 @@ struct Axis {
 class AxesMap : public Map {
  public:
   AxesMap(Axis x, Axis y);
+  [[nodiscard]] bool has_parallel_meridians() const override { return true; }
   [[nodiscard]] Located locate(const glm::dvec3& point) const override;
+  void identify(Identity& to) const override;
 
  private:
   Axis x_, y_;
@@ -62,6 +70,7 @@ class ColumnsMap : public Map {
  public:
   explicit ColumnsMap(Columns columns);
   [[nodiscard]] Located locate(const glm::dvec3& point) const override;
+  void identify(Identity& to) const override;
 
  private:
   Columns columns_;

@@ -34,6 +34,19 @@ double cover(const Stroke& stroke, double distance, double scale) {
   return stroke.opacity * std::min(width, 1.0) * clamped(reach - distance);
 }
 
+// Of a degree of longitude.
+double length_of_longitude(double latitude) {
+  return std::max(std::cos(std::min(std::abs(latitude), 90.0) * std::numbers::pi / 180), 1e-9);
+}
+
+// Whether the bounds of a segment meet a rectangle of that many degrees to each side of a place.
+bool meets(const Ends& ends, const Place& place, double longitudes, double latitudes) {
+  return std::max(ends.ay, ends.by) >= place.latitude - latitudes &&
+         std::min(ends.ay, ends.by) <= place.latitude + latitudes &&
+         std::max(ends.ax, ends.bx) >= place.longitude - longitudes &&
+         std::min(ends.ax, ends.bx) <= place.longitude + longitudes;
+}
+
 double fading(double cosine) {
   constexpr double gone = 0.03;
   constexpr double whole = 0.15;
@@ -115,6 +128,15 @@ double graticule_cover(double degrees, double step, double per_pixel, double sca
 Paint::Paint(std::shared_ptr<const Map> map, const Style& style)
     : map_(std::move(map)), style_(style) {}
 
+void Paint::identify(Identity& to) const {
+  for (const Color* color : {&style_.land, &style_.sea, &style_.line}) {
+    to.numbers.insert(to.numbers.end(), color->begin(), color->end());
+  }
+  to.numbers.insert(to.numbers.end(), {style_.coastlines ? 1.0 : 0.0, style_.borders ? 1.0 : 0.0,
+                                       style_.graticule, style_.scale});
+  map_->identify(to);
+}
+
 // The point moves along the surface: with the ray's direction w, of forward component 1, and the
 // normal n, by s (r - w (r n) / (w n)) for a step r, where s is the size of a pixel there.
 Seen Paint::seen(const terrain::View& view, double x, double y, double depth,
@@ -184,23 +206,26 @@ Color Paint::color(const Seen& seen) const {
   const Level& level = level_for(pixels.degrees());
   Distances distances;
   distances.is_land = level.is_land(at.place);
+  const double east = reach() * pixels.longitudes();
+  const double north = reach() * pixels.latitudes();
   level.each(pixels.around(level, reach()), style_.borders, [&](const Segment& s, bool is_coast) {
-    distances.see(is_coast, pixels.distance2(ends_near(s, at.place.longitude)));
+    const Ends ends = ends_near(s, at.place.longitude);
+    if (meets(ends, at.place, east, north)) distances.see(is_coast, pixels.distance2(ends));
   });
   return blend(at, seen, distances);
 }
 
-std::optional<Near> Paint::near(const Seen& middle, double pixels) const {
+bool Paint::find_near(const Seen& middle, double pixels, Near& near) const {
   constexpr double grazing = 0.2;
   constexpr double polar = 84;
   constexpr double wide = 15;
   // The map from pixels to degrees changes from pixel to pixel.
   constexpr double change = 1.25;
-  if (middle.cosine < grazing) return std::nullopt;
+  if (middle.cosine < grazing) return false;
   const Located at = map_->locate(middle.point);
   const Pixels to(at, middle);
-  if (!to.is_regular()) return std::nullopt;
-  Near near;
+  if (!to.is_regular()) return false;
+  near.count = 0;
   near.level = &level_for(to.degrees());
   near.middle = at.place;
   // Along x and y both, and a quarter of that again for the bend.
@@ -209,35 +234,33 @@ std::optional<Near> Paint::near(const Seen& middle, double pixels) const {
   near.latitudes = extent * to.latitudes();
   const double east = near.longitudes + change * reach() * to.longitudes();
   const double north = near.latitudes + change * reach() * to.latitudes();
-  if (east > wide || std::abs(at.place.latitude) + north > polar) return std::nullopt;
+  const double farthest = map_->has_parallel_meridians() ? 90 : polar;
+  if (east > wide || std::abs(at.place.latitude) + north > farthest) return false;
   bool fits = true;
   const auto cells = near.level->cells(at.place.longitude - east, at.place.longitude + east,
                                        at.place.latitude - north, at.place.latitude + north);
   near.level->each(cells, style_.borders, [&](const Segment& s, bool is_coast) {
-    const double south =
-        at.place.latitude - north - static_cast<double>(std::max(s.from[1], s.to[1]));
-    const double above =
-        static_cast<double>(std::min(s.from[1], s.to[1])) - at.place.latitude - north;
-    if (south > 0 || above > 0) return;
     const Ends ends = ends_near(s, at.place.longitude);
-    if (std::max(ends.ax, ends.bx) < at.place.longitude - east ||
-        std::min(ends.ax, ends.bx) > at.place.longitude + east) {
-      return;
-    }
+    if (!meets(ends, at.place, east, north)) return;
     // A segment of several cells comes several times; others may have the same ends.
     for (std::size_t n = 0; n < near.count; ++n) {
       if (near.lines[n].segment == &s) return;
     }
     fits = fits && near.count < Near::most;
-    if (fits) near.lines[near.count++] = {&s, ends, is_coast};
+    const bool divides = is_coast && meets(ends, at.place, near.longitudes, near.latitudes);
+    if (!fits) return;
+    near.lines[near.count++] = {&s, ends, crossing_of(ends, at.place.latitude), is_coast, divides};
   });
-  if (!fits) return std::nullopt;
+  if (!fits) return false;
   near.is_land = near.level->is_land(at.place);
-  constexpr double other_size = 1.06;  // of a pixel of the square, at most
+  // Of a pixel of the square, at most: parallels shrink towards the poles.
+  const double other_size =
+      1.06 * std::sqrt(length_of_longitude(at.place.latitude) /
+                       length_of_longitude(std::abs(at.place.latitude) + near.latitudes));
   const bool same_level = near.level == &level_for(to.degrees() * other_size) &&
                           near.level == &level_for(to.degrees() / other_size);
   near.is_even = near.count == 0 && same_level && !is_near_graticule(at.place, east, north);
-  return near;
+  return true;
 }
 
 bool Paint::is_near_graticule(const Place& place, double east, double north) const {
@@ -261,10 +284,15 @@ Color Paint::color(const Seen& seen, const Near& near) const {
   if (!holds) return color(seen);
   Distances distances;
   distances.is_land = near.is_land;
+  // A line that is farther away than any reaches changes nothing.
+  const double east_reach = reach() * pixels.longitudes();
+  const double north_reach = reach() * pixels.latitudes();
   for (std::size_t n = 0; n < near.count; ++n) {
     const Near::Line& line = near.lines[n];
-    distances.see(line.is_coast, pixels.distance2(line.ends));
-    if (line.is_coast && separates(line.ends, near.middle, at.place)) {
+    if (meets(line.ends, at.place, east_reach, north_reach)) {
+      distances.see(line.is_coast, pixels.distance2(line.ends));
+    }
+    if (line.divides && separates(line.ends, line.crossing, near.middle, at.place)) {
       distances.is_land = !distances.is_land;
     }
   }

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 #include <memory>
-#include <optional>
 
 #include "server/ground/map.hpp"
 #include "server/terrain/terrain_pixel.hpp"
@@ -32,14 +31,17 @@ struct Seen {
   double cosine = 1;  // between ray and normal
 };
 
-// The lines near a square of pixels, and whether its middle is land.
+// The lines near a square of pixels, and whether its middle is land. Only the first `count` lines
+// are set.
 struct Near {
   struct Line {
-    const Segment* segment = nullptr;
+    const Segment* segment;
     Ends ends;
-    bool is_coast = false;
+    double crossing;  // longitude at which a coast crosses the parallel of the middle; NaN: nowhere
+    bool is_coast;
+    bool divides;  // a coast that may lie between the middle and another pixel
   };
-  static constexpr std::size_t most = 32;
+  static constexpr std::size_t most = 96;
   std::array<Line, most> lines;
   std::size_t count = 0;
   const Level* level = nullptr;
@@ -53,6 +55,9 @@ class Paint {
  public:
   Paint(std::shared_ptr<const Map> map, const Style& style);
 
+  // Adds what distinguishes it from other paints.
+  void identify(Identity& to) const;
+
   // x, y: pixels to the right of and below the middle of the picture. `normal` of the surface; 0:
   // it is level.
   [[nodiscard]] Seen seen(const terrain::View& view, double x, double y, double depth,
@@ -60,9 +65,9 @@ class Paint {
   // Without the shade of the surface.
   [[nodiscard]] Color color(const Seen& at) const;
   // What is near the pixels whose middles are at most that many pixels away along x and y, if their
-  // places lie about as those of a plane. Empty at limbs, at poles and where there are too many
+  // places lie about as those of a plane. False at limbs, at poles and where there are too many
   // lines.
-  [[nodiscard]] std::optional<Near> near(const Seen& middle, double pixels) const;
+  bool find_near(const Seen& middle, double pixels, Near& near) const;
   // The same colour as without `near`, faster.
   [[nodiscard]] Color color(const Seen& at, const Near& near) const;
   // That of all these pixels if `is_even`.

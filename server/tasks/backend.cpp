@@ -20,7 +20,9 @@ Backend::Backend(std::shared_ptr<data::Store> store, std::shared_ptr<ThreadPool>
                 std::move(options.charge),
                 [this] { metrics.refused(metrics::LimitKind::waiting); }}),
       loads(load_settings, [this] { metrics.refused(metrics::LimitKind::waiting); }),
-      check_cost_(std::move(options.check_cost)) {}
+      check_cost_(std::move(options.check_cost)) {
+  frames.space.limit_grounds(options.ground_bytes);
+}
 
 Result<Catalogue::Checked> Backend::check(const protocol::View& view) {
   auto checked = catalogue.check(view);

@@ -2,6 +2,7 @@
 // queries of data. Independent of HTTP and sockets.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -30,6 +31,8 @@ struct BackendOptions {
   std::function<void(const std::string& payer, std::int64_t us)> charge;
   // Limit on the cost of a picture.
   std::function<Result<void>(const frame::Cost& cost)> check_cost;
+  // Of the grounds that the renderer keeps between frames.
+  std::uint64_t ground_bytes = std::uint64_t{64} << 20;
 };
 
 // Outlives all connections; owned by the server.

@@ -25,7 +25,8 @@ ServerParts::ServerParts(api::ServerOptions server_options, std::shared_ptr<data
           std::move(store), std::move(threads), metrics,
           {options.requests_waiting_ms_max, options.limits.wait_ms,
            [this](const std::string& address, std::int64_t us) { admission.rendered(address, us); },
-           [this](const frame::Cost& cost) { return admission.check(cost); }}),
+           [this](const frame::Cost& cost) { return admission.check(cost); },
+           options.ground_bytes}),
       router(api::routes(options, draining, admission, backend, look_ups, view_io),
              options.base_path, admission, draining) {
   metrics.count_routes(router.route_names());

@@ -122,7 +122,8 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
     return make_error(ErrorKind::malformed, "--base-path '" + printable(arguments.base_path) +
                                                 "' is not of the form /windsplat/");
   }
-  if (const auto limit = memory_limit(arguments.memory_limit); !limit) return limit.error();
+  const auto limit = memory_limit(arguments.memory_limit);
+  if (!limit) return limit.error();
   auto data_root = plain_folder(arguments.data_root);
   if (!data_root) return data_root.error();
   if (!arguments.data_hosts.hosts.empty()) {
@@ -149,6 +150,7 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   options.base_path = arguments.base_path;
   options.sessions_max = arguments.sessions;
   options.idle_timeout_s = arguments.idle_timeout_s;
+  options.ground_bytes = ground_bytes_of(*limit);
   options.limits = arguments.limits;
   options.allow_origins = arguments.origins;
   return options;

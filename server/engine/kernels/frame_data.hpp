@@ -14,6 +14,10 @@ namespace windsplat::terrain {
 class Terrain;
 }
 
+namespace windsplat::engine {
+class KeptGround;
+}
+
 namespace windsplat::engine::kernels {
 
 constexpr int block_side = 4;                          // pixels
@@ -181,6 +185,7 @@ struct Body {
   float rgb[3];
   float ambient;
   const light::GroundLight* light;  // factor of its colour by place; null: 1
+  KeptGround* kept;                 // terrain and paint of earlier frames; or null
 };
 
 // Kernel positions of one stride, with their lines and media.

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <glm/geometric.hpp>
-#include <optional>
 
+#include "server/engine/layers/kept_ground.hpp"
 #include "server/ground/paint.hpp"
 #include "server/light/ground_light.hpp"
 #include "server/terrain/terrain_pixel.hpp"
@@ -67,6 +67,7 @@ terrain::View view_of(const Camera& camera, const Body& body) {
 }  // namespace
 
 void add_terrain(const Camera& camera, const Body& body, BodyPixels& pixels) {
+  if (body.kept != nullptr && body.kept->find_surface(pixels)) return;
   std::array<terrain::PixelSurface, block_pixels> seen;
   static_assert(block_side <= terrain::side_max);
   terrain::look(*body.terrain, view_of(camera, body),
@@ -81,10 +82,13 @@ void add_terrain(const Camera& camera, const Body& body, BodyPixels& pixels) {
     pixels.relief[l] = one.relief;
     for (int a = 0; a < 3; ++a) pixels.normal[l][a] = one.normal[a];
   }
+  if (body.kept != nullptr) body.kept->keep_surface(pixels);
 }
 
-void paint_body(const Camera& camera, const Body& body, const BodyPixels& pixels,
-                float rgb[3][block_pixels]) {
+namespace {
+
+void paint_pixels(const Camera& camera, const Body& body, const BodyPixels& pixels,
+                  float rgb[3][block_pixels]) {
   const terrain::View view = view_of(camera, body);
   const auto seen_at = [&](int l) {
     const double x = pixels.left + l % block_side + 0.5 - static_cast<double>(camera.half_width_px);
@@ -97,21 +101,39 @@ void paint_body(const Camera& camera, const Body& body, const BodyPixels& pixels
       rgb[c][l] = static_cast<float>(color.at(static_cast<std::size_t>(c)));
   };
   const double* const coverage = pixels.coverage;
+  const auto is_seen = [](double c) { return c > 0; };
+  if (std::none_of(coverage, coverage + block_pixels, is_seen)) return;
   const bool whole =
       std::all_of(coverage, coverage + block_pixels, [](double c) { return c >= 1; });
-  std::optional<ground::Near> near;
+  ground::Near near;
+  bool known = false;
   constexpr int middle = block_side / 2;
-  if (whole) near = body.paint->near(seen_at(middle * block_side + middle), middle);
-  const bool even = near && near->is_even && body.terrain == nullptr;
+  constexpr int centre = middle * block_side + middle;
+  // All pixels of a plane that see it see about the same of it.
+  const bool plane = body.shape == body_ground && body.terrain == nullptr;
+  if (whole || (plane && is_seen(coverage[centre]))) {
+    known = body.paint->find_near(seen_at(centre), middle, near);
+  }
+  const bool even = known && near.is_even && body.terrain == nullptr;
   for (int l = 0; l < block_pixels; ++l) {
+    if (!is_seen(coverage[l])) continue;
     if (even) {
-      put(l, body.paint->even_color(*near));
-    } else if (near) {
-      put(l, body.paint->color(seen_at(l), *near));
-    } else if (coverage[l] > 0) {
+      put(l, body.paint->even_color(near));
+    } else if (known) {
+      put(l, body.paint->color(seen_at(l), near));
+    } else {
       put(l, body.paint->color(seen_at(l)));
     }
   }
+}
+
+}  // namespace
+
+void paint_body(const Camera& camera, const Body& body, const BodyPixels& pixels,
+                float rgb[3][block_pixels]) {
+  if (body.kept != nullptr && body.kept->find_colors(pixels, rgb)) return;
+  paint_pixels(camera, body, pixels, rgb);
+  if (body.kept != nullptr) body.kept->keep_colors(pixels, rgb);
 }
 
 void light_body(const Camera& camera, const Body& body, double left, double top,

@@ -276,13 +276,13 @@ TEST(Ground, SquaresOfPixelsHaveTheColorsOfTheirPixels) {
                            depth_at(x + 3, y + 3))) {
           continue;
         }
-        const auto near = paint.near(seen(2, 2), 2);
-        if (!near) continue;
-        ++(near->is_even ? even : uneven);
+        ground::Near near;
+        if (!paint.find_near(seen(2, 2), 2, near)) continue;
+        ++(near.is_even ? even : uneven);
         for (int l = 0; l < 16; ++l) {
           const ground::Color own = paint.color(seen(l % 4, l / 4));
           const ground::Color fast =
-              near->is_even ? paint.even_color(*near) : paint.color(seen(l % 4, l / 4), *near);
+              near.is_even ? paint.even_color(near) : paint.color(seen(l % 4, l / 4), near);
           for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(own[c], fast[c], 1e-9);
         }
       }
