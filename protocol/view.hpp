@@ -271,7 +271,7 @@ struct SurfaceView {
 // An opaque surface: a terrain, a globe within the shell of a sphere, or the bottom of the box. The
 // rest of the keys have an effect only where its places on the Earth are known.
 struct GroundView {
-  GroundShow show = GroundShow::automatic;  // automatic: on a sphere
+  GroundShow show = GroundShow::automatic;  // automatic: on a sphere, and below data of the Earth
   std::string surface_color = "#2b3a4d";    // sRGB, without `tint`
   bool tint = true;
   std::string land_color = "#3f4a3c";  // sRGB

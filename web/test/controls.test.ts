@@ -188,7 +188,7 @@ test("controls without effect are hidden or disabled", () => {
   assert.equal(off({ geometry: { slice: { axis: "x", index: 0 } } }).slice, true);
   assert.equal(off({ camera: { projection: "orthographic" } }).fovY, false);
   const globe = { mapping: "sphere" } as const;
-  assert.equal(off({ geometry: { mapping: "flat" } }).ground, false);
+  assert.equal(off({ geometry: { mapping: "flat" } }).ground, true);
   assert.equal(off({ ground: { show: "on" } }).ground, true);
   assert.equal(off({ geometry: globe }).ground, true);
   assert.equal(off({ geometry: globe, ground: { show: "auto" } }).ground, true);

@@ -106,6 +106,29 @@ std::shared_ptr<const ground::Paint> paint_of(const protocol::View& view, const 
   return std::make_shared<ground::Paint>(std::move(map), style);
 }
 
+// Whether levels lie below the level of the sea, where coasts are: by the kind of the vertical
+// axis, the names of CF for levels of oceans, or negative heights.
+bool is_below_sea(const data::Axis& vertical) {
+  if (vertical.kind == AxisKind::depth) return true;
+  if (vertical.standard_name.rfind("ocean_", 0) == 0) return true;
+  const auto& heights = vertical.coordinates;
+  return vertical.kind == AxisKind::height && !heights.empty() &&
+         std::min(heights.front(), heights.back()) < 0;
+}
+
+// Beneath data of the Earth, seen from above: a map below one layer, or below levels of the
+// atmosphere. Coasts at the bottom of a sea would be at a wrong place, and an eye below the ground
+// would see nothing else.
+bool is_ground_by_default(const protocol::GeometryView& geometry, const Camera& camera,
+                          const Placed& placed) {
+  const Lattice& lattice = placed.lattice;
+  const bool below = camera.perspective ? camera.eye.z < lattice.box_min.z : camera.forward.z > 0;
+  if (below || !map_of(geometry, placed)) return false;
+  const bool one_layer =
+      lattice.dims[2] == 1 || (geometry.slice && geometry.slice->axis == protocol::GridAxis::z);
+  return one_layer || !is_below_sea(placed.grid.axes[2]);
+}
+
 }  // namespace
 
 std::shared_ptr<const ground::Map> map_of(const protocol::GeometryView& geometry,
@@ -136,7 +159,9 @@ Result<std::optional<Body>> make_body(const protocol::View& view, const Camera& 
   const Lattice& lattice = placed.lattice;
   const bool sphere = view.geometry.mapping == GeometryMapping::sphere;
   const bool asked = view.ground.show == protocol::GroundShow::on;
-  const bool shown = asked || (view.ground.show == protocol::GroundShow::automatic && sphere);
+  const bool automatic = view.ground.show == protocol::GroundShow::automatic;
+  const bool shown =
+      asked || (automatic && (sphere || is_ground_by_default(view.geometry, camera, placed)));
   if (!shown) return std::optional<Body>();
   Body body;
   // Not by default: moving frames cannot afford its rays.

@@ -53,6 +53,7 @@ class Picks : public testing::Test {
     return {{"dataset", "small"},
             {"step", 1},
             {"image", {{"width", width}, {"height", height}}},
+            {"ground", {{"show", "off"}}},
             {"annotations", Json::object()},
             {"vector", {{"minMagnitude", fast}, {"magnitudeIntensity", 0}}},
             {"scalars", Json::array()}};

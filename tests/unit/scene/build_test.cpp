@@ -283,7 +283,6 @@ TEST(BuildScene, AGlobeHasABodyUnlessItIsOff) {
   using protocol::GroundShow;
   auto dataset = weather();
   View view;
-  EXPECT_FALSE(built(view, *dataset).body);
   view.geometry.mapping = protocol::GeometryMapping::sphere;
   view.ground.surface_color = "#00ff00";
   const Scene scene = built(view, *dataset);

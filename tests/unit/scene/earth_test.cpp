@@ -109,6 +109,62 @@ TEST(Earth, IsShownWherePlacesAreKnown) {
   EXPECT_FALSE(ground_of(section, all).body->paint);
 }
 
+// Whether a view of the grid shows a ground by default.
+bool has_default_ground(data::Grid grid, const View& view = {}) {
+  auto dataset = dataset_of(
+      std::make_unique<FakeSource>(std::move(grid), std::vector<data::FieldInfo>{wind_info()}, 1));
+  auto scene = build_scene(view, *dataset);
+  EXPECT_TRUE(scene) << scene.error().message;
+  return scene && scene->body.has_value();
+}
+
+TEST(Earth, LiesBelowTheAtmosphereByDefault) {
+  EXPECT_TRUE(has_default_ground(along_degrees()));
+  EXPECT_TRUE(has_default_ground(turned()));
+  data::Grid box = turned();
+  box.columns = nullptr;
+  EXPECT_FALSE(has_default_ground(box));
+  View off;
+  off.ground.show = protocol::GroundShow::off;
+  EXPECT_FALSE(has_default_ground(along_degrees(), off));
+}
+
+// Coasts at the floor of a sea would be at a wrong place; those below one layer are not.
+TEST(Earth, IsNoFloorOfASeaByDefault) {
+  data::Grid depths = along_degrees();
+  depths.axes[2].kind = data::AxisKind::depth;
+  EXPECT_FALSE(has_default_ground(depths));
+  View layer;
+  layer.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 0};
+  EXPECT_TRUE(has_default_ground(depths, layer));
+  layer.geometry.slice->axis = protocol::GridAxis::x;
+  EXPECT_FALSE(has_default_ground(depths, layer));
+  data::Grid surface = depths;
+  surface.axes[2].coordinates = {depths.axes[2].coordinates.front()};
+  EXPECT_TRUE(has_default_ground(surface));
+  data::Grid terms = along_degrees();
+  terms.axes[2].standard_name = "ocean_s_coordinate_g2";
+  EXPECT_FALSE(has_default_ground(terms));
+  data::Grid negative = along_degrees();
+  negative.axes[2].kind = data::AxisKind::height;
+  for (double& height : negative.axes[2].coordinates) height -= 1e6;
+  EXPECT_FALSE(has_default_ground(negative));
+}
+
+// It would hide all data.
+TEST(Earth, IsNotDrawnBeforeAnEyeBelowIt) {
+  View view;
+  view.camera.target = {0, 0, 0};
+  view.camera.eye = {0, -1, 2};
+  EXPECT_TRUE(has_default_ground(along_degrees(), view));
+  view.camera.eye = {0, -1, -2};
+  EXPECT_FALSE(has_default_ground(along_degrees(), view));
+  view.camera.projection = protocol::Projection::orthographic;
+  EXPECT_FALSE(has_default_ground(along_degrees(), view));
+  view.camera.eye = {0, -1, 2};
+  EXPECT_TRUE(has_default_ground(along_degrees(), view));
+}
+
 TEST(Earth, AGroundWithoutLinesAndTintHasOneColor) {
   protocol::GroundView plain;
   plain.coastlines = plain.tint = false;

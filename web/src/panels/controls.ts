@@ -215,13 +215,10 @@ export const qualityHint = (view: View): string =>
     : "Moving frames: the least error that the budget allows.";
 
 // The choices of ground.show.
-export const groundOptions: Options = { "on a globe": "auto", always: "on", never: "off" };
+export const groundOptions: Options = { automatic: "auto", always: "on", never: "off" };
 
-// Whether the view draws its ground.
-export function showsGround(view: View): boolean {
-  const show = view.ground?.show ?? "auto";
-  return show === "auto" ? view.geometry?.mapping === "sphere" : show === "on";
-}
+// Whether the view may draw a ground: by default the server decides.
+export const showsGround = (view: View): boolean => (view.ground?.show ?? "auto") !== "off";
 
 // Whether the places of a dataset on the Earth are known: then it can be drawn as a globe.
 export const showsTheEarth = (dataset: Dataset): boolean => dataset.mappings.includes("sphere");
