@@ -62,6 +62,10 @@ void clear_image(const scene::Camera& camera, const CancelToken& cancel, Image& 
 
 }  // namespace
 
+std::uint64_t surface_bytes(const scene::Scene& scene) {
+  return surface::Pixels::bytes_for(scene.surfaces);
+}
+
 Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const CancelToken& cancel,
                           RenderSpace& space, TileSink sink) {
   const auto table = kernels::chosen_table();
@@ -85,6 +89,9 @@ Result<WorkReport> render(const scene::Scene& scene, ThreadPool& pool, const Can
                  parts.tiles, sink, work);
     }
   }
+  // What the memory of a picture counts is not kept beyond it.
+  constexpr std::size_t surface_bytes_kept = std::size_t{8} << 20U;
+  parts.surfaces.release_beyond(surface_bytes_kept);
   if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "frame cancelled");
   return work;
 }

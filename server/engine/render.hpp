@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <type_traits>
 #include <vector>
@@ -95,6 +96,9 @@ class RenderSpace {
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
+
+// Memory for the lists of the triangles of its surfaces while a frame is drawn.
+std::uint64_t surface_bytes(const scene::Scene& scene);
 
 // Delivers tiles to `sink` as they are finished. Errors: cancelled (the delivered tiles are
 // invalid); invalid (the environment selects an instruction set that is not available).

@@ -297,6 +297,8 @@ std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annot
   return (pixels - retained_pixels) * bytes_a_pixel + overlay;
 }
 
+std::uint64_t surface_bytes(const scene::Scene& scene) { return engine::surface_bytes(scene); }
+
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
                          data::Dataset& dataset, const Encoding& encoding) {
   const Clock::time_point start = Clock::now();

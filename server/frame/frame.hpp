@@ -103,6 +103,9 @@ struct Workspace {
 // retained_pixels (base/trim_storage.hpp) without annotations.
 std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annotated = false);
 
+// Memory for the lists of the triangles of a scene while it is drawn.
+std::uint64_t surface_bytes(const scene::Scene& scene);
+
 // Completes a view for its dataset; if memory does not suffice, the error states what all fields of
 // the view need. Errors: those of scene::complete(); invalid at /method/name for a reference that
 // is not allowed: it takes seconds to minutes, so only a command line that does not share the

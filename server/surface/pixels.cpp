@@ -236,6 +236,15 @@ void Pixels::list(const std::vector<Shown>& shown, const terrain::View& view, in
   }
 }
 
+void Pixels::release_beyond(std::size_t bytes) {
+  std::size_t held = vertices_.capacity() * sizeof(Vertex) + corners_.capacity() * sizeof(Corner) +
+                     extra_.capacity() * sizeof(Extra) +
+                     (first_.capacity() + entries_.capacity()) * sizeof(std::uint32_t);
+  for (const auto& part : counts_) held += part.capacity() * sizeof(std::uint32_t);
+  for (const auto& part : crossing_) held += part.capacity() * sizeof(std::uint32_t);
+  if (held > bytes) *this = Pixels();
+}
+
 void Pixels::look(int column, int row, Cell& to) const {
   const std::size_t cell = cell_at(column, row);
   CellRaster raster(view_, column * cell_side, row * cell_side, 0.5 * width_, 0.5 * height_, to);

@@ -60,6 +60,14 @@ class Pixels {
   static std::uint64_t bytes_for(const Mesh& mesh) {
     return mesh.places.size() * sizeof(Vertex) + mesh.triangles.size() * 2 * sizeof(std::uint32_t);
   }
+  [[nodiscard]] static std::uint64_t bytes_for(const std::vector<Shown>& shown) {
+    std::uint64_t bytes = 0;
+    for (const Shown& one : shown) bytes += bytes_for(*one.mesh);
+    return bytes;
+  }
+  // Frees the storage if there is more of it; then list() comes before look().
+  void release_beyond(std::size_t bytes);
+
   [[nodiscard]] bool any(int column, int row) const {
     const std::size_t cell = cell_at(column, row);
     return first_[cell + 1] > first_[cell];

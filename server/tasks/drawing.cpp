@@ -67,15 +67,18 @@ Result<PreparedPtr> with_memory(frame::Prepared prepared, const data::Dataset& d
   const int width = prepared.scene.camera.width;
   const int height = prepared.scene.camera.height;
   const std::uint64_t bytes = frame::bytes_beyond_kept(width, height, prepared.encoding.format,
-                                                       prepared.figure.has_value());
+                                                       prepared.figure.has_value()) +
+                              frame::surface_bytes(prepared.scene);
   Result<Held> reserved = bytes == 0 ? Held() : dataset.reserve(bytes);
   if (!reserved) {
     const Error& error = reserved.error();
     if (loading == Loading::none) return make_error(ErrorKind::not_resident, error.message);
     if (error.kind != ErrorKind::out_of_memory) return error;
-    return make_error(ErrorKind::out_of_memory, "a picture of " + std::to_string(width) + " x " +
-                                                    std::to_string(height) +
-                                                    " pixels is too large: " + error.message);
+    const bool surfaces = !prepared.scene.surfaces.empty();
+    return make_error(ErrorKind::out_of_memory,
+                      "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+                          (surfaces ? " pixels with surfaces" : " pixels") +
+                          " is too large: " + error.message);
   }
   return std::make_shared<PreparedPicture>(
       PreparedPicture{std::move(prepared), std::move(*reserved)});

@@ -297,11 +297,8 @@ struct Painting::State {
   Result<void> list_surfaces(const scene::Scene& scene, const CancelToken& cancel,
                              const Reserve& reserve) {
     if (scene.surfaces.empty()) return {};
-    std::uint64_t bytes = 0;
-    for (const surface::Shown& shown : scene.surfaces) {
-      bytes += surface::Pixels::bytes_for(*shown.mesh);
-    }
     if (reserve) {
+      const std::uint64_t bytes = surface::Pixels::bytes_for(scene.surfaces);
       if (auto held = reserve_bytes(bytes, reserve); !held) return held;
     }
     ThreadPool alone(1);

@@ -411,6 +411,26 @@ TEST(Drawings, SamplingOfASectionIsChargedLikeRendering) {
   EXPECT_LT(charged[2], hour_us);
 }
 
+TEST(Drawings, TheListsOfSurfacesAreChargedWhileTheirPictureExists) {
+  const auto store = std::make_shared<data::Store>(std::uint64_t{1} << 30);
+  const auto dataset = store->add("climate:64x32x8").value();
+  protocol::View view;
+  view.dataset = dataset->info().id;
+  view.surfaces.emplace_back();
+  view.surfaces[0].field = "cloud";
+  view.surfaces[0].isovalue = 0.3;
+  const auto completed = scene::complete(view, *dataset).value();
+  auto picture = tasks::prepare_picture(completed, frame::own_setting(completed), {}, *dataset,
+                                        tasks::Loading::allowed);
+  ASSERT_TRUE(picture);
+  const auto& mesh = *(*picture)->frame.scene.surfaces.at(0).mesh;
+  const std::uint64_t least = 16 * mesh.places.size() + 4 * mesh.triangles.size();
+  const std::uint64_t with_lists = store->counts().bytes;
+  picture->reset();
+  EXPECT_GT(least, 1000U);
+  EXPECT_GE(with_lists - store->counts().bytes, least);
+}
+
 TEST(Drawings, AdmittedRequestIsNotRefusedAfterLoading) {
   Gate gate;  // declared before the parts: their threads use it until they end
   std::promise<std::string> told;
