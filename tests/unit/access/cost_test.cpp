@@ -66,6 +66,19 @@ TEST_F(CostTest, CountsEveryKernelPositionAndSample) {
   EXPECT_LT(cost(unseen).kernels, samples);
 }
 
+// Measured: some 50 ns a pixel of a ground and 100 to 220 ns of a surface, at 6 ns a kernel.
+TEST_F(CostTest, CountsThePixelsOfGroundsAndSurfaces) {
+  constexpr double pixels = 1280 * 720;
+  protocol::View ground = view_;
+  ground.ground.show = protocol::GroundShow::on;
+  EXPECT_GE(cost(ground).kernels, cost(view_).kernels + 5 * pixels);
+  protocol::View surface = view_;
+  surface.surfaces.emplace_back();
+  surface.surfaces[0].field = medium().field;
+  surface.surfaces[0].isovalue = 0.5;
+  EXPECT_GE(cost(surface).kernels, cost(view_).kernels + samples + 20 * pixels);
+}
+
 TEST_F(CostTest, StrideReducesSamplesAndASliceLeavesOneLayer) {
   protocol::View strided = view_;
   strided.vector.stride = 4;
