@@ -5,6 +5,7 @@
 //   bench_left_out --trials=HEIGHT [--field=NAME]    what tolerances leave out of pictures of
 //   generated fields
 #include <benchmark/benchmark.h>
+#include <malloc.h>
 
 #include <array>
 #include <cstdio>
@@ -23,6 +24,7 @@
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/engine/render.hpp"
 #include "server/frame/frame.hpp"
+#include "server/ground/atlas.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
@@ -47,6 +49,7 @@ struct Feature {
   Change with;
   Change without;
   bool alike = false;  // the picture should hardly change: the difference is measured
+  bool anew = false;   // nothing of a ground is kept between frames
 };
 
 [[noreturn]] void give_up(const Error& error) {
@@ -137,12 +140,30 @@ void no_overlap(View& view) { view.vector.span = 1; }
 void flat_on(View& view) { view.camera.projection = protocol::Projection::orthographic; }
 void globe(View& view) {
   view.geometry.mapping = protocol::GeometryMapping::sphere;
-  view.ground.show = protocol::GroundShow::off;
   view.camera.eye.reset();
   view.camera.target.reset();
   view.camera.height.reset();
 }
-void opaque(View& view) { view.ground.show = protocol::GroundShow::on; }
+void grounded(View& view) { view.ground.show = protocol::GroundShow::on; }
+void bare_globe(View& view) {
+  no_lines(view);
+  no_medium(view);
+  globe(view);
+}
+Change isosurface(double opacity) {
+  return [=](View& view) {
+    protocol::SurfaceView surface;
+    surface.field = "cloud";
+    surface.isovalue = 0.5;
+    surface.opacity = opacity;
+    view.surfaces.push_back(surface);
+  };
+}
+void traced(View& view) { view.vector.trace.emplace(); }
+void region(View& view) {
+  view.region.x = {-15, 40};
+  view.region.y = {30, 70};
+}
 void one_layer(View& view) { view.geometry.slice = {protocol::GridAxis::z, 8}; }
 
 // Every wind is rendered except where omitting winds is the feature, as in the figures of the
@@ -168,7 +189,16 @@ std::vector<Feature> features() {
        then(all, no_medium)},
       {"curved lattice: globe to flat", "climate", then(all, globe), all},
       {"the far side of a globe: opaque", "climate", then(all, globe),
-       then(then(all, globe), opaque)},
+       then(then(all, globe), grounded)},
+      {"ground of a flat map", "climate", then(all, grounded), all},
+      {"ground of a flat map, painted anew", "climate", then(all, grounded), all, false, true},
+      {"ground of a globe alone", "climate", then(bare_globe, grounded), bare_globe},
+      {"ground of a globe alone, painted anew", "climate", then(bare_globe, grounded), bare_globe,
+       false, true},
+      {"an isosurface, opaque", "climate", then(all, isosurface(1)), all},
+      {"an isosurface, opacity 0.4", "climate", then(all, isosurface(0.4)), all},
+      {"streamlets: to straight lines", "tornado", then(all, traced), all},
+      {"samples outside of a region", "climate", all, then(all, region)},
       {"overlap: span 7 to 1", "climate", all, then(all, no_overlap)},
       {"every other sample: stride 2", "climate", all, then(all, stride(2))},
       {"all layers but one: a slice", "climate", all, then(all, one_layer)},
@@ -193,18 +223,41 @@ View make_view(const Feature& feature, const Change& change, protocol::MethodNam
   const auto placed = value_or_give_up(scene::place_dataset(view.geometry, dataset));
   scene::orbit(view, placed->lattice, 20, 35, 1);
   view.method.name = method;
+  view.ground.show = protocol::GroundShow::off;
   change(view);
   return value_or_give_up(scene::complete(view, dataset)).view();
 }
 
-// The report of a frame; the picture is the end of an NPY file.
-void draw_once(const View& view, data::Dataset& dataset, Half& half) {
+// Bytes of the heap that are in use.
+double heap_bytes() {
+  const struct mallinfo2 now = mallinfo2();
+  return static_cast<double>(now.uordblks) + static_cast<double>(now.hblkhd);
+}
+
+// Memory for a view and all that is kept after its second frame, without fields, which are no part
+// of the heap, and without the lines of the Earth, 5 MB once.
+double held_bytes(const View& view, const std::string& name, ThreadPool& pool) {
+  ground::atlas();
+  const double before = heap_bytes();
+  data::Dataset dataset(value_or_give_up(data::open_sample(name)), name, std::uint64_t{4} << 30U);
+  const scene::Scene scene = value_or_give_up(scene::build_scene(view, dataset));
+  engine::RenderSpace space;
+  for (int n = 0; n < 2; ++n) value_or_give_up(engine::render(scene, pool, CancelToken(), space));
+  return heap_bytes() - before;
+}
+
+// The report of a frame, with its measured error; the picture is the end of an NPY file.
+void draw_once(const View& view, const std::string& name, Half& half) {
   ThreadPool pool(1);
+  data::Dataset& dataset = dataset_of(name);
+  half.bytes = held_bytes(view, name, pool);
   frame::Encoding encoding;
   encoding.format = frame::Format::npy;
+  encoding.measure = true;
   const frame::Frame drawn =
       value_or_give_up(frame::produce(view, dataset, encoding, pool, CancelToken()));
   half.work = drawn.work;
+  half.error = drawn.error;
   half.rgba = bench::npy_values(drawn.bytes, drawn.width, drawn.height);
 }
 
@@ -225,15 +278,20 @@ double time_frame(const scene::Scene& scene, ThreadPool& pool, engine::RenderSpa
 void run_pair(benchmark::State& state, const Feature& feature, protocol::MethodName method,
               Pair& pair) {
   data::Dataset& dataset = dataset_of(feature.dataset);
+  std::array<View, 2> views;
   std::array<scene::Scene, 2> scenes;
   std::array<Half*, 2> halves{&pair.with, &pair.without};
   for (const std::size_t i : {0U, 1U}) {
     const View view = make_view(feature, i == 0 ? feature.with : feature.without, method);
-    draw_once(view, dataset, *halves[i]);
-    scenes[i] = value_or_give_up(scene::build_scene(view, dataset));
+    draw_once(view, feature.dataset, *halves[i]);
+    views[i] = view;
+  }
+  for (const std::size_t i : {0U, 1U}) {
+    scenes[i] = value_or_give_up(scene::build_scene(views[i], dataset));
   }
   ThreadPool pool(1);
   std::array<engine::RenderSpace, 2> spaces;
+  if (feature.anew) spaces[0].limit_grounds(0);
   std::size_t first = 0;
   while (state.KeepRunning()) {
     std::array<double, 2> ms{};

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,9 @@ namespace windsplat::bench {
 struct Half {
   std::vector<double> ms;
   engine::WorkReport work;
-  std::vector<float> rgba;  // linear, premultiplied
+  double bytes = 0;             // of the heap: all but fields, which are no part of it
+  std::optional<double> error;  // measured against the reference; empty: it cannot be
+  std::vector<float> rgba;      // linear, premultiplied
 };
 
 struct Pair {
@@ -69,6 +72,10 @@ inline double saved_percent(const Pair& pair) {
   return 100 * (1 - median(ratios));
 }
 
+inline std::string error_text(const Half& half) {
+  return half.error ? number("%.2g", *half.error) : "unknown";
+}
+
 inline Row cost_row(const Pair& pair) {
   const engine::WorkReport& with = pair.with.work;
   const engine::WorkReport& without = pair.without.work;
@@ -79,6 +86,8 @@ inline Row cost_row(const Pair& pair) {
           number("%.1f", median(pair.with.ms)),
           number("%.1f", median(pair.without.ms)),
           number("%.0f %%", saved_percent(pair)),
+          both("%.1f", pair.with.bytes / 1e6, pair.without.bytes / 1e6),
+          error_text(pair.with) + " / " + error_text(pair.without),
           counts(with.exponentials, without.exponentials),
           counts(with.pixel_updates, without.pixel_updates),
           fields == left ? fields : fields + " / " + left,
@@ -122,8 +131,9 @@ inline Row error_row(const Pair& pair) {
 
 // Costs of each frame, and the difference of pictures that should be equal.
 inline std::vector<Table> tables(const std::vector<Pair>& pairs) {
-  Table costs{{"omitted", "method", "with, ms", "without, ms", "saved", "exponentials, M",
-               "pixel updates, M", "fields touched", "samples, M", "kernels skipped, M"}};
+  Table costs{{"omitted", "method", "with, ms", "without, ms", "saved", "memory beside fields, MB",
+               "error", "exponentials, M", "pixel updates, M", "fields touched", "samples, M",
+               "kernels skipped, M"}};
   Table errors{{"omitted", "method", "mean at most", "stop at most", "mean", "max", "RMSE"}};
   for (const Pair& pair : pairs) {
     if (pair.with.ms.empty()) continue;
