@@ -197,7 +197,7 @@ std::string step_patch(int step) { return dump(Json{{"step", step}}); }
 std::string dataset_patch(const std::string& dataset) {
   Json patch{{"dataset", dataset}};
   for (const char* key :
-       {"step", "camera", "geometry", "vector", "scalars", "depthCue", "method"}) {
+       {"step", "difference", "camera", "geometry", "vector", "scalars", "depthCue", "method"}) {
     patch[key] = nullptr;
   }
   return dump(patch);

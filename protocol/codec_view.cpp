@@ -6,6 +6,7 @@
 #include "protocol/codec_names.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/view/codec_annotations.hpp"
+#include "protocol/view/codec_difference.hpp"
 #include "protocol/view/codec_ground.hpp"
 #include "protocol/view/codec_light.hpp"
 #include "protocol/view/codec_mark.hpp"
@@ -371,6 +372,9 @@ View read_view(const Json& document, Faults& faults) {
   const auto object = [&](const char* key, auto read, auto& out) {
     if (const Json* json = reader.child(key)) out = read(*json, reader.at(key), faults);
   };
+  if (const Json* minus = reader.child("difference", Presence::optional, Null::is_default)) {
+    view.difference = read_difference(*minus, reader.at("difference"), faults);
+  }
   object("camera", read_camera, view.camera);
   object("image", read_image, view.image);
   object("geometry", read_geometry, view.geometry);
@@ -402,6 +406,7 @@ Json view_to_json(const View& view) {
   }
   return Json{{"dataset", view.dataset},
               {"step", view.step},
+              {"difference", difference_to_json(view.difference)},
               {"camera",
                {{"projection", name_of(view.camera.projection, projection_names)},
                 {"eye", numbers_or_null(view.camera.eye)},

@@ -283,9 +283,17 @@ struct GroundView {
   bool operator==(const GroundView&) const = default;
 };
 
+// What is subtracted from the fields: those of another dataset, of another step, or both.
+struct DifferenceView {
+  std::optional<std::string> dataset;  // empty: that of the view
+  std::optional<int> step;             // empty: that of the view
+  bool operator==(const DifferenceView&) const = default;
+};
+
 struct View {
   std::string dataset;
   int step = 0;
+  std::optional<DifferenceView> difference;  // empty: fields as they are
   CameraView camera;
   ImageView image;
   GeometryView geometry;

@@ -73,12 +73,18 @@ std::string end_ahead(const scene::VectorLayer& layer) {
   return layer.mark.tail_light < 1 ? ", bright end ahead" : "";
 }
 
-std::string field_title(const data::FieldInfo* field, const std::string& name) {
+// What the values of a field are in this view.
+std::string titled(const Subject& subject, std::string name) {
+  return subject.completed.view().difference ? "difference of " + name : name;
+}
+
+std::string field_title(const Subject& subject, const data::FieldInfo* field,
+                        const std::string& name) {
   constexpr std::size_t longest = 40;  // characters that fit over a strip
   if (field == nullptr || field->long_name.empty() || field->long_name.size() > longest) {
-    return spaced(name);
+    return titled(subject, spaced(name));
   }
-  return field->long_name;
+  return titled(subject, field->long_name);
 }
 
 constexpr int strip_parts = 5;
@@ -158,7 +164,7 @@ Entry lines_entry(const Subject& subject) {
   Entry entry;
   entry.colors = colors_of(layer.color);
   entry.ticks = even_ticks(range[0], range[1], strip_parts);
-  entry.title = spaced(vector.field.name) + ": ";
+  entry.title = titled(subject, spaced(vector.field.name)) + ": ";
   using scene::LineColor;
   switch (layer.color_by) {
     case LineColor::world_z:
@@ -195,13 +201,13 @@ Entry lines_entry(const Subject& subject) {
     case LineColor::scalar: {
       const std::string name = vector.color.field.value_or("");
       const data::FieldInfo* const scalar = subject.info.find(name);
-      entry.title += field_title(scalar, name);
+      entry.title += field_title(subject, scalar, name);
       entry.units = scalar == nullptr ? std::string() : unit_text(scalar->units);
       if (layer.color_field) entry.beyond = beyond_ends(range, layer.color_field->range);
       break;
     }
     case LineColor::constant:
-      entry.title = spaced(vector.field.name);
+      entry.title = titled(subject, spaced(vector.field.name));
       entry.ticks.clear();
       break;
   }
@@ -251,7 +257,7 @@ Entry medium_entry(const Subject& subject, const scene::ScalarLayer& layer,
                    const std::string& name) {
   const data::FieldInfo* const field = subject.info.find(name);
   Entry entry;
-  entry.title = field_title(field, name);
+  entry.title = field_title(subject, field, name);
   entry.units = field == nullptr ? std::string() : unit_text(field->units);
   entry.colors = colors_of(layer.color);
   entry.ticks = even_ticks(layer.color.range[0], layer.color.range[1], strip_parts);
@@ -275,9 +281,9 @@ Entry surface_entry(const Subject& subject, const surface::Shown& shown,
   const std::string name = scene::color_field_of(view);
   const data::FieldInfo* const cut = subject.info.find(view.field);
   const data::FieldInfo* const field = subject.info.find(name);
-  const std::string cut_title = field_title(cut, view.field);
+  const std::string cut_title = field_title(subject, cut, view.field);
   Entry entry;
-  entry.title = name.empty() ? cut_title : field_title(field, name);
+  entry.title = name.empty() ? cut_title : field_title(subject, field, name);
   entry.colors = colors_of({shown.range, shown.colors});
   if (!name.empty()) {
     entry.units = unit_of(field);

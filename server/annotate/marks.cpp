@@ -188,6 +188,37 @@ void add_scale_bar(const Subject& subject, const Style& style, Figure& figure) {
               figure);
 }
 
+namespace {
+
+// Time and number of a step; empty where they tell nothing.
+std::string step_text(const data::DatasetInfo& info, std::size_t step) {
+  if (step >= info.steps.size()) return "";
+  const data::TimeStep& time = info.steps[step];
+  // The only step of data without times has the number 0 as its time, which tells nothing.
+  const bool untimed = info.steps.size() == 1 && info.time_units.empty() && time.text == "0";
+  if (untimed) return "";
+  std::string text = time_text(time.text);
+  if (info.steps.size() > 1) {
+    text += (text.empty() ? "" : "  \u00b7  ") + std::string("step ") + std::to_string(step + 1) +
+            " of " + std::to_string(info.steps.size());
+  }
+  return text;
+}
+
+std::string minus_text(const protocol::View& view, const data::DatasetInfo& info,
+                       const data::DatasetInfo& subtracted) {
+  std::string text = "minus ";
+  const bool other = view.difference->dataset.has_value();
+  // Members of an ensemble have the same title.
+  const bool titled = !subtracted.title.empty() && subtracted.title != info.title;
+  if (other) text += titled ? subtracted.title : subtracted.id;
+  const int step = view.difference->step.value_or(view.step);
+  const std::string when = step_text(subtracted, static_cast<std::size_t>(step));
+  return text + (other && !when.empty() ? "  \u00b7  " : "") + when;
+}
+
+}  // namespace
+
 void add_heading(const Subject& subject, const Style& style, Figure& figure) {
   const protocol::View& view = subject.completed.view();
   const protocol::AnnotationsView& shown = view.annotations;
@@ -206,20 +237,18 @@ void add_heading(const Subject& subject, const Style& style, Figure& figure) {
     add_if_free(Text{std::move(text), {edge, line}, size, 0, style.color, style.rim}, figure);
     line += 1.6 * style.text;
   }
-  if (!shown.step_time) return;
-  const auto step = static_cast<std::size_t>(view.step);
-  if (step >= subject.info.steps.size()) return;
-  const data::TimeStep& time = subject.info.steps[step];
-  // The only step of data without times has the number 0 as its time, which tells nothing.
-  const bool untimed =
-      subject.info.steps.size() == 1 && subject.info.time_units.empty() && time.text == "0";
-  if (untimed) return;
-  std::string text = time_text(time.text);
-  if (subject.info.steps.size() > 1) {
-    text += (text.empty() ? "" : "  \u00b7  ") + std::string("step ") + std::to_string(step + 1) +
-            " of " + std::to_string(subject.info.steps.size());
+  if (shown.step_time) {
+    const std::string text = step_text(subject.info, static_cast<std::size_t>(view.step));
+    if (!text.empty()) {
+      add_if_free(Text{text, {edge, line}, style.text, 0, style.color, style.rim}, figure);
+      line += 1.5 * style.text;
+    }
   }
-  add_if_free(Text{text, {edge, line}, style.text, 0, style.color, style.rim}, figure);
+  if (view.difference && subject.subtracted != nullptr) {
+    std::string text = fitted(minus_text(view, subject.info, *subject.subtracted), style.text,
+                              figure.width - 2 * edge);
+    add_if_free(Text{std::move(text), {edge, line}, style.text, 0, style.color, style.rim}, figure);
+  }
 }
 
 }  // namespace windsplat::annotate

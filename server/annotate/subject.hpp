@@ -13,6 +13,7 @@ struct Subject {
   const scene::CompletedView& completed;
   const scene::Scene& scene;
   const data::DatasetInfo& info;
+  const data::DatasetInfo* subtracted = nullptr;  // of a difference: the dataset subtracted
 };
 
 struct Style {

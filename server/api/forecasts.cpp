@@ -63,7 +63,7 @@ void post_forecast(tasks::Backend& backend, const http::Request& request, http::
     reply(http::problem_response(view.error()));
     return;
   }
-  const auto dataset = backend.catalogue.find(view->dataset);
+  const auto dataset = tasks::find_shown(backend.catalogue, *view);
   if (!dataset) {
     reply(http::problem_response(dataset.error()));
     return;

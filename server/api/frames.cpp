@@ -99,8 +99,8 @@ std::string ascii_json(std::string_view json) {
 // All inputs that determine the bytes of a picture.
 std::string picture_etag(const protocol::View& view, const data::Dataset& dataset,
                          const frame::Encoding& encoding) {
-  return etag_of(protocol::encode_view(view) + '\n' + dataset.info().digest + '\n' +
-                 WINDSPLAT_VERSION + '\n' + std::string(media_type(encoding.format)) + ' ' +
+  return etag_of(protocol::encode_view(view) + '\n' + dataset.digest() + '\n' + WINDSPLAT_VERSION +
+                 '\n' + std::string(media_type(encoding.format)) + ' ' +
                  std::to_string(encoding.quality));
 }
 
@@ -420,7 +420,7 @@ void post_frame(tasks::Backend& backend, access::Admission& admission, const htt
     return;
   }
   picture->cost = std::move(checked->cost);
-  auto dataset = backend.catalogue.find(picture->view.dataset);
+  auto dataset = tasks::find_shown(backend.catalogue, picture->view);
   if (!dataset) {
     reply(http::problem_response(dataset.error()));
     return;

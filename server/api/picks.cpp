@@ -162,7 +162,7 @@ void post_pick(tasks::Backend& backend, const http::Request& request, http::Repl
   }
   auto asked = read_request(backend, request);
   if (!asked) return reply(http::problem_response(asked.error()));
-  const auto dataset = backend.catalogue.find(asked->view.dataset);
+  const auto dataset = tasks::find_shown(backend.catalogue, asked->view);
   if (!dataset) return reply(http::problem_response(dataset.error()));
   run_later(backend.loads, request, std::move(reply), "a pick", dataset->get(),
             [&backend, asked = std::move(*asked), dataset = *dataset, cancel = request.cancel] {

@@ -48,7 +48,7 @@ void post_reference(tasks::Backend& backend, access::Admission& admission,
   }
   auto view = read_view(backend, request);
   if (!view) return answer(http::problem_response(view.error()));
-  const auto dataset = backend.catalogue.find(view->dataset);
+  const auto dataset = tasks::find_shown(backend.catalogue, *view);
   if (!dataset) return answer(http::problem_response(dataset.error()));
   if (auto refusal = admission.picture(request.address)) return answer(*refusal);
   tasks::Jobs::Terms terms;

@@ -251,10 +251,9 @@ Result<Reports> draw_all(const Plan& plan, protocol::View view, LimitedPictures&
 Result<void> animate(const AnimateArguments& arguments, const CancelToken& cancel) {
   const auto document = assemble_view(arguments.view);
   if (!document) return document.error();
-  const auto dataset = open_dataset(arguments.view);
-  if (!dataset) return dataset.error();
   protocol::View view = document->view();
-  view.dataset = (*dataset)->info().id;
+  const auto dataset = open_dataset(arguments.view, view);
+  if (!dataset) return dataset.error();
   const auto plan = plan_of(arguments, (*dataset)->info(), view);
   if (!plan) return plan.error();
 

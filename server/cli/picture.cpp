@@ -9,6 +9,7 @@
 #include "server/base/whole_file.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/open_store.hpp"
+#include "server/scene/difference/difference.hpp"
 
 namespace windsplat::cli {
 void add_view_options(CLI::App& command, ViewArguments& arguments) {
@@ -21,6 +22,14 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
   command.add_flag("--figure", arguments.figure,
                    "Draw box, axes, north arrow, scale bar, legend, title and time, and lines in "
                    "the colours of the legend");
+  command
+      .add_option("--minus", arguments.minus,
+                  "Draw the fields minus those of another dataset on the same grid")
+      ->type_name("DATASET");
+  command
+      .add_option("--minus-step", arguments.minus_step,
+                  "Draw the fields minus those of this step, from 0")
+      ->type_name("N");
   command.add_option("--set", arguments.settings, "Change one key of the view; may be repeated")
       ->allow_extra_args(false)
       ->type_name("/json/pointer=value");
@@ -63,6 +72,7 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
     }
     changes.emplace_back("/vector/color/trueColors", "true");
   }
+  if (!arguments.minus_step.empty()) changes.emplace_back("/difference/step", arguments.minus_step);
   for (const std::string& setting : arguments.settings) {
     const std::size_t equals = setting.find('=');
     if (equals == std::string::npos) {
@@ -101,13 +111,32 @@ frame::Encoding file_encoding(frame::Format format, const ViewArguments& argumen
   return encoding;
 }
 
-Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments) {
+Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments,
+                                                    protocol::View& view) {
   const auto limit = memory_limit(arguments.memory);
   if (!limit) return limit.error();
   auto fetcher = open_fetcher(arguments.data_hosts);
   if (!fetcher) return fetcher.error();
   // Datasets do not depend on the store.
-  return data::Store(store_options(*limit, std::move(*fetcher))).add(arguments.dataset);
+  data::Store store(store_options(*limit, std::move(*fetcher)));
+  auto dataset = store.add(arguments.dataset);
+  if (!dataset) return dataset;
+  view.dataset = (*dataset)->info().id;
+  std::shared_ptr<data::Dataset> other;
+  if (!arguments.minus.empty()) {
+    auto opened = store.add(arguments.minus);
+    if (!opened) return opened;
+    other = std::move(*opened);
+    if (!view.difference) view.difference.emplace();
+    view.difference->dataset = other->info().id;
+  } else if (view.difference && view.difference->dataset) {
+    return make_error_at(ErrorKind::invalid, "/difference/dataset",
+                         "is " + in_quotes(*view.difference->dataset) +
+                             " of a server: name the file or sample here, by --minus");
+  }
+  auto shown = scene::with_difference(view, **dataset, other.get());
+  if (!shown) return shown.error();
+  return std::make_shared<data::Dataset>(std::move(*shown));
 }
 
 }  // namespace windsplat::cli

@@ -40,10 +40,9 @@ Result<void> render(const RenderArguments& arguments) {
   }
   const auto document = assemble_view(arguments.view);
   if (!document) return document.error();
-  const auto dataset = open_dataset(arguments.view);
-  if (!dataset) return dataset.error();
   protocol::View view = document->view();
-  view.dataset = (*dataset)->info().id;
+  const auto dataset = open_dataset(arguments.view, view);
+  if (!dataset) return dataset.error();
 
   ThreadPool pool(arguments.threads);
   frame::Encoding encoding = file_encoding(*format, arguments.view);

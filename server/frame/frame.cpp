@@ -18,6 +18,7 @@
 #include "server/image/video_encoder.hpp"
 #include "server/quality/setting.hpp"
 #include "server/scene/build.hpp"
+#include "server/scene/defaults.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -308,7 +309,9 @@ Result<Prepared> prepare(const scene::CompletedView& completed, const quality::S
   if (!scene) return with_need(scene.error(), completed.view(), dataset);
   std::optional<annotate::Figure> figure;
   if (encoding.format != Format::npy && annotate::any(drawn->view().annotations)) {
-    figure = annotate::figure_of({*drawn, *scene, dataset.info()});
+    const auto minus = dataset.subtrahend();
+    figure =
+        annotate::figure_of({*drawn, *scene, dataset.info(), minus ? minus->info.get() : nullptr});
   }
   return Prepared{std::move(*drawn),
                   completed.view().image,

@@ -238,7 +238,7 @@ bool are_within_limit(const std::vector<Shown>& shown, const View& view, const L
     const std::size_t components = dataset.info().find(field)->components.size();
     levels += level_bytes(lattice, components, how);
     const std::uint64_t part = kept ? level_bytes(lattice, components, {}) : 0;
-    largest = std::max(largest, dataset.level_bytes(field, {}) + part);
+    largest = std::max(largest, dataset.loading_bytes(field) + part);
   }
   return dataset.is_within_limit(levels + largest);
 }

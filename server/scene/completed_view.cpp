@@ -15,6 +15,7 @@
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/difference/difference.hpp"
 #include "server/scene/earth/ground.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/lines/mark.hpp"
@@ -79,9 +80,9 @@ Result<void> check_color_field(const protocol::VectorColorView& color,
   return {};
 }
 
-// Numbers that follow from a field at the first step and from `arguments`: computed once, so that
-// later steps do not need the first step resident. `placed`: where it is part of the grid, they
-// follow from the samples of that part.
+// Numbers that follow from a field at the first step (step_of_defaults) and from `arguments`:
+// computed once, so that later steps do not need the first step resident. `placed`: where it is
+// part of the grid, they follow from the samples of that part.
 template <class Make>
 Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* what,
                                             const std::string& field,
@@ -97,7 +98,7 @@ Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* 
     key += data::digest_of(placed->region);
   }
   return dataset.remembered(key, [&]() -> Result<std::vector<double>> {
-    auto volume = dataset.derived(field, 0, part);
+    auto volume = dataset.derived(field, step_of_defaults(dataset), part);
     if (!volume) return volume.error();
     return make(**volume);
   });
@@ -162,9 +163,11 @@ Result<void> check_vector(const protocol::VectorView& vector) {
 }
 
 Result<Range> first_scalar_range(const data::FieldInfo& field, data::Dataset& dataset) {
-  const auto range = from_first_step(
-      dataset, "range", field.name, {},
-      [&](const data::Volume& volume) { return numbers_of(default_scalar_range(field, volume)); });
+  const auto range =
+      from_first_step(dataset, "range", field.name, {}, [&](const data::Volume& volume) {
+        return numbers_of(dataset.subtrahend() ? default_difference_range(volume)
+                                               : default_scalar_range(field, volume));
+      });
   if (!range) return range.error();
   return Range{(*range)[0], (*range)[1]};
 }
@@ -249,10 +252,12 @@ Result<void> check_extinction(const protocol::ScalarView& scalar, const std::str
 
 // Completes the style of a medium and checks it; needs no data.
 Result<void> outline_scalar(protocol::ScalarView& scalar, const std::string& pointer,
-                            const data::DatasetInfo& info) {
+                            bool difference, const data::DatasetInfo& info) {
   const auto field = find_field(info, scalar.field, data::FieldKind::scalar, pointer + "/field");
   if (!field) return field.error();
-  if (!scalar.color.map) scalar.color.map = default_map(**field, info);
+  if (!scalar.color.map) {
+    scalar.color.map = difference ? difference_map : default_map(**field, info);
+  }
   if (auto ok = check_map(*scalar.color.map, pointer + "/color/map"); !ok) return ok;
   if (auto ok = check_color_range(scalar.color.range, pointer + "/color/range"); !ok) return ok;
   return check_extinction(scalar, pointer);
@@ -266,7 +271,8 @@ Result<void> outline_scalars(View& view, const data::DatasetInfo& info) {
     }
   }
   for (std::size_t n = 0; n < view.scalars->size(); ++n) {
-    auto ok = outline_scalar((*view.scalars)[n], "/scalars/" + std::to_string(n), info);
+    auto ok = outline_scalar((*view.scalars)[n], "/scalars/" + std::to_string(n),
+                             view.difference.has_value(), info);
     if (!ok) return ok;
   }
   return {};
@@ -280,7 +286,9 @@ Result<void> complete_scalar(protocol::ScalarView& scalar, const Lattice& lattic
   if (!range) return range.error();
   if (!scalar.color.range) scalar.color.range = *range;
   if (!scalar.extinction) {
-    scalar.extinction = default_extinction(field, *range, lattice, slice, map);
+    scalar.extinction = dataset.subtrahend()
+                            ? default_difference_extinction(field, *range, lattice, slice, map)
+                            : default_extinction(field, *range, lattice, slice, map);
   }
   return {};
 }
@@ -324,7 +332,9 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
   }
   if (auto ok = check_color_field(vector.color, info); !ok) return ok.error();
   if (!vector.color.by) {
-    vector.color.by = default_color_by(info.grid, slice_of(view.geometry, lattice));
+    vector.color.by = view.difference
+                          ? ColorBy::magnitude
+                          : default_color_by(info.grid, slice_of(view.geometry, lattice));
   }
   complete_heads(vector, view.image.background);
   if (vector.trace && is_marked(vector.mark)) {
@@ -393,6 +403,7 @@ Result<CompletedView> complete(const View& view, data::Dataset& dataset) {
   View full = view;
   if (full.dataset.empty()) full.dataset = info.id;
   if (auto ok = check(full, info); !ok) return ok.error();
+  if (auto ok = check_difference(full, dataset); !ok) return ok.error();
   auto placed = place_dataset(full.geometry, dataset, full.region);
   if (!placed) return placed.error();
   const Lattice& lattice = (*placed)->lattice;
@@ -435,32 +446,6 @@ Result<ViewOutline> outline(const View& view, const data::DatasetInfo& info) {
   if (!camera) return camera.error();
   out.camera = *camera;
   return out;
-}
-
-std::vector<std::string> fields_of(const View& view, const data::DatasetInfo& info) {
-  std::vector<std::string> fields;
-  const auto add = [&](const std::string& name) {
-    const bool is_known = std::find(fields.begin(), fields.end(), name) != fields.end();
-    if (!is_known && info.find(name) != nullptr) fields.push_back(name);
-  };
-  const FieldChoice& lines = view.vector.field;
-  if (lines.kind == FieldChoice::Kind::named) add(lines.name);
-  if (lines.kind == FieldChoice::Kind::dataset_default) {
-    const data::FieldInfo* const first = default_vector(info);
-    if (first != nullptr) add(first->name);
-  }
-  if (view.vector.color.by == ColorBy::scalar && view.vector.color.field) {
-    add(*view.vector.color.field);
-  }
-  if (view.scalars) {
-    for (const protocol::ScalarView& scalar : *view.scalars) add(scalar.field);
-  } else {
-    for (const std::string& name : default_scalars(info)) add(name);
-  }
-  for (const std::string& name : surface_fields(view)) add(name);
-  if (view.geometry.height_field) add(*view.geometry.height_field);
-  for (const protocol::FilterView& filter : view.region.where) add(filter.field);
-  return fields;
 }
 
 Result<std::string> hidden_vectors(const protocol::View& view, data::Dataset& dataset) {

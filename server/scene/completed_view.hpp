@@ -75,10 +75,6 @@ struct ViewOutline {
 // Loads nothing. Errors: those of complete() that need no data.
 Result<ViewOutline> outline(const protocol::View& view, const data::DatasetInfo& info);
 
-// The fields of a dataset that a view, completed or not, may load: without duplicates, and without
-// those that do not exist. Loads nothing.
-std::vector<std::string> fields_of(const protocol::View& view, const data::DatasetInfo& info);
-
 // How many vectors of the first step the view leaves out by /vector/minMagnitude, for notes; empty:
 // less than a hundredth. Errors: those of loading the field.
 Result<std::string> hidden_vectors(const protocol::View& view, data::Dataset& dataset);

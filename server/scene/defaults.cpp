@@ -461,4 +461,30 @@ protocol::ColorBy default_color_by(const data::Grid& grid, const std::optional<S
                                                          : protocol::ColorBy::magnitude;
 }
 
+std::vector<std::string> fields_of(const protocol::View& view, const data::DatasetInfo& info) {
+  std::vector<std::string> fields;
+  const auto add = [&](const std::string& name) {
+    const bool is_known = std::find(fields.begin(), fields.end(), name) != fields.end();
+    if (!is_known && info.find(name) != nullptr) fields.push_back(name);
+  };
+  const protocol::FieldChoice& lines = view.vector.field;
+  if (lines.kind == protocol::FieldChoice::Kind::named) add(lines.name);
+  if (lines.kind == protocol::FieldChoice::Kind::dataset_default) {
+    const data::FieldInfo* const first = default_vector(info);
+    if (first != nullptr) add(first->name);
+  }
+  if (view.vector.color.by == protocol::ColorBy::scalar && view.vector.color.field) {
+    add(*view.vector.color.field);
+  }
+  if (view.scalars) {
+    for (const protocol::ScalarView& scalar : *view.scalars) add(scalar.field);
+  } else {
+    for (const std::string& name : default_scalars(info)) add(name);
+  }
+  for (const std::string& name : surface_fields(view)) add(name);
+  if (view.geometry.height_field) add(*view.geometry.height_field);
+  for (const protocol::FilterView& filter : view.region.where) add(filter.field);
+  return fields;
+}
+
 }  // namespace windsplat::scene

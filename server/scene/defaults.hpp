@@ -75,6 +75,10 @@ std::string default_map(const data::FieldInfo& field, const data::DatasetInfo& i
 // the flow; in a dataset without a vector field at least the first scalar; of a map the first.
 std::vector<std::string> default_scalars(const data::DatasetInfo& info);
 
+// The fields of a dataset that a view, completed or not, may load: without duplicates, and without
+// those that do not exist. Loads nothing.
+std::vector<std::string> fields_of(const protocol::View& view, const data::DatasetInfo& info);
+
 protocol::Range default_scalar_range(const data::FieldInfo& field, const data::Volume& volume);
 
 // Dense parts are nearly opaque through the shortest edge of the box; in a slice through its layer.

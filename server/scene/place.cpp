@@ -340,7 +340,7 @@ Result<std::shared_ptr<const Placed>> place_whole(const protocol::GeometryView& 
     auto field =
         find_field(info, *geometry.height_field, data::FieldKind::scalar, "/geometry/heightField");
     if (!field) return field.error();
-    auto values = dataset.volume(*geometry.height_field, 0);
+    auto values = dataset.minuend().volume(*geometry.height_field, 0);
     if (!values) return values.error();
     of_heights = *field;
     heights = Heights{(*field)->name, (*field)->units, std::move(*values)};

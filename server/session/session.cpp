@@ -57,10 +57,14 @@ Effects Session::on_drain(Micros now) {
 }
 
 Effects Session::on_changed(const std::string& dataset, Micros now) {
-  if (closed_ || state_.view.view().dataset != dataset) return {};
+  const auto& minus = state_.view.view().difference;
+  const bool subtracted = minus && minus->dataset == dataset;
+  const bool own = state_.view.view().dataset == dataset;
+  if (closed_ || !(own || subtracted)) return {};
   state_.displayed.forget();
   renew_view(state_, now);
   state_.prefetcher.forget();
+  if (!own) return finish(now);
   protocol::View bare;
   bare.dataset = dataset;
   const auto steps = state_.surroundings.check(bare);

@@ -75,7 +75,7 @@ std::shared_ptr<Study> begin(Backend& backend, const scene::CompletedView& compl
 void submit_calibration(Backend& backend, std::uint64_t owner, const protocol::View& view,
                         const std::shared_ptr<ViewCompletion>& completion,
                         const CancelToken& unwanted) {
-  const auto found = backend.catalogue.find(view.dataset);
+  const auto found = find_shown(backend.catalogue, view);
   if (!found) return;
   const auto run = [&backend, owner, view, completion, unwanted, dataset = *found] {
     std::shared_ptr<Study> study;

@@ -1,10 +1,13 @@
 // Describes datasets of the store and caches the descriptions.
 #include "server/tasks/catalogue.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "server/scene/completed_view.hpp"
+#include "server/scene/defaults.hpp"
 #include "server/scene/describe.hpp"
+#include "server/scene/difference/difference.hpp"
 
 namespace windsplat::tasks {
 
@@ -192,12 +195,34 @@ void Catalogue::remove(const std::string& id) {
 }
 
 Result<Catalogue::Checked> Catalogue::check(const protocol::View& view) const {
-  const auto dataset = find(view.dataset);
+  const auto dataset = find_shown(*this, view);
   if (!dataset) return dataset.error();
   const auto outline = scene::outline(view, (*dataset)->info());
   if (!outline) return outline.error();
-  return Checked{static_cast<int>((*dataset)->info().steps.size()),
-                 frame::cost_of(*outline, **dataset)};
+  if (auto ok = scene::check_difference(view, **dataset); !ok) return ok.error();
+  std::size_t steps = (*dataset)->info().steps.size();
+  if (const auto minus = (*dataset)->subtrahend(); minus && !minus->step) {
+    steps = std::min(steps, minus->info->steps.size());
+  }
+  return Checked{static_cast<int>(steps), frame::cost_of(*outline, **dataset)};
+}
+
+Result<std::shared_ptr<data::Dataset>> find_shown(const Catalogue& catalogue,
+                                                  const protocol::View& view) {
+  auto dataset = catalogue.find(view.dataset);
+  if (!dataset || !view.difference) return dataset;
+  std::shared_ptr<data::Dataset> other;
+  if (const auto& named = view.difference->dataset) {
+    auto found = catalogue.find(*named);
+    if (!found) {
+      return make_error_at(ErrorKind::not_found, "/difference/dataset",
+                           found.error().at.front().detail);
+    }
+    other = std::move(*found);
+  }
+  auto difference = scene::with_difference(view, **dataset, other.get());
+  if (!difference) return difference.error();
+  return std::make_shared<data::Dataset>(std::move(*difference));
 }
 
 Error with_dataset_name(Error error, const std::string& dataset, const std::string& field) {

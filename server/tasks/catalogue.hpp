@@ -81,7 +81,7 @@ class Catalogue {
   // Checks whether the view can be drawn, without loading. Errors: not_found (dataset), invalid
   // (with a pointer).
   struct Checked {
-    int steps = 0;  // number of steps of the dataset
+    int steps = 0;  // number of steps that can be shown
     frame::Cost cost;
   };
   [[nodiscard]] Result<Checked> check(const protocol::View& view) const;
@@ -117,6 +117,12 @@ class Catalogue {
   std::map<std::string, std::shared_ptr<Openers>> openers_;  // keyed by dataset
   mutable data::ChosenDatasets chosen_;                      // find() notes the time of use
 };
+
+// The dataset of a view, as the handle that yields its fields, which are differences if the view
+// has one. Errors: those of Catalogue::find(); not_found at /difference/dataset; those of
+// scene::with_difference().
+Result<std::shared_ptr<data::Dataset>> find_shown(const Catalogue& catalogue,
+                                                  const protocol::View& view);
 
 // An out-of-memory error extended by the name of what was being loaded; other errors are unchanged.
 Error with_dataset_name(Error error, const std::string& dataset, const std::string& field = "");

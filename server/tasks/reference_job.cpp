@@ -72,7 +72,7 @@ Result<void> in_background(Backend& backend, const DrawingOwner& owner, const Ca
 // All inputs that determine the picture and its error.
 std::string id_of(const protocol::View& completed, const data::Dataset& dataset) {
   const std::string text =
-      protocol::encode_view(completed) + '\n' + dataset.info().digest + '\n' + WINDSPLAT_VERSION;
+      protocol::encode_view(completed) + '\n' + dataset.digest() + '\n' + WINDSPLAT_VERSION;
   const std::string first = data::digest_of(text);
   return first + data::digest_of(first + text);
 }

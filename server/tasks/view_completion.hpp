@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 
 #include "server/data/resident/dataset.hpp"
 #include "server/frame/frame.hpp"
@@ -23,6 +24,7 @@ class ViewCompletion {
   struct Latest {
     protocol::View view;
     std::weak_ptr<const data::DatasetInfo> info;  // a reopened dataset has a new info
+    std::string digest;                           // also of what the view subtracts
     scene::CompletedView completed;
   };
   std::mutex mutex_;

@@ -150,9 +150,11 @@ void Viewer::start(const session::StartRender& effect, DrawnReply reply) {
   calibration_.cancel();  // the view is changing again
   const CancelToken cancel;
   running_.emplace(effect.ticket, cancel);
-  auto dataset = backend_.catalogue.find(effect.view.dataset);
+  auto dataset = find_shown(backend_.catalogue, effect.view);
   if (!dataset) return reply(effect.ticket, dataset.error());
   shown_ = backend_.catalogue.use(effect.view.dataset);
+  const auto& minus = effect.view.difference;
+  subtracted_ = minus && minus->dataset ? backend_.catalogue.use(*minus->dataset) : nullptr;
   // A final frame may be larger than the view that was checked before.
   if (const auto fits = backend_.check(effect.view); !fits) {
     return reply(effect.ticket, fits.error());
@@ -217,7 +219,7 @@ void Viewer::start(const session::Describe& effect, DescribedReply reply) {
 }
 
 void Viewer::start(const session::Prefetch& effect) {
-  const auto found = backend_.catalogue.find(effect.view.dataset);
+  const auto found = find_shown(backend_.catalogue, effect.view);
   if (effect.steps.empty() || !found) {
     cancel_prefetch();
     return;

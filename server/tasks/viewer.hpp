@@ -48,6 +48,7 @@ class Viewer {
   const std::uint64_t owner_;
   const std::string payer_;
   data::ChosenDatasets::Use shown_;               // of the dataset of the newest picture
+  data::ChosenDatasets::Use subtracted_;          // of the one that it subtracts
   std::map<std::uint64_t, CancelToken> running_;  // keyed by ticket
   std::shared_ptr<PrefetchState> requests_;       // shared with the jobs that evaluate them
   // Shared with jobs.

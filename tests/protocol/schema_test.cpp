@@ -76,12 +76,14 @@ TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
   view.scalars->front().field = "q";
   const Json without = Json::parse(encode_view(view));
   view.light = LightView{};
+  view.difference = DifferenceView{};
   view.vector.trace = TraceView{};
   const Json with_all = Json::parse(encode_view(view));
   int compared = 0;
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
     const Json::json_pointer pointer(at);
-    const bool optional = at.starts_with("/light/") || at.starts_with("/vector/trace/");
+    const bool optional = at.starts_with("/light/") || at.starts_with("/vector/trace/") ||
+                          at.starts_with("/difference/");
     const Json& encoded = optional ? with_all : without;
     if (in_sun_at(at)) return;
     if (schema.contains("default")) {
@@ -112,6 +114,7 @@ TEST(Schema, EncodedViewsHoldExactlyTheSchemasKeys) {
   view.scalars = std::vector<ScalarView>(1);
   view.scalars->front().field = "q";
   view.vector.trace = TraceView{};
+  view.difference = DifferenceView{};
   view.light = LightView{};
   view.light->sun_at = SunAtView{};
   const Json encoded = Json::parse(encode_view(view));

@@ -26,6 +26,7 @@
 #include "server/data/samples/samples.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/scene/defaults.hpp"
 #include "server/transport/server.hpp"
 #include "server/views/saved_views.hpp"
 

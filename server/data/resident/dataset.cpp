@@ -2,19 +2,10 @@
 #include "server/data/resident/dataset.hpp"
 
 #include <algorithm>
-#include <deque>
-#include <exception>
-#include <map>
-#include <mutex>
-#include <new>
 #include <utility>
 
-#include "server/base/log.hpp"
-#include "server/data/bytes/decode_limits.hpp"
 #include "server/data/model/digest.hpp"
-#include "server/data/model/packed.hpp"
-#include "server/data/resident/sizes.hpp"
-#include "server/data/resident/turnstile.hpp"
+#include "server/data/resident/dataset_state.hpp"
 
 namespace windsplat::data {
 
@@ -24,174 +15,7 @@ using VolumePtr = std::shared_ptr<const Volume>;
 
 constexpr std::size_t remembered_max = 256;
 
-Result<VolumePtr> as_volume(const Result<Resident>& kept) {
-  if (!kept) return kept.error();
-  return std::static_pointer_cast<const Volume>(*kept);
-}
-
-// Runs a function that makes a volume; exceptions become errors.
-template <class Make>
-Result<Resident> guarded(const FieldInfo& field, const Make& make) {
-  try {
-    Result<Volume> volume = make();
-    if (!volume) {
-      return volume.error();
-    }
-    return Resident(std::make_shared<const Volume>(std::move(*volume)));
-  } catch (const std::bad_alloc&) {
-    return make_error(ErrorKind::out_of_memory,
-                      "the machine has no memory left for " + in_quotes(field.name));
-  } catch (const std::exception& fault) {
-    // The text of an internal error is logged only, because it may contain source locations.
-    log::error("loading failed", {{"field", field.name}, {"fault", fault.what()}});
-    return make_error(ErrorKind::internal, "loading " + in_quotes(field.name) + " failed");
-  }
-}
-
 }  // namespace
-
-struct Dataset::State {
-  State(std::unique_ptr<Source> from, std::string id, std::shared_ptr<Budget> shared, Storage how)
-      : source(std::move(from)),
-        info(source->info()),
-        budget(std::move(shared)),
-        owner(budget->next_owner()),
-        charged(budget, Reservation::Term::lasting),
-        storage(how) {
-    info.id = std::move(id);
-    source->on_progress([this](double done) {
-      const std::lock_guard lock(mutex);
-      if (loading) loading->done = done;
-    });
-  }
-  ~State() { budget->forget(owner); }
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
-
-  // Validates field and step indices. Errors: not_found.
-  [[nodiscard]] Result<std::size_t> find(const std::string& field, std::size_t step) const {
-    const FieldInfo* found = info.find(field);
-    if (found == nullptr) {
-      return make_error(ErrorKind::not_found, "dataset " + in_quotes(info.id) + " has no field " +
-                                                  in_quotes(field) + absence_text(info, field));
-    }
-    if (step >= info.steps.size()) {
-      return make_error(ErrorKind::not_found, "dataset " + in_quotes(info.id) + " has no step " +
-                                                  std::to_string(step) + "; its last step is " +
-                                                  std::to_string(info.steps.size() - 1));
-    }
-    return static_cast<std::size_t>(found - info.fields.data());
-  }
-
-  // Bytes reserved in the limit while a field is read.
-  [[nodiscard]] std::uint64_t bytes_beside(std::uint64_t loader_bytes) const {
-    return charged.bytes() + (info.stored_bytes > 0 ? loader_bytes : 0);
-  }
-
-  [[nodiscard]] Error not_resident(std::size_t field, std::size_t step) const {
-    return make_error(ErrorKind::not_resident, in_quotes(info.fields[field].name) + " at step " +
-                                                   std::to_string(step) + " is not in memory yet");
-  }
-
-  // Reads the volume from its source, or unpacks it.
-  Result<Resident> load(std::size_t field, std::size_t step, Urgency urgency) {
-    const ResidentKey twin{owner, field, step, packed_variant};
-    if (const Resident packed = budget->find_now(twin)) {
-      add(&Counts::unpacked);
-      return guarded(info.fields[field], [&]() -> Result<Volume> {
-        return unpack(*std::static_pointer_cast<const PackedVolume>(packed));
-      });
-    }
-    auto volume = read(field, step, urgency);
-    if (volume && storage == Storage::packed16) {
-      // If the packed form does not fit too, only the volume itself is kept.
-      (void)budget->get(twin, values_of(info, field) * sizeof(std::uint16_t), Urgency::prefetch,
-                        [&] { return pack_volume(field, *volume); });
-    }
-    return volume;
-  }
-
-  Result<Resident> read(std::size_t field, std::size_t step, Urgency urgency) {
-    turnstile.enter(urgency);
-    {
-      const std::lock_guard lock(mutex);
-      if (ended) {
-        turnstile.leave();
-        return why_cancelled();
-      }
-      ++counts.loads;
-      counts.prefetched += urgency == Urgency::prefetch ? 1 : 0;
-      loading = Loading{info.fields[field].name, step, 0};
-    }
-    Reservation inputs(budget);  // of a derived field of a sample; a loader counts its own memory
-    const auto held =
-        inputs.resize(info.stored_bytes == 0 ? info.fields[field].chunk_bytes : 0, urgency);
-    auto volume = held ? guarded(info.fields[field], [&] { return source->read(field, step); })
-                       : Result<Resident>(held.error());
-    {
-      const std::lock_guard lock(mutex);
-      loading.reset();
-      if (volume) {
-        const auto& read = *std::static_pointer_cast<const Volume>(*volume);
-        seen[{field, step}] = {read.range, read.masked};
-      } else {
-        ++counts.failures;
-        if (volume.error().kind == ErrorKind::cancelled) volume = why_cancelled();
-      }
-    }
-    turnstile.leave();
-    budget->count_read(volume.has_value());
-    return volume;
-  }
-
-  // The error of a read cancelled by end(), forget() or evict(), for its callers. Called with the
-  // mutex held.
-  [[nodiscard]] Error why_cancelled() const {
-    if (ended) return make_error(ErrorKind::draining, "the server is shutting down");
-    if (forgotten) {
-      return make_error(ErrorKind::not_found,
-                        "dataset " + in_quotes(info.id) + " was removed while it was read");
-    }
-    return make_error(ErrorKind::not_resident, "the memory of dataset " + in_quotes(info.id) +
-                                                   " was released while it was read; try again");
-  }
-
-  Result<Resident> pack_volume(std::size_t field, const Resident& volume) {
-    auto packed = pack(*std::static_pointer_cast<const Volume>(volume));
-    if (!packed) {
-      return make_error(ErrorKind::invalid, "the range of values is too large for packing");
-    }
-    const std::lock_guard lock(mutex);
-    for (int c = 0; c < packed->components; ++c) {
-      errors[field] = std::max(errors[field], packed->error(c));
-    }
-    return Resident(std::make_shared<const PackedVolume>(std::move(*packed)));
-  }
-
-  void add(std::uint64_t Counts::*count) {
-    const std::lock_guard lock(mutex);
-    ++(counts.*count);
-  }
-
-  std::unique_ptr<Source> source;
-  DatasetInfo info;
-  std::shared_ptr<Budget> budget;
-  const std::uint64_t owner;
-  Reservation charged;  // memory of the info
-  const Storage storage;
-  Turnstile turnstile;  // guards the source
-
-  mutable std::mutex mutex;  // guards all members below
-  Counts counts;
-  std::optional<Loading> loading;
-  bool ended = false;
-  bool forgotten = false;
-  std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // keyed by field and step
-  std::map<std::size_t, float> errors;                       // packing errors, by field
-  std::deque<std::pair<std::string, std::vector<double>>> remembered;
-  std::string kept_key;
-  std::any kept_value;
-};
 
 Dataset::Dataset(std::unique_ptr<Source> source, std::string id, std::uint64_t bytes_max)
     : Dataset(std::move(source), std::move(id), std::make_shared<Budget>(bytes_max)) {}
@@ -205,12 +29,19 @@ const DatasetInfo& Dataset::info() const { return state_->info; }
 
 std::shared_ptr<const DatasetInfo> Dataset::shared_info() const { return {state_, &state_->info}; }
 
-Dataset Dataset::resident_only() const { return {state_, Manner::resident_only}; }
+Dataset Dataset::with(Manner manner) const {
+  Dataset out(state_, manner);
+  out.minus_ = minus_;
+  out.minus_step_ = minus_step_;
+  return out;
+}
 
-Dataset Dataset::prefetching() const { return {state_, Manner::prefetch}; }
+Dataset Dataset::resident_only() const { return with(Manner::resident_only); }
+
+Dataset Dataset::prefetching() const { return with(Manner::prefetch); }
 
 Dataset Dataset::in_turn(const CancelToken& cancel) const {
-  Dataset out(state_, Manner::in_turn);
+  Dataset out = with(Manner::in_turn);
   out.cancel_ = cancel;
   out.own_ = std::make_shared<OwnPins>();
   return out;
@@ -232,6 +63,7 @@ Result<Resident> Dataset::get(const ResidentKey& key, std::uint64_t bytes,
 Result<VolumePtr> Dataset::volume(const std::string& field, std::size_t step) {
   const Result<std::size_t> index = state_->find(field, step);
   if (!index) return index.error();
+  if (minus_) return difference(field, *index, step);
   const ResidentKey key{state_->owner, *index, step, ""};
   if (manner_ == Manner::resident_only) {
     const Resident there = state_->budget->find_now(key);
@@ -260,7 +92,7 @@ Result<VolumePtr> Dataset::derived(const std::string& field, std::size_t step,
   if (how.variant.empty()) return volume(field, step);
   const Result<std::size_t> index = state_->find(field, step);
   if (!index) return index.error();
-  const ResidentKey key{state_->owner, *index, step, how.variant};
+  const ResidentKey key{state_->owner, *index, step, variant_of(how.variant, step)};
   if (manner_ == Manner::resident_only) {
     const Resident there = state_->budget->find_now(key);
     return there ? as_volume(there) : state_->not_resident(*index, step);
@@ -309,7 +141,7 @@ Result<Resident> Dataset::auxiliary(const std::string& variant, std::uint64_t by
 }
 
 ResidentKey Dataset::auxiliary_key(const std::string& variant) const {
-  return {state_->owner, no_field, 0, variant};
+  return {state_->owner, no_field, 0, name_of_subtrahend() + variant};
 }
 
 std::uint64_t Dataset::level_bytes(const std::string& field, const Coarsening& how) const {
@@ -342,7 +174,7 @@ std::optional<ResidentKey> Dataset::key_of(const std::string& field, std::size_t
                                            const Derivation& how) const {
   const Result<std::size_t> index = state_->find(field, step);
   if (!index) return std::nullopt;
-  return ResidentKey{state_->owner, *index, step, how.variant};
+  return ResidentKey{state_->owner, *index, step, variant_of(how.variant, step)};
 }
 
 std::any Dataset::kept(const std::string& key) const {
@@ -357,7 +189,8 @@ void Dataset::keep(std::string key, std::any value) {
 }
 
 Result<std::vector<double>> Dataset::remembered(
-    const std::string& key, const std::function<Result<std::vector<double>>()>& make) {
+    const std::string& of, const std::function<Result<std::vector<double>>()>& make) {
+  const std::string key = name_of_subtrahend() + of;
   {
     const std::lock_guard lock(state_->mutex);
     for (const auto& [known, numbers] : state_->remembered) {
@@ -424,7 +257,7 @@ std::optional<Dataset::Loading> Dataset::loading() const {
 
 Result<void> Dataset::check_room(const std::vector<std::string>& fields) const {
   for (const std::string& field : fields) {
-    const std::uint64_t bytes = bytes_at_a_step(state_->info, {field});
+    const std::uint64_t bytes = loading_bytes(field);
     if (is_within_limit(bytes)) continue;
     return make_error(ErrorKind::out_of_memory, in_quotes(field) + " needs " + megabytes(bytes) +
                                                     " at a step; " + state_->budget->limit_text() +
@@ -435,7 +268,12 @@ Result<void> Dataset::check_room(const std::vector<std::string>& fields) const {
 
 std::string Dataset::beyond_limit(const std::vector<std::string>& fields) const {
   const Budget& budget = *state_->budget;
-  const std::uint64_t bytes = bytes_at_a_step(state_->info, fields);
+  std::uint64_t bytes = bytes_at_a_step(state_->info, fields);
+  std::uint64_t operands = 0;  // of the largest difference, beside all of them
+  for (const std::string& field : fields) {
+    operands = std::max(operands, loading_bytes(field) - level_bytes(field, {}));
+  }
+  bytes += operands;
   const std::uint64_t all = bytes + state_->bytes_beside(reading_bytes(state_->info, fields));
   if (all <= budget.bytes_max() || !budget.name().raised) return "";
   std::string text = "; ";

@@ -93,6 +93,24 @@ class Dataset {
   // A handle for prefetching: it gives precedence to demanded loads and does not evict volumes with
   // prefetch requests.
   [[nodiscard]] Dataset prefetching() const;
+
+  // A handle whose fields are those of this dataset minus those of `other`, at its step `step`
+  // (empty: at the same step). Differences are kept like levels, and inputs are loaded as the
+  // handle loads. Errors: invalid (different grids; `step` beyond the last).
+  [[nodiscard]] Result<Dataset> minus(const Dataset& other, std::optional<std::size_t> step) const;
+  // What a handle subtracts.
+  struct Subtrahend {
+    std::shared_ptr<const DatasetInfo> info;
+    std::optional<std::size_t> step;  // empty: the same step
+  };
+  [[nodiscard]] std::optional<Subtrahend> subtrahend() const;  // nullopt: fields are as loaded
+  // The handle without the difference.
+  [[nodiscard]] Dataset minuend() const;
+  // Changes whenever the data of the handle may have changed.
+  [[nodiscard]] std::string digest() const;
+  // Bytes of all volumes that are held at once while a field at a step is loaded; 0: no such field.
+  [[nodiscard]] std::uint64_t loading_bytes(const std::string& field) const;
+
   // Reserves `bytes` of working memory in addition to the volumes while the result exists. A handle
   // in_turn() waits for room; meanwhile others get only the room that it does not need. Errors:
   // out_of_memory, cancelled.
@@ -175,7 +193,13 @@ class Dataset {
   Dataset(std::shared_ptr<State> state, Manner manner)
       : state_(std::move(state)), manner_(manner) {}
 
+  [[nodiscard]] Dataset with(Manner manner) const;
   [[nodiscard]] Urgency urgency() const;
+  // Of a key: `variant` of the fields that the handle yields.
+  [[nodiscard]] std::string variant_of(const std::string& variant, std::size_t step) const;
+  [[nodiscard]] std::string name_of_subtrahend() const;
+  Result<std::shared_ptr<const Volume>> difference(const std::string& field, std::size_t index,
+                                                   std::size_t step);
   Result<Resident> get(const ResidentKey& key, std::uint64_t bytes, const Budget::Make& make);
   Result<std::shared_ptr<const Volume>> inputs(const std::string& field, std::size_t step,
                                                const Derivation& how,
@@ -183,6 +207,8 @@ class Dataset {
 
   std::shared_ptr<State> state_;
   Manner manner_ = Manner::demand;
+  std::shared_ptr<State> minus_;  // of the dataset that is subtracted; null: none
+  std::optional<std::size_t> minus_step_;
   std::shared_ptr<OwnPins> own_;       // for handles in_turn(): volumes they returned
   std::optional<CancelToken> cancel_;  // for handles in_turn()
 };

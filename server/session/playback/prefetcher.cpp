@@ -14,6 +14,9 @@ std::string fields_of(const protocol::View& view) {
     names += '\n';
     names += name;
   };
+  if (const auto& minus = view.difference) {
+    add(minus->dataset.value_or("") + '@' + (minus->step ? std::to_string(*minus->step) : ""));
+  }
   add(std::to_string(static_cast<int>(view.vector.field.kind)) + view.vector.field.name);
   add(view.vector.color.field.value_or(""));
   if (!view.scalars) add("default");

@@ -10,6 +10,7 @@
 
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/scene/defaults.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/place.hpp"
 #include "server/scene/region/select.hpp"

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "server/scene/defaults.hpp"
 #include "server/scene/surfaces/make_surfaces.hpp"
 #include "tests/unit/scene/fake.hpp"
 

@@ -1,0 +1,22 @@
+#include "protocol/view/codec_difference.hpp"
+
+#include "protocol/limits.hpp"
+
+namespace windsplat::protocol {
+
+DifferenceView read_difference(const Json& json, const std::string& pointer, Faults& faults) {
+  DifferenceView difference;
+  ObjectReader reader(json, pointer, faults);
+  reader.text("dataset", difference.dataset, 1);
+  reader.integer("step", difference.step, {0, limits::step_max});
+  reader.finish();
+  return difference;
+}
+
+Json difference_to_json(const std::optional<DifferenceView>& difference) {
+  if (!difference) return nullptr;
+  return Json{{"dataset", text_or_null(difference->dataset)},
+              {"step", difference->step ? Json(*difference->step) : Json(nullptr)}};
+}
+
+}  // namespace windsplat::protocol
