@@ -281,6 +281,7 @@ export class Page {
       hud: ignore,
       legend: ignore,
       gizmo: ignore,
+      beside: { follow: () => {}, suffix: "", take: (hash: string) => hash },
       probe: ignore,
       hover: { refresh: () => {} },
       panels: { build: () => (this.built += 1), refresh: () => {} },

@@ -14,6 +14,8 @@ export interface AddressHost {
   // whether playback or line motion is active; the address is updated once both have stopped
   runs(): boolean;
   restore(view: View): void; // the user has navigated to another address
+  // the second picture, which is kept behind the view
+  beside?: { readonly suffix: string; take(hash: string): string };
 }
 
 const delayMs = 400;
@@ -70,7 +72,8 @@ export class Address {
 
   // The link, and a note for the status line.
   private async linkOf(view: View): Promise<[link: string, remark: string]> {
-    const linkTo = (hash: string): string => new URL(hash, window.location.href).href;
+    const suffix = this.host.beside?.suffix ?? "";
+    const linkTo = (hash: string): string => new URL(hash + suffix, window.location.href).href;
     const href = linkTo(hashOfView(view));
     if (href.length <= linkMax) return [href, ""];
     try {
@@ -83,7 +86,7 @@ export class Address {
   }
 
   private read(begin: (view: View | null) => void): void {
-    const { hash } = window.location;
+    const hash = this.host.beside?.take(window.location.hash) ?? window.location.hash;
     const id = shortLinkId(hash);
     this.reads += 1;
     if (id !== null) {
@@ -118,7 +121,7 @@ export class Address {
 
   private write(): void {
     if (this.link !== "followed" || this.host.runs()) return;
-    const hash = hashOfView(this.host.document());
+    const hash = hashOfView(this.host.document()) + (this.host.beside?.suffix ?? "");
     if (window.location.hash !== hash) window.history.replaceState(null, "", hash);
   }
 }

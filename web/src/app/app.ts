@@ -114,6 +114,7 @@ export class App {
         document: () => this.model.state.document,
         runs: () => this.playback.running || this.flowing.running,
         restore: (view) => this.undoControl.edit(() => this.restore(view)),
+        beside: parts.beside,
       },
       parts.status,
       this.baseUri,
@@ -236,6 +237,16 @@ export class App {
 
   isFlowing(): boolean {
     return this.flowing.running;
+  }
+
+  // The address keeps more than the view.
+  saveAddress(): void {
+    this.address.edited();
+    this.address.save();
+  }
+
+  hasPicture(): boolean {
+    return this.model.drawnView() !== null;
   }
 
   copyLink(): Promise<void> {
@@ -425,6 +436,7 @@ export class App {
     this.showTime();
     this.parts.probe.show();
     this.parts.hover.refresh();
+    this.parts.beside.follow();
     const camera = this.model.camera();
     if (camera !== null) {
       this.parts.gizmo.show(camera);

@@ -1,4 +1,5 @@
 // The parts of the page that the application controller drives.
+import type { BesidePicture } from "./beside";
 import type { Cards } from "./dataset_cards";
 import type { DatasetList } from "./dataset_list";
 import type { EntryPicker } from "./entry_picker";
@@ -16,6 +17,7 @@ import type { Viewport } from "../viewport/viewport";
 export interface AppParts {
   viewport: Viewport;
   hud: Hud;
+  beside: Pick<BesidePicture, "follow" | "suffix" | "take">;
   legend: Legend;
   gizmo: Gizmo;
   panels: Panels;

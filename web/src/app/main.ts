@@ -3,8 +3,10 @@ import { drag, pan, roll, zoom, type Angles } from "../view/camera";
 import { pictureCaption } from "../view/caption";
 import { About } from "./about";
 import { App } from "./app";
+import { BesidePicture } from "./beside";
 import { Cards } from "./dataset_cards";
 import { DatasetList } from "./dataset_list";
+import { entryOf, openEntry } from "./entries";
 import { EntryPicker } from "./entry_picker";
 import { byId, make } from "../base/dom";
 import { toggleErrorMetric } from "../base/error_text";
@@ -19,6 +21,7 @@ import { Legend } from "../viewport/legend";
 import { Login } from "./login";
 import { Panels } from "../panels/panels";
 import { Probe } from "../viewport/probe";
+import { otherDatasets } from "../view/others";
 import { makeReference } from "../viewport/reference_view";
 import { saveDialog } from "../save/save_dialog";
 import { takeDrops, type FileTarget } from "../save/saved_picture";
@@ -27,14 +30,12 @@ import { TimeBar } from "./time_bar";
 import { Turn } from "../viewport/camera_turn";
 import { Viewport } from "../viewport/viewport";
 
-const app = new App(
-  {
-    setTimeout: (run, ms) => window.setTimeout(run, ms),
-    clearTimeout: (timer) => window.clearTimeout(timer),
-    random: () => Math.random(),
-  },
-  document.baseURI,
-);
+const clock = {
+  setTimeout: (run: () => void, ms: number) => window.setTimeout(run, ms),
+  clearTimeout: (timer: number) => window.clearTimeout(timer),
+  random: () => Math.random(),
+};
+const app = new App(clock, document.baseURI);
 
 const canvas = byId("picture", HTMLCanvasElement);
 const moves = new MoveQueue(app.cameras, (run) => window.requestAnimationFrame(run));
@@ -76,7 +77,27 @@ const host = {
   playing: () => app.playback.running,
   frame: () => viewport.frame,
 };
+const comparable = {
+  others: () => otherDatasets(app.dataset(), list.all),
+  openOther: async (id: string): Promise<string> => {
+    const entry = list.has(id) ? null : entryOf(id, list.all);
+    if (entry === null) return id;
+    const sleep = (ms: number) => new Promise<void>((done) => clock.setTimeout(done, ms));
+    return (await openEntry(app.api, entry, () => true, sleep))?.id ?? id;
+  },
+};
+const beside = new BesidePicture(document.baseURI, clock, {
+  ...comparable,
+  view: () => app.view(),
+  drawn: () => app.hasPicture(),
+  dataset: () => app.dataset(),
+  openView: (view) => app.openView(view),
+  edited: () => app.saveAddress(),
+});
+new PointerInput(beside.canvas, moves, () => {});
 const panels = new Panels(panelBox, host, {
+  ...comparable,
+  compare: () => beside.toggle(),
   reset: () => app.resetAll(),
   openView: (view) => app.openView(view),
   camera: () => app.cameras.camera(),
@@ -232,6 +253,7 @@ const bindings: Binding[] = [
   { keys: ["e"], shown: "e", does: "errors as RMSE or PSNR", run: toggleErrorMetric },
   { keys: ["a"], shown: "a", does: "about this dataset", run: showAbout },
   { keys: ["d"], shown: "d", does: "datasets", run: () => cards.show() },
+  { keys: ["c"], shown: "c", does: "compare: a second picture", run: () => beside.toggle() },
   { keys: ["p"], shown: "p", does: "panel", run: togglePanel },
   { keys: ["s"], shown: "s", does: "save: pictures and views", run: openSaving },
   { keys: ["?"], shown: "?", does: "this list", run: () => help.showModal() },
@@ -291,6 +313,7 @@ window.addEventListener("beforeprint", () => {
 app.start({
   viewport,
   hud,
+  beside,
   legend: new Legend(byId("legend", HTMLElement), app.maps),
   gizmo: new Gizmo(byId("gizmo", HTMLElement), lookFrom),
   probe,

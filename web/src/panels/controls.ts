@@ -239,6 +239,8 @@ export function controlStates(view: View) {
     span: lines && jitter.overlap !== false,
     pattern: lines && (jitter.center !== 0 || jitter.stride !== 0),
     motion: lines && vector.motion?.mode === "phase",
+    minusStep: (view.difference?.step ?? null) !== null,
+    minusDataset: (view.difference?.dataset ?? null) !== null,
     slab: view.method?.name === "slab",
     slice: (view.geometry?.slice ?? null) !== null,
     plane: (view.geometry?.plane ?? null) !== null,

@@ -15,6 +15,7 @@ import { errorMetric } from "../base/error_text";
 import { ForecastPlot } from "./forecast_plot";
 import { addSection, addPlace, type CameraSwitch } from "./panel_geometry";
 import { Kept, keyAccess, PanelKit, type PanelHost } from "./panel_kit";
+import { addDifference, type DifferenceActions } from "./panel_difference";
 import { addLight } from "./panel_light";
 import { addLines } from "./panel_lines";
 import { addMedia } from "./panel_media";
@@ -29,7 +30,7 @@ import { videoUse, type VideoUse } from "../view/video_setting";
 const streamBudgetMs = 33; // for streams whose view names no budget
 const firstLimit = 0.01; // initial error limit when one is switched on; linear RMSE
 
-export interface PanelActions extends CameraSwitch, FlowSwitch, PresetSwitch {
+export interface PanelActions extends CameraSwitch, FlowSwitch, PresetSwitch, DifferenceActions {
   reset(): void; // restores the dataset's defaults
   probed(): void; // the probe was moved or switched
 }
@@ -70,6 +71,7 @@ export class Panels {
     addPlace(gui, kit, this.actions);
     addLight(gui, kit);
     addTime(gui, kit, this.actions);
+    addDifference(gui, kit, this.actions);
     addQuality(gui, kit);
     kit.action(gui, "All defaults", "Everything back to the dataset's defaults", () =>
       this.actions.reset(),

@@ -317,9 +317,17 @@ export function curvePoints(points: [number, number][]): [x: number, y: number][
   ].map(([x, share]) => [x, 0.94 - 0.88 * share]);
 }
 
+// The ranges of the dataset are those of its fields, not of their differences.
+function differenceEntries(dataset: Dataset, view: View): LegendEntry[] {
+  const fields = dataset.fields.map(({ range: _range, ...field }) => field as Field);
+  const entries = legendEntries({ ...dataset, fields }, { ...view, difference: null });
+  return entries.map((entry) => ({ ...entry, title: `difference of ${entry.title}` }));
+}
+
 // Empty if the server draws the legend into the picture.
 export function legendEntries(dataset: Dataset, view: View): LegendEntry[] {
   if (view.annotations?.legend === true) return [];
+  if (view.difference) return differenceEntries(dataset, view);
   const lines = linesEntry(dataset, view);
   const media = (view.scalars ?? []).map((layer) => mediumEntry(dataset, layer));
   const surfaces = (view.surfaces ?? [])

@@ -71,3 +71,19 @@ test("the legend of a section has its own colours and its contours; unseen ones 
     ],
   );
 });
+
+test("the legend says that the values are differences, without the range of the field", () => {
+  const view = {
+    vector: { field: "wind", color: { by: "magnitude", range: [0, 1] } },
+    scalars: [],
+  } as const;
+  const dataset = described("gcm");
+  const fields = dataset.fields.map((field) => ({ ...field, range: [0, 60] }));
+  const entry = (more: object) =>
+    legendEntries({ ...dataset, fields } as never, { ...view, ...more } as never)[0]!;
+  assert.equal(entry({}).title, "wind: magnitude");
+  assert.deepEqual(entry({}).beyond, [false, true]);
+  const difference = entry({ difference: { step: 0 } });
+  assert.equal(difference.title, "difference of wind: magnitude");
+  assert.deepEqual(difference.beyond, [false, false]);
+});

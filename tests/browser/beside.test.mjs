@@ -1,0 +1,229 @@
+// Comparison on the page: two pictures with one camera and equal ranges, and differences.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { test } from "node:test";
+import {
+  choose,
+  control,
+  drag,
+  finalPicture,
+  patience,
+  sharedDaemon,
+  shot,
+  state,
+  type,
+  unfold,
+} from "./support.mjs";
+
+const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+// Records per connection the view that the server reports with each frame.
+const watchViews = () => {
+  window.reported = [];
+  const Native = window.WebSocket;
+  window.WebSocket = class extends Native {
+    constructor(...args) {
+      super(...args);
+      const views = [];
+      window.reported.push(views);
+      this.addEventListener("message", ({ data }) => {
+        if (typeof data !== "string") return;
+        const message = JSON.parse(data);
+        if (message.type === "chosen") views.push(message.view);
+      });
+    }
+  };
+};
+
+const { withPage } = sharedDaemon({
+  page: { viewport: { width: 1300, height: 640 }, initScript: [watchViews] },
+});
+
+// Waits until the second picture shows the newest view, and the first one too.
+async function bothFinal(page) {
+  await finalPicture(page);
+  await page.waitForFunction(
+    () => {
+      const { rev, wanted, state: now } = document.querySelector("#beside-picture").dataset;
+      return now === "final" && rev === wanted;
+    },
+    null,
+    { polling: 20, timeout: 20_000 * patience },
+  );
+}
+
+const compare = async (page) => {
+  await page.locator("#compare-button").click();
+  await bothFinal(page);
+};
+
+// The views that the server reported last to the two sessions.
+const views = async (page) => {
+  await bothFinal(page);
+  return page.evaluate(() => window.reported.slice(-2).map((all) => all.at(-1)));
+};
+
+const ranges = ({ vector, scalars }) => ({
+  magnitudes: vector.magnitudeRange,
+  least: vector.minMagnitude,
+  length: vector.length,
+  lines: vector.color.range,
+  media: scalars.map(({ color, extinction }) => [color.range, extinction]),
+});
+
+const dragBeside = async (page) => {
+  const box = await page.locator("#beside-picture").boundingBox();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  for (let n = 1; n <= 8; n++) await page.mouse.move(x - 12 * n, y + 4 * n);
+  await page.mouse.up();
+};
+
+test("a drag in either picture moves both cameras, as the server reports them", () =>
+  withPage(async (page) => {
+    await compare(page);
+    const [first, second] = await views(page);
+    assert.deepEqual(second.camera, first.camera);
+    assert.notEqual(second.step ?? 0, first.step ?? 0, "another step is shown at first");
+    await drag(page, 120, 30);
+    const [moved, followed] = await views(page);
+    assert.notDeepEqual(moved.camera, first.camera);
+    assert.deepEqual(followed.camera, moved.camera);
+    await dragBeside(page);
+    const [led, leader] = await views(page);
+    assert.notDeepEqual(led.camera, moved.camera);
+    assert.deepEqual(leader.camera, led.camera);
+    await shot(page, "beside");
+  }));
+
+test("both pictures have the ranges of the first, and follow its settings until unlinked", () =>
+  withPage(async (page) => {
+    await compare(page);
+    const [first, second] = await views(page);
+    assert.deepEqual(ranges(second), ranges(first));
+    await type(page, "opacity", 0.35);
+    const [changed, followed] = await views(page);
+    assert.equal(changed.vector.opacity, 0.35);
+    assert.equal(followed.vector.opacity, 0.35);
+    await page.locator("#beside-linked").uncheck();
+    await type(page, "opacity", 0.9);
+    await drag(page, 60, 0);
+    const [own, kept] = await views(page);
+    assert.equal(own.vector.opacity, 0.9);
+    assert.equal(kept.vector.opacity, 0.35, "its own settings");
+    assert.deepEqual(kept.camera, own.camera, "the camera stays linked");
+    await page.locator("#beside-linked").check();
+    assert.equal((await views(page))[1].vector.opacity, 0.9);
+  }));
+
+test("step and swap, by keyboard alone; the way out gives the room and the focus back", () =>
+  withPage(async (page) => {
+    const width = () => page.locator("#picture").evaluate(({ clientWidth }) => clientWidth);
+    const alone = await width();
+    await page.locator("#picture").focus();
+    await page.keyboard.press("c");
+    await bothFinal(page);
+    assert.ok((await width()) < 0.6 * alone);
+    assert.equal(await page.evaluate(() => document.activeElement.id), "beside-dataset");
+    await page.keyboard.press("Tab");
+    await page.keyboard.type("3");
+    await page.keyboard.press("Enter");
+    assert.equal((await views(page))[1].step, 2, "counted from 1");
+    const before = (await views(page))[0].step ?? 0;
+    await page.keyboard.press("Tab");
+    await page.keyboard.press("Tab");
+    await page.keyboard.press("Enter"); // Swap
+    await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "2");
+    assert.equal((await views(page))[1].step ?? 0, before);
+    await page.locator("#beside-step").fill("");
+    await page.keyboard.press("Enter");
+    assert.equal((await views(page))[1].step, 2, "the step of the first picture");
+    await page.locator("#beside-close").press("Enter");
+    assert.equal(await page.locator("#beside").isVisible(), false);
+    assert.equal(await page.evaluate(() => document.activeElement.id), "compare-button");
+    assert.equal(await width(), alone);
+  }));
+
+test("the address keeps the comparison", () =>
+  withPage(async (page) => {
+    await compare(page);
+    await page.locator("#beside-step").fill("2");
+    await page.keyboard.press("Enter");
+    const [, second] = await views(page);
+    await page.waitForFunction(() => window.location.hash.includes("&beside="));
+    await page.waitForTimeout(600); // the address is written with a delay
+    await page.reload();
+    await bothFinal(page);
+    const [, again] = await views(page);
+    assert.deepEqual(again, second);
+    await page.locator("#beside-close").click();
+    await page.waitForFunction(() => !window.location.hash.includes("&beside="));
+  }));
+
+test("another dataset whose fields differ says so, and the first picture stays", () =>
+  withPage(
+    async (page) => {
+      await compare(page);
+      const other = (await state(page)).seq;
+      await page.locator("#beside-dataset").selectOption("efield");
+      await page.waitForFunction(() =>
+        document.querySelector("#beside-words").classList.contains("refused"),
+      );
+      assert.match(await page.locator("#beside-words").textContent(), /field/);
+      assert.equal((await state(page)).seq, other);
+      await page.locator("#beside-dataset").selectOption({ index: 0 });
+      await bothFinal(page);
+    },
+    { faulty: true },
+  ));
+
+for (const [name, viewport] of [
+  ["wide", { width: 1300, height: 640 }],
+  ["narrow", { width: 800, height: 800 }],
+  ["phone", { width: 390, height: 844 }],
+]) {
+  test(`both pictures have room and axe finds nothing: ${name}`, () =>
+    withPage(
+      async (page) => {
+        await compare(page);
+        const box = (id) => page.locator(id).boundingBox();
+        const [first, second] = [await box("#picture"), await box("#beside-picture")];
+        assert.ok(first.width > 200 && first.height > 120, JSON.stringify(first));
+        assert.ok(Math.abs(second.width - first.width) <= 2, JSON.stringify([first, second]));
+        assert.ok(Math.abs(second.height - first.height) <= 2, JSON.stringify([first, second]));
+        if (name === "wide") assert.ok(second.x >= first.x + first.width - 1, "beside it");
+        else assert.ok(second.y >= first.y + first.height - 1, "below it");
+        const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+        assert.ok(wide <= viewport.width, "nothing is cut off");
+        await page.evaluate(axe);
+        const found = await page.evaluate(() => window.axe.run(document));
+        assert.deepEqual(
+          found.violations.map(({ id, nodes }) => [id, ...nodes.map(({ target }) => target)]),
+          [],
+        );
+        await shot(page, `beside-${name}`);
+      },
+      { viewport },
+    ));
+}
+
+test("the panel subtracts another step, and the legend says so", () =>
+  withPage(async (page) => {
+    await unfold(page, "Compare");
+    await page.keyboard.press("]");
+    await choose(page, "subtract", /a step/);
+    await finalPicture(page);
+    const shown = await page.evaluate(() => window.reported.at(-1).at(-1));
+    assert.equal(shown.difference.step, 0);
+    const [low, high] = shown.scalars[0].color.range;
+    assert.equal(low, -high);
+    assert.match(await page.locator("#legend").textContent(), /difference of/);
+    await shot(page, "difference");
+    await control(page, "subtract").selectOption({ label: "nothing" });
+    await finalPicture(page);
+    const after = await page.evaluate(() => window.reported.at(-1).at(-1));
+    assert.equal(after.difference ?? null, null);
+    assert.doesNotMatch(await page.locator("#legend").textContent(), /difference/);
+  }));

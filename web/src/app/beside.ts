@@ -1,0 +1,265 @@
+// The second picture beside the first: a session of its own whose view follows that of the first,
+// except for its dataset and step. What the user chooses in its bar -> its view -> its picture.
+import { anglesOf, distanceOf, type Camera } from "../view/camera";
+import { besideSuffix, besideView, takeBeside, type Beside } from "../view/beside";
+import { ViewState } from "../view/view_state";
+import { byId } from "../base/dom";
+import { pictureCaption } from "../view/caption";
+import type { Clock, Connection } from "../wire/connection";
+import type { Dataset, FrameHeader, ServerMessage, View } from "../wire/protocol";
+import { problemText } from "../wire/requests";
+import { Viewport } from "../viewport/viewport";
+import { PatchAnswers } from "./patch_answers";
+import { openConnection, watchPresence } from "./server_link";
+
+export interface BesideHost {
+  view(): View; // of the first picture, with all known values
+  drawn(): boolean; // whether the first picture has been drawn
+  dataset(): Dataset; // of the first picture
+  others(): Map<string, string>; // datasets that may be shown beside it: id -> text
+  openOther(id: string): Promise<string>; // opens an entry that is not listed; its id
+  openView(view: View): void; // shows another view in the first picture
+  edited(): void; // what the address keeps has changed
+}
+
+const same = ""; // the dataset of the first picture
+
+export class BesidePicture {
+  readonly canvas = byId("beside-picture", HTMLCanvasElement);
+  private readonly section = byId("beside", HTMLElement);
+  private readonly datasets = byId("beside-dataset", HTMLSelectElement);
+  private readonly step = byId("beside-step", HTMLInputElement);
+  private readonly linked = byId("beside-linked", HTMLInputElement);
+  private readonly words = byId("beside-words", HTMLElement);
+  private readonly button = byId("compare-button", HTMLButtonElement);
+  private readonly viewport: Viewport;
+  private readonly connection: Connection;
+  private state = new ViewState();
+  private answers = new PatchAnswers(this.state);
+  private shows: Beside | null = null;
+  private own: View | null = null; // settings that do not follow the first picture
+  private running = false;
+  private caption = "";
+  private sent = ""; // the view sent last, as text; a refused one is not sent again
+
+  constructor(
+    baseUri: string,
+    clock: Clock,
+    private readonly host: BesideHost,
+  ) {
+    this.viewport = new Viewport(this.canvas, {
+      decoded: ({ seq }, decodeMs) => this.acknowledge(seq, decodeMs),
+      drawn: ({ header }) => this.onDrawn(header),
+      broken: ({ seq }) => this.acknowledge(seq, 0),
+      videoFailed: () => {}, // no video is asked for
+      resized: () => this.follow(),
+    });
+    this.connection = openConnection(baseUri, clock, {
+      state: ({ name }) => (this.section.dataset.connection = name),
+      hello: ({ limits }) => {
+        this.viewport.newSession(limits.imagePixelsMax);
+        this.state = new ViewState();
+        this.answers = new PatchAnswers(this.state);
+        this.sent = "";
+        this.sendVisibility();
+        this.follow();
+      },
+      message: (message) => this.onMessage(message),
+      frame: (frame) => {
+        this.viewport.show(frame).catch(() => this.acknowledge(frame.header.seq, 0));
+      },
+    });
+    watchPresence(this.connection, () => this.sendVisibility());
+    this.datasets.addEventListener("change", () => this.choose(this.datasets.value));
+    this.step.addEventListener("change", () => this.chooseStep(this.step.value));
+    this.linked.addEventListener("change", () => {
+      this.own = this.linked.checked ? null : this.state.document;
+      this.follow();
+    });
+    byId("beside-swap", HTMLButtonElement).addEventListener("click", () => this.swap());
+    byId("beside-close", HTMLButtonElement).addEventListener("click", () => this.show(null));
+    this.button.addEventListener("click", () => this.toggle());
+  }
+
+  // --- the page's address ----------------------------------------------------------------
+
+  get suffix(): string {
+    return besideSuffix(this.shows);
+  }
+
+  // Shows what the address keeps; returns its rest.
+  take(hash: string): string {
+    const [rest, beside] = takeBeside(hash);
+    this.show(beside);
+    return rest;
+  }
+
+  // --- what it shows ---------------------------------------------------------------------
+
+  toggle(): void {
+    if (this.shows !== null) {
+      this.show(null);
+      return;
+    }
+    if (!this.host.drawn()) return;
+    // At first another step, if there is one; otherwise another dataset.
+    const { count } = this.host.dataset().steps;
+    const now = this.host.view().step ?? 0;
+    const [other] = this.host.others().keys();
+    this.show(count > 1 ? { step: now > 0 ? 0 : count - 1 } : {});
+    if (count <= 1 && other !== undefined) this.choose(other);
+    this.datasets.focus();
+  }
+
+  private show(beside: Beside | null): void {
+    if (beside === null && this.shows === null) return;
+    const hadFocus = this.section.contains(document.activeElement);
+    this.shows = beside;
+    this.section.hidden = beside === null;
+    this.button.setAttribute("aria-pressed", String(beside !== null));
+    document.documentElement.classList.toggle("comparing", beside !== null);
+    if (beside === null) {
+      this.own = null;
+      this.linked.checked = true;
+      this.running = false;
+      this.connection.stop();
+      this.words.textContent = "";
+      if (hadFocus) this.button.focus();
+    }
+    this.follow();
+    this.host.edited();
+  }
+
+  private choose(id: string): void {
+    this.words.textContent = "";
+    if (id === same) {
+      this.show({ ...this.shows, dataset: undefined });
+      return;
+    }
+    this.host.openOther(id).then(
+      (dataset) => {
+        if (this.shows !== null) this.show({ ...this.shows, dataset });
+      },
+      (failure: unknown) => (this.words.textContent = String((failure as Error).message)),
+    );
+  }
+
+  private chooseStep(text: string): void {
+    const counted = Number(text);
+    const step = text.trim() === "" || !(counted >= 1) ? undefined : Math.round(counted) - 1;
+    this.show({ ...this.shows, step });
+  }
+
+  // The first picture shows what this one shows, and the other way round.
+  private swap(): void {
+    if (this.shows === null) return;
+    const { dataset = undefined, step = undefined } = this.shows;
+    const first = this.host.view();
+    const { image: _image, ...settings } = first;
+    this.show({
+      ...(dataset === undefined ? {} : { dataset: first.dataset }),
+      ...(step === undefined ? {} : { step: first.step ?? 0 }),
+    });
+    this.host.openView({
+      ...settings,
+      dataset: dataset ?? first.dataset,
+      step: step ?? first.step ?? 0,
+    });
+  }
+
+  // The first picture, or this one's place, has changed.
+  follow(): void {
+    if (this.shows === null || !this.host.drawn()) return;
+    if (!this.running) {
+      this.running = true;
+      this.connection.start();
+    }
+    this.writeBar();
+    if (!this.connection.live || !this.connection.ready) return;
+    const next = besideView(this.host.view(), this.shows, this.viewport.size(), this.own);
+    const text = JSON.stringify(next);
+    if (text === this.sent) return;
+    this.sent = text;
+    for (const { rev, patch } of this.state.replace(next)) {
+      this.connection.send({ type: "patch", rev, t: performance.now(), patch });
+    }
+    this.canvas.dataset.wanted = String(this.state.rev);
+  }
+
+  private writeBar(): void {
+    const { dataset = same, step } = this.shows!;
+    const others = this.host.others();
+    if (dataset !== same && !others.has(dataset)) others.set(dataset, dataset);
+    const options = [[same, "same dataset"], ...others].map(([id, text]) => `${id}\n${text}`);
+    if (this.datasets.dataset.options !== options.join("\n\n")) {
+      this.datasets.dataset.options = options.join("\n\n");
+      this.datasets.replaceChildren(
+        new Option("same dataset", same),
+        ...[...others].map(([id, text]) => new Option(text, id)),
+      );
+    }
+    this.datasets.value = dataset;
+    if (document.activeElement !== this.step) {
+      this.step.value = step === undefined ? "" : String(step + 1);
+    }
+  }
+
+  // --- the server ------------------------------------------------------------------------
+
+  private onMessage(message: ServerMessage): void {
+    if (message.type === "chosen") this.answers.onChosen(message);
+    if (message.type === "unchanged") {
+      this.answers.onUnchanged(message);
+      this.settleUnchanged();
+    }
+    if (message.type !== "error") return;
+    this.words.textContent = problemText(message.problem);
+    this.words.classList.add("refused");
+    if (message.rev !== undefined) this.answers.refuse(message.rev);
+  }
+
+  private onDrawn(header: FrameHeader): void {
+    const chosen = this.answers.drawn(header);
+    if (chosen !== null && this.answers.isAfterRefusal(header.rev)) {
+      const view = chosen.view as View;
+      this.caption = this.captionOf(view, header.step);
+      this.showCaption();
+      const camera = view.camera as Camera;
+      const { azimuth, elevation } = anglesOf(camera);
+      // As the server drew it.
+      this.canvas.dataset.azimuth = azimuth.toFixed(1);
+      this.canvas.dataset.elevation = elevation.toFixed(1);
+      this.canvas.dataset.distance = distanceOf(camera).toFixed(4);
+    }
+    this.settleUnchanged();
+    this.follow(); // changes that had to wait
+  }
+
+  // The picture shown is the answer to the newest patch.
+  private settleUnchanged(): void {
+    const rev = this.answers.settleUnchanged();
+    if (rev === null || !this.answers.isAfterRefusal(rev)) return;
+    this.canvas.dataset.rev = String(Math.max(rev, Number(this.canvas.dataset.rev)));
+    this.showCaption();
+  }
+
+  private showCaption(): void {
+    this.words.classList.remove("refused");
+    this.words.textContent = this.caption;
+  }
+
+  private captionOf({ dataset = "" }: View, step: number): string {
+    const first = this.host.dataset();
+    if (dataset === first.id) return pictureCaption(first, step);
+    return `${this.host.others().get(dataset) ?? dataset} · step ${step + 1}`;
+  }
+
+  private acknowledge(seq: number, decodeMs: number): void {
+    this.connection.send({ type: "ack", seq, decodeMs });
+  }
+
+  private sendVisibility(): void {
+    if (!document.hidden) this.connection.wake();
+    this.connection.send({ type: "visibility", hidden: document.hidden });
+  }
+}
