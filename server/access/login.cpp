@@ -11,6 +11,7 @@
 
 #include "server/base/check.hpp"
 #include "server/base/log.hpp"
+#include "server/http/framing.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 
@@ -88,6 +89,35 @@ http::Response login_page(const std::string& base_path, std::string_view message
   return response;
 }
 
+// In a frame there is no login: a foreign page around it could lead a user to type the token into a
+// form of its own, and browsers neither store nor send the cookie there.
+constexpr std::string_view frame_script = "document.links[0].hash=location.hash";
+
+http::Response frame_page(const std::string& base_path, const std::vector<std::string>& embedders) {
+  static const std::string policy = "default-src 'none'; style-src " + policy_hash(style) +
+                                    "; script-src " + policy_hash(frame_script) +
+                                    "; img-src data:; base-uri 'none'; form-action 'none'; ";
+  http::Response response;
+  response.status = 401;
+  response.content_type = "text/html; charset=utf-8";
+  response.headers = {{"Cache-Control", "no-store"},
+                      {"Content-Security-Policy", policy + http::frame_ancestors(embedders)}};
+  add_challenge(response, false);
+  std::string html =
+      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+      "<link rel=\"icon\" href=\"data:,\"><title>windsplat: not shown here</title><style>";
+  html += style;
+  html +=
+      "</style></head><body><main><p role=\"alert\">This picture needs a login, which browsers do "
+      "not pass on to frames of other sites.</p><p><a target=\"_blank\" rel=\"noopener\" href=\"";
+  html += base_path + "\">Open in windsplat</a></p></main><script>";
+  html += frame_script;
+  html += "</script></body></html>\n";
+  response.body = http::Body::of(std::move(html));
+  return response;
+}
+
 bool wants_page(const http::Request& request) {
   if (request.method != "GET" && request.method != "HEAD") return false;
   constexpr std::array<std::string_view, 2> offers{"application/problem+json", "text/html"};
@@ -133,7 +163,8 @@ std::string posted_token(const std::string& body) {
 }  // namespace
 
 http::Response turned_away(Verdict verdict, const http::Request& request,
-                           const std::string& base_path) {
+                           const std::string& base_path,
+                           const std::vector<std::string>& embedders) {
   switch (verdict) {
     case Verdict::token_in_url:
       return http::problem_response(400, "Bad Request",
@@ -155,7 +186,11 @@ http::Response turned_away(Verdict verdict, const http::Request& request,
       break;
   }
   const bool wrong = verdict == Verdict::wrong_token;
-  if (wants_page(request)) return login_page(base_path, "", wrong);
+  if (wants_page(request)) {
+    const bool framed = http::is_in_frame(request) && http::asks_embedded(request);
+    return framed && !embedders.empty() ? frame_page(base_path, embedders)
+                                        : login_page(base_path, "", wrong);
+  }
   http::Response response = http::problem_response(
       401, "Unauthorized",
       wrong ? "invalid token" : "a token is required: Authorization: Bearer TOKEN");

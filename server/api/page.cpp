@@ -7,6 +7,7 @@
 #include "server/api/resources.hpp"
 #include "server/api/web_assets.hpp"
 #include "server/base/check.hpp"
+#include "server/http/framing.hpp"
 #include "server/http/negotiate.hpp"
 
 namespace windsplat::api {
@@ -15,8 +16,15 @@ namespace {
 constexpr const char* page_policy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
     "font-src 'self'; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action "
-    "'none'; frame-ancestors 'self'";
+    "'none'; ";
 constexpr const char* immutable_policy = "public, max-age=31536000, immutable";
+
+// Other sites may show the embedded view only: the whole page could be made to act by clicks that
+// its user believes to be on theirs.
+std::string policy_for(const std::vector<std::string>& embedders, const http::Request& request) {
+  const bool embedded = http::asks_embedded(request);
+  return page_policy + http::frame_ancestors(embedded ? embedders : std::vector<std::string>());
+}
 
 std::string_view as_text(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -83,7 +91,8 @@ const WebAsset* find_asset(const std::string& path) {
 
 bool has_page(const std::string& path) { return find_asset(path) != nullptr; }
 
-http::Response get_page(const http::Request& request, const std::string& path) {
+http::Response get_page(const std::vector<std::string>& embedders, const std::string& path,
+                        const http::Request& request) {
   const WebAsset* asset = find_asset(path);
   WINDSPLAT_CHECK(asset != nullptr);
   const bool gzip = http::accepts_gzip(request.header("Accept-Encoding"));
@@ -96,7 +105,7 @@ http::Response get_page(const http::Request& request, const std::string& path) {
                       {"Vary", "Accept-Encoding"},
                       // Headers of a 304 replace the cached ones, so the policy is sent with it
                       // too.
-                      {"Content-Security-Policy", page_policy},
+                      {"Content-Security-Policy", policy_for(embedders, request)},
                       {"Cross-Origin-Opener-Policy", "same-origin"}};
   if (http::matches_etag(request.header("If-None-Match"), etag)) {
     response.status = 304;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/access/admission.hpp"
 #include "server/api/server_options.hpp"
@@ -89,7 +90,9 @@ void delete_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const s
 
 // An embedded file of the page; `path` as in web_assets().
 bool has_page(const std::string& path);
-http::Response get_page(const http::Request& request, const std::string& path);
+// `embedders`: other origins that may show the embedded view in a frame (http/framing.hpp).
+http::Response get_page(const std::vector<std::string>& embedders, const std::string& path,
+                        const http::Request& request);
 
 // A JSON response.
 http::Response json_response(std::string json);

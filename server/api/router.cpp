@@ -45,12 +45,12 @@ bool matches(std::string_view path, const Segments& given, PathValues& values) {
 }
 
 // Files of the page. Links to them may have query parameters added by other sites.
-const Route& page_route() {
-  static const Route route{"GET", "",
-                           [](const PathValues& values, const http::Request& request,
-                              const http::Reply& reply) { reply(get_page(request, values[0])); },
-                           Query::taken};
-  return route;
+Route page_route(const std::vector<std::string>& embedders) {
+  return {
+      "GET", "",
+      [&embedders](const PathValues& values, const http::Request& request,
+                   const http::Reply& reply) { reply(get_page(embedders, values[0], request)); },
+      Query::taken};
 }
 
 std::string page_file(const Segments& path) {
@@ -102,10 +102,11 @@ struct Router::Resource {
   }
 };
 
-Router::Router(std::vector<Route> routes, const std::string& base_path,
+Router::Router(std::vector<Route> routes, const ServerOptions& options,
                access::Admission& admission, const std::atomic<bool>& draining)
     : routes_(std::move(routes)),
-      base_path_(base_path),
+      page_(page_route(options.embedders)),
+      base_path_(options.base_path),
       admission_(admission),
       draining_(draining) {}
 
@@ -122,7 +123,7 @@ std::optional<Router::Resource> Router::find(const http::Request& request) const
   if (!found.routes.empty()) return found;
   std::string file = page_file(request.path);
   if (!request.below_base || !has_page(file)) return std::nullopt;
-  return Resource{route_page, {&page_route()}, {std::move(file)}};
+  return Resource{route_page, {&page_}, {std::move(file)}};
 }
 
 void Router::answer(const http::Request& request, const std::optional<Resource>& resource,

@@ -17,8 +17,8 @@ bool names_stream(const http::Request& request);
 
 class Router {
  public:
-  // While `draining` only health is answered.
-  Router(std::vector<Route> routes, const std::string& base_path, access::Admission& admission,
+  // While `draining` only health is answered. The references outlive the router.
+  Router(std::vector<Route> routes, const ServerOptions& options, access::Admission& admission,
          const std::atomic<bool>& draining);
 
   // Whether the path is answered under any load: /livez, /readyz, /metrics.
@@ -36,6 +36,7 @@ class Router {
               const http::Reply& reply) const;
 
   const std::vector<Route> routes_;
+  const Route page_;  // files of the page
   const std::string& base_path_;
   access::Admission& admission_;
   const std::atomic<bool>& draining_;

@@ -44,7 +44,9 @@ struct ServerOptions {
   double requests_waiting_ms_max = 30'000;
   // Of the grounds that the renderer keeps between frames.
   std::uint64_t ground_bytes = std::uint64_t{64} << 20;
-  std::vector<std::string> allow_origins;      // besides the origin of the server
+  std::vector<std::string> allow_origins;  // besides the origin of the server
+  // Other origins whose pages may show the embedded view in a frame (http/framing.hpp).
+  std::vector<std::string> embedders;
   std::shared_ptr<const access::Token> token;  // null: no authentication
   std::shared_ptr<transport::TlsContext> tls;  // null: plain TCP
   // Phases of a drain: when rendering is cancelled, and when connections are closed.

@@ -50,6 +50,14 @@ void add_network_options(CLI::App& command, ServeArguments& arguments) {
       ->allow_extra_args(false)
       ->delimiter(',')
       ->type_name("NAME");
+  command
+      .add_option("--allow-embed", arguments.embedders,
+                  "Web origin whose pages may show the embedded view (?embed) in a frame, such as "
+                  "https://site.example; may be repeated")
+      ->envname("WINDSPLAT_ALLOW_EMBED")
+      ->allow_extra_args(false)
+      ->delimiter(',')
+      ->type_name("ORIGIN");
   command.add_option("--max-sessions", arguments.sessions, "Concurrent sessions")
       ->envname("WINDSPLAT_MAX_SESSIONS")
       ->check(CLI::Range(1, sessions_max))

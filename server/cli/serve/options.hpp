@@ -32,6 +32,7 @@ struct ServeArguments {
   int sessions = protocol::limits::sessions_max_default;
   std::vector<std::string> origins;
   std::vector<std::string> hosts;
+  std::vector<std::string> embedders;
   int idle_timeout_s = 300;
   std::string log_format = "text";
   std::string log_level = "info";

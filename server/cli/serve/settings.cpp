@@ -19,6 +19,7 @@
 #include "server/cli/serve/config_file.hpp"
 #include "server/cli/serve/listen_address.hpp"
 #include "server/cli/settings_file.hpp"
+#include "server/http/framing.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -113,11 +114,19 @@ Result<void> check_host_names(const std::vector<std::string>& names) {
                                               "' is not a host name such as winds.example");
 }
 
+Result<void> check_embedders(const std::vector<std::string>& origins) {
+  const auto bad = std::find_if_not(origins.begin(), origins.end(), http::is_embedder);
+  if (bad == origins.end()) return {};
+  return make_error(ErrorKind::malformed, "--allow-embed '" + printable(*bad) +
+                                              "' is not an origin such as https://site.example");
+}
+
 Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   const auto listen = parse_listen_address(arguments.listen);
   if (!listen) return listen.error();
   if (const auto ok = check_exposure(arguments, listen->loopback); !ok) return ok.error();
   if (const auto ok = check_host_names(arguments.hosts); !ok) return ok.error();
+  if (const auto ok = check_embedders(arguments.embedders); !ok) return ok.error();
   if (!is_base_path(arguments.base_path)) {
     return make_error(ErrorKind::malformed, "--base-path '" + printable(arguments.base_path) +
                                                 "' is not of the form /windsplat/");
@@ -153,6 +162,7 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   options.ground_bytes = ground_bytes_of(*limit);
   options.limits = arguments.limits;
   options.allow_origins = arguments.origins;
+  options.embedders = arguments.embedders;
   return options;
 }
 
@@ -192,6 +202,10 @@ void warn_of(const ServeSettings& settings) {
       options.tls != nullptr ? transport::expensive_handshakes(*options.tls) : "";
   if (!expensive.empty()) {
     log::warn("TLS handshakes are expensive", {{"file", arguments.tls_cert}, {"fault", expensive}});
+  }
+  if (options.token != nullptr && !options.embedders.empty()) {
+    log::warn("frames of other sites get no picture: browsers keep the login out of them",
+              {{"allow-embed", options.embedders.front()}});
   }
   if (!options.local_hosts_only && options.token != nullptr && options.tls == nullptr) {
     log::warn("the token is sent unencrypted: use --tls-cert or a proxy with TLS",

@@ -49,7 +49,7 @@ std::optional<http::Response> check_access(const api::ServerOptions& options,
       access::judge(request, upgrade, token, options.allow_origins, std::time(nullptr), secure);
   if (verdict == access::Verdict::wrong_token) admission.failed_login(request.address);
   if (verdict != access::Verdict::allowed)
-    return access::turned_away(verdict, request, options.base_path);
+    return access::turned_away(verdict, request, options.base_path, options.embedders);
   if (token != nullptr && !health && !access::is_login(request)) {
     admission.authenticated(request.address);
   }

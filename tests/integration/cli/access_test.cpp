@@ -420,6 +420,25 @@ TEST_F(CliAccess, NonLoopbackWithoutTokenAnswersOnlyKnownHostNames) {
   }
 }
 
+TEST_F(CliAccess, EmbeddersAreOriginsAndNothingElse) {
+  const auto policy = [](Process& daemon) {
+    return server_test::get(port_of(daemon), "/?embed").header("content-security-policy");
+  };
+  Process daemon(serve({"--allow-embed", "https://a.example,http://localhost:8080"}));
+  EXPECT_THAT(policy(daemon), HasSubstr("'self' https://a.example http://localhost:8080"));
+  for (const char* bad :
+       {"a.example", "https://", "https://*", "https://a.example/", "https://a.example/page",
+        "https://a.example:", "https://a.example:0", "https://a.example:65536", "ftp://a.example",
+        "https://a.example; script-src *", "https://a.example\r\nX: y", "*", "'self'"}) {
+    const Outcome outcome = refused({"--allow-embed", bad});
+    EXPECT_EQ(outcome.code, 2) << bad;
+    EXPECT_THAT(outcome.err, HasSubstr("--allow-embed")) << bad;
+  }
+  const std::string file = secret("token", first_token);
+  Process guarded(serve({"--token-file", file, "--allow-embed", "https://a.example"}));
+  EXPECT_TRUE(says(guarded, "frames of other sites get no picture"));
+}
+
 TEST_F(CliAccess, SighupBeforeStartupIsHandled) {
   const std::string file = secret("token", first_token);
   const std::string large = folder.file("large.nc");

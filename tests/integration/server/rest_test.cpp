@@ -13,6 +13,7 @@
 namespace server_test {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -393,6 +394,27 @@ TEST_F(Rest, FullQueueGets429AtOnce) {
 }
 
 // --- the page -----------------------------------------------------------------------------------
+
+// The whole page could be made to act by clicks into a frame, so others may show the embedded
+// view only.
+TEST(Embedding, IsForTheEmbeddedViewAndTheOriginsThatAreNamed) {
+  const auto policy = [](const TestServer& server, const std::string& target) {
+    return get(server.port(), target).header("content-security-policy");
+  };
+  const TestServer closed{windsplat::api::ServerOptions{}};
+  EXPECT_THAT(policy(closed, "/?embed"), EndsWith("; frame-ancestors 'self'"));
+  windsplat::api::ServerOptions options;
+  options.embedders = {"https://a.example", "https://*.b.example:8443"};
+  const TestServer open{options};
+  const std::string both = "; frame-ancestors 'self' https://a.example https://*.b.example:8443";
+  EXPECT_THAT(policy(open, "/?embed"), EndsWith(both));
+  EXPECT_THAT(policy(open, "/?from=mail&embed=1"), EndsWith(both));
+  EXPECT_THAT(policy(open, "/"), EndsWith("; frame-ancestors 'self'"));
+  EXPECT_THAT(policy(open, "/?embedded"), EndsWith("; frame-ancestors 'self'"));
+  EXPECT_THAT(policy(open, "/v1"), EndsWith("frame-ancestors 'none'"));
+  EXPECT_EQ(get(open.port(), "/?embed").header("x-frame-options"), "")
+      << "it knows no list of origins, and would forbid what the policy allows";
+}
 
 TEST_F(Rest, PageIsServedWithSecurityAndCacheHeaders) {
   const Answer page = get(port(), "/");

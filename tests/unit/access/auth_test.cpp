@@ -314,6 +314,35 @@ TEST(AccessRefusal, ProgramsGetAProblemAndBrowsersAForm) {
   EXPECT_EQ(turned_away(Verdict::wrong_origin, person, "/").status, 403);
 }
 
+// A foreign page around a login form could ask for the token itself.
+TEST(AccessRefusal, FramesOfOtherSitesGetAReasonInsteadOfAForm) {
+  const std::vector<std::string> embedders{"https://site.example"};
+  const auto framed = [](const std::string& into, http::Parameters query) {
+    http::Request asked = request("GET", {}, {{"Accept", "text/html"}, {"Sec-Fetch-Dest", into}});
+    asked.query = std::move(query);
+    return asked;
+  };
+  const http::Response page =
+      turned_away(Verdict::no_token, framed("iframe", {{"embed", ""}}), "/winds/", embedders);
+  EXPECT_EQ(page.status, 401);
+  EXPECT_THAT(text_of(page), Not(HasSubstr("<form")));
+  EXPECT_THAT(text_of(page), HasSubstr("needs a login"));
+  EXPECT_THAT(text_of(page), HasSubstr("href=\"/winds/\""));
+  const std::string policy = header_of(page, "Content-Security-Policy");
+  EXPECT_THAT(policy, HasSubstr("frame-ancestors 'self' https://site.example"));
+  EXPECT_THAT(policy, HasSubstr("form-action 'none'"));
+  EXPECT_THAT(policy, Not(HasSubstr("unsafe")));
+  for (const http::Request& other :
+       {framed("document", {{"embed", ""}}), framed("iframe", {}), framed("", {{"embed", ""}})}) {
+    const http::Response form = turned_away(Verdict::no_token, other, "/winds/", embedders);
+    EXPECT_THAT(text_of(form), HasSubstr("<form"));
+    EXPECT_THAT(header_of(form, "Content-Security-Policy"), HasSubstr("frame-ancestors 'none'"));
+  }
+  const http::Response denied =
+      turned_away(Verdict::no_token, framed("iframe", {{"embed", ""}}), "/winds/");
+  EXPECT_THAT(header_of(denied, "Content-Security-Policy"), HasSubstr("frame-ancestors 'none'"));
+}
+
 http::Request login(const std::string& body,
                     http::Headers headers = {{"Origin", "http://winds.example"}}) {
   headers.emplace_back("Content-Type", "application/x-www-form-urlencoded; charset=utf-8");

@@ -6,6 +6,7 @@ import { App } from "./app";
 import { BesidePicture } from "./beside";
 import { Cards } from "./dataset_cards";
 import { DatasetList } from "./dataset_list";
+import { embeddedKeys, isEmbedded, openLink, takesWheel } from "./embed";
 import { entryOf, openEntry } from "./entries";
 import { EntryPicker } from "./entry_picker";
 import { byId, make } from "../base/dom";
@@ -37,6 +38,8 @@ const clock = {
 };
 const app = new App(clock, document.baseURI);
 
+const embedded = isEmbedded(window.location.search);
+document.documentElement.classList.toggle("embedded", embedded);
 const canvas = byId("picture", HTMLCanvasElement);
 const moves = new MoveQueue(app.cameras, (run) => window.requestAnimationFrame(run));
 const turn = new Turn(moves, {
@@ -45,7 +48,10 @@ const turn = new Turn(moves, {
   still: () => window.matchMedia("(prefers-reduced-motion: reduce)").matches,
 });
 const lookFrom = (angles: Angles) => turn.to(app.cameras.viewFrom(angles));
-new PointerInput(canvas, moves, (x, y, alt) => probe.pick([x, y], alt));
+new PointerInput(canvas, moves, {
+  clicked: (x, y, alt) => probe.pick([x, y], alt && !embedded),
+  takesWheel: (event) => !embedded || takesWheel(canvas, event),
+});
 
 const viewport = new Viewport(canvas, {
   decoded: (header, decodeMs) => app.acknowledge(header.seq, decodeMs),
@@ -146,6 +152,7 @@ const cards = new Cards(datasets, byId("cards", HTMLElement), {
   open: (id) => app.open(id),
 });
 const help = byId("help", HTMLDialogElement);
+const login = new Login(document.baseURI, () => app.connectNow());
 const status = new Status();
 const pictures: FileTarget = {
   open: (view) => app.openView(view),
@@ -165,7 +172,7 @@ const openSaving = saveDialog(
   },
   document.baseURI,
 );
-takeDrops(byId("drop-hint", HTMLElement), pictures);
+if (!embedded) takeDrops(byId("drop-hint", HTMLElement), pictures);
 
 // Whether the canvas shows the final picture of the newest view.
 function isSettled({ state, rev, wanted }: DOMStringMap): boolean {
@@ -285,12 +292,13 @@ function onClick(id: string, run: () => void): void {
   byId(id, HTMLButtonElement).addEventListener("click", run);
 }
 
+if (embedded) openLink(document.baseURI, () => app.explicitView()).hidden = false;
 app.undoControl.bind(
   byId("undo-button", HTMLButtonElement),
   byId("redo-button", HTMLButtonElement),
 );
 app.undoControl.watch(document);
-bindKeys(bindings, document);
+bindKeys(embedded ? embeddedKeys(bindings) : bindings, document);
 fillHelp();
 onClick("datasets-button", () => cards.show());
 onClick("about-button", showAbout);
@@ -321,9 +329,10 @@ app.start({
   panels,
   timeBar,
   list,
-  cards,
+  cards: embedded ? { show: () => status.empty("the server has no such dataset open") } : cards,
   status,
-  login: new Login(document.baseURI, () => app.connectNow()),
+  // A page around the frame could show a login of its own, so there is none in it.
+  login: embedded ? { ask: () => {}, done: () => {} } : login,
   picker: byId("dataset", HTMLSelectElement),
   entries: new EntryPicker(byId("entries", HTMLElement), (dimension, value) =>
     app.chooseEntry(dimension, value),

@@ -76,6 +76,12 @@ export function twist(before: Finger[], after: Finger[]): number {
   return (Math.atan2(across, along) * 180) / Math.PI;
 }
 
+export interface PointerHost {
+  // A click or tap that moved nothing; positions are fractions of the element's size.
+  clicked(x: number, y: number, alt: boolean): void;
+  takesWheel(event: WheelEvent): boolean; // false: it scrolls what is around the element
+}
+
 // One finger or the left button orbits; two fingers, another button or shift pan; two fingers also
 // zoom and roll.
 export class PointerInput {
@@ -88,8 +94,7 @@ export class PointerInput {
   constructor(
     private readonly element: HTMLElement,
     private readonly moves: MoveQueue,
-    // Called for a click or tap that moved nothing; positions are fractions of the element's size.
-    private readonly clicked: (x: number, y: number, alt: boolean) => void,
+    private readonly host: PointerHost,
   ) {
     element.addEventListener("pointerdown", (event) => this.down(event));
     element.addEventListener("pointermove", (event) => this.move(event));
@@ -119,7 +124,7 @@ export class PointerInput {
     if (known && event.type === "pointerup" && !this.panning && this.travelled < clickPixels) {
       const box = this.element.getBoundingClientRect();
       const x = (event.clientX - box.left) / box.width;
-      this.clicked(x, (event.clientY - box.top) / box.height, event.altKey);
+      this.host.clicked(x, (event.clientY - box.top) / box.height, event.altKey);
     }
     if (this.fingers.size === 0) this.element.classList.remove("dragging");
   }
@@ -164,6 +169,7 @@ export class PointerInput {
   }
 
   private wheel(event: WheelEvent): void {
+    if (!this.host.takesWheel(event)) return;
     event.preventDefault();
     this.moves.push((camera) => zoom(camera, wheelZoom(event)));
   }
