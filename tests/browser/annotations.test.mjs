@@ -1,7 +1,15 @@
 // Annotations that the server draws into the picture, switched by the panel.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { control, finalPicture, pixels, sharedDaemon, shot, unfold } from "./support.mjs";
+import {
+  control,
+  finalPicture,
+  pictureBox,
+  pixels,
+  sharedDaemon,
+  shot,
+  unfold,
+} from "./support.mjs";
 
 const { withPage } = sharedDaemon();
 
@@ -36,3 +44,85 @@ test("each annotation changes the picture, and the server's legend replaces the 
     assert.equal((await pixels(page)).hash, plain, "nothing else has changed");
     assert.equal(await page.locator(".legend-entry").first().isVisible(), true);
   }));
+
+// Keeps the pixels of the picture in the page.
+const keepPixels = (page) =>
+  page.evaluate(() => {
+    const canvas = document.querySelector("#picture");
+    const { width, height } = canvas;
+    window.keptPixels = canvas.getContext("2d").getImageData(0, 0, width, height);
+  });
+
+// The rectangle of the pixels that have changed since, in CSS pixels of the page.
+async function changedBox(page) {
+  const picture = await pictureBox(page);
+  const found = await page.evaluate(() => {
+    const canvas = document.querySelector("#picture");
+    const { width, height } = canvas;
+    const now = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+    const then = window.keptPixels.data;
+    const box = [width, height, 0, 0];
+    for (let n = 0; n < width * height; n++) {
+      if ([0, 1, 2].every((c) => now[4 * n + c] === then[4 * n + c])) continue;
+      const [x, y] = [n % width, Math.floor(n / width)];
+      box[0] = Math.min(box[0], x);
+      box[1] = Math.min(box[1], y);
+      box[2] = Math.max(box[2], x + 1);
+      box[3] = Math.max(box[3], y + 1);
+    }
+    return { box, scale: canvas.clientWidth / width };
+  });
+  const [left, top, right, bottom] = found.box.map((edge) => edge * found.scale);
+  return { x: picture.x + left, y: picture.y + top, width: right - left, height: bottom - top };
+}
+
+const overlap = (a, b) =>
+  a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
+
+const sizes = [
+  { width: 1440, height: 900 },
+  { width: 1000, height: 480 },
+];
+const cases = [
+  ["title", ["#hud"]],
+  ["stepTime", ["#hud"]],
+  ["north", [".gizmo-end", ".corner-buttons button"]],
+  ["scaleBar", ["#open-link"]],
+];
+
+for (const size of sizes) {
+  test(`no overlay lies on an annotation at ${size.width} x ${size.height}`, async () => {
+    for (const [key, overlays] of cases) {
+      const embed = key === "scaleBar" ? "?embed" : "";
+      const hash = (on) => {
+        const view = { dataset: "climate", annotations: { [key]: on } };
+        return `#!${encodeURIComponent(JSON.stringify(view))}`;
+      };
+      await withPage(
+        async (page) => {
+          await finalPicture(page);
+          await keepPixels(page);
+          await page.evaluate((address) => (location.hash = address), hash(true));
+          await page.waitForFunction(
+            (wanted) => document.documentElement.dataset.annotations === wanted,
+            key,
+          );
+          await finalPicture(page);
+          const drawn = await changedBox(page);
+          assert.ok(drawn.width > 8 && drawn.height > 4, `${key} is drawn`);
+          for (const overlay of overlays) {
+            for (const element of await page.locator(overlay).all()) {
+              const box = await element.boundingBox();
+              assert.ok(box !== null, `${overlay} is shown`);
+              assert.ok(!overlap(drawn, box), `${overlay} lies on ${key}`);
+              const stage = await pictureBox(page);
+              assert.ok(box.y + box.height <= stage.y + stage.height, `${overlay} is inside`);
+            }
+          }
+          await shot(page, `annotation-${key}-${size.width}`);
+        },
+        { path: `${embed}${hash(false)}`, viewport: size },
+      );
+    }
+  });
+}

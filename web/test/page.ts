@@ -25,7 +25,7 @@ class Element {
   inert = false;
   max = "";
   children: Element[] = [];
-  style = {};
+  style = { setProperty: () => {} };
   readonly attributes = new Map<string, string>();
   readonly classes = new Set<string>();
   readonly classList = {

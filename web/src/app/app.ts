@@ -12,6 +12,7 @@ import type { Clock, Connection, ConnectionState } from "../wire/connection";
 import { Flow } from "../view/flow";
 import { scaleText, type FrameState } from "../viewport/frame_text";
 import { loadHelpTexts } from "../panels/help_texts";
+import { leaveRoom } from "../viewport/annotation_room";
 import { legendEntries } from "../view/legend_entries";
 import { DatasetOpener } from "./dataset_opener";
 import { openEntry } from "./entries";
@@ -466,7 +467,9 @@ export class App {
 
   private showLegend(): void {
     const view = this.model.drawnView();
-    if (view !== null) this.parts.legend.show(legendEntries(this.dataset(), view));
+    if (view === null) return;
+    this.parts.legend.show(legendEntries(this.dataset(), view));
+    leaveRoom(document.documentElement, view);
   }
 
   private showTime(): void {
