@@ -102,9 +102,26 @@ Cell curved_cell(const Flow& flow, const glm::dvec3& index, const Corners& at) {
   return cell;
 }
 
-Cell straight_cell(const Flow& flow, const Corners& at) {
+// Along an axis that closes: in the outer halves of the outermost cells positions go on linearly.
+void place_around(const Flow& flow, double index, Cell& cell) {
+  const double at = index - flow.around * std::floor((index + 0.5) / flow.around);
+  const int last = flow.around - 1;
+  const int low = std::clamp(static_cast<int>(std::floor(at)), 0, last);
+  const auto& positions = flow.positions[0];
+  const auto k = static_cast<std::size_t>(low);
+  const bool inner = at >= 0 && at < last;
+  const double width = inner ? positions[k + 1] - positions[k] : flow.spacing[0][k];
+  cell.place.x = positions[k] + (at - low) * width;
+  cell.edge[0].x = width;
+}
+
+Cell straight_cell(const Flow& flow, const glm::dvec3& index, const Corners& at) {
   Cell cell;
   for (int a = 0; a < 3; ++a) {
+    if (a == 0 && flow.around > 0) {
+      place_around(flow, index.x, cell);
+      continue;
+    }
     const auto [low, high] = at.sample[a];
     const double from = flow.positions[a][static_cast<std::size_t>(low)];
     const double width =
@@ -116,7 +133,7 @@ Cell straight_cell(const Flow& flow, const Corners& at) {
 }
 
 Cell cell_at(const Flow& flow, const glm::dvec3& index, const Corners& at) {
-  return flow.places != nullptr ? curved_cell(flow, index, at) : straight_cell(flow, at);
+  return flow.places != nullptr ? curved_cell(flow, index, at) : straight_cell(flow, index, at);
 }
 
 // Linear between the samples on both sides, constant beyond the outermost.
@@ -149,6 +166,35 @@ bool interpolate(const Flow& flow, const Corners& at, const std::array<const flo
   return true;
 }
 
+// The frames on both sides of a time, and the share of the second; the same twice if one counts.
+struct Moment {
+  std::array<const std::array<const float*, 3>*, 2> of{};
+  double part = 0;
+};
+
+Moment moment_of(const Flow& flow, double time) {
+  const std::span<const Frame> frames = flow.frames;
+  if (frames.empty()) return {{&flow.components, &flow.components}, 0};
+  const auto after = std::upper_bound(frames.begin(), frames.end(), time,
+                                      [](double t, const Frame& frame) { return t < frame.time; });
+  if (after == frames.begin()) return {{&after->components, &after->components}, 0};
+  const auto before = after - 1;
+  if (after == frames.end()) return {{&before->components, &before->components}, 0};
+  const double part = (time - before->time) / (after->time - before->time);
+  if (!(part > 0)) return {{&before->components, &before->components}, 0};
+  return {{&before->components, &after->components}, part};
+}
+
+bool vector_at(const Flow& flow, const Corners& at, double time, glm::dvec3& out) {
+  const Moment moment = moment_of(flow, time);
+  if (!interpolate(flow, at, *moment.of[0], out)) return false;
+  if (!(moment.part > 0)) return true;
+  glm::dvec3 after(0);
+  if (!interpolate(flow, at, *moment.of[1], after)) return false;
+  out = (1 - moment.part) * out + moment.part * after;
+  return true;
+}
+
 }  // namespace
 
 bool Flow::bounds(const glm::dvec3& index) const {
@@ -159,12 +205,14 @@ bool Flow::bounds(const glm::dvec3& index) const {
   return true;
 }
 
-bool Flow::holds(const glm::dvec3& index) const {
+bool Flow::holds(const glm::dvec3& index, double time) const {
   if (!bounds(index)) return false;
   std::array<int, 3> nearest{};
   const Corners at = corners_of(*this, index);
   for (int a = 0; a < 3; ++a) nearest[a] = at.sample[a][at.part[a] >= 0.5 ? 1 : 0];
-  return !std::isnan(components[0][number_of(*this, nearest[0], nearest[1], nearest[2])]);
+  const std::size_t number = number_of(*this, nearest[0], nearest[1], nearest[2]);
+  const Moment moment = moment_of(*this, time);
+  return !std::isnan((*moment.of[0])[0][number]) && !std::isnan((*moment.of[1])[0][number]);
 }
 
 std::uint32_t Flow::nearest(const glm::dvec3& index) const {
@@ -183,10 +231,27 @@ glm::dvec3 Flow::place(const glm::dvec3& index) const {
   return cell_at(*this, index, corners_of(*this, index)).place;
 }
 
-bool motion_at(const Flow& flow, const glm::dvec3& index, Motion& out) {
+int Flow::turn(const glm::dvec3& index) const {
+  if (around <= 0 || places != nullptr) return 0;
+  return static_cast<int>(std::floor((index.x + 0.5) / around));
+}
+
+glm::dvec3 Flow::within_turn(const glm::dvec3& index, int turn) const {
+  if (around <= 0 || places != nullptr) return index;
+  constexpr double inside = 1e-9;
+  const double first = static_cast<double>(turn) * around - 0.5;
+  return {std::clamp(index.x, first, first + around - inside), index.y, index.z};
+}
+
+double Flow::cell_volume(const glm::dvec3& index) const {
+  const Cell cell = cell_at(*this, index, corners_of(*this, index));
+  return std::abs(glm::dot(cell.edge[0], glm::cross(cell.edge[1], cell.edge[2])));
+}
+
+bool motion_at(const Flow& flow, const glm::dvec3& index, Motion& out, double time) {
   constexpr double flattest = 1e-6;  // of an edge, relative to the longest
   const Corners at = corners_of(flow, index);
-  if (!interpolate(flow, at, flow.components, out.vector)) return false;
+  if (!vector_at(flow, at, time, out.vector)) return false;
   out.magnitude = glm::length(out.vector);
   glm::dvec3 drawn = out.vector * flow.scale;
   if (!flow.rate_x.empty()) {

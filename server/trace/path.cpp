@@ -43,36 +43,52 @@ dvec4 place_in(const Step& step, double part) {
   return t[0] + part * (t[1] + rest * (t[2] + part * (t[3] + rest * t[4])));
 }
 
+// Where each stage is within a step.
+constexpr double nodes[stages] = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1};
+
+// When a particle passes: at `start` of the path at `time`, and back in time if `sign` is negative.
+struct Clock {
+  bool runs = false;  // false: the field does not change, and the path goes by world length
+  double time = 0;
+};
+
 class Follower {
  public:
-  Follower(const Flow& flow, double length, bool upstream, const Limits& limits, Path& out)
-      : flow_(flow), length_(length), sign_(upstream ? -1 : 1), limits_(limits), out_(out) {}
+  Follower(const Flow& flow, double length, bool upstream, const Limits& limits, Path& out,
+           const Clock& clock = {})
+      : flow_(flow),
+        length_(length),
+        sign_(upstream ? -1 : 1),
+        limits_(limits),
+        clock_(clock),
+        out_(out) {}
 
   void run() {
-    if (!flow_.holds(out_.start)) {
+    if (!flow_.holds(out_.start, clock_.time)) {
       out_.end = flow_.bounds(out_.start) ? End::masked : End::boundary;
       return;
     }
     state_ = dvec4(out_.start, 0);
-    if (!slope(state_, slopes_[0])) {
+    if (!slope(state_, 0, slopes_[0])) {
       out_.end = End::boundary;
       return;
     }
     const double rate = widest(slopes_[0]);
-    if (!(rate > 0)) return;
-    double step = 0.25 / rate;
+    if (!clock_.runs && !(rate > 0)) return;
+    double step = rate > 0 ? 0.25 / rate : length_;
     for (int n = 0; n < limits_.steps_max; ++n) {
       const double left = length_ - out_.length;
       if (!(left > 1e-12 * length_)) return finish(End::length);
       const double rate_here = widest(slopes_[0]);
-      step = std::min({step, left, step_most / rate_here});
+      step = std::min({step, left, to_next_frame()});
+      if (rate_here > 0) step = std::min(step, step_most / rate_here);
       const double error = try_step(step) / limits_.tolerance;
       if (!(error <= 1)) {
         step *= std::isfinite(error) ? std::max(0.2, 0.9 * std::pow(error, -0.2)) : 0.25;
-        if (step * rate_here < step_least) return finish(blocked_);
+        if (is_least(step, rate_here)) return finish(blocked_);
         continue;
       }
-      if (reverses(step)) {
+      if (!clock_.runs && reverses(step)) {
         // About a sink, errors are of the order of the steps and would let it pass back and forth.
         if (step * rate_here < std::max(20 * limits_.tolerance, step_least)) {
           return finish(End::stagnation);
@@ -89,12 +105,40 @@ class Follower {
  private:
   void finish(End end) { out_.end = end; }
 
-  // The change of place and time per unit of world length. False where there is no flow.
-  bool slope(const dvec4& state, dvec4& out) {
+  // The time at a place of the path.
+  [[nodiscard]] double now(double from_start) const {
+    return clock_.runs ? clock_.time + sign_ * from_start : 0;
+  }
+
+  // Between frames the field is smooth: no step crosses one.
+  [[nodiscard]] double to_next_frame() const {
+    if (!clock_.runs) return HUGE_VAL;
+    const double slack = 1e-12 * length_;
+    double least = HUGE_VAL;
+    for (const Frame& frame : flow_.frames) {
+      const double way = sign_ * (frame.time - now(out_.length));
+      if (way > slack) least = std::min(least, way);
+    }
+    return least;
+  }
+
+  [[nodiscard]] bool is_least(double step, double rate) const {
+    return step * rate < step_least && (!clock_.runs || step < 1e-9 * length_);
+  }
+
+  // The change of place and time per unit of world length, or of place and length per unit of time.
+  // False where there is no flow.
+  bool slope(const dvec4& state, double from_start, dvec4& out) {
     ++out_.evaluations;
     Motion motion;
-    if (!motion_at(flow_, index_of(state), motion)) return false;
-    out = motion.speed > 0 ? sign_ * dvec4(motion.along, 1 / motion.speed) : dvec4(0);
+    if (!motion_at(flow_, index_of(state), motion, now(from_start))) return false;
+    if (!(motion.speed > 0)) {
+      out = dvec4(0);
+    } else if (clock_.runs) {
+      out = sign_ * motion.speed * dvec4(motion.along, 1);
+    } else {
+      out = sign_ * dvec4(motion.along, 1 / motion.speed);
+    }
     return true;
   }
 
@@ -105,9 +149,10 @@ class Follower {
     for (int s = 1; s < stages; ++s) {
       dvec4 at = state_;
       for (int k = 0; k < s; ++k) at += step * weights[s][k] * slopes_[k];
-      if (!slope(at, slopes_[s])) {
-        blocked_ =
-            flow_.bounds(index_of(at)) && !flow_.holds(index_of(at)) ? End::masked : End::boundary;
+      const double there = out_.length + nodes[s] * step;
+      if (!slope(at, there, slopes_[s])) {
+        const bool masked = flow_.bounds(index_of(at)) && !flow_.holds(index_of(at), now(there));
+        blocked_ = masked ? End::masked : End::boundary;
         return HUGE_VAL;
       }
       next_ = at;  // the last stage is the end of the step
@@ -139,9 +184,17 @@ class Follower {
     if (part < 1) return false;
     state_ = next_;
     slopes_[0] = slopes_[6];
-    if (widest(slopes_[0]) > 0) return true;
+    if (clock_.runs || widest(slopes_[0]) > 0) return true;
     finish(End::stagnation);
     return false;
+  }
+
+  // Why a path ends before a part of a step; `steps` if it does not.
+  [[nodiscard]] End leaves(const Step& step, double part) const {
+    const dvec4 there = place_in(step, part);
+    if (!clock_.runs && std::abs(there.w) > limits_.duration_max) return End::length;
+    if (flow_.holds(index_of(there), now(step.start + part * step.length))) return End::steps;
+    return flow_.bounds(index_of(there)) ? End::masked : End::boundary;
   }
 
   // The part of a step before it leaves the domain; sets the reason if it does.
@@ -151,15 +204,15 @@ class Follower {
     double low = 0;
     for (int n = 1; n <= checks; ++n) {
       double high = static_cast<double>(n) / checks;
-      const dvec3 there = index_of(place_in(step, high));
-      if (flow_.holds(there)) {
+      const End why = leaves(step, high);
+      if (why == End::steps) {
         low = high;
         continue;
       }
-      finish(flow_.bounds(there) ? End::masked : End::boundary);
+      finish(why);
       for (int k = 0; k < halvings; ++k) {
         const double middle = 0.5 * (low + high);
-        (flow_.holds(index_of(place_in(step, middle))) ? low : high) = middle;
+        (leaves(step, middle) == End::steps ? low : high) = middle;
       }
       return low;
     }
@@ -170,6 +223,7 @@ class Follower {
   const double length_;
   const double sign_;
   const Limits& limits_;
+  const Clock clock_;
   Path& out_;
   dvec4 state_{0};
   dvec4 next_{0};
@@ -190,13 +244,27 @@ Place Path::at(double from_start) const {
   return {index_of(state), state.w};
 }
 
-void follow(const Flow& flow, const glm::dvec3& start, double length, bool upstream,
-            const Limits& limits, Path& out) {
+namespace {
+
+void begin(const glm::dvec3& start, Path& out) {
   out.steps.clear();
   out.length = 0;
   out.end = End::stagnation;
   out.evaluations = 0;
   out.start = start;
+}
+
+}  // namespace
+
+void follow_through_time(const Flow& flow, const glm::dvec3& start, double time, double duration,
+                         bool back, const Limits& limits, Path& out) {
+  begin(start, out);
+  Follower(flow, duration, back, limits, out, {true, time}).run();
+}
+
+void follow(const Flow& flow, const glm::dvec3& start, double length, bool upstream,
+            const Limits& limits, Path& out) {
+  begin(start, out);
   Follower(flow, length, upstream, limits, out).run();
 }
 

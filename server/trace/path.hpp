@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -16,7 +17,7 @@ namespace windsplat::trace {
 
 // Why a path ends.
 enum class End : std::uint8_t {
-  length,      // it has the length asked for
+  length,      // it has the length or the time asked for
   boundary,    // of the lattice, or a degenerate cell
   masked,      // a masked cell
   stagnation,  // the flow has no direction, or reverses it within 20 tolerances
@@ -28,7 +29,8 @@ struct Limits {
   // Bounds the estimated error of each step, in cells. The error of a place on the path is of the
   // order of the number of steps times this, and grows where neighbouring paths diverge.
   double tolerance = 1e-3;
-  int steps_max = 1000;  // tried steps
+  int steps_max = 1000;            // tried steps
+  double duration_max = HUGE_VAL;  // of Place::time, from the start
 };
 
 // No step is longer than a cell, so that none crosses a masked cell unseen, nor turns by more than
@@ -64,5 +66,12 @@ struct Path {
 // storage is reused. A start outside of the domain gives a path without length.
 void follow(const Flow& flow, const glm::dvec3& start, double length, bool upstream,
             const Limits& limits, Path& out);
+
+// The path of a particle in a flow that changes, which is at `start` at the time `time`: followed
+// for `duration`, back in time if asked. In what it writes, world lengths and times change places:
+// Path::length, Step::start and Step::length are times, Place::time is a world length, negative
+// back in time. A particle at rest stays where it is until the flow moves it.
+void follow_through_time(const Flow& flow, const glm::dvec3& start, double time, double duration,
+                         bool back, const Limits& limits, Path& out);
 
 }  // namespace windsplat::trace

@@ -33,10 +33,14 @@ struct Segments {
   // Magnitude of the sample times magnitude_scale; below 0: no segment begins; not_drawn: a line
   // below the least magnitude.
   std::vector<float> magnitudes;
-  double magnitude_scale = 1;          // a power of two, as the engine chooses it
-  std::vector<float> phases;           // [0, 1), for phase motion
+  double magnitude_scale = 1;  // a power of two, as the engine chooses it
+  std::vector<float> phases;   // [0, 1), for phase motion
+  // Of dashes: phases are the places of the vertices in their dash, and these the numbers of dashes
+  // that segments have. Empty: a line has one texture, along q.
+  std::vector<float> turns;
   std::vector<float> colors;           // the value that determines the colour; NaN: unknown
   std::vector<std::uint32_t> samples;  // number of the sample nearest to the middle, x fastest
+  double longest = 0;                  // chord of a segment, world units
   Tally tally;
 
   // 2^-e for a full magnitude of the order of 2^e beyond [1e-15, 1e15], where squares and inverses
@@ -52,7 +56,7 @@ struct Segments {
 
   [[nodiscard]] std::size_t vertices() const { return magnitudes.size(); }
   // Bytes of each vertex.
-  static constexpr std::size_t vertex_bytes = 11 * sizeof(float);
+  static constexpr std::size_t vertex_bytes = 12 * sizeof(float);
 };
 
 }  // namespace windsplat::trace

@@ -1,0 +1,160 @@
+// Lines through seeds: both halves of each, its segments and its dashes.
+#include "server/trace/streamlines.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "server/base/pcg3d.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/trace/chain.hpp"
+
+namespace windsplat::trace {
+
+namespace {
+
+using glm::dvec3;
+
+constexpr std::size_t row_seeds = 16;
+
+class SeedLines {
+ public:
+  explicit SeedLines(const Streamlines& of) : of_(of) {}
+
+  void add_line(std::size_t n, Row& row) {
+    const dvec3& seed = of_.seeds[n];
+    const bool paths = !of_.flow.frames.empty();
+    Motion motion;
+    if (!of_.flow.holds(seed, of_.time) || !motion_at(of_.flow, seed, motion, of_.time)) return;
+    if (paths) {
+      follow_through_time(of_.flow, seed, of_.time, of_.back, true, of_.limits, upstream_);
+      follow_through_time(of_.flow, seed, of_.time, of_.ahead, false, of_.limits, downstream_);
+    } else {
+      follow(of_.flow, seed, of_.length, true, of_.limits, upstream_);
+      follow(of_.flow, seed, of_.length, false, of_.limits, downstream_);
+    }
+    row.tally.evaluations += 1 + upstream_.evaluations + downstream_.evaluations;
+    ++row.tally.ends[static_cast<std::size_t>(upstream_.end)];
+    ++row.tally.ends[static_cast<std::size_t>(downstream_.end)];
+    if (upstream_.length + downstream_.length > 0) add_segments(n, paths, dash_time(motion), row);
+  }
+
+ private:
+  // The time of a dash; 0: none.
+  [[nodiscard]] double dash_time(const Motion& motion) const {
+    if (!(of_.dash > 0) || !(motion.speed > 0)) return 0;
+    const double part = of_.full_magnitude > 0 ? motion.magnitude / of_.full_magnitude : 1;
+    return of_.dash * part / motion.speed;
+  }
+
+  void add_segments(std::size_t n, bool paths, double dash, Row& row) {
+    const Curve curve(of_.flow, upstream_, downstream_);
+    const auto number = static_cast<std::uint32_t>(n);
+    turns_ = static_cast<double>(pcg3d({number, of_.seed, of_.epoch})[0] >> 8U) / 16777216.0;
+    const std::vector<Curve> parts = curve.by_turns();
+    ++row.tally.lines;
+    for (const Curve& part : parts) {
+      // Of a line that passes the seam often, each part has its share.
+      const auto share = static_cast<double>(of_.pieces_max) * part.length() / curve.length();
+      const int most = std::max(1, static_cast<int>(share));
+      add_part(part, curve, part.pieces(most, of_.departure, of_.longest), paths, dash, row);
+    }
+  }
+
+  void add_part(const Curve& part, const Curve& whole, int count, bool paths, double dash,
+                Row& row) {
+    row.tally.segments += count;
+    const std::size_t first = row.vertices.size();
+    const auto time_at = [&](double s) { return paths ? s : whole.at(s).time; };
+    for (int v = 0; v <= count; ++v) {
+      const double s = part.along(v, count);
+      Vertex vertex;
+      vertex.place = rounded(part.place(v, count));
+      const double q = (s - whole.low()) / whole.length() - 0.5;
+      vertex.q = static_cast<float>(std::clamp(q, -0.5, 0.5));
+      if (v < count) {
+        set_segment(whole, part.along(v + 0.5, count), paths, vertex);
+        const double took = time_at(part.along(v + 1, count)) - time_at(s);
+        const double own = dash > 0 ? std::clamp(took / dash, 0.0, dashes_most) : 0;
+        vertex.phase = static_cast<float>(turns_ - std::floor(turns_));
+        vertex.turn = static_cast<float>(own);
+        turns_ += own;
+      }
+      row.vertices.push_back(vertex);
+    }
+    set_tangents(first, row.vertices);
+  }
+
+  // s: in the middle of the segment.
+  void set_segment(const Curve& curve, double s, bool paths, Vertex& vertex) const {
+    const dvec3 middle = curve.at(s).index;
+    Motion motion;
+    motion_at(of_.flow, middle, motion, paths ? of_.time + s : 0);
+    vertex.magnitude =
+        as_float(std::max(motion.magnitude * of_.magnitude_scale, of_.magnitude_least));
+    vertex.color = as_float(of_.color(middle, motion));
+    vertex.sample = of_.flow.nearest(middle);
+  }
+
+  const Streamlines& of_;
+  Path upstream_, downstream_;
+  double turns_ = 0;  // dashes so far
+};
+
+}  // namespace
+
+std::int64_t vertices_at_most(const Streamlines& of) {
+  // Passing the seam, a line has two vertices more.
+  constexpr std::int64_t parts_most = 64;
+  const std::int64_t more = of.flow.around > 0 ? parts_most : 0;
+  return padded(static_cast<std::int64_t>(of.seeds.size()) * (of.pieces_max + 1 + 2 * more));
+}
+
+Segments make_streamlines(const Streamlines& of, const CancelToken& cancel) {
+  std::vector<Row> rows((of.seeds.size() + row_seeds - 1) / row_seeds);
+  const auto pool = few_threads(rows.size());
+  pool->run(rows.size(), [&](std::size_t n, unsigned) {
+    SeedLines lines(of);
+    const std::size_t end = std::min(of.seeds.size(), (n + 1) * row_seeds);
+    for (std::size_t s = n * row_seeds; s < end && !cancel.cancelled(); ++s) {
+      lines.add_line(s, rows[n]);
+    }
+  });
+  return gather(rows, of.magnitude_scale);
+}
+
+std::vector<dvec3> evenly(const Flow& flow, int count) {
+  constexpr int trials_each = 256;
+  constexpr int first_trials = 4096;
+  // The root of g^5 = g + 1.
+  constexpr double golden = 1.1673039782614187;
+  const auto candidate = [&](int n, double& fourth) {
+    dvec3 index(0);
+    double step = 1;
+    for (int a = 0; a < 3; ++a) {
+      step /= golden;
+      const double turned = 0.5 + step * (n + 1);
+      const double part = turned - std::floor(turned);
+      const int samples = flow.dims[static_cast<std::size_t>(a)];
+      const int wide = a == 0 && flow.around > 0 ? flow.around : samples;
+      if (wide > 1) index[a] = part * wide - 0.5;
+    }
+    const double turned = 0.5 + step / golden * (n + 1);
+    fourth = turned - std::floor(turned);
+    return index;
+  };
+  double largest = 0;
+  double fourth = 0;
+  for (int n = 0; n < first_trials; ++n) {
+    largest = std::max(largest, flow.cell_volume(candidate(n, fourth)));
+  }
+  std::vector<dvec3> out;
+  for (int n = 0; n < trials_each * count && static_cast<int>(out.size()) < count; ++n) {
+    const dvec3 index = candidate(n, fourth);
+    if (fourth * largest < flow.cell_volume(index) && flow.holds(index)) out.push_back(index);
+  }
+  return out;
+}
+
+}  // namespace windsplat::trace
