@@ -27,6 +27,8 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
                 0,
                 0,
                 1,
+                0,
+                1,
                 &line};
   const int style = style_of(line);
   if (style == style_chain || line.moving != 0) {
@@ -39,6 +41,8 @@ inline Ribbon ribbon_at(const LineStyle& line, const Ribbons& r, int l) {
     out.end_x = r.end_x[l];
     out.end_y = r.end_y[l];
     out.end_most = r.end_most[l];
+    out.whole = r.whole[l];
+    out.whole_rise = r.whole_rise[l];
   }
   return out;
 }

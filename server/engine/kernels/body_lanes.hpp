@@ -35,18 +35,38 @@ struct RibbonLanes {
   Pixel tail[3], rise[3];
   Pixel phase, phase_rise;
   Pixel reach, steep, opacity;  // the ramp: clamp(reach - steep distance, 0, opacity)
+  Pixel blur;                   // half of the dashes that a pixel has
   int moving, marked;
+  int dashed;                                  // of a segment of a chain
   MarkLanes mark;                              // set if marked
   Pixel cut_x, cut_y, end_x, end_y, end_most;  // of a segment of a chain
 };
 
-KERNEL_INLINE void spread_style(const LineStyle& line, float ux, float uy, RibbonLanes& to) {
+// A line on the screen: from f = 0 to f = 1, what part of the whole line that is, and how many
+// dashes it has.
+struct RibbonSpan {
+  float ux, uy, wx, wy;
+  float whole, whole_rise, turns;
+};
+
+// Dashes are averaged over a pixel along the line, at least 1e-3 of a dash, where differences of
+// integrals are exact enough, and at most 8, where none can be told apart.
+inline float dash_blur(const RibbonSpan& span) {
+  const float each = __builtin_sqrtf(span.wx * span.wx + span.wy * span.wy);
+  return limited(0.5F * absolute(span.turns) * each, 1e-3F, 8.0F);
+}
+
+KERNEL_INLINE void spread_style(const LineStyle& line, const RibbonSpan& span, RibbonLanes& to) {
   to.reach = all<Pixel>(line.reach);
   to.steep = all<Pixel>(line.steep);
   to.opacity = all<Pixel>(line.opacity);
   to.moving = line.moving;
   to.marked = line.marked;
-  if (line.marked != 0) to.mark = spread_mark(line, ux, uy);
+  to.dashed = line.chains.turn != nullptr && line.moving != 0 ? 1 : 0;
+  to.blur = all<Pixel>(to.dashed != 0 ? dash_blur(span) : 0.0F);
+  if (line.marked != 0) {
+    to.mark = spread_mark(line, span.ux, span.uy, {span.whole, span.whole_rise});
+  }
 }
 
 KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
@@ -72,7 +92,7 @@ KERNEL_INLINE RibbonLanes spread(const Ribbon& r) {
   out.end_x = lanes(r.end_x);
   out.end_y = lanes(r.end_y);
   out.end_most = lanes(r.end_most);
-  spread_style(*r.style, r.ux, r.uy, out);
+  spread_style(*r.style, {r.ux, r.uy, r.wx, r.wy, r.whole, r.whole_rise, r.phase_rise}, out);
   return out;
 }
 
@@ -110,7 +130,13 @@ KERNEL_INLINE RibbonLanes spread(const LineStyle& line, const Ribbons& r, int l)
     out.end_y = lanes(r.end_y);
     out.end_most = lanes(r.end_most);
   }
-  spread_style(line, r.ux[l], r.uy[l], out);
+  RibbonSpan span = {r.ux[l], r.uy[l], r.wx[l], r.wy[l], 0, 1, 0};
+  if (style == style_chain) {
+    span.whole = r.whole[l];
+    span.whole_rise = r.whole_rise[l];
+    span.turns = r.phase_rise[l];
+  }
+  spread_style(line, span, out);
   return out;
 }
 
@@ -135,6 +161,22 @@ KERNEL_INLINE Pixel along_ribbon(const RibbonLanes& r, Pixel w) {
   return w;
 }
 
+// The integral of W over [0, p].
+KERNEL_INLINE Pixel dash_integral(Pixel p) {
+  const Pixel half = all<Pixel>(0.5F);
+  const Pixel whole = hn::Floor(p);
+  const Pixel part = p - whole;
+  const Pixel square = part * part;
+  const Pixel falling = hn::MulAdd(all<Pixel>(2.0F), part, hn::Neg(square)) - half;
+  return hn::MulAdd(half, whole, hn::IfThenElse(hn::Lt(part, half), square, falling));
+}
+
+// The mean of W over [p - blur, p + blur].
+KERNEL_INLINE Pixel mean_dash(Pixel p, Pixel blur) {
+  const Pixel mean = (dash_integral(p + blur) - dash_integral(p - blur)) / (blur + blur);
+  return clamped(mean, hn::Zero(PixelTag()), all<Pixel>(1.0F));
+}
+
 // dx, dy: pixels from the point f = 0 of the line.
 template <Depth Along, int Style>
 KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
@@ -144,7 +186,7 @@ KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   const Pixel w = clamped(along, zero, one);
   Pixel light = one;
   Pixel cover = zero;
-  if (Style == style_general && r.marked != 0) {
+  if ((Style == style_general || Style == style_chain) && r.marked != 0) {
     const MarkCover found = mark_cover(r.mark, {r.ux, r.uy, r.steep, r.opacity}, along, w, dx, dy);
     cover = found.whole;
     light = found.line / hn::Max(found.whole, all<Pixel>(1e-30F));
@@ -165,6 +207,9 @@ KERNEL_INLINE RibbonLane ribbon_lane(const RibbonLanes& r, Pixel dx, Pixel dy) {
   if (Style == style_chain || (Style == style_general && r.moving != 0)) {
     // W(frac(q + 1/2 - phase)), W(p) = 1 - |2 p - 1|.
     const Pixel shifted = hn::MulAdd(f, r.phase_rise, r.phase);
+    if (Style == style_chain && r.dashed != 0) {
+      return {cover * mean_dash(shifted, r.blur), f, light};
+    }
     const Pixel p = hn::IfThenElse(hn::Ge(shifted, one), shifted - one, shifted);
     cover = cover * (one - hn::Abs(hn::MulSub(all<Pixel>(2.0F), p, one)));
   }
@@ -176,7 +221,7 @@ template <int Style>
 KERNEL_INLINE Pixel line_color(const RibbonLanes& r, const RibbonLane& lane, int c) {
   if (Style == style_plain) return r.tail[c];
   const Pixel color = hn::MulAdd(lane.f, r.rise[c], r.tail[c]);
-  return Style == style_general ? color * lane.light : color;
+  return Style == style_general || Style == style_chain ? color * lane.light : color;
 }
 
 // Constants of a splat, broadcast to all lanes.

@@ -280,9 +280,9 @@ KERNEL_INLINE void blend(const float* entry, float part, float* rgb) {
 }
 
 // Colours of one line from its table colour in `tail`: dimmed, and desaturated by `grey` at the
-// tail and a further `more` at the head; of the tail, the part `tail_light` remains.
-KERNEL_INLINE void shade(float dim, float grey, float more, float tail_light, float* tail,
-                         float* rise) {
+// tail and a further `more` at the head; the parts `tail_light` and `head_light` remain.
+KERNEL_INLINE void shade(float dim, float grey, float more, float tail_light, float head_light,
+                         float* tail, float* rise) {
   const ColorTag tag;
   const float top = dim * larger(larger(tail[0], tail[1]), tail[2]);
   for (std::size_t c = 0; c < color_floats; c += hn::MaxLanes(tag)) {
@@ -290,8 +290,8 @@ KERNEL_INLINE void shade(float dim, float grey, float more, float tail_light, fl
     const auto to_grey = hn::Set(tag, top) - rgb;
     const auto lit = hn::MulAdd(hn::Set(tag, grey), to_grey, rgb);
     hn::Store(hn::Set(tag, tail_light) * lit, tag, tail + c);
-    const auto dark = hn::Set(tag, 1.0F - tail_light) * lit;
-    hn::Store(hn::MulAdd(hn::Set(tag, more), to_grey, dark), tag, rise + c);
+    const auto dark = hn::Set(tag, head_light - tail_light) * lit;
+    hn::Store(hn::MulAdd(hn::Set(tag, head_light * more), to_grey, dark), tag, rise + c);
   }
 }
 
@@ -338,17 +338,25 @@ KERNEL_INLINE void shade_ribbons(const Camera& camera, const LineStyle& line, co
 // Computes the colours of the remaining lines.
 inline void color_ribbons(const LineStyle& line, const Shades& shades, std::uint64_t lines,
                           Ribbons& r) {
+  // Of a segment of a chain, the light at both ends is that of the whole line there.
+  const bool chained = line.chains.q != nullptr;
+  const auto finish = [&](int l) {
+    const float dark = 1.0F - line.tail_light;
+    const float tail = chained ? 1.0F - dark * (1.0F - r.whole[l]) : line.tail_light;
+    const float head = chained ? 1.0F - dark * (1.0F - (r.whole[l] + r.whole_rise[l])) : 1.0F;
+    shade(shades.dim[l], shades.grey[l], shades.more[l], tail, head, r.tail[l], r.rise[l]);
+  };
   for (std::uint64_t left = lines; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
     blend(line.color.rgb + color_floats * static_cast<std::ptrdiff_t>(shades.entry[l]),
           shades.part[l], r.tail[l]);
-    shade(shades.dim[l], shades.grey[l], shades.more[l], line.tail_light, r.tail[l], r.rise[l]);
+    finish(l);
   }
   // Mid-grey where the field that determines the colour is masked.
   for (std::uint64_t left = lines & shades.unknown; left != 0; left &= left - 1U) {
     const int l = __builtin_ctzll(left);
     for (float& c : r.tail[l]) c = 0.5F;
-    shade(shades.dim[l], shades.grey[l], shades.more[l], line.tail_light, r.tail[l], r.rise[l]);
+    finish(l);
   }
 }
 

@@ -63,6 +63,7 @@ struct Chains {
   const float* magnitude;
   const float* tangent[3];
   const float* phase;
+  const float* turn;  // null: one texture along q; otherwise dashes across the segment
   const float* color;
   const std::uint32_t* sample;  // of the lattice
 };

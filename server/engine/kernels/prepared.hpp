@@ -35,7 +35,7 @@ struct Ribbons {
   alignas(64) float bend[brick_kernels];         // depth_ratio - 1
   alignas(64) float depth[brick_kernels];        // view depth at f = 0 minus that of the centre
   alignas(64) float depth_rise[brick_kernels];
-  // q + 3/2 - phase at f = 0, in [0, 2]; only with phase motion.
+  // q + 3/2 - phase at f = 0, in [0, 2]; of dashes their number, in [0, 1); only with phase motion.
   alignas(64) float phase[brick_kernels];
   alignas(64) float phase_rise[brick_kernels];
   // Segments of a chain: the pixel at (dx, dy) from f = 0 belongs to it where cut . d >= 0, and
@@ -45,6 +45,9 @@ struct Ribbons {
   alignas(64) float end_x[brick_kernels];
   alignas(64) float end_y[brick_kernels];
   alignas(64) float end_most[brick_kernels];
+  // The part of the whole line, from its tail, at f = 0, and how much more it is at f = 1.
+  alignas(64) float whole[brick_kernels];
+  alignas(64) float whole_rise[brick_kernels];
   alignas(64) float tail[brick_kernels][color_floats];  // colour at f = 0
   alignas(64) float rise[brick_kernels][color_floats];  // colour at f = 1 minus tail
 };
@@ -155,6 +158,7 @@ struct Ribbon {
   float depth, depth_rise;
   float phase, phase_rise;
   float cut_x, cut_y, end_x, end_y, end_most;
+  float whole, whole_rise;
   const LineStyle* style;
 };
 

@@ -22,10 +22,11 @@ void chain_lines(const trace::Segments& from, kernels::LineStyle& to) {
                from.magnitudes.data(),
                {from.tangents[0].data(), from.tangents[1].data(), from.tangents[2].data()},
                from.phases.data(),
+               from.turns.empty() ? nullptr : from.turns.data(),
                from.colors.data(),
                from.samples.data()};
-  // No vertex of a segment is farther from the other than half of this: a whole line may be one.
-  to.length *= 2;
+  // No vertex of a segment is farther from the other than half of this.
+  to.length = static_cast<float>(2 * std::max(from.longest, static_cast<double>(to.length)));
   to.half_span = 1e9F;
   for (const float*& component : to.velocity) component = nullptr;
   to.rate_x = to.rate_z = nullptr;

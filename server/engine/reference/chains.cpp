@@ -88,6 +88,18 @@ bool place_ends(const View& view, const Joint& from, const Joint& to, Ribbon& li
   return true;
 }
 
+// Of the part of a segment that is drawn.
+void set_dashes(const Segments& from, std::size_t v, double cycles, Ribbon& line) {
+  const auto low = static_cast<double>(from.q[v]);
+  const double rise = static_cast<double>(from.q[v + 1]) - low;
+  const auto part = [&](double q) { return rise > 0 ? (q - low) / rise : 0; };
+  const auto turns = static_cast<double>(from.turns[v]);
+  const double first = static_cast<double>(from.phases[v]) - cycles;
+  line.dashed = true;
+  line.turn0 = first + part(line.q0) * turns;
+  line.turn1 = first + (rise > 0 ? part(line.q1) : 1) * turns;
+}
+
 }  // namespace
 
 void list_chains(const Scene& scene, const View& view, const VectorLayer& layer, Kernels& kernels) {
@@ -109,6 +121,9 @@ void list_chains(const Scene& scene, const View& view, const VectorLayer& layer,
     line.opacity = layer.opacity;
     line.desaturation = layer.head_desaturation;
     line.perspective = view.perspective;
+    line.mark = layer.mark;
+    line.whole = line.q0 + 0.5;
+    line.whole_rise = line.q1 - line.q0;
     line.moving = layer.moving;
     const double depth = 0.5 * (a.at[2] + b.at[2]);
     const double magnitude = static_cast<double>(from.magnitudes[v]) / scale;
@@ -120,7 +135,9 @@ void list_chains(const Scene& scene, const View& view, const VectorLayer& layer,
     double value = static_cast<double>(from.colors[v]);
     if (layer.color_by == LineColor::magnitude) value /= scale;
     line.color = scaled(color_at(layer, value, depth), dim);
-    if (layer.moving) {
+    if (layer.moving && !from.turns.empty()) {
+      set_dashes(from, v, layer.motion_cycles, line);
+    } else if (layer.moving) {
       const double part = full > 0 ? std::min(magnitude / full, 1.0) : 1.0;
       line.phase = static_cast<double>(from.phases[v]) + layer.motion_cycles * part;
     }

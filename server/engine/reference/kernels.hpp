@@ -113,7 +113,13 @@ struct BasicRibbon {
   Real phase = 0;
   // A segment of a curved line: it has the pixels p with cut . (p - start) >= 0 and
   // end . (p - end of the line) < end_most.
+  // Its light at both ends, and the part of the whole line before it and within it, are of the
+  // whole line.
   bool chained = false;
+  Real whole = 0, whole_rise = 1;
+  // Dashes at both ends, of a line with dashes.
+  bool dashed = false;
+  Real turn0 = 0, turn1 = 0;
   std::array<Real, 2> cut{}, end{};
   Real end_most = 1;
 };
@@ -153,14 +159,14 @@ MarkCover<Real> mark_cover(const BasicRibbon<Real>& line, Real px, Real py, Real
   const Real edge = std::max(line.r2 - line.r1, Real(1e-6));
   const Real middle = (line.r1 + line.r2) / 2;
   const Real halo = static_cast<Real>(line.mark.halo);
-  const Real most = length / 4;
+  const Real most = length / (4 * std::max(line.whole_rise, Real(1e-6)));
   const Real change = std::clamp(
       static_cast<Real>(scene::narrowing(line.mark, static_cast<double>(middle))), -most, most);
   const bool arrow = line.mark.shape == scene::LineShape::arrow && line.mark.head_length > 0;
   const Real head = arrow ? std::min(static_cast<Real>(line.mark.head_length), length / 2) : 0;
   const Real least = Real(1e-6) * line.r2;
   const Real at = std::min(w, 1 - head / std::max(length, least));
-  const Real half = middle + change * (1 - 2 * at);
+  const Real half = middle + change * (1 - 2 * (line.whole + at * line.whole_rise));
   MarkCover<Real> cover =
       cover_within(half - std::hypot(px - at * ux, py - at * uy), half, halo, edge);
   if (!(head > 0) || length <= least) return cover;
@@ -172,6 +178,22 @@ MarkCover<Real> mark_cover(const BasicRibbon<Real>& line, Real px, Real py, Real
                                std::min(head - from_point, slope * head - across));
   const auto tip = cover_within(inside, cosine * slope * from_point, halo, edge);
   return {std::max(cover.line, tip.line), std::max(cover.whole, tip.whole)};
+}
+
+// W(frac(turns)), averaged over a pixel along the line; docs/design/rendering-model.md.
+template <class Real>
+Real mean_dash(const BasicRibbon<Real>& line, Real f) {
+  const Real pixels = std::hypot(line.x1 - line.x0, line.y1 - line.y0);
+  const Real turns = line.turn1 - line.turn0;
+  const Real blur = std::clamp(std::abs(turns) / (2 * std::max(pixels, Real(1e-6) * line.r2)),
+                               Real(1e-3), Real(8));
+  const auto integral = [](Real p) {
+    const Real whole = std::floor(p);
+    const Real part = p - whole;
+    return whole / 2 + (part < Real(0.5) ? part * part : 2 * part - part * part - Real(0.5));
+  };
+  const Real at = line.turn0 + f * turns;
+  return (integral(at + blur) - integral(at - blur)) / (2 * blur);
 }
 
 template <class Real>
@@ -210,7 +232,9 @@ RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
   }
   const Real q = line.q0 + f * (line.q1 - line.q0);
   hit.depth = line.a[2] + f * (line.b[2] - line.a[2]);
-  if (line.moving) {
+  if (line.moving && line.dashed) {
+    hit.opacity *= mean_dash(line, f);
+  } else if (line.moving) {
     const Real turn = q + Real(0.5) - line.phase;
     hit.opacity *= 1 - std::abs(2 * (turn - std::floor(turn)) - 1);
   }
@@ -220,6 +244,13 @@ RibbonHit<Real> hit_ribbon(const BasicRibbon<Real>& line, Real x, Real y) {
   };
   const auto dark = static_cast<Real>(1 - line.mark.tail_light);
   for (int c = 0; c < 3; ++c) {
+    if (line.chained) {
+      // Linear between the ends of the segment, each with the light of the whole line there.
+      const Real tail = (1 - dark * (1 - line.whole)) * lit(c, line.q0);
+      const Real head = (1 - dark * (1 - line.whole - line.whole_rise)) * lit(c, line.q1);
+      hit.color[c] = light * (tail + f * (head - tail));
+      continue;
+    }
     hit.color[c] = light * (lit(c, q) - dark * (1 - f) * lit(c, line.q0));
   }
   return hit;

@@ -36,11 +36,6 @@ bool is_dark(const std::string& background) {
 
 }  // namespace
 
-bool is_marked(const protocol::MarkView& mark) {
-  return mark.shape != protocol::MarkShape::line || mark.tail_darkening.value() > 0 ||
-         mark.halo > 0;
-}
-
 // docs/benchmarks/direction.md has the measurements behind the limit.
 bool shows_white_heads(const protocol::VectorColorView& color) {
   constexpr double least_contrast = 0.045;

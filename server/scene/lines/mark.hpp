@@ -8,9 +8,6 @@
 
 namespace windsplat::scene {
 
-// Whether a completed view asks for more than lines of constant width and light.
-bool is_marked(const protocol::MarkView& mark);
-
 // Whether nine tenths of the colours of lines change visibly if they are whitened as by default.
 bool shows_white_heads(const protocol::VectorColorView& color);
 

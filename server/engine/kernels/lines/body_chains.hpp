@@ -80,12 +80,17 @@ KERNEL_INLINE MaskOf<Kernel> divides(const Direction& at, Kernel ux, Kernel uy,
   return hn::And(whole, hn::Gt(along, hn::Zero(KernelTag())));
 }
 
+// The parts of segments that are drawn.
+struct Clip {
+  alignas(64) float first[pair_kernels], last[pair_kernels];
+};
+
 // Projects segments. Sets the part of each that is drawn as q of the whole line. Returns the lanes
 // with a visible segment.
 template <bool Perspective>
 KERNEL_INLINE MaskOf<Kernel> project_chains(const Camera& camera, const LineStyle& line,
                                             const ChainEnds& ends, const KernelPositions& positions,
-                                            int l, Segments& s, Ribbons& r) {
+                                            int l, Segments& s, Clip& clip, Ribbons& r) {
   const Kernel zero = hn::Zero(KernelTag());
   const Kernel one = all<Kernel>(1.0F);
   const Kernel near = all<Kernel>(camera.near);
@@ -150,6 +155,10 @@ KERNEL_INLINE MaskOf<Kernel> project_chains(const Camera& camera, const LineStyl
   const Kernel rise = load<Kernel>(ends.q_to) - q0;
   s.low = hn::MulAdd(first, rise, q0);
   s.high = hn::MulAdd(last, rise, q0);
+  store(s.low + all<Kernel>(0.5F), r.whole + l);
+  store(s.high - s.low, r.whole_rise + l);
+  store(first, clip.first);
+  store(last, clip.last);
   return shown;
 }
 
@@ -157,6 +166,21 @@ KERNEL_INLINE MaskOf<Kernel> project_chains(const Camera& camera, const LineStyl
 inline void still_ribbons(int l, Ribbons& r) {
   store(all<Kernel>(0.5F), r.phase + l);
   store(hn::Zero(KernelTag()), r.phase_rise + l);
+}
+
+// Dashes: their number from the tail of the line, which moves by motion_cycles.
+inline void dash_ribbons(const LineStyle& line, const Rows& rows, const Clip& clip, int i, int l,
+                         Ribbons& r) {
+  for (int k = 0; k < kernel_lanes; ++k) {
+    const std::int64_t vertex = offset_of(rows, i + k);
+    const auto turn = static_cast<double>(line.chains.turn[vertex]);
+    const double from = static_cast<double>(line.chains.phase[vertex]) +
+                        static_cast<double>(clip.first[k]) * turn - line.motion_cycles;
+    const double rest = from - static_cast<double>(static_cast<std::int64_t>(from));
+    r.phase[l + k] = static_cast<float>(rest < 0 ? rest + 1 : rest);
+    r.phase_rise[l + k] = static_cast<float>(
+        (static_cast<double>(clip.last[k]) - static_cast<double>(clip.first[k])) * turn);
+  }
 }
 
 // Prepares a vector of segments. Returns the lanes with a visible segment.
@@ -171,9 +195,13 @@ KERNEL_INLINE std::uint32_t prepare_chains(const Camera& camera, const Pass& pas
   s.lift = zero;
   s.phase = fetch(pass.line.chains.phase, rows, i);
   const ChainEnds ends = chain_ends(camera, pass, rows, i);
-  const auto shown = project_chains<Perspective>(camera, pass.line, ends, positions, l, s, ribbons);
+  Clip clip;
+  const auto shown =
+      project_chains<Perspective>(camera, pass.line, ends, positions, l, s, clip, ribbons);
   shade_ribbons(camera, pass.line, rows, positions, vectors, s, i, l, shades);
-  if (pass.line.moving != 0) {
+  if (pass.line.moving != 0 && pass.line.chains.turn != nullptr) {
+    dash_ribbons(pass.line, rows, clip, i, l, ribbons);
+  } else if (pass.line.moving != 0) {
     phase_ribbons(pass.line, vectors, s, l, ribbons);
   } else {
     still_ribbons(l, ribbons);

@@ -24,16 +24,24 @@ struct MarkLanes {
   int arrow;
 };
 
-KERNEL_INLINE MarkLanes spread_mark(const LineStyle& line, float ux, float uy) {
+// The part of a whole line that is drawn: 0 and 1 of a straight line. A segment of a chain narrows
+// as a straight line of the length that the whole would have, were all of it as long as this part.
+struct PartOfLine {
+  float from, rise;
+};
+
+KERNEL_INLINE MarkLanes spread_mark(const LineStyle& line, float ux, float uy,
+                                    const PartOfLine& part) {
   const float length = __builtin_sqrtf(ux * ux + uy * uy);
   const float least = 1e-6F * line.r2;
-  const float most = narrowing_of_length * length;
+  const float most = narrowing_of_length * length / larger(part.rise, 1e-6F);
   const float narrowing = limited(line.narrowing, -most, most);
   const float head = smaller(line.head_length, head_of_length * length);
   const float inverse = 1.0F / larger(length, least);
   MarkLanes out;
-  out.reach = all<Pixel>(line.steep * (line.half_width + narrowing) + 0.5F * line.opacity);
-  out.widen = all<Pixel>(-2.0F * line.steep * narrowing);
+  out.reach = all<Pixel>(line.steep * (line.half_width + narrowing * (1.0F - 2.0F * part.from)) +
+                         0.5F * line.opacity);
+  out.widen = all<Pixel>(-2.0F * line.steep * narrowing * part.rise);
   out.shaft = all<Pixel>(1.0F - head * inverse);
   out.length = all<Pixel>(length);
   out.inverse_length = all<Pixel>(inverse);
