@@ -337,11 +337,6 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
                           : default_color_by(info.grid, slice_of(view.geometry, lattice));
   }
   complete_heads(vector, view.image.background);
-  if (vector.trace && is_marked(vector.mark)) {
-    return invalid_at("/vector/mark",
-                      "streamlets have no marks: use the shape \"line\" without tailDarkening and "
-                      "halo, or set vector.trace to null");
-  }
   if (auto ok = outline_scalars(view, info); !ok) return ok.error();
   return camera;
 }

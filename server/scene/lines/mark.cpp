@@ -49,8 +49,9 @@ bool shows_white_heads(const protocol::VectorColorView& color) {
 void complete_heads(protocol::VectorView& vector, const std::string& background) {
   std::optional<double>& white = vector.head_desaturation;
   std::optional<double>& dark = vector.mark.tail_darkening;
-  const bool plain = vector.mark.shape == protocol::MarkShape::line && !vector.trace;
-  bool hued = plain && vector.color.true_colors;
+  const bool unshaped = vector.mark.shape == protocol::MarkShape::line;
+  const bool plain = unshaped && !vector.trace;
+  bool hued = unshaped && vector.color.true_colors;
   if (plain && !white && !dark && is_dark(background) && !shows_white_heads(vector.color)) {
     white = 0;
     hued = true;
@@ -63,8 +64,8 @@ void complete_heads(protocol::VectorView& vector, const std::string& background)
 void draw_true_colors(protocol::VectorView& completed) {
   if (completed.color.true_colors) return;
   completed.color.true_colors = true;
-  const bool plain = completed.mark.shape == protocol::MarkShape::line && !completed.trace;
-  if (plain && completed.mark.tail_darkening == 0.0) {
+  const bool unshaped = completed.mark.shape == protocol::MarkShape::line;
+  if (unshaped && completed.mark.tail_darkening == 0.0) {
     completed.mark.tail_darkening = default_darkening;
   }
 }

@@ -100,7 +100,7 @@ const beside = new BesidePicture(document.baseURI, clock, {
   openView: (view) => app.openView(view),
   edited: () => app.saveAddress(),
 });
-new PointerInput(beside.canvas, moves, () => {});
+new PointerInput(beside.canvas, moves, { clicked: () => {}, takesWheel: () => true });
 const panels = new Panels(panelBox, host, {
   ...comparable,
   compare: () => beside.toggle(),
