@@ -18,7 +18,8 @@ bool keeps_null(const std::string& pointer, const std::string& key) {
 
 // Objects whose absence means something else than their defaults.
 bool keeps_empty(const std::string& pointer, const std::string& key) {
-  return (key == "light" && pointer.empty()) || (key == "trace" && pointer == "/vector");
+  return (key == "light" && pointer.empty()) || (key == "trace" && pointer == "/vector") ||
+         (key == "seeds" && pointer == "/vector/trace");
 }
 
 // Removes redundant parts: nulls that mean a default, and empty objects.

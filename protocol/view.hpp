@@ -90,10 +90,39 @@ struct VectorColorView {
   bool operator==(const VectorColorView&) const = default;
 };
 
+// Seeds at equal distances, in the coordinates of the axes.
+struct SeedLineView {
+  Vec3 from{};
+  Vec3 to{};
+  int count = 20;
+  bool operator==(const SeedLineView&) const = default;
+};
+struct SeedBlockView {
+  Vec3 from{};
+  Vec3 to{};
+  std::array<int, 3> counts{8, 8, 1};  // along each axis
+  bool operator==(const SeedBlockView&) const = default;
+};
+
+// Where lines begin, and how far each is followed.
+struct SeedsView {
+  std::optional<int> evenly;  // empty: 100, or 0 with other seeds
+  std::vector<Vec3> points;
+  std::optional<SeedLineView> line;
+  std::optional<SeedBlockView> block;
+  std::optional<double> length;    // world units to each side; empty: the diagonal of the box
+  std::optional<double> duration;  // to each side; empty: any
+  int path_steps = 0;              // of paths through time, before and after; 0: streamlines
+  int pieces = 500;                // of a line, at most
+  double dash = 0.15;              // world units at the top of magnitude_range
+  bool operator==(const SeedsView&) const = default;
+};
+
 // Curved lines that follow the flow in place of straight ones.
 struct TraceView {
-  int segments = 8;          // straight pieces of a line, at most
-  double step_error = 1e-3;  // of each step of the integration, grid cells
+  int segments = 8;                // straight pieces of a line, at most
+  double step_error = 1e-3;        // of each step of the integration, grid cells
+  std::optional<SeedsView> seeds;  // empty: a line for each sample
   bool operator==(const TraceView&) const = default;
 };
 

@@ -303,6 +303,7 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
   layer.moving = from.motion == protocol::MotionMode::phase;
   if (layer.moving) layer.motion_cycles = from.motion_rate * (view.step + from.motion_time);
   layer.epoch = from.jitter.per_step ? static_cast<std::uint32_t>(view.step) : 0U;
+  if (has_seeds(view)) layer.min_magnitude = 0;  // chosen lines have no gaps
   layer.combine_or = from.combine == protocol::LineCombination::either &&
                      (view.geometry.slice || view.geometry.plane);
   if (layer.color_by == LineColor::scalar) lines.colors = fields.of_lines(*from.color.field);
@@ -377,7 +378,7 @@ Result<Scene> with_data(Scene scene, NeededScene needed, const CompletedView& co
     if (auto ok = load(vectors, step, dataset, layer.field); !ok) return ok.error();
     merge_lines(whole, scene.level, pixels_per_unit(scene.camera, whole), layer);
     if (has_streamlets(completed.view())) {
-      auto segments = streamlets_of(completed.view(), *completed.placed(), layer, dataset);
+      auto segments = traced_of(completed.view(), *completed.placed(), layer, vectors.how, dataset);
       if (!segments) return segments.error();
       layer.streamlets = std::move(*segments);
     }

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <iomanip>
 #include <sstream>
 #include <string>
 #include <utility>
 
+#include "protocol/limits.hpp"
 #include "server/base/ascii.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/scene/camera.hpp"
@@ -25,6 +27,7 @@
 #include "server/scene/region/select.hpp"
 #include "server/scene/section.hpp"
 #include "server/scene/surfaces/make_surfaces.hpp"
+#include "server/scene/traced/seeds.hpp"
 
 namespace windsplat::scene {
 
@@ -327,6 +330,19 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
                       "streamlets leave a slice or plane: set it to null, or vector.trace");
   }
   if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry, lattice));
+  if (vector.trace && vector.trace->seeds) {
+    const std::int64_t seeds = seeds_in(*vector.trace->seeds);
+    if (seeds > protocol::limits::seeds_max) {
+      return invalid_at("/vector/trace/seeds", "has " + std::to_string(seeds) +
+                                                   " seeds; the limit is " +
+                                                   std::to_string(protocol::limits::seeds_max));
+    }
+  }
+  if (vector.trace && vector.mark.shape == protocol::MarkShape::arrow) {
+    return invalid_at("/vector/mark/shape",
+                      "traced lines have no arrow heads: use \"taper\" or \"comet\", or set "
+                      "vector.trace to null");
+  }
   if (const auto& range = vector.magnitude_range; range && !((*range)[0] < (*range)[1])) {
     return invalid_at("/vector/magnitudeRange", "does not ascend");
   }

@@ -35,6 +35,14 @@ bool in_plane(const std::string& pointer) { return pointer.starts_with("/geometr
 
 bool in_sun_at(const std::string& pointer) { return pointer.starts_with("/light/sunAt/"); }
 
+bool in_seed_line(const std::string& pointer) {
+  return pointer.starts_with("/vector/trace/seeds/line/");
+}
+
+bool in_seed_block(const std::string& pointer) {
+  return pointer.starts_with("/vector/trace/seeds/block/");
+}
+
 Json with_scalar() { return Json{{"scalars", {{{"field", "q"}}}}}; }
 
 // A view with one value set, and others that it requires.
@@ -52,6 +60,12 @@ Json view_with(const std::string& pointer, const Json& value) {
   }
   if (in_sun_at(pointer)) {
     view["light"]["sunAt"] = {{"utc", "2024-06-21T12:00:00Z"}, {"longitude", 0}, {"latitude", 0}};
+  }
+  if (in_seed_line(pointer)) {
+    view["vector"]["trace"]["seeds"]["line"] = {{"from", {0, 0, 0}}, {"to", {0, 0, 1}}};
+  }
+  if (in_seed_block(pointer)) {
+    view["vector"]["trace"]["seeds"]["block"] = {{"from", {0, 0, 0}}, {"to", {0, 0, 1}}};
   }
   view[Json::json_pointer(pointer)] = value;
   return view;
@@ -78,6 +92,9 @@ TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
   view.light = LightView{};
   view.difference = DifferenceView{};
   view.vector.trace = TraceView{};
+  view.vector.trace->seeds = SeedsView{};
+  view.vector.trace->seeds->line = SeedLineView{};
+  view.vector.trace->seeds->block = SeedBlockView{};
   const Json with_all = Json::parse(encode_view(view));
   int compared = 0;
   walk(read_protocol_json("view.schema.json"), "", [&](const std::string& at, const Json& schema) {
@@ -86,13 +103,19 @@ TEST(Schema, StaticDefaultsAreThoseOfTheStructs) {
                           at.starts_with("/difference/");
     const Json& encoded = optional ? with_all : without;
     if (in_sun_at(at)) return;
+    // These are set here, and null by default.
+    if (at == "/vector/trace/seeds" || at == "/vector/trace/seeds/line" ||
+        at == "/vector/trace/seeds/block") {
+      return;
+    }
     if (schema.contains("default")) {
       ASSERT_TRUE(encoded.contains(pointer)) << at;
       EXPECT_EQ(encoded.at(pointer), schema["default"]) << at;
       ++compared;
     } else if (at == "/vector/field") {
       EXPECT_FALSE(encoded.contains(pointer)) << "null means no lines";
-    } else if (at != "/scalars" && at != "/scalars/0/field" && !in_slice(at) && !in_plane(at)) {
+    } else if (at != "/scalars" && at != "/scalars/0/field" && !in_slice(at) && !in_plane(at) &&
+               !in_seed_line(at) && !in_seed_block(at)) {
       ASSERT_TRUE(encoded.contains(pointer)) << at;
       EXPECT_TRUE(encoded.at(pointer).is_null()) << at << " has no static default";
     }
@@ -115,6 +138,9 @@ TEST(Schema, EncodedViewsHoldExactlyTheSchemasKeys) {
   view.scalars->front().field = "q";
   view.vector.trace = TraceView{};
   view.difference = DifferenceView{};
+  view.vector.trace->seeds = SeedsView{};
+  view.vector.trace->seeds->line = SeedLineView{};
+  view.vector.trace->seeds->block = SeedBlockView{};
   view.light = LightView{};
   view.light->sun_at = SunAtView{};
   const Json encoded = Json::parse(encode_view(view));
@@ -157,7 +183,9 @@ TEST(Schema, RangesInsideArraysMatchTheCodec) {
            {std::pair{"minimum", -1e300}, std::pair{"maximum", 1e300}}) {
         const auto bound = schema["items"].at(keyword).get<double>();
         Json value = Json::array();
-        for (std::size_t k = 0; k < count; ++k) value.push_back(0.25 * static_cast<double>(k + 1));
+        const bool whole = schema["items"]["type"] == "integer";
+        const double step = whole ? 1 : 0.25;
+        for (std::size_t k = 0; k < count; ++k) value.push_back(step * static_cast<double>(k + 1));
         // Keeps a range ascending.
         if (count == 2) {
           const char* const other = i == 0 ? "maximum" : "minimum";
@@ -166,7 +194,7 @@ TEST(Schema, RangesInsideArraysMatchTheCodec) {
         if (count == 2 && (i == 0) == (outward > 0)) continue;
         value[i] = bound;
         EXPECT_TRUE(accepted(view_with(at, value))) << at << " " << keyword;
-        value[i] = std::nextafter(bound, outward);
+        value[i] = whole ? bound + std::copysign(1, outward) : std::nextafter(bound, outward);
         EXPECT_EQ(first_pointer(view_with(at, value)), at + "/" + std::to_string(i)) << keyword;
         ++bounds;
       }
@@ -298,6 +326,10 @@ TEST(Schema, NullMeansTheDefaultExactlyWhereTheSchemaAllowsIt) {
     if (!may_be_null(schema) || at == "/vector/field") return;
     Json silent = at.starts_with("/scalars/") ? with_scalar() : Json::object();
     if (at.starts_with("/light/")) silent["light"] = Json::object();
+    if (at.starts_with("/vector/trace/")) silent["vector"]["trace"] = Json::object();
+    if (at.starts_with("/vector/trace/seeds/")) {
+      silent["vector"]["trace"]["seeds"] = Json::object();
+    }
     EXPECT_EQ(ViewDocument::parse(view.dump())->canonical(), silent.dump()) << at;
   });
 }

@@ -4,12 +4,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 #include <sstream>
 #include <string>
 
 #include "server/scene/refusal.hpp"
 #include "server/scene/region/crop.hpp"
+#include "server/scene/traced/streamlines.hpp"
+#include "server/scene/traced/traced_flow.hpp"
 #include "server/trace/streamlets.hpp"
 
 namespace windsplat::scene {
@@ -17,72 +18,6 @@ namespace windsplat::scene {
 namespace {
 
 using trace::Motion;
-
-// The smallest magnitude that the kernels draw, whatever the least of the view.
-constexpr double drawn_least = 0x1p-124;
-
-trace::Flow flow_of(const VectorLayer& layer, const Lattice& lattice) {
-  trace::Flow flow;
-  flow.dims = lattice.dims;
-  flow.around = lattice.around;
-  for (int c = 0; c < layer.field->components && c < 3; ++c) {
-    flow.components[static_cast<std::size_t>(c)] = layer.field->component(c);
-  }
-  flow.scale = layer.scale;
-  flow.rate_x = layer.rate_x;
-  flow.rate_y = layer.rate_y;
-  flow.rate_z = layer.rate_z;
-  for (std::size_t a = 0; a < 3; ++a) {
-    flow.positions[a] = lattice.positions[a];
-    flow.spacing[a] = lattice.spacing[a];
-  }
-  if (lattice.places) flow.places = lattice.places->data();
-  return flow;
-}
-
-// The height of a place on the uncurved lattice.
-double height_at(const Lattice& lattice, double index) {
-  const std::vector<double>& z = lattice.positions[2];
-  if (z.size() < 2) return z[0] + index * lattice.spacing[2][0];
-  const double low = std::clamp(std::floor(index), 0.0, static_cast<double>(z.size() - 2));
-  const auto k = static_cast<std::size_t>(low);
-  return z[k] + (index - low) * (z[k + 1] - z[k]);
-}
-
-// The compass bearing in [0, 360).
-double compass_bearing(const glm::dvec3& v) {
-  const double degrees = std::atan2(v.x, v.y) * 180 / std::numbers::pi;
-  const double turned = degrees < 0 ? degrees + 360 : degrees;
-  return turned < 360 ? turned : 0;
-}
-
-// The value of a place that determines its colour; see trace::Segments::colors.
-double color_value(const VectorLayer& layer, const Lattice& lattice, const trace::Flow& flow,
-                   const glm::dvec3& index, const Motion& motion) {
-  switch (layer.color_by) {
-    case LineColor::world_z:
-      return height_at(lattice, index.z);
-    case LineColor::rise: {
-      const auto [low, high] = layer.color.range;
-      const auto [bottom, top] = height_range(lattice);
-      const double full = layer.magnitude_range[1];
-      const double part = full > 0 ? std::min(motion.magnitude / full, 1.0) : 1.0;
-      const double rise = motion.drawn.z * part * layer.length;
-      return (1 - layer.rise_weight) * (height_at(lattice, index.z) - bottom) / (top - bottom) +
-             layer.rise_weight * (rise - low) / (high - low);
-    }
-    case LineColor::magnitude:
-      return motion.magnitude * trace::Segments::scale_of(layer.magnitude_range[1]);
-    case LineColor::direction:
-      return compass_bearing(motion.drawn);
-    case LineColor::scalar:
-      return trace::value_at(flow, layer.color_field->values.data(), index);
-    case LineColor::screen_z:
-    case LineColor::constant:
-      break;
-  }
-  return 0;
-}
 
 trace::Streamlets description_of(const protocol::View& view, const VectorLayer& layer,
                                  const Lattice& lattice) {
@@ -139,10 +74,13 @@ std::string segments_key(const protocol::View& view, const Placed& placed,
 
 }  // namespace
 
-Result<std::shared_ptr<const trace::Segments>> streamlets_of(const protocol::View& view,
-                                                             const Placed& placed,
-                                                             const VectorLayer& layer,
-                                                             data::Dataset& dataset) {
+Result<std::shared_ptr<const trace::Segments>> traced_of(const protocol::View& view,
+                                                         const Placed& placed,
+                                                         const VectorLayer& layer,
+                                                         const data::Derivation& how,
+                                                         data::Dataset& dataset) {
+  const std::string key = segments_key(view, placed, layer);
+  if (has_seeds(view)) return streamlines_of(view, placed, layer, how, key, dataset);
   const trace::Streamlets of = description_of(view, layer, placed.lattice);
   const std::int64_t vertices = trace::vertices_at_most(of);
   const std::uint64_t bytes = static_cast<std::uint64_t>(vertices) * trace::Segments::vertex_bytes;
@@ -152,10 +90,9 @@ Result<std::shared_ptr<const trace::Segments>> streamlets_of(const protocol::Vie
                           " MiB, more than the memory limit permits: choose a larger "
                           "/vector/stride or fewer /vector/trace/segments");
   }
-  auto kept =
-      dataset.auxiliary(segments_key(view, placed, layer), bytes, [&of]() -> data::Resident {
-        return std::make_shared<const trace::Segments>(trace::make_segments(of));
-      });
+  auto kept = dataset.auxiliary(key, bytes, [&of]() -> data::Resident {
+    return std::make_shared<const trace::Segments>(trace::make_segments(of));
+  });
   if (!kept) return kept.error();
   return std::static_pointer_cast<const trace::Segments>(*kept);
 }

@@ -1,4 +1,4 @@
-// View and fields -> the streamlets of a scene.
+// View and fields -> the traced lines of a scene.
 #pragma once
 
 #include <cstddef>
@@ -14,13 +14,20 @@ namespace windsplat::scene {
 
 // Whether lines follow the flow.
 inline bool has_streamlets(const protocol::View& view) { return view.vector.trace.has_value(); }
+// Whether they are those through seeds.
+inline bool has_seeds(const protocol::View& view) {
+  return view.vector.trace && view.vector.trace->seeds;
+}
 
-// The streamlets of a layer whose fields are loaded, on the lattice of the whole data. Computed on
-// first need, shared, counted and evicted like a level of a volume; what they depend on is their
-// key. Errors: invalid at /vector/trace (more memory than the limit), out_of_memory, not_resident.
-Result<std::shared_ptr<const trace::Segments>> streamlets_of(const protocol::View& view,
-                                                             const Placed& placed,
-                                                             const VectorLayer& layer,
-                                                             data::Dataset& dataset);
+// The streamlets of a layer whose fields are loaded, on the lattice of the whole data, or its lines
+// through seeds. Computed on first need, shared, counted and evicted like a level of a volume; what
+// they depend on is their key. `how`: that of the vectors of the layer. Errors: invalid at
+// /vector/trace (more memory than the limit), out_of_memory, not_resident; those of
+// streamlines_of().
+Result<std::shared_ptr<const trace::Segments>> traced_of(const protocol::View& view,
+                                                         const Placed& placed,
+                                                         const VectorLayer& layer,
+                                                         const data::Derivation& how,
+                                                         data::Dataset& dataset);
 
 }  // namespace windsplat::scene

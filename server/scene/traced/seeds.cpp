@@ -1,0 +1,234 @@
+#include "server/scene/traced/seeds.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <string>
+
+#include "server/data/model/measure.hpp"
+#include "server/scene/refusal.hpp"
+#include "server/scene/region/select.hpp"
+#include "server/trace/streamlines.hpp"
+
+namespace windsplat::scene {
+
+namespace {
+
+using glm::dvec3;
+using protocol::SeedsView;
+using protocol::Vec3;
+
+constexpr double turn_degrees = 360;
+constexpr int evenly_default = 100;
+constexpr std::array<const char*, 3> letters{"x", "y", "z"};
+
+std::string number(double value) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.7g", value);
+  return text.data();
+}
+
+Error outside(std::size_t axis, double at, double low, double high, const data::Axis& of,
+              const std::string& pointer) {
+  std::string text = std::string(letters.at(axis)) + " = " + number(at) +
+                     " is outside of the data, " + number(std::min(low, high)) + " to " +
+                     number(std::max(low, high));
+  if (!of.units.empty()) text += " " + printable(of.units, 80);
+  return invalid_at(pointer, text);
+}
+
+// The index of a coordinate, linear between the samples and in the outer half of the outermost
+// cells; nullopt beyond.
+std::optional<double> along(const std::vector<double>& coordinates, double at) {
+  const bool ascends = coordinates.back() > coordinates.front();
+  const auto above = std::partition_point(coordinates.begin(), coordinates.end(),
+                                          [&](double c) { return ascends ? c <= at : c >= at; });
+  const auto count = static_cast<std::ptrdiff_t>(coordinates.size());
+  const std::ptrdiff_t low =
+      std::clamp<std::ptrdiff_t>(above - coordinates.begin() - 1, 0, count - 2);
+  const double from = coordinates[static_cast<std::size_t>(low)];
+  const double to = coordinates[static_cast<std::size_t>(low + 1)];
+  const double index = static_cast<double>(low) + (at - from) / (to - from);
+  constexpr double slack = 1e-9;
+  if (!(index >= -0.5 - slack && index <= static_cast<double>(count) - 0.5 + slack)) {
+    return std::nullopt;
+  }
+  return index;
+}
+
+Result<double> along_axis(const data::Axis& axis, std::size_t letter, double at,
+                          const std::string& pointer) {
+  const std::vector<double>& c = axis.coordinates;
+  if (c.size() < 2) return 0.0;
+  const bool round = axis.kind == data::AxisKind::longitude && axis.units.substr(0, 3) != "rad";
+  if (!round) {
+    if (const auto index = along(c, at)) return *index;
+  } else {
+    // Of equivalent longitudes the one nearest to the middle of the axis, then its neighbours.
+    const double middle = 0.5 * (c.front() + c.back());
+    const double near = middle + std::remainder(at - middle, turn_degrees);
+    for (const double turns : {0.0, 1.0, -1.0}) {
+      if (const auto index = along(c, near + turns * turn_degrees)) return *index;
+    }
+    // Between the last column and the first one of an axis that closes in steps of other width.
+    const double rest = turn_degrees - std::abs(c.back() - c.front());
+    const double beyond =
+        std::fmod(std::fmod(near - c.back(), turn_degrees) + turn_degrees, turn_degrees);
+    const double widest = 1.5 * std::abs(c[1] - c[0]);
+    if (c.back() > c.front() && rest > 0 && rest <= widest && beyond <= rest) {
+      return static_cast<double>(c.size() - 1) + beyond / rest;
+    }
+  }
+  return outside(letter, at, c.front(), c.back(), axis, pointer);
+}
+
+// Longitude and latitude within the quadrilaterals of columns, by the method of Newton from the
+// nearest column.
+class ColumnSearch {
+ public:
+  ColumnSearch(const data::Columns& columns, const std::array<int, 3>& dims)
+      : columns_(columns), dims_(dims) {}
+
+  // Changes x and y; leaves them where the method finds no place within a cell of theirs.
+  void refine(double longitude, double latitude, dvec3& index) const {
+    if (dims_[0] < 2 || dims_[1] < 2) return;
+    constexpr int steps = 20;
+    double x = index.x;
+    double y = index.y;
+    for (int n = 0; n < steps; ++n) {
+      const Local at = local(x, y);
+      const double east = std::remainder(longitude - at.longitude, turn_degrees);
+      const double north = latitude - at.latitude;
+      const double det = at.lon_x * at.lat_y - at.lon_y * at.lat_x;
+      if (!(std::abs(det) > 0)) return;
+      x += (east * at.lat_y - north * at.lon_y) / det;
+      y += (north * at.lon_x - east * at.lat_x) / det;
+      if (!(std::abs(x - index.x) <= 1.5 && std::abs(y - index.y) <= 1.5)) return;
+    }
+    index.x = std::clamp(x, -0.5, dims_[0] - 0.5);
+    index.y = std::clamp(y, -0.5, dims_[1] - 0.5);
+  }
+
+ private:
+  struct Local {
+    double longitude, latitude, lon_x, lon_y, lat_x, lat_y;
+  };
+
+  [[nodiscard]] Local local(double x, double y) const {
+    const int i = std::clamp(static_cast<int>(std::floor(x)), 0, dims_[0] - 2);
+    const int j = std::clamp(static_cast<int>(std::floor(y)), 0, dims_[1] - 2);
+    const double u = x - i;
+    const double v = y - j;
+    const auto value = [&](const std::vector<double>& of, int di, int dj) {
+      return of[static_cast<std::size_t>(j + dj) * static_cast<std::size_t>(dims_[0]) +
+                static_cast<std::size_t>(i + di)];
+    };
+    const auto bilinear = [&](const std::vector<double>& of, double& by_x, double& by_y) {
+      const double a = value(of, 0, 0);
+      const double b = value(of, 1, 0);
+      const double c = value(of, 0, 1);
+      const double d = value(of, 1, 1);
+      by_x = (1 - v) * (b - a) + v * (d - c);
+      by_y = (1 - u) * (c - a) + u * (d - b);
+      return (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d);
+    };
+    Local out{};
+    out.longitude = bilinear(columns_.longitude, out.lon_x, out.lon_y);
+    out.latitude = bilinear(columns_.latitude, out.lat_x, out.lat_y);
+    return out;
+  }
+
+  const data::Columns& columns_;
+  const std::array<int, 3>& dims_;
+};
+
+// The n-th of `count` places from one end to the other; the middle if there is one.
+double part_of(int n, int count) { return count > 1 ? static_cast<double>(n) / (count - 1) : 0.5; }
+
+double mixed(double from, double to, double part) { return (1 - part) * from + part * to; }
+
+Vec3 mixed(const Vec3& from, const Vec3& to, const Vec3& part) {
+  Vec3 out{};
+  for (std::size_t a = 0; a < 3; ++a) out[a] = mixed(from[a], to[a], part[a]);
+  return out;
+}
+
+}  // namespace
+
+Result<dvec3> index_of(const Vec3& at, const Placed& placed, const data::Axis& vertical,
+                       const std::string& pointer) {
+  dvec3 index(0);
+  const data::Grid& grid = placed.grid;
+  if (grid.columns) {
+    data::Grid flat = grid;
+    flat.axes[2].coordinates.resize(1);
+    const auto nearest = data::nearest_sample(flat, {at[0], at[1], std::nullopt}, nullptr);
+    if (!nearest) return invalid_at(pointer, nearest.error().message);
+    index.x = nearest->index[0];
+    index.y = nearest->index[1];
+    const std::array<int, 3> dims = grid.dims();
+    ColumnSearch(*grid.columns, dims).refine(at[0], at[1], index);
+  }
+  for (std::size_t a = grid.columns ? 2 : 0; a < 3; ++a) {
+    const auto along = along_axis(a == 2 ? vertical : grid.axes[a], a, at[a], pointer);
+    if (!along) return along.error();
+    index[static_cast<glm::length_t>(a)] = *along;
+  }
+  return index;
+}
+
+std::int64_t seeds_in(const SeedsView& seeds) {
+  std::int64_t others = static_cast<std::int64_t>(seeds.points.size());
+  if (seeds.line) others += seeds.line->count;
+  if (seeds.block) {
+    std::int64_t product = 1;
+    for (const int count : seeds.block->counts) product *= count;
+    others += product;
+  }
+  return others + seeds.evenly.value_or(others > 0 ? 0 : evenly_default);
+}
+
+Result<std::vector<dvec3>> seeds_of(const SeedsView& seeds, const Placed& placed,
+                                    const data::Axis& vertical, const trace::Flow& flow) {
+  const std::string root = "/vector/trace/seeds";
+  std::vector<dvec3> out;
+  Result<void> good;
+  const auto add = [&](const Vec3& at, const std::string& pointer) {
+    if (!good) return;
+    if (auto index = index_of(at, placed, vertical, pointer)) {
+      out.push_back(*index);
+    } else {
+      good = index.error();
+    }
+  };
+  for (std::size_t n = 0; n < seeds.points.size(); ++n) {
+    add(seeds.points[n], root + "/points/" + std::to_string(n));
+  }
+  if (const auto& line = seeds.line) {
+    for (int n = 0; n < line->count; ++n) {
+      const double part = part_of(n, line->count);
+      add(mixed(line->from, line->to, {part, part, part}),
+          root + (part < 0.5 ? "/line/from" : "/line/to"));
+    }
+  }
+  if (const auto& block = seeds.block) {
+    const auto& [nx, ny, nz] = block->counts;
+    for (int z = 0; z < nz; ++z) {
+      for (int y = 0; y < ny; ++y) {
+        for (int x = 0; x < nx; ++x) {
+          add(mixed(block->from, block->to, {part_of(x, nx), part_of(y, ny), part_of(z, nz)}),
+              root + "/block");
+        }
+      }
+    }
+  }
+  if (!good) return good.error();
+  const int even = seeds.evenly.value_or(out.empty() ? evenly_default : 0);
+  const std::vector<dvec3> places = trace::evenly(flow, even);
+  out.insert(out.end(), places.begin(), places.end());
+  return out;
+}
+
+}  // namespace windsplat::scene

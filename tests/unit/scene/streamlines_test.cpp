@@ -1,0 +1,260 @@
+// Lines through the seeds of a view: where they begin, what is refused, what they depend on.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "server/scene/traced/seeds.hpp"
+#include "tests/unit/scene/fake.hpp"
+
+namespace windsplat::scene {
+namespace {
+
+using protocol::SeedsView;
+using protocol::View;
+using testing::HasSubstr;
+
+std::unique_ptr<data::Dataset> wind_dataset(int steps) {
+  return dataset_of(
+      std::make_unique<FakeSource>(atmosphere_grid(), std::vector{wind_info()}, steps));
+}
+
+// (step + 1) m/s to the east, every ten hours.
+class EastWind final : public data::Source {
+ public:
+  EastWind(data::Grid grid, int steps) {
+    info_.id = "fake";
+    info_.title = "East wind";
+    info_.source = "fake.nc";
+    info_.format = "fake";
+    info_.digest = "1";
+    info_.grid = std::move(grid);
+    data::FieldInfo wind = wind_info();
+    wind.components = {"u", "v"};
+    wind.component_units = {"m s-1", "m s-1"};
+    info_.fields = {wind};
+    info_.time_units = "hours since 2000-01-01";
+    for (int s = 0; s < steps; ++s) info_.steps.push_back({10.0 * s, std::to_string(s)});
+  }
+  [[nodiscard]] const data::DatasetInfo& info() const override { return info_; }
+  Result<data::Volume> read(std::size_t /*field*/, std::size_t step) override {
+    data::Volume volume;
+    volume.dims = info_.grid.dims();
+    volume.components = 2;
+    std::vector<float> values(2 * volume.samples(), 0.0F);
+    std::fill_n(values.begin(), volume.samples(), static_cast<float>(step + 1));
+    volume.values = std::move(values);
+    data::finish_volume(volume);
+    return volume;
+  }
+
+ private:
+  data::DatasetInfo info_;
+};
+
+View seeded(const std::vector<protocol::Vec3>& points = {}) {
+  View view;
+  view.vector.trace = protocol::TraceView{};
+  view.vector.trace->seeds = SeedsView{};
+  view.vector.trace->seeds->points = points;
+  view.scalars = std::vector<protocol::ScalarView>{};
+  return view;
+}
+
+std::int64_t lines_of(const View& view, data::Dataset& dataset) {
+  return built(view, dataset).vector->streamlets->tally.lines;
+}
+
+// The pointer and message of the refusal.
+std::pair<std::string, std::string> refusal_of(const View& view, data::Dataset& dataset) {
+  const auto scene = build_scene(view, dataset);
+  EXPECT_FALSE(scene);
+  if (scene || scene.error().at.empty()) return {};
+  EXPECT_EQ(scene.error().kind, ErrorKind::invalid);
+  return {scene.error().at[0].pointer, scene.error().message};
+}
+
+TEST(SeededScene, AllKindsOfSeedsAddUp) {
+  auto dataset = sample_dataset("tornado", {24, 24, 24});
+  View view = seeded();
+  EXPECT_EQ(lines_of(view, *dataset), 100);
+  SeedsView& seeds = *view.vector.trace->seeds;
+  const auto& axes = dataset->info().grid.axes;
+  const auto corner = [&](double part) {
+    protocol::Vec3 at{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto& c = axes[a].coordinates;
+      at[a] = c.front() + part * (c.back() - c.front());
+    }
+    return at;
+  };
+  seeds.points = {corner(0.4), corner(0.7)};
+  EXPECT_EQ(lines_of(view, *dataset), 2);
+  seeds.line = protocol::SeedLineView{corner(0.2), corner(0.8), 7};
+  EXPECT_EQ(lines_of(view, *dataset), 9);
+  seeds.block = protocol::SeedBlockView{corner(0.2), corner(0.8), {3, 4, 1}};
+  EXPECT_EQ(lines_of(view, *dataset), 21);
+  seeds.evenly = 30;
+  EXPECT_EQ(lines_of(view, *dataset), 51);
+}
+
+TEST(SeededScene, WeakPartsOfALineAreDrawn) {
+  auto dataset = sample_dataset("tornado", {24, 24, 24});
+  View view = seeded();
+  view.vector.min_magnitude = 1e6;
+  const Scene scene = built(view, *dataset);
+  EXPECT_EQ(scene.vector->streamlets->tally.lines, 100);
+  EXPECT_EQ(scene.vector->min_magnitude, 0);
+}
+
+TEST(SeededScene, ASeedOutsideIsRefusedWithItsPlaceAndTheRange) {
+  auto dataset = wind_dataset(1);
+  const auto point = refusal_of(seeded({{10, 0, 500}, {10, 40, 500}}), *dataset);
+  EXPECT_EQ(point.first, "/vector/trace/seeds/points/1");
+  EXPECT_THAT(point.second, HasSubstr("y = 40 is outside of the data, -10 to 10 degrees_north"));
+  View line = seeded();
+  line.vector.trace->seeds->line = protocol::SeedLineView{{0, 0, 500}, {30, 0, 100}, 5};
+  const auto end = refusal_of(line, *dataset);
+  EXPECT_EQ(end.first, "/vector/trace/seeds/line/to");
+  EXPECT_THAT(end.second, HasSubstr("250 to 1000 hPa"));
+  View block = seeded();
+  block.vector.trace->seeds->block =
+      protocol::SeedBlockView{{0, -30, 500}, {30, 0, 500}, {2, 2, 1}};
+  EXPECT_EQ(refusal_of(block, *dataset).first, "/vector/trace/seeds/block");
+  // Half a cell beyond the last sample, and a longitude of another turn.
+  EXPECT_TRUE(build_scene(seeded({{10, 14.9, 500}}), *dataset));
+  EXPECT_TRUE(build_scene(seeded({{-350, 0, 500}}), *dataset));
+  EXPECT_FALSE(build_scene(seeded({{10, 15.1, 500}}), *dataset));
+}
+
+TEST(SeededScene, ARegionHasItsOwnRange) {
+  auto dataset = wind_dataset(1);
+  View view = seeded({{30, 0, 500}});
+  EXPECT_TRUE(build_scene(view, *dataset));
+  view.region.x = protocol::Range{0, 20};
+  const auto refused = refusal_of(view, *dataset);
+  EXPECT_EQ(refused.first, "/vector/trace/seeds/points/0");
+  EXPECT_THAT(refused.second, HasSubstr("x = 30 is outside of the data, 0 to 20"));
+}
+
+TEST(SeededScene, CoordinatesAreLinearBetweenSamples) {
+  auto dataset = wind_dataset(1);
+  const auto placed = place_dataset({}, *dataset);
+  ASSERT_TRUE(placed);
+  const auto index = index_of({15, -5, 625}, **placed, dataset->info().grid.axes[2], "");
+  ASSERT_TRUE(index);
+  EXPECT_NEAR(index->x, 1.5, 1e-12);
+  EXPECT_NEAR(index->y, 0.5, 1e-12);
+  EXPECT_NEAR(index->z, 0.75, 1e-12);  // of 1000 and 500 hPa
+}
+
+// Columns of a turned map, whose longitudes and latitudes are linear in the index.
+TEST(SeededScene, LongitudesAndLatitudesOfColumnsAreSought) {
+  Placed placed;
+  placed.grid.axes = {axis(data::AxisKind::cartesian, "", {0, 1, 2, 3, 4, 5}),
+                      axis(data::AxisKind::cartesian, "", {0, 1, 2, 3, 4}),
+                      axis(data::AxisKind::pressure, "hPa", {1000})};
+  data::Columns columns;
+  for (int j = 0; j < 5; ++j) {
+    for (int i = 0; i < 6; ++i) {
+      columns.longitude.push_back(8 + 0.9 * i - 0.4 * j);
+      columns.latitude.push_back(45 + 0.4 * i + 0.8 * j);
+    }
+  }
+  placed.grid.columns = std::make_shared<const data::Columns>(columns);
+  const double x = 2.3;
+  const double y = 1.6;
+  const auto index = index_of({8 + 0.9 * x - 0.4 * y, 45 + 0.4 * x + 0.8 * y, 7}, placed,
+                              placed.grid.axes[2], "/here");
+  ASSERT_TRUE(index);
+  EXPECT_NEAR(index->x, x, 1e-9);
+  EXPECT_NEAR(index->y, y, 1e-9);
+  EXPECT_EQ(index->z, 0);
+  const auto far = index_of({60, 45, 7}, placed, placed.grid.axes[2], "/here");
+  ASSERT_FALSE(far);
+  EXPECT_EQ(far.error().at[0].pointer, "/here");
+}
+
+TEST(SeededScene, WhatDeterminesTheLinesIsPartOfTheirKey) {
+  auto dataset = sample_dataset("tornado", {12, 12, 12});
+  const auto first = built(seeded(), *dataset).vector->streamlets;
+  const auto differs = [&](const auto& change) {
+    View view = seeded();
+    change(*view.vector.trace->seeds);
+    return built(view, *dataset).vector->streamlets != first;
+  };
+  EXPECT_FALSE(differs([](SeedsView&) {}));
+  EXPECT_TRUE(differs([](SeedsView& s) { s.evenly = 99; }));
+  EXPECT_TRUE(differs([](SeedsView& s) { s.length = 0.3; }));
+  EXPECT_TRUE(differs([](SeedsView& s) { s.duration = 0.01; }));
+  EXPECT_TRUE(differs([](SeedsView& s) { s.pieces = 10; }));
+  EXPECT_TRUE(differs([](SeedsView& s) { s.dash = 0.3; }));
+}
+
+TEST(SeededScene, BeyondTheMemoryLimitIsRefusedWithTheRemedy) {
+  auto source = data::open_sample("tornado", {16, 16, 16});
+  data::Dataset dataset(std::move(*source), "tornado", std::uint64_t{40} << 20U);
+  View view = seeded();
+  view.vector.trace->seeds->evenly = 5000;
+  view.vector.trace->seeds->pieces = 4096;
+  const auto refused = refusal_of(view, dataset);
+  EXPECT_EQ(refused.first, "/vector/trace/seeds");
+  EXPECT_THAT(refused.second, HasSubstr("/vector/trace/seeds/pieces"));
+  view.vector.trace->seeds->pieces = 20;
+  EXPECT_TRUE(build_scene(view, dataset));
+}
+
+TEST(SeededScene, MoreSeedsTogetherThanTheLimitAreRefused) {
+  auto dataset = wind_dataset(1);
+  View view = seeded();
+  view.vector.trace->seeds->evenly = 4000;
+  view.vector.trace->seeds->block = protocol::SeedBlockView{{0, 0, 500}, {30, 0, 500}, {40, 40, 1}};
+  const auto refused = complete(view, *dataset);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().at[0].pointer, "/vector/trace/seeds");
+  EXPECT_THAT(refused.error().message, HasSubstr("has 5600 seeds; the limit is 5000"));
+}
+
+TEST(PathScene, NeedsTimesAndSpeedsInTheWorld) {
+  auto dataset = wind_dataset(3);
+  View view = seeded({{10, 0, 500}});
+  view.vector.trace->seeds->path_steps = 1;
+  EXPECT_EQ(refusal_of(view, *dataset).first, "/vector/trace/seeds/pathSteps");
+  EXPECT_THAT(refusal_of(view, *dataset).second, HasSubstr("/vector/space"));
+  view.vector.space = protocol::VectorSpace::world;
+  EXPECT_THAT(refusal_of(view, *dataset).second, HasSubstr("no known unit"));
+  auto one = wind_dataset(1);
+  EXPECT_THAT(refusal_of(view, *one).second, HasSubstr("has one step"));
+}
+
+// A wind of (step + 1) m/s to the east, that changes linearly in time, moves along the equator.
+TEST(PathScene, AWindThatGrowsCarriesAParticleByItsMeanSpeed) {
+  data::Dataset dataset(std::make_unique<EastWind>(atmosphere_grid(), 3), "fake",
+                        std::uint64_t{1} << 30U);
+  View view = seeded({{15, 0, 500}});
+  view.vector.field = {protocol::FieldChoice::Kind::named, "wind"};
+  view.vector.space = protocol::VectorSpace::world;
+  view.step = 1;
+  view.vector.trace->seeds->path_steps = 5;  // of which the series has one on each side
+  const Scene scene = built(view, dataset);
+  const trace::Segments& made = *scene.vector->streamlets;
+  ASSERT_EQ(made.tally.lines, 1);
+  double low = 1e9;
+  double high = -1e9;
+  for (std::size_t v = 0; v + 1 < made.vertices(); ++v) {
+    if (!(made.magnitudes[v] > 0)) continue;
+    low = std::min<double>(low, made.places[v][0]);
+    high = std::max<double>(high, made.places[v + 1][0]);
+  }
+  // Ten hours a step: from 1 to 2 m/s 54 km, from 2 to 3 m/s 90 km; world units by longitude.
+  const auto& x = scene.lattice.positions[0];
+  const double per_degree = (x.back() - x.front()) / 30;
+  const double metres = 6371000 * std::numbers::pi / 180;
+  const double middle = 0.5 * (x.front() + x.back());
+  EXPECT_NEAR((middle - low) / per_degree * metres, 54000, 300);
+  EXPECT_NEAR((high - middle) / per_degree * metres, 90000, 300);
+}
+
+}  // namespace
+}  // namespace windsplat::scene
