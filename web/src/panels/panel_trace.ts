@@ -1,6 +1,7 @@
-// Streamlets: lines that follow the flow.
+// Streamlets and streamlines: lines that follow the flow.
 import type GUI from "lil-gui";
 import { keyAccess, type PanelKit } from "./panel_kit";
+import { addSeeds, kindOf } from "./panel_seeds";
 
 export function addTrace(folder: GUI, kit: PanelKit): void {
   const follows = kit.toggle(folder, "follow the flow", {
@@ -14,5 +15,7 @@ export function addTrace(folder: GUI, kit: PanelKit): void {
     step: 1,
   });
   kit.showWhen((states) => states.traceable || states.traced, follows);
-  kit.showWhen((states) => states.traced, segments);
+  const eachSample = (): boolean => kindOf(kit.host.view()) === "none";
+  kit.showWhen((states) => states.traced && eachSample(), segments);
+  addSeeds(folder, kit);
 }
