@@ -121,7 +121,8 @@ class Run:
             if release.result():
                 self.ctest("release", "release", *chosen)
                 browser = {path.name: ["tests/browser/run", "--test-reporter=tap", path.name]
-                           for path in sorted((ROOT / "tests/browser").glob("*.test.mjs"))}
+                           for path in sorted((ROOT / "tests/browser").rglob("*.test.mjs"))
+                           if "node_modules" not in path.parts}
                 self.suite("page browser", node_suite.run, browser, BROWSERS)
             if dev.result():
                 self.ctest("asan ubsan", "dev", *chosen)

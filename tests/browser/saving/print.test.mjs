@@ -14,7 +14,7 @@ import {
   state,
   type,
   unfold,
-} from "./support.mjs";
+} from "../support.mjs";
 
 const { withPage } = sharedDaemon({ args: ["tornado"] });
 

@@ -1,7 +1,7 @@
 // The page's address with a link to a stored view, and dataset cards while their list is refreshed.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { drag, finalPicture, sharedDaemon } from "./support.mjs";
+import { drag, finalPicture, sharedDaemon } from "../support.mjs";
 
 const { withPage } = sharedDaemon({ page: { viewport: { width: 900, height: 600 } } });
 

@@ -15,7 +15,7 @@ import {
   sharedDaemon,
   shot,
   state,
-} from "./support.mjs";
+} from "../support.mjs";
 
 const shared = sharedDaemon({ basePath: "/a/b/", page: { viewport: { width: 900, height: 600 } } });
 const { withPage } = shared;

@@ -1,7 +1,7 @@
 // Saved views and links in a real browser: the list in the Save dialog, Share, short links.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { finalPicture, pixels, sharedDaemon, state } from "./support.mjs";
+import { finalPicture, pixels, sharedDaemon, state } from "../support.mjs";
 
 const shared = sharedDaemon({ basePath: "/a/b/", page: { viewport: { width: 900, height: 600 } } });
 const { withPage } = shared;
