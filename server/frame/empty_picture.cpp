@@ -23,7 +23,10 @@ std::string number(double value) {
   return text.data();
 }
 
-std::string quoted(const std::string& name) { return "\"" + printable(name) + "\""; }
+std::string quoted(const std::string& name) {
+  std::string out = "\"";
+  return out.append(printable(name)).append("\"");
+}
 
 // Values of a scalar, or magnitudes of a vector, of the samples shown; nullopt: all are masked.
 using Span = std::optional<std::array<double, 2>>;
