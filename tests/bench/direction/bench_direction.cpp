@@ -77,6 +77,7 @@ constexpr std::array<const char*, 7> new_maps{"inferno", "plasma",   "sunset", "
 std::vector<Look> looks(bool smoke, bool learnt) {
   if (smoke) return {{widths[0], maps[0], dark}, {widths[0], maps[0], light}};
   std::vector<Look> out;
+  out.reserve(widths.size() + 2 * maps.size() + new_maps.size());
   for (const int width : widths) out.push_back({width, maps[0], dark});
   for (const char* const map : maps) {
     if (map != maps[0]) out.push_back({map_width, map, dark});
@@ -329,8 +330,10 @@ void print_fields(const Measure& measure, const char* title, Question question,
 void print_all(const Measure& measure, const std::vector<DirectionField>& judges) {
   print_totals(measure);
   std::vector<std::string> sizes;
+  sizes.reserve(widths.size());
   for (const int width : widths) sizes.push_back("width " + std::to_string(width));
   std::vector<std::string> colors;
+  colors.reserve(2 * maps.size() + new_maps.size());
   for (const char* const map : maps) colors.emplace_back(map);
   for (const char* const map : new_maps) colors.emplace_back(map);
   for (const char* const map : maps) colors.push_back(std::string(map) + ", white");

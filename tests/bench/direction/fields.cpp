@@ -162,6 +162,7 @@ constexpr std::array<Formula, 14> formulas{{{"helix", helix, true},
 const std::vector<DirectionField>& formula_fields() {
   static const std::vector<DirectionField> fields = [] {
     std::vector<DirectionField> out;
+    out.reserve(formulas.size());
     for (const Formula& one : formulas) out.push_back({one.name, one.learnt, false});
     return out;
   }();
