@@ -254,45 +254,49 @@ test("the legend shows surfaces, and the range of their colours can be set", () 
   }));
 
 test("undo takes back changes in every folder, one after another", () =>
-  withPage(async (page) => {
-    await unfold(page, "Section", "Ground", "Axes and labels", "Surfaces", "Light", "Time");
-    await unfold(page, "Quality", "Method", "Winds > More", "Volume: cloud > More");
-    const link = () => page.evaluate(() => location.hash);
-    const view = async () => JSON.parse(decodeURIComponent((await link()).slice(2)));
-    const button = (label) => page.locator("#panel button", { hasText: new RegExp(`^${label}$`) });
-    const changes = [
-      () => preset(page, /^Section$/).click(),
-      () => preset(page, /^Winds and clouds$/).click(),
-      () => choose(page, "slice", /^across z/),
-      () => type(page, "length", 0.08),
-      () => type(page, "min optical depth", 0.01),
-      () => button("Add an isosurface").click(),
-      () => button("Add a section").click(),
-      () => type(page, "vertical exaggeration", 3),
-      () => choose(page, "show", /^always$/),
-      () => control(page, "graticule", "input").check(),
-      () => control(page, "axes", "input").check(),
-      () => control(page, "sunlight", "input").check(),
-      () => choose(page, "sun by", /^time and place$/),
-      () => choose(page, "texture", /^moves/),
-      () => control(page, "lossless final", "input").check(),
-      () => choose(page, "compositing", /^simple/),
-    ];
-    const moved = (from) => page.waitForFunction((one) => location.hash !== one, from);
-    const before = await pixels(page);
-    const views = [await view()];
-    for (const change of changes) {
-      const from = await link();
-      await change();
-      await moved(from);
-      views.push(await view());
-    }
-    for (let n = changes.length - 1; n >= 0; n--) {
-      const from = await link();
-      await page.locator("#undo-button").click();
-      await moved(from);
-      assert.deepEqual(await view(), views[n], `change ${n} is undone`);
-    }
-    await finalPicture(page);
-    assert.equal((await pixels(page)).hash, before.hash);
-  }));
+  withPage(
+    async (page) => {
+      await unfold(page, "Section", "Ground", "Axes and labels", "Surfaces", "Light", "Time");
+      await unfold(page, "Quality", "Method", "Winds > More", "Volume: cloud > More");
+      const link = () => page.evaluate(() => location.hash);
+      const view = async () => JSON.parse(decodeURIComponent((await link()).slice(2)));
+      const button = (label) =>
+        page.locator("#panel button", { hasText: new RegExp(`^${label}$`) });
+      const changes = [
+        () => preset(page, /^Sections$/).click(),
+        () => preset(page, /^Winds and clouds$/).click(),
+        () => choose(page, "slice", /^across z/),
+        () => type(page, "length", 0.08),
+        () => type(page, "min optical depth", 0.01),
+        () => button("Add an isosurface").click(),
+        () => button("Add a section").click(),
+        () => type(page, "vertical exaggeration", 3),
+        () => choose(page, "show", /^always$/),
+        () => control(page, "graticule", "input").check(),
+        () => control(page, "axes", "input").check(),
+        () => control(page, "sunlight", "input").check(),
+        () => choose(page, "sun by", /^time and place$/),
+        () => choose(page, "texture", /^moves/),
+        () => control(page, "lossless final", "input").check(),
+        () => choose(page, "compositing", /^simple/),
+      ];
+      const moved = (from) => page.waitForFunction((one) => location.hash !== one, from);
+      const before = await pixels(page);
+      const views = [await view()];
+      for (const change of changes) {
+        const from = await link();
+        await change();
+        await moved(from);
+        views.push(await view());
+      }
+      for (let n = changes.length - 1; n >= 0; n--) {
+        const from = await link();
+        await page.locator("#undo-button").click();
+        await moved(from);
+        assert.deepEqual(await view(), views[n], `change ${n} is undone`);
+      }
+      await finalPicture(page);
+      assert.equal((await pixels(page)).hash, before.hash);
+    },
+    { path: '#!{"dataset":"climate","step":0}' },
+  ));

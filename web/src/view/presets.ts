@@ -140,6 +140,21 @@ function ofParts(dataset: Dataset): Preset[] {
   return found;
 }
 
+// An upright section, long because across the shorter horizontal axis, and a low level.
+function sections(dataset: Dataset, { name }: Field): Preset {
+  const axis = dataset.dims.x < dataset.dims.y ? "x" : "y";
+  const at = (one: "x" | "y" | "z", part: number) => ({
+    field: name,
+    slice: { axis: one, index: Math.floor(part * (dataset.dims[one] - 1)) },
+  });
+  return {
+    key: "sections",
+    title: "Sections",
+    about: `${name} along an upright section and on a low level`,
+    view: { scalars: [], vector: noLines, surfaces: [at(axis, 0.5), at("z", 0.25)] },
+  };
+}
+
 function ofSurfaces(dataset: Dataset): Preset[] {
   const field = mainScalar(dataset);
   if (field === undefined || !isSolid(dataset)) return [];
@@ -158,15 +173,7 @@ function ofSurfaces(dataset: Dataset): Preset[] {
       view: { ...alone, surfaces: [{ field: field.name, isovalue, ...color }] },
     });
   }
-  // Across the shorter horizontal axis, so that the section is long.
-  const axis = dataset.dims.x < dataset.dims.y ? "x" : "y";
-  const index = Math.floor((dataset.dims[axis] - 1) / 2);
-  found.push({
-    key: "section",
-    title: "Section",
-    about: `${field.name} along an upright section`,
-    view: { ...alone, surfaces: [{ field: field.name, slice: { axis, index } }] },
-  });
+  found.push(sections(dataset, magnitudeField(dataset) ?? field));
   return found;
 }
 

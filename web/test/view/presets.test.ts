@@ -20,7 +20,7 @@ function storm(size: number, more: Described = {}): Dataset {
 
 test("winds and clouds have views of both, of each, and of surfaces, light and place", () => {
   assert.deepEqual(keysOf(storm(40, { mappings: ["flat", "sphere"] })), [
-    ...["default", "lines", "volumes", "streamlets", "light", "isosurface", "section"],
+    ...["default", "lines", "volumes", "streamlets", "light", "isosurface", "sections"],
     ...["above", "level", "globe", "figure"],
   ]);
   const titles = presetsOf(storm(40), 1.6).map(({ title }) => title);
@@ -31,7 +31,7 @@ test("winds and clouds have views of both, of each, and of surfaces, light and p
 
 test("data without vectors have no lines, data without volumes no light", () => {
   assert.deepEqual(keysOf(described("box", { fields: ["temperature"] })), [
-    ...["default", "light", "isosurface", "section", "above", "level", "figure"],
+    ...["default", "light", "isosurface", "sections", "above", "level", "figure"],
   ]);
   assert.deepEqual(keysOf(described("box", { fields: ["wind"] })), [
     ...["default", "streamlets", "above", "level", "figure"],
@@ -112,4 +112,16 @@ test("a preset keeps what is shown of the data and how it is drawn, nothing else
   const lines = presetsOf(storm(40), 1.6).find(({ key }) => key === "lines")!;
   const { camera: _c, light: _l, surfaces: _s, ...kept } = now;
   assert.deepEqual(presetView(lines, storm(40), now), { ...kept, scalars: [] });
+});
+
+test("sections show the speed where there is one, across the shorter horizontal axis", () => {
+  const dataset = storm(40);
+  dataset.dims = { x: 20, y: 41, z: 9 };
+  const surfaces = (field: string) => [
+    { field, slice: { axis: "x", index: 9 } },
+    { field, slice: { axis: "z", index: 2 } },
+  ];
+  assert.deepEqual(viewOf(dataset, "sections").surfaces, surfaces("cloud"));
+  dataset.fields.push({ ...dataset.fields[1]!, name: "wind_speed", dtype: "derived" });
+  assert.deepEqual(viewOf(dataset, "sections").surfaces, surfaces("wind_speed"));
 });
