@@ -95,3 +95,19 @@ test("a lossless final frame equals the pixels of the daemon, a JPEG does not", 
     await finalPicture(page);
     assert.equal((await lastFrame(page)).codec, "png", "the next final frame is lossless too");
   }));
+
+test("a refused view is told by the labels of the controls, not by JSON pointers", () =>
+  withPage(
+    async (page) => {
+      const view = { dataset: "tornado", vector: { stride: 100 }, annotations: { title: 3 } };
+      const hash = `#!${encodeURIComponent(JSON.stringify(view))}`;
+      await page.evaluate((address) => (location.hash = address), hash);
+      const alert = page.locator("#alert-text");
+      await alert.filter({ hasText: "stride" }).waitFor();
+      const text = await alert.textContent();
+      assert.match(text, /Lines, sampling stride: must be a whole number from 1 to 64, not 100/);
+      assert.match(text, /Annotations, title: must be true or false/);
+      assert.doesNotMatch(text, /\/\w/);
+    },
+    { alert: true },
+  ));

@@ -9,6 +9,7 @@ import { controlStates, type ControlStates, type Options } from "./controls";
 import { make } from "../base/dom";
 import { PictureStore } from "../base/picture_store";
 import { Folders, type FolderOptions } from "./panel_folders";
+import { nameKey } from "../base/key_words";
 import { histogramBins, HistogramView } from "./histogram_view";
 import { unitText } from "../view/legend_entries";
 import type { RangeMode } from "./range_choice";
@@ -381,6 +382,7 @@ export class PanelKit {
     access: Access<T>,
   ): Controller {
     controller.name(label);
+    nameKey(access.pointer, label);
     explain(controller.domElement, access.pointer);
     controller.onChange((value: T) => {
       const patch = access.set(value);

@@ -1,0 +1,71 @@
+// The server's messages in the words of the page.
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import test from "node:test";
+import { entryText, keyName, nameKey } from "../src/base/key_words";
+import { problemText } from "../src/wire/requests";
+
+interface Schema {
+  properties?: Record<string, Schema>;
+  items?: Schema | boolean;
+}
+
+function pointersOf(node: Schema, at: string, found: string[] = []): string[] {
+  for (const [key, child] of Object.entries(node.properties ?? {})) {
+    found.push(`${at}/${key}`);
+    pointersOf(child, `${at}/${key}`, found);
+    if (typeof child.items === "object") pointersOf(child.items, `${at}/${key}/0`, found);
+  }
+  return found;
+}
+
+test("every key of the view has a name in plain words", () => {
+  const schema = JSON.parse(readFileSync("../protocol/view.schema.json", "utf8")) as Schema;
+  const pointers = pointersOf(schema, "");
+  assert.ok(pointers.length > 100);
+  for (const pointer of pointers) {
+    const name = keyName(pointer);
+    assert.ok(name !== null, `${pointer} has a name`);
+    assert.doesNotMatch(name, /\/|[a-z][A-Z]|\br\d|\d/, pointer);
+  }
+});
+
+test("a message names the control by its label", () => {
+  nameKey("/vector/stride", "sampling stride");
+  nameKey("/region/x", "longitude from (°E)");
+  nameKey("/region/x", "longitude to (°E)");
+  const limit = "must be a whole number from 1 to 64, not 100";
+  assert.equal(entryText("/vector/stride", limit), `Lines, sampling stride: ${limit}`);
+  assert.equal(keyName("/region/x/0"), "Region, longitude");
+  const problem = { errors: [{ pointer: "/region/x", detail: "both ends are equal" }] };
+  assert.equal(
+    problemText({ title: "", detail: "", status: 422, ...problem } as never),
+    "Region, longitude: both ends are equal",
+  );
+});
+
+test("keys within a text are named too, other words with dots and slashes stay", () => {
+  assert.equal(
+    entryText("/geometry/plane", "is not available with heightField: use geometry.slice"),
+    "Geometry, plane: is not available with a height field: use “Geometry, slice”",
+  );
+  assert.equal(
+    entryText("/geometry", "a view has a slice or a plane, not both: set one to null"),
+    "Geometry: a view has a slice or a plane, not both: switch one off",
+  );
+  assert.equal(entryText("", "see /vector/r1"), "see “Lines, radius at the tail”");
+  for (const text of ["/data/winds.nc is no file", "winds.nc has 12.5 MB", "https://a.example/x"]) {
+    assert.equal(entryText("", text), text);
+  }
+});
+
+test("keys that are none of the view are shown by their last word", () => {
+  assert.equal(entryText("/jobName", "is unknown"), "job name: is unknown");
+});
+
+test("the type that JSON expects is left out where no control can send it", () => {
+  assert.equal(
+    entryText("/annotations/title", "must be true or false, not an object"),
+    "Annotations, title: must be true or false",
+  );
+});
