@@ -12,25 +12,119 @@ namespace windsplat::surface {
 
 namespace {
 
+// Shares of a cell within which a plane, or the number of a layer, is that of a layer of samples:
+// places are of single precision.
+constexpr double plane_of_layer = 1e-4;
+constexpr double whole_layer = 1e-9;
+
 enum State : std::uint8_t { outside = 0, inside = 1, masked = 2 };
+
+double distance(const Samples& samples, const Cut& plane, const std::array<int, 3>& at) {
+  return glm::dot(samples.place(at[0], at[1], at[2]) - plane.point, plane.normal);
+}
+
+// Calls visit(sample) for those of a layer across an axis until it returns false. Returns whether
+// all returned true.
+template <class Visit>
+bool each_of_layer(const Samples& samples, std::size_t axis, int number, const Visit& visit) {
+  const std::size_t u = axis == 0 ? 1 : 0;
+  const std::size_t v = axis == 2 ? 1 : 2;
+  std::array<int, 3> at{};
+  at.at(axis) = number;
+  for (int n = 0; n < samples.dims.at(v); ++n) {
+    at.at(v) = n;
+    for (int m = 0; m < samples.dims.at(u); ++m) {
+      at.at(u) = m;
+      if (!visit(at)) return false;
+    }
+  }
+  return true;
+}
+
+// Whether a plane holds a layer of samples and has those of all other layers on its two sides: a
+// plane through a meridian of a globe holds two.
+bool parts_at(const Samples& samples, const Cut& plane, std::size_t axis, int number) {
+  const int count = samples.dims.at(axis);
+  const auto near = [&](std::array<int, 3> at) {
+    const double off = std::abs(distance(samples, plane, at));
+    at.at(axis) += number + 1 < count ? 1 : -1;
+    return off <= plane_of_layer * std::abs(distance(samples, plane, at));
+  };
+  if (!each_of_layer(samples, axis, number, near)) return false;
+  std::array<double, 2> sides{};  // signs of the distances before and after the layer
+  for (int n = 0; n < count; ++n) {
+    if (n == number) continue;
+    double& side = sides.at(n < number ? 0 : 1);
+    const bool one_side = each_of_layer(samples, axis, n, [&](const std::array<int, 3>& at) {
+      const double off = distance(samples, plane, at);
+      if (side == 0) side = off > 0 ? 1 : -1;
+      return off * side > 0;
+    });
+    if (!one_side) return false;
+  }
+  return sides[0] != sides[1];
+}
+
+// A plane that holds a layer of samples is that layer; a layer within rounding of a whole number is
+// that of the number. On an axis that closes, numbers are those of the first turn.
+Cut resolved(const Samples& samples, Cut cut) {
+  if (cut.kind == Cut::Kind::plane) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (int n = 0; n < samples.dims.at(axis); ++n) {
+        if (!parts_at(samples, cut, axis, n)) continue;
+        cut.kind = Cut::Kind::layer;
+        cut.axis = static_cast<int>(axis);
+        cut.index = n;
+        return cut;
+      }
+    }
+  }
+  if (cut.kind != Cut::Kind::layer) return cut;
+  const double nearest = std::round(cut.index);
+  if (std::abs(cut.index - nearest) <= whole_layer) cut.index = nearest;
+  if (cut.axis == 0 && samples.around > 0 && cut.index >= samples.around) {
+    cut.index -= samples.around;
+  }
+  return cut;
+}
 
 // The function that is zero on the surface, and its gradient.
 class Field {
  public:
-  Field(const Samples& samples, const Cut& cut) : samples_(samples), cut_(cut) {}
+  Field(const Samples& samples, const Cut& cut) : samples_(samples), cut_(resolved(samples, cut)) {
+    if (cut_.kind != Cut::Kind::layer) return;
+    const double below = std::floor(cut_.index);
+    if (cut_.index == below) whole_ = static_cast<int>(below);
+    low_ = static_cast<int>(whole_ > 0 ? below - 1 : below);
+    high_ = closes() ? (low_ + 1) % samples.around : low_ + 1;
+  }
 
-  // NaN: masked.
+  // NaN: masked. On a layer of samples those count, whatever the next layers are.
   [[nodiscard]] double operator()(int i, int j, int k) const {
-    const float value = cut_.values != nullptr ? cut_.values[samples_.index(i, j, k)] : 0.0F;
-    if (cut_.kind == Cut::Kind::isosurface) return static_cast<double>(value) - cut_.level;
-    if (std::isnan(value)) return static_cast<double>(value);
-    if (cut_.kind == Cut::Kind::plane) {
-      return glm::dot(samples_.place(i, j, k) - cut_.point, cut_.normal);
+    if (cut_.kind == Cut::Kind::isosurface) {
+      return static_cast<double>(mask({i, j, k})) - cut_.level;
     }
-    const std::array<int, 3> at{i, j, k};
+    std::array<int, 3> at{i, j, k};
+    if (cut_.kind == Cut::Kind::plane) {
+      const float value = mask(at);
+      return std::isnan(value) ? static_cast<double>(value) : distance(samples_, cut_, at);
+    }
+    int& along = at.at(static_cast<std::size_t>(cut_.axis));
+    double beyond = along - cut_.index;
+    if (closes()) beyond -= samples_.around * std::round(beyond / samples_.around);
+    if (whole_ >= 0) along = whole_;
+    const float value = mask(at);
+    if (std::isnan(value)) return static_cast<double>(value);
     // A sample on the surface is inside, so the first layer needs the others outside.
-    const double beyond = at.at(static_cast<std::size_t>(cut_.axis)) - cut_.index;
     return cut_.index > 0 ? beyond : -beyond;
+  }
+
+  // Whether cells with this sample as a corner may be cut: those between two layers only.
+  [[nodiscard]] bool may_be_cut(int i, int j, int k) const {
+    if (cut_.kind != Cut::Kind::layer) return true;
+    const std::array<int, 3> at{i, j, k};
+    const int along = at.at(static_cast<std::size_t>(cut_.axis));
+    return along == low_ || along == high_;
   }
 
   // In world coordinates: differences along the axes of the lattice, between both neighbours, by
@@ -72,8 +166,17 @@ class Field {
     return std::isnan(value(there)) ? at : there;
   }
 
+  [[nodiscard]] bool closes() const { return cut_.axis == 0 && samples_.around > 0; }
+
+  // The value of the field at a sample.
+  [[nodiscard]] float mask(const std::array<int, 3>& at) const {
+    return cut_.values != nullptr ? cut_.values[samples_.index(at[0], at[1], at[2])] : 0.0F;
+  }
+
   const Samples& samples_;
-  const Cut& cut_;
+  const Cut cut_;
+  int whole_ = -1;          // number of the layer of samples that is drawn; -1: none
+  int low_ = 0, high_ = 0;  // the layers next to a layer
 };
 
 glm::dvec3 unit(const glm::dvec3& v) {
@@ -120,8 +223,11 @@ class Layers {
     to.resize(area());
     for (int j = 0; j < height(); ++j) {
       for (int i = 0; i < width_; ++i) {
+        std::uint8_t& state = to[at(i, j)];
+        state = masked;
+        if (!field_.may_be_cut(i, j, k)) continue;
         const double f = field_(i, j, k);
-        to[at(i, j)] = std::isnan(f) ? masked : f >= 0 ? inside : outside;
+        if (!std::isnan(f)) state = f >= 0 ? inside : outside;
       }
     }
   }
@@ -252,14 +358,23 @@ class Filler {
     const double f = field(from[0], from[1], from[2]);
     const double g = field(to[0], to[1], to[2]);
     const double part = std::clamp(f / (f - g), 0.0, 1.0);
-    const auto between = [part](const auto& p, const auto& q) { return p + part * (q - p); };
-    mesh_.places[at] = point_of(between(field.place(from), field.place(to)));
-    mesh_.normals[at] = point_of(unit(between(field.gradient(from), field.gradient(to))));
+    // On a sample the other one, which may be masked, has no share.
+    const auto between = [&](const auto& of) {
+      if (!(part > 0)) return of(from);
+      if (!(part < 1)) return of(to);
+      const auto p = of(from);
+      return p + part * (of(to) - p);
+    };
+    using Sample = std::array<int, 3>;
+    const auto place = [&](const Sample& of) { return field.place(of); };
+    const auto gradient = [&](const Sample& of) { return field.gradient(of); };
+    mesh_.places[at] = point_of(between(place));
+    mesh_.normals[at] = point_of(unit(between(gradient)));
     if (second_ == nullptr) return;
     const auto value = [&](const std::array<int, 3>& of) {
       return static_cast<double>(second_[layers_.samples().index(of[0], of[1], of[2])]);
     };
-    mesh_.values[at] = static_cast<float>(between(value(from), value(to)));
+    mesh_.values[at] = static_cast<float>(between(value));
   }
 
   const Layers& layers_;

@@ -3,8 +3,9 @@
 //
 // A cell has eight neighbouring samples as its corners (cell_cases.hpp). Vertices lie on its edges,
 // where the function, linear along them, has the value of the surface. A cell with a masked corner
-// is left out, which leaves a hole. Samples that close a circle have cells between the last and the
-// first. The same for any number of threads.
+// is left out, which leaves a hole; of a section along a layer of samples only those of the layer
+// count. Samples that close a circle have cells between the last and the first. The same for any
+// number of threads.
 #pragma once
 
 #include <array>
@@ -21,7 +22,8 @@ using Point = std::array<float, 3>;
 
 struct Mesh {
   std::vector<Point> places;   // of vertices, world units
-  std::vector<Point> normals;  // unit, towards larger values; zero where the gradient vanishes
+  std::vector<Point> normals;  // unit, towards larger values; zero where the gradient vanishes; of
+                               // a layer of samples along its axis, to either side
   std::vector<float> values;   // of the second field, NaN where it is masked; empty: none
   std::vector<std::array<std::uint32_t, 3>> triangles;
   [[nodiscard]] std::size_t bytes() const;
@@ -44,7 +46,8 @@ struct Samples {
 };
 
 // What is zero on the surface. `values` minus the level of an isosurface; the distance from a
-// plane; or, of a layer, the index along an axis minus that of the layer.
+// plane; or, of a layer, the index along an axis minus that of the layer. A plane closer than 1e-4
+// cells to all samples of a layer is that layer, unless it cuts the lattice elsewhere too.
 struct Cut {
   enum class Kind { isosurface, plane, layer };
   Kind kind = Kind::isosurface;

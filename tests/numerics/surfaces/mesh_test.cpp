@@ -240,6 +240,84 @@ TEST(SurfaceMesh, FirstMiddleAndLastLayersAreWhole) {
   }
 }
 
+// Only the two samples of every axis on the far side of the section are valid, or on the near one.
+TEST(SurfaceMesh, SectionAlongSamplesNeedsThoseSamplesOnly) {
+  ThreadPool pool(1);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int number : {0, 2, 4}) {
+      for (const int valid : {-1, 0, 1}) {  // besides the layer: those before, none, those after
+        Lattice lattice = cube(5, squared);
+        const surface::Samples samples = lattice.samples();
+        for (int n = 0; n < 125; ++n) {
+          const std::array<int, 3> at{n % 5, n / 5 % 5, n / 25};
+          const int off = at.at(static_cast<std::size_t>(axis)) - number;
+          if (off != 0 && off * valid <= 0) {
+            lattice.values[samples.index(at[0], at[1], at[2])] = nan_value;
+          }
+        }
+        surface::Cut cut;
+        cut.values = lattice.values.data();
+        for (const bool plane : {false, true}) {
+          cut.kind = plane ? surface::Cut::Kind::plane : surface::Cut::Kind::layer;
+          cut.axis = axis;
+          cut.index = number;
+          cut.normal = glm::dvec3(0);
+          cut.normal[axis] = number == 2 ? valid == 1 ? 1 : -1 : number - 2;
+          cut.point = glm::dvec3(0);
+          cut.point[axis] = -1 + 0.5 * number;
+          const surface::Mesh mesh = surface::extract(samples, cut, lattice.values.data(), pool);
+          EXPECT_NEAR(area(mesh), 4, 1e-6) << axis << ' ' << number << ' ' << valid << plane;
+          for (std::size_t v = 0; v < mesh.places.size(); ++v) {
+            EXPECT_NEAR(mesh.values[v], squared(vec(mesh.places[v])), 1e-6);
+          }
+        }
+      }
+    }
+  }
+}
+
+// The column at the seam has one cell on each side of it as any other.
+TEST(SurfaceMesh, LayerAcrossLongitudesIsOneMeridian) {
+  Lattice lattice = globe(24);
+  lattice.fill(squared);
+  ThreadPool pool(1);
+  surface::Cut cut;
+  cut.kind = surface::Cut::Kind::layer;
+  cut.axis = 0;
+  cut.values = lattice.values.data();
+  for (const double index : {0.0, 5.0, 7.5, 23.0, 23.5, 24.0}) {
+    cut.index = index;
+    const surface::Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
+    EXPECT_EQ(mesh.triangles.size(), 8U * 4 * 2) << index;
+    for (const surface::Point& p : mesh.places) {
+      const double longitude = 2 * std::numbers::pi * index / 24;
+      const double off = p[0] * std::sin(longitude) - p[1] * std::cos(longitude);
+      EXPECT_NEAR(off, 0, 1e-6) << index;
+      EXPECT_GT(p[0] * std::cos(longitude) + p[1] * std::sin(longitude), 0) << index;
+    }
+  }
+}
+
+// A plane through the poles holds two meridians: both are drawn.
+TEST(SurfaceMesh, PlaneThroughTwoMeridiansOfAGlobeHasBoth) {
+  Lattice lattice = globe(24);
+  lattice.fill(squared);
+  ThreadPool pool(1);
+  surface::Cut cut;
+  cut.kind = surface::Cut::Kind::plane;
+  cut.normal = {0, 1, 0};
+  cut.values = lattice.values.data();
+  const surface::Mesh mesh = surface::extract(lattice.samples(), cut, nullptr, pool);
+  double most = 0;
+  double least = 0;
+  for (const surface::Point& p : mesh.places) {
+    most = std::max(most, static_cast<double>(p[0]));
+    least = std::min(least, static_cast<double>(p[0]));
+  }
+  EXPECT_NEAR(most, 1, 1e-6);
+  EXPECT_NEAR(least, -1, 1e-6);
+}
+
 TEST(SurfaceMesh, LayerOfAGlobeIsAShellOfConstantRadiusThatCloses) {
   Lattice lattice = globe(24);
   lattice.fill(squared);
