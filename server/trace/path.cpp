@@ -157,6 +157,8 @@ class Follower {
       }
       next_ = at;  // the last stage is the end of the step
     }
+    way_ = dvec4(0);
+    for (int k = 0; k + 1 < stages; ++k) way_ += step * weights[stages - 1][k] * slopes_[k];
     dvec4 error(0);
     for (int s = 0; s < stages; ++s) error += step * errors[s] * slopes_[s];
     return widest(error);
@@ -167,7 +169,7 @@ class Follower {
     const dvec3 from = index_of(slopes_[0]);
     const dvec3 to = index_of(slopes_[stages - 1]);
     const double way = 0.5 * step * (glm::length(from) + glm::length(to));
-    return glm::dot(from, to) < 0 || glm::length(index_of(next_ - state_)) < 0.5 * way;
+    return glm::dot(from, to) < 0 || glm::length(index_of(way_)) < 0.5 * way;
   }
 
   // Adds the step, or its part before the domain ends. Returns whether the path continues.
@@ -227,6 +229,7 @@ class Follower {
   Path& out_;
   dvec4 state_{0};
   dvec4 next_{0};
+  dvec4 way_{0};  // from the state to the next, also where it is lost in their rounding
   std::array<dvec4, stages> slopes_{};
   End blocked_ = End::stagnation;
 };

@@ -29,7 +29,7 @@ struct Limits {
   // Bounds the estimated error of each step, in cells. The error of a place on the path is of the
   // order of the number of steps times this, and grows where neighbouring paths diverge.
   double tolerance = 1e-3;
-  int steps_max = 1000;            // tried steps
+  int steps_max = 10000;           // tried steps
   double duration_max = HUGE_VAL;  // of Place::time, from the start
 };
 

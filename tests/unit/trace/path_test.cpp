@@ -139,6 +139,28 @@ TEST(Path, TimeIsLengthOverSpeed) {
   }
 }
 
+// The way is lost in the rounding of the index.
+TEST(Path, OfAnyLengthIsNoStagnation) {
+  const Block block = rotation();
+  for (const double length : {1e-10, 1e-20, 1e-30, 1e-37}) {
+    Path path;
+    follow(block.flow(), {26, 16, 0}, length, false, {}, path);
+    EXPECT_EQ(path.end, End::length) << length;
+    EXPECT_NEAR(path.length, length, 1e-11 * length);
+  }
+}
+
+// Twenty turns on a circle of 20 cells across.
+TEST(Path, OfSmallToleranceIsNotCutShort) {
+  const Block block = rotation();
+  Path path;
+  Limits limits;
+  limits.tolerance = 1e-9;
+  follow(block.flow(), {26, 16, 0}, 40 * pi * 10, false, limits, path);
+  EXPECT_GT(path.steps.size(), 1000U);
+  EXPECT_EQ(path.end, End::length);
+}
+
 // x' = x, y' = -y from (x0, y0): x0 e^t, y0 e^-t, on axes whose cells differ.
 TEST(Path, ASaddleOnUnevenAxesGrowsByTheExponential) {
   std::vector<double> x, y;
