@@ -273,6 +273,17 @@ Entry medium_entry(const Subject& subject, const scene::ScalarLayer& layer,
   return entry;
 }
 
+// Least and greatest value on the surface; nullopt: none.
+std::optional<std::array<float, 2>> values_on(const surface::Mesh& mesh) {
+  std::optional<std::array<float, 2>> values;
+  for (const float value : mesh.values) {
+    if (std::isnan(value)) continue;
+    if (!values) values = std::array{value, value};
+    values = std::array{std::min((*values)[0], value), std::max((*values)[1], value)};
+  }
+  return values;
+}
+
 Entry surface_entry(const Subject& subject, const surface::Shown& shown,
                     const protocol::SurfaceView& view) {
   const auto unit_of = [](const data::FieldInfo* field) {
@@ -288,6 +299,9 @@ Entry surface_entry(const Subject& subject, const surface::Shown& shown,
   if (!name.empty()) {
     entry.units = unit_of(field);
     entry.ticks = even_ticks(shown.range[0], shown.range[1], strip_parts);
+    if (const auto values = values_on(*shown.mesh)) {
+      entry.beyond = beyond_ends(shown.range, *values);
+    }
   }
   if (view.isovalue) {
     const std::string units = unit_of(cut);

@@ -388,6 +388,34 @@ TEST(Legend, MarksTheEndsBeyondWhichValuesLie) {
   EXPECT_EQ(marked(0, 1e6), (std::array{0, 0}));
 }
 
+// Values of t are n: a layer of it shows a part of them.
+TEST(Legend, MarksTheEndsBeyondWhichASurfaceHasValues) {
+  const auto marked = [](double low, double high, bool section) {
+    const Shown shown(scene::atmosphere_grid(), one_scalar(), [&](protocol::View& view) {
+      view.scalars.emplace();
+      protocol::SurfaceView surface;
+      surface.field = "cloud";
+      if (section) {
+        surface.slice = protocol::SliceView{protocol::GridAxis::z, 1};
+      } else {
+        surface.isovalue = 17;
+        surface.color.field = "cloud";
+      }
+      surface.color.range = protocol::Range{low, high};
+      view.surfaces.push_back(surface);
+    });
+    Figure figure = empty_figure(shown);
+    add_legend(shown.subject(), style_of(shown.subject()), figure);
+    return arrows(figure);
+  };
+  EXPECT_EQ(marked(12, 23, true), (std::array{0, 0})) << "values of other layers do not count";
+  EXPECT_EQ(marked(12, 20, true), (std::array{0, 1}));
+  EXPECT_EQ(marked(15, 23, true), (std::array{1, 0}));
+  EXPECT_EQ(marked(23, 15, true), (std::array{1, 0})) << "its colours are reversed, not the strip";
+  EXPECT_EQ(marked(0, 16, false), (std::array{0, 1})) << "the value of the isosurface";
+  EXPECT_EQ(marked(16, 18, false), (std::array{0, 0}));
+}
+
 // Values that are transparent at that end are not drawn.
 TEST(Legend, MarksNoEndBeyondWhichAMediumIsTransparent) {
   const auto marked = [](double low_extinction) {

@@ -284,6 +284,9 @@ function surfaceEntry(dataset: Dataset, surface: SurfaceView): LegendEntry {
   const range = (surface.color?.range ?? field?.range ?? [0, 1]) as [number, number];
   const { isovalue = null, contours = null } = surface;
   const where = name === null ? "it" : cutTitle;
+  // On an isosurface its own field has one value.
+  const values =
+    isovalue !== null && name === surface.field ? ([isovalue, isovalue] as const) : field?.range;
   return {
     kind: "surface",
     title: name === null ? cutTitle : fieldTitle(field, name),
@@ -299,7 +302,7 @@ function surfaceEntry(dataset: Dataset, surface: SurfaceView): LegendEntry {
         : `surface where ${where} is ${formatNumber(isovalue)} ${unitText(cut?.units)}`.trim(),
       contours === null ? "" : `contours every ${formatNumber(contours.interval)} ${units}`.trim(),
     ),
-    beyond: [false, false],
+    beyond: name === null ? [false, false] : beyondEnds(range, values),
     leftOut: "",
   };
 }
