@@ -118,8 +118,8 @@ std::string why_no_medium(const scene::ScalarLayer& layer, const std::string& fi
 }
 
 std::string reasons(const scene::Scene& scene, const protocol::View& view,
-                    const engine::WorkReport& work) {
-  if (!scene.vector && scene.scalars.empty()) {
+                    const std::vector<std::string>& surfaces, const engine::WorkReport& work) {
+  if (!scene.vector && scene.scalars.empty() && scene.surfaces.empty()) {
     return "the view shows no field: neither lines of an opacity above 0 nor a medium of an "
            "extinction above 0";
   }
@@ -140,6 +140,8 @@ std::string reasons(const scene::Scene& scene, const protocol::View& view,
     add(why_no_medium(*layer, scalar.field, i, view, scene.slice));
     ++layer;
   }
+  all.insert(all.end(), surfaces.begin(), surfaces.end());
+  if (surfaces.size() < scene.surfaces.size()) unexplained = true;
   if (unexplained) {
     const bool seen = !work.variant.reference && work.culled < work.samples;
     all.emplace_back(seen ? "what lies in the picture is masked, or below a threshold of the view"
@@ -153,13 +155,14 @@ std::string reasons(const scene::Scene& scene, const protocol::View& view,
 }  // namespace
 
 std::string why_empty(const scene::Scene& scene, const protocol::View& view,
-                      const engine::WorkReport& work, bool transparent) {
-  // Surfaces are no data of the report.
-  const bool drawn = work.variant.reference    ? !transparent
-                     : !scene.surfaces.empty() ? true
-                     : scene.body              ? work.culled + work.skipped_both < work.samples
-                                               : work.pixel_updates > 0;
-  return drawn ? "" : reasons(scene, view, work);
+                      const std::vector<std::string>& surfaces, const engine::WorkReport& work,
+                      bool transparent) {
+  // The report does not count the pixels of surfaces: any triangle counts as drawn.
+  const bool drawn = work.variant.reference                    ? !transparent
+                     : scene.surfaces.size() > surfaces.size() ? true
+                     : scene.body ? work.culled + work.skipped_both < work.samples
+                                  : work.pixel_updates > 0;
+  return drawn ? "" : reasons(scene, view, surfaces, work);
 }
 
 }  // namespace windsplat::frame

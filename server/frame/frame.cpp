@@ -4,6 +4,7 @@
 #include <chrono>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "server/annotate/annotate.hpp"
 #include "server/annotate/paint/compose.hpp"
@@ -19,6 +20,7 @@
 #include "server/quality/setting.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/surfaces/make_surfaces.hpp"
 
 namespace windsplat::frame {
 namespace {
@@ -281,6 +283,17 @@ Result<void> set_overlay(const Prepared& prepared, Workspace& workspace) {
   return {};
 }
 
+// Why surfaces of the scene have no triangles, if none has any.
+Result<std::vector<std::string>> missing_surfaces(const Prepared& prepared,
+                                                  data::Dataset& dataset) {
+  const auto& surfaces = prepared.scene.surfaces;
+  const auto has_some = [](const surface::Shown& shown) { return !shown.mesh->triangles.empty(); };
+  if (surfaces.empty() || std::any_of(surfaces.begin(), surfaces.end(), has_some)) {
+    return std::vector<std::string>();
+  }
+  return scene::why_no_surfaces(prepared.completed, dataset);
+}
+
 }  // namespace
 
 std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annotated) {
@@ -341,7 +354,9 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   name_fields(scene, prepared.completed, drawn.work);
   drawn.view = prepared.completed.view();
   const bool transparent = drawn.work.variant.reference && is_transparent(workspace.space.image());
-  drawn.empty = why_empty(scene, drawn.view, drawn.work, transparent);
+  auto missing = missing_surfaces(prepared, dataset);
+  if (!missing) return given_up(missing.error(), workspace);
+  drawn.empty = why_empty(scene, drawn.view, *missing, drawn.work, transparent);
   drawn.view.image = prepared.asked;
   drawn.detail = scene::detail_shown(prepared.completed) * prepared.asked.height / drawn.height;
   drawn.halvings = halvings_of(prepared, dataset);

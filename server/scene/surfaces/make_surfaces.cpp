@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <glm/geometric.hpp>
+#include <iomanip>
 #include <memory>
 #include <sstream>
 #include <utility>
@@ -172,6 +173,37 @@ Result<std::shared_ptr<const surface::Mesh>> mesh_of(const SurfaceView& from, st
   return std::static_pointer_cast<const surface::Mesh>(*kept);
 }
 
+std::string number_text(double value) {
+  std::ostringstream text;
+  text << std::setprecision(4) << value;
+  return text.str();
+}
+
+// Of a surface without triangles.
+std::string why_none(const SurfaceView& surface, std::size_t n, const protocol::View& view,
+                     const data::Volume& volume) {
+  const std::string name = in_double_quotes(surface.field);
+  const std::string part = view.region == protocol::RegionView{} ? "" : " in the region";
+  const std::string left_out = view.region.where.empty() ? "" : ", or left out by /region/where";
+  if (volume.masked == static_cast<std::int64_t>(volume.samples())) {
+    return pointer_of(n) + ": every sample of " + name + part + " is masked at step " +
+           std::to_string(view.step) + left_out;
+  }
+  const auto least = static_cast<double>(volume.range[0]);
+  const auto most = static_cast<double>(volume.range[1]);
+  if (surface.isovalue && !(*surface.isovalue >= least && *surface.isovalue <= most)) {
+    return pointer_of(n, "/isovalue") + " " + number_text(*surface.isovalue) +
+           " is beyond the values of " + name + part + ", " + number_text(least) + " to " +
+           number_text(most);
+  }
+  if (surface.isovalue) {
+    return pointer_of(n, "/isovalue") + " " + number_text(*surface.isovalue) + ": " + name +
+           " does not cross it between samples that are not masked" + left_out;
+  }
+  return pointer_of(n) + ": the section lies outside the data" + part + ", or where " + name +
+         " is masked at step " + std::to_string(view.step) + left_out;
+}
+
 }  // namespace
 
 Result<void> check_surfaces(const protocol::View& view, const data::DatasetInfo& info) {
@@ -209,6 +241,25 @@ std::vector<std::pair<std::string, data::Derivation>> needed_by_surfaces(
     if (!colors.empty()) needed.emplace_back(colors, kept_part(placed, 1, {}));
   }
   return needed;
+}
+
+Result<std::vector<std::string>> why_no_surfaces(const CompletedView& completed,
+                                                 data::Dataset& dataset) {
+  const protocol::View& view = completed.view();
+  const auto filters = filters_of(view.region, protocol::FilterOf::all);
+  std::vector<std::string> reasons;
+  for (std::size_t n = 0; n < view.surfaces.size(); ++n) {
+    const SurfaceView& from = view.surfaces[n];
+    if (!is_seen(from)) continue;
+    const auto mesh = mesh_of(from, n, completed, dataset);
+    if (!mesh) return mesh.error();
+    if (!(*mesh)->triangles.empty()) continue;
+    const auto volume = dataset.derived(from.field, static_cast<std::size_t>(view.step),
+                                        kept_part(*completed.placed(), 1, filters));
+    if (!volume) return volume.error();
+    reasons.push_back(why_none(from, n, view, **volume));
+  }
+  return reasons;
 }
 
 Result<std::vector<surface::Shown>> make_surfaces(const CompletedView& completed,

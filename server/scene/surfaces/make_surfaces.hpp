@@ -36,4 +36,9 @@ std::vector<std::pair<std::string, data::Derivation>> needed_by_surfaces(
 Result<std::vector<surface::Shown>> make_surfaces(const CompletedView& completed,
                                                   data::Dataset& dataset);
 
+// Why surfaces of the view have no triangles, one text for each that has none: every sample masked,
+// the values of the field, or masked samples where the surface would be. Errors: those of loading.
+Result<std::vector<std::string>> why_no_surfaces(const CompletedView& completed,
+                                                 data::Dataset& dataset);
+
 }  // namespace windsplat::scene

@@ -115,6 +115,29 @@ TEST_F(Produce, EmptyMediumSaysWhy) {
   }
 }
 
+// Black pictures of surfaces said nothing.
+TEST_F(Produce, EmptySurfaceSaysWhy) {
+  view.vector.field.kind = protocol::FieldChoice::Kind::none;
+  view.scalars = std::vector<protocol::ScalarView>();
+  protocol::SurfaceView surface;
+  surface.field = "cloud";
+  surface.isovalue = 1e6;
+  view.surfaces = {surface};
+  Encoding encoding;
+  encoding.allow_reference = true;
+  for (const auto name : {protocol::MethodName::slab, protocol::MethodName::kernel,
+                          protocol::MethodName::reference}) {
+    view.method.name = name;
+    const auto frame = produce(view, *dataset, encoding, pool, cancel);
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_THAT(frame->empty, testing::StartsWith("/surfaces/0/isovalue 1e+06 is beyond"));
+  }
+  surface.isovalue.reset();
+  surface.slice = protocol::SliceView{protocol::GridAxis::z, 3};
+  view.surfaces.push_back(surface);
+  EXPECT_EQ(produce(view, *dataset, encoding, pool, cancel)->empty, "") << "the other one is seen";
+}
+
 TEST(EmptyPicture, MaskedSamplesAreNamed) {
   auto source = std::make_unique<scene::FakeSource>(
       scene::atmosphere_grid(),

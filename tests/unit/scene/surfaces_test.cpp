@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "server/scene/defaults.hpp"
 #include "server/scene/surfaces/make_surfaces.hpp"
@@ -114,6 +115,41 @@ TEST(SurfaceView, ASectionIsColouredByItsFieldOverTheDefaultRange) {
   ASSERT_EQ(shown.mesh->values.size(), 12U);
   EXPECT_EQ(shown.mesh->values.front(), 18);  // between 12 and 24
   EXPECT_EQ(shown.mesh->triangles.size(), 2U * 3 * 2);
+}
+
+std::vector<std::string> reasons_of(const View& view, data::Dataset& dataset) {
+  const auto completed = complete(view, dataset);
+  EXPECT_TRUE(completed);
+  return why_no_surfaces(*completed, dataset).value();
+}
+
+TEST(SurfaceView, OneWithoutTrianglesTellsWhy) {
+  auto dataset = weather_of_t();
+  EXPECT_THAT(reasons_of(view_of(isosurface(13)), *dataset), testing::IsEmpty());
+  View beyond = view_of(isosurface(300));
+  beyond.surfaces.push_back(isosurface(13));
+  EXPECT_THAT(reasons_of(beyond, *dataset),
+              testing::ElementsAre("/surfaces/0/isovalue 300 is beyond the values of \"t\", "
+                                   "0 to 35"));
+  // The middle layer is masked: of the isosurfaces only those between other layers are seen.
+  auto source = std::make_unique<FakeSource>(
+      atmosphere_grid(), std::vector<data::FieldInfo>{scalar_info("t", "K"), scalar_info("q", "1")},
+      1);
+  source->values = [](const std::string& field, std::size_t n) {
+    if (field == "q" || n / 12 == 1) return std::numeric_limits<double>::quiet_NaN();
+    return static_cast<double>(n);
+  };
+  auto masked = dataset_of(std::move(source));
+  EXPECT_THAT(reasons_of(view_of(layer(protocol::GridAxis::z, 1)), *masked),
+              testing::ElementsAre("/surfaces/0: the section lies outside the data, or where \"t\" "
+                                   "is masked at step 0"));
+  EXPECT_THAT(reasons_of(view_of(isosurface(17)), *masked),
+              testing::ElementsAre("/surfaces/0/isovalue 17: \"t\" does not cross it between "
+                                   "samples that are not masked"));
+  SurfaceView none = isosurface(3);
+  none.field = "q";
+  EXPECT_THAT(reasons_of(view_of(none), *masked),
+              testing::ElementsAre("/surfaces/0: every sample of \"q\" is masked at step 0"));
 }
 
 TEST(SurfaceView, APlaneThroughAnOutermostLayerIsSeenFromBothSides) {
