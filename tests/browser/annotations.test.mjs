@@ -1,4 +1,4 @@
-// Annotations that the server draws into the picture, switched by the panel.
+// Annotations that the panel adds to the picture, and overlays that make room for them.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import {

@@ -6,7 +6,7 @@ import { Ajv2020 } from "ajv/dist/2020.js";
 import { Api, type Answer, type Histogram } from "../src/wire/api";
 import { pointInPlane, project, type Camera } from "../src/view/camera";
 import type { Vec3 } from "../src/base/vec3";
-import { barPath, clipRange, neat, quantile, RangeDrag, valueAt } from "../src/panels/histogram";
+import { barPath, clipRange, neat, quantile, RangeDrag, valueAt } from "../src/view/histogram";
 import {
   coordinatesOf,
   magnitude,

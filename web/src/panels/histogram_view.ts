@@ -9,7 +9,7 @@ import {
   setAttributes,
   observeVisibility,
 } from "../base/dom";
-import { barPath, clipRange, positionOf, RangeDrag, valueAt } from "./histogram";
+import { barPath, clipRange, positionOf, RangeDrag, valueAt } from "../view/histogram";
 import { oriented, RangeChoice, type RangeSource } from "./range_choice";
 import { formatNumber } from "../base/ticks";
 import { TransferView, type CurveSource } from "./transfer_view";

@@ -1,11 +1,24 @@
 // The surfaces panel: isosurfaces and sections of scalar fields, each with colours and opacity.
 import type GUI from "lil-gui";
 import { surfaceColors, unitText } from "../view/legend_entries";
+import { failureText, type FieldRange, type Histogram } from "../wire/api";
 import type { SurfaceView } from "../wire/protocol";
 import { fieldOptions } from "./controls";
+import { histogramBins } from "./histogram_view";
 import type { Access, PanelKit } from "./panel_kit";
+import {
+  candidates,
+  facingAxis,
+  firstIsosurface,
+  isEdgeOn,
+  keepsValue,
+  middleValue,
+  noSurfaceText,
+  type Axis,
+} from "./surface_choice";
 
 const surfacesMax = 8;
+const rangesMax = 64; // that are kept
 const ownColor = ""; // the choice of colours that needs no field
 const cuts: Record<string, string> = {
   isosurface: "isosurface",
@@ -15,7 +28,7 @@ const cuts: Record<string, string> = {
   "oblique plane": "plane",
 };
 
-type Axis = "x" | "y" | "z";
+const noCut = { isovalue: null, slice: null, plane: null, contours: null };
 
 const kindOf = (surface: SurfaceView): string =>
   surface.slice?.axis ?? (surface.plane ? "plane" : "isosurface");
@@ -31,6 +44,8 @@ export function addSurfaces(gui: GUI, kit: PanelKit): void {
 class SurfacesPanel {
   private shape = ""; // what decides which controls there are
   private controls: PanelKit;
+  private message = ""; // about what could not be added or changed
+  private readonly ranges = new Map<string, FieldRange | null>(); // null: asked for
 
   constructor(
     private readonly folder: GUI,
@@ -42,8 +57,9 @@ class SurfacesPanel {
     this.refresh();
   }
 
+  // As the view has them, so that no default is sent back.
   private surfaces(): SurfaceView[] {
-    return this.kit.host.view().surfaces ?? [];
+    return this.kit.host.explicitView().surfaces ?? [];
   }
 
   private refresh(): void {
@@ -60,6 +76,7 @@ class SurfacesPanel {
   }
 
   private send(surfaces: SurfaceView[]): void {
+    this.message = "";
     this.kit.host.change({ surfaces });
   }
 
@@ -67,20 +84,102 @@ class SurfacesPanel {
     for (const child of [...this.folder.children]) child.destroy();
     this.controls = this.kit.again();
     this.surfaces().forEach((_, index) => this.addSurface(index));
+    this.controls.note(this.folder, () => this.message);
     if (this.surfaces().length >= surfacesMax) return;
-    const field = Object.values(this.options)[0]!;
-    this.controls.action(this.folder, "Add an isosurface", "Where a field has one value", () => {
-      this.send([...this.surfaces(), { field, isovalue: this.middleOf(field), opacity: 0.5 }]);
-    });
-    this.controls.action(this.folder, "Add a section", "A layer of the grid in colours", () => {
-      this.send([...this.surfaces(), { field, slice: this.layerOf("z") }]);
-    });
+    const add = (label: string, title: string, run: () => void) =>
+      this.controls.action(this.folder, label, title, run);
+    add("Add an isosurface", "Where a field has one value", () => this.addIsosurface());
+    const section = (axis: Axis) => {
+      const field = candidates(this.kit.host.dataset())[0]!;
+      this.send([...this.surfaces(), { field, slice: this.layerOf(axis) }]);
+    };
+    add("Add a level section", "A layer of the grid in colours", () => section("z"));
+    add("Add a vertical section", "The one that faces the camera", () =>
+      section(facingAxis(this.kit.host.view())),
+    );
   }
 
-  private middleOf(field: string): number {
-    const known = this.kit.host.dataset().defaultView?.scalars?.find((s) => s.field === field);
-    const range = known?.color?.range ?? [0, 1];
-    return Number((0.5 * (range[0] + range[1])).toPrecision(3));
+  private async histogram(field: string): Promise<Histogram> {
+    const { host } = this.kit;
+    const step = host.view().step ?? 0;
+    return host.api.histogram(host.dataset().id, field, step, histogramBins);
+  }
+
+  // Reads values and then changes the surfaces, unless these have changed meanwhile.
+  private afterReading<T>(read: () => Promise<T>, use: (answer: T) => void): void {
+    const before = JSON.stringify(this.surfaces());
+    const { id } = this.kit.host.dataset();
+    const isCurrent = () =>
+      this.kit.host.explicitView().dataset === id && JSON.stringify(this.surfaces()) === before;
+    const say = (text: string) => {
+      this.message = text;
+      this.controls.refresh();
+    };
+    read().then(
+      (answer) => isCurrent() && use(answer),
+      (failure: unknown) => isCurrent() && say(failureText(failure)),
+    );
+  }
+
+  private addIsosurface(): void {
+    const fields = candidates(this.kit.host.dataset());
+    this.afterReading(
+      () => firstIsosurface(fields, (field) => this.histogram(field)),
+      (found) => {
+        if (found !== null) return this.send([...this.surfaces(), { ...found, opacity: 0.5 }]);
+        this.message = "No field has different values at this step.";
+        this.controls.refresh();
+      },
+    );
+  }
+
+  // The surface at this index becomes an isosurface of a field, at the present value if the field
+  // has it.
+  private cutAtValue(index: number, field: string, change: Partial<SurfaceView>): null {
+    const before = this.surfaces()[index]!;
+    const kept = before.isovalue;
+    this.afterReading(
+      () => this.histogram(field),
+      (histogram) => {
+        const dataset = this.kit.host.dataset();
+        const keeps =
+          typeof kept === "number" && keepsValue(dataset, before.field, field, kept, histogram);
+        const isovalue = keeps ? kept : (middleValue(histogram) ?? histogram.range[0]);
+        this.update(index, { ...change, field, isovalue });
+      },
+    );
+    return null;
+  }
+
+  // What a user should know of a surface that is not seen.
+  private noteOf(index: number): string {
+    const surface = this.surfaces()[index];
+    const { host } = this.kit;
+    if (surface === undefined || host.playing()) return "";
+    if (isEdgeOn(host.dataset(), host.view(), surface)) {
+      return "Seen edge-on: turn the picture, or choose another shape.";
+    }
+    const known = typeof surface.isovalue === "number" ? this.rangeOf(surface.field) : null;
+    return known === null ? "" : noSurfaceText(host.dataset(), surface, known);
+  }
+
+  private rangeOf(field: string): FieldRange | null {
+    const { host } = this.kit;
+    const { id } = host.dataset();
+    const step = host.view().step ?? 0;
+    const key = `${id} ${step} ${field}`;
+    const known = this.ranges.get(key);
+    if (known !== undefined) return known;
+    if (this.ranges.size > rangesMax) this.ranges.clear();
+    this.ranges.set(key, null);
+    host.api.range(id, field, step).then(
+      (range) => {
+        this.ranges.set(key, range);
+        this.controls.refresh();
+      },
+      () => undefined, // the frame tells what is wrong
+    );
+    return null;
   }
 
   private layerOf(axis: Axis): { axis: Axis; index: number } {
@@ -97,7 +196,7 @@ class SurfacesPanel {
     index: number,
     key: string,
     get: (surface: SurfaceView) => T | null | undefined,
-    change: (value: T, surface: SurfaceView) => Partial<SurfaceView>,
+    change: (value: T, surface: SurfaceView) => Partial<SurfaceView> | null, // null: sent later
   ): Access<T> {
     return {
       pointer: `/surfaces/${key}`,
@@ -107,16 +206,15 @@ class SurfacesPanel {
       },
       set: (value) => {
         const surface = this.surfaces()[index];
-        return surface === undefined ? null : this.update(index, change(value, surface));
+        const changed = surface === undefined ? null : change(value, surface);
+        return changed === null ? null : this.update(index, changed);
       },
     };
   }
 
-  private cutBy(kind: string, surface: SurfaceView): Partial<SurfaceView> {
-    const none = { isovalue: null, slice: null, plane: null, contours: null };
-    if (kind === "isosurface") return { ...none, isovalue: this.middleOf(surface.field) };
-    if (kind === "plane") return { ...none, plane: { point: [0, 0, 0], normal: [1, 1, 0] } };
-    return { ...none, slice: this.layerOf(kind as Axis) };
+  private cutBy(kind: string): Partial<SurfaceView> {
+    if (kind === "plane") return { ...noCut, plane: { point: [0, 0, 0], normal: [1, 1, 0] } };
+    return { ...noCut, slice: this.layerOf(kind as Axis) };
   }
 
   private addSurface(index: number): void {
@@ -130,21 +228,24 @@ class SurfacesPanel {
         index,
         "field",
         (s) => s.field,
-        (field, s) => ({
-          field,
-          ...(s.isovalue == null ? {} : { isovalue: this.middleOf(field) }),
-          color: { ...s.color, range: null },
-        }),
+        (field, s) => {
+          const color = { ...s.color, range: null };
+          if (s.isovalue == null) return { field, color };
+          return this.cutAtValue(index, field, { color });
+        },
       ),
       this.options,
     );
     this.controls.choice(
       folder,
       "shape",
-      this.access(index, "shape", kindOf, (kind, s) => this.cutBy(kind, s)),
+      this.access(index, "shape", kindOf, (kind, s) =>
+        kind === "isosurface" ? this.cutAtValue(index, s.field, noCut) : this.cutBy(kind),
+      ),
       cuts,
     );
     this.addPlace(folder, index, surface);
+    this.controls.note(folder, () => this.noteOf(index));
     this.controls.number(
       folder,
       "opacity",
@@ -160,6 +261,11 @@ class SurfacesPanel {
     this.controls.action(folder, "Remove", "Take this surface out of the view", () => {
       this.send(this.surfaces().filter((_, n) => n !== index));
     });
+  }
+
+  // The range of the colours in the newest picture where the view has none.
+  private drawnRange(index: number): number[] | null | undefined {
+    return this.kit.host.view().surfaces?.[index]?.color?.range;
   }
 
   private unitsOf(name: string): string {
@@ -267,7 +373,7 @@ class SurfacesPanel {
       this.access(
         index,
         "color/range",
-        (s) => s.color?.range as [number, number] | null | undefined,
+        (s) => (s.color?.range ?? this.drawnRange(index)) as [number, number] | null | undefined,
         (range, s) => ({ color: { ...s.color, range } }),
       ),
       this.unitsOf(name),

@@ -1,7 +1,7 @@
 // Model of a medium's opacity curve editor: points moved, added and removed, their positions on a
 // linear or logarithmic scale, and the curve as a path. Pure.
 import type { Range } from "../wire/api";
-import { neat } from "./histogram";
+import { neat } from "../view/histogram";
 import { densityOf, type Curve } from "./media";
 import { formatNumber } from "../base/ticks";
 import { clamp } from "../base/values";

@@ -2,7 +2,7 @@
 // table of numbers. During a drag at most one change per display frame is sent.
 import type { Range } from "../wire/api";
 import { checkLabel, make, makeSvg, numberBox, setAttributes } from "../base/dom";
-import { neat, positionOf } from "./histogram";
+import { neat, positionOf } from "../view/histogram";
 import type { Curve } from "./media";
 import {
   addPoint,

@@ -2,8 +2,8 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
-import { entryText, keyName, nameKey } from "../src/base/key_words";
-import { problemText } from "../src/wire/requests";
+import { entryText, keyName, nameKey } from "../../src/base/key_words";
+import { problemText } from "../../src/wire/requests";
 
 interface Schema {
   properties?: Record<string, Schema>;
