@@ -230,9 +230,9 @@ struct WindFrames {
   }
 };
 
-// x' = cos(t), y' = 0.25: x = sin(t), y = t / 4, with rests where cos(t) is 0 at turning points.
+// x' = cos(t + 0.7), y' = 0.25: x = sin(t + 0.7) - sin(0.7), y = t / 4.
 double wave_miss(int frames) {
-  const WindFrames wind(-4, 5, frames, [](double t) { return dvec3(std::cos(t), 0.25, 0); });
+  const WindFrames wind(-4, 5, frames, [](double t) { return dvec3(std::cos(t + 0.7), 0.25, 0); });
   Streamlines of = wind.fields[0].lines();
   of.flow.frames = wind.frames;
   of.seeds = {{8, 8, 0}};
@@ -243,12 +243,16 @@ double wave_miss(int frames) {
   EXPECT_NEAR(chains[0].front().y, -1, 1e-6);
   EXPECT_NEAR(chains[0].back().y, 1.25, 1e-6);
   double most = 0;
-  for (const dvec3& at : chains[0]) most = std::max(most, std::abs(at.x - std::sin(4 * at.y)));
+  for (const dvec3& at : chains[0]) {
+    most = std::max(most, std::abs(at.x - std::sin(4 * at.y + 0.7) + std::sin(0.7)));
+  }
   return most;
 }
 
 TEST(Pathlines, AnOscillatingWindMovesThemAlongAWaveToSecondOrderInTheSteps) {
-  EXPECT_LT(wave_miss(46), 4e-3);
+  // The mean of cos between points h apart is h^2 / 12 of it larger than linear: of ways up
+  // to 1.64.
+  EXPECT_LT(wave_miss(46), 6e-3);
   EXPECT_GT(wave_miss(46) / wave_miss(91), 3.5);
 }
 
