@@ -259,11 +259,12 @@ std::uint64_t curved_working_bytes(std::uint64_t samples) {
 }
 
 SampleFactors curved_sunlight(const Lattice& lattice, const std::vector<float>& extinctions,
-                              const glm::dvec3& sun) {
+                              const glm::dvec3& sun, const CancelToken& cancel) {
   WINDSPLAT_CHECK(lattice.places != nullptr);
   const Cells cells(lattice);
   const Lattice grid = grid_around(cells, extinctions.size());
-  const SampleFactors at_points = sunlight(grid, spread(lattice, cells, extinctions, grid), sun);
+  const SampleFactors at_points =
+      sunlight(grid, spread(lattice, cells, extinctions, grid), sun, cancel);
   SampleFactors out(extinctions.size());
   constexpr std::size_t block = 4096;
   const std::size_t blocks = (out.size() + block - 1) / block;

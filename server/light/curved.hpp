@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::light {
@@ -18,7 +19,8 @@ namespace windsplat::light {
 // size of the cells. A globe throws its own shadow, with a radius two cells of the grid below the
 // lowest edge of the shell.
 scene::SampleFactors curved_sunlight(const scene::Lattice& lattice,
-                                     const std::vector<float>& extinctions, const glm::dvec3& sun);
+                                     const std::vector<float>& extinctions, const glm::dvec3& sun,
+                                     const CancelToken& cancel = {});
 
 // Bytes of the grid while it exists.
 std::uint64_t curved_working_bytes(std::uint64_t samples);

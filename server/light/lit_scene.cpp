@@ -109,8 +109,11 @@ Result<Factors> kept_factors(data::Dataset& dataset, const std::string& key, std
                              std::uint64_t working_bytes,
                              const std::function<SampleFactors()>& make) {
   const std::uint64_t bytes = samples * sizeof(SampleFactors::value_type);
-  const auto made = [&]() -> data::Resident {
-    return std::make_shared<const SampleFactors>(make());
+  const CancelToken cancel = dataset.cancellation();
+  const auto made = [&]() -> Result<data::Resident> {
+    auto factors = std::make_shared<const SampleFactors>(make());
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "sunlight cancelled");
+    return data::Resident(std::move(factors));
   };
   const auto typed = [](data::Resident resident) {
     return std::static_pointer_cast<const SampleFactors>(std::move(resident));
@@ -143,11 +146,12 @@ Result<void> add_sunlight(const protocol::View& view, const std::vector<std::str
   const bool curved = scene.lattice.places != nullptr;
   const std::uint64_t working =
       samples * sizeof(float) + (curved ? curved_working_bytes(samples) : 0);
-  auto factors = kept_factors(dataset, key, samples, working, [&scene, &sun, curved] {
+  const CancelToken cancel = dataset.cancellation();
+  auto factors = kept_factors(dataset, key, samples, working, [&scene, &sun, curved, &cancel] {
     const std::vector<float> media =
-        extinctions(scene.lattice, scene.scalars, scene.light->shadows);
-    return curved ? curved_sunlight(scene.lattice, media, sun)
-                  : sunlight(scene.lattice, media, sun);
+        extinctions(scene.lattice, scene.scalars, scene.light->shadows, cancel);
+    return curved ? curved_sunlight(scene.lattice, media, sun, cancel)
+                  : sunlight(scene.lattice, media, sun, cancel);
   });
   if (!factors) return factors.error();
   scene.light->sunlight = std::move(*factors);

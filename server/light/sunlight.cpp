@@ -298,7 +298,7 @@ int layer_axis(const Lattice& lattice, const glm::dvec3& sun) {
 }
 
 std::vector<float> extinctions(const Lattice& lattice, const std::vector<ScalarLayer>& media,
-                               double factor) {
+                               double factor, const CancelToken& cancel) {
   const std::size_t nx = index(lattice.dims[0]);
   const std::size_t ny = index(lattice.dims[1]);
   const std::size_t rows = ny * index(lattice.dims[2]);
@@ -312,6 +312,7 @@ std::vector<float> extinctions(const Lattice& lattice, const std::vector<ScalarL
       kernels[index(a)] = kernel_samples(lattice.dims[index(a)], layer.stride);
     }
     pool->run(rows, [&](std::size_t row, unsigned) {
+      if (cancel.cancelled()) return;
       const std::size_t y = index(kernels[1][row % ny]);
       const std::size_t z = index(kernels[2][row / ny]);
       add_row(layer, function, kernels[0], nx * (y + ny * z), out.data() + nx * row);
@@ -321,7 +322,7 @@ std::vector<float> extinctions(const Lattice& lattice, const std::vector<ScalarL
 }
 
 SampleFactors sunlight(const Lattice& lattice, const std::vector<float>& extinctions,
-                       const glm::dvec3& sun) {
+                       const glm::dvec3& sun, const CancelToken& cancel) {
   WINDSPLAT_CHECK(lattice.places == nullptr);
   constexpr int rows_of_band = 32;
   const int m = layer_axis(lattice, sun);
@@ -346,6 +347,7 @@ SampleFactors sunlight(const Lattice& lattice, const std::vector<float>& extinct
     Crossing along_u;
     Crossing along_v;
     for (const Layer& layer : layers) {
+      if (cancel.cancelled()) return;
       cross(u_rays, layer, along_u);
       cross(v_rays, layer, along_v);
       band.pass(layer, (layer.bottom - layer.top) / steep, along_u, along_v, out);

@@ -4,6 +4,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/scene/scene.hpp"
 
 namespace windsplat::light {
@@ -11,8 +12,10 @@ namespace windsplat::light {
 // The extinction of all media at the samples of a lattice, per world unit, times a factor, x
 // fastest; of a medium with a stride each sample has that of its kernel. Computed on several
 // threads.
+// Incomplete if cancelled.
 std::vector<float> extinctions(const scene::Lattice& lattice,
-                               const std::vector<scene::ScalarLayer>& media, double factor = 1);
+                               const std::vector<scene::ScalarLayer>& media, double factor = 1,
+                               const CancelToken& cancel = {});
 
 // For each sample the mean of the transmittances from the sun to the two places where the ray
 // through the sample enters and leaves its layer of cells, the layers being those across the axis
@@ -28,9 +31,9 @@ std::vector<float> extinctions(const scene::Lattice& lattice,
 // an uneven axis the rays lie as close as its narrowest cells, but at least a quarter of the mean
 // cell apart. The same for any number of threads.
 //
-// sun: unit vector towards it. The lattice must be rectilinear.
+// sun: unit vector towards it. The lattice must be rectilinear. Incomplete if cancelled.
 scene::SampleFactors sunlight(const scene::Lattice& lattice, const std::vector<float>& extinctions,
-                              const glm::dvec3& sun);
+                              const glm::dvec3& sun, const CancelToken& cancel = {});
 
 // The axis across which the layers of sunlight() lie.
 int layer_axis(const scene::Lattice& lattice, const glm::dvec3& sun);

@@ -299,10 +299,12 @@ LayerSize measure_layer(const Layers& layers, int k) {
   return size;
 }
 
-std::vector<LayerSize> measure_layers(const Layers& layers, ThreadPool& pool) {
+std::vector<LayerSize> measure_layers(const Layers& layers, ThreadPool& pool,
+                                      const CancelToken& cancel) {
   std::vector<LayerSize> sizes(static_cast<std::size_t>(layers.count()));
-  pool.run(sizes.size(),
-           [&](std::size_t k, unsigned) { sizes[k] = measure_layer(layers, static_cast<int>(k)); });
+  pool.run(sizes.size(), [&](std::size_t k, unsigned) {
+    if (!cancel.cancelled()) sizes[k] = measure_layer(layers, static_cast<int>(k));
+  });
   return sizes;
 }
 
@@ -402,18 +404,20 @@ glm::dvec3 Samples::place(int i, int j, int k) const {
   return {positions[0][i], positions[1][j], positions[2][k]};
 }
 
-MeshSize measure(const Samples& samples, const Cut& cut, ThreadPool& pool) {
+MeshSize measure(const Samples& samples, const Cut& cut, ThreadPool& pool,
+                 const CancelToken& cancel) {
   MeshSize sum;
-  for (const LayerSize& size : measure_layers(Layers(samples, cut), pool)) {
+  for (const LayerSize& size : measure_layers(Layers(samples, cut), pool, cancel)) {
     sum.vertices += size.within + size.across;
     sum.triangles += size.triangles;
   }
   return sum;
 }
 
-Mesh extract(const Samples& samples, const Cut& cut, const float* second, ThreadPool& pool) {
+Mesh extract(const Samples& samples, const Cut& cut, const float* second, ThreadPool& pool,
+             const CancelToken& cancel) {
   const Layers layers(samples, cut);
-  const std::vector<LayerSize> sizes = measure_layers(layers, pool);
+  const std::vector<LayerSize> sizes = measure_layers(layers, pool, cancel);
   std::vector<MeshSize> first(sizes.size() + 1);
   for (std::size_t k = 0; k < sizes.size(); ++k) {
     first[k + 1].vertices = first[k].vertices + sizes[k].within + sizes[k].across;
@@ -425,6 +429,8 @@ Mesh extract(const Samples& samples, const Cut& cut, const float* second, Thread
   if (second != nullptr) mesh.values.resize(first.back().vertices);
   mesh.triangles.resize(first.back().triangles);
   pool.run(sizes.size(), [&](std::size_t k, unsigned) {
+    // A layer that was not measured has no room.
+    if (cancel.cancelled()) return;
     Filler(layers, second, mesh)
         .fill(static_cast<int>(k), first[k].vertices, first[k + 1].vertices, first[k].triangles);
   });

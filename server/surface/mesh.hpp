@@ -14,6 +14,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
 
 namespace windsplat::surface {
@@ -65,9 +66,13 @@ struct MeshSize {
 };
 
 // The size of the mesh that extract() makes. Takes one pass over the samples.
-MeshSize measure(const Samples& samples, const Cut& cut, ThreadPool& pool);
+// Incomplete if cancelled.
+MeshSize measure(const Samples& samples, const Cut& cut, ThreadPool& pool,
+                 const CancelToken& cancel = {});
 
 // second: values of the field at vertices, or null. At least two samples along every axis.
-Mesh extract(const Samples& samples, const Cut& cut, const float* second, ThreadPool& pool);
+// Incomplete if cancelled.
+Mesh extract(const Samples& samples, const Cut& cut, const float* second, ThreadPool& pool,
+             const CancelToken& cancel = {});
 
 }  // namespace windsplat::surface

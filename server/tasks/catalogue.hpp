@@ -57,11 +57,11 @@ class Catalogue {
   // the io thread.
   std::vector<std::string> look_after();
   // Calls load(data::Dataset&). If memory does not suffice, waits for its turn until others release
-  // memory (data::Dataset::in_turn()) and calls it once more. `cancel` ends the wait with the error
-  // cancelled.
+  // memory (data::Dataset::in_turn()) and calls it once more. `cancel` ends the wait, and the
+  // computation of traced lines, surfaces and sunlight, with the error cancelled.
   template <class Load>
   auto load(const data::Dataset& dataset, const Load& load, const CancelToken& cancel = {}) {
-    data::Dataset handle = dataset;
+    data::Dataset handle = dataset.cancelled_by(cancel);
     auto loaded = load(handle);
     if (loaded || loaded.error().kind != ErrorKind::out_of_memory) return loaded;
     const auto turn = store_->take_turn(dataset, cancel);

@@ -124,12 +124,13 @@ std::int64_t vertices_at_most(const Streamlets& of) {
   return padded(lines * (of.segments_max + 1));
 }
 
-Segments make_segments(const Streamlets& of) {
+Segments make_segments(const Streamlets& of, const CancelToken& cancel) {
   const int wide = positions_along(of, 0);
   const auto high = static_cast<std::size_t>(positions_along(of, 1));
   std::vector<Row> rows(high * static_cast<std::size_t>(positions_along(of, 2)));
   const auto pool = few_threads(rows.size());
   pool->run(rows.size(), [&](std::size_t n, unsigned) {
+    if (cancel.cancelled()) return;
     Maker maker(of);
     const Position y = position_at(of, 1, static_cast<int>(n % high));
     const Position z = position_at(of, 2, static_cast<int>(n / high));

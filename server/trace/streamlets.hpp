@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 
+#include "server/base/cancel.hpp"
 #include "server/trace/segments.hpp"
 
 namespace windsplat::trace {
@@ -36,8 +37,9 @@ std::int64_t vertices_at_most(const Streamlets& of);
 // and is shorter where the flow ends. Its length follows from the magnitude of the sample, as that
 // of the straight line does. It is divided into 1, 2, 4 ... segments, at most segments_max, until
 // none departs from the curve by more than chord_departure of the length. Lines are in the order of
-// the kernel positions, x fastest. Computed on several threads; deterministic.
+// the kernel positions, x fastest. Computed on several threads; deterministic; incomplete if
+// cancelled.
 constexpr double chord_departure = 1.0 / 200;
-Segments make_segments(const Streamlets& of);
+Segments make_segments(const Streamlets& of, const CancelToken& cancel = {});
 
 }  // namespace windsplat::trace

@@ -47,6 +47,12 @@ Dataset Dataset::in_turn(const CancelToken& cancel) const {
   return out;
 }
 
+Dataset Dataset::cancelled_by(const CancelToken& cancel) const {
+  Dataset out = *this;
+  out.cancel_ = cancel;
+  return out;
+}
+
 Urgency Dataset::urgency() const {
   if (manner_ == Manner::in_turn) return Urgency::in_turn;
   return manner_ == Manner::prefetch ? Urgency::prefetch : Urgency::demand;
@@ -130,14 +136,19 @@ Result<VolumePtr> Dataset::inputs(const std::string& field, std::size_t step, co
 }
 
 Result<Resident> Dataset::auxiliary(const std::string& variant, std::uint64_t bytes,
-                                    const std::function<Resident()>& make) {
+                                    const std::function<Result<Resident>()>& make) {
   const ResidentKey key = auxiliary_key(variant);
   if (manner_ == Manner::resident_only) {
     Resident there = state_->budget->find_now(key);
     if (there) return there;
     return make_error(ErrorKind::not_resident, "a part of the view is not in memory yet");
   }
-  return get(key, bytes, [&]() -> Result<Resident> { return make(); });
+  const CancelToken own = cancellation();
+  for (;;) {
+    auto kept = get(key, bytes, make);
+    const bool others = !kept && kept.error().kind == ErrorKind::cancelled && !own.cancelled();
+    if (!others) return kept;
+  }
 }
 
 ResidentKey Dataset::auxiliary_key(const std::string& variant) const {

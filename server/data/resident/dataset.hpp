@@ -73,10 +73,10 @@ class Dataset {
   [[nodiscard]] Derivation reduction(const std::string& field, const Coarsening& how) const;
 
   // The result of make(), which takes `bytes` bytes and follows from the description of the dataset
-  // and `variant`: computed on first need, shared, counted and evicted like a level. Errors:
-  // out_of_memory, not_resident.
+  // and `variant`: computed on first need, shared, counted and evicted like a level. A make() that
+  // another caller cancelled is called again. Errors: out_of_memory, not_resident, those of make().
   Result<Resident> auxiliary(const std::string& variant, std::uint64_t bytes,
-                             const std::function<Resident()>& make);
+                             const std::function<Result<Resident>()>& make);
   [[nodiscard]] ResidentKey auxiliary_key(const std::string& variant) const;
 
   // Bytes of the field at a step, reduced in that way; 0: no such field.
@@ -86,6 +86,12 @@ class Dataset {
 
   // A handle that never loads, reduces or waits: absent volumes yield the error not_resident.
   [[nodiscard]] Dataset resident_only() const;
+  // The same handle for work that a raised `cancel` ends: what auxiliary() computes for it polls
+  // cancellation().
+  [[nodiscard]] Dataset cancelled_by(const CancelToken& cancel) const;
+  // That of cancelled_by() or in_turn(), otherwise one that is never raised.
+  [[nodiscard]] CancelToken cancellation() const { return cancel_ ? *cancel_ : CancelToken(); }
+
   // A handle that waits for room used by others (Budget::get(), in_turn). Only one thread at a
   // time, among all datasets that share a budget, so that each gets all the room it needs. `cancel`
   // ends its waits for room with the error cancelled.
@@ -210,7 +216,7 @@ class Dataset {
   std::shared_ptr<State> minus_;  // of the dataset that is subtracted; null: none
   std::optional<std::size_t> minus_step_;
   std::shared_ptr<OwnPins> own_;       // for handles in_turn(): volumes they returned
-  std::optional<CancelToken> cancel_;  // for handles in_turn()
+  std::optional<CancelToken> cancel_;  // for handles in_turn() or cancelled_by()
 };
 
 }  // namespace windsplat::data

@@ -151,9 +151,11 @@ Result<std::shared_ptr<const surface::Mesh>> mesh_of(const SurfaceView& from, st
   }
   cut.values = (*volume)->component(0);
   const std::string key = key_of(from, cut, completed.view(), kept_samples);
+  const CancelToken cancel = dataset.cancellation();
   const auto numbers = dataset.remembered(key, [&]() -> Result<std::vector<double>> {
     const auto pool = few_threads(static_cast<std::size_t>(samples.dims[2]));
-    const surface::MeshSize size = surface::measure(samples, cut, *pool);
+    const surface::MeshSize size = surface::measure(samples, cut, *pool, cancel);
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "meshing cancelled");
     return std::vector{static_cast<double>(size.vertices), static_cast<double>(size.triangles)};
   });
   if (!numbers) return numbers.error();
@@ -164,11 +166,14 @@ Result<std::shared_ptr<const surface::Mesh>> mesh_of(const SurfaceView& from, st
                          "would have " + std::to_string(size.triangles) + " triangles; at most " +
                              std::to_string(surface_triangles_max) + " are drawn");
   }
-  auto kept = dataset.auxiliary(key, size.bytes(colors != nullptr), [&]() -> data::Resident {
-    const auto pool = few_threads(static_cast<std::size_t>(samples.dims[2]));
-    return std::make_shared<const surface::Mesh>(
-        surface::extract(samples, cut, colors ? colors->component(0) : nullptr, *pool));
-  });
+  auto kept =
+      dataset.auxiliary(key, size.bytes(colors != nullptr), [&]() -> Result<data::Resident> {
+        const auto pool = few_threads(static_cast<std::size_t>(samples.dims[2]));
+        auto made = std::make_shared<const surface::Mesh>(
+            surface::extract(samples, cut, colors ? colors->component(0) : nullptr, *pool, cancel));
+        if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "meshing cancelled");
+        return data::Resident(std::move(made));
+      });
   if (!kept) return kept.error();
   return std::static_pointer_cast<const surface::Mesh>(*kept);
 }

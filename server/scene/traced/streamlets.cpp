@@ -6,6 +6,7 @@
 #include <limits>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include "server/scene/refusal.hpp"
 #include "server/scene/region/crop.hpp"
@@ -90,8 +91,11 @@ Result<std::shared_ptr<const trace::Segments>> traced_of(const protocol::View& v
                           " MiB, more than the memory limit permits: choose a larger "
                           "/vector/stride or fewer /vector/trace/segments");
   }
-  auto kept = dataset.auxiliary(key, bytes, [&of]() -> data::Resident {
-    return std::make_shared<const trace::Segments>(trace::make_segments(of));
+  auto kept = dataset.auxiliary(key, bytes, [&]() -> Result<data::Resident> {
+    const CancelToken cancel = dataset.cancellation();
+    auto made = std::make_shared<const trace::Segments>(trace::make_segments(of, cancel));
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "tracing cancelled");
+    return data::Resident(std::move(made));
   });
   if (!kept) return kept.error();
   return std::static_pointer_cast<const trace::Segments>(*kept);

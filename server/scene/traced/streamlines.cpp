@@ -95,7 +95,7 @@ Result<Series> series_of(const protocol::View& view, const data::Derivation& how
   const int first = std::max(view.step - view.vector.trace->seeds->path_steps, 0);
   const int last = std::min(view.step + view.vector.trace->seeds->path_steps, last_step);
   const std::uint64_t each = layer.field->values.size() * sizeof(float);
-  const auto count = static_cast<std::uint64_t>(last - first + 1);
+  const auto count = static_cast<std::uint64_t>(last) - static_cast<std::uint64_t>(first) + 1;
   if (!dataset.is_within_limit(count * each)) {
     return invalid_at(steps_pointer, std::to_string(count) + " steps take " +
                                          std::to_string(count * each >> 20U) +
@@ -178,8 +178,11 @@ Result<std::shared_ptr<const trace::Segments>> streamlines_of(
                                          " MiB, more than the memory limit permits: choose fewer "
                                          "seeds or /vector/trace/seeds/pieces");
   }
-  auto kept = dataset.auxiliary(key + seeds_key(seeds), bytes, [&of]() -> data::Resident {
-    return std::make_shared<const trace::Segments>(trace::make_streamlines(of));
+  auto kept = dataset.auxiliary(key + seeds_key(seeds), bytes, [&]() -> Result<data::Resident> {
+    const CancelToken cancel = dataset.cancellation();
+    auto made = std::make_shared<const trace::Segments>(trace::make_streamlines(of, cancel));
+    if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "tracing cancelled");
+    return data::Resident(std::move(made));
   });
   if (!kept) return kept.error();
   return std::static_pointer_cast<const trace::Segments>(*kept);

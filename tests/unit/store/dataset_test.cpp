@@ -71,7 +71,7 @@ TEST(Dataset, AuxiliaryDataAreSharedAndEvictedBeforeWhatIsReadFromFiles) {
   EXPECT_FALSE(get(dataset->resident_only(), "b")) << "`a` is referenced";
   EXPECT_TRUE(dataset->resident_only().volume("a", 0));
   const auto held = dataset->volume("a", 2);
-  const auto refused = dataset->auxiliary("c", 3 * kVolumeBytes, [] { return nullptr; });
+  const auto refused = dataset->auxiliary("c", 3 * kVolumeBytes, [] { return Resident(); });
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::out_of_memory);
 }
