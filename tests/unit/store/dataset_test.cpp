@@ -55,7 +55,7 @@ TEST(Dataset, AuxiliaryDataAreSharedAndEvictedBeforeWhatIsReadFromFiles) {
   int made = 0;
   const auto get = [&](Dataset dataset, const std::string& variant) {
     return dataset.auxiliary(variant, kVolumeBytes,
-                             [&] { return std::make_shared<const int>(++made); });
+                             [&] { return Resident(std::make_shared<const int>(++made)); });
   };
   EXPECT_EQ(get(dataset->resident_only(), "a").error().kind, ErrorKind::not_resident);
   const auto first = get(*dataset, "a").value();

@@ -223,7 +223,8 @@ TEST(Resident, RequestedAverageStaysThoughItCouldBeRecomputed) {
 TEST(Resident, WhatIsShownWithARequestedVolumeStays) {
   Fixture f(3);
   const auto get = [&](Dataset dataset) {
-    return dataset.auxiliary("a", volume_bytes, [] { return Resident(std::make_shared<const int>(1)); });
+    return dataset.auxiliary("a", volume_bytes,
+                             [] { return Resident(std::make_shared<const int>(1)); });
   };
   ASSERT_TRUE(get(*f.dataset));
   for (const std::size_t step : {0, 1}) ASSERT_TRUE(f.dataset->volume("f", step));
