@@ -482,7 +482,7 @@ test("a problem is described by its invalid values", () => {
   assert.equal(problemText({ ...problem, detail: "" }), "Bad");
   assert.equal(
     problemText({ ...problem, errors: [{ pointer: "/step", detail: "too large" }] }),
-    "/step: too large",
+    "Time step: too large",
   );
 });
 
