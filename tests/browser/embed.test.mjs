@@ -1,5 +1,6 @@
 // The embedded view (?embed) in a real browser: the picture alone, with a link to the whole page,
-// and the frames of other sites that may show it.
+// and the frames of other sites that may show it. At the end the page on phones, with touch: the
+// panel as a sheet, values by tapping, two fingers.
 import assert from "node:assert/strict";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
@@ -135,3 +136,83 @@ test("with a token a frame says that it needs a login, and has no form", async (
   assert.equal(new URL(href).search, "");
   await shot(page, "embed-login");
 });
+
+// --- phones
+
+const phones = [
+  { width: 390, height: 844 },
+  { width: 360, height: 640 },
+];
+const phone = { hasTouch: true, isMobile: true };
+
+for (const viewport of phones) {
+  const named = `${viewport.width} x ${viewport.height}`;
+  test(`the open panel leaves half of the screen to the picture at ${named}`, () =>
+    withPage(
+      async (page) => {
+        const open = await pictureBox(page);
+        assert.ok(open.height >= viewport.height / 2, `${open.height} pixels`);
+        const panel = page.locator("#panel");
+        assert.ok((await panel.boundingBox()).height > 60, "the panel can be used");
+        await shot(page, `phone-${viewport.width}`);
+        const handle = await page.locator("#panel-handle").boundingBox();
+        const [x, y] = [handle.x + handle.width / 2, handle.y + handle.height / 2];
+        await page.mouse.move(x, y);
+        await page.mouse.down();
+        await page.mouse.move(x, y + 60, { steps: 4 });
+        await page.mouse.up();
+        await panel.waitFor({ state: "hidden" });
+        assert.ok((await pictureBox(page)).height > open.height);
+        await page.locator("#panel-button").tap();
+        await panel.waitFor();
+        await page.locator("#panel-handle").tap();
+        await panel.waitFor({ state: "hidden" });
+      },
+      { ...phone, viewport },
+    ));
+}
+
+test("a tap shows the value of what is seen, and the next touch hides it", () =>
+  withPage(
+    async (page) => {
+      const box = await pictureBox(page);
+      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+      await page.touchscreen.tap(x, y);
+      const value = page.locator("#hover");
+      await value.waitFor();
+      assert.match(await value.textContent(), /(wind|cloud) [\d.]+/);
+      await shot(page, "phone-tap");
+      await page.touchscreen.tap(x, y);
+      await value.waitFor({ state: "hidden" });
+    },
+    { ...phone, viewport: phones[0] },
+  ));
+
+test("two fingers zoom and pan", () =>
+  withPage(
+    async (page) => {
+      const before = await state(page);
+      const box = await pictureBox(page);
+      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+      const client = await page.context().newCDPSession(page);
+      const touch = (type, apart, down = 0) =>
+        client.send("Input.dispatchTouchEvent", {
+          type,
+          touchPoints:
+            type === "touchEnd"
+              ? []
+              : [
+                  { x: x - apart, y: y + down, id: 0 },
+                  { x: x + apart, y: y + down, id: 1 },
+                ],
+        });
+      await touch("touchStart", 30);
+      for (let n = 1; n <= 6; n++) await touch("touchMove", 30 + 8 * n);
+      await touch("touchEnd", 0);
+      await finalPicture(page);
+      const after = await state(page);
+      assert.ok(Number(after.distance) < Number(before.distance), "fingers apart: nearer");
+      assert.equal(await page.locator("#hover").isVisible(), false);
+    },
+    { ...phone, viewport: phones[0] },
+  ));

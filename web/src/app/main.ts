@@ -20,6 +20,7 @@ import { MoveQueue, PointerInput } from "../viewport/input";
 import { bindKeys, modText, type Binding } from "./keyboard";
 import { Legend } from "../viewport/legend";
 import { Login } from "./login";
+import { panelSheet } from "./panel_sheet";
 import { Panels } from "../panels/panels";
 import { Probe } from "../viewport/probe";
 import { otherDatasets } from "../view/others";
@@ -49,7 +50,10 @@ const turn = new Turn(moves, {
 });
 const lookFrom = (angles: Angles) => turn.to(app.cameras.viewFrom(angles));
 new PointerInput(canvas, moves, {
-  clicked: (x, y, alt) => probe.pick([x, y], alt && !embedded),
+  clicked: (x, y, { altKey, pointerType }) => {
+    probe.pick([x, y], altKey && !embedded);
+    if (pointerType === "touch") hover.tap([x, y]);
+  },
   takesWheel: (event) => !embedded || takesWheel(canvas, event),
 });
 
@@ -184,6 +188,10 @@ function togglePanel(): void {
   byId("panel-button", HTMLButtonElement).setAttribute("aria-expanded", String(!hidden));
 }
 
+function foldPanel(): void {
+  if (!document.documentElement.classList.contains("no-panel")) togglePanel();
+}
+
 const arrow = (right: number, down: number) => (event: KeyboardEvent) =>
   moves.push((camera) =>
     event.shiftKey ? pan(camera, 0.01 * right, 0.01 * down) : drag(camera, right, down),
@@ -306,6 +314,7 @@ onClick("cancel-button", () => app.cancelLoading());
 onClick("retry-button", () => app.connectNow());
 onClick("share-button", () => void app.copyLink());
 onClick("save-button", openSaving);
+panelSheet(byId("panel-handle", HTMLButtonElement), foldPanel);
 onClick("help-button", () => help.showModal());
 onClick("panel-button", togglePanel);
 onClick("hud-button", () => hud.toggle());

@@ -1,7 +1,7 @@
 // The value under the cursor on the page: mouse position on the picture -> text beside the cursor,
 // and a ring around the sample that it is read from. It is the sample that the picture shows there,
 // which the server finds, or by choice the one in the probe's level. It can be switched on or off
-// for the session; on touch screens a tap probes instead.
+// for the session; on touch screens a tap shows it and the next touch hides it.
 import type { Api } from "../wire/api";
 import { make } from "../base/dom";
 import { Hover } from "./hover";
@@ -27,6 +27,7 @@ type Target = Found | { pixel: [number, number] };
 
 export class HoverView {
   private readonly hover: Hover<Target>;
+  private dismissed = false; // the touch that goes on has hidden a value
   private marked: [number, number] | null = null; // the ring of the newest answer
 
   constructor(
@@ -51,7 +52,9 @@ export class HoverView {
     for (const type of ["pointermove", "pointerdown", "pointerup"] as const) {
       canvas.addEventListener(type, (event) => this.move(event));
     }
-    canvas.addEventListener("pointerleave", () => this.hover.leave());
+    canvas.addEventListener("pointerleave", ({ pointerType }) => {
+      if (pointerType !== "touch") this.hover.leave(); // a lifted finger leaves, too
+    });
     document.addEventListener("visibilitychange", () => this.hover.poke());
     for (const setting of [hoverOn, hoverOf]) setting.watch(() => this.hover.poke());
   }
@@ -61,8 +64,18 @@ export class HoverView {
     this.hover.poke();
   }
 
+  // Shows the value at a place that was tapped, until the picture is touched again.
+  tap(at: [number, number]): void {
+    if (!this.dismissed) this.hover.move(at);
+  }
+
   private move(event: PointerEvent): void {
-    if (event.pointerType === "touch") return;
+    if (event.pointerType === "touch") {
+      if (event.type !== "pointerdown") return;
+      this.dismissed = !this.element.hidden;
+      this.hover.leave();
+      return;
+    }
     const box = this.canvas.getBoundingClientRect();
     const x = (event.clientX - box.left) / box.width;
     this.hover.move([x, (event.clientY - box.top) / box.height]);
@@ -121,7 +134,7 @@ export class HoverView {
     element.style.left = `${100 * x}%`;
     element.style.top = `${100 * y}%`;
     // Places the text on the side with more room.
-    const aside = (at: number) => (at < 0.6 ? `${gap}px` : `calc(-100% - ${gap}px)`);
+    const aside = (at: number) => (at < 0.5 ? `${gap}px` : `calc(-100% - ${gap}px)`);
     element.style.transform = `translate(${aside(x)}, ${aside(y)})`;
   }
 }

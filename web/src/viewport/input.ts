@@ -78,7 +78,7 @@ export function twist(before: Finger[], after: Finger[]): number {
 
 export interface PointerHost {
   // A click or tap that moved nothing; positions are fractions of the element's size.
-  clicked(x: number, y: number, alt: boolean): void;
+  clicked(x: number, y: number, event: PointerEvent): void;
   takesWheel(event: WheelEvent): boolean; // false: it scrolls what is around the element
 }
 
@@ -121,12 +121,12 @@ export class PointerInput {
   private up(event: PointerEvent): void {
     const known = this.fingers.delete(event.pointerId);
     this.holdRoll();
+    if (this.fingers.size === 0) this.element.classList.remove("dragging");
     if (known && event.type === "pointerup" && !this.panning && this.travelled < clickPixels) {
       const box = this.element.getBoundingClientRect();
       const x = (event.clientX - box.left) / box.width;
-      this.host.clicked(x, (event.clientY - box.top) / box.height, event.altKey);
+      this.host.clicked(x, (event.clientY - box.top) / box.height, event);
     }
-    if (this.fingers.size === 0) this.element.classList.remove("dragging");
   }
 
   private holdRoll(): void {
