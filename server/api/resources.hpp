@@ -60,6 +60,9 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
                 const std::string& field, const http::Request& request, http::Reply reply);
 void get_range(tasks::Backend& backend, const std::string& id, const std::string& field,
                const http::Request& request, http::Reply reply);
+// Of the part of the data in the region of a view, which is the body.
+void post_range(tasks::Backend& backend, const std::string& id, const std::string& field,
+                const http::Request& request, http::Reply reply);
 
 void get_frame(tasks::Backend& backend, access::Admission& admission, frame::Format format,
                const std::string& id, const http::Request& request, http::Reply reply);

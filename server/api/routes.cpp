@@ -118,6 +118,11 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
             Query::taken, Charge::picture},
       Route{"GET", "/v1/datasets/{id}/fields/{field}/range", later(get_range, backend),
             Query::taken, Charge::picture},
+      Route{"POST",
+            "/v1/datasets/{id}/fields/{field}/range",
+            later(post_range, backend),
+            {},
+            Charge::picture},
   };
 }
 

@@ -173,8 +173,10 @@ Result<Plan> plan_of(const AnimateArguments& arguments, const data::DatasetInfo&
   Plan plan;
   const auto pattern = parse_pattern(arguments.output);
   if (!pattern) {
-    return make_error(ErrorKind::invalid, "-o '" + printable(arguments.output) +
-                                              "' needs exactly one number, like f_%04d.jpg");
+    return make_error(ErrorKind::invalid,
+                      "-o '" + printable(arguments.output) +
+                          "' needs exactly one number, like f_%04d.jpg: animate writes pictures, "
+                          "of which ffmpeg makes a video");
   }
   plan.pattern = *pattern;
   const auto format = format_of(plan.pattern.name(0));

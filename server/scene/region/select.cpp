@@ -83,16 +83,18 @@ Run run_of(const std::vector<unsigned char>& marked, int turn) {
   return run;
 }
 
-Error empty(const char* key, const Range& range, const Axis& axis) {
+// `columns`: of a grid whose columns have longitudes and latitudes of their own.
+Error empty(const char* key, const Range& range, const Axis& axis, bool columns) {
   std::ostringstream text;
   text << "no sample of axis " << in_double_quotes(axis.name) << " is within "
        << text_of(range[0], range[1]) << ": its coordinates are " << text_of(axis.coordinates);
   if (!axis.units.empty()) text << ' ' << printable(axis.units, 80);
+  if (columns && *key != 'z') text << "; /region/longitudes and /region/latitudes take degrees";
   return invalid_at(std::string("/region/") + key, text.str());
 }
 
 Result<Run> along_axis(const std::optional<Range>& range, const char* key, const Axis& axis,
-                       int turn) {
+                       int turn, bool columns) {
   if (!range) return Run{0, static_cast<int>(axis.coordinates.size())};
   const bool longitudes = axis.kind == AxisKind::longitude;
   std::vector<unsigned char> marked;
@@ -101,7 +103,7 @@ Result<Run> along_axis(const std::optional<Range>& range, const char* key, const
     marked.push_back(longitudes ? is_between_longitudes(at, *range) : is_between(at, *range));
   }
   const Run run = run_of(marked, turn);
-  if (run.count == 0) return empty(key, *range, axis);
+  if (run.count == 0) return empty(key, *range, axis, columns);
   for (int i = run.first; i < run.first + run.count; ++i) {
     const int at = turn > 0 ? i % turn : i;
     if (marked[static_cast<std::size_t>(at)] != 0) continue;
@@ -238,11 +240,12 @@ int samples_around(const data::Grid& grid) {
 
 Result<Crop> crop_of(const RegionView& region, const data::Grid& grid, int around) {
   const int turn = grid.columns ? around : samples_around(grid);
-  const auto x = along_axis(region.x, "x", grid.axes[0], turn);
+  const bool columns = grid.columns != nullptr;
+  const auto x = along_axis(region.x, "x", grid.axes[0], turn, columns);
   if (!x) return x.error();
-  const auto y = along_axis(region.y, "y", grid.axes[1], 0);
+  const auto y = along_axis(region.y, "y", grid.axes[1], 0, columns);
   if (!y) return y.error();
-  const auto z = along_axis(region.z, "z", grid.axes[2], 0);
+  const auto z = along_axis(region.z, "z", grid.axes[2], 0, columns);
   if (!z) return z.error();
   Crop crop;
   crop.first = {x->first, y->first, z->first};

@@ -274,7 +274,7 @@ test("an animation over steps is a ZIP of the right frames, requested two at a t
     page.on("requestfinished", (one) => {
       if (one.url().endsWith("/v1/frames")) under -= 1;
     });
-    await setAnimation(page, { from: 1, to: 6, every: 2, legend: false, fps: 5 });
+    await setAnimation(page, { from: 2, to: 7, every: 2, legend: false, fps: 5 });
     assert.match(await page.locator("#save-about").textContent(), /^3 frames of .*, 0\.6 s\./);
     const { name, bytes } = await saved(page, "#save-animation");
     assert.equal(name, "climate-steps.zip");
@@ -287,7 +287,7 @@ test("an animation over steps is a ZIP of the right frames, requested two at a t
     const pictures = [];
     for (const [n, [, file]] of files.entries()) {
       const view = viewIn(file);
-      assert.equal(view.step, 1 + 2 * n);
+      assert.equal(view.step, 1 + 2 * n, "the dialog counts from 1, as the player");
       pictures.push(await decode(page, file));
       assert.equal(difference(pictures[n], await decode(page, await drawn(view))), null);
     }
@@ -409,7 +409,7 @@ test("cancel stops the requests and saves nothing", () =>
       asked.push(route.request());
       return asked.length === 1 ? route.continue() : undefined;
     });
-    await setAnimation(page, { from: 0, to: 7 });
+    await setAnimation(page, { from: 1, to: 8 });
     await page.locator("#save-animation").click();
     await page
       .locator("#save-progress")

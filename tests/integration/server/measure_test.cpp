@@ -6,6 +6,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <numeric>
 #include <thread>
 
@@ -272,6 +273,37 @@ TEST_F(Measures, RangeOfAllStepsIsReadOnce) {
   EXPECT_EQ(server_.loads(), 3U) << "cached though evicted";
   expect_problem_saying(refused("fields/" + name + "/range?of=most"), 422);
   expect_problem_saying(refused("fields/" + name + "/range?of=all&step=1"), 422);
+}
+
+// The page goes to the maximum of what is drawn.
+TEST_F(Measures, RangeInTheRegionOfAViewIsThatOfItsSamples) {
+  const auto& info = field(windsplat::data::FieldKind::scalar);
+  const auto& x = dataset_->info().grid.axes[0].coordinates;
+  const Json view = {{"step", 1}, {"region", {{"x", {x[3], x[6]}}}}};
+  const auto posted = [&](const std::string& name, const std::string& body) {
+    return request(port(), "POST", "/v1/datasets/small/fields/" + name + "/range",
+                   {{"Content-Type", "application/json"}}, body);
+  };
+  const Answer answer = posted(info.name, view.dump());
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  const Json told = json_of(answer);
+  const auto there = volume(info.name, 1);
+  float high = -std::numeric_limits<float>::infinity();
+  for (int k = 0; k < there->dims[2]; ++k) {
+    for (int j = 0; j < there->dims[1]; ++j) {
+      for (int i = 3; i <= 6; ++i) high = std::max(high, there->component(0)[flat(i, j, k)]);
+    }
+  }
+  EXPECT_EQ(told["range"][1].get<float>(), high);
+  const Json& index = told["places"]["max"]["index"];
+  EXPECT_EQ(there->component(0)[flat(index["x"], index["y"], index["z"])], high);
+  EXPECT_EQ(told["places"]["max"]["x"], x[index["x"].get<std::size_t>()]);
+  const std::string whole = "fields/" + info.name + "/range?step=1";
+  EXPECT_EQ(json_of(posted(info.name, R"({"step":1})")), ask(whole));
+  expect_problem_saying(posted("none", "{}"), 404, "none");
+  expect_problem_saying(posted(info.name, "{"), 400);
+  expect_problem_saying(posted(info.name, R"({"step":99})"), 422);
+  expect_problem_saying(posted(info.name, R"({"region":{"x":[1e6,2e6]}})"), 422, "no sample");
 }
 
 // Samples are named by which the values of the range are read again.

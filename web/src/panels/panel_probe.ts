@@ -15,13 +15,21 @@ import {
   magnitude,
   nearestIndex,
   placeText,
+  positionText,
   valueText,
   type Sample,
 } from "../view/sample_position";
 import { timeEnds, drawSeries } from "./series_plot";
 import { formatNumber } from "../base/ticks";
+import type { View } from "../wire/protocol";
 
 const restMs = 150;
+
+// Whether a region leaves something out.
+const isPart = (region: View["region"]): boolean =>
+  Object.values(region ?? {}).some(
+    (part) => part !== null && part !== undefined && !(Array.isArray(part) && part.length === 0),
+  );
 
 export class ProbePanel {
   private readonly folder: GUI;
@@ -33,6 +41,7 @@ export class ProbePanel {
   private readonly values = make("dl", "probe-values");
   private readonly picker = make("select");
   private readonly plot = makeSvg("svg", { class: "course", role: "img" });
+  private readonly maximum = make("p", "probe-words"); // the one that was gone to
   private series: Series | null = null;
   private position: Position | null = null; // that was read last
   private from: Position | null = null;
@@ -51,6 +60,8 @@ export class ProbePanel {
     axisNames.forEach((_, axis) => this.addAxis(axis));
     this.message.setAttribute("role", "status");
     this.way.setAttribute("role", "status");
+    this.maximum.setAttribute("role", "status");
+    this.maximum.hidden = true;
     this.box.append(this.message, this.way, this.values);
     this.addWay();
     this.addMaximum();
@@ -86,6 +97,7 @@ export class ProbePanel {
   moveTo(sample: Sample): void {
     if (sample.every((index, axis) => index === this.sample[axis])) return;
     this.sample = sample;
+    this.maximum.hidden = true;
     this.series = null;
     this.showPlace();
     this.refresh();
@@ -154,7 +166,8 @@ export class ProbePanel {
     this.box.append(checkLabel(level, "in the probe's level", why));
   }
 
-  // Moves the probe to the sample with the greatest value of a field at this step.
+  // Moves the probe to the sample with the greatest value of a field at this step, in the region of
+  // the view.
   private addMaximum(): void {
     const { fields } = this.kit.host.dataset();
     const drawn = this.kit.host.view().vector?.field;
@@ -170,17 +183,31 @@ export class ProbePanel {
     });
     const row = make("div", "histogram-row");
     row.append(field, button);
-    this.box.append(row);
+    this.box.append(row, this.maximum);
   }
 
   private async goToMaximum(field: string): Promise<void> {
     const { host } = this.kit;
     try {
+      const dataset = host.dataset();
+      const whole = host.explicitView();
+      const within = isPart(whole.region) ? " in the region" : "";
       const step = host.view().step ?? 0;
-      const { places } = await host.api.range(host.dataset().id, field, step);
+      const { range, places } =
+        within === ""
+          ? await host.api.range(dataset.id, field, step)
+          : await host.api.rangeIn({ ...whole, step }, dataset.id, field);
       const sample = places === undefined ? null : sampleOf(places.max);
-      if (sample === null) this.showMessage(`${field} has no value at this step`, true);
-      else this.moveTo(sample);
+      if (sample === null) {
+        this.showMessage(`${field} has no value${within} at this step`, true);
+        return;
+      }
+      this.moveTo(sample);
+      const units = dataset.fields.find(({ name }) => name === field)?.units ?? "";
+      this.maximum.textContent =
+        `greatest ${field}${within}: ${valueText(range![1], units)} ` +
+        `at ${positionText(dataset, places!.max)}`;
+      this.maximum.hidden = false;
     } catch (failure) {
       this.showMessage(failureText(failure), true);
     }

@@ -3,7 +3,7 @@ import type GUI from "lil-gui";
 import type { Controller } from "lil-gui";
 import { make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
-import { fieldOptions } from "./controls";
+import { fieldOptions, showsTheEarth } from "./controls";
 import { vectorsTitle } from "../view/words";
 import { unitText } from "../view/legend_entries";
 import { axisNames, axisUnit } from "../view/sample_position";
@@ -37,6 +37,32 @@ function addRanges(folder: GUI, kit: PanelKit): void {
         pointer: `/region/${axis}`,
         get: (view) => rangeOf(dataset, view, axis),
         set: (range) => ({ region: { [axis]: range } }),
+      },
+      unit,
+    );
+  }
+}
+
+// Degrees for columns that have longitudes and latitudes of their own.
+const degrees = [
+  ["longitudes", "longitude", [-180, 180], "°E"],
+  ["latitudes", "latitude", [-90, 90], "°N"],
+] as const;
+
+// Of axes that are longitude and latitude themselves they would say the same again.
+export const offersDegrees = (dataset: Dataset): boolean =>
+  showsTheEarth(dataset) && dataset.axes.x.kind !== "longitude";
+
+function addDegrees(folder: GUI, kit: PanelKit): void {
+  if (!offersDegrees(kit.host.dataset())) return;
+  for (const [key, label, whole, unit] of degrees) {
+    kit.range(
+      folder,
+      label,
+      {
+        pointer: `/region/${key}`,
+        get: (view) => view.region?.[key] ?? [...whole],
+        set: (range) => ({ region: { [key]: range } }),
       },
       unit,
     );
@@ -131,6 +157,7 @@ function addPolygon(folder: GUI, kit: PanelKit): void {
 
 export function addRegion(parent: GUI, kit: PanelKit): void {
   const folder = kit.folder(parent, "Region");
+  addDegrees(folder, kit);
   addRanges(folder, kit);
   addFilter(folder, kit);
   addPolygon(folder, kit);

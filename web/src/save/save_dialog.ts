@@ -35,8 +35,8 @@ function fill(host: SaveHost, dialog: HTMLElement): void {
   if (dialog.dataset.of === filled) return;
   dialog.dataset.of = filled;
   const last = steps.count - 1;
-  for (const end of ["from", "to"]) input(end).max = String(last);
-  const first = { from: 0, to: last, every: 1, frames: 48, fps: last < 1 ? 12 : 5 };
+  for (const end of ["from", "to"]) input(end).max = String(steps.count);
+  const first = { from: 1, to: steps.count, every: 1, frames: 48, fps: last < 1 ? 12 : 5 };
   for (const [name, value] of Object.entries(first)) input(name).value = String(value);
   select("over").value = last < 1 ? "turn" : "steps";
 }
@@ -59,7 +59,7 @@ const dotsPerInchChosen = (): number => number("dpi");
 
 function animationChosen(): Animation {
   const over = select("over").value as AnimationKind;
-  const [from, to, every] = [number("from"), number("to"), number("every")];
+  const [from, to, every] = [number("from") - 1, number("to") - 1, number("every")];
   return { over, from, to, every, frames: number("frames"), fps: number("fps") };
 }
 

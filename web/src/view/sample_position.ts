@@ -1,5 +1,5 @@
 // World positions of samples in a view, and the sample nearest to a position. Pure.
-import type { Probe, Value } from "../wire/api";
+import type { Position, Probe, Value } from "../wire/api";
 import type { Vec3 } from "../base/vec3";
 import { unitText } from "./legend_entries";
 import type { Dataset, View } from "../wire/protocol";
@@ -95,6 +95,12 @@ export function coordinateText(
   if (called !== undefined) return `${called} ${text}`;
   return unit.startsWith("°") ? text : `${name} ${text}`;
 }
+
+// A position in the coordinates and units of an answer.
+export const positionText = (dataset: Dataset, position: Position): string =>
+  axisNames
+    .map((axis, n) => coordinateText(dataset, n, position[axis], undefined, position.units[axis]))
+    .join(", ");
 
 // Where a probe was read, if other coordinates than those of the axes tell: longitude and latitude
 // of a column, and the height of the sample where a field of heights places it.

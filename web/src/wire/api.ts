@@ -132,6 +132,12 @@ export class Api {
     return this.get<FieldRange>(path, (a) => a.range === null || isRange(a.range));
   }
 
+  // The range at the step and in the region of a view.
+  async rangeIn(view: View, id: string, field: string): Promise<FieldRange> {
+    const looksRight = (a: Record<string, unknown>) => a.range === null || isRange(a.range);
+    return this.get<FieldRange>(`${this.field(id, field)}/range`, looksRight, posted(view));
+  }
+
   // of: indices of the sample. With heights its position has the height of the sample there.
   async probe(
     id: string,

@@ -2,7 +2,9 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { earthRadiusKm, greatCircleKm, initialBearing, wayText } from "../../src/view/distance";
+import { offersDegrees } from "../../src/panels/panel_region";
 import { polygonFrom, positionsMax } from "../../src/view/geo_polygon";
+import type { Dataset } from "../../src/wire/protocol";
 import { described } from "../page";
 
 const near = (value: number | null, wanted: number, slack = 1e-9): void =>
@@ -121,4 +123,13 @@ test("files without polygons, or with too many positions, are refused with the r
   const ring = Array.from({ length: positionsMax + 1 }, (_, n) => [n, 0]);
   const large = JSON.stringify({ type: "Polygon", coordinates: [ring] });
   assert.throws(() => polygonFrom(large), new RegExp(`${positionsMax + 1} positions`));
+});
+
+test("a region in degrees is offered where the axes are not, but the columns are", () => {
+  const earth = described("gcm");
+  const on = (kind: "longitude" | "cartesian", mappings: Dataset["mappings"]) =>
+    offersDegrees({ ...earth, mappings, axes: { ...earth.axes, x: { ...earth.axes.x, kind } } });
+  assert.equal(on("cartesian", ["flat", "sphere"]), true);
+  assert.equal(on("longitude", ["flat", "sphere"]), false);
+  assert.equal(on("cartesian", ["flat"]), false);
 });
