@@ -13,6 +13,7 @@ const parts: Readonly<Record<string, string>> = {
   vector: "Lines",
   scalars: "Volumes",
   depthCue: "Depth cue",
+  difference: "Difference",
   method: "Method",
   quality: "Quality",
   annotations: "Annotations",
