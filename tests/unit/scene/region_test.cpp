@@ -164,21 +164,6 @@ TEST(Region, ARangeThatMissesTheDataNamesTheirCoordinates) {
   EXPECT_EQ(pointer_of(view), "/region/y") << "between two samples";
 }
 
-// Users typed degrees for axes in metres.
-TEST(Region, RangesBeyondTheAxesOfAMapNameTheKeysInDegrees) {
-  const auto message = [](const data::Grid& grid, const char* key) {
-    RegionView region;
-    if (*key == 'x') region.x = {500, 600};
-    if (*key == 'z') region.z = {5e6, 6e6};
-    return crop_of(region, grid, 0).error().message;
-  };
-  data::Grid grid = turned_grid();
-  EXPECT_THAT(message(grid, "x"), HasSubstr("; /region/longitudes and /region/latitudes"));
-  EXPECT_THAT(message(grid, "z"), testing::Not(HasSubstr("/region/longitudes")));
-  grid.columns.reset();
-  EXPECT_THAT(message(grid, "x"), testing::Not(HasSubstr("/region/longitudes")));
-}
-
 TEST(Region, LongitudesAtBothEndsOfPartOfTheGlobeAreRefused) {
   data::Grid grid = whole_earth();
   grid.axes[0].coordinates = evenly(-150, 10, 31);
@@ -324,6 +309,21 @@ TEST(Region, PlacesOfACurvedPartAreThoseOfTheWhole) {
     }
   }
   EXPECT_LT(part.lattice.box_max.x - part.lattice.box_min.x, 1.2);
+}
+
+// Users typed degrees for axes in metres.
+TEST(Region, RangesBeyondTheAxesOfAMapNameTheKeysInDegrees) {
+  const auto message = [](const data::Grid& grid, const char* key) {
+    RegionView region;
+    if (*key == 'x') region.x = {500, 600};
+    if (*key == 'z') region.z = {5e6, 6e6};
+    return crop_of(region, grid, 0).error().message;
+  };
+  data::Grid grid = turned_grid();
+  EXPECT_THAT(message(grid, "x"), HasSubstr("; /region/longitudes and /region/latitudes"));
+  EXPECT_THAT(message(grid, "z"), testing::Not(HasSubstr("/region/longitudes")));
+  grid.columns.reset();
+  EXPECT_THAT(message(grid, "x"), testing::Not(HasSubstr("/region/longitudes")));
 }
 
 TEST(Region, GeographicKeysNeedLongitudesAndLatitudes) {
