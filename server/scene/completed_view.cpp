@@ -238,6 +238,9 @@ Result<Range> default_color_range(const View& view, const Placed& placed,
   return Range{0, 1};
 }
 
+// Between closer points single precision, of which values and slopes are, does not suffice.
+constexpr double extinction_gap_min = 1e-30;
+
 Result<void> check_extinction(const protocol::ScalarView& scalar, const std::string& pointer) {
   if (!scalar.extinction) return {};
   for (std::size_t n = 0; n < scalar.extinction->size(); ++n) {
@@ -248,6 +251,12 @@ Result<void> check_extinction(const protocol::ScalarView& scalar, const std::str
     }
     if (n > 0 && point[0] < (*scalar.extinction)[n - 1][0]) {
       return invalid_at(at, "its value is less than the previous one");
+    }
+    const double gap = n > 0 ? point[0] - (*scalar.extinction)[n - 1][0] : 0;
+    if (gap > 0 && gap < extinction_gap_min) {
+      return invalid_at(at,
+                        "its value is less than 1e-30 above the previous one: two equal values "
+                        "form a step");
     }
   }
   return {};

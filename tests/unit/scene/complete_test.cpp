@@ -333,6 +333,11 @@ TEST(CompleteView, RefusesByPointer) {
          v.scalars = {scalar("cloud")};
          (*v.scalars)[0].extinction = {{1, 0}, {0, 2}};
        }},
+      {"/scalars/0/extinction/2",
+       [&](View& v) {
+         v.scalars = {scalar("cloud")};
+         (*v.scalars)[0].extinction = {{0, 0}, {0, 1}, {9e-31, 2}};
+       }},
   };
   for (const auto& [pointer, spoil] : cases) {
     View view;
