@@ -3,15 +3,21 @@
 #include <algorithm>
 #include <cstddef>
 #include <glm/geometric.hpp>
+#include <utility>
 
 namespace windsplat::light {
 
-GroundLight::GroundLight(const scene::Scene& scene)
+GroundLight::GroundLight(const scene::Scene& scene,
+                         std::shared_ptr<const scene::SampleFactors> ground)
     : light_(*scene.light), globe_(scene.lattice.inner_radius > 0) {
   if (scene.lattice.places) {
     light_.sunlight.reset();
   } else {
     positions_ = scene.lattice.positions;
+    if (ground) {
+      light_.sunlight = std::move(ground);
+      positions_[2] = {scene.lattice.box_min.z};
+    }
   }
 }
 
@@ -49,9 +55,9 @@ double GroundLight::factor(const glm::dvec3& place) const {
   return light_.ambient + (1 - light_.ambient) * std::min(sun, 1.0);
 }
 
-void light_ground(scene::Scene& scene) {
+void light_ground(scene::Scene& scene, std::shared_ptr<const scene::SampleFactors> ground) {
   if (!scene.body || !scene.light) return;
-  scene.body->light = std::make_shared<const GroundLight>(scene);
+  scene.body->light = std::make_shared<const GroundLight>(scene, std::move(ground));
 }
 
 }  // namespace windsplat::light

@@ -9,6 +9,8 @@
 
 #include "protocol/utc_time.hpp"
 #include "server/light/curved.hpp"
+#include "server/light/ground_light.hpp"
+#include "server/light/ground_rays.hpp"
 #include "server/light/relief.hpp"
 #include "server/light/sun.hpp"
 #include "server/light/sunlight.hpp"
@@ -42,7 +44,7 @@ Result<Sun> sun_of(const LightView& view, bool globe) {
     }
     direction = sun_direction(*days, view.sun_at->longitude, view.sun_at->latitude);
   }
-  return Sun{sun_vector(direction), globe || direction.elevation > 0};
+  return Sun{sun_vector(direction), globe || direction.elevation >= 0};
 }
 
 // All bytes of the numbers, which clients choose: two views with the same digest could be found.
@@ -127,10 +129,10 @@ Result<Factors> kept_factors(data::Dataset& dataset, const std::string& key, std
   return typed(std::move(*kept));
 }
 
-Result<void> add_sunlight(const protocol::View& view, const std::vector<std::string>& media,
-                          data::Dataset& dataset, Scene& scene) {
-  const glm::dvec3& sun = scene.light->sun;
-  std::string key = key_of("sunlight", view, scene, sun);
+// Identifies what the transmittance of the media depends on.
+std::string media_key(const char* what, const protocol::View& view,
+                      const std::vector<std::string>& media, const Scene& scene) {
+  std::string key = key_of(what, view, scene, scene.light->sun);
   append(scene.light->shadows, key);
   for (std::size_t n = 0; n < scene.scalars.size(); ++n) {
     const scene::ScalarLayer& layer = scene.scalars[n];
@@ -142,6 +144,13 @@ Result<void> add_sunlight(const protocol::View& view, const std::vector<std::str
       append(extinction, key);
     }
   }
+  return key;
+}
+
+Result<void> add_sunlight(const protocol::View& view, const std::vector<std::string>& media,
+                          data::Dataset& dataset, Scene& scene) {
+  const glm::dvec3& sun = scene.light->sun;
+  const std::string key = media_key("sunlight", view, media, scene);
   const std::size_t samples = scene.scalars.front().field->samples();
   const bool curved = scene.lattice.places != nullptr;
   const std::uint64_t working =
@@ -156,6 +165,22 @@ Result<void> add_sunlight(const protocol::View& view, const std::vector<std::str
   if (!factors) return factors.error();
   scene.light->sunlight = std::move(*factors);
   return {};
+}
+
+// Of level ground below a rectilinear lattice; null: of another body, or none.
+Result<Factors> ground_factors(const protocol::View& view, const std::vector<std::string>& media,
+                               data::Dataset& dataset, const Scene& scene) {
+  const scene::Lattice& lattice = scene.lattice;
+  const bool level = scene.body && scene.body->shape == scene::BodyShape::ground;
+  if (!level || lattice.places) return Factors();
+  const std::size_t columns = lattice.positions[0].size() * lattice.positions[1].size();
+  const std::size_t samples = columns * lattice.positions[2].size();
+  return kept_factors(dataset, media_key("ground", view, media, scene), columns,
+                      samples * sizeof(float), [&scene, &lattice] {
+                        return ground_sunlight(
+                            lattice, extinctions(lattice, scene.scalars, scene.light->shadows),
+                            scene.light->sun);
+                      });
 }
 
 Result<void> add_relief(const protocol::View& view, const std::string& medium,
@@ -188,14 +213,22 @@ Result<void> light_scene(const protocol::View& view, const std::vector<std::stri
     for (scene::ScalarLayer& layer : scene.scalars) {
       if (layer.shading == scene::Shading::gradient) layer.shading = scene::Shading::scatter;
     }
+    light_ground(scene);
     return {};
   }
-  if (scene.scalars.empty()) return {};
+  if (scene.scalars.empty()) {
+    light_ground(scene);
+    return {};
+  }
   for (std::size_t n = 0; n < scene.scalars.size(); ++n) {
     if (scene.scalars[n].shading != scene::Shading::gradient) continue;
     if (auto ok = add_relief(view, media[n], dataset, scene, scene.scalars[n]); !ok) return ok;
   }
-  return add_sunlight(view, media, dataset, scene);
+  if (auto ok = add_sunlight(view, media, dataset, scene); !ok) return ok;
+  auto ground = ground_factors(view, media, dataset, scene);
+  if (!ground) return ground.error();
+  light_ground(scene, std::move(*ground));
+  return {};
 }
 
 }  // namespace windsplat::light

@@ -7,7 +7,6 @@
 #include <set>
 #include <utility>
 
-#include "server/light/ground_light.hpp"
 #include "server/light/lit_scene.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
@@ -444,15 +443,14 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   scene.level = level_of(completed, dataset);
   auto needed = needed_scene(completed, scene.level, dataset);
   if (!needed) return needed.error();
+  auto body = make_body(view, scene.camera, *completed.placed(), dataset);
+  if (!body) return body.error();
+  scene.body = std::move(*body);
   auto built = with_data(std::move(scene), std::move(*needed), completed, dataset);
   if (!built) return built;
-  auto body = make_body(view, built->camera, *completed.placed(), dataset);
-  if (!body) return body.error();
-  built->body = std::move(*body);
   auto surfaces = make_surfaces(completed, dataset);
   if (!surfaces) return surfaces.error();
   built->surfaces = std::move(*surfaces);
-  light::light_ground(*built);
   return built;
 }
 

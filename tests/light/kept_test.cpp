@@ -1,10 +1,13 @@
 // The light of views: what a dataset keeps of it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
+#include <glm/vec3.hpp>
 #include <memory>
 
 #include "server/data/samples/samples.hpp"
+#include "server/light/ground_light.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::test {
@@ -83,6 +86,39 @@ TEST_F(LightOfAView, BelowTheHorizonIsAmbientAndNeedsNoVolume) {
   const auto scene = built();
   EXPECT_EQ(scene.light->strength, 0);
   EXPECT_EQ(scene.light->sunlight, nullptr);
+}
+
+TEST_F(LightOfAView, AtTheHorizonIsThatOfTheLimit) {
+  view.light->elevation = 0;
+  const auto level = built();
+  view.light->elevation = 1e-6;
+  const auto above = built();
+  EXPECT_GT(level.light->strength, 0);
+  ASSERT_NE(level.light->sunlight, nullptr);
+  ASSERT_NE(above.light->sunlight, nullptr);
+  for (std::size_t n = 0; n < level.light->sunlight->size(); ++n) {
+    ASSERT_NEAR((*level.light->sunlight)[n], (*above.light->sunlight)[n], 2);
+  }
+}
+
+// The light of the lowest samples is the mean above and below them.
+TEST_F(LightOfAView, OnTheGroundHasPassedTheLowestCellsWhole) {
+  view.light->elevation = 90;
+  view.light->ambient = 0;
+  view.light->shadows = 20;
+  view.ground.show = protocol::GroundShow::on;
+  const auto scene = built();
+  ASSERT_TRUE(scene.body && scene.body->light);
+  const auto& at = scene.lattice.positions;
+  double most = 0;
+  for (std::size_t n = 0; n < at[0].size() * at[1].size(); ++n) {
+    const glm::dvec3 place(at[0][n % at[0].size()], at[1][n / at[0].size()], scene.body->height);
+    const double sample = (*scene.light->sunlight)[n] / scene::full_factor;
+    const double ground = scene.body->light->factor(place) / scene.light->strength;
+    EXPECT_LE(ground, sample + 2e-5);
+    most = std::max(most, sample - ground);
+  }
+  EXPECT_GT(most, 0.01);
 }
 
 // Noon at the equator on the day of an equinox.

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
 
+#include "server/light/ground_rays.hpp"
 #include "tests/numerics/scenes.hpp"
 
 namespace windsplat::test {
@@ -72,6 +74,77 @@ double slab_error(int n, bool uneven, const glm::dvec3& sun, double sigma) {
   });
   EXPECT_GT(judged, n * n / 4);
   return most;
+}
+
+SampleFactors on_ground(const Lattice& lattice, const std::shared_ptr<const data::Volume>& field,
+                        const glm::dvec3& sun) {
+  return light::ground_sunlight(lattice, light::extinctions(lattice, {medium(field, {1, 1, 1})}),
+                                sun);
+}
+
+// The ray leaves the box through its top or a side; a single layer is no exception.
+TEST(Sunlight, OnTheGroundOfAHomogeneousBoxIsThatOfTheWholeWay) {
+  for (const int layers : {1, 2, 17}) {
+    for (const bool uneven : {false, true}) {
+      const double growth = uneven ? 4 : 1;
+      const Lattice lattice = make_lattice(
+          {stretched(20, 2, growth), stretched(12, 2, 1), stretched(layers, 1, growth)});
+      for (const double sigma : {0.1, 1.0, 100.0}) {
+        const auto field = uniform(lattice, static_cast<float>(sigma));
+        for (const glm::dvec3& towards :
+             {glm::dvec3(0, 0, 1), glm::dvec3(0.4, -0.2, 0.7), glm::dvec3(-2, 1, 0.05),
+              glm::dvec3(1, 0.3, 1e-7), glm::dvec3(1, 0.3, 0)}) {
+          const glm::dvec3 sun = glm::normalize(towards);
+          const SampleFactors factors = on_ground(lattice, field, sun);
+          ASSERT_EQ(factors.size(), 20U * 12);
+          for (std::size_t n = 0; n < factors.size(); ++n) {
+            const std::array<double, 2> from{lattice.positions[0][n % 20],
+                                             lattice.positions[1][n / 20]};
+            double way = sun.z > 0 ? 1 / sun.z : 1e30;
+            for (int a = 0; a < 2; ++a) {
+              if (sun[a] == 0) continue;
+              const double face = sun[a] > 0 ? lattice.box_max[a] : lattice.box_min[a];
+              way = std::min(way, (face - from.at(static_cast<std::size_t>(a))) / sun[a]);
+            }
+            ASSERT_NEAR(factor(factors, n), std::exp(-sigma * way), 2e-5)
+                << layers << ' ' << uneven << ' ' << sigma << ' ' << towards.z;
+          }
+        }
+      }
+    }
+  }
+}
+
+// A Gaussian cloud above the ground: its depth along the whole ray.
+TEST(Sunlight, OnTheGroundShadowsLieWhereTheirRaysMeetIt) {
+  constexpr double w = 0.15;
+  constexpr double peak = 4;
+  for (const glm::dvec3& towards : {glm::dvec3(0, 0, 1), glm::dvec3(0.5, 0.3, 0.8)}) {
+    const glm::dvec3 sun = glm::normalize(towards);
+    const auto error = [&](int n) {
+      const Lattice lattice =
+          make_lattice({stretched(n, 2, 1), stretched(n, 2, 1), stretched(n, 2, 3)});
+      const auto cloud = make_volume(lattice, 1, [&](int, double x, double y, double z) {
+        return static_cast<float>(peak * std::exp(-(x * x + y * y + z * z) / (2 * w * w)));
+      });
+      const SampleFactors factors = on_ground(lattice, cloud, sun);
+      double most = 0;
+      for (std::size_t m = 0; m < factors.size(); ++m) {
+        const auto count = static_cast<std::size_t>(n);
+        const glm::dvec3 place(lattice.positions[0][m % count], lattice.positions[1][m / count],
+                               lattice.box_min.z);
+        const double along = glm::dot(place, sun);
+        const double beside2 = glm::dot(place, place) - along * along;
+        const double depth = peak * std::exp(-beside2 / (2 * w * w)) * w * std::sqrt(2 * pi);
+        most = std::max(most, std::abs(factor(factors, m) - std::exp(-depth)));
+      }
+      return most;
+    };
+    const double coarse = error(20);
+    const double fine = error(40);
+    EXPECT_LT(fine, 0.02);
+    EXPECT_GT(coarse, 3 * (fine - 2e-5));
+  }
 }
 
 TEST(Sunlight, InASlabDecaysExponentiallyToSecondOrderInTheCells) {
