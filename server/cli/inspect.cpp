@@ -9,6 +9,7 @@
 #include "protocol/codec.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/data_hosts.hpp"
+#include "server/cli/greatest.hpp"
 #include "server/cli/inspect_text.hpp"
 #include "server/cli/open_store.hpp"
 #include "server/data/bytes/decode_limits.hpp"
@@ -129,6 +130,9 @@ Result<std::string> described(const InspectArguments& arguments, const std::stri
     auto ranged = scene::describe(**dataset, choice.ranges);
     if (ranged) {
       description = std::move(ranged);
+      const bool all = choice.ranges == scene::RangesOf::all_steps;
+      const auto lines = greatest_values(**dataset, all ? (*dataset)->info().steps.size() : 1);
+      description->notes.insert(description->notes.end(), lines.begin(), lines.end());
     } else {
       const Error error =
           (*dataset)->with_need(ranged.error(), {largest_field((*dataset)->info())});

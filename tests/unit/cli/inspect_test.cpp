@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -31,6 +32,35 @@ bool has_note(const json& dataset, const std::string& part) {
     if (note.get<std::string>().find(part) != std::string::npos) return true;
   }
   return false;
+}
+
+// "Jet core and its speed found": a user had to draw pictures for it.
+TEST(Inspect, TellsWhereFieldsAreGreatest) {
+  const json wind = described("climate:32x16x6");
+  EXPECT_TRUE(has_note(wind, "greatest wind: "));
+  double greatest = 0;
+  double longitude = 0;
+  int step = -1;
+  for (const auto& note : wind["notes"]) {
+    const auto text = note.get<std::string>();
+    if (std::sscanf(text.c_str(), "greatest wind: %lf m s-1 at lon %lf degrees_east", &greatest,
+                    &longitude) != 2) {
+      continue;
+    }
+    const std::size_t at = text.rfind("step ");
+    ASSERT_NE(at, std::string::npos) << text;
+    step = std::stoi(text.substr(at + 5));
+  }
+  double range = 0;
+  for (const auto& field : wind["fields"]) {
+    if (field["name"] == "wind") range = field["range"][1].get<double>();
+  }
+  EXPECT_NEAR(greatest, range, 1e-4 * range);
+  EXPECT_GE(longitude, -180);
+  EXPECT_LE(longitude, 180);
+  EXPECT_GE(step, 0);
+  EXPECT_LT(step, 8);
+  EXPECT_FALSE(has_note(described("climate:32x16x6", "none"), "greatest wind"));
 }
 
 // Eight steps of 64 x 64, in mostly empty chunks of the given number of steps.
