@@ -41,10 +41,16 @@ struct Entry {
   int quality;
 };
 
+// A sample by its name, a file by its path below the folder of scripts/fetch-test-data.
+std::string source_of(const std::string& dataset) {
+  const bool file = dataset.find('.') != std::string::npos;
+  return file ? (root() / "build" / "test-data" / dataset).string() : dataset;
+}
+
 // The list in the script: lines of the form "name dataset quality".
 std::vector<Entry> script_entries() {
   const std::string script = read_file((root() / "scripts" / "gallery").string());
-  const std::regex line(R"re(\n *"([a-z0-9-]+) ([a-z]+) ([0-9]+)")re");
+  const std::regex line(R"re(\n *"([a-z0-9-]+) ([^ "]+) ([0-9]+)")re");
   std::vector<Entry> entries;
   for (std::sregex_iterator at(script.begin(), script.end(), line), end; at != end; ++at) {
     entries.push_back({(*at)[1], (*at)[2], std::stoi((*at)[3])});
@@ -77,7 +83,7 @@ TEST(Gallery, EveryViewIsValidAndFillsItsPicture) {
     size << width << 'x' << height;
     const std::string output = folder.file(name + ".npy");
     const Outcome drawn =
-        run({"render", view["dataset"].get<std::string>(), "--view",
+        run({"render", source_of(view["dataset"].get<std::string>()), "--view",
              (gallery() / (name + ".json")).string(), "--size", size.str(), "-o", output});
     ASSERT_EQ(drawn.code, 0) << drawn.err;
     EXPECT_EQ(drawn.err, "");
@@ -116,7 +122,9 @@ TEST(Gallery, TextQuotesTheCommandsOfTheScript) {
   const std::string text = read_file((gallery() / "README.md").string());
   for (const Entry& entry : script_entries()) {
     std::ostringstream command;
-    command << "windsplat render " << entry.dataset << " --view docs/gallery/" << entry.name
+    const bool pattern = entry.dataset.find('{') != std::string::npos;
+    const std::string dataset = pattern ? "'" + entry.dataset + "'" : entry.dataset;
+    command << "windsplat render " << dataset << " --view docs/gallery/" << entry.name
             << ".json --quality " << entry.quality << " -o " << entry.name << ".jpg";
     EXPECT_THAT(text, HasSubstr(command.str()));
   }
