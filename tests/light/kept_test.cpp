@@ -69,7 +69,8 @@ TEST_F(LightOfAView, CountsTowardsTheMemoryOfTheDataset) {
   const std::uint64_t before = dataset->resident_bytes();
   view.light.emplace();
   built();
-  EXPECT_EQ(dataset->resident_bytes(), before + 2U * 40 * 24 * 10);
+  // Two bytes for each sample, and for each column on the ground.
+  EXPECT_EQ(dataset->resident_bytes(), before + 2U * 40 * 24 * 10 + 2U * 40 * 24);
 }
 
 TEST_F(LightOfAView, IsAbsentWithoutItAndInSlices) {

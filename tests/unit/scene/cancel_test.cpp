@@ -59,7 +59,9 @@ TEST(CancelledScene, KeepsNothingHalfDone) {
     if (!view.surfaces.empty()) {
       EXPECT_EQ(scene.surfaces[0].mesh->triangles, expected.surfaces[0].mesh->triangles);
     }
-    if (view.light) EXPECT_EQ(*scene.light->sunlight, *expected.light->sunlight);
+    if (view.light) {
+      EXPECT_EQ(*scene.light->sunlight, *expected.light->sunlight);
+    }
   }
 }
 
