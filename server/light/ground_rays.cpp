@@ -83,12 +83,13 @@ double depth_of_ray(const scene::Lattice& lattice, const std::vector<float>& ext
   for (std::size_t k = 0; k < lattice.spacing[2].size() && low < top && sum < opaque_depth; ++k) {
     const double face = low + lattice.spacing[2][k];
     const double high = std::min(face, top);
-    const double pieces = std::max(1.0, std::ceil(steep * (high - low)));
-    const double piece = (high - low) / pieces;
+    const auto pieces = static_cast<std::int64_t>(std::max(1.0, std::ceil(steep * (high - low))));
+    const double piece = (high - low) / static_cast<double>(pieces);
     const GroundLayer values{extinctions.data() + k * layer, row};
-    for (double n = 0; n < pieces; ++n) {
-      x.go_to(low + (n + 0.5) * piece);
-      y.go_to(low + (n + 0.5) * piece);
+    for (std::int64_t n = 0; n < pieces; ++n) {
+      const double middle = low + (static_cast<double>(n) + 0.5) * piece;
+      x.go_to(middle);
+      y.go_to(middle);
       sum += values.at(x, y) * piece * way;
     }
     low = face;
