@@ -1,6 +1,7 @@
 #include "protocol/view/codec_difference.hpp"
 
 #include "protocol/limits.hpp"
+#include "protocol/view/codec_planes.hpp"
 
 namespace windsplat::protocol {
 
