@@ -61,6 +61,7 @@ Level read_level(Reader& from, int rows, double tolerance) {
     }
     if (coast) coasts = segments.size();
   }
+  segments.shrink_to_fit();
   return {std::move(segments), coasts, rows, tolerance};
 }
 

@@ -77,9 +77,9 @@ Result<std::shared_ptr<const Volume>> Dataset::difference(const std::string& fie
   Dataset other = whole;
   other.state_ = minus_;
   // Both are referenced, so that neither is evicted before the result is computed from them.
-  const auto from = whole.volume(field, step);
+  auto from = whole.volume(field, step);
   if (!from) return from;
-  const auto minus = other.volume(field, minus_step_.value_or(step));
+  auto minus = other.volume(field, minus_step_.value_or(step));
   if (!minus) return minus;
   const auto made = get(key, (*from)->bytes(), [&] {
     return guarded(state_->info.fields[index],
