@@ -68,7 +68,7 @@ windsplat_smoke(picture bench_picture --benchmark_filter=640x480 --benchmark_min
 file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"height\":24}}\n")
 windsplat_smoke(path bench_path tornado bench_views.jsonl bench_view.png)
 windsplat_smoke(memory python3 ${bench_dir}/memory.py --program=$<TARGET_FILE:windsplat>
-  --frames=4 --sessions=2 --max-mb=100)
+  --frames=4 --sessions=2 --max-mb=115)
 windsplat_smoke(load bench_load --program=$<TARGET_FILE:windsplat> --dims=32x16x8 --rounds=1)
 windsplat_smoke(playback python3 ${bench_dir}/playback.py --program=$<TARGET_FILE:windsplat>
   --dims=32x16x8 --steps=6 --size=64x48 --memory-limit=512M)

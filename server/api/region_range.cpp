@@ -76,8 +76,10 @@ void post_range(tasks::Backend& backend, const std::string& id, const std::strin
   asked.view.dataset = id;
   asked.view.quality = {};
   if (const auto drawable = backend.check(asked.view); !drawable) return refuse(drawable.error());
-  run_later(backend.loads, request, std::move(reply), "a range", found->get(),
-            [&backend, asked = std::move(asked), dataset = *found, cancel = request.cancel] {
+  const auto shown = tasks::find_shown(backend.catalogue, asked.view);
+  if (!shown) return refuse(shown.error());
+  run_later(backend.loads, request, std::move(reply), "a range", shown->get(),
+            [&backend, asked = std::move(asked), dataset = *shown, cancel = request.cancel] {
               const auto range = backend.catalogue.load(
                   *dataset, [&](data::Dataset& loading) { return range_of(asked, loading); },
                   cancel);

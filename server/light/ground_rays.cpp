@@ -15,7 +15,8 @@ namespace windsplat::light {
 namespace {
 
 constexpr double lowest_sun = 1e-9;  // its z: a ray along the ground passes all of the lowest layer
-constexpr double opaque_depth = 20;  // optical depth, beyond which factors are 0
+constexpr double pieces_most = 4096;  // in a layer
+constexpr double opaque_depth = 20;   // optical depth, beyond which factors are 0
 
 // A ray along a horizontal axis.
 struct RayAlong {
@@ -83,7 +84,8 @@ double depth_of_ray(const scene::Lattice& lattice, const std::vector<float>& ext
   for (std::size_t k = 0; k < lattice.spacing[2].size() && low < top && sum < opaque_depth; ++k) {
     const double face = low + lattice.spacing[2][k];
     const double high = std::min(face, top);
-    const auto pieces = static_cast<std::int64_t>(std::max(1.0, std::ceil(steep * (high - low))));
+    const auto pieces =
+        static_cast<std::int64_t>(std::clamp(std::ceil(steep * (high - low)), 1.0, pieces_most));
     const double piece = (high - low) / static_cast<double>(pieces);
     const GroundLayer values{extinctions.data() + k * layer, row};
     for (std::int64_t n = 0; n < pieces; ++n) {
@@ -100,7 +102,8 @@ double depth_of_ray(const scene::Lattice& lattice, const std::vector<float>& ext
 }  // namespace
 
 scene::SampleFactors ground_sunlight(const scene::Lattice& lattice,
-                                     const std::vector<float>& extinctions, const glm::dvec3& sun) {
+                                     const std::vector<float>& extinctions, const glm::dvec3& sun,
+                                     const CancelToken& cancel) {
   WINDSPLAT_CHECK(lattice.places == nullptr);
   const double up = std::max(sun.z, lowest_sun);
   const RayAlong x_axis = ray_along(lattice, 0, sun.x / up);
@@ -114,6 +117,7 @@ scene::SampleFactors ground_sunlight(const scene::Lattice& lattice,
     RayAlong x = x_axis;
     RayAlong y = y_axis;
     y.from = ys[j];
+    if (cancel.cancelled()) return;
     for (std::size_t i = 0; i < xs.size(); ++i) {
       x.from = xs[i];
       const double depth = depth_of_ray(lattice, extinctions, 1 / up, x, y);

@@ -175,11 +175,13 @@ Result<Factors> ground_factors(const protocol::View& view, const std::vector<std
   if (!level || lattice.places) return Factors();
   const std::size_t columns = lattice.positions[0].size() * lattice.positions[1].size();
   const std::size_t samples = columns * lattice.positions[2].size();
+  const CancelToken cancel = dataset.cancellation();
   return kept_factors(dataset, media_key("ground", view, media, scene), columns,
-                      samples * sizeof(float), [&scene, &lattice] {
+                      samples * sizeof(float), [&scene, &lattice, &cancel] {
                         return ground_sunlight(
-                            lattice, extinctions(lattice, scene.scalars, scene.light->shadows),
-                            scene.light->sun);
+                            lattice,
+                            extinctions(lattice, scene.scalars, scene.light->shadows, cancel),
+                            scene.light->sun, cancel);
                       });
 }
 

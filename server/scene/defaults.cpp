@@ -12,6 +12,7 @@
 
 #include "server/scene/camera.hpp"
 #include "server/scene/lattice.hpp"
+#include "server/scene/surfaces/make_surfaces.hpp"
 
 namespace windsplat::scene {
 

@@ -67,7 +67,7 @@ terrain::View view_of(const Camera& camera, const Body& body) {
 }  // namespace
 
 void add_terrain(const Camera& camera, const Body& body, BodyPixels& pixels) {
-  if (body.kept != nullptr && body.kept->find_surface(pixels)) return;
+  if (body.kept != nullptr && body.kept->find_surface(body.paint != nullptr, pixels)) return;
   std::array<terrain::PixelSurface, block_pixels> seen;
   static_assert(block_side <= terrain::side_max);
   terrain::look(*body.terrain, view_of(camera, body),

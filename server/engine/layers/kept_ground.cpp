@@ -53,12 +53,17 @@ bool KeptGround::has_room(std::vector<T>& in) {
   return true;
 }
 
-bool KeptGround::find_surface(BodyPixels& pixels) const {
+bool KeptGround::find_surface(bool painted, BodyPixels& pixels) const {
   const Place at = place_of(pixels);
   const Tile& tile = tiles_[at.tile];
   const std::uint32_t kept = tile.surface_at[at.block];
   if (kept == 0) return false;
   const Surface& from = tile.surfaces[kept - 1];
+  const auto is_seen = [](double coverage) { return coverage > 0; };
+  if (painted && tile.color_at[at.block] == 0 &&
+      std::any_of(from.coverage.begin(), from.coverage.end(), is_seen)) {
+    return false;
+  }
   std::copy(from.depth.begin(), from.depth.end(), pixels.depth);
   std::copy(from.coverage.begin(), from.coverage.end(), pixels.coverage);
   std::copy(from.cosine.begin(), from.cosine.end(), pixels.cosine);
@@ -69,7 +74,7 @@ bool KeptGround::find_surface(BodyPixels& pixels) const {
 void KeptGround::keep_surface(const BodyPixels& pixels) {
   const Place at = place_of(pixels);
   Tile& tile = tiles_[at.tile];
-  if (!has_room(tile.surfaces)) return;
+  if (tile.surface_at[at.block] != 0 || !has_room(tile.surfaces)) return;
   Surface& to = tile.surfaces.emplace_back();
   for (std::size_t l = 0; l < block_pixels; ++l) {
     to.depth[l] = pixels.depth[l];

@@ -21,8 +21,9 @@ class KeptGround {
   // Forgets all blocks and keeps storage. bytes_max: of blocks beyond it none are kept.
   void begin(int width, int height, int tile_pixels, std::size_t bytes_max);
 
-  // What add_terrain() sets, except normals, which only paint_body() uses. False: not kept.
-  bool find_surface(kernels::BodyPixels& pixels) const;
+  // What add_terrain() sets, except normals, which only paint_body() uses. False: not kept, or the
+  // body is painted and the colours of the block are not kept, so that they need the normals.
+  bool find_surface(bool painted, kernels::BodyPixels& pixels) const;
   void keep_surface(const kernels::BodyPixels& pixels);
   // What paint_body() sets.
   bool find_colors(const kernels::BodyPixels& pixels, float rgb[3][kernels::block_pixels]) const;
