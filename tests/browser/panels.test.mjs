@@ -227,7 +227,7 @@ test("the sun stands at a time and place, or in a direction", () =>
 test("the legend shows surfaces, and the range of their colours can be set", () =>
   withPage(async (page) => {
     await unfold(page, "Surfaces");
-    await page.locator("#panel button", { hasText: /^Add a section$/ }).click();
+    await page.locator("#panel button", { hasText: /^Add a level section$/ }).click();
     const card = page.locator(".legend-surface");
     await card.locator(".legend-note", { hasText: /^on a section$/ }).waitFor();
     await finalPicture(page);
@@ -269,7 +269,7 @@ test("undo takes back changes in every folder, one after another", () =>
         () => type(page, "length", 0.08),
         () => type(page, "min optical depth", 0.01),
         () => button("Add an isosurface").click(),
-        () => button("Add a section").click(),
+        () => button("Add a level section").click(),
         () => type(page, "vertical exaggeration", 3),
         () => choose(page, "show", /^always$/),
         () => control(page, "graticule", "input").check(),
