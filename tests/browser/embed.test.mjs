@@ -70,11 +70,20 @@ test("drag, wheel and keys move the embedded view; keys of the whole page do not
       await page.keyboard.press("ArrowLeft");
       await finalPicture(page);
       assert.notEqual((await state(page)).azimuth, zoomed.azimuth);
-      for (const key of ["d", "s", "a", "?", "p", "i", "\\"]) await page.keyboard.press(key);
+      for (const key of ["c", "d", "s", "a", "?", "p", "i", "\\"]) await page.keyboard.press(key);
       assert.equal(await page.locator("dialog[open]").count(), 0);
       assert.deepEqual(await pictureBox(page), { x: 0, y: 0, ...size });
     },
     { path: `?embed${hash}` },
+  ));
+
+test("a second picture in the address is left out of the embedded view", () =>
+  withPage(
+    async (page) => {
+      assert.deepEqual(await pictureBox(page), { x: 0, y: 0, ...size });
+      assert.equal(await page.locator("#beside").isVisible(), false);
+    },
+    { path: `?embed${hash}&beside=${encodeURIComponent('{"step":0}')}` },
   ));
 
 // A site on localhost, which is another site than 127.0.0.1, with a frame of this address.

@@ -9,7 +9,7 @@ import type { Binding } from "./keyboard";
 export const isEmbedded = (search: string): boolean => new URLSearchParams(search).has("embed");
 
 // Keys that open parts of the page which the embedded view lacks.
-const wholePageKeys = new Set(["i", "r", "Escape", "\\", "e", "a", "d", "p", "s", "?"]);
+const wholePageKeys = new Set(["i", "r", "Escape", "\\", "e", "a", "d", "c", "p", "s", "?"]);
 
 export const embeddedKeys = (bindings: Binding[]): Binding[] =>
   bindings.filter(({ keys }) => !keys.some((key) => wholePageKeys.has(key)));

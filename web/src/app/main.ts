@@ -1,4 +1,5 @@
 // Assembles the page (parts, key bindings, buttons) and starts the application.
+import { takeBeside } from "../view/beside";
 import { drag, pan, roll, zoom, type Angles } from "../view/camera";
 import { pictureCaption } from "../view/caption";
 import { About } from "./about";
@@ -330,7 +331,8 @@ window.addEventListener("beforeprint", () => {
 app.start({
   viewport,
   hud,
-  beside,
+  // The embedded view has one picture; a second one in its address is left out.
+  beside: embedded ? { follow: () => {}, suffix: "", take: (hash) => takeBeside(hash)[0] } : beside,
   legend: new Legend(byId("legend", HTMLElement), app.maps),
   gizmo: new Gizmo(byId("gizmo", HTMLElement), lookFrom),
   probe,

@@ -12,7 +12,7 @@ test("the embedded view is asked for by a parameter of the address", () => {
 });
 
 test("keys of the camera and of time stay, those that open other parts go", () => {
-  const keys = [["ArrowLeft"], ["+", "="], [" "], ["Mod+z"], ["s"], ["d"], ["?"], ["p"]];
+  const keys = [["ArrowLeft"], ["+", "="], [" "], ["Mod+z"], ["s"], ["d"], ["c"], ["?"], ["p"]];
   const bindings = keys.map((names) => ({ keys: names, shown: "", does: "", run: () => {} }));
   const kept = embeddedKeys(bindings).map((binding) => binding.keys[0]);
   assert.deepEqual(kept, ["ArrowLeft", "+", " ", "Mod+z"]);
