@@ -54,7 +54,7 @@ async function bothFinal(page) {
 }
 
 const compare = async (page) => {
-  await page.locator("#compare-button").click();
+  await page.locator("#picture").press("c"); // narrow pages have no button
   await bothFinal(page);
 };
 
@@ -208,6 +208,23 @@ for (const [name, viewport] of [
       { viewport },
     ));
 }
+
+test("printing shows the first picture alone, and draws none of another size", () =>
+  withPage(async (page) => {
+    await compare(page);
+    const [first, second] = await views(page);
+    await page.emulateMedia({ media: "print" });
+    await page.waitForTimeout(400);
+    assert.equal(await page.locator("#beside").isVisible(), false);
+    const { width } = await page.locator("#picture").boundingBox();
+    assert.ok(width > 700, `the width of the paper, not ${width}`);
+    await page.emulateMedia({ media: "screen" });
+    const after = await views(page);
+    assert.deepEqual(
+      after.map(({ image }) => image),
+      [first.image, second.image],
+    );
+  }));
 
 test("the panel subtracts another step, and the legend says so", () =>
   withPage(async (page) => {

@@ -1,12 +1,13 @@
 // The second picture beside the first: a session of its own whose view follows that of the first,
 // except for its dataset and step. What the user chooses in its bar -> its view -> its picture.
 import { anglesOf, distanceOf, type Camera } from "../view/camera";
-import { besideSuffix, besideView, takeBeside, type Beside } from "../view/beside";
+import { besideSuffix, besideView, swapped, takeBeside, type Beside } from "../view/beside";
 import { ViewState } from "../view/view_state";
-import { byId } from "../base/dom";
+import { afterResizing, byId } from "../base/dom";
 import { pictureCaption } from "../view/caption";
-import type { Clock, Connection } from "../wire/connection";
+import type { Clock, Connection, ConnectionState } from "../wire/connection";
 import type { Dataset, FrameHeader, ServerMessage, View } from "../wire/protocol";
+import { failureText } from "../wire/api";
 import { problemText } from "../wire/requests";
 import { Viewport } from "../viewport/viewport";
 import { PatchAnswers } from "./patch_answers";
@@ -14,6 +15,7 @@ import { openConnection, watchPresence } from "./server_link";
 
 export interface BesideHost {
   view(): View; // of the first picture, with all known values
+  explicitView(): View; // of the first picture, without defaults
   drawn(): boolean; // whether the first picture has been drawn
   dataset(): Dataset; // of the first picture
   others(): Map<string, string>; // datasets that may be shown beside it: id -> text
@@ -39,6 +41,7 @@ export class BesidePicture {
   private shows: Beside | null = null;
   private own: View | null = null; // settings that do not follow the first picture
   private running = false;
+  private choices = 0; // of datasets; answers to earlier ones are too late
   private caption = "";
   private sent = ""; // the view sent last, as text; a refused one is not sent again
 
@@ -52,10 +55,10 @@ export class BesidePicture {
       drawn: ({ header }) => this.onDrawn(header),
       broken: ({ seq }) => this.acknowledge(seq, 0),
       videoFailed: () => {}, // no video is asked for
-      resized: () => this.follow(),
+      resized: afterResizing(() => this.follow()),
     });
     this.connection = openConnection(baseUri, clock, {
-      state: ({ name }) => (this.section.dataset.connection = name),
+      state: (state) => this.onState(state),
       hello: ({ limits }) => {
         this.viewport.newSession(limits.imagePixelsMax);
         this.state = new ViewState();
@@ -121,16 +124,24 @@ export class BesidePicture {
     if (beside === null) {
       this.own = null;
       this.linked.checked = true;
+      this.choices += 1;
       this.running = false;
       this.connection.stop();
       this.words.textContent = "";
-      if (hadFocus) this.button.focus();
+      if (hadFocus) this.returnFocus();
     }
     this.follow();
     this.host.edited();
   }
 
+  // Narrow pages have no button.
+  private returnFocus(): void {
+    const main = byId("picture", HTMLCanvasElement);
+    (this.button.offsetParent === null ? main : this.button).focus();
+  }
+
   private choose(id: string): void {
+    const choice = ++this.choices;
     this.words.textContent = "";
     if (id === same) {
       this.show({ ...this.shows, dataset: undefined });
@@ -138,9 +149,14 @@ export class BesidePicture {
     }
     this.host.openOther(id).then(
       (dataset) => {
-        if (this.shows !== null) this.show({ ...this.shows, dataset });
+        if (this.shows !== null && choice === this.choices) this.show({ ...this.shows, dataset });
       },
-      (failure: unknown) => (this.words.textContent = String((failure as Error).message)),
+      (failure: unknown) => {
+        if (this.shows === null || choice !== this.choices) return;
+        this.words.textContent = failureText(failure);
+        this.words.classList.add("refused");
+        this.writeBar(); // the dataset that is still shown
+      },
     );
   }
 
@@ -153,18 +169,9 @@ export class BesidePicture {
   // The first picture shows what this one shows, and the other way round.
   private swap(): void {
     if (this.shows === null) return;
-    const { dataset = undefined, step = undefined } = this.shows;
-    const first = this.host.view();
-    const { image: _image, ...settings } = first;
-    this.show({
-      ...(dataset === undefined ? {} : { dataset: first.dataset }),
-      ...(step === undefined ? {} : { step: first.step ?? 0 }),
-    });
-    this.host.openView({
-      ...settings,
-      dataset: dataset ?? first.dataset,
-      step: step ?? first.step ?? 0,
-    });
+    const [view, beside] = swapped(this.host.explicitView(), this.shows);
+    this.show(beside);
+    this.host.openView(view);
   }
 
   // The first picture, or this one's place, has changed.
@@ -205,6 +212,13 @@ export class BesidePicture {
   }
 
   // --- the server ------------------------------------------------------------------------
+
+  private onState(state: ConnectionState): void {
+    this.section.dataset.connection = state.name;
+    if (state.name !== "waiting" && state.name !== "asleep" && state.name !== "locked") return;
+    this.words.textContent = state.name === "locked" ? "needs a login" : state.reason;
+    this.words.classList.add("refused");
+  }
 
   private onMessage(message: ServerMessage): void {
     if (message.type === "chosen") this.answers.onChosen(message);

@@ -10,7 +10,7 @@ import { DatasetList } from "./dataset_list";
 import { embeddedKeys, isEmbedded, openLink, takesWheel } from "./embed";
 import { entryOf, openEntry } from "./entries";
 import { EntryPicker } from "./entry_picker";
-import { byId, make } from "../base/dom";
+import { afterResizing, byId, make } from "../base/dom";
 import { toggleErrorMetric } from "../base/error_text";
 import { FileBrowser } from "./file_browser";
 import { Gizmo, looks } from "../viewport/gizmo";
@@ -63,7 +63,7 @@ const viewport = new Viewport(canvas, {
   drawn: (frame) => app.onDrawn(frame),
   broken: (header) => app.onBroken(header.seq),
   videoFailed: () => app.video.failed(),
-  resized: debouncedResize(),
+  resized: afterResizing(() => app.resize(...viewport.size())),
 });
 const timeBar = new TimeBar({
   seek: (step) => app.seek(step),
@@ -102,6 +102,7 @@ const beside = new BesidePicture(document.baseURI, clock, {
   view: () => app.view(),
   drawn: () => app.hasPicture(),
   dataset: () => app.dataset(),
+  explicitView: () => app.explicitView(),
   openView: (view) => app.openView(view),
   edited: () => app.saveAddress(),
 });
@@ -185,8 +186,11 @@ function isSettled({ state, rev, wanted }: DOMStringMap): boolean {
 }
 
 function togglePanel(): void {
+  const button = byId("panel-button", HTMLButtonElement);
+  const hadFocus = panelBox.contains(document.activeElement);
   const hidden = document.documentElement.classList.toggle("no-panel");
-  byId("panel-button", HTMLButtonElement).setAttribute("aria-expanded", String(!hidden));
+  button.setAttribute("aria-expanded", String(!hidden));
+  if (hidden && hadFocus) button.focus();
 }
 
 function foldPanel(): void {
@@ -284,17 +288,6 @@ function fillHelp(): void {
   for (const binding of bindings) {
     list.append(make("dt", "", binding.shown), make("dd", "", binding.does));
   }
-}
-
-function debouncedResize(): () => void {
-  let timer: number | undefined;
-  return () => {
-    window.clearTimeout(timer);
-    timer = window.setTimeout(() => {
-      // Paper shows the present picture; its size on paper is none to draw at.
-      if (!window.matchMedia("print").matches) app.resize(...viewport.size());
-    }, 120);
-  };
 }
 
 function onClick(id: string, run: () => void): void {

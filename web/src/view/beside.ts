@@ -32,6 +32,26 @@ export function takeBeside(hash: string): [rest: string, beside: Beside | null] 
   }
 }
 
+// The first picture's view and the second picture after both have changed places. view: without
+// defaults.
+export function swapped(view: View, { dataset, step }: Beside): [view: View, beside: Beside] {
+  const { image, ...settings } = view;
+  const background = image?.background;
+  const now = view.step ?? 0;
+  return [
+    {
+      ...settings,
+      ...(background === undefined ? {} : { image: { background } }),
+      dataset: dataset ?? view.dataset,
+      step: step ?? now,
+    },
+    {
+      ...(dataset === undefined ? {} : { dataset: view.dataset }),
+      ...(step === undefined ? {} : { step: now }),
+    },
+  ];
+}
+
 // The view of the second picture. first: that of the first one, with all known values, so that both
 // have the same camera, ranges and lengths. own: what the second keeps apart from its camera, if
 // its settings do not follow the first.

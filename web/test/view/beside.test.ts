@@ -1,7 +1,7 @@
 // The second picture: its view, its place in the address, and what can be compared.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { besideSuffix, besideView, takeBeside } from "../../src/view/beside";
+import { besideSuffix, besideView, swapped, takeBeside } from "../../src/view/beside";
 import { hashOfView, viewOfHash } from "../../src/view/link";
 import { otherDatasets } from "../../src/view/others";
 import type { Dataset, View } from "../../src/wire/protocol";
@@ -32,6 +32,15 @@ test("settings of its own stay, except for the camera", () => {
   const view = besideView(first, {}, [8, 8], own);
   assert.deepEqual(view.vector, { opacity: 0.3 });
   assert.deepEqual(view.camera, first.camera);
+});
+
+test("swapped pictures keep the background and gain no defaults", () => {
+  assert.deepEqual(swapped(first, { dataset: "b", step: 0 }), [
+    { ...first, dataset: "b", step: 0, image: { background: "#102030" } },
+    { dataset: "a", step: 3 },
+  ]);
+  const plain = { dataset: "a", image: { width: 8, height: 8 } };
+  assert.deepEqual(swapped(plain, { step: 2 }), [{ dataset: "a", step: 2 }, { step: 0 }]);
 });
 
 test("the address keeps the second picture behind any view", () => {
