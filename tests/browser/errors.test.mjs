@@ -106,7 +106,7 @@ test("a refused view is told by the labels of the controls, not by JSON pointers
       await alert.filter({ hasText: "stride" }).waitFor();
       const text = await alert.textContent();
       assert.match(text, /Lines, sampling stride: must be a whole number from 1 to 64, not 100/);
-      assert.match(text, /Annotations, title: must be true or false/);
+      assert.match(text, /Axes and labels, title: must be true or false/);
       assert.doesNotMatch(text, /\/\w/);
     },
     { alert: true },

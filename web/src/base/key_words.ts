@@ -3,12 +3,14 @@
 
 const labels = new Map<string, string>(); // pointer without array indices -> label
 
+const titles = new Map<string, string>(); // of folders that are named for the data
+
 const parts: Readonly<Record<string, string>> = {
   dataset: "Dataset",
   step: "Time step",
   camera: "Camera",
   image: "Picture",
-  geometry: "Geometry",
+  geometry: "Place",
   ground: "Ground",
   vector: "Lines",
   scalars: "Volumes",
@@ -16,7 +18,7 @@ const parts: Readonly<Record<string, string>> = {
   difference: "Difference",
   method: "Method",
   quality: "Quality",
-  annotations: "Annotations",
+  annotations: "Axes and labels",
   region: "Region",
   light: "Light",
   surfaces: "Surfaces",
@@ -50,14 +52,27 @@ export function nameKey(pointer: string, label: string): void {
 
 const ordinals = ["first", "second", "third", "fourth"];
 
+// "5th", "21st"; of the counted place from 1.
+function ordinal(place: number): string {
+  const word = ordinals[place - 1];
+  if (word !== undefined) return word;
+  const teen = Math.floor(place / 10) % 10 === 1;
+  return `${place}${(teen ? undefined : ["th", "st", "nd", "rd"][place % 10]) ?? "th"}`;
+}
+
+// The panel's folders of vectors and volumes are titled for the data.
+export function namePart(key: "vector" | "scalars", title: string): void {
+  titles.set(key, title);
+}
+
 // "/vector/stride" -> "Lines, sampling stride"; "/scalars/1/stride" -> "Volumes (second), sampling
 // stride". null: not a key of the view.
 export function keyName(pointer: string): string | null {
   const keys = pointer.split("/").slice(1);
-  const part = parts[keys[0] ?? ""];
+  const part = titles.get(keys[0] ?? "") ?? parts[keys[0] ?? ""];
   if (part === undefined) return null;
   const at = Number(keys[1]);
-  const which = keys[1] !== undefined && isIndex(keys[1]) ? (ordinals[at] ?? `${at + 1}th`) : "";
+  const which = keys[1] !== undefined && isIndex(keys[1]) ? ordinal(at + 1) : "";
   const place = which === "" ? part : `${part} (${which})`;
   const inner = keys.slice(1).filter((key) => !isIndex(key));
   if (inner.length === 0) return place;
@@ -73,13 +88,32 @@ const named = (pointer: string, asWritten: string): string => {
   return name === null ? asWritten : `“${name}”`;
 };
 
+// Whether a dotted word is a key, not a file such as surfaces.nc: a control sets it, or the schema
+// of the view describes it.
+const schemaKeys = new Set<string>(); // pointers without array indices
+const isKey = (pointer: string): boolean => labels.has(pointer) || schemaKeys.has(pointer);
+
+export function learnKeys(pointers: Iterable<string>): void {
+  for (const pointer of pointers) schemaKeys.add(pointer);
+}
+
+// Names in quotes are those of fields and files.
+const quoted = /("[^"]*"|“[^”]*”|'[^']*'(?!\w))/;
+
 // A text of the server with the keys in it by their names: "/geometry/slice" and "geometry.slice".
 const withNames = (text: string): string =>
   text
+    .split(quoted)
+    .map((piece, n) => (n % 2 === 1 ? piece : withNamesUnquoted(piece)))
+    .join("");
+
+const withNamesUnquoted = (text: string): string =>
+  text
     .replace(/(?<![\w/.])(?:\/[A-Za-z0-9]+)+/g, (pointer) => named(pointer, pointer))
-    .replace(/(?<![\w/.])[a-z][A-Za-z]*(?:\.[a-z][A-Za-z0-9]*)+(?![\w/])/g, (dotted) =>
-      named(`/${dotted.replaceAll(".", "/")}`, dotted),
-    );
+    .replace(/(?<![\w/.])[a-z][A-Za-z]*(?:\.[a-z][A-Za-z0-9]*)+(?![\w/])/g, (dotted) => {
+      const pointer = `/${dotted.replaceAll(".", "/")}`;
+      return isKey(pointer) ? named(pointer, dotted) : dotted;
+    });
 
 // What the server's texts say about JSON, as people say it.
 const plain: readonly [RegExp, string][] = [

@@ -1,6 +1,8 @@
 // Descriptions of keys in the server's view schema -> tooltips of the controls. Fetched when the
 // panel is first built; until then, or if the request fails, controls have only their labels.
 
+import { learnKeys } from "../base/key_words";
+
 interface Schema {
   description?: string;
   properties?: Record<string, Schema>;
@@ -30,6 +32,7 @@ export async function loadHelpTexts(baseUri: string): Promise<void> {
   try {
     const answer = await fetch(new URL("view.schema.json", baseUri));
     if (answer.ok) collect((await answer.json()) as Schema, "");
+    learnKeys(texts.keys());
   } finally {
     const due = waiting;
     waiting = []; // cleared after a failure too: each new panel registers again

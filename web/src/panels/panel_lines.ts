@@ -6,6 +6,7 @@ import type { Range } from "../wire/api";
 import { colorScale } from "../view/color_scale";
 import { unitText } from "../view/legend_entries";
 import { keyAccess, type PanelKit } from "./panel_kit";
+import { namePart } from "../base/key_words";
 import { vectorsTitle } from "../view/words";
 import { addTrace } from "./panel_trace";
 import { addMark } from "./panel_mark";
@@ -14,6 +15,7 @@ export function addLines(gui: GUI, kit: PanelKit): void {
   const dataset = kit.host.dataset();
   const options = fieldOptions(dataset, "vector");
   if (Object.keys(options).length === 0) return;
+  namePart("vector", vectorsTitle(dataset));
   const folder = kit.folder(gui, vectorsTitle(dataset), { open: true, key: "Vectors" });
   let named = Object.values(options)[0]!;
   kit.toggle(folder, "shown", {

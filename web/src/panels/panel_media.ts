@@ -17,6 +17,7 @@ import {
 } from "./media";
 import type { Access, PanelKit } from "./panel_kit";
 import type { ScalarView } from "../wire/protocol";
+import { namePart } from "../base/key_words";
 import { isRamp } from "./transfer";
 
 const layersMax = 4;
@@ -25,6 +26,7 @@ export function addMedia(gui: GUI, kit: PanelKit): void {
   const options = fieldOptions(kit.host.dataset(), "scalar");
   if (Object.keys(options).length === 0) return;
   const title = volumesTitle(kit.host.dataset());
+  namePart("scalars", title);
   const folder = kit.folder(gui, title, { open: true, key: "Volumes" });
   new MediaPanel(folder, kit, options);
 }

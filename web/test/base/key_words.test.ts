@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
-import { entryText, keyName, nameKey } from "../../src/base/key_words";
+import { entryText, keyName, learnKeys, nameKey, namePart } from "../../src/base/key_words";
 import { problemText } from "../../src/wire/requests";
 
 interface Schema {
@@ -23,6 +23,7 @@ test("every key of the view has a name in plain words", () => {
   const schema = JSON.parse(readFileSync("../protocol/view.schema.json", "utf8")) as Schema;
   const pointers = pointersOf(schema, "");
   assert.ok(pointers.length > 100);
+  learnKeys(pointers);
   for (const pointer of pointers) {
     const name = keyName(pointer);
     assert.ok(name !== null, `${pointer} has a name`);
@@ -47,14 +48,20 @@ test("a message names the control by its label", () => {
 test("keys within a text are named too, other words with dots and slashes stay", () => {
   assert.equal(
     entryText("/geometry/plane", "is not available with heightField: use geometry.slice"),
-    "Geometry, plane: is not available with a height field: use “Geometry, slice”",
+    "Place, plane: is not available with a height field: use “Place, slice”",
   );
   assert.equal(
     entryText("/geometry", "a view has a slice or a plane, not both: set one to null"),
-    "Geometry: a view has a slice or a plane, not both: switch one off",
+    "Place: a view has a slice or a plane, not both: switch one off",
   );
   assert.equal(entryText("", "see /vector/r1"), "see “Lines, radius at the tail”");
-  for (const text of ["/data/winds.nc is no file", "winds.nc has 12.5 MB", "https://a.example/x"]) {
+  for (const text of [
+    "/data/winds.nc is no file",
+    "winds.nc has 12.5 MB",
+    "surfaces.nc is empty",
+    "https://a.example/x",
+    '"geometry.slice" is no field',
+  ]) {
     assert.equal(entryText("", text), text);
   }
 });
@@ -66,6 +73,21 @@ test("keys that are none of the view are shown by their last word", () => {
 test("the type that JSON expects is left out where no control can send it", () => {
   assert.equal(
     entryText("/annotations/title", "must be true or false, not an object"),
-    "Annotations, title: must be true or false",
+    "Axes and labels, title: must be true or false",
   );
+});
+
+test("places are counted in words or by right ordinals", () => {
+  const names = [0, 3, 4, 10, 20, 21, 22, 110].map((at) => keyName(`/surfaces/${at}`));
+  const counted = ["first", "fourth", "5th", "11th", "21st", "22nd", "23rd", "111th"];
+  assert.deepEqual(
+    names,
+    counted.map((word) => `Surfaces (${word})`),
+  );
+});
+
+test("parts that are named for the data have the title of their folder", () => {
+  namePart("vector", "Winds");
+  assert.equal(keyName("/vector/opacity"), "Winds, opacity");
+  namePart("vector", "Lines");
 });
