@@ -15,7 +15,11 @@ const [width, height] = [192, 120]; // pixels, two for each of the page
 const restMs = 700; // after the last change of the view
 const busyMs = 3000; // until a busy server is asked again
 const triesMax = 5;
-const busyCodes = [409, 429, 503]; // loading, busy, draining
+const refusedCodes = [400, 422]; // of a view that the server does not draw
+
+// Whether asking again would be in vain; a login, a busy server or a lost connection may change.
+export const isRefusedView = (failure: unknown): boolean =>
+  failure instanceof Refusal && refusedCodes.includes(failure.status);
 
 export function addPresets(gui: GUI, kit: PanelKit, actions: PresetSwitch): void {
   const folder = kit.folder(gui, "Views to start from", { open: true });
@@ -146,8 +150,7 @@ class PresetPictures {
       this.kit.pictures.keep(key, await api.picture(pictureView(tile.preset, this.kit), signal));
     } catch (failure) {
       if (signal.aborted) return false;
-      const known = failure instanceof Refusal && !busyCodes.includes(failure.status);
-      if (known && failure.status < 500) this.refused.add(key);
+      if (isRefusedView(failure)) this.refused.add(key);
       else {
         this.tries += 1;
         this.startSoon(busyMs);

@@ -2,7 +2,9 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { project, type Camera } from "../../src/view/camera";
+import { isRefusedView } from "../../src/panels/panel_presets";
 import { presetsOf, presetView } from "../../src/view/presets";
+import { Refusal } from "../../src/wire/api";
 import type { Dataset, View } from "../../src/wire/protocol";
 import { described, type Described } from "../page";
 
@@ -124,4 +126,12 @@ test("sections show the speed where there is one, across the shorter horizontal 
   assert.deepEqual(viewOf(dataset, "sections").surfaces, surfaces("cloud"));
   dataset.fields.push({ ...dataset.fields[1]!, name: "wind_speed", dtype: "derived" });
   assert.deepEqual(viewOf(dataset, "sections").surfaces, surfaces("wind_speed"));
+});
+
+test("only a view that the server refuses is given up", () => {
+  for (const status of [400, 422]) assert.ok(isRefusedView(new Refusal("", status)), `${status}`);
+  for (const status of [401, 403, 404, 409, 429, 500, 503]) {
+    assert.equal(isRefusedView(new Refusal("", status)), false, `${status}`);
+  }
+  assert.equal(isRefusedView(new TypeError("network")), false);
 });
