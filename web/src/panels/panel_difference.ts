@@ -1,5 +1,6 @@
 // The difference: what is subtracted from the fields, another step or another dataset.
 import type GUI from "lil-gui";
+import { failureText } from "../wire/api";
 import { keyAccess, type PanelKit } from "./panel_kit";
 
 export interface DifferenceActions {
@@ -16,14 +17,25 @@ export function addDifference(gui: GUI, kit: PanelKit, actions: DifferenceAction
   const folder = kit.folder(gui, "Compare");
   const { host } = kit;
   const steps = host.dataset().steps.count;
-  const choices = (): Record<string, string> => ({
+  let choices = 0; // answers to earlier ones are too late
+  let failure = "";
+  const offered = (): Record<string, string> => ({
     [nothing]: nothing,
     ...(steps > 1 ? { [step]: step } : {}),
     ...(actions.others().size > 0 ? { [other]: other } : {}),
   });
   const subtract = async (id: string): Promise<void> => {
-    const dataset = await actions.openOther(id);
-    host.change({ difference: { dataset, step: null } });
+    const choice = ++choices;
+    const open = host.dataset().id;
+    const isCurrent = () => choice === choices && host.explicitView().dataset === open;
+    failure = "";
+    try {
+      const dataset = await actions.openOther(id);
+      if (isCurrent()) host.change({ difference: { dataset, step: null } });
+    } catch (reason) {
+      if (isCurrent()) failure = failureText(reason);
+    }
+    kit.refresh();
   };
   kit.choice(
     folder,
@@ -33,6 +45,8 @@ export function addDifference(gui: GUI, kit: PanelKit, actions: DifferenceAction
       get: ({ difference }) =>
         !difference ? nothing : (difference.dataset ?? null) === null ? step : other,
       set: (what) => {
+        choices += 1;
+        failure = "";
         if (what === nothing) return { difference: null };
         if (what === step) return { difference: { dataset: null, step: 0 } };
         const [first] = actions.others().keys();
@@ -40,7 +54,7 @@ export function addDifference(gui: GUI, kit: PanelKit, actions: DifferenceAction
         return null;
       },
     },
-    choices,
+    offered,
   );
   const number = kit.number(
     folder,
@@ -66,6 +80,7 @@ export function addDifference(gui: GUI, kit: PanelKit, actions: DifferenceAction
     () => Object.fromEntries([...actions.others()].map(([id, text]) => [text, id])),
   );
   kit.showWhen((states) => states.minusDataset, dataset);
+  kit.note(folder, () => failure);
   kit.note(folder, () =>
     host.view().difference ? "Histograms and probes show the field itself." : "",
   );

@@ -42,6 +42,7 @@ export class ProbePanel {
   private readonly picker = make("select");
   private readonly plot = makeSvg("svg", { class: "course", role: "img" });
   private readonly maximum = make("p", "probe-words"); // the one that was gone to
+  private maximumOf = ""; // scope of that maximum
   private series: Series | null = null;
   private position: Position | null = null; // that was read last
   private from: Position | null = null;
@@ -105,9 +106,16 @@ export class ProbePanel {
   }
 
   refresh(): void {
+    if (this.maximumOf !== this.scope()) this.maximum.hidden = true;
     if (!this.on) return;
     if (this.key() !== this.wanted && !this.kit.host.playing()) this.readSoon();
     this.showSeries();
+  }
+
+  // What the greatest value is one of.
+  private scope(): string {
+    const { dataset, step, region, difference } = this.kit.host.explicitView();
+    return JSON.stringify([dataset, step ?? 0, region ?? null, difference ?? null]);
   }
 
   private key(): string {
@@ -191,12 +199,14 @@ export class ProbePanel {
     try {
       const dataset = host.dataset();
       const whole = host.explicitView();
+      const scope = this.scope();
       const within = isPart(whole.region) ? " in the region" : "";
       const step = host.view().step ?? 0;
       const { range, places } =
         within === ""
           ? await host.api.range(dataset.id, field, step)
           : await host.api.rangeIn({ ...whole, step }, dataset.id, field);
+      if (scope !== this.scope()) return;
       const sample = places === undefined ? null : sampleOf(places.max);
       if (sample === null) {
         this.showMessage(`${field} has no value${within} at this step`, true);
@@ -207,6 +217,7 @@ export class ProbePanel {
       this.maximum.textContent =
         `greatest ${field}${within}: ${valueText(range![1], units)} ` +
         `at ${positionText(dataset, places!.max)}`;
+      this.maximumOf = scope;
       this.maximum.hidden = false;
     } catch (failure) {
       this.showMessage(failureText(failure), true);

@@ -1,6 +1,7 @@
 // The region: ranges of the axes, a filter by another field, and a polygon from a GeoJSON file.
 import type GUI from "lil-gui";
 import type { Controller } from "lil-gui";
+import { failureText } from "../wire/api";
 import { make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
 import { fieldOptions, showsTheEarth } from "./controls";
@@ -73,6 +74,8 @@ function addFilter(folder: GUI, kit: PanelKit): void {
   const dataset = kit.host.dataset();
   const fields = fieldOptions(dataset, "scalar");
   if (Object.keys(fields).length === 0) return;
+  let choices = 0; // of fields; answers to earlier ones are too late
+  let failure = "";
   const first = () => kit.host.view().region?.where?.[0];
   kit.choice(
     folder,
@@ -81,6 +84,8 @@ function addFilter(folder: GUI, kit: PanelKit): void {
       pointer: "/region/where",
       get: () => first()?.field ?? everywhere,
       set: (field) => {
+        choices += 1;
+        failure = "";
         if (field === everywhere) return { region: { where: [] } };
         void startRange(field);
         return null;
@@ -90,10 +95,18 @@ function addFilter(folder: GUI, kit: PanelKit): void {
   );
   // The upper half of the range of the field, from which the user goes on.
   const startRange = async (field: string): Promise<void> => {
+    const choice = choices;
     const step = kit.host.view().step ?? 0;
-    const { range } = await kit.host.api.range(dataset.id, field, step);
-    const [low, high] = range ?? [0, 1];
-    kit.host.change({ region: { where: [{ field, range: [(low + high) / 2, high] }] } });
+    const isCurrent = () => choice === choices && kit.host.explicitView().dataset === dataset.id;
+    try {
+      const { range } = await kit.host.api.range(dataset.id, field, step);
+      if (!isCurrent()) return;
+      const [low, high] = range ?? [0, 1];
+      kit.host.change({ region: { where: [{ field, range: [(low + high) / 2, high] }] } });
+    } catch (reason) {
+      if (isCurrent()) failure = failureText(reason);
+      kit.refresh();
+    }
   };
   const ends: Controller[] = kit.range(
     folder,
@@ -110,6 +123,7 @@ function addFilter(folder: GUI, kit: PanelKit): void {
     "",
   );
   kit.note(folder, () => {
+    if (failure !== "") return failure;
     const filter = first();
     if (filter === undefined) return "";
     const units = unitText(dataset.fields.find(({ name }) => name === filter.field)?.units);

@@ -1,6 +1,7 @@
 // Lines through seeds: how many of them fill the data, or a line or plane of them by numbers.
 import type GUI from "lil-gui";
 import type { Controller } from "lil-gui";
+import { nameKey } from "../base/key_words";
 import { axisNames, axisUnit } from "../view/sample_position";
 import { extentOf } from "./panel_region";
 import { keyAccess, type PanelKit } from "./panel_kit";
@@ -48,6 +49,8 @@ function addEnds(folder: GUI, kit: PanelKit): Controller[] {
   const dataset = kit.host.dataset();
   const boxes: Controller[] = [];
   for (const end of ["from", "to"] as const) {
+    // Three boxes set one key, so its name is that of the end.
+    for (const key of ["line", "block"]) nameKey(`/vector/trace/seeds/${key}/${end}`, end);
     axisNames.forEach((axis, n) => {
       const { coordinates, name, units } = dataset.axes[axis];
       if (coordinates.length < 2) return;
@@ -91,7 +94,7 @@ export function addSeeds(folder: GUI, kit: PanelKit): void {
       get: (view) => seedsOf(view)?.evenly ?? 100,
       set: (evenly) => ({ vector: { trace: { seeds: { evenly } } } }),
     },
-    { min: 0, max: 1000, step: 1 },
+    { min: 1, max: 1000, step: 1 },
   );
   const line = kit.number(
     folder,
