@@ -8,6 +8,30 @@ export interface FolderOptions {
   key?: string; // what it is known by among its siblings; default: its title
 }
 
+// The control that has the focus: its folder among those of the parent (-1: the parent itself) and
+// its label.
+export interface ControlPlace {
+  folder: number;
+  label: string;
+}
+
+const labelOf = (row: Element): string => row.querySelector(".lil-name")?.textContent ?? "";
+
+export function focusedControl(parent: GUI): ControlPlace | null {
+  const row = document.activeElement?.closest(".lil-controller") ?? null;
+  if (row === null || !parent.domElement.contains(row)) return null;
+  const folder = parent.folders.findIndex(({ domElement }) => domElement.contains(row));
+  return { folder, label: labelOf(row) };
+}
+
+// The control at a place, once the controls have been built anew; without it the parent's title.
+export function focusControl(parent: GUI, { folder, label }: ControlPlace): void {
+  const within = parent.folders[folder] ?? parent;
+  const row = within.controllersRecursive().find(({ domElement }) => labelOf(domElement) === label);
+  const target = row?.domElement.querySelector<HTMLElement>("select, input, button");
+  (target ?? parent.$title).focus();
+}
+
 const firstLevel = 2; // the page's own title has level 1
 
 export class Folders {

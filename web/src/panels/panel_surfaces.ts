@@ -5,6 +5,7 @@ import { failureText, type FieldRange, type Histogram } from "../wire/api";
 import type { SurfaceView } from "../wire/protocol";
 import { fieldOptions } from "./controls";
 import { histogramBins } from "./histogram_view";
+import { focusControl, focusedControl } from "./panel_folders";
 import type { Access, PanelKit } from "./panel_kit";
 import {
   candidates,
@@ -80,7 +81,14 @@ class SurfacesPanel {
     this.kit.host.change({ surfaces });
   }
 
+  // Keeps the focus that a control had which is built anew.
   private build(): void {
+    const at = focusedControl(this.folder);
+    this.buildControls();
+    if (at !== null) focusControl(this.folder, at);
+  }
+
+  private buildControls(): void {
     for (const child of [...this.folder.children]) child.destroy();
     this.controls = this.kit.again();
     this.surfaces().forEach((_, index) => this.addSurface(index));
