@@ -104,11 +104,11 @@ class SeedLines {
 
 }  // namespace
 
-std::int64_t vertices_at_most(const Streamlines& of) {
+std::int64_t vertices_at_most(const Streamlines& of, std::int64_t lines) {
   // Passing the seam, a line has two vertices more.
   constexpr std::int64_t parts_most = 64;
   const std::int64_t more = of.flow.around > 0 ? parts_most : 0;
-  return padded(static_cast<std::int64_t>(of.seeds.size()) * (of.pieces_max + 1 + 2 * more));
+  return padded(lines * (of.pieces_max + 1 + 2 * more));
 }
 
 Segments make_streamlines(const Streamlines& of, const CancelToken& cancel) {
@@ -124,7 +124,7 @@ Segments make_streamlines(const Streamlines& of, const CancelToken& cancel) {
   return gather(rows, of.magnitude_scale);
 }
 
-std::vector<dvec3> evenly(const Flow& flow, int count) {
+std::vector<dvec3> evenly(const Flow& flow, int count, const CancelToken& cancel) {
   constexpr int trials_each = 256;
   constexpr int first_trials = 4096;
   // The root of g^5 = g + 1.
@@ -146,11 +146,12 @@ std::vector<dvec3> evenly(const Flow& flow, int count) {
   };
   double largest = 0;
   double fourth = 0;
-  for (int n = 0; n < first_trials; ++n) {
+  for (int n = 0; n < first_trials && !cancel.cancelled(); ++n) {
     largest = std::max(largest, flow.cell_volume(candidate(n, fourth)));
   }
   std::vector<dvec3> out;
   for (int n = 0; n < trials_each * count && static_cast<int>(out.size()) < count; ++n) {
+    if (cancel.cancelled()) break;
     const dvec3 index = candidate(n, fourth);
     if (fourth * largest < flow.cell_volume(index) && flow.holds(index)) out.push_back(index);
   }

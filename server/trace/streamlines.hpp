@@ -32,8 +32,8 @@ struct Streamlines {
   std::function<double(const glm::dvec3& index, const Motion& motion)> color;
 };
 
-// Number of vertices at most, for memory.
-std::int64_t vertices_at_most(const Streamlines& of);
+// Number of vertices of so many lines at most, for memory. `of`: the seeds are not read.
+std::int64_t vertices_at_most(const Streamlines& of, std::int64_t lines);
 
 // Lines in the order of the seeds. A line has 1, 2, 4 ... segments of equal arc length (of paths:
 // equal times), at most pieces_max, until they keep to `departure` and `longest`. q runs from -1/2
@@ -50,6 +50,7 @@ Segments make_streamlines(const Streamlines& of, const CancelToken& cancel = {})
 // masked: those of a sequence of low discrepancy (M. Roberts, The Unreasonable Effectiveness of
 // Quasirandom Sequences, 2018; the generalised golden ratio in four dimensions) at which a fourth
 // coordinate is below the volume of the cell over the largest. Along axes of one sample index 0.
-std::vector<glm::dvec3> evenly(const Flow& flow, int count);
+// Fewer if cancelled.
+std::vector<glm::dvec3> evenly(const Flow& flow, int count, const CancelToken& cancel = {});
 
 }  // namespace windsplat::trace

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "server/base/check.hpp"
+#include "server/data/model/column_search.hpp"
 #include "server/data/model/measure.hpp"
 
 namespace windsplat::data {
@@ -115,28 +116,16 @@ double reach(const Columns& columns, const std::array<int, 3>& dims, int x, int 
   return farthest / 2;
 }
 
-Result<void> nearest_column(const Grid& grid, const std::array<std::optional<double>, 3>& at,
-                            Place& place) {
-  const Columns& columns = *grid.columns;
-  const std::array<int, 3> dims = grid.dims();
-  WINDSPLAT_CHECK(columns.longitude.size() == columns.latitude.size() &&
-                  columns.longitude.size() ==
-                      static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]));
-  if (!at[0]) return absent(0);
-  if (!at[1]) return absent(1);
-  if (std::abs(*at[1]) > 90)
-    return outside(1, *at[1],
-                   "x and y are longitude and latitude here, which must be from -90 to 90 degrees");
-  double least = std::numeric_limits<double>::infinity();
-  std::size_t nearest = 0;
-  for (std::size_t i = 0; i < columns.latitude.size(); ++i) {
-    // A great-circle distance is never less than the difference in latitude.
-    if (std::abs(columns.latitude[i] - *at[1]) >= least) continue;
-    const double d = distance(*at[0], *at[1], columns.longitude[i], columns.latitude[i]);
-    if (d >= least) continue;
-    least = d;
-    nearest = i;
-  }
+Error beyond_poles(double latitude) {
+  return outside(1, latitude,
+                 "x and y are longitude and latitude here, which must be from -90 to 90 degrees");
+}
+
+// The nearest column and its distance; an error if the place is outside of its cell, which only
+// those of the rim can tell.
+Result<std::array<int, 2>> within_reach(const Columns& columns, const std::array<int, 3>& dims,
+                                        double longitude, double latitude, std::size_t nearest,
+                                        double least) {
   const int x = static_cast<int>(nearest % static_cast<std::size_t>(dims[0]));
   const int y = static_cast<int>(nearest / static_cast<std::size_t>(dims[0]));
   const bool rim = x == 0 || y == 0 || x == dims[0] - 1 || y == dims[1] - 1;
@@ -147,13 +136,38 @@ Result<void> nearest_column(const Grid& grid, const std::array<std::optional<dou
     const auto [south, north] =
         std::minmax_element(columns.latitude.begin(), columns.latitude.end());
     std::string box = "no column is near latitude ";
-    box.append(number(*at[1])).append("; columns are at longitudes ");
+    box.append(number(latitude)).append("; columns are at longitudes ");
     box.append(interval({*west, *east}, "")).append(", latitudes ");
     box.append(interval({*south, *north}, "degrees"));
-    return outside(0, *at[0], box);
+    return outside(0, longitude, box);
   }
-  place.index[0] = x;
-  place.index[1] = y;
+  return std::array{x, y};
+}
+
+Result<void> nearest_column(const Grid& grid, const std::array<std::optional<double>, 3>& at,
+                            Place& place) {
+  const Columns& columns = *grid.columns;
+  const std::array<int, 3> dims = grid.dims();
+  WINDSPLAT_CHECK(columns.longitude.size() == columns.latitude.size() &&
+                  columns.longitude.size() ==
+                      static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]));
+  if (!at[0]) return absent(0);
+  if (!at[1]) return absent(1);
+  if (std::abs(*at[1]) > 90) return beyond_poles(*at[1]);
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t nearest = 0;
+  for (std::size_t i = 0; i < columns.latitude.size(); ++i) {
+    // A great-circle distance is never less than the difference in latitude.
+    if (std::abs(columns.latitude[i] - *at[1]) >= least) continue;
+    const double d = distance(*at[0], *at[1], columns.longitude[i], columns.latitude[i]);
+    if (d >= least) continue;
+    least = d;
+    nearest = i;
+  }
+  const auto found = within_reach(columns, dims, *at[0], *at[1], nearest, least);
+  if (!found) return found.error();
+  place.index[0] = (*found)[0];
+  place.index[1] = (*found)[1];
   place.coordinates[0] = columns.longitude[nearest];
   place.coordinates[1] = columns.latitude[nearest];
   return {};
@@ -200,6 +214,70 @@ Result<Place> nearest_sample(const Grid& grid, const std::array<std::optional<do
     place.coordinates[a] = axis.coordinates[static_cast<std::size_t>(*index)];
   }
   return place;
+}
+
+ColumnSearch::ColumnSearch(const Columns& columns, const std::array<int, 3>& dims,
+                           const CancelToken& cancel)
+    : columns_(columns), dims_(dims) {
+  for (std::size_t n = 0; n < columns.longitude.size(); ++n) {
+    const double longitude = columns.longitude[n];
+    const double latitude = columns.latitude[n];
+    if (!std::isfinite(longitude) || !std::isfinite(latitude)) continue;
+    nodes_.push_back({unit_vector(longitude, latitude), n});
+  }
+  sort(0, nodes_.size(), 0, cancel);
+}
+
+std::array<double, 3> ColumnSearch::unit_vector(double longitude, double latitude) {
+  const double x = longitude * radians_per_degree;
+  const double y = latitude * radians_per_degree;
+  return {std::cos(y) * std::cos(x), std::cos(y) * std::sin(x), std::sin(y)};
+}
+
+void ColumnSearch::sort(std::size_t first, std::size_t last, std::size_t axis,
+                        const CancelToken& cancel) {
+  if (last - first < 2 || cancel.cancelled()) return;
+  const std::size_t middle = first + (last - first) / 2;
+  const auto at = [this](std::size_t n) { return nodes_.begin() + static_cast<std::ptrdiff_t>(n); };
+  std::nth_element(at(first), at(middle), at(last), [axis](const Node& a, const Node& b) {
+    return a.place.at(axis) < b.place.at(axis);
+  });
+  sort(first, middle, (axis + 1) % 3, cancel);
+  sort(middle + 1, last, (axis + 1) % 3, cancel);
+}
+
+void ColumnSearch::seek(const std::array<double, 3>& place, std::size_t first, std::size_t last,
+                        std::size_t axis, Best& best) const {
+  if (first >= last) return;
+  const std::size_t middle = first + (last - first) / 2;
+  const Node& node = nodes_[middle];
+  double square = 0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    square += (node.place.at(a) - place.at(a)) * (node.place.at(a) - place.at(a));
+  }
+  if (square < best.square || (square == best.square && node.column < best.column)) {
+    best = {square, node.column};
+  }
+  const double side = place.at(axis) - node.place.at(axis);
+  const std::size_t next = (axis + 1) % 3;
+  for (const bool below : {side < 0, side >= 0}) {
+    if (below != (side < 0) && side * side > best.square) return;
+    if (below) {
+      seek(place, first, middle, next, best);
+    } else {
+      seek(place, middle + 1, last, next, best);
+    }
+  }
+}
+
+Result<std::array<int, 2>> ColumnSearch::nearest(double longitude, double latitude) const {
+  if (std::abs(latitude) > 90) return beyond_poles(latitude);
+  if (nodes_.empty()) return outside(0, longitude, "no column has a place");
+  Best best{std::numeric_limits<double>::infinity(), 0};
+  seek(unit_vector(longitude, latitude), 0, nodes_.size(), 0, best);
+  const double least = distance(longitude, latitude, columns_.longitude[best.column],
+                                columns_.latitude[best.column]);
+  return within_reach(columns_, dims_, longitude, latitude, best.column, least);
 }
 
 }  // namespace windsplat::data

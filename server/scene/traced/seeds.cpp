@@ -7,7 +7,6 @@
 #include <optional>
 #include <string>
 
-#include "server/data/model/measure.hpp"
 #include "server/scene/refusal.hpp"
 #include "server/scene/region/select.hpp"
 #include "server/trace/streamlines.hpp"
@@ -86,9 +85,9 @@ Result<double> along_axis(const data::Axis& axis, std::size_t letter, double at,
 
 // Longitude and latitude within the quadrilaterals of columns, by the method of Newton from the
 // nearest column.
-class ColumnSearch {
+class CellSearch {
  public:
-  ColumnSearch(const data::Columns& columns, const std::array<int, 3>& dims)
+  CellSearch(const data::Columns& columns, const std::array<int, 3>& dims)
       : columns_(columns), dims_(dims) {}
 
   // Changes x and y; leaves them where the method finds no place within a cell of theirs.
@@ -98,8 +97,8 @@ class ColumnSearch {
     double x = index.x;
     double y = index.y;
     for (int n = 0; n < steps; ++n) {
-      const Local at = local(x, y);
-      const double east = std::remainder(longitude - at.longitude, turn_degrees);
+      const Local at = local(x, y, longitude);
+      const double east = longitude - at.longitude;
       const double north = latitude - at.latitude;
       const double det = at.lon_x * at.lat_y - at.lon_y * at.lat_x;
       if (!(std::abs(det) > 0)) return;
@@ -116,7 +115,8 @@ class ColumnSearch {
     double longitude, latitude, lon_x, lon_y, lat_x, lat_y;
   };
 
-  [[nodiscard]] Local local(double x, double y) const {
+  // `near`: longitudes of the corners are those within half a turn of it.
+  [[nodiscard]] Local local(double x, double y, double near) const {
     const int i = std::clamp(static_cast<int>(std::floor(x)), 0, dims_[0] - 2);
     const int j = std::clamp(static_cast<int>(std::floor(y)), 0, dims_[1] - 2);
     const double u = x - i;
@@ -125,23 +125,27 @@ class ColumnSearch {
       return of[static_cast<std::size_t>(j + dj) * static_cast<std::size_t>(dims_[0]) +
                 static_cast<std::size_t>(i + di)];
     };
-    const auto bilinear = [&](const std::vector<double>& of, double& by_x, double& by_y) {
-      const double a = value(of, 0, 0);
-      const double b = value(of, 1, 0);
-      const double c = value(of, 0, 1);
-      const double d = value(of, 1, 1);
+    const auto longitude = [&](int di, int dj) {
+      return near + std::remainder(value(columns_.longitude, di, dj) - near, turn_degrees);
+    };
+    const auto latitude = [&](int di, int dj) { return value(columns_.latitude, di, dj); };
+    const auto bilinear = [&](const auto& corner, double& by_x, double& by_y) {
+      const double a = corner(0, 0);
+      const double b = corner(1, 0);
+      const double c = corner(0, 1);
+      const double d = corner(1, 1);
       by_x = (1 - v) * (b - a) + v * (d - c);
       by_y = (1 - u) * (c - a) + u * (d - b);
       return (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d);
     };
     Local out{};
-    out.longitude = bilinear(columns_.longitude, out.lon_x, out.lon_y);
-    out.latitude = bilinear(columns_.latitude, out.lat_x, out.lat_y);
+    out.longitude = bilinear(longitude, out.lon_x, out.lon_y);
+    out.latitude = bilinear(latitude, out.lat_x, out.lat_y);
     return out;
   }
 
   const data::Columns& columns_;
-  const std::array<int, 3>& dims_;
+  std::array<int, 3> dims_;
 };
 
 // The n-th of `count` places from one end to the other; the middle if there is one.
@@ -157,22 +161,23 @@ Vec3 mixed(const Vec3& from, const Vec3& to, const Vec3& part) {
 
 }  // namespace
 
-Result<dvec3> index_of(const Vec3& at, const Placed& placed, const data::Axis& vertical,
-                       const std::string& pointer) {
+PlaceSearch::PlaceSearch(const Placed& placed, const data::Axis& vertical,
+                         const CancelToken& cancel)
+    : grid_(placed.grid), vertical_(vertical) {
+  if (grid_.columns) columns_.emplace(*grid_.columns, grid_.dims(), cancel);
+}
+
+Result<dvec3> PlaceSearch::index_of(const Vec3& at, const std::string& pointer) const {
   dvec3 index(0);
-  const data::Grid& grid = placed.grid;
-  if (grid.columns) {
-    data::Grid flat = grid;
-    flat.axes[2].coordinates.resize(1);
-    const auto nearest = data::nearest_sample(flat, {at[0], at[1], std::nullopt}, nullptr);
+  if (columns_) {
+    const auto nearest = columns_->nearest(at[0], at[1]);
     if (!nearest) return invalid_at(pointer, nearest.error().message);
-    index.x = nearest->index[0];
-    index.y = nearest->index[1];
-    const std::array<int, 3> dims = grid.dims();
-    ColumnSearch(*grid.columns, dims).refine(at[0], at[1], index);
+    index.x = (*nearest)[0];
+    index.y = (*nearest)[1];
+    CellSearch(*grid_.columns, grid_.dims()).refine(at[0], at[1], index);
   }
-  for (std::size_t a = grid.columns ? 2 : 0; a < 3; ++a) {
-    const auto along = along_axis(a == 2 ? vertical : grid.axes[a], a, at[a], pointer);
+  for (std::size_t a = columns_ ? 2 : 0; a < 3; ++a) {
+    const auto along = along_axis(a == 2 ? vertical_ : grid_.axes.at(a), a, at.at(a), pointer);
     if (!along) return along.error();
     index[static_cast<glm::length_t>(a)] = *along;
   }
@@ -191,13 +196,18 @@ std::int64_t seeds_in(const SeedsView& seeds) {
 }
 
 Result<std::vector<dvec3>> seeds_of(const SeedsView& seeds, const Placed& placed,
-                                    const data::Axis& vertical, const trace::Flow& flow) {
+                                    const data::Axis& vertical, const trace::Flow& flow,
+                                    const CancelToken& cancel) {
   const std::string root = "/vector/trace/seeds";
   std::vector<dvec3> out;
   Result<void> good;
+  std::optional<PlaceSearch> search;
   const auto add = [&](const Vec3& at, const std::string& pointer) {
     if (!good) return;
-    if (auto index = index_of(at, placed, vertical, pointer)) {
+    if (!search) search.emplace(placed, vertical, cancel);
+    if (cancel.cancelled()) {
+      good = make_error(ErrorKind::cancelled, "tracing cancelled");
+    } else if (auto index = search->index_of(at, pointer)) {
       out.push_back(*index);
     } else {
       good = index.error();
@@ -226,7 +236,7 @@ Result<std::vector<dvec3>> seeds_of(const SeedsView& seeds, const Placed& placed
   }
   if (!good) return good.error();
   const int even = seeds.evenly.value_or(out.empty() ? evenly_default : 0);
-  const std::vector<dvec3> places = trace::evenly(flow, even);
+  const std::vector<dvec3> places = trace::evenly(flow, even, cancel);
   out.insert(out.end(), places.begin(), places.end());
   return out;
 }

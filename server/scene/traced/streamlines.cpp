@@ -156,10 +156,14 @@ Result<std::shared_ptr<const trace::Segments>> streamlines_of(
     const protocol::View& view, const Placed& placed, const VectorLayer& layer,
     const data::Derivation& how, const std::string& key, data::Dataset& dataset) {
   const SeedsView& seeds = *view.vector.trace->seeds;
+  const std::string name = key + seeds_key(seeds);
+  const auto none = []() -> Result<data::Resident> { return data::Resident(); };
+  if (seeds.path_steps > 0) {  // kept lines do not need the vectors of their steps
+    if (auto there = dataset.resident_only().auxiliary(name, 0, none)) {
+      return std::static_pointer_cast<const trace::Segments>(*there);
+    }
+  }
   trace::Streamlines of = description_of(view, layer, placed);
-  auto places = seeds_of(seeds, placed, vertical_of(dataset.info(), placed.lattice), of.flow);
-  if (!places) return places.error();
-  of.seeds = std::move(*places);
   Series series;
   if (seeds.path_steps > 0) {
     auto loaded = series_of(view, how, layer, dataset);
@@ -170,16 +174,22 @@ Result<std::shared_ptr<const trace::Segments>> streamlines_of(
     of.back = std::min(most, -series.frames.front().time);
     of.ahead = std::min(most, series.frames.back().time);
   }
-  const std::int64_t vertices = trace::vertices_at_most(of);
+  const std::int64_t vertices = trace::vertices_at_most(of, seeds_in(seeds));
   const std::uint64_t bytes = static_cast<std::uint64_t>(vertices) * trace::Segments::vertex_bytes;
   if (!dataset.is_within_limit(bytes) || vertices > std::numeric_limits<std::int32_t>::max()) {
-    return invalid_at(seeds_pointer, "the segments of " + std::to_string(of.seeds.size()) +
+    return invalid_at(seeds_pointer, "the segments of " + std::to_string(seeds_in(seeds)) +
                                          " lines take up to " + std::to_string(bytes >> 20U) +
                                          " MiB, more than the memory limit permits: choose fewer "
                                          "seeds or /vector/trace/seeds/pieces");
   }
-  auto kept = dataset.auxiliary(key + seeds_key(seeds), bytes, [&]() -> Result<data::Resident> {
+  auto kept = dataset.auxiliary(name, bytes, [&]() -> Result<data::Resident> {
     const CancelToken cancel = dataset.cancellation();
+    trace::Flow steady = of.flow;
+    steady.frames = {};
+    auto places =
+        seeds_of(seeds, placed, vertical_of(dataset.info(), placed.lattice), steady, cancel);
+    if (!places) return places.error();
+    of.seeds = std::move(*places);
     auto made = std::make_shared<const trace::Segments>(trace::make_streamlines(of, cancel));
     if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "tracing cancelled");
     return data::Resident(std::move(made));

@@ -4,7 +4,10 @@
 
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
+#include "server/data/model/column_search.hpp"
+#include "server/data/model/measure.hpp"
 #include "server/scene/traced/seeds.hpp"
 #include "tests/unit/scene/fake.hpp"
 
@@ -142,38 +145,97 @@ TEST(SeededScene, CoordinatesAreLinearBetweenSamples) {
   auto dataset = wind_dataset(1);
   const auto placed = place_dataset({}, *dataset);
   ASSERT_TRUE(placed);
-  const auto index = index_of({15, -5, 625}, **placed, dataset->info().grid.axes[2], "");
+  const auto index =
+      PlaceSearch(**placed, dataset->info().grid.axes[2]).index_of({15, -5, 625}, "");
   ASSERT_TRUE(index);
   EXPECT_NEAR(index->x, 1.5, 1e-12);
   EXPECT_NEAR(index->y, 0.5, 1e-12);
   EXPECT_NEAR(index->z, 0.75, 1e-12);  // of 1000 and 500 hPa
 }
 
-// Columns of a turned map, whose longitudes and latitudes are linear in the index.
-TEST(SeededScene, LongitudesAndLatitudesOfColumnsAreSought) {
+// Columns of a turned map, whose longitudes and latitudes are linear in the index; longitudes from
+// -180 to 180 degrees.
+Placed turned_map(double first, int nx = 6, int ny = 5) {
   Placed placed;
-  placed.grid.axes = {axis(data::AxisKind::cartesian, "", {0, 1, 2, 3, 4, 5}),
-                      axis(data::AxisKind::cartesian, "", {0, 1, 2, 3, 4}),
+  std::vector<double> x(static_cast<std::size_t>(nx));
+  std::vector<double> y(static_cast<std::size_t>(ny));
+  std::iota(x.begin(), x.end(), 0);
+  std::iota(y.begin(), y.end(), 0);
+  placed.grid.axes = {axis(data::AxisKind::cartesian, "", x),
+                      axis(data::AxisKind::cartesian, "", y),
                       axis(data::AxisKind::pressure, "hPa", {1000})};
   data::Columns columns;
-  for (int j = 0; j < 5; ++j) {
-    for (int i = 0; i < 6; ++i) {
-      columns.longitude.push_back(8 + 0.9 * i - 0.4 * j);
+  for (const double j : y) {
+    for (const double i : x) {
+      columns.longitude.push_back(std::remainder(first + 0.9 * i - 0.4 * j, 360.0));
       columns.latitude.push_back(45 + 0.4 * i + 0.8 * j);
     }
   }
   placed.grid.columns = std::make_shared<const data::Columns>(columns);
-  const double x = 2.3;
-  const double y = 1.6;
-  const auto index = index_of({8 + 0.9 * x - 0.4 * y, 45 + 0.4 * x + 0.8 * y, 7}, placed,
-                              placed.grid.axes[2], "/here");
-  ASSERT_TRUE(index);
-  EXPECT_NEAR(index->x, x, 1e-9);
-  EXPECT_NEAR(index->y, y, 1e-9);
-  EXPECT_EQ(index->z, 0);
-  const auto far = index_of({60, 45, 7}, placed, placed.grid.axes[2], "/here");
-  ASSERT_FALSE(far);
-  EXPECT_EQ(far.error().at[0].pointer, "/here");
+  return placed;
+}
+
+TEST(SeededScene, LongitudesAndLatitudesOfColumnsAreSought) {
+  // From 177.8 to 178.4 the antimeridian passes through the cell.
+  for (const double first : {8.0, 177.8, 178.0, 178.4}) {
+    const Placed placed = turned_map(first);
+    const double x = 2.3;
+    const double y = 1.6;
+    const PlaceSearch search(placed, placed.grid.axes[2]);
+    const auto index =
+        search.index_of({first + 0.9 * x - 0.4 * y, 45 + 0.4 * x + 0.8 * y, 7}, "/here");
+    ASSERT_TRUE(index);
+    EXPECT_NEAR(index->x, x, 1e-9) << first;
+    EXPECT_NEAR(index->y, y, 1e-9) << first;
+    EXPECT_EQ(index->z, 0);
+    const auto far = search.index_of({60, 45, 7}, "/here");
+    ASSERT_FALSE(far);
+    EXPECT_EQ(far.error().at[0].pointer, "/here");
+  }
+}
+
+TEST(SeededScene, TheSearchFindsTheColumnOfAScan) {
+  const Placed placed = turned_map(160, 31, 22);
+  const data::ColumnSearch search(*placed.grid.columns, placed.grid.dims());
+  int found = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const double longitude = 150 + std::fmod(n * 0.618034, 1.0) * 50;
+    const double latitude = 40 + std::fmod(n * 0.414214, 1.0) * 40;
+    const auto scanned = data::nearest_sample(placed.grid, {longitude, latitude, std::nullopt});
+    const auto sought = search.nearest(longitude, latitude);
+    ASSERT_EQ(scanned.has_value(), sought.has_value()) << longitude << ' ' << latitude;
+    if (!sought) {
+      EXPECT_EQ(scanned.error().message, sought.error().message);
+      continue;
+    }
+    ++found;
+    EXPECT_EQ(scanned->index[0], (*sought)[0]);
+    EXPECT_EQ(scanned->index[1], (*sought)[1]);
+  }
+  EXPECT_GT(found, 500);
+  EXPECT_LT(found, 2000);
+}
+
+TEST(SeededScene, SeekingSeedsEndsWhenCancelled) {
+  const Placed placed = turned_map(8);
+  const CancelToken cancel;
+  cancel.cancel();
+  const SeedsView points = *seeded({{10, 47, 7}}).vector.trace->seeds;
+  const auto none = seeds_of(points, placed, placed.grid.axes[2], {}, cancel);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().kind, ErrorKind::cancelled);
+}
+
+// A handle that computes nothing does not seek seeds either: it reports what is absent.
+TEST(SeededScene, SeedsAreSoughtOnlyWhileLinesAreMade) {
+  auto dataset = wind_dataset(1);
+  built(seeded({{10, 0, 500}}), *dataset);
+  const View outside = seeded({{10, 40, 500}});
+  data::Dataset resident = dataset->resident_only();
+  const auto absent = build_scene(outside, resident);
+  ASSERT_FALSE(absent);
+  EXPECT_EQ(absent.error().kind, ErrorKind::not_resident);
+  EXPECT_EQ(refusal_of(outside, *dataset).first, "/vector/trace/seeds/points/0");
 }
 
 TEST(SeededScene, WhatDeterminesTheLinesIsPartOfTheirKey) {
@@ -190,6 +252,13 @@ TEST(SeededScene, WhatDeterminesTheLinesIsPartOfTheirKey) {
   EXPECT_TRUE(differs([](SeedsView& s) { s.duration = 0.01; }));
   EXPECT_TRUE(differs([](SeedsView& s) { s.pieces = 10; }));
   EXPECT_TRUE(differs([](SeedsView& s) { s.dash = 0.3; }));
+  EXPECT_TRUE(differs([](SeedsView& s) { s.points = {{0.4, 0.4, 0.4}}; }));
+  EXPECT_TRUE(differs([](SeedsView& s) {
+    s.line = protocol::SeedLineView{{0.4, 0.4, 0.4}, {0.6, 0.6, 0.6}, 2};
+  }));
+  EXPECT_TRUE(differs([](SeedsView& s) {
+    s.block = protocol::SeedBlockView{{0.4, 0.4, 0.4}, {0.6, 0.6, 0.6}, {2, 1, 1}};
+  }));
 }
 
 TEST(SeededScene, BeyondTheMemoryLimitIsRefusedWithTheRemedy) {
