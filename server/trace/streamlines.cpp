@@ -17,6 +17,21 @@ namespace {
 using glm::dvec3;
 
 constexpr std::size_t row_seeds = 16;
+// Parts of a line that passes the seam of a flat map, at most. Passing it, a line has two vertices
+// more.
+constexpr int parts_most = 64;
+
+// A line of more parts ends on both sides so that the part with the seed is in the middle of what
+// remains, as far as there are parts on both sides.
+void shorten(std::vector<Curve>& parts) {
+  const auto most = static_cast<std::ptrdiff_t>(parts_most);
+  const auto count = static_cast<std::ptrdiff_t>(parts.size());
+  if (count <= most) return;
+  const auto seed = std::find_if(parts.begin(), parts.end(),
+                                 [](const Curve& part) { return part.low() + part.length() >= 0; });
+  const auto first = std::clamp<std::ptrdiff_t>(seed - parts.begin() - most / 2, 0, count - most);
+  parts = std::vector<Curve>(parts.begin() + first, parts.begin() + first + most);
+}
 
 class SeedLines {
  public:
@@ -52,11 +67,15 @@ class SeedLines {
     const Curve curve(of_.flow, upstream_, downstream_);
     const auto number = static_cast<std::uint32_t>(n);
     turns_ = static_cast<double>(pcg3d({number, of_.seed, of_.epoch})[0] >> 8U) / 16777216.0;
-    const std::vector<Curve> parts = curve.by_turns();
+    std::vector<Curve> parts = curve.by_turns();
+    if (parts.empty()) return;
+    shorten(parts);
+    low_ = parts.front().low();
+    length_ = parts.back().low() + parts.back().length() - low_;
     ++row.tally.lines;
     for (const Curve& part : parts) {
       // Of a line that passes the seam often, each part has its share.
-      const auto share = static_cast<double>(of_.pieces_max) * part.length() / curve.length();
+      const auto share = static_cast<double>(of_.pieces_max) * part.length() / length_;
       const int most = std::max(1, static_cast<int>(share));
       add_part(part, curve, part.pieces(most, of_.departure, of_.longest), paths, dash, row);
     }
@@ -71,7 +90,7 @@ class SeedLines {
       const double s = part.along(v, count);
       Vertex vertex;
       vertex.place = rounded(part.place(v, count));
-      const double q = (s - whole.low()) / whole.length() - 0.5;
+      const double q = (s - low_) / length_ - 0.5;
       vertex.q = static_cast<float>(std::clamp(q, -0.5, 0.5));
       if (v < count) {
         set_segment(whole, part.along(v + 0.5, count), paths, vertex);
@@ -99,14 +118,13 @@ class SeedLines {
 
   const Streamlines& of_;
   Path upstream_, downstream_;
-  double turns_ = 0;  // dashes so far
+  double low_ = 0, length_ = 0;  // of the line drawn
+  double turns_ = 0;             // dashes so far
 };
 
 }  // namespace
 
 std::int64_t vertices_at_most(const Streamlines& of, std::int64_t lines) {
-  // Passing the seam, a line has two vertices more.
-  constexpr std::int64_t parts_most = 64;
   const std::int64_t more = of.flow.around > 0 ? parts_most : 0;
   return padded(lines * (of.pieces_max + 1 + 2 * more));
 }

@@ -210,6 +210,28 @@ TEST(Streamlines, AFlatMapThatClosesIsLeftOnOneSideAndEnteredOnTheOther) {
   EXPECT_NEAR(one[0].back().x, 355, 1e-4);
 }
 
+// Around six columns 200 times on each side: what is drawn fits into the memory foreseen.
+TEST(Streamlines, ALineThatPassesTheSeamOftenEndsAfterSomeTurns) {
+  const SeedField map({6, 3, 1}, {0, 0, 0}, 10, [](const dvec3&) { return dvec3(2, 0, 0); });
+  Streamlines of = map.lines();
+  of.flow.around = 6;
+  of.seeds = {{3, 1, 0}};
+  of.length = 12000;
+  of.pieces_max = 4;
+  const Segments made = make_streamlines(of);
+  EXPECT_EQ(chains_of(made).size(), 64U);
+  EXPECT_LE(made.vertices(), static_cast<std::size_t>(vertices_at_most(of, 1)));
+  float low = 1;
+  float high = -1;
+  for (std::size_t v = 0; v < made.vertices(); ++v) {
+    if (!(made.magnitudes[v] > 0)) continue;
+    low = std::min(low, made.q[v]);
+    high = std::max(high, made.q[v]);
+  }
+  EXPECT_FLOAT_EQ(low, -0.5F);
+  EXPECT_NEAR(high, 0.5 - 1.0 / 64, 1e-3);
+}
+
 // Frames of a uniform wind along x and y.
 struct WindFrames {
   std::vector<SeedField> fields;
