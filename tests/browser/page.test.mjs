@@ -254,7 +254,10 @@ test("a link with a value out of range names the value and shows the remaining v
   withPage(
     async (page) => {
       await page.locator("#alert").waitFor();
-      assert.match(await page.locator("#alert-text").textContent(), /\/vector\/length/);
+      assert.match(
+        await page.locator("#alert-text").textContent(),
+        /length: must be a number from 0 to 10, not -5/,
+      );
       assert.equal(await page.locator("#dataset").inputValue(), "climate");
       assertDrawn(await pixels(page));
     },

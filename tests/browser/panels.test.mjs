@@ -18,11 +18,11 @@ const openDataset = async (page, id) => {
 
 test("folders are ordered by task and named for the data", () =>
   withPage(async (page) => {
-    const after = ["Surfaces", "Place", "Light", "Time", "Quality"];
+    const after = ["Surfaces", "Place", "Light", "Time", "Compare", "Quality"];
     const before = await titles(page);
-    assert.deepEqual(before.slice(-8), ["Data", "Winds", "Clouds and volumes", ...after]);
+    assert.deepEqual(before.slice(-9), ["Data", "Winds", "Clouds and volumes", ...after]);
     await openDataset(page, "efield");
-    assert.deepEqual((await titles(page)).slice(-8), ["Data", "Vectors", "Volumes", ...after]);
+    assert.deepEqual((await titles(page)).slice(-9), ["Data", "Vectors", "Volumes", ...after]);
   }));
 
 test("titles of folders are headings one level below those around them", () =>

@@ -330,7 +330,9 @@ test("a high-density screen is sharp at rest and within the budget in motion", (
         mobile: false,
       });
       // Emulation does not send the event of a window that moves to another screen.
-      await page.evaluate(() => window.densities.at(-1).dispatchEvent(new Event("change")));
+      await page.evaluate(() =>
+        window.densities.forEach((one) => one.dispatchEvent(new Event("change"))),
+      );
       await page.waitForFunction(
         (width) => document.querySelector("#picture").width === width,
         Math.round(1.5 * box.width),

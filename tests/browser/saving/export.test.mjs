@@ -250,6 +250,9 @@ async function filesIn(page, bytes) {
   }
 }
 
+// The panel's small pictures of views are no frames of an animation.
+const isFrame = (one) => one.url().endsWith("/v1/frames") && one.postDataJSON().image.width > 192;
+
 async function setAnimation(page, choices) {
   await page.keyboard.press("s");
   await page.locator("#save-scale").selectOption("1");
@@ -268,9 +271,6 @@ test("an animation over steps is a ZIP of the right frames, requested two at a t
   withPage(async (page) => {
     let under = 0;
     let most = 0;
-    // Those of the animation: the panel's small pictures of views are no part of it.
-    const isFrame = (one) =>
-      one.url().endsWith("/v1/frames") && one.postDataJSON().image.width > 192;
     page.on("request", (one) => isFrame(one) && (most = Math.max(most, ++under)));
     page.on("requestfinished", (one) => isFrame(one) && (under -= 1));
     await setAnimation(page, { from: 2, to: 7, every: 2, legend: false, fps: 5 });
@@ -361,7 +361,7 @@ test("without an encoder of videos the page offers the ZIP only", () =>
 
 test("a WebM video has the size and duration of its frames", () =>
   withPage(async (page) => {
-    await setAnimation(page, { as: "webm", to: 5, fps: 4 });
+    await setAnimation(page, { as: "webm", to: 6, fps: 4 });
     const { name, bytes } = await saved(page, "#save-animation");
     assert.equal(name, "climate-steps.webm");
     assert.equal(timesInWebm(bytes).length, 6);
@@ -400,11 +400,11 @@ test("cancel stops the requests and saves nothing", () =>
   withPage(async (page) => {
     const asked = [];
     const failed = [];
-    const ours = (one) => one.url().endsWith("/v1/frames");
-    page.on("requestfailed", (one) => ours(one) && failed.push(one));
+    page.on("requestfailed", (one) => isFrame(one) && failed.push(one));
     page.on("download", () => assert.fail("no file may be saved"));
     // The server answers the first request and delays the others.
     await page.route("**/v1/frames", (route) => {
+      if (!isFrame(route.request())) return route.continue();
       asked.push(route.request());
       return asked.length === 1 ? route.continue() : undefined;
     });
@@ -431,6 +431,7 @@ test("an error of the server is shown in the dialog", () =>
   withPage(async (page) => {
     let tries = 0;
     await page.route("**/v1/frames", (route) => {
+      if (!isFrame(route.request())) return route.continue();
       tries += 1;
       const busy = tries === 1;
       return route.fulfill({
