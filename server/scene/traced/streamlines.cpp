@@ -77,29 +77,45 @@ struct Series {
   std::vector<trace::Frame> frames;
 };
 
+// `segments`: bytes of what is made from them, which must fit beside them.
 Result<Series> series_of(const protocol::View& view, const data::Derivation& how,
-                         const VectorLayer& layer, data::Dataset& dataset) {
+                         const VectorLayer& layer, std::uint64_t segments, data::Dataset& dataset) {
   const data::DatasetInfo& info = dataset.info();
   if (view.vector.space != protocol::VectorSpace::world) {
     return invalid_at(steps_pointer,
                       "paths need speeds in the world: set /vector/space to \"world\"");
   }
   const auto seconds = seconds_of(info);
-  if (!seconds || info.steps.size() < 2) {
-    return invalid_at(steps_pointer, info.steps.size() < 2
-                                         ? "dataset " + in_double_quotes(info.id) + " has one step"
-                                         : "the times of the steps have no known unit: " +
-                                               in_double_quotes(info.time_units));
+  // Of a difference at the same steps, those of both datasets.
+  const data::DatasetInfo* shortest = &info;
+  const auto other = dataset.subtrahend();
+  if (other && !other->step && other->info->steps.size() < info.steps.size()) {
+    shortest = other->info.get();
   }
-  const int last_step = static_cast<int>(info.steps.size()) - 1;
+  if (!seconds || shortest->steps.size() < 2) {
+    return invalid_at(
+        steps_pointer,
+        shortest->steps.size() < 2
+            ? "dataset " + in_double_quotes(shortest->id) + " has one step"
+            : "the times of the steps have no known unit: " + in_double_quotes(info.time_units));
+  }
+  const int last_step = static_cast<int>(shortest->steps.size()) - 1;
   const int first = std::max(view.step - view.vector.trace->seeds->path_steps, 0);
   const int last = std::min(view.step + view.vector.trace->seeds->path_steps, last_step);
   const std::uint64_t each = layer.field->values.size() * sizeof(float);
   const auto count = static_cast<std::uint64_t>(last) - static_cast<std::uint64_t>(first) + 1;
-  if (!dataset.is_within_limit(count * each)) {
-    return invalid_at(steps_pointer, std::to_string(count) + " steps take " +
-                                         std::to_string(count * each >> 20U) +
-                                         " MiB, more than the memory limit permits");
+  // What a step is computed from is let go before segments are made.
+  const bool computed = !how.variant.empty();
+  const std::uint64_t loading = dataset.loading_bytes(view.vector.field.name);
+  const std::uint64_t operands = computed ? loading : loading - std::min(each, loading);
+  const std::uint64_t all = count * each + std::max(segments, operands);
+  if (!dataset.is_within_limit(all)) {
+    return invalid_at(seeds_pointer, "the vectors of " + std::to_string(count) +
+                                         " steps and the segments of the paths take up to " +
+                                         std::to_string(all >> 20U) +
+                                         " MiB, more than the memory limit permits: choose fewer "
+                                         "/vector/trace/seeds/pathSteps, seeds or "
+                                         "/vector/trace/seeds/pieces");
   }
   Series out;
   const double origin = info.steps[static_cast<std::size_t>(view.step)].value;
@@ -164,16 +180,6 @@ Result<std::shared_ptr<const trace::Segments>> streamlines_of(
     }
   }
   trace::Streamlines of = description_of(view, layer, placed);
-  Series series;
-  if (seeds.path_steps > 0) {
-    auto loaded = series_of(view, how, layer, dataset);
-    if (!loaded) return loaded.error();
-    series = std::move(*loaded);
-    of.flow.frames = series.frames;
-    const double most = seeds.duration.value_or(std::numeric_limits<double>::max());
-    of.back = std::min(most, -series.frames.front().time);
-    of.ahead = std::min(most, series.frames.back().time);
-  }
   const std::int64_t vertices = trace::vertices_at_most(of, seeds_in(seeds));
   const std::uint64_t bytes = static_cast<std::uint64_t>(vertices) * trace::Segments::vertex_bytes;
   if (!dataset.is_within_limit(bytes) || vertices > std::numeric_limits<std::int32_t>::max()) {
@@ -181,6 +187,16 @@ Result<std::shared_ptr<const trace::Segments>> streamlines_of(
                                          " lines take up to " + std::to_string(bytes >> 20U) +
                                          " MiB, more than the memory limit permits: choose fewer "
                                          "seeds or /vector/trace/seeds/pieces");
+  }
+  Series series;
+  if (seeds.path_steps > 0) {
+    auto loaded = series_of(view, how, layer, bytes, dataset);
+    if (!loaded) return loaded.error();
+    series = std::move(*loaded);
+    of.flow.frames = series.frames;
+    const double most = seeds.duration.value_or(std::numeric_limits<double>::max());
+    of.back = std::min(most, -series.frames.front().time);
+    of.ahead = std::min(most, series.frames.back().time);
   }
   auto kept = dataset.auxiliary(name, bytes, [&]() -> Result<data::Resident> {
     const CancelToken cancel = dataset.cancellation();

@@ -41,7 +41,9 @@ class EastWind final : public data::Source {
     for (int s = 0; s < steps; ++s) info_.steps.push_back({10.0 * s, std::to_string(s)});
   }
   [[nodiscard]] const data::DatasetInfo& info() const override { return info_; }
+  [[nodiscard]] const int& reads() const { return reads_; }
   Result<data::Volume> read(std::size_t /*field*/, std::size_t step) override {
+    ++reads_;
     data::Volume volume;
     volume.dims = info_.grid.dims();
     volume.components = 2;
@@ -53,6 +55,7 @@ class EastWind final : public data::Source {
   }
 
  private:
+  int reads_ = 0;
   data::DatasetInfo info_;
 };
 
@@ -323,6 +326,83 @@ TEST(PathScene, AWindThatGrowsCarriesAParticleByItsMeanSpeed) {
   const double middle = 0.5 * (x.front() + x.back());
   EXPECT_NEAR((middle - low) / per_degree * metres, 54000, 300);
   EXPECT_NEAR((high - middle) / per_degree * metres, 90000, 300);
+}
+
+View carried_paths(int steps) {
+  View view = seeded({{15, 0, 500}});
+  view.vector.field = {protocol::FieldChoice::Kind::named, "wind"};
+  view.vector.space = protocol::VectorSpace::world;
+  view.step = 1;
+  view.vector.trace->seeds->path_steps = steps;
+  return view;
+}
+
+TEST(PathScene, TheNumberOfStepsIsPartOfTheKeyOfTheLines) {
+  data::Dataset dataset(std::make_unique<EastWind>(atmosphere_grid(), 5), "fake",
+                        std::uint64_t{1} << 30U);
+  const auto one = built(carried_paths(1), dataset).vector->streamlets;
+  EXPECT_EQ(built(carried_paths(1), dataset).vector->streamlets, one);
+  EXPECT_NE(built(carried_paths(3), dataset).vector->streamlets, one);
+  EXPECT_NE(built(carried_paths(0), dataset).vector->streamlets, one);
+}
+
+// Drawing the picture again needs the vectors of its own step only.
+TEST(PathScene, KeptPathsDoNotLoadTheirStepsAgain) {
+  auto source = std::make_unique<EastWind>(atmosphere_grid(), 3);
+  const int& reads = source->reads();
+  data::Dataset dataset(std::move(source), "fake", std::uint64_t{1} << 30U);
+  const auto kept = built(carried_paths(1), dataset).vector->streamlets;
+  dataset.evict();
+  const int before = reads;
+  const Scene again = built(carried_paths(1), dataset);
+  EXPECT_EQ(again.vector->streamlets, kept);
+  EXPECT_LE(reads, before + 1);
+}
+
+// Of a difference at the same steps, paths end where one of the datasets does.
+TEST(PathScene, ADifferenceHasTheStepsOfBothDatasets) {
+  const data::Dataset longer(std::make_unique<EastWind>(atmosphere_grid(), 5), "longer",
+                             std::uint64_t{1} << 30U);
+  for (const int steps : {1, 2}) {
+    const data::Dataset shorter(std::make_unique<EastWind>(atmosphere_grid(), steps), "shorter",
+                                std::uint64_t{1} << 30U);
+    auto both = longer.minus(shorter, std::nullopt);
+    ASSERT_TRUE(both) << both.error().message;
+    View view = carried_paths(4);
+    view.step = 0;
+    view.difference = protocol::DifferenceView{"shorter", std::nullopt};
+    const auto scene = build_scene(view, *both);
+    EXPECT_EQ(scene.has_value(), steps == 2);
+    if (steps == 1) {
+      ASSERT_FALSE(scene.error().at.empty()) << scene.error().message;
+      EXPECT_EQ(scene.error().at[0].pointer, "/vector/trace/seeds/pathSteps");
+    } else if (!scene) {
+      ADD_FAILURE() << scene.error().message;
+    }
+  }
+}
+
+// Each of them fits, but not both.
+TEST(PathScene, VectorsOfTheStepsAndSegmentsMustFitTogether) {
+  data::Grid grid = atmosphere_grid();
+  std::vector<double> levels;
+  for (int k = 0; k < 20000; ++k) levels.push_back(1000 - 0.04 * k);
+  grid.axes[2].coordinates = levels;
+  constexpr std::uint64_t series = 5 * 12 * 20000 * 2 * sizeof(float);
+  std::uint64_t limit = series;
+  const auto dataset_within = [&](std::uint64_t bytes) {
+    return data::Dataset(std::make_unique<EastWind>(grid, 5), "fake", bytes);
+  };
+  while (!dataset_within(limit).is_within_limit(series + (series / 2))) limit += 1U << 20U;
+  data::Dataset dataset = dataset_within(limit);
+  View view = carried_paths(4);
+  view.vector.trace->seeds->points.clear();
+  view.vector.trace->seeds->pieces = 4096;
+  view.vector.trace->seeds->evenly =
+      static_cast<int>(series / (4224 * trace::Segments::vertex_bytes));
+  const auto refused = refusal_of(view, dataset);
+  EXPECT_EQ(refused.first, "/vector/trace/seeds");
+  EXPECT_THAT(refused.second, HasSubstr("/vector/trace/seeds/pathSteps"));
 }
 
 }  // namespace
