@@ -74,7 +74,7 @@ std::string end_ahead(const scene::VectorLayer& layer) {
 }
 
 // What the values of a field are in this view.
-std::string titled(const Subject& subject, std::string name) {
+std::string titled(const Subject& subject, const std::string& name) {
   return subject.completed.view().difference ? "difference of " + name : name;
 }
 
