@@ -303,7 +303,7 @@ TEST_F(Measures, RangeInTheRegionOfAViewIsThatOfItsSamples) {
   expect_problem_saying(posted("none", "{}"), 404, "none");
   expect_problem_saying(posted(info.name, "{"), 400);
   expect_problem_saying(posted(info.name, R"({"step":99})"), 422);
-  expect_problem_saying(posted(info.name, R"({"region":{"x":[1e6,2e6]}})"), 422, "no sample");
+  expect_problem_saying(posted(info.name, R"({"region":{"y":[1e6,2e6]}})"), 422, "no sample");
 }
 
 // Samples are named by which the values of the range are read again.
