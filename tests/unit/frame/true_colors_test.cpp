@@ -110,8 +110,8 @@ TEST(TrueColors, LeaveOutWhiteningDimmingAndDepthCue) {
   EXPECT_EQ(after->depth_cue.strength, 0);
 }
 
-// Without white heads the dark tail is all that tells a plain line's direction; other shapes tell
-// it themselves, and streamlets have no marks.
+// Without white heads the dark tail is all that tells the direction of a line without a shape, also
+// of a traced one; other shapes tell it themselves.
 TEST(TrueColors, DarkenTheTailsOfPlainLinesUnlessGiven) {
   auto dataset = scene::sample_dataset("tornado", {8, 8, 8});
   const auto tail = [&](const auto& change) {
@@ -125,7 +125,7 @@ TEST(TrueColors, DarkenTheTailsOfPlainLinesUnlessGiven) {
   EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.mark.tail_darkening = 0.2; }), 0.2);
   EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.mark.shape = MarkShape::taper; }), 0);
   EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.mark.shape = MarkShape::arrow; }), 0);
-  EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.trace.emplace(); }), 0);
+  EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.trace.emplace(); }), 0.85);
   EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.color.true_colors = false; }), 0);
 }
 
