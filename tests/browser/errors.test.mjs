@@ -96,7 +96,7 @@ test("a lossless final frame equals the pixels of the daemon, a JPEG does not", 
     assert.equal((await lastFrame(page)).codec, "png", "the next final frame is lossless too");
   }));
 
-test("a refused view is told by the labels of the controls, not by JSON pointers", () =>
+test("the message of a refused view has the labels of the controls, not JSON pointers", () =>
   withPage(
     async (page) => {
       const view = { dataset: "tornado", vector: { stride: 100 }, annotations: { title: 3 } };

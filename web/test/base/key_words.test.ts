@@ -77,7 +77,7 @@ test("the type that JSON expects is left out where no control can send it", () =
   );
 });
 
-test("places are counted in words or by right ordinals", () => {
+test("repeated parts have ordinals: words up to the fourth, then numbers", () => {
   const names = [0, 3, 4, 10, 20, 21, 22, 110].map((at) => keyName(`/surfaces/${at}`));
   const counted = ["first", "fourth", "5th", "11th", "21st", "22nd", "23rd", "111th"];
   assert.deepEqual(
