@@ -300,6 +300,14 @@ TEST_F(Measures, RangeInTheRegionOfAViewIsThatOfItsSamples) {
   EXPECT_EQ(told["places"]["max"]["x"], x[index["x"].get<std::size_t>()]);
   const std::string whole = "fields/" + info.name + "/range?step=1";
   EXPECT_EQ(json_of(posted(info.name, R"({"step":1})")), ask(whole));
+  // Of a difference, as the view shows it.
+  const auto before = volume(info.name, 0);
+  float changed = -std::numeric_limits<float>::infinity();
+  for (std::size_t n = 0; n < there->samples(); ++n) {
+    changed = std::max(changed, there->component(0)[n] - before->component(0)[n]);
+  }
+  const Json difference = json_of(posted(info.name, R"({"step":1,"difference":{"step":0}})"));
+  EXPECT_EQ(difference["range"][1].get<float>(), changed);
   expect_problem_saying(posted("none", "{}"), 404, "none");
   expect_problem_saying(posted(info.name, "{"), 400);
   expect_problem_saying(posted(info.name, R"({"step":99})"), 422);
