@@ -242,6 +242,7 @@ test("the legend shows surfaces, and the range of their colours can be set", () 
     const ticks = () => card.locator(".legend-tick").allTextContents();
     const largest = Number((await ticks()).at(-1));
     assert.ok(largest > high / 2 && largest <= high, `${largest} of ${high}`);
+    await page.keyboard.press("Shift"); // another key begins another undo entry
     await surface("colours to").fill(String(3 * high));
     await surface("colours to").press("Enter");
     await finalPicture(page);
