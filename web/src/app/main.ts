@@ -24,6 +24,7 @@ import { Login } from "./login";
 import { panelSheet } from "./panel_sheet";
 import { Panels } from "../panels/panels";
 import { Probe } from "../viewport/probe";
+import { RegionBox } from "../viewport/region_box";
 import { otherDatasets } from "../view/others";
 import { makeReference } from "../viewport/reference_view";
 import { saveDialog } from "../save/save_dialog";
@@ -115,6 +116,7 @@ const panels = new Panels(panelBox, host, {
   camera: () => app.cameras.camera(),
   setCamera: (camera) => app.cameras.setCamera(camera),
   probed: () => probe.show(),
+  cropped: () => regionBox.show(),
   flowing: () => app.isFlowing(),
   flow: (on) => app.flow(on),
 });
@@ -132,6 +134,15 @@ const probe = new Probe(
   byId("probe-button", HTMLButtonElement),
 );
 
+const regionBox = new RegionBox(document.querySelector<SVGSVGElement>("#region-box")!, {
+  on: () => app.isOpen() && panels.cropping(),
+  camera: () => app.cameras.camera(),
+  view: () => app.view(),
+  explicitView: () => app.explicitView(),
+  dataset: () => app.dataset(),
+  change: (patch) => app.change(patch),
+  ready: () => app.cameras.ready(),
+});
 const reference = makeReference(canvas, () => app.view());
 const hover = new HoverView(
   canvas,

@@ -169,7 +169,8 @@ function addPolygon(folder: GUI, kit: PanelKit): void {
   });
 }
 
-export function addRegion(parent: GUI, kit: PanelKit): void {
+// Its handles over the picture are shown while the folder is open.
+export function addRegion(parent: GUI, kit: PanelKit, changed: () => void): GUI {
   const folder = kit.folder(parent, "Region");
   addDegrees(folder, kit);
   addRanges(folder, kit);
@@ -178,4 +179,7 @@ export function addRegion(parent: GUI, kit: PanelKit): void {
   kit.action(folder, "everything", "Draw all of the data again", () =>
     kit.host.change({ region: null }),
   );
+  folder.onOpenClose(changed);
+  kit.onRefresh(changed);
+  return folder;
 }

@@ -33,12 +33,14 @@ const firstLimit = 0.01; // initial error limit when one is switched on; linear 
 export interface PanelActions extends CameraSwitch, FlowSwitch, PresetSwitch, DifferenceActions {
   reset(): void; // restores the dataset's defaults
   probed(): void; // the probe was moved or switched
+  cropped(): void; // the region may have changed, or its folder was opened or closed
 }
 
 export class Panels {
   private gui: GUI | null = null;
   private kit: PanelKit | null = null;
   probe: ProbePanel | null = null;
+  cropping = (): boolean => false; // the folder of the region is open
   private readonly kept = new Kept();
   private of = ""; // id of the dataset for which the panels were built
 
@@ -63,7 +65,8 @@ export class Panels {
     addPresets(gui, kit, this.actions);
     const data = kit.folder(gui, "Data");
     addSection(data, kit);
-    addRegion(data, kit);
+    const region = addRegion(data, kit, () => this.actions.cropped());
+    this.cropping = () => !region._closed;
     this.probe = new ProbePanel(data, kit, () => this.actions.probed(), this.probePlace());
     addLines(gui, kit);
     addMedia(gui, kit);
