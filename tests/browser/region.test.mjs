@@ -1,9 +1,12 @@
 // Handles of the region over the picture.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { finalPicture, sharedDaemon } from "./support.mjs";
+import { finalPicture, sharedDaemon, shot, state } from "./support.mjs";
 
 const { withPage } = sharedDaemon();
+
+const climate = `#!${encodeURIComponent('{"dataset":"climate"}')}`;
+const unfolded = ["Data", "Region"];
 
 test("handles on the picture crop the region, by pointer and by keys", async () => {
   await withPage(
@@ -47,6 +50,29 @@ test("handles on the picture crop the region, by pointer and by keys", async () 
       await page.locator("#panel .lil-title", { hasText: /^Region$/ }).click();
       assert.equal(await page.locator("#region-box").isVisible(), false);
     },
-    { unfolded: ["Data", "Region"], path: `#!${encodeURIComponent('{"dataset":"climate"}')}` },
+    { unfolded, path: climate },
+  );
+});
+
+test("pictures that do not move the handles leave them alone", async () => {
+  await withPage(
+    async (page) => {
+      await page.evaluate(() => {
+        window.changes = 0;
+        const count = (all) => (window.changes += all.length);
+        const what = { subtree: true, childList: true, attributes: true };
+        new MutationObserver(count).observe(document.querySelector("#region-box"), what);
+      });
+      const { rev } = await state(page);
+      await page.keyboard.press("]");
+      await finalPicture(page);
+      assert.notEqual((await state(page)).rev, rev, "another step is drawn");
+      assert.equal(await page.evaluate(() => window.changes), 0);
+      await page.locator("#picture").press("ArrowRight");
+      await finalPicture(page);
+      assert.ok((await page.evaluate(() => window.changes)) > 0, "they follow the camera");
+      await shot(page, "region-handles");
+    },
+    { unfolded, path: climate },
   );
 });

@@ -48,29 +48,49 @@ const radius = 8; // of handles, pixels
 const touchRadius = 16; // takes the pointer
 const pageShare = 0.1; // of the samples, by page up and down
 
+// A line with a dark rim, which keeps it in sight over any picture: two paths of the same course.
+type Outline = [line: SVGElement, rim: SVGElement];
+
+function outline(kind: string): Outline {
+  const path = (name: string): SVGElement =>
+    makeSvg("path", { class: `${name} ${kind}`.trim(), "aria-hidden": "true" });
+  return [path("region-line"), path("region-rim")];
+}
+
+const pathPoint = (point: [number, number]): string => point.map((at) => at.toFixed(1)).join(" ");
+
 export class RegionBox {
-  private readonly edges: SVGElement;
+  private readonly edges: [near: Outline, far: Outline];
   private readonly handles: SVGElement[];
   private drag: Drag | null = null;
+  private drawn = ""; // what the lines and handles show
 
   constructor(
     private readonly svg: SVGSVGElement,
     private readonly host: RegionBoxHost,
   ) {
-    this.edges = makeSvg("g", { "aria-hidden": "true" });
+    this.edges = [outline(""), outline("is-far")];
     this.handles = faces.map((face) => this.makeHandle(face));
-    svg.append(this.edges, ...this.handles);
+    svg.append(...this.edges.flat().reverse(), ...this.handles);
     new ResizeObserver(() => this.show()).observe(svg);
   }
 
-  // Call when the view, the camera or the folder may have changed.
+  // Call when the view, the camera or the folder may have changed, as with every picture. What is
+  // shown already is left alone: a change of it paints the whole picture of the page again.
   show(): void {
     const camera = this.host.on() ? this.host.camera() : null;
     const box = camera === null ? null : cropBox(this.host.dataset(), this.host.view());
-    this.svg.toggleAttribute("hidden", box === null);
+    const hidden = box === null;
+    if (this.svg.hasAttribute("hidden") !== hidden) this.svg.toggleAttribute("hidden", hidden);
     if (camera === null || box === null) return;
-    this.showEdges(camera, box);
     const slice = this.host.view().geometry?.slice?.axis;
+    const { clientWidth, clientHeight } = this.svg;
+    const { id } = this.host.dataset();
+    const held = this.drag?.face ?? null;
+    const wanted = JSON.stringify([id, clientWidth, clientHeight, camera, box, slice, held]);
+    if (wanted === this.drawn) return;
+    this.drawn = wanted;
+    this.showEdges(camera, box);
     this.handles.forEach((handle, n) => {
       const face = faces[n]!;
       const held = this.drag?.face === face;
@@ -91,8 +111,8 @@ export class RegionBox {
   // Edges whose two faces are turned away are dashed.
   private showEdges(camera: Camera, box: CropBox): void {
     const away = faces.map((face) => towardViewer(camera, box, face) < 0);
-    const lines: SVGElement[] = [];
-    for (const [n, axis] of ([0, 1, 2] as const).entries()) {
+    const lines = ["", ""]; // near, far
+    for (const n of [0, 1, 2] as const) {
       const [b, c] = [(n + 1) % 3, (n + 2) % 3] as [0 | 1 | 2, 0 | 1 | 2];
       for (const corner of [0, 1, 2, 3]) {
         const [endB, endC] = [corner & 1, corner >> 1];
@@ -100,16 +120,16 @@ export class RegionBox {
         if (endB === 1) from[b] = box.max[b];
         if (endC === 1) from[c] = box.max[c];
         const to: Vec3 = [...from];
-        to[axis] = box.max[axis];
+        to[n] = box.max[n];
         const [p, q] = [this.place(camera, from), this.place(camera, to)];
         if (p === null || q === null) continue;
         const far = away[2 * b + endB]! && away[2 * c + endC]!;
-        const line = makeSvg("line", { x1: p[0], y1: p[1], x2: q[0], y2: q[1] });
-        line.classList.toggle("is-far", far);
-        lines.push(line);
+        lines[Number(far)] += `M${pathPoint(p)}L${pathPoint(q)}`;
       }
     }
-    this.edges.replaceChildren(...lines);
+    this.edges.forEach((paths, far) => {
+      for (const path of paths) path.setAttribute("d", lines[far]!);
+    });
   }
 
   private showHandle(handle: SVGElement, box: CropBox, face: Face, [x, y]: [number, number]): void {
