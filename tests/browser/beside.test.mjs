@@ -58,10 +58,11 @@ const compare = async (page) => {
   await bothFinal(page);
 };
 
-// The views that the server reported last to the two sessions.
+// The views that the server reported last to the two sessions. The second one begins anew whenever
+// its picture is opened.
 const views = async (page) => {
   await bothFinal(page);
-  return page.evaluate(() => window.reported.slice(-2).map((all) => all.at(-1)));
+  return page.evaluate(() => [window.reported[0], window.reported.at(-1)].map((all) => all.at(-1)));
 };
 
 const ranges = ({ vector, scalars }) => ({
@@ -118,6 +119,82 @@ test("both pictures have the ranges of the first, and follow its settings until 
     assert.equal((await views(page))[1].vector.opacity, 0.9);
   }));
 
+test("cameras are unlinked and linked again; each picture is then moved by itself", () =>
+  withPage(async (page) => {
+    await compare(page);
+    const [{ camera }] = await views(page);
+    const linked = page.locator("#beside-camera");
+    await linked.uncheck();
+    await dragBeside(page);
+    const [first, second] = await views(page);
+    assert.deepEqual(first.camera, camera, "the first camera stays");
+    assert.notDeepEqual(second.camera, camera);
+    await drag(page, 120, 30);
+    const [moved, kept] = await views(page);
+    assert.notDeepEqual(moved.camera, camera);
+    assert.deepEqual(kept.camera, second.camera, "so does the second");
+    await shot(page, "beside-cameras");
+    await page.locator("#beside-picture").press("ArrowLeft"); // keys move the one with the focus
+    const [still, turned] = await views(page);
+    assert.deepEqual(still.camera, moved.camera);
+    assert.notDeepEqual(turned.camera, second.camera);
+    await page.locator("#beside-swap").click();
+    const [swapped, other] = await views(page);
+    assert.deepEqual([swapped.camera, other.camera], [turned.camera, moved.camera]);
+    await linked.check();
+    const [leader, follower] = await views(page);
+    assert.deepEqual(leader.camera, swapped.camera);
+    assert.deepEqual(follower.camera, swapped.camera);
+  }));
+
+// What a user set in the second picture alone.
+const setApart = async (page) => {
+  await compare(page);
+  await page.locator("#beside-linked").uncheck();
+  await page.locator("#beside-camera").uncheck();
+  await type(page, "opacity", 0.35); // the first one
+  await dragBeside(page);
+  await page.locator("#beside-step").fill("3");
+  await page.keyboard.press("Enter");
+  const both = await views(page);
+  assert.notEqual(both[0].vector.opacity, both[1].vector.opacity);
+  assert.notDeepEqual(both[0].camera, both[1].camera);
+  assert.equal(both[1].step, 2);
+  return both;
+};
+
+test("the address restores settings and camera of both pictures", () =>
+  withPage(async (page) => {
+    const before = await setApart(page);
+    await page.waitForTimeout(600); // the address is written with a delay
+    await page.reload();
+    assert.deepEqual(await views(page), before);
+    assert.equal(await page.locator("#beside-linked").isChecked(), false);
+    assert.equal(await page.locator("#beside-camera").isChecked(), false);
+  }));
+
+test("a saved view restores both pictures, and one without a second closes it", () =>
+  withPage(async (page) => {
+    const save = async (name) => {
+      await page.locator("#save-button").click();
+      await page.locator("#keep-name").fill(name);
+      await page.keyboard.press("Enter");
+      await page.locator("#kept li").first().waitFor();
+    };
+    const reopen = async (name) => page.locator("#save").getByLabel(`Open ${name}`).click();
+    await save("alone");
+    await page.keyboard.press("Escape");
+    const before = await setApart(page);
+    await save("both");
+    await shot(page, "beside-saved");
+    await reopen("alone");
+    await finalPicture(page);
+    assert.equal(await page.locator("#beside").isVisible(), false);
+    await page.locator("#save-button").click();
+    await reopen("both");
+    assert.deepEqual(await views(page), before);
+  }));
+
 test("step and swap, by keyboard alone; the way out gives the room and the focus back", () =>
   withPage(async (page) => {
     const width = () => page.locator("#picture").evaluate(({ clientWidth }) => clientWidth);
@@ -132,8 +209,7 @@ test("step and swap, by keyboard alone; the way out gives the room and the focus
     await page.keyboard.press("Enter");
     assert.equal((await views(page))[1].step, 2, "counted from 1");
     const before = (await views(page))[0].step ?? 0;
-    await page.keyboard.press("Tab");
-    await page.keyboard.press("Tab");
+    for (let n = 0; n < 3; n++) await page.keyboard.press("Tab");
     await page.keyboard.press("Enter"); // Swap
     await page.waitForFunction(() => document.querySelector("#picture").dataset.step === "2");
     assert.equal((await views(page))[1].step ?? 0, before);

@@ -39,6 +39,30 @@ test("views are saved, renamed and deleted, the newest first", () => {
   assert.deepEqual(namesOf(saved), ["eins"]);
 });
 
+test("a view is saved with the picture beside it, which is checked when it is read", () => {
+  const store = new Store();
+  const saved = new SavedViews(() => store, "key");
+  const beside = { step: 2, camera: { eye: [1, 2, 3] as [number, number, number] } };
+  saved.add("two", { step: 1 }, 10, beside);
+  saved.add("one", { step: 1 }, 20);
+  saved.rename(saved.list()[1]!.id, "both");
+  assert.deepEqual(
+    saved.list().map(({ name, beside: kept }) => [name, kept]),
+    [
+      ["one", undefined],
+      ["both", beside],
+    ],
+  );
+  store.text = JSON.stringify([
+    { name: "a", view: {}, date: 1, beside: { step: "x", camera: { eye: 3 } } },
+    { name: "b", view: {}, date: 1, beside: 7 },
+  ]);
+  assert.deepEqual(
+    saved.list().map(({ beside: kept }) => kept),
+    [{}, undefined],
+  );
+});
+
 const namesOf = (saved: SavedViews): string[] => saved.list().map(({ name }) => name);
 
 test("changes by other tabs are applied, including entries of earlier releases", () => {

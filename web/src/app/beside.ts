@@ -1,7 +1,17 @@
 // The second picture beside the first: a session of its own whose view follows that of the first,
-// except for its dataset and step. What the user chooses in its bar -> its view -> its picture.
+// except for its dataset and step, and for its settings and camera while they are not linked. What
+// the user chooses in its bar -> its view -> its picture.
 import { anglesOf, distanceOf, type Camera } from "../view/camera";
-import { besideSuffix, besideView, swapped, takeBeside, type Beside } from "../view/beside";
+import {
+  besideSuffix,
+  besideView,
+  ownSettings,
+  swapped,
+  takeBeside,
+  withOwnSettings,
+  type Beside,
+} from "../view/beside";
+import { roundedCamera } from "../view/camera_control";
 import { ViewState } from "../view/view_state";
 import { afterResizing, byId } from "../base/dom";
 import { pictureCaption } from "../view/caption";
@@ -9,6 +19,7 @@ import type { Clock, Connection, ConnectionState } from "../wire/connection";
 import type { Dataset, FrameHeader, ServerMessage, View } from "../wire/protocol";
 import { failureText } from "../wire/api";
 import { problemText } from "../wire/requests";
+import type { CameraHost } from "../viewport/input";
 import { Viewport } from "../viewport/viewport";
 import { PatchAnswers } from "./patch_answers";
 import { openConnection, watchPresence } from "./server_link";
@@ -17,14 +28,22 @@ export interface BesideHost {
   view(): View; // of the first picture, with all known values
   explicitView(): View; // of the first picture, without defaults
   drawn(): boolean; // whether the first picture has been drawn
+  answered(): boolean; // whether the first picture is that of its newest view
   dataset(): Dataset; // of the first picture
   others(): Map<string, string>; // datasets that may be shown beside it: id -> text
   openOther(id: string): Promise<string>; // opens an entry that is not listed; its id
   openView(view: View): void; // shows another view in the first picture
   edited(): void; // what the address keeps has changed
+  cameras: CameraHost; // of the first picture
 }
 
 const same = ""; // the dataset of the first picture
+
+const spoken = (withOwnCamera: boolean): string =>
+  withOwnCamera
+    ? "The volume for comparison, with a camera of its own. Drag or use arrow keys to rotate it."
+    : "The volume for comparison, with the camera of the first picture. " +
+      "Drag or use the arrow keys to rotate both.";
 
 export class BesidePicture {
   readonly canvas = byId("beside-picture", HTMLCanvasElement);
@@ -32,6 +51,7 @@ export class BesidePicture {
   private readonly datasets = byId("beside-dataset", HTMLSelectElement);
   private readonly step = byId("beside-step", HTMLInputElement);
   private readonly linked = byId("beside-linked", HTMLInputElement);
+  private readonly sameCamera = byId("beside-camera", HTMLInputElement);
   private readonly words = byId("beside-words", HTMLElement);
   private readonly button = byId("compare-button", HTMLButtonElement);
   private readonly viewport: Viewport;
@@ -39,7 +59,8 @@ export class BesidePicture {
   private state = new ViewState();
   private answers = new PatchAnswers(this.state);
   private shows: Beside | null = null;
-  private own: View | null = null; // settings that do not follow the first picture
+  private own: View | null = null; // settings that do not follow the first picture, all of them
+  private drawnCamera: Camera | null = null; // as the server drew it
   private running = false;
   private choices = 0; // of datasets; answers to earlier ones are too late
   private caption = "";
@@ -77,7 +98,11 @@ export class BesidePicture {
     this.step.addEventListener("change", () => this.chooseStep(this.step.value));
     this.linked.addEventListener("change", () => {
       this.own = this.linked.checked ? null : this.state.document;
-      this.follow();
+      this.show({ ...this.shows, settings: undefined });
+    });
+    this.sameCamera.addEventListener("change", () => {
+      const camera = this.sameCamera.checked ? undefined : (this.cameras.camera() ?? {});
+      this.show({ ...this.shows, camera });
     });
     byId("beside-swap", HTMLButtonElement).addEventListener("click", () => this.swap());
     byId("beside-close", HTMLButtonElement).addEventListener("click", () => this.show(null));
@@ -87,14 +112,63 @@ export class BesidePicture {
   // --- the page's address ----------------------------------------------------------------
 
   get suffix(): string {
-    return besideSuffix(this.shows);
+    return besideSuffix(this.kept);
+  }
+
+  // What restores this picture beside the first one; null: it is not shown.
+  get kept(): Beside | null {
+    if (this.shows === null || this.own === null) return this.shows;
+    return { ...this.shows, settings: ownSettings(this.host.view(), this.own) };
   }
 
   // Shows what the address keeps; returns its rest.
   take(hash: string): string {
     const [rest, beside] = takeBeside(hash);
-    this.show(beside);
+    this.open(beside);
     return rest;
+  }
+
+  // Shows what was kept; its own settings once the first picture has been drawn, from whose they
+  // depart. null: closes this picture.
+  open(beside: Beside | null): void {
+    this.own = null;
+    this.show(beside);
+  }
+
+  // --- its camera ------------------------------------------------------------------------
+
+  get hasOwnCamera(): boolean {
+    return this.shows?.camera !== undefined;
+  }
+
+  // Moves this picture alone, or both.
+  readonly cameras: CameraHost = {
+    camera: () => {
+      const own = this.shows?.camera;
+      if (own === undefined) return this.host.cameras.camera();
+      const set = Object.entries(own).filter(([, value]) => value !== null);
+      const camera = { ...this.drawnCamera, ...Object.fromEntries(set) } as Camera;
+      return camera.eye && camera.target && camera.up ? camera : null;
+    },
+    setCamera: (camera) => {
+      if (this.hasOwnCamera) this.setOwnCamera(roundedCamera(camera));
+      else this.host.cameras.setCamera(camera);
+    },
+    ready: () => (this.hasOwnCamera ? this.connection.ready : this.host.cameras.ready()),
+  };
+
+  // The server then frames the whole box.
+  resetCamera(): void {
+    const { projection, fovY } = this.shows?.camera ?? {};
+    this.setOwnCamera({ projection, fovY });
+  }
+
+  private setOwnCamera(camera: Beside["camera"]): void {
+    if (this.shows === null) return;
+    this.shows = { ...this.shows, camera };
+    this.connection.wake();
+    this.follow();
+    this.host.edited();
   }
 
   // --- what it shows ---------------------------------------------------------------------
@@ -123,7 +197,6 @@ export class BesidePicture {
     document.documentElement.classList.toggle("comparing", beside !== null);
     if (beside === null) {
       this.own = null;
-      this.linked.checked = true;
       this.choices += 1;
       this.running = false;
       this.connection.stop();
@@ -168,8 +241,10 @@ export class BesidePicture {
 
   // The first picture shows what this one shows, and the other way round.
   private swap(): void {
-    if (this.shows === null) return;
-    const [view, beside] = swapped(this.host.explicitView(), this.shows);
+    if (this.shows === null || this.shows.settings !== undefined) return;
+    const [explicit, first] = [this.host.explicitView(), this.host.view()];
+    const [view, beside, own] = swapped({ explicit, first, beside: this.shows, own: this.own });
+    this.own = own;
     this.show(beside);
     this.host.openView(view);
   }
@@ -182,7 +257,7 @@ export class BesidePicture {
       this.connection.start();
     }
     this.writeBar();
-    if (!this.connection.live || !this.connection.ready) return;
+    if (!this.connection.live || !this.connection.ready || !this.hasSettings()) return;
     const next = besideView(this.host.view(), this.shows, this.viewport.size(), this.own);
     const text = JSON.stringify(next);
     if (text === this.sent) return;
@@ -191,6 +266,17 @@ export class BesidePicture {
       this.connection.send({ type: "patch", rev, t: performance.now(), patch });
     }
     this.canvas.dataset.wanted = String(this.state.rev);
+  }
+
+  // Whether its own settings are known. Those that were kept depart from the settings of the first
+  // picture, whose defaults are known once it has been drawn.
+  private hasSettings(): boolean {
+    const { settings, ...shows } = this.shows!;
+    if (settings === undefined) return true;
+    if (!this.host.answered()) return false;
+    this.own = withOwnSettings(this.host.view(), settings);
+    this.shows = shows;
+    return true;
   }
 
   private writeBar(): void {
@@ -206,6 +292,9 @@ export class BesidePicture {
       );
     }
     this.datasets.value = dataset;
+    this.linked.checked = this.own === null && this.shows!.settings === undefined;
+    this.sameCamera.checked = !this.hasOwnCamera;
+    this.canvas.ariaLabel = spoken(this.hasOwnCamera);
     if (document.activeElement !== this.step) {
       this.step.value = step === undefined ? "" : String(step + 1);
     }
@@ -239,6 +328,7 @@ export class BesidePicture {
       this.caption = this.captionOf(view, header.step);
       this.showCaption();
       const camera = view.camera as Camera;
+      this.drawnCamera = camera;
       const { azimuth, elevation } = anglesOf(camera);
       // As the server drew it.
       this.canvas.dataset.azimuth = azimuth.toFixed(1);

@@ -1,6 +1,6 @@
 // Assembles the page (parts, key bindings, buttons) and starts the application.
 import { takeBeside } from "../view/beside";
-import { drag, pan, roll, zoom, type Angles } from "../view/camera";
+import { drag, pan, roll, withProjection, zoom, type Angles } from "../view/camera";
 import { pictureCaption } from "../view/caption";
 import { About } from "./about";
 import { App } from "./app";
@@ -44,13 +44,16 @@ const app = new App(clock, document.baseURI);
 const embedded = isEmbedded(window.location.search);
 document.documentElement.classList.toggle("embedded", embedded);
 const canvas = byId("picture", HTMLCanvasElement);
-const moves = new MoveQueue(app.cameras, (run) => window.requestAnimationFrame(run));
-const turn = new Turn(moves, {
+const requestFrame = (run: () => void) => void window.requestAnimationFrame(run);
+const turnHost = {
   now: () => performance.now(),
-  requestFrame: (run) => window.requestAnimationFrame(run),
+  requestFrame,
   still: () => window.matchMedia("(prefers-reduced-motion: reduce)").matches,
-});
-const lookFrom = (angles: Angles) => turn.to(app.cameras.viewFrom(angles));
+};
+const moves = new MoveQueue(app.cameras, requestFrame);
+const turn = new Turn(moves, turnHost);
+const lookFrom = (angles: Angles) =>
+  (besideIsSteered() ? besideTurn : turn).to(app.cameras.viewFrom(angles));
 new PointerInput(canvas, moves, {
   clicked: (x, y, { altKey, pointerType }) => {
     probe.pick([x, y], altKey && !embedded);
@@ -102,12 +105,19 @@ const beside = new BesidePicture(document.baseURI, clock, {
   ...comparable,
   view: () => app.view(),
   drawn: () => app.hasPicture(),
+  answered: () => app.isOpen() && canvas.dataset.rev === canvas.dataset.wanted,
+  cameras: app.cameras,
   dataset: () => app.dataset(),
   explicitView: () => app.explicitView(),
   openView: (view) => app.openView(view),
   edited: () => app.saveAddress(),
 });
-new PointerInput(beside.canvas, moves, { clicked: () => {}, takesWheel: () => true });
+const besideMoves = new MoveQueue(beside.cameras, requestFrame);
+const besideTurn = new Turn(besideMoves, turnHost);
+new PointerInput(beside.canvas, besideMoves, { clicked: () => {}, takesWheel: () => true });
+// Whether keys move the second picture alone: it has the focus and a camera of its own.
+const besideIsSteered = () => beside.hasOwnCamera && document.activeElement === beside.canvas;
+const steered = () => (besideIsSteered() ? besideMoves : moves);
 const panels = new Panels(panelBox, host, {
   ...comparable,
   compare: () => beside.toggle(),
@@ -185,6 +195,11 @@ const openSaving = saveDialog(
     maps: app.maps,
     size: () => [canvas.clientWidth, canvas.clientHeight],
     pixelsMax: () => viewport.pixelsMax,
+    beside: () => beside.kept,
+    openSaved: (view, kept) => {
+      app.openView(view);
+      beside.open(kept);
+    },
     files: pictures,
   },
   document.baseURI,
@@ -209,27 +224,38 @@ function foldPanel(): void {
 }
 
 const arrow = (right: number, down: number) => (event: KeyboardEvent) =>
-  moves.push((camera) =>
+  steered().push((camera) =>
     event.shiftKey ? pan(camera, 0.01 * right, 0.01 * down) : drag(camera, right, down),
   );
+
+function toggleBesideProjection(): void {
+  besideMoves.push((camera) =>
+    withProjection(camera, camera.projection === "perspective" ? "orthographic" : "perspective"),
+  );
+}
 
 const bindings: Binding[] = [
   { keys: ["ArrowLeft"], shown: "←", does: "rotate (shift: pan) left", run: arrow(-5, 0) },
   { keys: ["ArrowRight"], shown: "→", does: "rotate (shift: pan) right", run: arrow(5, 0) },
   { keys: ["ArrowUp"], shown: "↑", does: "tilt (shift: pan) up", run: arrow(0, -5) },
   { keys: ["ArrowDown"], shown: "↓", does: "tilt (shift: pan) down", run: arrow(0, 5) },
-  { keys: ["+", "="], shown: "+", does: "zoom in", run: () => moves.push((c) => zoom(c, 1.15)) },
+  {
+    keys: ["+", "="],
+    shown: "+",
+    does: "zoom in",
+    run: () => steered().push((c) => zoom(c, 1.15)),
+  },
   {
     keys: ["-", "_"],
     shown: "−",
     does: "zoom out",
-    run: () => moves.push((c) => zoom(c, 1 / 1.15)),
+    run: () => steered().push((c) => zoom(c, 1 / 1.15)),
   },
   {
     keys: ["Home", "0"],
     shown: "0",
     does: "whole volume or slice, upright",
-    run: () => app.cameras.reset(),
+    run: () => (besideIsSteered() ? beside.resetCamera() : app.cameras.reset()),
   },
   ...looks.map(({ key, name, angles }) => ({
     keys: [key],
@@ -237,13 +263,13 @@ const bindings: Binding[] = [
     does: `view ${name}`,
     run: () => lookFrom(angles),
   })),
-  { keys: [","], shown: ",", does: "roll left", run: () => moves.push((c) => roll(c, -5)) },
-  { keys: ["."], shown: ".", does: "roll right", run: () => moves.push((c) => roll(c, 5)) },
+  { keys: [","], shown: ",", does: "roll left", run: () => steered().push((c) => roll(c, -5)) },
+  { keys: ["."], shown: ".", does: "roll right", run: () => steered().push((c) => roll(c, 5)) },
   {
     keys: ["o"],
     shown: "o",
     does: "perspective or orthographic",
-    run: () => app.cameras.toggleProjection(),
+    run: () => (besideIsSteered() ? toggleBesideProjection() : app.cameras.toggleProjection()),
   },
   {
     keys: [" "],

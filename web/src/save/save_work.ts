@@ -1,5 +1,6 @@
 // The jobs of the Save dialog: view and choices -> a picture, or the frames of an animation in one
 // file, rendered by the server.
+import type { Beside } from "../view/beside";
 import type { Camera } from "../view/camera";
 import type { ColorMaps } from "../wire/color_maps";
 import {
@@ -28,6 +29,8 @@ export interface SaveHost {
   size(): [width: number, height: number]; // CSS pixels
   pixelsMax(): number; // the server's limit for one picture
   files: FileTarget;
+  beside(): Beside | null; // the second picture; null: there is none
+  openSaved(view: View, beside: Beside | null): void;
 }
 
 const safeName = (name: string): string => name.replace(/[^\w.-]+/g, "_");

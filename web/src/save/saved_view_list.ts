@@ -27,7 +27,7 @@ export function savedViewList(
     }
   }
 
-  function row({ id, name: oldName, date, view }: SavedView): HTMLElement {
+  function row({ id, name: oldName, date, view, beside }: SavedView): HTMLElement {
     const name = make("input");
     name.value = oldName;
     name.maxLength = nameMax;
@@ -39,7 +39,7 @@ export function savedViewList(
     };
     const open = act("Open", () => {
       dialog.close();
-      host.files.open(view);
+      host.openSaved(view, beside ?? null);
     });
     const remove = act("×", () => {
       change(() => views.remove(id));
@@ -59,7 +59,9 @@ export function savedViewList(
       }),
     );
     const item = make("li");
-    item.append(name, make("time", "", new Date(date).toLocaleDateString()), open, remove);
+    const day = new Date(date).toLocaleDateString();
+    const text = beside === undefined ? day : `two pictures, ${day}`;
+    item.append(name, make("time", "", text), open, remove);
     return item;
   }
 
@@ -72,7 +74,7 @@ export function savedViewList(
   byId("keep-form", HTMLFormElement).addEventListener("submit", (event) => {
     event.preventDefault();
     const view = withoutSize(host.explicitView());
-    change(() => views.add(newName.value.trim(), view, Date.now()));
+    change(() => views.add(newName.value.trim(), view, Date.now(), host.beside()));
     show();
   });
   return show;

@@ -1,5 +1,6 @@
 // Named views saved in this browser's storage: a list, newest first. Stored content is untrusted
 // and checked.
+import { besideOf, type Beside } from "../view/beside";
 import type { View } from "../wire/protocol";
 import { isView } from "../wire/view_shape";
 
@@ -8,6 +9,7 @@ export interface SavedView {
   name: string;
   view: View;
   date: number; // ms since 1970
+  beside?: Beside; // the second picture
 }
 
 export const savedViewsMax = 100;
@@ -20,6 +22,11 @@ function looksRight(entry: unknown): entry is SavedView {
   const { name, view, date } = (entry ?? {}) as Partial<SavedView>;
   const named = typeof name === "string" && name.length <= nameMax;
   return named && isView(view) && Number.isFinite(date);
+}
+
+function checkedBeside({ beside, ...saved }: SavedView): SavedView {
+  const checked = besideOf(beside);
+  return checked === null ? saved : { ...saved, beside: checked };
 }
 
 // Entries of earlier releases have no id; it is derived from their original date and name.
@@ -39,7 +46,7 @@ export class SavedViews {
     try {
       const found: unknown = JSON.parse(this.store().getItem(this.key) ?? "[]");
       return Array.isArray(found)
-        ? found.filter(looksRight).slice(0, savedViewsMax).map(withId)
+        ? found.filter(looksRight).slice(0, savedViewsMax).map(checkedBeside).map(withId)
         : [];
     } catch {
       return [];
@@ -47,12 +54,13 @@ export class SavedViews {
   }
 
   // Throws an Error with a message if the browser refuses storage.
-  add(name: string, view: View, date: number): void {
+  add(name: string, view: View, date: number, beside: Beside | null = null): void {
     const list = this.list();
     if (list.length >= savedViewsMax)
       throw new Error(`${savedViewsMax} views are saved: delete one first.`);
-    if (JSON.stringify(view).length > viewCharactersMax) throw new Error("This view is too long.");
-    this.write([withId({ name: name.slice(0, nameMax), view, date }), ...list]);
+    const both = beside === null ? { view } : { view, beside };
+    if (JSON.stringify(both).length > viewCharactersMax) throw new Error("This view is too long.");
+    this.write([withId({ name: name.slice(0, nameMax), date, ...both }), ...list]);
   }
 
   // An entry that another tab has deleted is not restored.

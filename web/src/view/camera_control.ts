@@ -11,6 +11,15 @@ const globe: Box = { min: [-1, -1, -1], max: [1, 1, 1] };
 const round = (v: number): number => Number(v.toFixed(6));
 const roundAll = (v: Vec3): Vec3 => [round(v[0]), round(v[1]), round(v[2])];
 
+// To the digits that are sent.
+export const roundedCamera = (camera: Camera): Camera => ({
+  ...camera,
+  eye: roundAll(camera.eye),
+  target: roundAll(camera.target),
+  up: roundAll(camera.up),
+  height: round(camera.height),
+});
+
 export interface CameraControlHost {
   change(patch: Patch): void;
   size(): [number, number]; // size of the picture in pixels
@@ -32,13 +41,8 @@ export class CameraControl {
   }
 
   setCamera(camera: Camera): void {
-    const { eye, target, up, projection } = camera;
-    const patch: Patch = {
-      eye: roundAll(eye),
-      target: roundAll(target),
-      up: roundAll(up),
-      height: round(camera.height),
-    };
+    const { eye, target, up, height, projection } = roundedCamera(camera);
+    const patch: Patch = { eye, target, up, height };
     if (projection !== this.model.view().camera?.projection) patch.projection = projection;
     this.host.change({ camera: patch });
   }

@@ -74,6 +74,22 @@ function replacement(old: Patch, next: Patch): Patch {
   return patch;
 }
 
+// The merge patch by which `next` departs from `base`: equal values are left out.
+export function departure(base: unknown, next: unknown): Patch {
+  const patch: Patch = {};
+  const from = isObject(base) ? base : {};
+  const to = isObject(next) ? next : {};
+  for (const key of Object.keys(from)) if (!(key in to) && from[key] !== null) patch[key] = null;
+  for (const [key, value] of Object.entries(to)) {
+    const before = from[key];
+    if (JSON.stringify(before) === JSON.stringify(value)) continue;
+    const inside = isObject(value) && isObject(before) ? departure(before, value) : null;
+    if (inside === null) patch[key] = value;
+    else if (Object.keys(inside).length > 0) patch[key] = inside;
+  }
+  return patch;
+}
+
 interface Pending {
   rev: number;
   patch: Patch;
