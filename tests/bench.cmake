@@ -81,6 +81,9 @@ windsplat_smoke(links python3 ${bench_dir}/links.py --program=$<TARGET_FILE:wind
 windsplat_smoke(preauth_cost python3 ${bench_dir}/preauth_cost.py --program=$<TARGET_FILE:windsplat>
   --count=2 --key=P-256)
 windsplat_smoke(viewers python3 ${bench_dir}/viewers.py --program=$<TARGET_FILE:windsplat> --smoke)
+windsplat_smoke(moving_camera python3 ${bench_dir}/viewers.py --program=$<TARGET_FILE:windsplat>
+  --dataset=climate:32x16x8 --compare=${PROJECT_SOURCE_DIR}/docs/benchmarks/everything.json
+  --rounds=1 --seconds=1 --size=64x48)
 # Without VTK it prints a message and succeeds.
 windsplat_smoke(peers python3 ${bench_dir}/peers/compare.py --build=${PROJECT_BINARY_DIR}
   --frames=1 --sizes=64x48 --dims=32x16x8 --slow)

@@ -5,6 +5,7 @@ their cost. Tables as Markdown on stdout. Linux only (/proc).
 Usage: viewers.py [--program=windsplat] [--dataset=climate] [--viewers=16] [--seconds=20]
        [--size=640x480] [--video=0] [--mixed] [--deaf=20] [--ended=200]
        [--min-jain=0.95] [--max-spread=0] [--smoke]
+       viewers.py --compare=VIEW.json [--rounds=5] [--seconds=20] [--size=1280x720] [--dataset=...]
 
 A session sends the next camera with every frame it receives. --video: of the sessions, so many
 announce H.264 and acknowledge frames as late as over a link of 2 Mbit/s. --mixed adds one session
@@ -14,6 +15,10 @@ as many as fit into a minute. 0: none. Exit 1 if Jain's index of the frame rates
 (sum x)^2 / (n sum x^2), is below
 --min-jain, the p99 of the latency is above --max-spread times its median (0: any), a session that
 never reads takes more than two frames and 256 KiB, or a session gets no answer for 30 s.
+--compare: in place of all that, one moving camera over the default view and over the view of a file
+in turn: processor time and time of a whole picture by both methods (POST /v1/frames, JPEG), and the
+frames of a session that rotates its camera, with their processor time and size; medians of the
+rounds, and of their ratios.
 --smoke: small and short; fails only if nothing works."""
 import argparse
 import json
@@ -46,8 +51,9 @@ def camera(angle):
 class Orbit(threading.Thread):
     """A client that rotates the camera until stopped."""
 
-    def __init__(self, port, dataset, size, first_angle, video=False):
+    def __init__(self, port, dataset, size, first_angle, video=False, view=None):
         super().__init__(daemon=True)
+        self.view, self.pixels = view or {}, 0
         self.video, self.videos = video, 0
         self.viewer = Viewer(port)
         self.viewer.socket.settimeout(ANSWER_S)
@@ -63,7 +69,8 @@ class Orbit(threading.Thread):
         view = {"camera": camera(self.angle)}
         if self.rev == 1:
             width, height = self.size
-            view.update(dataset=self.dataset, image={"width": width, "height": height})
+            view = dict(self.view, dataset=self.dataset, camera=view["camera"],
+                        image={"width": width, "height": height})
         self.sent[self.rev] = time.monotonic()
         self.viewer.say({"type": "patch", "rev": self.rev, "t": self.rev, "patch": view})
 
@@ -94,6 +101,7 @@ class Orbit(threading.Thread):
             self.frames += 1
             self.bytes += len(payload)
             self.videos += payload[28] == H264
+            self.pixels += math.prod(struct.unpack_from("<2H", payload, 24))
             self.latencies.append(1000 * (now - self.sent[rev]))
         for old in [known for known in self.sent if known < rev]:
             del self.sent[old]
@@ -278,6 +286,62 @@ def measure_ended(daemon, options, size):
           f"{count}, after {others} others)")
 
 
+def cpu_seconds(daemon):
+    """Processor time that the daemon has used, to a tick of the system (mostly 10 ms)."""
+    stat = pathlib.Path(f"/proc/{daemon.child.pid}/stat").read_text()
+    return sum(map(int, stat.rpartition(")")[2].split()[11:13])) / os.sysconf("SC_CLK_TCK")
+
+
+def whole_pictures(daemon, view, seconds):
+    """Processor ms and ms of a picture while the camera turns."""
+    def draw(number):
+        body = json.dumps(dict(view, camera=camera(math.radians(2 * number)))).encode()
+        request = urllib.request.Request(
+            f"http://127.0.0.1:{daemon.port}/v1/frames", body,
+            {"Content-Type": "application/json", "Accept": "image/jpeg"})
+        with urllib.request.urlopen(request, timeout=ANSWER_S) as answer:
+            answer.read()
+
+    draw(0)  # loads, traces and meshes what the view needs
+    begun, cpu, count = time.monotonic(), cpu_seconds(daemon), 0
+    while count == 0 or time.monotonic() - begun < seconds:
+        count += 1
+        draw(count)
+    return (1000 * (cpu_seconds(daemon) - cpu) / count,
+            1000 * (time.monotonic() - begun) / count)
+
+
+def compare(daemon, options, size):
+    """Prints the table of --compare."""
+    shown = json.loads(pathlib.Path(options.compare).read_text())
+    image = {"width": size[0], "height": size[1]}
+    names = ("slab: processor ms", "ms", "kernel: processor ms", "ms", "session: frames/s",
+             "processor ms a frame", "share of the pixels", "latency, ms")
+    rounds = {"default": [], "view": []}
+    for _ in range(options.rounds):
+        for name, view in (("default", {}), ("view", shown)):
+            view = dict(view, dataset=options.dataset_id, image=image)
+            whole = [value for method in ("slab", "kernel") for value in
+                     whole_pictures(daemon, dict(view, method={"name": method}),
+                                    options.seconds / 4)]
+            orbit = Orbit(daemon.port, options.dataset_id, size, 0, view=view)
+            cpu = cpu_seconds(daemon)
+            took = run([orbit], options.seconds)
+            cpu = 1000 * (cpu_seconds(daemon) - cpu)
+            frames = max(1, orbit.frames)
+            rounds[name].append((*whole, frames / took, cpu / max(1, orbit.rev),
+                                 orbit.pixels / frames / math.prod(size),
+                                 statistics.median(orbit.latencies or [math.nan])))
+    medians = {name: [statistics.median(values) for values in zip(*taken)]
+               for name, taken in rounds.items()}
+    ratios = [statistics.median(b / a for a, b in zip(plain, other)) for plain, other in
+              zip(zip(*rounds["default"]), zip(*rounds["view"]))]
+    print("| of one moving camera | " + " | ".join(names) + " |")
+    print("|---" * (len(names) + 1) + "|")
+    for name, values in {**medians, "view / default": ratios}.items():
+        print(f"| {name} | " + " | ".join(f"{value:.2f}" for value in values) + " |")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     default = pathlib.Path(__file__).resolve().parents[2] / "build/release/windsplat"
@@ -292,6 +356,8 @@ def main():
     parser.add_argument("--ended", type=int, default=200)
     parser.add_argument("--min-jain", type=float, default=0.95)
     parser.add_argument("--max-spread", type=float, default=0)
+    parser.add_argument("--compare")
+    parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--smoke", action="store_true")
     options = parser.parse_args()
     deaf_view = DEAF_VIEW
@@ -309,6 +375,9 @@ def main():
               f"{daemon.memory()['VmRSS'] / MB:.1f} MB\n")
         hello = json.loads(Viewer(daemon.port).message()[1])
         options.dataset_id = hello["datasets"][0]["id"]
+        if options.compare:
+            compare(daemon, options, size)
+            return 0
         first = Viewer(daemon.port)
         first.turn({"dataset": options.dataset_id,
                     "image": {"width": size[0], "height": size[1]}}, 1)
