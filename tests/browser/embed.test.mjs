@@ -86,6 +86,24 @@ test("a second picture in the address is left out of the embedded view", () =>
     { path: `?embed${hash}&beside=${encodeURIComponent('{"step":0}')}` },
   ));
 
+test("a dataset that is not there is told, in the embedded view and in the whole page", () =>
+  withPage(
+    async (page) => {
+      const missing = `#!${encodeURIComponent(JSON.stringify({ dataset: "gone" }))}`;
+      const told = /there is no dataset “gone” on this server/;
+      await page.locator("#empty", { hasText: told }).waitFor();
+      await shot(page, "embed-missing");
+      assert.equal((await state(page)).seq, undefined, "no other dataset is drawn");
+      await page.goto(page.url().replace("?embed", "").split("#")[0] + missing);
+      await page.locator("#datasets-note", { hasText: told }).waitFor();
+      assert.equal((await state(page)).seq, undefined, "no other dataset is drawn");
+      await shot(page, "missing");
+      await page.locator(".card").first().click();
+      await finalPicture(page);
+    },
+    { path: `?embed#!${encodeURIComponent('{"dataset":"gone"}')}`, settle: false },
+  ));
+
 // A site on localhost, which is another site than 127.0.0.1, with a frame of this address.
 async function siteWith(t, framed) {
   const site = createServer((request, response) => {

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bestDataset, pickerEntries, withState } from "../src/app/dataset_list";
+import { hashOfView } from "../src/view/link";
 import type { View } from "../src/wire/protocol";
 import { mergeView } from "../src/view/view_state";
 import { described, Page, problem, summaryOf } from "./page";
@@ -137,4 +138,29 @@ test("a picture that shows nothing of the data says why, until one shows some", 
   assert.equal(page.emptyText, "Nothing is shown: the camera does not show the data.");
   page.draws();
   assert.equal(page.emptyText, null);
+});
+
+test("a link to a dataset that is not there says so, and shows no other one", () => {
+  const page = new Page([described("climate"), described("storm")], {
+    hash: hashOfView({ dataset: "gone", step: 2 } as View),
+  });
+  assert.equal(page.sent("open").at(-1)!.dataset, "gone");
+  page.receives({ type: "error", id: page.openId, problem: problem("no dataset 'gone'", 404) });
+  assert.equal(page.sent("open").length, 1, "no other dataset is asked for");
+  assert.equal(page.alert, "There is no dataset “gone” on this server.");
+  assert.deepEqual(page.cardsSaid, ["there is no dataset “gone” on this server"]);
+  assert.equal(page.element("loading").hidden, true);
+  page.choose("storm");
+  page.opened(page.datasets[1]!);
+  page.draws();
+  assert.equal(page.alert, null);
+  assert.equal(page.app.dataset().id, "storm");
+});
+
+test("a link to a dataset that cannot be read shows the reason and no other one", () => {
+  const hash = hashOfView({ dataset: "big" } as View);
+  const page = new Page([described("climate"), described("big")], { hash });
+  page.receives({ type: "error", id: page.openId, problem: problem(tooBig, 507) });
+  assert.equal(page.sent("open").length, 1);
+  assert.match(page.alert!, /needs 27.5 MiB/);
 });

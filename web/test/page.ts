@@ -218,12 +218,18 @@ export class Page {
   readonly app: App;
   built = 0; // number of times the panels were built
   cardsShown = 0; // number of times the cards were shown
+  cardsSaid: string[] = []; // reasons why they were shown
   entriesShown: string[] = []; // what the entry picker shows
   entriesRefused = "";
   private seq = 0;
   private socket: Socket;
 
-  constructor(readonly datasets: Dataset[]) {
+  // hash: of the address with which the page is opened
+  constructor(
+    readonly datasets: Dataset[],
+    { hash = "" } = {},
+  ) {
+    window.location.hash = hash;
     const clock = {
       setTimeout: (run: () => void, ms: number) => {
         if (ms < 5000) timers.push(run);
@@ -297,7 +303,12 @@ export class Page {
       login: { ask: () => {}, done: () => {} },
       picker: this.element("dataset"),
       list: new DatasetList(this.element("dataset") as unknown as HTMLSelectElement),
-      cards: { show: () => (this.cardsShown += 1) },
+      cards: {
+        show: (why?: string) => {
+          this.cardsShown += 1;
+          if (why !== undefined) this.cardsSaid.push(why);
+        },
+      },
       entries: {
         show: (choices: Dataset["choices"]) => {
           this.entriesShown = choices.map(({ name, chosen }) => `${name}=${chosen}`);

@@ -144,7 +144,7 @@ export class App {
         opened: (anew, changed) => this.onOpened(anew, changed),
         refresh: () => this.refresh(),
         mark: () => this.showMark(),
-        empty: () => cards.show(),
+        empty: (why) => cards.show(why),
         openEntry: (entry, wanted) =>
           openEntry(
             this.api,

@@ -49,6 +49,7 @@ export class Cards {
   constructor(
     private readonly dialog: HTMLDialogElement,
     private readonly box: HTMLElement,
+    private readonly note: HTMLElement,
     private readonly host: CardsHost,
   ) {
     box.addEventListener("keydown", (event) => this.key(event));
@@ -58,8 +59,11 @@ export class Cards {
     });
   }
 
-  // Refreshes the list first: files may have been added since the hello message.
-  show(): void {
+  // Refreshes the list first: files may have been added since the hello message. why: what the user
+  // asked for cannot be shown.
+  show(why = ""): void {
+    this.note.hidden = why === "";
+    this.note.textContent = why === "" ? "" : `Nothing is shown: ${why}.`;
     if (this.dialog.open) return;
     const { api, list } = this.host;
     this.clear();

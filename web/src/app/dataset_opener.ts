@@ -27,7 +27,8 @@ export interface DatasetOpenerHost {
   opened(anew: boolean, changed: boolean): void;
   refresh(): void;
   mark(): void; // another view was requested
-  empty(): void; // nothing to show: the user must choose or add a dataset
+  // nothing to show: the user must choose or add a dataset; `why`: if one was asked for
+  empty(why?: string): void;
   // null: no longer wanted
   openEntry(entry: Entry, wanted: () => boolean): Promise<Dataset | null>;
   // how to run a change that follows the present user action later
@@ -37,6 +38,7 @@ export interface DatasetOpenerHost {
 }
 
 const forbidden = 403; // the server does not let clients open other entries
+const notFound = 404;
 const busyCodes = [429, 503]; // the server is busy; the dataset itself may be readable
 
 export class DatasetOpener {
@@ -46,6 +48,7 @@ export class DatasetOpener {
   private before: View | undefined; // view of the displayed dataset when another was requested
   private abandonedId = 0; // id of the newest cancelled `open`
   private waits = false; // `opened` has not arrived yet
+  private named: string | undefined; // the dataset that the page's address named
   private abandonedRev = 0; // last rev of a view whose dataset could not be opened
   private restored = new Set<number>(); // revs of the view that replaced a refused one
 
@@ -156,6 +159,7 @@ export class DatasetOpener {
     // A restarted server may no longer have the displayed dataset.
     if (model.open !== null && !list.has(model.open.id)) model.open = null;
     const wanted = model.state.document.dataset;
+    if (this.openId === 0) this.named = wanted;
     const id = wanted ?? list.first();
     list.show(id ?? "");
     if (id === undefined) {
@@ -321,6 +325,17 @@ export class DatasetOpener {
     const failed = this.openingId;
     this.abandonedRev = model.state.rev;
     if (!busyCodes.includes(code)) this.list.failed(failed, text);
+    if (model.open === null && this.named !== undefined) {
+      // Another dataset would be taken for the one that was asked for.
+      const missing = `there is no dataset “${failed}” on this server`;
+      const isMissing = code === notFound && failed === this.named;
+      const why = isMissing ? missing : text.replace(/\.$/, "");
+      status.error("dataset", `${why.charAt(0).toUpperCase()}${why.slice(1)}.`);
+      status.announce("live, without a dataset");
+      this.list.show("");
+      this.host.empty(why);
+      return;
+    }
     const fallback = model.open?.id ?? this.list.best();
     this.list.show(fallback ?? "");
     if (fallback === undefined || fallback === failed) {

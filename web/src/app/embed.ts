@@ -19,11 +19,14 @@ export const embeddedKeys = (bindings: Binding[]): Binding[] =>
 export const takesWheel = (picture: Element, { ctrlKey }: WheelEvent): boolean =>
   ctrlKey || document.activeElement === picture;
 
-// The link to the whole page with the present view, of which `view` gives the explicit keys.
-export function openLink(baseUri: string, view: () => View): HTMLAnchorElement {
+// The link to the whole page with the present view, of which `view` gives the explicit keys; null:
+// none is shown, and the link keeps what the address asks for.
+export function openLink(baseUri: string, view: () => View | null): HTMLAnchorElement {
   const link = byId("open-link", HTMLAnchorElement);
   const update = () => {
-    link.href = new URL(`./${hashOfView(view())}`, baseUri).href;
+    const shown = view();
+    const hash = shown === null ? window.location.hash : hashOfView(shown);
+    link.href = new URL(`./${hash}`, baseUri).href;
   };
   update();
   // Before the browser reads the address: by mouse, touch, keyboard and menu.

@@ -171,7 +171,7 @@ const files = new FileBrowser({
     app.open(id);
   },
 });
-const cards = new Cards(datasets, byId("cards", HTMLElement), {
+const cards = new Cards(datasets, byId("cards", HTMLElement), byId("datasets-note", HTMLElement), {
   api: app.api,
   list,
   files,
@@ -320,6 +320,12 @@ function showAbout(): void {
   if (app.isOpen()) about.show(app.dataset());
 }
 
+// In place of the cards.
+function showNothing(why = "the server has no dataset open"): void {
+  status.clearError();
+  status.empty(why);
+}
+
 function fillHelp(): void {
   const list = byId("help-keys", HTMLElement);
   for (const binding of bindings) {
@@ -331,7 +337,10 @@ function onClick(id: string, run: () => void): void {
   byId(id, HTMLButtonElement).addEventListener("click", run);
 }
 
-if (embedded) openLink(document.baseURI, () => app.explicitView()).hidden = false;
+if (embedded) {
+  const shown = () => (app.isOpen() ? app.explicitView() : null);
+  openLink(document.baseURI, shown).hidden = false;
+}
 app.undoControl.bind(
   byId("undo-button", HTMLButtonElement),
   byId("redo-button", HTMLButtonElement),
@@ -370,7 +379,7 @@ app.start({
   panels,
   timeBar,
   list,
-  cards: embedded ? { show: () => status.empty("the server has no such dataset open") } : cards,
+  cards: embedded ? { show: (why) => showNothing(why) } : cards,
   status,
   // A page around the frame could show a login of its own, so there is none in it.
   login: embedded ? { ask: () => {}, done: () => {} } : login,
