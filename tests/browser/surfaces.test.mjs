@@ -86,6 +86,33 @@ for (const [what, label] of [
     }));
 }
 
+// Pixels with a hue: the most of red, green and blue is well above the least.
+const colored = (page) =>
+  page.evaluate(() => {
+    const canvas = document.querySelector("#picture");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let count = 0;
+    for (let n = 0; n < data.length; n += 4) {
+      const [r, g, b] = data.subarray(n, n + 3);
+      if (Math.max(r, g, b) - Math.min(r, g, b) > 60) count += 1;
+    }
+    return count;
+  });
+
+test("a new isosurface is seen in the cloud of its field", () =>
+  withPage(
+    async (page) => {
+      const before = await colored(page);
+      await add(page, "Add an isosurface");
+      const after = await colored(page);
+      await shot(page, "surface-in-cloud");
+      assert.ok(after > before + 2000, `${after} coloured pixels, ${before} before`);
+    },
+    {
+      path: `#!${encodeURIComponent('{"dataset":"climate","vector":{"field":null}}')}`,
+    },
+  ));
+
 test("an isosurface has a value of its field, also after another field is chosen", () =>
   withPage(async (page) => {
     const lineless = (await pixels(page)).hash;

@@ -3,6 +3,7 @@ import type GUI from "lil-gui";
 import { surfaceColors, unitText } from "../view/legend_entries";
 import { failureText, type FieldRange, type Histogram } from "../wire/api";
 import type { SurfaceView } from "../wire/protocol";
+import { colorsIn, contrastColor } from "../view/contrast_color";
 import { fieldOptions } from "./controls";
 import { histogramBins } from "./histogram_view";
 import { focusControl, focusedControl } from "./panel_folders";
@@ -134,11 +135,20 @@ class SurfacesPanel {
     this.afterReading(
       () => firstIsosurface(fields, (field) => this.histogram(field)),
       (found) => {
-        if (found !== null) return this.send([...this.surfaces(), { ...found, opacity: 0.5 }]);
+        if (found !== null) {
+          const color = { constant: this.newColor() };
+          return this.send([...this.surfaces(), { ...found, opacity: 0.5, color }]);
+        }
         this.message = "No field has different values at this step.";
         this.controls.refresh();
       },
     );
+  }
+
+  // One that is told from the media, among which the surface may lie.
+  private newColor(): string {
+    const { maps } = this.kit.host;
+    return contrastColor(colorsIn(this.kit.host.view(), (map) => maps.stops(map)));
   }
 
   // The surface at this index becomes an isosurface of a field, at the present value if the field
