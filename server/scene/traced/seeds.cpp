@@ -29,13 +29,14 @@ std::string number(double value) {
   return text.data();
 }
 
-Error outside(std::size_t axis, double at, double low, double high, const data::Axis& of,
-              const std::string& pointer) {
-  std::string text = std::string(letters.at(axis)) + " = " + number(at) +
-                     " is outside of the data, " + number(std::min(low, high)) + " to " +
-                     number(std::max(low, high));
+std::string outside(std::size_t axis, double at, const data::Axis& of, bool region) {
+  const double low = of.coordinates.front();
+  const double high = of.coordinates.back();
+  std::string text = std::string(letters.at(axis)) + " = " + number(at) + " is outside of the " +
+                     (region ? "region, which keeps " : "data, ") + number(std::min(low, high)) +
+                     " to " + number(std::max(low, high));
   if (!of.units.empty()) text += " " + printable(of.units, 80);
-  return invalid_at(pointer, text);
+  return text;
 }
 
 // The index of a coordinate, linear between the samples and in the outer half of the outermost
@@ -57,8 +58,8 @@ std::optional<double> along(const std::vector<double>& coordinates, double at) {
   return index;
 }
 
-Result<double> along_axis(const data::Axis& axis, std::size_t letter, double at,
-                          const std::string& pointer) {
+// nullopt: more than half a cell outside.
+std::optional<double> along_axis(const data::Axis& axis, double at) {
   const std::vector<double>& c = axis.coordinates;
   if (c.size() < 2) return 0.0;
   const bool round = axis.kind == data::AxisKind::longitude && axis.units.substr(0, 3) != "rad";
@@ -80,7 +81,7 @@ Result<double> along_axis(const data::Axis& axis, std::size_t letter, double at,
       return static_cast<double>(c.size() - 1) + beyond / rest;
     }
   }
-  return outside(letter, at, c.front(), c.back(), axis, pointer);
+  return std::nullopt;
 }
 
 // Longitude and latitude within the quadrilaterals of columns, by the method of Newton from the
@@ -163,22 +164,24 @@ Vec3 mixed(const Vec3& from, const Vec3& to, const Vec3& part) {
 
 PlaceSearch::PlaceSearch(const Placed& placed, const data::Axis& vertical,
                          const CancelToken& cancel)
-    : grid_(placed.grid), vertical_(vertical) {
+    : grid_(placed.grid), vertical_(vertical), region_(placed.crop.has_value()) {
   if (grid_.columns) columns_.emplace(*grid_.columns, grid_.dims(), cancel);
 }
 
-Result<dvec3> PlaceSearch::index_of(const Vec3& at, const std::string& pointer) const {
+Result<dvec3> PlaceSearch::index_of(const Vec3& at, const std::string& pointer,
+                                    const std::string& which) const {
   dvec3 index(0);
   if (columns_) {
     const auto nearest = columns_->nearest(at[0], at[1]);
-    if (!nearest) return invalid_at(pointer, nearest.error().message);
+    if (!nearest) return invalid_at(pointer, which + nearest.error().message);
     index.x = (*nearest)[0];
     index.y = (*nearest)[1];
     CellSearch(*grid_.columns, grid_.dims()).refine(at[0], at[1], index);
   }
   for (std::size_t a = columns_ ? 2 : 0; a < 3; ++a) {
-    const auto along = along_axis(a == 2 ? vertical_ : grid_.axes.at(a), a, at.at(a), pointer);
-    if (!along) return along.error();
+    const data::Axis& axis = a == 2 ? vertical_ : grid_.axes.at(a);
+    const auto along = along_axis(axis, at.at(a));
+    if (!along) return invalid_at(pointer, which + outside(a, at.at(a), axis, region_));
     index[static_cast<glm::length_t>(a)] = *along;
   }
   return index;
@@ -202,12 +205,12 @@ Result<std::vector<dvec3>> seeds_of(const SeedsView& seeds, const Placed& placed
   std::vector<dvec3> out;
   Result<void> good;
   std::optional<PlaceSearch> search;
-  const auto add = [&](const Vec3& at, const std::string& pointer) {
+  const auto add = [&](const Vec3& at, const std::string& pointer, const std::string& which = "") {
     if (!good) return;
     if (!search) search.emplace(placed, vertical, cancel);
     if (cancel.cancelled()) {
       good = make_error(ErrorKind::cancelled, "tracing cancelled");
-    } else if (auto index = search->index_of(at, pointer)) {
+    } else if (auto index = search->index_of(at, pointer, which)) {
       out.push_back(*index);
     } else {
       good = index.error();
@@ -219,8 +222,11 @@ Result<std::vector<dvec3>> seeds_of(const SeedsView& seeds, const Placed& placed
   if (const auto& line = seeds.line) {
     for (int n = 0; n < line->count; ++n) {
       const double part = part_of(n, line->count);
-      add(mixed(line->from, line->to, {part, part, part}),
-          root + (part < 0.5 ? "/line/from" : "/line/to"));
+      const bool between = line->count == 1 || (n > 0 && n + 1 < line->count);
+      const char* const end = between ? "/line" : n == 0 ? "/line/from" : "/line/to";
+      add(mixed(line->from, line->to, {part, part, part}), root + end,
+          between ? "seed " + std::to_string(n + 1) + " of " + std::to_string(line->count) + ": "
+                  : std::string());
     }
   }
   if (const auto& block = seeds.block) {

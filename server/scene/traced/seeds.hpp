@@ -25,13 +25,15 @@ class PlaceSearch {
   PlaceSearch(const Placed& placed, const data::Axis& vertical, const CancelToken& cancel = {});
 
   // Linear between the samples; along an axis of one sample 0. Errors: invalid at `pointer`, with
-  // the range of the data, if it is more than half a cell outside.
-  [[nodiscard]] Result<glm::dvec3> index_of(const protocol::Vec3& at,
-                                            const std::string& pointer) const;
+  // the range of the data or of the region, if it is more than half a cell outside; the text begins
+  // with `which`.
+  [[nodiscard]] Result<glm::dvec3> index_of(const protocol::Vec3& at, const std::string& pointer,
+                                            const std::string& which = "") const;
 
  private:
   const data::Grid& grid_;
   const data::Axis& vertical_;
+  bool region_ = false;  // whether the grid is part of the data
   std::optional<data::ColumnSearch> columns_;
 };
 
@@ -39,7 +41,7 @@ class PlaceSearch {
 std::int64_t seeds_in(const protocol::SeedsView& seeds);
 
 // All seeds of a view, in the order points, line, block, evenly. `flow`: steady, of the lattice.
-// Errors: those of PlaceSearch::index_of() for points and the ends of lines and blocks; cancelled.
+// Errors: those of PlaceSearch::index_of() for points, lines and blocks; cancelled.
 Result<std::vector<glm::dvec3>> seeds_of(const protocol::SeedsView& seeds, const Placed& placed,
                                          const data::Axis& vertical, const trace::Flow& flow,
                                          const CancelToken& cancel = {});

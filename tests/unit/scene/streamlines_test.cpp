@@ -141,7 +141,21 @@ TEST(SeededScene, ARegionHasItsOwnRange) {
   view.region.x = protocol::Range{0, 20};
   const auto refused = refusal_of(view, *dataset);
   EXPECT_EQ(refused.first, "/vector/trace/seeds/points/0");
-  EXPECT_THAT(refused.second, HasSubstr("x = 30 is outside of the data, 0 to 20"));
+  EXPECT_THAT(refused.second, HasSubstr("x = 30 is outside of the region, which keeps 0 to 20"));
+}
+
+// Both ends lie in an axis of longitudes that is not closed, and the seeds between them do not.
+TEST(SeededScene, ASeedBetweenTheEndsOfALineIsNamedByItsNumber) {
+  auto dataset = wind_dataset(1);
+  View view = seeded();
+  view.vector.trace->seeds->line = protocol::SeedLineView{{0, 0, 500}, {360, 0, 500}, 5};
+  const auto refused = refusal_of(view, *dataset);
+  EXPECT_EQ(refused.first, "/vector/trace/seeds/line");
+  EXPECT_THAT(refused.second, HasSubstr("seed 2 of 5: x = 90 is outside of the data"));
+  view.vector.trace->seeds->line = protocol::SeedLineView{{-90, 0, 500}, {-10, 0, 500}, 1};
+  EXPECT_THAT(refusal_of(view, *dataset).second, HasSubstr("seed 1 of 1: x = -50"));
+  view.vector.trace->seeds->line = protocol::SeedLineView{{0, 0, 500}, {90, 0, 500}, 2};
+  EXPECT_EQ(refusal_of(view, *dataset).first, "/vector/trace/seeds/line/to");
 }
 
 TEST(SeededScene, CoordinatesAreLinearBetweenSamples) {
