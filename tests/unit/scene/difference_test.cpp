@@ -15,13 +15,13 @@ using protocol::DifferenceView;
 using testing::HasSubstr;
 
 // Temperature 250 + n + s (n - 20) K at sample n of 36 and step s; its difference from step 0 is
-// s (n - 20), from -20 s to 15 s.
+// s (n - 20), from -20 s to 15 s. Heights of 1000 m a level, 10 m more with each step.
 class Warming final : public data::Source {
  public:
   Warming() {
     info_.id = "warming";
     info_.grid = atmosphere_grid();
-    info_.fields = {scalar_info("temperature", "K"), wind_info()};
+    info_.fields = {scalar_info("temperature", "K"), wind_info(), scalar_info("height", "m")};
     for (int s = 0; s < 4; ++s) {
       info_.steps.push_back({static_cast<double>(s), std::to_string(s)});
     }
@@ -30,12 +30,14 @@ class Warming final : public data::Source {
   Result<data::Volume> read(std::size_t field, std::size_t step) override {
     data::Volume volume;
     volume.dims = info_.grid.dims();
-    volume.components = field == 0 ? 1 : 3;
+    volume.components = field == 1 ? 3 : 1;
     std::vector<float> values;
     for (std::size_t n = 0; n < volume.samples() * static_cast<std::size_t>(volume.components);
          ++n) {
-      const double at = static_cast<double>(n);
-      values.push_back(static_cast<float>(250 + at + static_cast<double>(step) * (at - 20)));
+      const auto at = static_cast<double>(n);
+      const auto s = static_cast<double>(step);
+      const double height = 1000 * static_cast<double>(n / 12 + 1) + 10 * s;
+      values.push_back(static_cast<float>(field == 2 ? height : 250 + at + s * (at - 20)));
     }
     volume.values = std::move(values);
     data::finish_volume(volume);
@@ -117,19 +119,17 @@ TEST(DifferenceView, DrawsTheDifferenceOfEveryKindOfField) {
 
 TEST(DifferenceView, HeightsArePlacedByTheFieldItself) {
   protocol::View view = temperature_minus(1);
-  view.geometry.height_field = "temperature";
+  view.geometry.height_field = "height";
   data::Dataset difference = handle(view);
   data::Dataset plain = difference.minuend();
   protocol::View undiffered = view;
   undiffered.difference.reset();
   const auto with = complete(view, difference);
+  ASSERT_TRUE(with) << with.error().message;
   const auto without = complete(undiffered, plain);
-  ASSERT_EQ(with.has_value(), without.has_value());
-  if (!with) {
-    EXPECT_EQ(with.error().message, without.error().message);
-    return;
-  }
-  EXPECT_EQ(with->lattice().positions[2], without->lattice().positions[2]);
+  ASSERT_TRUE(without) << without.error().message;
+  EXPECT_EQ(with->lattice().box_max, without->lattice().box_max);
+  EXPECT_GT(with->lattice().box_max.z, 0.01) << "levels are apart";
 }
 
 TEST(DifferenceView, IsRefusedWhereItCannotBeShown) {
