@@ -43,6 +43,8 @@ bool in_seed_block(const std::string& pointer) {
   return pointer.starts_with("/vector/trace/seeds/block/");
 }
 
+bool in_difference(const std::string& pointer) { return pointer.starts_with("/difference/"); }
+
 Json with_scalar() { return Json{{"scalars", {{{"field", "q"}}}}}; }
 
 // A view with one value set, and others that it requires.
@@ -61,6 +63,7 @@ Json view_with(const std::string& pointer, const Json& value) {
   if (in_sun_at(pointer)) {
     view["light"]["sunAt"] = {{"utc", "2024-06-21T12:00:00Z"}, {"longitude", 0}, {"latitude", 0}};
   }
+  if (in_difference(pointer)) view["difference"] = {{"dataset", "other"}, {"step", 0}};
   if (in_seed_line(pointer)) {
     view["vector"]["trace"]["seeds"]["line"] = {{"from", {0, 0, 0}}, {"to", {0, 0, 1}}};
   }
@@ -330,6 +333,8 @@ TEST(Schema, NullMeansTheDefaultExactlyWhereTheSchemaAllowsIt) {
     if (at.starts_with("/vector/trace/seeds/")) {
       silent["vector"]["trace"]["seeds"] = Json::object();
     }
+    if (at == "/difference/dataset") silent["difference"] = {{"step", 0}};
+    if (at == "/difference/step") silent["difference"] = {{"dataset", "other"}};
     EXPECT_EQ(ViewDocument::parse(view.dump())->canonical(), silent.dump()) << at;
   });
 }

@@ -107,7 +107,6 @@ TEST_F(Differences, AreShownByAStreamThatPlaysThem) {
   DifferenceStream stream(server_.port());
   Json view = view_of("a", {{"dataset", "b"}});
   view["step"] = 0;
-  view.erase("surfaces");  // "small" has no such field
   ASSERT_TRUE(stream.reaches_final(1, view.dump()));
   ASSERT_TRUE(stream.reaches_final(2, R"({"step": 2})"));
   Json chosen;
@@ -119,7 +118,8 @@ TEST_F(Differences, AreShownByAStreamThatPlaysThem) {
   EXPECT_EQ(chosen["view"]["difference"]["dataset"], "b");
   EXPECT_EQ(chosen["view"]["step"], 2);
   stream.say(R"({"type": "open", "id": 1, "dataset": "small"})");
-  ASSERT_TRUE(stream.reaches_final(3, R"({"image": {"width": 150}})")) << "grids differ";
+  ASSERT_TRUE(stream.reaches_final(3, R"({"image": {"width": 150}})"))
+      << "neither its grid nor its fields are those of the surfaces and the difference";
 }
 
 TEST_F(Differences, WhatCannotBeSubtractedIsRefusedWithItsPlace) {
@@ -137,6 +137,7 @@ TEST_F(Differences, WhatCannotBeSubtractedIsRefusedWithItsPlace) {
   expect_refused(view_of("a", {{"dataset", "celsius"}}), 422, "/difference",
                  "the units of 't' differ: 'K' here, 'degC' in 'celsius'");
   expect_refused(view_of("a", {{"dataset", "none"}}), 404, "/difference/dataset", "'none'");
+  expect_refused(view_of("a", Json::object()), 422, "/difference", "must name a dataset, a step");
   expect_refused(view_of("a", {{"step", 3}}), 422, "/difference/step", "has steps 0 to 2");
 }
 
