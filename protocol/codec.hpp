@@ -55,7 +55,9 @@ std::string view_text(const std::optional<std::string>& step,
 
 // Patches that a session applies for its client.
 std::string step_patch(int step);
-std::string dataset_patch(const std::string& dataset);  // resets all but picture size and budget
+// Shows another dataset: resets what refers to fields, coordinates or places of the last one.
+// Picture, quality and annotations stay, except a title of one's own.
+std::string dataset_patch(const std::string& dataset);
 
 Result<ClientMessage> parse_client_message(std::string_view json);
 

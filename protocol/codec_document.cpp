@@ -197,10 +197,11 @@ std::string step_patch(int step) { return dump(Json{{"step", step}}); }
 
 std::string dataset_patch(const std::string& dataset) {
   Json patch{{"dataset", dataset}};
-  for (const char* key :
-       {"step", "difference", "camera", "geometry", "vector", "scalars", "depthCue", "method"}) {
+  for (const char* key : {"step", "difference", "camera", "geometry", "vector", "scalars",
+                          "depthCue", "method", "surfaces", "region", "light", "ground"}) {
     patch[key] = nullptr;
   }
+  patch["annotations"] = Json{{"titleText", nullptr}};
   return dump(patch);
 }
 

@@ -237,6 +237,25 @@ TEST(MergePatch, RemovingAMissingKeyIsNoError) {
   EXPECT_EQ(patched(R"({"step":1})", R"({"camera":null,"zoom":null})"), R"({"step":1})");
 }
 
+// What names fields, coordinates or places of the last dataset does not fit another one.
+TEST(MergePatch, AnotherDatasetKeepsPictureQualityAndAnnotationsAlone) {
+  const std::string kept =
+      R"("image":{"background":"#102030","height":100,"width":200},"quality":{"budgetMs":40}})";
+  const std::string before =
+      R"({"dataset":"a","step":3,"difference":{"step":0},"camera":{"eye":[1,2,3]},)"
+      R"("geometry":{"mapping":"sphere"},"ground":{"borders":true},"vector":{"field":"w"},)"
+      R"("scalars":[{"field":"q"}],"depthCue":{"strength":0},"method":{"name":"kernel"},)"
+      R"("surfaces":[{"field":"q","isovalue":1}],"region":{"x":[0,10]},"light":{},)"
+      R"("annotations":{"legend":true,"titleText":"of a","titleStyle":{"size":2}},)" +
+      kept;
+  EXPECT_EQ(patched(before, dataset_patch("b")),
+            R"({"annotations":{"legend":true,"titleStyle":{"size":2}},"dataset":"b",)" + kept);
+  const Json schema = read_protocol_json("view.schema.json");
+  for (const auto& [key, property] : schema.at("properties").items()) {
+    EXPECT_TRUE(Json::parse(before).contains(key)) << key;
+  }
+}
+
 TEST(SetAt, AcceptsJsonOrPlainText) {
   EXPECT_EQ(set("{}", "/step", "3"), R"({"step":3})");
   EXPECT_EQ(set("{}", "/dataset", "tornado"), R"({"dataset":"tornado"})");
