@@ -214,6 +214,13 @@ struct QualityView {
 };
 
 // What is written and drawn around the data, each if it is set.
+// How one of the annotations differs from the others.
+struct AnnotationStyleView {
+  double size = 1;                        // factor of that of all annotations
+  std::optional<std::string> text_color;  // sRGB; empty: that of all annotations
+  bool operator==(const AnnotationStyleView&) const = default;
+};
+
 struct AnnotationsView {
   bool box = false;
   bool axes = false;
@@ -224,6 +231,14 @@ struct AnnotationsView {
   bool step_time = false;
   double size = 1;                        // factor of the size of texts and lines
   std::optional<std::string> text_color;  // sRGB; empty: contrasts with the background
+  std::optional<std::string> title_text;  // empty: the title of the dataset
+  AnnotationStyleView box_style;
+  AnnotationStyleView axes_style;
+  AnnotationStyleView north_style;
+  AnnotationStyleView scale_bar_style;
+  AnnotationStyleView legend_style;
+  AnnotationStyleView title_style;
+  AnnotationStyleView step_time_style;
   bool operator==(const AnnotationsView&) const = default;
 };
 

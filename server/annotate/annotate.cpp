@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "protocol/limits.hpp"
 #include "server/annotate/box.hpp"
 #include "server/annotate/legend.hpp"
 #include "server/annotate/marks.hpp"
@@ -23,20 +24,21 @@ double luminance(const std::array<float, 3>& linear) {
 
 }  // namespace
 
-Style style_of(const Subject& subject) {
+Style style_of(const Subject& subject, const protocol::AnnotationStyleView& part) {
   const protocol::AnnotationsView& view = subject.completed.view().annotations;
   const scene::Camera& camera = subject.scene.camera;
+  const double size = std::min(view.size * part.size, protocol::limits::annotation_size_max);
   // Of a picture of 1280 x 720; a narrower one has smaller texts.
   const double unit =
-      view.size * std::min(static_cast<double>(camera.height) / 720, camera.width / 960.0);
+      size * std::min(static_cast<double>(camera.height) / 720, camera.width / 960.0);
   constexpr double middle = 0.18;  // between dark and light, linear
   const bool dark = luminance(subject.scene.background) < middle;
   Style style;
   style.text = 14 * unit;
   style.line = std::max(1.2 * unit, 0.5);
   style.color = dark ? Color{0.93, 0.95, 0.98, 1} : Color{0.08, 0.10, 0.13, 1};
-  if (view.text_color) {
-    if (const auto own = scene::parse_color(*view.text_color)) style.color = srgb(*own);
+  if (const auto& named = part.text_color ? part.text_color : view.text_color) {
+    if (const auto own = scene::parse_color(*named)) style.color = srgb(*own);
   }
   const double lightness = 0.3 * style.color.red + 0.6 * style.color.green + 0.1 * style.color.blue;
   style.quiet = style.color;
@@ -52,17 +54,21 @@ bool any(const protocol::AnnotationsView& annotations) {
 
 Figure figure_of(const Subject& subject) {
   const protocol::AnnotationsView& shown = subject.completed.view().annotations;
-  const Style style = style_of(subject);
+  const auto style = [&](const protocol::AnnotationStyleView& part) {
+    return style_of(subject, part);
+  };
   Figure figure;
   figure.width = subject.scene.camera.width;
   figure.height = subject.scene.camera.height;
-  if (shown.box) add_box(subject, style, figure);
-  if (shown.north) add_north(subject, style, figure);
-  if (shown.scale_bar) add_scale_bar(subject, style, figure);
-  if (shown.legend) add_legend(subject, style, figure);
-  if (shown.title || shown.step_time) add_heading(subject, style, figure);
+  if (shown.box) add_box(subject, style(shown.box_style), figure);
+  if (shown.north) add_north(subject, style(shown.north_style), figure);
+  if (shown.scale_bar) add_scale_bar(subject, style(shown.scale_bar_style), figure);
+  if (shown.legend) add_legend(subject, style(shown.legend_style), figure);
+  if (shown.title || shown.step_time) {
+    add_heading(subject, style(shown.title_style), style(shown.step_time_style), figure);
+  }
   // Last: their texts are left out where something else is written.
-  if (shown.axes) add_axes(subject, style, figure);
+  if (shown.axes) add_axes(subject, style(shown.axes_style), figure);
   return figure;
 }
 

@@ -219,35 +219,38 @@ std::string minus_text(const protocol::View& view, const data::DatasetInfo& info
 
 }  // namespace
 
-void add_heading(const Subject& subject, const Style& style, Figure& figure) {
+void add_heading(const Subject& subject, const Style& title, const Style& time, Figure& figure) {
   const protocol::View& view = subject.completed.view();
   const protocol::AnnotationsView& shown = view.annotations;
-  const double edge = 1.4 * style.text;
-  double line = edge + style.text;
+  // Of the first line, so that both start at the same place.
+  const Style& first = shown.title ? title : time;
+  const double edge = 1.4 * first.text;
+  double line = edge + first.text;
   if (shown.title) {
     constexpr double larger = 1.25;
     const std::string& own = subject.info.title;
-    const double size = larger * style.text;
+    const std::string name = own.empty() ? subject.info.id : own;
+    const double size = larger * title.text;
     // Left of the arrow to the north.
     double room = figure.width - 2 * edge;
     for (const Rectangle& taken : figure.taken) {
       if (taken.low.y < line && taken.low.x > edge) room = std::min(room, taken.low.x - 2 * edge);
     }
-    std::string text = fitted(own.empty() ? subject.info.id : own, size, room);
-    add_if_free(Text{std::move(text), {edge, line}, size, 0, style.color, style.rim}, figure);
-    line += 1.6 * style.text;
+    std::string text = fitted(shown.title_text.value_or(name), size, room);
+    add_if_free(Text{std::move(text), {edge, line}, size, 0, title.color, title.rim}, figure);
+    line += 1.6 * title.text + (time.text - title.text);
   }
+  const auto add_line = [&](const std::string& whole) {
+    std::string text = fitted(whole, time.text, figure.width - 2 * edge);
+    add_if_free(Text{std::move(text), {edge, line}, time.text, 0, time.color, time.rim}, figure);
+    line += 1.5 * time.text;
+  };
   if (shown.step_time) {
     const std::string text = step_text(subject.info, static_cast<std::size_t>(view.step));
-    if (!text.empty()) {
-      add_if_free(Text{text, {edge, line}, style.text, 0, style.color, style.rim}, figure);
-      line += 1.5 * style.text;
-    }
+    if (!text.empty()) add_line(text);
   }
   if (view.difference && subject.subtracted != nullptr) {
-    std::string text = fitted(minus_text(view, subject.info, *subject.subtracted), style.text,
-                              figure.width - 2 * edge);
-    add_if_free(Text{std::move(text), {edge, line}, style.text, 0, style.color, style.rim}, figure);
+    add_line(minus_text(view, subject.info, *subject.subtracted));
   }
 }
 

@@ -11,7 +11,8 @@ namespace windsplat::annotate {
 void add_north(const Subject& subject, const Style& style, Figure& figure);
 // A round length across the line of sight at the centre of the box.
 void add_scale_bar(const Subject& subject, const Style& style, Figure& figure);
-// Title of the dataset, and the time of the step with its number of all steps.
-void add_heading(const Subject& subject, const Style& style, Figure& figure);
+// Title of the view or of the dataset, and below it the time of the step with its number of all
+// steps, and what a difference subtracts.
+void add_heading(const Subject& subject, const Style& title, const Style& time, Figure& figure);
 
 }  // namespace windsplat::annotate

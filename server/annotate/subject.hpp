@@ -23,9 +23,9 @@ struct Style {
   Color quiet;       // of what matters less
   Color rim;         // of the outline of texts; the colour of cards
 };
-// Sizes follow the picture as radii of lines do: view.annotations.size times those at a height of
-// 720, and not more than fits the width. A colour that the view does not give contrasts with its
-// background.
-Style style_of(const Subject& subject);
+// Sizes follow the picture as radii of lines do: view.annotations.size and part.size, at most 4
+// together, times those at a height of 720, and not more than fits the width. A colour that neither
+// the part nor the view gives contrasts with the background.
+Style style_of(const Subject& subject, const protocol::AnnotationStyleView& part = {});
 
 }  // namespace windsplat::annotate

@@ -9,6 +9,7 @@
 #include "server/annotate/annotate.hpp"
 #include "server/annotate/paint/compose.hpp"
 #include "server/annotate/paint/document.hpp"
+#include "server/annotate/paint/type.hpp"
 #include "server/base/check.hpp"
 #include "server/base/trim_storage.hpp"
 #include "server/engine/reference/reference.hpp"
@@ -83,6 +84,14 @@ void name_fields(const scene::Scene& scene, const scene::CompletedView& view,
 
 }  // namespace
 
+Result<void> check_title(const protocol::View& view) {
+  const auto& title = view.annotations.title_text;
+  const std::string missing = title ? annotate::character_without_glyph(*title) : std::string();
+  if (missing.empty()) return {};
+  return make_error_at(ErrorKind::invalid, "/annotations/titleText",
+                       "has '" + missing + "', which the font, DejaVu Sans, lacks");
+}
+
 Result<scene::CompletedView> complete(const protocol::View& view, data::Dataset& dataset,
                                       bool allow_reference) {
   if (view.method.name == protocol::MethodName::reference && !allow_reference) {
@@ -90,6 +99,7 @@ Result<scene::CompletedView> complete(const protocol::View& view, data::Dataset&
                          "reference takes too long for a shared renderer: use "
                          "`POST /v1/references` or `windsplat render`");
   }
+  if (auto ok = check_title(view); !ok) return ok.error();
   auto completed = scene::complete(view, dataset);
   if (!completed) return with_need(completed.error(), view, dataset);
   return completed;

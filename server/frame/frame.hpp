@@ -106,10 +106,13 @@ std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annot
 // Memory for the lists of the triangles of a scene while it is drawn.
 std::uint64_t surface_bytes(const scene::Scene& scene);
 
+// Whether the font can write the title of one's own. Errors: invalid at /annotations/titleText.
+Result<void> check_title(const protocol::View& view);
+
 // Completes a view for its dataset; if memory does not suffice, the error states what all fields of
 // the view need. Errors: those of scene::complete(); invalid at /method/name for a reference that
 // is not allowed: it takes seconds to minutes, so only a command line that does not share the
-// machine allows it.
+// machine allows it; those of check_title().
 Result<scene::CompletedView> complete(const protocol::View& view, data::Dataset& dataset,
                                       bool allow_reference = false);
 

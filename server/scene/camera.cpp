@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "protocol/limits.hpp"
 #include "server/scene/angles.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/place.hpp"
@@ -196,7 +197,9 @@ double share_of_legend(const protocol::View& view) {
   constexpr double card = 10;  // em, with its distance from the edge
   constexpr double share_most = 0.4;
   const double narrow = view.image.width / 960.0 / view.image.height;
-  return std::min(card * 14 * shown.size * std::min(1 / 720.0, narrow), share_most);
+  const double size =
+      std::min(shown.size * shown.legend_style.size, protocol::limits::annotation_size_max);
+  return std::min(card * 14 * size * std::min(1 / 720.0, narrow), share_most);
 }
 
 // The whole box with the room that annotations need: above a legend, if it has ticks. `centred`:

@@ -45,6 +45,21 @@ test("each annotation changes the picture, and the server's legend replaces the 
     assert.equal(await page.locator(".legend-entry").first().isVisible(), true);
   }));
 
+test("a title of one's own is drawn in place of the dataset's until it is emptied", () =>
+  withPage(async (page) => {
+    await unfold(page, "Axes and labels");
+    await control(page, "title", "input").check();
+    await finalPicture(page);
+    const { hash: dataset } = await pixels(page);
+    await control(page, "own title", "input").fill("Storm of 18 January");
+    await finalPicture(page);
+    assert.notEqual((await pixels(page)).hash, dataset);
+    assert.equal(await control(page, "own title", "input").inputValue(), "Storm of 18 January");
+    await control(page, "own title", "input").fill("");
+    await finalPicture(page);
+    assert.equal((await pixels(page)).hash, dataset);
+  }));
+
 // Keeps the pixels of the picture in the page.
 const keepPixels = (page) =>
   page.evaluate(() => {

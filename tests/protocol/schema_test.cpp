@@ -305,6 +305,25 @@ TEST(Schema, NamesAreMeasuredInCharacters) {
   }
 }
 
+TEST(Schema, ATitleOfOnesOwnIsOneLineOfText) {
+  const auto title = [](const std::string& text) {
+    return Json{{"annotations", {{"titleText", text}}}};
+  };
+  EXPECT_TRUE(
+      accepted(title("Kyrill, 2007-01-18 \u2014 \u0394\u03b8 in \u00b0C \u00b7 5 < 6 & 7")));
+  std::string longest;
+  for (std::size_t i = 0; i < limits::name_chars_max; ++i) longest += "\u00fc";
+  EXPECT_TRUE(accepted(title(longest)));
+  for (const std::string& bad :
+       {std::string(), longest + "x", std::string("a\nb"), std::string("a\tb"),
+        std::string("a\x7f"), std::string("\u0085"), std::string("\u009f"), std::string("a\u2028b"),
+        std::string("\u2029"), std::string("\ufffe"), std::string("a\uffff")}) {
+    EXPECT_EQ(first_pointer(title(bad)), "/annotations/titleText") << bad;
+  }
+  // Of the same bytes as parts of these, and no control characters.
+  EXPECT_TRUE(accepted(title("\u00a0 \u2027 \u202f \ufffd")));
+}
+
 // Codec and schema agree on every key and every type of value.
 TEST(Schema, EveryKeyAcceptsTheTypesOfTheSchema) {
   const std::vector<Json> samples{

@@ -52,12 +52,7 @@ class Font {
 
   // Lengths are of an em of 1. Glyphs in visual order, clusters in the same.
   Shaped shape(std::string_view text) {
-    const std::unique_ptr<hb_buffer_t, decltype(&hb_buffer_destroy)> buffer(hb_buffer_create(),
-                                                                            &hb_buffer_destroy);
-    hb_buffer_add_utf8(buffer.get(), text.data(), static_cast<int>(text.size()), 0,
-                       static_cast<int>(text.size()));
-    hb_buffer_guess_segment_properties(buffer.get());
-    hb_shape(shaping_, buffer.get(), nullptr, 0);
+    const auto buffer = shaped(text);
     unsigned count = 0;
     const hb_glyph_info_t* const info = hb_buffer_get_glyph_infos(buffer.get(), &count);
     const hb_glyph_position_t* const at = hb_buffer_get_glyph_positions(buffer.get(), &count);
@@ -72,10 +67,34 @@ class Font {
     return out;
   }
 
+  // Empty: all characters have a glyph.
+  std::string without_glyph(std::string_view text) {
+    const auto buffer = shaped(text);
+    unsigned count = 0;
+    const hb_glyph_info_t* const info = hb_buffer_get_glyph_infos(buffer.get(), &count);
+    for (unsigned n = 0; n < count; ++n) {
+      if (info[n].codepoint != 0) continue;
+      std::size_t end = info[n].cluster + 1;
+      while (end < text.size() && (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80U) ++end;
+      return std::string(text.substr(info[n].cluster, end - info[n].cluster));
+    }
+    return {};
+  }
+
   std::mutex& mutex() { return mutex_; }
   cairo_font_face_t* drawing() { return drawing_; }
 
  private:
+  using Buffer = std::unique_ptr<hb_buffer_t, decltype(&hb_buffer_destroy)>;
+
+  Buffer shaped(std::string_view text) {
+    Buffer buffer(hb_buffer_create(), &hb_buffer_destroy);
+    hb_buffer_add_utf8(buffer.get(), text.data(), static_cast<int>(text.size()), 0,
+                       static_cast<int>(text.size()));
+    hb_buffer_guess_segment_properties(buffer.get());
+    hb_shape(shaping_, buffer.get(), nullptr, 0);
+    return buffer;
+  }
   // Of a text from left to right; HarfBuzz numbers clusters by their first byte.
   static void set_clusters(std::span<const hb_glyph_info_t> info, std::size_t bytes, Shaped& out) {
     for (std::size_t n = 0; n < info.size();) {
@@ -109,6 +128,11 @@ void set_color(cairo_t* target, const Color& color) {
 double width_of(std::string_view text, double size) {
   const std::lock_guard lock(font().mutex());
   return size * font().shape(text).width;
+}
+
+std::string character_without_glyph(std::string_view text) {
+  const std::lock_guard lock(font().mutex());
+  return font().without_glyph(text);
 }
 
 void draw_text(cairo_t* target, const Text& text) {

@@ -268,7 +268,7 @@ TEST(Figure, TextsLieInThePictureAndApart) {
         view.camera.eye = protocol::Vec3{4 * std::sin(a), -4 * std::cos(a), 2};
         view.image.width = across;
         view.image.height = down;
-        view.annotations = {true, true, true, true, true, true, true, 1, {}};
+        show_all(view.annotations);
       });
       const Figure figure = figure_of(shown.subject());
       std::vector<Rectangle> boxes;

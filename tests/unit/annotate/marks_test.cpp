@@ -433,16 +433,5 @@ TEST(Legend, MarksNoEndBeyondWhichAMediumIsTransparent) {
   EXPECT_EQ(marked(0), (std::array{0, 0}));
 }
 
-TEST(Style, ContrastsWithTheBackground) {
-  const auto style_on = [](const std::string& background) {
-    const Shown shown(scene::atmosphere_grid(), one_scalar(),
-                      [&](protocol::View& view) { view.image.background = background; });
-    return style_of(shown.subject());
-  };
-  EXPECT_GT(style_on("#000000").color.red, 0.8);
-  EXPECT_LT(style_on("#ffffff").color.red, 0.2);
-  EXPECT_GT(style_on("#ffffff").rim.red, 0.8);
-}
-
 }  // namespace
 }  // namespace windsplat::annotate

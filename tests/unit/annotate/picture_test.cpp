@@ -17,6 +17,7 @@
 #include "server/data/samples/samples.hpp"
 #include "server/frame/frame.hpp"
 #include "server/image/decode.hpp"
+#include "tests/unit/annotate/shown.hpp"
 #include "tests/unit/image/decoded_png.hpp"
 #include "tests/unit/scene/fake.hpp"
 
@@ -33,7 +34,7 @@ class AnnotatedPicture : public testing::Test {
     view.dataset = "climate";
     view.image.width = 400;
     view.image.height = 240;
-    view.annotations = {true, true, true, true, true, true, true, 1, {}};
+    show_all(view.annotations);
   }
   frame::Frame produce(Format format, const protocol::View& of, bool measure = false) {
     frame::Encoding encoding;
@@ -161,6 +162,24 @@ TEST_F(AnnotatedPicture, SvgHasItsTextsAsText) {
   EXPECT_THAT(svg, HasSubstr(">Global circulation with clouds</text>"));
   EXPECT_THAT(svg, HasSubstr("data:image/png;base64,iVBORw0KGgo"));
   EXPECT_EQ(svg.find("nan", svg.find("</text>")), std::string::npos) << "behind the picture";
+}
+
+TEST_F(AnnotatedPicture, ATitleOfOnesOwnIsTextToo) {
+  view.annotations.title_text = "\u0394\u03b8 < 5 K & rising \u2014 18 January";
+  const frame::Frame made = produce(Format::svg);
+  const std::string svg(made.bytes.begin(), made.bytes.end());
+  EXPECT_THAT(svg, HasSubstr(">\u0394\u03b8 &lt; 5 K &amp; rising \u2014 18 January</text>"));
+  EXPECT_EQ(svg.find("Global circulation"), std::string::npos);
+}
+
+TEST_F(AnnotatedPicture, ACharacterThatTheFontLacksIsRefused) {
+  view.annotations.title_text = "a \u4e2d";
+  const auto refused = frame::complete(view, *dataset);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().at.at(0).pointer, "/annotations/titleText");
+  EXPECT_THAT(refused.error().message, HasSubstr("'\u4e2d'"));
+  view.annotations.title_text = "e\u0301 \u00fc \u0416 \u2248 \u2192";
+  EXPECT_TRUE(frame::complete(view, *dataset));
 }
 
 // SVG aligns texts at their start, middle and end: any other alignment is a shift, so that a text

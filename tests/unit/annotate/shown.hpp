@@ -41,6 +41,13 @@ class Shown {
   std::optional<scene::Scene> scene_;
 };
 
+inline void show_all(protocol::AnnotationsView& view) {
+  for (bool* part : {&view.box, &view.axes, &view.north, &view.scale_bar, &view.legend, &view.title,
+                     &view.step_time}) {
+    *part = true;
+  }
+}
+
 inline std::vector<std::string> texts(const std::vector<Item>& items) {
   std::vector<std::string> out;
   for (const Item& item : items) {

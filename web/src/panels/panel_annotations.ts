@@ -17,5 +17,6 @@ export function addAnnotations(parent: GUI, kit: PanelKit): void {
   for (const [label, key] of parts) {
     kit.toggle(folder, label, keyAccess<boolean>(`/annotations/${key}`));
   }
+  kit.text(folder, "own title", keyAccess<string | null>("/annotations/titleText"));
   kit.number(folder, "text size", keyAccess<number>("/annotations/size"), { step: 0.05 });
 }

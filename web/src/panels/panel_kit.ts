@@ -241,6 +241,16 @@ export class PanelKit {
     return this.bind(controller, label, model, access);
   }
 
+  // A line of text; empty: null.
+  text(folder: GUI, label: string, access: Access<string | null>): Controller {
+    const model = { value: access.get(this.host.view()) ?? "" };
+    return this.bind(folder.add(model, "value"), label, model, {
+      pointer: access.pointer,
+      get: (view) => access.get(view) ?? "",
+      set: (value) => access.set(value === "" ? null : value),
+    });
+  }
+
   color(folder: GUI, label: string, access: Access<string>): Controller {
     const model = { value: access.get(this.host.view()) ?? "#000000" };
     return this.bind(new PickerBox(folder, model, "color"), label, model, access);
