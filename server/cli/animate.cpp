@@ -13,12 +13,14 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/base/cancel.hpp"
 #include "server/base/elapsed.hpp"
 #include "server/base/thread_pool.hpp"
+#include "server/cli/beside/panels.hpp"
+#include "server/cli/beside/sheets.hpp"
 #include "server/cli/command.hpp"
-#include "server/cli/limited_picture.hpp"
 #include "server/cli/picture.hpp"
 #include "server/cli/signals.hpp"
 #include "server/engine/render.hpp"
@@ -167,9 +169,19 @@ bool draws_lines(const protocol::View& view, const data::DatasetInfo& info) {
   return info.first(data::FieldKind::vector) != nullptr;
 }
 
-Result<Plan> plan_of(const AnimateArguments& arguments, const data::DatasetInfo& info,
-                     const protocol::View& view) {
-  const int step_count = static_cast<int>(info.steps.size());
+// Steps that every panel which shows them has.
+int steps_of(const std::vector<Panel>& panels) {
+  std::size_t least = panels.front().dataset->info().steps.size();
+  for (const Panel& panel : panels) {
+    if (!panel.keeps_step) least = std::min(least, panel.dataset->info().steps.size());
+  }
+  return static_cast<int>(least);
+}
+
+Result<Plan> plan_of(const AnimateArguments& arguments, const std::vector<Panel>& panels) {
+  const data::DatasetInfo& info = panels.front().dataset->info();
+  const protocol::View& view = panels.front().view;
+  const int step_count = steps_of(panels);
   Plan plan;
   const auto pattern = parse_pattern(arguments.output);
   if (!pattern) {
@@ -193,7 +205,9 @@ Result<Plan> plan_of(const AnimateArguments& arguments, const data::DatasetInfo&
   }
   if (plan.steps.last >= step_count) {
     return make_error(ErrorKind::invalid,
-                      "--steps: the dataset's last step is " + std::to_string(step_count - 1));
+                      "--steps: the dataset's last step" +
+                          std::string(panels.size() > 1 ? " that both have is " : " is ") +
+                          std::to_string(step_count - 1));
   }
   plan.per_step = arguments.per_step;
   const bool moves = view.vector.motion == protocol::MotionMode::phase && draws_lines(view, info);
@@ -222,49 +236,49 @@ struct Reports {
   std::string first_empty;  // why the first of them does
 };
 
-Result<Reports> draw_all(const Plan& plan, protocol::View view, LimitedPictures& pictures,
+Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& sheets,
                          const CancelToken& cancel) {
   Reports reports;
   const int total = plan.steps.count() * plan.per_step;
-  const double motion_start = view.vector.motion_time;
+  std::vector<double> starts;  // of the motion
+  for (const Panel& panel : panels) starts.push_back(panel.view.vector.motion_time);
   Progress progress(total);
   for (int n = 0; n < total; ++n) {
     progress.show(n);
-    view.step = plan.steps.first + n / plan.per_step * plan.steps.stride;
     // Fraction of the way to the next drawn step, so that the phase is continuous.
     const double part = static_cast<double>(n % plan.per_step) / plan.per_step;
-    view.vector.motion_time = motion_start + plan.steps.stride * part;
-    const auto picture = pictures.draw(view, cancel);
+    for (std::size_t p = 0; p < panels.size(); ++p) {
+      protocol::View& view = panels[p].view;
+      if (!panels[p].keeps_step) {
+        view.step = plan.steps.first + n / plan.per_step * plan.steps.stride;
+      }
+      view.vector.motion_time = starts[p] + plan.steps.stride * part;
+    }
+    const auto sheet = sheets.draw(cancel);
     if (cancel.cancelled()) return interrupted(n, total);
-    if (!picture) return picture.error();
-    if (auto done = write_output(plan.pattern.name(n), picture->frame.bytes); !done) {
-      return done.error();
-    }
-    if (!exceeded_limits(*picture).empty()) ++reports.exceeding;
-    if (!picture->frame.empty.empty() && reports.empty++ == 0) {
-      reports.first_empty = picture->frame.empty;
-    }
-    reports.lines += report_line(*picture);
+    if (!sheet) return sheet.error();
+    if (auto done = write_output(plan.pattern.name(n), sheet->bytes); !done) return done.error();
+    if (!sheet->exceeded.empty()) ++reports.exceeding;
+    if (!sheet->empty.empty() && reports.empty++ == 0) reports.first_empty = sheet->empty;
+    reports.lines += sheet->reports;
   }
   progress.show(total);
   return reports;
 }
 
 Result<void> animate(const AnimateArguments& arguments, const CancelToken& cancel) {
-  const auto document = assemble_view(arguments.view);
-  if (!document) return document.error();
-  protocol::View view = document->view();
-  const auto dataset = open_dataset(arguments.view, view);
-  if (!dataset) return dataset.error();
-  const auto plan = plan_of(arguments, (*dataset)->info(), view);
+  auto panels = open_panels(arguments.view);
+  if (!panels) return panels.error();
+  const auto plan = plan_of(arguments, *panels);
   if (!plan) return plan.error();
 
   frame::Encoding encoding = file_encoding(plan->format, arguments.view);
   encoding.measure = !arguments.report.empty();
   encoding.measure_change = encoding.measure;
   ThreadPool pool(arguments.threads);
-  LimitedPictures pictures(**dataset, encoding, pool);
-  const auto reports = draw_all(*plan, view, pictures, cancel);
+  auto sheets = Sheets::of(*panels, encoding, pool);
+  if (!sheets) return sheets.error();
+  const auto reports = draw_all(*plan, *panels, *sheets, cancel);
   if (!reports) return reports.error();
   if (reports->exceeding > 0) {
     complain(std::to_string(reports->exceeding) + " pictures exceed a limit of /quality");

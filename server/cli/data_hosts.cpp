@@ -1,5 +1,6 @@
 #include "server/cli/data_hosts.hpp"
 
+#include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>

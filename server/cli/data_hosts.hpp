@@ -1,13 +1,16 @@
 // The options of commands that open datasets on other hosts.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "server/base/error.hpp"
 #include "server/data/fetch/fetcher.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace windsplat::cli {
 

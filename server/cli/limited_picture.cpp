@@ -140,10 +140,6 @@ std::string report_line(const Picture& picture) {
          '\n';
 }
 
-std::string empty_text(const Picture& picture) {
-  return "the picture shows nothing of the data: " + picture.frame.empty;
-}
-
 std::string exceeded_limits(const Picture& picture) {
   const protocol::QualityView& limits = picture.frame.view.quality;
   std::string text;

@@ -61,9 +61,6 @@ class LimitedPictures {
 // The report of a picture as a line of JSON.
 std::string report_line(const Picture& picture);
 
-// Says that the picture shows nothing of the data, and why.
-std::string empty_text(const Picture& picture);
-
 // Text on each limit of the view that the picture does not keep; empty if it keeps them.
 std::string exceeded_limits(const Picture& picture);
 

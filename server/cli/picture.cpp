@@ -1,6 +1,7 @@
 // Parses the arguments of a picture: view, format and dataset.
 #include "server/cli/picture.hpp"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
 #include <utility>
@@ -30,6 +31,19 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
       .add_option("--minus-step", arguments.minus_step,
                   "Draw the fields minus those of this step, from 0")
       ->type_name("N");
+  command
+      .add_option("--beside", arguments.beside,
+                  "Draw another dataset on the right, with the same camera and ranges")
+      ->type_name("DATASET");
+  command
+      .add_option("--beside-step", arguments.beside_step,
+                  "Draw this step on the right, from 0; default: the same")
+      ->type_name("N");
+  command
+      .add_option("--beside-set", arguments.beside_settings,
+                  "Change one key of the view on the right; may be repeated")
+      ->allow_extra_args(false)
+      ->type_name("/json/pointer=value");
   command.add_option("--set", arguments.settings, "Change one key of the view; may be repeated")
       ->allow_extra_args(false)
       ->type_name("/json/pointer=value");
@@ -73,16 +87,28 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
     changes.emplace_back("/vector/color/trueColors", "true");
   }
   if (!arguments.minus_step.empty()) changes.emplace_back("/difference/step", arguments.minus_step);
-  for (const std::string& setting : arguments.settings) {
-    const std::size_t equals = setting.find('=');
-    if (equals == std::string::npos) {
-      return make_error(ErrorKind::malformed, "--set '" + printable(setting) +
-                                                  "' is not of the form /json/pointer=value");
+  if (arguments.is_pair()) {
+    for (const char* shown : {"title", "stepTime"}) {
+      changes.emplace_back(std::string("/annotations/") + shown, "true");
     }
-    changes.emplace_back(setting.substr(0, equals), setting.substr(equals + 1));
+  }
+  for (const std::string& setting : arguments.settings) {
+    auto change = parse_setting("--set", setting);
+    if (!change) return change.error();
+    changes.push_back(std::move(*change));
   }
   if (!document || changes.empty()) return document;
   return protocol::set_all(*document, changes);
+}
+
+Result<std::pair<std::string, std::string>> parse_setting(const char* option,
+                                                          const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals != std::string::npos) {
+    return std::pair(text.substr(0, equals), text.substr(equals + 1));
+  }
+  return make_error(ErrorKind::malformed, std::string(option) + " '" + printable(text) +
+                                              "' is not of the form /json/pointer=value");
 }
 
 Result<frame::Format> format_of(const std::string& output) {
@@ -111,30 +137,38 @@ frame::Encoding file_encoding(frame::Format format, const ViewArguments& argumen
   return encoding;
 }
 
-Result<std::shared_ptr<data::Dataset>> open_dataset(const ViewArguments& arguments,
-                                                    protocol::View& view) {
+Result<OpenedDatasets> open_datasets(const ViewArguments& arguments) {
   const auto limit = memory_limit(arguments.memory);
   if (!limit) return limit.error();
   auto fetcher = open_fetcher(arguments.data_hosts);
   if (!fetcher) return fetcher.error();
   // Datasets do not depend on the store.
   data::Store store(store_options(*limit, std::move(*fetcher)));
-  auto dataset = store.add(arguments.dataset);
-  if (!dataset) return dataset;
-  view.dataset = (*dataset)->info().id;
-  std::shared_ptr<data::Dataset> other;
-  if (!arguments.minus.empty()) {
-    auto opened = store.add(arguments.minus);
-    if (!opened) return opened;
-    other = std::move(*opened);
+  OpenedDatasets out;
+  for (const auto& [name, dataset] :
+       {std::pair(&arguments.dataset, &out.first), std::pair(&arguments.minus, &out.minus),
+        std::pair(&arguments.beside, &out.beside)}) {
+    if (name->empty()) continue;
+    auto opened = store.add(*name);
+    if (!opened) return opened.error();
+    *dataset = std::move(*opened);
+  }
+  return out;
+}
+
+Result<std::shared_ptr<data::Dataset>> shown_dataset(protocol::View& view,
+                                                     const std::shared_ptr<data::Dataset>& dataset,
+                                                     const std::shared_ptr<data::Dataset>& minus) {
+  view.dataset = dataset->info().id;
+  if (minus) {
     if (!view.difference) view.difference.emplace();
-    view.difference->dataset = other->info().id;
+    view.difference->dataset = minus->info().id;
   } else if (view.difference && view.difference->dataset) {
     return make_error_at(ErrorKind::invalid, "/difference/dataset",
                          "is " + in_quotes(*view.difference->dataset) +
                              " of a server: name the file or sample here, by --minus");
   }
-  auto shown = scene::with_difference(view, **dataset, other.get());
+  auto shown = scene::with_difference(view, *dataset, minus.get());
   if (!shown) return shown.error();
   return std::make_shared<data::Dataset>(std::move(*shown));
 }

@@ -7,8 +7,9 @@
 
 #include "server/base/cancel.hpp"
 #include "server/base/thread_pool.hpp"
+#include "server/cli/beside/panels.hpp"
+#include "server/cli/beside/sheets.hpp"
 #include "server/cli/command.hpp"
-#include "server/cli/limited_picture.hpp"
 #include "server/cli/picture.hpp"
 
 namespace windsplat::cli {
@@ -20,11 +21,6 @@ struct RenderArguments {
   std::string report;  // empty: no report
   unsigned threads = 0;
 };
-
-Result<void> write_report(const std::string& path, const Picture& picture) {
-  const std::string text = report_line(picture);
-  return write_output(path, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-}
 
 Result<void> render(const RenderArguments& arguments) {
   const bool to_stdout = arguments.output == "-";
@@ -38,23 +34,24 @@ Result<void> render(const RenderArguments& arguments) {
     return make_error(ErrorKind::invalid,
                       "-o -: stdout is a terminal; redirect it to a file or a pipe");
   }
-  const auto document = assemble_view(arguments.view);
-  if (!document) return document.error();
-  protocol::View view = document->view();
-  const auto dataset = open_dataset(arguments.view, view);
-  if (!dataset) return dataset.error();
+  auto panels = open_panels(arguments.view);
+  if (!panels) return panels.error();
 
   ThreadPool pool(arguments.threads);
   frame::Encoding encoding = file_encoding(*format, arguments.view);
   encoding.measure = !arguments.report.empty();
   encoding.measure_change = encoding.measure;
-  const auto picture = LimitedPictures(**dataset, encoding, pool).draw(view, CancelToken());
-  if (!picture) return picture.error();
-  if (const std::string text = exceeded_limits(*picture); !text.empty()) complain(text);
-  if (!picture->frame.empty.empty()) complain(empty_text(*picture));
-  auto written = write_output(arguments.output, picture->frame.bytes);
+  auto sheets = Sheets::of(*panels, encoding, pool);
+  if (!sheets) return sheets.error();
+  const auto sheet = sheets->draw(CancelToken());
+  if (!sheet) return sheet.error();
+  if (!sheet->exceeded.empty()) complain(sheet->exceeded);
+  if (!sheet->empty.empty()) complain("the picture shows nothing of the data: " + sheet->empty);
+  auto written = write_output(arguments.output, sheet->bytes);
   if (!written || arguments.report.empty()) return written;
-  return write_report(arguments.report, *picture);
+  const std::string& text = sheet->reports;
+  return write_output(arguments.report,
+                      {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
 }  // namespace

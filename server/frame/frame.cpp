@@ -28,8 +28,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double document_dots_per_inch = 300;  // of pdf and svg without a value
-
 std::int64_t microseconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();
 }
@@ -266,9 +264,14 @@ Result<image::Bytes> bytes_of(Workspace& workspace, ThreadPool& pool, const Canc
   auto& [width, height, rgba] = workspace.space.image();
   if (encoding.format == Format::npy) return image::encode_npy(rgba, width, height, cancel);
   if (workspace.overlay) annotate::composite(*workspace.overlay, pool, rgba);
-  const image::Bytes rgb = image::tone_map(rgba, width, height, workspace.background, cancel);
+  image::Bytes rgb = image::tone_map(rgba, width, height, workspace.background, cancel);
+  if (encoding.format == Format::png && encoding.raw) return rgb;
   if (encoding.format == Format::png) {
     return image::encode_png(rgb, width, height, cancel, encoding.dots_per_inch);
+  }
+  if (encoding.raw) {
+    workspace.drawn.figure = std::move(workspace.figure);
+    return rgb;
   }
   annotate::Figure plain;
   plain.width = width;

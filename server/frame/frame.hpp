@@ -35,6 +35,8 @@ namespace windsplat::frame {
 // pdf, svg: the picture with its annotations as texts and lines.
 enum class Format { jpeg, png, npy, pdf, svg };
 
+inline constexpr double document_dots_per_inch = 300;  // of pdf and svg without a value
+
 struct Encoding {
   Format format = Format::jpeg;
   int quality = 90;
@@ -57,6 +59,9 @@ struct Encoding {
   bool key = false;
   std::optional<double> dots_per_inch =
       std::nullopt;  // of pdf and svg (300 without it) and png (none without it)
+  // Whether the bytes of a png, pdf or svg are its pixels, for encode_pair() (pair/pair.hpp): 8-bit
+  // sRGB, and of pdf and svg what lies over them in Frame::figure.
+  bool raw = false;
 };
 
 // How a picture was encoded.
@@ -82,6 +87,7 @@ struct Frame {
   std::optional<double> jpeg_error;
   // measured_skipped_change, or 0 if it is certain that nothing is left out; empty: not measured.
   std::optional<double> skipped_change;
+  std::optional<annotate::Figure> figure;  // only if raw
   Coded coded = Coded::as_asked;
   std::string video_fault;  // if video failed
 };

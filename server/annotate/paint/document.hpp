@@ -10,6 +10,22 @@
 
 namespace windsplat::annotate {
 
+// A figure whose left edge lies at a column of the picture; what lies beyond its size is cut off.
+struct Part {
+  const Figure& figure;
+  int left = 0;
+};
+// A picture with the figures over it; without parts the picture alone.
+struct Page {
+  std::span<const std::uint8_t> rgb;  // 8-bit sRGB
+  int width = 0, height = 0;
+  std::span<const Part> parts;
+  double dots_per_inch = 300;
+};
+// As those of one figure, below.
+Result<image::Bytes> encode_pdf(const Page& page);
+Result<image::Bytes> encode_svg(const Page& page);
+
 // `rgb`: the picture, 8-bit sRGB, width x height of the figure, with figure.below drawn into it;
 // only figure.above is drawn over it. The document is `dots_per_inch` pixels to the inch, and the
 // same bytes for the same arguments. Errors: internal, out_of_memory.

@@ -117,23 +117,38 @@ class Writer {
 
 }  // namespace
 
-Result<image::Bytes> encode_svg(std::span<const std::uint8_t> rgb, const Figure& figure,
-                                double dots_per_inch) {
-  const auto png = image::encode_png(rgb, figure.width, figure.height);
+Result<image::Bytes> encode_svg(const Page& page) {
+  const auto png = image::encode_png(page.rgb, page.width, page.height);
   if (!png) return png.error();
-  const std::string width = std::to_string(figure.width);
-  const std::string height = std::to_string(figure.height);
+  const std::string width = std::to_string(page.width);
+  const std::string height = std::to_string(page.height);
   std::string out =
       "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" "
       "width=\"" +
-      number(figure.width / dots_per_inch) + "in\" height=\"" +
-      number(figure.height / dots_per_inch) + "in\" viewBox=\"0 0 " + width + " " + height +
+      number(page.width / page.dots_per_inch) + "in\" height=\"" +
+      number(page.height / page.dots_per_inch) + "in\" viewBox=\"0 0 " + width + " " + height +
       "\" font-family=\"'DejaVu Sans', Verdana, sans-serif\">\n<image width=\"" + width +
       "\" height=\"" + height + "\" xlink:href=\"data:image/png;base64," + base64(*png) + "\"/>\n";
   Writer writer(out);
-  for (const Item& item : figure.above) std::visit(writer, item);
+  for (const Part& part : page.parts) {
+    const bool narrower = part.figure.width < page.width;
+    // A viewport of its own, which clips (SVG 1.1, 14.3.3).
+    if (narrower) {
+      out += "<svg x=\"" + std::to_string(part.left) + "\" y=\"0\" width=\"" +
+             std::to_string(part.figure.width) + "\" height=\"" +
+             std::to_string(part.figure.height) + "\" overflow=\"hidden\">\n";
+    }
+    for (const Item& item : part.figure.above) std::visit(writer, item);
+    if (narrower) out += "</svg>\n";
+  }
   out += "</svg>\n";
   return image::Bytes(out.begin(), out.end());
+}
+
+Result<image::Bytes> encode_svg(std::span<const std::uint8_t> rgb, const Figure& figure,
+                                double dots_per_inch) {
+  const Part whole{figure};
+  return encode_svg({rgb, figure.width, figure.height, {&whole, 1}, dots_per_inch});
 }
 
 }  // namespace windsplat::annotate

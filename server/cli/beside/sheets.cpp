@@ -1,0 +1,56 @@
+#include "server/cli/beside/sheets.hpp"
+
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include "server/frame/pair/pair.hpp"
+
+namespace windsplat::cli {
+namespace {
+
+void add_text(const std::string& text, bool pair, std::size_t panel, std::string& out) {
+  if (text.empty()) return;
+  if (!out.empty()) out += "; ";
+  if (pair) out += panel == 0 ? "left: " : "right: ";
+  out += text;
+}
+
+}  // namespace
+
+Result<Sheets> Sheets::of(std::vector<Panel>& panels, const frame::Encoding& encoding,
+                          ThreadPool& pool) {
+  Sheets out(panels, encoding);
+  frame::Encoding each = encoding;
+  if (panels.size() > 1) {
+    const auto raw = frame::raw_of_pair(encoding);
+    if (!raw) return raw.error();
+    each = *raw;
+  }
+  for (Panel& panel : panels) out.pictures_.emplace_back(*panel.dataset, each, pool);
+  return out;
+}
+
+Result<Sheet> Sheets::draw(const CancelToken& cancel) {
+  Sheet sheet;
+  std::array<frame::Frame, 2> frames;
+  const bool pair = panels_->size() > 1;
+  for (std::size_t n = 0; n < panels_->size(); ++n) {
+    auto picture = pictures_[n].draw((*panels_)[n].view, cancel);
+    if (!picture) return picture.error();
+    sheet.reports += report_line(*picture);
+    add_text(exceeded_limits(*picture), pair, n, sheet.exceeded);
+    add_text(picture->frame.empty, pair, n, sheet.empty);
+    frames.at(n) = std::move(picture->frame);
+  }
+  if (!pair) {
+    sheet.bytes = std::move(frames[0].bytes);
+    return sheet;
+  }
+  auto bytes = frame::encode_pair(frames, encoding_, cancel);
+  if (!bytes) return bytes.error();
+  sheet.bytes = std::move(*bytes);
+  return sheet;
+}
+
+}  // namespace windsplat::cli

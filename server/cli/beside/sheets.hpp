@@ -1,0 +1,45 @@
+// Panels -> the file of one picture, or of two side by side.
+#pragma once
+
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "server/base/cancel.hpp"
+#include "server/base/error.hpp"
+#include "server/base/thread_pool.hpp"
+#include "server/cli/beside/panels.hpp"
+#include "server/cli/limited_picture.hpp"
+#include "server/image/encode.hpp"
+
+namespace windsplat::cli {
+
+struct Sheet {
+  image::Bytes bytes;
+  std::string reports;  // a line of JSON for each picture, from left to right
+  // On each limit that a picture exceeds; why a picture shows nothing of the data. Empty: none.
+  std::string exceeded;
+  std::string empty;
+};
+
+// Draws the pictures of a command one after another.
+class Sheets {
+ public:
+  // Panels and pool must outlive this object; between two calls of draw() the panels may get other
+  // steps and times. Errors: invalid for two panels as an array (npy).
+  static Result<Sheets> of(std::vector<Panel>& panels, const frame::Encoding& encoding,
+                           ThreadPool& pool);
+
+  // Errors: those of LimitedPictures::draw() and frame::encode_pair().
+  Result<Sheet> draw(const CancelToken& cancel);
+
+ private:
+  Sheets(std::vector<Panel>& panels, const frame::Encoding& encoding)
+      : panels_(&panels), encoding_(encoding) {}
+
+  std::vector<Panel>* panels_;
+  frame::Encoding encoding_;
+  std::deque<LimitedPictures> pictures_;  // of each panel
+};
+
+}  // namespace windsplat::cli
