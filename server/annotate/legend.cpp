@@ -12,6 +12,7 @@
 #include "server/annotate/labels.hpp"
 #include "server/annotate/paint/type.hpp"
 #include "server/image/tone_map.hpp"
+#include "server/scene/defaults.hpp"
 #include "server/scene/surfaces/make_surfaces.hpp"
 
 namespace windsplat::annotate {
@@ -155,6 +156,17 @@ std::array<float, 2> drawn_magnitudes(const scene::VectorLayer& layer) {
   return {std::max(least, static_cast<float>(layer.min_magnitude)), most};
 }
 
+// How many of the lines drawn have colours that end before their magnitudes.
+std::string beyond_text(const scene::VectorLayer& layer, double top) {
+  const double drawn = 1 - scene::hidden_share(layer.min_magnitude, *layer.field);
+  const double beyond = 1 - scene::hidden_share(top, *layer.field);
+  const double percent = drawn > 0 ? 100 * beyond / drawn : 0;
+  constexpr double least_percent = 0.1;
+  const std::string share =
+      percent < least_percent ? "less than 0.1" : number_text_of(std::min(percent, 100.0), 2);
+  return share + " % of the lines lie beyond";
+}
+
 Entry lines_entry(const Subject& subject) {
   const scene::VectorLayer& layer = *subject.scene.vector;
   const protocol::VectorView& vector = subject.completed.view().vector;
@@ -192,6 +204,9 @@ Entry lines_entry(const Subject& subject) {
       entry.title += "magnitude";
       entry.units = units;
       entry.beyond = beyond_ends(range, drawn_magnitudes(layer));
+      if (range[0] <= range[1] && entry.beyond[1]) {
+        entry.notes.push_back(beyond_text(layer, range[1]));
+      }
       break;
     case LineColor::direction:
       entry.title += "direction";

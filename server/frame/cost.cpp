@@ -146,7 +146,7 @@ class Counting {
   void add_lines(const protocol::VectorView& vector) {
     double widest = 0;
     for (std::size_t a = 0; a < 3; ++a) widest = std::max(widest, scene::cell_size(lattice_, a));
-    const double box = std::max(vector.span, 1.0) * vector.stride * widest * 2;
+    const double box = std::max(vector.span, 1.0) * *vector.stride * widest * 2;
     const double length = vector.trace ? *vector.length : std::min(*vector.length, box);
     const double parts = vector.trace ? vector.trace->segments : 1;  // each is drawn as a line
     const double scale = view_.image.height / reference_height;
@@ -154,7 +154,7 @@ class Counting {
         2 * std::max(1.0, scene::outer_radius(scene::mark_of(vector, view_.image.height),
                                               vector.r1 * scale, vector.r2 * scale));
     const double longish = length * visible_.px / parts;
-    const double count = parts * stops(vector.stride);
+    const double count = parts * stops(*vector.stride);
     const double covering = count * drawn((longish + wide) * wide);
     add("/vector/stride", count);
     add(wide > longish ? "/vector/r2" : "/vector/length", covering);

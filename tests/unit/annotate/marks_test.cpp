@@ -388,6 +388,23 @@ TEST(Legend, MarksTheEndsBeyondWhichValuesLie) {
   EXPECT_EQ(marked(0, 1e6), (std::array{0, 0}));
 }
 
+// Sample n of 36 has the components n, n + 100 and n + 200: 13 of them have more than 255.
+TEST(Legend, TellsHowManyLinesLieBeyondItsColors) {
+  const auto written = [](double high) {
+    std::vector<data::FieldInfo> fields{scene::wind_info()};
+    const Shown shown(scene::atmosphere_grid(), fields, [&](protocol::View& view) {
+      view.vector.min_magnitude = 0;
+      view.vector.color.by = protocol::ColorBy::magnitude;
+      view.vector.color.range = protocol::Range{0, high};
+    });
+    Figure figure = empty_figure(shown);
+    add_legend(shown.subject(), style_of(shown.subject()), figure);
+    return texts(figure.above);
+  };
+  EXPECT_THAT(written(255), Contains("36 % of the lines lie beyond"));
+  EXPECT_THAT(written(1e3), Not(Contains(HasSubstr("lie beyond"))));
+}
+
 // Values of t are n: a layer of it shows a part of them.
 TEST(Legend, MarksTheEndsBeyondWhichASurfaceHasValues) {
   const auto marked = [](double low, double high, bool section) {

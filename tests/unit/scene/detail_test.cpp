@@ -203,6 +203,7 @@ class LevelOfAScene : public testing::Test {
     dataset = sample_dataset("tornado", {64, 64, 64});
     view.image.width = 40;
     view.image.height = 30;
+    view.vector.stride = 1;
   }
   Scene built() {
     const auto completed = complete(view, *dataset);
