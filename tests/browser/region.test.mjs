@@ -1,7 +1,7 @@
 // Handles of the region over the picture.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { finalPicture, sharedDaemon, shot, state } from "./support.mjs";
+import { control, finalPicture, sharedDaemon, shot, state, type } from "./support.mjs";
 
 const { withPage } = sharedDaemon();
 
@@ -72,6 +72,28 @@ test("pictures that do not move the handles leave them alone", async () => {
       await finalPicture(page);
       assert.ok((await page.evaluate(() => window.changes)) > 0, "they follow the camera");
       await shot(page, "region-handles");
+    },
+    { unfolded, path: climate },
+  );
+});
+
+test("undo of a region tells the whole range at once, before the next picture", async () => {
+  await withPage(
+    async (page) => {
+      const box = control(page, "lon to \\(°E\\)", "input");
+      const whole = await box.inputValue();
+      await type(page, "lon to \\(°E\\)", 60);
+      await finalPicture(page);
+      assert.equal(Number(await box.inputValue()), 60);
+      await page.locator("#picture").press("Shift"); // ends the typing
+      // In one turn of the page, in which no picture arrives.
+      const after = await box.evaluate((input) => {
+        document.querySelector("#undo-button").click();
+        return input.value;
+      });
+      assert.equal(after, whole);
+      await finalPicture(page);
+      assert.equal(await box.inputValue(), whole);
     },
     { unfolded, path: climate },
   );
