@@ -164,3 +164,35 @@ test("a link to a dataset that cannot be read shows the reason and no other one"
   assert.equal(page.sent("open").length, 1);
   assert.match(page.alert!, /needs 27.5 MiB/);
 });
+
+test("a step that is not there is counted from 1, as on the page", () => {
+  const page = new Page([described("a")]);
+  page.opened(page.datasets[0]!);
+  page.draws();
+  const told = (detail: string): string | null => {
+    page.app.change({ step: 40 });
+    page.receives({ type: "error", rev: page.rev, problem: problem(detail, 422, "/step") });
+    return page.alert;
+  };
+  assert.equal(told("dataset 'a' has steps 0 to 11"), "Time step: dataset 'a' has steps 1 to 12");
+  assert.match(
+    told("dataset 'b' has no step 9 to subtract: name one of 0 to 3")!,
+    /no step 10 to subtract: name one of 1 to 4$/,
+  );
+  assert.match(
+    told("the times of steps 2 and 3 differ by 5 steps")!,
+    /steps 3 and 4 differ by 5 st/,
+  );
+  page.draws({ empty: "every sample of cloud is masked at step 0" });
+  assert.equal(page.emptyText, "Nothing is shown: every sample of cloud is masked at step 1.");
+});
+
+test("a picture that is dark because it is night says so", () => {
+  const page = new Page([described("a")]);
+  page.opened(page.datasets[0]!);
+  const sunAt = { utc: "2024-06-20T00:00Z", longitude: 0, latitude: 50 };
+  page.draws({ view: { light: { sunAt } } as unknown as View });
+  assert.match(page.emptyText!, /^The sun is \d+° below the horizon here at this time\.$/);
+  page.draws({ view: { light: { sunAt: { ...sunAt, longitude: 180 } } } as unknown as View });
+  assert.equal(page.emptyText, null);
+});

@@ -95,7 +95,7 @@ test("fewer steps select the last one and keep the rest", () => {
   page.draws();
   const { built } = page;
   page.receives({ type: "error", rev: page.rev, problem: problem(gone, 422, "/step") });
-  assert.match(page.alert ?? "", /steps 0 to 2/);
+  assert.match(page.alert ?? "", /steps 1 to 3/);
   page.opened(described("storm", { steps: 3 }));
   assert.equal(page.alert, null, "the step is no longer requested");
   const last = page.sent("patch").at(-1)!.patch as View;

@@ -27,6 +27,7 @@ import {
 import { problemText } from "../wire/requests";
 import { openConnection, watchPresence } from "./server_link";
 import { UndoControl } from "./undo_control";
+import { nightText } from "../view/sun_at";
 import { VideoOffer } from "./video_offer";
 import { ViewModel } from "../view/view_model";
 import type { Outgoing, Patch } from "../view/view_state";
@@ -375,7 +376,7 @@ export class App {
     this.flowing.answered(header.rev);
     if (chosen !== null) {
       this.model.drew(chosen, header.final);
-      status.empty(chosen.empty);
+      status.empty(chosen.empty, nightText(chosen.view as View));
     }
     // The server's step is adopted if no newer view was requested or playback is running.
     if (this.playback.running || header.rev === this.model.state.rev) this.followStep(header.step);

@@ -1,6 +1,7 @@
 // Status text: connection, loading with a progress bar, and errors. An error is shown until it is
 // dismissed or the failed operation succeeds; less important messages never overwrite it.
 import type { ConnectionState } from "../wire/connection";
+import { countedFromOne } from "../base/step_text";
 import { byId } from "../base/dom";
 
 const noteMs = 4000;
@@ -104,11 +105,12 @@ export class Status {
     this.alertText.textContent = "";
   }
 
-  // Why the picture shows nothing of the data; undefined: it shows some.
-  empty(reason: string | undefined): void {
-    const text = reason === undefined ? "" : `Nothing is shown: ${reason}.`;
+  // Why the picture shows nothing of the data; undefined: it shows some. note: what else to know.
+  empty(reason: string | undefined, note = ""): void {
+    const text = reason === undefined ? note : `Nothing is shown: ${countedFromOne(reason)}.`;
     if (this.emptyText.textContent !== text) this.emptyText.textContent = text;
-    this.emptyText.hidden = reason === undefined;
+    this.emptyText.hidden = text === "";
+    this.emptyText.classList.toggle("is-note", reason === undefined);
   }
 
   // Keeps the error even if its operation succeeds, because another view replaced the failed one.

@@ -1,12 +1,13 @@
 // Requests that post a document, and the text of error answers.
+import { countedFromOne } from "../base/step_text";
 import { entryText } from "../base/key_words";
 import type { Problem, View } from "./protocol";
 
 export function problemText(problem: Problem): string {
   const details = problem.errors?.map(({ pointer, detail }) => entryText(pointer, detail));
   // The detail often repeats the first entry; the complete list is more useful.
-  if (details !== undefined && details.length > 0) return details.join("; ");
-  return problem.detail === "" ? problem.title : problem.detail;
+  if (details !== undefined && details.length > 0) return countedFromOne(details.join("; "));
+  return countedFromOne(problem.detail || problem.title || "");
 }
 
 export const posted = (body: View | object, headers = {}): RequestInit => ({
