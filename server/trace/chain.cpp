@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "server/base/thread_pool.hpp"
+
 namespace windsplat::trace {
 
 namespace {
@@ -33,29 +35,72 @@ constexpr int brick_side = 8;
 constexpr std::size_t sheet_rows = 128;
 constexpr std::size_t sheet = brick_side * sheet_rows;
 
-void resize(std::size_t vertices, bool turns, Segments& out) {
-  const std::size_t sheets = std::max<std::size_t>((vertices + sheet - 1) / sheet, 1);
-  out.dims = {brick_side, static_cast<int>(sheet_rows), static_cast<int>(sheets)};
-  const std::size_t count = sheets * sheet + 1;
-  for (auto& tangent : out.tangents) tangent.assign(count, 0);
-  out.q.assign(count, 0);
-  out.magnitudes.assign(count, Segments::none);
-  out.phases.assign(count, 0);
-  if (turns) out.turns.assign(count, 0);
-  out.colors.assign(count, 0);
-  out.samples.assign(count, 0);
-  out.places.assign(count, {0, 0, 0});
+std::size_t sheets_of(std::size_t vertices) {
+  return std::max<std::size_t>((vertices + sheet - 1) / sheet, 1);
 }
 
-void copy(const Vertex& from, std::size_t to, Segments& out) {
-  out.places[to] = from.place;
-  for (std::size_t c = 0; c < 3; ++c) out.tangents[c][to] = from.tangent[c];
-  out.q[to] = from.q;
-  out.magnitudes[to] = from.magnitude;
-  out.phases[to] = from.phase;
-  if (!out.turns.empty()) out.turns[to] = from.turn;
-  out.colors[to] = from.color;
-  out.samples[to] = from.sample;
+// Calls use(values, value of a vertex where nothing begins) for the values of vertices, but places
+// and turns.
+template <class Use>
+void each_array(Segments& out, const Use& use) {
+  for (auto& tangent : out.tangents) use(tangent, 0.F);
+  use(out.q, 0.F);
+  use(out.magnitudes, Segments::none);
+  use(out.phases, 0.F);
+  use(out.colors, 0.F);
+  use(out.samples, std::uint32_t{0});
+}
+
+void reserve(std::size_t vertices, Segments& out) {
+  each_array(out, [&](auto& values, auto) { values.reserve(vertices); });
+  out.places.reserve(vertices);
+}
+
+// room: vertices at most.
+void append(const Row& row, std::size_t room, Segments& out) {
+  const std::size_t before = out.places.size();
+  for (const Vertex& from : row.vertices) {
+    out.places.push_back(from.place);
+    for (std::size_t c = 0; c < 3; ++c) out.tangents[c].push_back(from.tangent[c]);
+    out.q.push_back(from.q);
+    out.magnitudes.push_back(from.magnitude);
+    out.phases.push_back(from.phase);
+    out.colors.push_back(from.color);
+    out.samples.push_back(from.sample);
+  }
+  const bool turns = std::any_of(row.vertices.begin(), row.vertices.end(),
+                                 [](const Vertex& vertex) { return vertex.turn != 0; });
+  if (!turns && out.turns.empty()) return;
+  out.turns.reserve(room);
+  out.turns.resize(before, 0);
+  for (const Vertex& from : row.vertices) out.turns.push_back(from.turn);
+}
+
+// Padding lies where the last vertex does, so that it widens no brick.
+void pad(Segments& out) {
+  const std::size_t sheets = sheets_of(out.places.size());
+  const std::size_t count = sheets * sheet + 1;
+  out.dims = {brick_side, static_cast<int>(sheet_rows), static_cast<int>(sheets)};
+  const auto last = out.places.empty() ? std::array<float, 3>{0, 0, 0} : out.places.back();
+  out.places.resize(count, last);
+  each_array(out, [&](auto& values, auto none) { values.resize(count, none); });
+  if (!out.turns.empty()) out.turns.resize(count, 0);
+}
+
+void add(const Tally& from, Tally& to) {
+  to.lines += from.lines;
+  to.segments += from.segments;
+  to.evaluations += from.evaluations;
+  for (std::size_t e = 0; e < from.ends.size(); ++e) to.ends[e] += from.ends[e];
+}
+
+// Rows that are made at a time: at least as many as there are threads.
+std::size_t together(const Rows& rows) {
+  constexpr std::int64_t vertices_together = std::int64_t{1} << 16U;
+  constexpr std::int64_t fewest = 4;
+  const std::int64_t most = std::max<std::int64_t>(rows.vertices_most, 1);
+  const auto wanted = static_cast<std::size_t>(std::max(vertices_together / most, fewest));
+  return std::min(wanted, rows.count);
 }
 
 }  // namespace
@@ -129,39 +174,44 @@ void set_tangents(std::size_t first, std::vector<Vertex>& vertices) {
   }
 }
 
-Segments gather(std::vector<Row>& rows, double magnitude_scale) {
-  Segments out;
-  out.magnitude_scale = magnitude_scale;
-  std::size_t vertices = 0;
-  bool turns = false;
-  for (const Row& row : rows) {
-    vertices += row.vertices.size();
-    turns = turns || std::any_of(row.vertices.begin(), row.vertices.end(),
-                                 [](const Vertex& vertex) { return vertex.turn != 0; });
-  }
-  resize(vertices, turns, out);
-  std::size_t next = 0;
-  for (Row& row : rows) {
-    for (std::size_t v = 0; v < row.vertices.size(); ++v) {
-      copy(row.vertices[v], next++, out);
-      if (!(row.vertices[v].magnitude > Segments::not_drawn)) continue;  // another line follows
-      const double chord = glm::length(between(row.vertices[v], row.vertices[v + 1]));
-      out.longest = std::max(out.longest, chord);
-    }
-    row.vertices = {};
-    out.tally.lines += row.tally.lines;
-    out.tally.segments += row.tally.segments;
-    out.tally.evaluations += row.tally.evaluations;
-    for (std::size_t e = 0; e < row.tally.ends.size(); ++e) out.tally.ends[e] += row.tally.ends[e];
-  }
-  // Padding lies where the last vertex does, so that it widens no brick.
-  const auto last = next > 0 ? out.places[next - 1] : std::array<float, 3>{0, 0, 0};
-  std::fill(out.places.begin() + static_cast<std::ptrdiff_t>(next), out.places.end(), last);
-  return out;
+Room Rows::room() const {
+  const auto extra = static_cast<std::int64_t>(sheet) + 1;
+  Room of;
+  of.vertices = static_cast<std::int64_t>(count) * vertices_most + extra;
+  const auto made = static_cast<std::uint64_t>(together(*this)) *
+                    static_cast<std::uint64_t>(vertices_most) * sizeof(Vertex);
+  of.bytes = static_cast<std::uint64_t>(of.vertices) * Segments::vertex_bytes + made;
+  return of;
 }
 
-std::int64_t padded(std::int64_t vertices) {
-  return vertices + static_cast<std::int64_t>(sheet) + 1;
+Segments gather(const Rows& rows, double magnitude_scale,
+                const std::function<void(std::size_t, Row&)>& make) {
+  Segments out;
+  out.magnitude_scale = magnitude_scale;
+  const auto room = static_cast<std::size_t>(rows.room().vertices);
+  reserve(room, out);
+  std::vector<Row> some(together(rows));
+  const auto pool = few_threads(some.size());
+  for (std::size_t first = 0; first < rows.count; first += some.size()) {
+    const std::size_t now = std::min(some.size(), rows.count - first);
+    pool->run(now, [&](std::size_t n, unsigned) {
+      some[n].vertices.clear();
+      some[n].vertices.reserve(static_cast<std::size_t>(rows.vertices_most));
+      some[n].tally = {};
+      make(first + n, some[n]);
+    });
+    for (std::size_t n = 0; n < now; ++n) {
+      const std::vector<Vertex>& vertices = some[n].vertices;
+      for (std::size_t v = 0; v < vertices.size(); ++v) {
+        if (!(vertices[v].magnitude > Segments::not_drawn)) continue;  // another line follows
+        out.longest = std::max(out.longest, glm::length(between(vertices[v], vertices[v + 1])));
+      }
+      append(some[n], room, out);
+      add(some[n].tally, out.tally);
+    }
+  }
+  pad(out);
+  return out;
 }
 
 }  // namespace windsplat::trace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -74,10 +75,17 @@ class Curve {
 // Sets the tangents of the vertices of a line, which begin at `first` and end with the last.
 void set_tangents(std::size_t first, std::vector<Vertex>& vertices);
 
-// Puts rows one after the other. Their storage is freed.
-Segments gather(std::vector<Row>& rows, double magnitude_scale);
+// Lines that are made in rows, each of at most so many vertices.
+struct Rows {
+  std::size_t count = 0;
+  std::int64_t vertices_most = 0;  // of a row
 
-// Vertices that gather() makes of so many, for memory.
-std::int64_t padded(std::int64_t vertices);
+  [[nodiscard]] Room room() const;
+};
+
+// The rows one after the other, made by make(number, row) on several threads, some at a time:
+// storage is reserved for all vertices that there may be, and becomes memory as they come.
+Segments gather(const Rows& rows, double magnitude_scale,
+                const std::function<void(std::size_t, Row&)>& make);
 
 }  // namespace windsplat::trace

@@ -59,4 +59,10 @@ struct Segments {
   static constexpr std::size_t vertex_bytes = 12 * sizeof(float);
 };
 
+// What lines need at most: their vertices, and memory while they are made and after.
+struct Room {
+  std::int64_t vertices = 0;
+  std::uint64_t bytes = 0;
+};
+
 }  // namespace windsplat::trace

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "server/base/pcg3d.hpp"
-#include "server/base/thread_pool.hpp"
 #include "server/trace/chain.hpp"
 
 namespace windsplat::trace {
@@ -116,27 +115,27 @@ class Maker {
   double phase_ = 0;
 };
 
+// One for each line along x.
+Rows rows_of(const Streamlets& of) {
+  return {static_cast<std::size_t>(positions_along(of, 1)) *
+              static_cast<std::size_t>(positions_along(of, 2)),
+          std::int64_t{positions_along(of, 0)} * (of.segments_max + 1)};
+}
+
 }  // namespace
 
-std::int64_t vertices_at_most(const Streamlets& of) {
-  std::int64_t lines = 1;
-  for (std::size_t a = 0; a < 3; ++a) lines *= positions_along(of, a);
-  return padded(lines * (of.segments_max + 1));
-}
+Room room_of(const Streamlets& of) { return rows_of(of).room(); }
 
 Segments make_segments(const Streamlets& of, const CancelToken& cancel) {
   const int wide = positions_along(of, 0);
   const auto high = static_cast<std::size_t>(positions_along(of, 1));
-  std::vector<Row> rows(high * static_cast<std::size_t>(positions_along(of, 2)));
-  const auto pool = few_threads(rows.size());
-  pool->run(rows.size(), [&](std::size_t n, unsigned) {
+  return gather(rows_of(of), of.magnitude_scale, [&](std::size_t n, Row& row) {
     if (cancel.cancelled()) return;
     Maker maker(of);
     const Position y = position_at(of, 1, static_cast<int>(n % high));
     const Position z = position_at(of, 2, static_cast<int>(n / high));
-    for (int x = 0; x < wide; ++x) maker.add_line({position_at(of, 0, x), y, z}, rows[n]);
+    for (int x = 0; x < wide; ++x) maker.add_line({position_at(of, 0, x), y, z}, row);
   });
-  return gather(rows, of.magnitude_scale);
 }
 
 }  // namespace windsplat::trace

@@ -29,8 +29,7 @@ struct Streamlets {
   std::function<double(const glm::dvec3& index, const Motion& motion)> color;
 };
 
-// Number of vertices at most, for memory.
-std::int64_t vertices_at_most(const Streamlets& of);
+Room room_of(const Streamlets& of);
 
 // A line is centred on the jittered position of the kernel (that of the straight line; the position
 // of the sample where that is masked or outside), half of its length upstream and half downstream,

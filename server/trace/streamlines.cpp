@@ -7,7 +7,6 @@
 #include <cstddef>
 
 #include "server/base/pcg3d.hpp"
-#include "server/base/thread_pool.hpp"
 #include "server/trace/chain.hpp"
 
 namespace windsplat::trace {
@@ -122,24 +121,27 @@ class SeedLines {
   double turns_ = 0;             // dashes so far
 };
 
+Rows rows_of(const Streamlines& of, std::size_t lines) {
+  const std::int64_t more = of.flow.around > 0 ? parts_most : 0;
+  const std::size_t each = std::min(lines, row_seeds);
+  return {(lines + row_seeds - 1) / row_seeds,
+          static_cast<std::int64_t>(each) * (of.pieces_max + 1 + 2 * more)};
+}
+
 }  // namespace
 
-std::int64_t vertices_at_most(const Streamlines& of, std::int64_t lines) {
-  const std::int64_t more = of.flow.around > 0 ? parts_most : 0;
-  return padded(lines * (of.pieces_max + 1 + 2 * more));
+Room room_of(const Streamlines& of, std::int64_t lines) {
+  return rows_of(of, static_cast<std::size_t>(lines)).room();
 }
 
 Segments make_streamlines(const Streamlines& of, const CancelToken& cancel) {
-  std::vector<Row> rows((of.seeds.size() + row_seeds - 1) / row_seeds);
-  const auto pool = few_threads(rows.size());
-  pool->run(rows.size(), [&](std::size_t n, unsigned) {
+  return gather(rows_of(of, of.seeds.size()), of.magnitude_scale, [&](std::size_t n, Row& row) {
     SeedLines lines(of);
     const std::size_t end = std::min(of.seeds.size(), (n + 1) * row_seeds);
     for (std::size_t s = n * row_seeds; s < end && !cancel.cancelled(); ++s) {
-      lines.add_line(s, rows[n]);
+      lines.add_line(s, row);
     }
   });
-  return gather(rows, of.magnitude_scale);
 }
 
 std::vector<dvec3> evenly(const Flow& flow, int count, const CancelToken& cancel) {

@@ -32,8 +32,8 @@ struct Streamlines {
   std::function<double(const glm::dvec3& index, const Motion& motion)> color;
 };
 
-// Number of vertices of so many lines at most, for memory. `of`: the seeds are not read.
-std::int64_t vertices_at_most(const Streamlines& of, std::int64_t lines);
+// That of so many lines. `of`: the seeds are not read.
+Room room_of(const Streamlines& of, std::int64_t lines);
 
 // Lines in the order of the seeds. A line has 1, 2, 4 ... segments of equal arc length (of paths:
 // equal times), at most pieces_max, until they keep to `departure` and `longest`. q runs from -1/2

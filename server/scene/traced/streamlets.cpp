@@ -83,8 +83,7 @@ Result<std::shared_ptr<const trace::Segments>> traced_of(const protocol::View& v
   const std::string key = segments_key(view, placed, layer);
   if (has_seeds(view)) return streamlines_of(view, placed, layer, how, key, dataset);
   const trace::Streamlets of = description_of(view, layer, placed.lattice);
-  const std::int64_t vertices = trace::vertices_at_most(of);
-  const std::uint64_t bytes = static_cast<std::uint64_t>(vertices) * trace::Segments::vertex_bytes;
+  const auto [vertices, bytes] = trace::room_of(of);
   if (!dataset.is_within_limit(bytes) || vertices > std::numeric_limits<std::int32_t>::max()) {
     return invalid_at("/vector/trace",
                       "its segments take up to " + std::to_string(bytes >> 20U) +

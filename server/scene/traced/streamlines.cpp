@@ -180,8 +180,7 @@ Result<std::shared_ptr<const trace::Segments>> streamlines_of(
     }
   }
   trace::Streamlines of = description_of(view, layer, placed);
-  const std::int64_t vertices = trace::vertices_at_most(of, seeds_in(seeds));
-  const std::uint64_t bytes = static_cast<std::uint64_t>(vertices) * trace::Segments::vertex_bytes;
+  const auto [vertices, bytes] = trace::room_of(of, seeds_in(seeds));
   if (!dataset.is_within_limit(bytes) || vertices > std::numeric_limits<std::int32_t>::max()) {
     return invalid_at(seeds_pointer, "the segments of " + std::to_string(seeds_in(seeds)) +
                                          " lines take up to " + std::to_string(bytes >> 20U) +

@@ -19,12 +19,15 @@
 #include "server/scene/camera.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/place.hpp"
+#include "server/trace/streamlets.hpp"
+#include "server/trace/streamlines.hpp"
 
 namespace {
 
 std::atomic<std::int64_t> blocks{0};
 std::atomic<std::int64_t> bytes{0};
 std::atomic<std::int64_t> held{0};  // bytes not yet freed
+std::atomic<std::int64_t> most{0};  // of them at a time
 thread_local int good_left = -1;    // number of allocations before one that fails; -1: none fails
 
 void fail_if_due() {
@@ -32,7 +35,10 @@ void fail_if_due() {
 }
 
 void* hold(void* at) {
-  held.fetch_add(static_cast<std::int64_t>(malloc_usable_size(at)), std::memory_order_relaxed);
+  const auto size = static_cast<std::int64_t>(malloc_usable_size(at));
+  const std::int64_t now = held.fetch_add(size, std::memory_order_relaxed) + size;
+  std::int64_t before = most;
+  while (before < now && !most.compare_exchange_weak(before, now)) continue;
   return at;
 }
 
@@ -320,6 +326,81 @@ TEST(WithoutMemory, PngIsAnError) {
 }
 
 // Checks the counter: an allocation of picture size is counted.
+// Bytes that run() holds at a time beyond those held before.
+template <class Run>
+std::int64_t held_by(const Run& run) {
+  const std::int64_t before = held;
+  most = before;
+  run();
+  return most - before;
+}
+
+// A vortex in a lattice of unit cells.
+struct Vortex {
+  static constexpr std::array<int, 3> dims{48, 48, 12};
+  std::array<std::vector<double>, 3> positions, spacing;
+  std::array<std::vector<float>, 3> values;
+
+  Vortex() {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto count = static_cast<std::size_t>(dims[a]);
+      for (int i = 0; i < dims[a]; ++i) positions[a].push_back(i);
+      spacing[a].assign(count, 1);
+    }
+    for (int n = 0; n < dims[0] * dims[1] * dims[2]; ++n) {
+      values[0].push_back(static_cast<float>(23.4 - n / dims[0] % dims[1]));
+      values[1].push_back(static_cast<float>(n % dims[0] - 23.7));
+      values[2].push_back(0);
+    }
+  }
+  void set(trace::Flow& flow) const {
+    for (std::size_t a = 0; a < 3; ++a) {
+      flow.dims.at(a) = dims[a];
+      flow.components.at(a) = values[a].data();
+      flow.positions.at(a) = positions[a];
+      flow.spacing.at(a) = spacing[a];
+    }
+  }
+};
+
+constexpr std::int64_t thread_bytes = 65536;  // of paths and threads
+
+TEST(Tracing, StreamletsHoldNoMoreThanTheyAreChargedWith) {
+  const Vortex vortex;
+  trace::Streamlets of;
+  vortex.set(of.flow);
+  of.drawn = Vortex::dims;
+  of.length = 12;
+  of.segments_max = 4;
+  of.color = [](const glm::dvec3&, const trace::Motion& motion) { return motion.magnitude; };
+  const trace::Room room = trace::room_of(of);
+  trace::Segments made;
+  const std::int64_t bytes = held_by([&] { made = trace::make_segments(of); });
+  EXPECT_GT(made.tally.segments, 2 * 48 * 48 * 12);
+  EXPECT_LE(made.vertices(), static_cast<std::size_t>(room.vertices));
+  EXPECT_LE(bytes, static_cast<std::int64_t>(room.bytes) + thread_bytes);
+}
+
+TEST(Tracing, LinesOfSeedsHoldNoMoreThanTheyAreChargedWith) {
+  const Vortex vortex;
+  trace::Streamlines of;
+  vortex.set(of.flow);
+  of.length = 30;
+  of.dash = 2;
+  of.pieces_max = 128;
+  of.departure = 1e-6;
+  of.longest = 0.5;
+  of.color = [](const glm::dvec3&, const trace::Motion& motion) { return motion.magnitude; };
+  constexpr int count = 2000;
+  for (int n = 0; n < count; ++n) of.seeds.emplace_back(12 + n % 24, 12 + n / 24 % 24, n % 11);
+  const trace::Room room = trace::room_of(of, count);
+  trace::Segments made;
+  const std::int64_t bytes = held_by([&] { made = trace::make_streamlines(of); });
+  EXPECT_GT(made.tally.segments, count * 100);
+  EXPECT_LE(made.vertices(), static_cast<std::size_t>(room.vertices));
+  EXPECT_LE(bytes, static_cast<std::int64_t>(room.bytes) + thread_bytes);
+}
+
 TEST(SteadyStateItself, CountsTheAllocationOfAVector) {
   const Spent spent = spent_by([] {
     std::vector<float> picture(4UL * 320 * 240);

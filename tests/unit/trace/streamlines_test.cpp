@@ -220,7 +220,7 @@ TEST(Streamlines, ALineThatPassesTheSeamOftenEndsAfterSomeTurns) {
   of.pieces_max = 4;
   const Segments made = make_streamlines(of);
   EXPECT_EQ(chains_of(made).size(), 64U);
-  EXPECT_LE(made.vertices(), static_cast<std::size_t>(vertices_at_most(of, 1)));
+  EXPECT_LE(made.vertices(), static_cast<std::size_t>(room_of(of, 1).vertices));
   float low = 1;
   float high = -1;
   for (std::size_t v = 0; v < made.vertices(); ++v) {
@@ -369,7 +369,7 @@ TEST(Streamlines, EachIsThatOfItsSeedAlone) {
     EXPECT_EQ(chains_of(make_streamlines(one))[0], chains[n]);
   }
   EXPECT_LE(all.vertices(), static_cast<std::size_t>(
-                                vertices_at_most(of, static_cast<std::int64_t>(of.seeds.size()))));
+                                room_of(of, static_cast<std::int64_t>(of.seeds.size())).vertices));
 }
 
 TEST(Streamlines, ACancelledTracingEndsAtOnce) {
