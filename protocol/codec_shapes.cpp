@@ -133,6 +133,7 @@ Json limits_json(std::int64_t image_pixels_max) {
               {"extinctionPointsMax", limits::extinction_points_max},
               {"scalarsMax", limits::scalars_max},
               {"surfacesMax", limits::surfaces_max},
+              {"contourLevelsMax", limits::contour_levels_max},
               {"segmentsMax", limits::segments_max},
               {"seedsMax", limits::seeds_max},
               {"piecesMax", limits::pieces_max},

@@ -19,6 +19,7 @@ inline constexpr std::int64_t image_pixels_max = 8192LL * 4320LL;
 inline constexpr int extinction_points_max = 64;
 inline constexpr int scalars_max = 4;
 inline constexpr int surfaces_max = 8;
+inline constexpr int contour_levels_max = 64;
 inline constexpr double extinction_max = 1e30;  // per world unit
 inline constexpr double radius_max = 64;        // r1, r2, pixels at a height of 720
 inline constexpr double mark_head_min = 1;      // width and length of the head of an arrow, pixels

@@ -229,6 +229,7 @@ struct AnnotationsView {
   bool legend = false;
   bool title = false;
   bool step_time = false;
+  bool contour_labels = false;            // values on the contours of surfaces
   double size = 1;                        // factor of the size of texts and lines
   std::optional<std::string> text_color;  // sRGB; empty: contrasts with the background
   std::optional<std::string> title_text;  // empty: the title of the dataset
@@ -292,11 +293,13 @@ struct SurfaceColorView {
   bool operator==(const SurfaceColorView&) const = default;
 };
 
-// Lines of constant value of the field that colours a surface.
+// Lines of constant value of the field that colours a surface, in its unit: at the multiples of an
+// interval, at levels, or both.
 struct ContoursView {
-  double interval = 1;                 // between values, in the unit of the field
+  std::optional<double> interval;      // empty: levels only
   double line_width = 1;               // pixels at a picture height of 720
   std::string line_color = "#000000";  // sRGB
+  std::vector<double> levels;          // ascending
   bool operator==(const ContoursView&) const = default;
 };
 

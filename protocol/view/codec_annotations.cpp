@@ -59,6 +59,7 @@ AnnotationsView read_annotations(const Json& json, const std::string& pointer, F
   reader.boolean("legend", annotations.legend);
   reader.boolean("title", annotations.title);
   reader.boolean("stepTime", annotations.step_time);
+  reader.boolean("contourLabels", annotations.contour_labels);
   reader.number("size", annotations.size, sizes);
   reader.color("textColor", annotations.text_color);
   reader.text("titleText", annotations.title_text, 1);
@@ -82,6 +83,7 @@ Json annotations_to_json(const AnnotationsView& annotations) {
            {"legend", annotations.legend},
            {"title", annotations.title},
            {"stepTime", annotations.step_time},
+           {"contourLabels", annotations.contour_labels},
            {"size", canonical_number(annotations.size)},
            {"textColor", text_or_null(annotations.text_color)},
            {"titleText", text_or_null(annotations.title_text)}};

@@ -21,11 +21,37 @@ SurfaceColorView read_surface_color(const Json& json, const std::string& pointer
   return color;
 }
 
+std::vector<double> read_levels(const Json& json, const std::string& pointer, Faults& faults) {
+  std::vector<double> levels;
+  if (!json.is_array() || json.size() > static_cast<std::size_t>(limits::contour_levels_max)) {
+    faults.add(pointer,
+               "must be an array of at most " + std::to_string(limits::contour_levels_max) +
+                   " values, not " +
+                   (json.is_array() ? "of " + std::to_string(json.size()) : described(json)));
+    return levels;
+  }
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const std::string at = join_pointer(pointer, i);
+    const auto level = read_number(json[i], at, {-value_max, value_max}, faults);
+    if (!level) continue;
+    if (!levels.empty() && *level <= levels.back()) {
+      faults.add(at, "must be greater than the previous level");
+    }
+    levels.push_back(*level);
+  }
+  return levels;
+}
+
 ContoursView read_contours(const Json& json, const std::string& pointer, Faults& faults) {
   ContoursView contours;
   ObjectReader reader(json, pointer, faults);
-  if (reader.child("interval", Presence::required) != nullptr) {
-    reader.number("interval", contours.interval, {limits::range_width_min, value_max});
+  const std::size_t before = faults.count();
+  reader.number("interval", contours.interval, {limits::range_width_min, value_max});
+  if (const Json* levels = reader.child("levels")) {
+    contours.levels = read_levels(*levels, reader.at("levels"), faults);
+  }
+  if (faults.count() == before && !contours.interval && contours.levels.empty()) {
+    faults.add(pointer, "must have an interval, levels, or both");
   }
   reader.number("lineWidth", contours.line_width, {0, limits::radius_max});
   reader.color("lineColor", contours.line_color);
@@ -68,7 +94,10 @@ SurfaceView read_surface(const Json& json, const std::string& pointer, Faults& f
 Json surface_to_json(const SurfaceView& surface) {
   Json contours;
   if (surface.contours) {
-    contours = {{"interval", canonical_number(surface.contours->interval)},
+    Json levels = Json::array();
+    for (const double level : surface.contours->levels) levels.push_back(canonical_number(level));
+    contours = {{"interval", number_or_null(surface.contours->interval)},
+                {"levels", std::move(levels)},
                 {"lineWidth", canonical_number(surface.contours->line_width)},
                 {"lineColor", surface.contours->line_color}};
   }

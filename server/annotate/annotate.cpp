@@ -4,6 +4,7 @@
 
 #include "protocol/limits.hpp"
 #include "server/annotate/box.hpp"
+#include "server/annotate/contour_labels.hpp"
 #include "server/annotate/legend.hpp"
 #include "server/annotate/marks.hpp"
 #include "server/image/tone_map.hpp"
@@ -49,7 +50,8 @@ Style style_of(const Subject& subject, const protocol::AnnotationStyleView& part
 
 bool any(const protocol::AnnotationsView& annotations) {
   return annotations.box || annotations.axes || annotations.north || annotations.scale_bar ||
-         annotations.legend || annotations.title || annotations.step_time;
+         annotations.legend || annotations.title || annotations.step_time ||
+         annotations.contour_labels;
 }
 
 Figure figure_of(const Subject& subject) {
@@ -69,6 +71,7 @@ Figure figure_of(const Subject& subject) {
   }
   // Last: their texts are left out where something else is written.
   if (shown.axes) add_axes(subject, style(shown.axes_style), figure);
+  if (shown.contour_labels) add_contour_labels(subject, style({}), figure);
   return figure;
 }
 

@@ -41,14 +41,16 @@ struct Strip {
   std::vector<Color> colors;
 };
 
-// `align` is the fraction of its width that lies left of `at`, which is on the baseline.
+// `align` is the fraction of its width that lies left of `at`, which is on the baseline. It is
+// turned about `at`.
 struct Text {
   std::string text;  // UTF-8
   Point at;
   double size = 12;  // em, pixels
   double align = 0;
   Color color;
-  Color rim;  // of its outline
+  Color rim;        // of its outline
+  double turn = 0;  // clockwise, radians
 };
 
 using Item = std::variant<Line, Area, Strip, Text>;

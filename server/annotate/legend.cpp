@@ -299,6 +299,26 @@ std::optional<std::array<float, 2>> values_on(const surface::Mesh& mesh) {
   return values;
 }
 
+// "contours every 5 K and at 273.15 K".
+std::string contours_text(const protocol::ContoursView& contours, const std::string& units) {
+  const std::string unit = units.empty() ? "" : " " + units;
+  std::string text = "contours";
+  if (contours.interval) text += " every " + number_text_of(*contours.interval, 3) + unit;
+  if (contours.levels.empty()) return text;
+  text += contours.interval ? " and at " : " at ";
+  constexpr std::size_t levels_named = 4;
+  const std::size_t count = contours.levels.size();
+  if (count > levels_named) {
+    return text + std::to_string(count) + " levels from " +
+           number_text_of(contours.levels.front(), 6) + " to " +
+           number_text_of(contours.levels.back(), 6) + unit;
+  }
+  for (std::size_t n = 0; n < count; ++n) {
+    text += (n == 0 ? "" : ", ") + number_text_of(contours.levels[n], 6);
+  }
+  return text + unit;
+}
+
 Entry surface_entry(const Subject& subject, const surface::Shown& shown,
                     const protocol::SurfaceView& view) {
   const auto unit_of = [](const data::FieldInfo* field) {
@@ -325,10 +345,7 @@ Entry surface_entry(const Subject& subject, const surface::Shown& shown,
   } else {
     entry.notes.emplace_back("on a section");
   }
-  if (view.contours) {
-    entry.notes.push_back("contours every " + number_text_of(view.contours->interval, 3) +
-                          (entry.units.empty() ? "" : " " + entry.units));
-  }
+  if (view.contours) entry.notes.push_back(contours_text(*view.contours, entry.units));
   return entry;
 }
 

@@ -1,6 +1,10 @@
 // What a figure is made of, and how its parts look.
 #pragma once
 
+#include <functional>
+#include <glm/vec3.hpp>
+#include <vector>
+
 #include "server/annotate/figure.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/scene/completed_view.hpp"
@@ -14,6 +18,8 @@ struct Subject {
   const scene::Scene& scene;
   const data::DatasetInfo& info;
   const data::DatasetInfo* subtracted = nullptr;  // of a difference: the dataset subtracted
+  // Whether something opaque lies before each of some places in the world; empty: nowhere.
+  std::function<std::vector<bool>(const std::vector<glm::dvec3>&)> hidden = {};
 };
 
 struct Style {

@@ -81,7 +81,8 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
     changes.emplace_back("/image/height", std::to_string((*size)[1]));
   }
   if (arguments.figure) {
-    for (const char* shown : {"box", "axes", "north", "scaleBar", "legend", "title", "stepTime"}) {
+    for (const char* shown :
+         {"box", "axes", "north", "scaleBar", "legend", "title", "stepTime", "contourLabels"}) {
       changes.emplace_back(std::string("/annotations/") + shown, "true");
     }
     changes.emplace_back("/vector/color/trueColors", "true");

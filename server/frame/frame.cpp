@@ -16,6 +16,7 @@
 #include "server/frame/content.hpp"
 #include "server/frame/empty_picture.hpp"
 #include "server/frame/measure.hpp"
+#include "server/frame/pick/hidden.hpp"
 #include "server/image/decode.hpp"
 #include "server/image/video_encoder.hpp"
 #include "server/quality/setting.hpp"
@@ -336,8 +337,9 @@ Result<Prepared> prepare(const scene::CompletedView& completed, const quality::S
   std::optional<annotate::Figure> figure;
   if (encoding.format != Format::npy && annotate::any(drawn->view().annotations)) {
     const auto minus = dataset.subtrahend();
-    figure =
-        annotate::figure_of({*drawn, *scene, dataset.info(), minus ? minus->info.get() : nullptr});
+    figure = annotate::figure_of(
+        {*drawn, *scene, dataset.info(), minus ? minus->info.get() : nullptr,
+         [&scene](const std::vector<glm::dvec3>& at) { return hidden_places(*scene, at); }});
   }
   return Prepared{std::move(*drawn),
                   completed.view().image,

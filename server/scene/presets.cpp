@@ -33,7 +33,7 @@ Result<void> apply_preset(protocol::View& completed, const Lattice& lattice,
   } else if (preset == "figure") {
     protocol::AnnotationsView& shown = completed.annotations;
     shown.box = shown.axes = shown.north = shown.scale_bar = true;
-    shown.legend = shown.title = shown.step_time = true;
+    shown.legend = shown.title = shown.step_time = shown.contour_labels = true;
     draw_true_colors(completed.vector);
     look_by_default(completed, lattice);  // with room for texts
   } else if (preset == "winds") {

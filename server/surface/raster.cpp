@@ -148,15 +148,54 @@ Color color_at(const Shown& shown, double value) {
 
 // The part of a pixel that lines of constant value cover; slope: change of the value by pixel.
 double contour_part(const Contours& contours, double value, double slope) {
-  if (!(contours.step > 0) || !(slope > 0)) return 0;
-  const double spacing = contours.step / slope;
-  if (spacing < contours.width + 1) return std::min(contours.width / spacing, 1.0);
-  const double distance = std::abs(std::remainder(value, contours.step)) / slope;
+  if (!(slope > 0)) return 0;
   const double wide = std::max(contours.width, 1.0);
-  return std::clamp(0.5 * wide + 0.5 - distance, 0.0, 1.0) * std::min(contours.width, 1.0);
+  const double faint = std::min(contours.width, 1.0);
+  const auto part_of = [&](double off) {
+    return std::clamp(0.5 * wide + 0.5 - std::abs(off) / slope, 0.0, 1.0) * faint;
+  };
+  // Of close levels the sum, whose mean is their width over their distance.
+  double at_levels = 0;
+  const double reach = (0.5 * wide + 0.5) * slope;
+  auto level = std::lower_bound(contours.levels.begin(), contours.levels.end(), value - reach);
+  for (; level != contours.levels.end() && *level <= value + reach; ++level) {
+    at_levels += part_of(value - *level);
+  }
+  at_levels = std::min(at_levels, 1.0);
+  if (!(contours.step > 0)) return at_levels;
+  const double spacing = contours.step / slope;
+  if (spacing < contours.width + 1) {
+    return std::max(std::min(contours.width / spacing, 1.0), at_levels);
+  }
+  return std::max(part_of(std::remainder(value, contours.step)), at_levels);
+}
+
+// The brightness of a surface in sunlight.
+double sunlit(const Sun& sun, const glm::dvec3& normal, const glm::dvec3& ray,
+              const glm::dvec3& place) {
+  // Where the gradient vanishes the surface faces the eye.
+  glm::dvec3 seen = glm::dot(normal, normal) > 0 ? normal : -ray;
+  if (glm::dot(seen, ray) > 0) seen = -seen;
+  const double cosine = glm::dot(seen, sun.direction) / glm::length(seen);
+  const double passes = sun.media ? sun.media->at(place) : 1;
+  return sun.ambient +
+         (1 - sun.ambient) * std::min(sun.strength * passes, 1.0) * std::clamp(cosine, 0.0, 1.0);
 }
 
 }  // namespace
+
+double CellRaster::brightness(const Shown& shown, const glm::dvec3& normal, double right,
+                              double down, double depth) const {
+  const glm::dvec3 aside = view_.pixel * (right * view_.right + down * view_.down);
+  const glm::dvec3 ray = view_.perspective ? view_.forward + aside : view_.forward;
+  if (shown.sun) {
+    const glm::dvec3 from = view_.perspective ? view_.eye : view_.eye + aside;
+    return sunlit(*shown.sun, normal, ray, from + depth * ray);
+  }
+  const double lengths = glm::length(normal) * glm::length(ray);
+  const double cosine = lengths > 0 ? std::abs(glm::dot(normal, ray)) / lengths : 1.0;
+  return shown.ambient + (1 - shown.ambient) * cosine;
+}
 
 void CellRaster::add_piece(const Shown& shown, std::uint16_t surface, const Triangle& triangle,
                            int x, int y, std::uint16_t mask) {
@@ -206,17 +245,12 @@ void CellRaster::add_piece(const Shown& shown, std::uint16_t surface, const Tria
   piece.opacity = static_cast<float>(shown.opacity);
   const double value = interpolated(value_of);
   piece.rgb = color_at(shown, value);
-  if (shown.ambient < 1) {
+  if (shown.ambient < 1 || shown.sun) {
     glm::dvec3 normal(0);
     for (std::size_t n = 0; n < 3; ++n) normal += share.at(n) * triangle.corners.at(n).normal;
-    glm::dvec3 ray = view_.forward;
-    if (view_.perspective) {
-      ray += view_.pixel * ((x + middle[0] / pixel_parts - middle_x_) * view_.right +
-                            (y + middle[1] / pixel_parts - middle_y_) * view_.down);
-    }
-    const double lengths = glm::length(normal) * glm::length(ray);
-    const double cosine = lengths > 0 ? std::abs(glm::dot(normal, ray)) / lengths : 1.0;
-    const auto shade = static_cast<float>(shown.ambient + (1 - shown.ambient) * cosine);
+    const double right = x + middle[0] / pixel_parts - middle_x_;
+    const double down = y + middle[1] / pixel_parts - middle_y_;
+    const auto shade = static_cast<float>(brightness(shown, normal, right, down, piece.depth));
     for (float& channel : piece.rgb) channel *= shade;
   }
   const double line = contour_part(shown.contours, value, slope_of(value_of, value));

@@ -33,6 +33,10 @@ class CellRaster {
   void add_piece(const Shown& shown, std::uint16_t surface, const Triangle& triangle, int x, int y,
                  std::uint16_t mask);
 
+  // (right, down): pixels from the middle of the picture. depth: view depth.
+  [[nodiscard]] double brightness(const Shown& shown, const glm::dvec3& normal, double right,
+                                  double down, double depth) const;
+
   const terrain::View& view_;
   int left_, top_;
   double middle_x_, middle_y_;

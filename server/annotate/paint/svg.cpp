@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -94,11 +95,16 @@ class Writer {
                                 : std::string();
     out_ += "<text x=\"" + number(text.at.x + shift) + "\" y=\"" + number(text.at.y) +
             "\" font-size=\"" + number(text.size) + "\" text-anchor=\"" + anchor +
-            "\" xml:space=\"preserve\"" + rim + paint("fill", text.color) + ">" +
+            "\" xml:space=\"preserve\"" + turned(text) + rim + paint("fill", text.color) + ">" +
             escaped(text.text) + "</text>\n";
   }
 
  private:
+  static std::string turned(const Text& text) {
+    if (text.turn == 0) return {};
+    return " transform=\"rotate(" + number(text.turn * 180 / std::numbers::pi) + " " +
+           number(text.at.x) + " " + number(text.at.y) + ")\"";
+  }
   static std::string paint(const std::string& what, const Color& color) {
     std::string out = " " + what + "=\"" + hex(color) + "\"";
     if (color.alpha < 1) out += " " + what + "-opacity=\"" + number(color.alpha) + "\"";

@@ -138,12 +138,18 @@ std::string character_without_glyph(std::string_view text) {
 void draw_text(cairo_t* target, const Text& text) {
   const std::lock_guard lock(font().mutex());
   Shaped shaped = font().shape(text.text);
-  const double left = text.at.x - text.align * text.size * shaped.width;
-  for (cairo_glyph_t& glyph : shaped.glyphs) {
-    glyph.x = left + text.size * glyph.x;
-    glyph.y = text.at.y + text.size * glyph.y;
-  }
+  const double left = -text.align * text.size * shaped.width;
   cairo_save(target);
+  const double x = text.turn == 0 ? text.at.x + left : left;
+  const double y = text.turn == 0 ? text.at.y : 0;
+  if (text.turn != 0) {
+    cairo_translate(target, text.at.x, text.at.y);
+    cairo_rotate(target, text.turn);
+  }
+  for (cairo_glyph_t& glyph : shaped.glyphs) {
+    glyph.x = x + text.size * glyph.x;
+    glyph.y = y + text.size * glyph.y;
+  }
   cairo_set_font_face(target, font().drawing());
   cairo_set_font_size(target, text.size);
   const std::unique_ptr<cairo_font_options_t, decltype(&cairo_font_options_destroy)> options(

@@ -292,9 +292,9 @@ Result<std::vector<surface::Shown>> make_surfaces(const CompletedView& completed
       }
     }
     if (from.contours) {
-      shown.contours = {from.contours->interval,
+      shown.contours = {from.contours->interval.value_or(0),
                         from.contours->line_width * view.image.height / contours_height,
-                        parse_color(from.contours->line_color).value()};
+                        parse_color(from.contours->line_color).value(), from.contours->levels};
     }
     all.push_back(std::move(shown));
   }

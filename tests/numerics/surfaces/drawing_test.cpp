@@ -292,12 +292,39 @@ TEST(Surfaces, ColoursAndContoursFollowTheValuesOfPixels) {
     }
   }
   // A line of two pixels where x = 0, +-0.5 and +-1.
-  scene.surfaces[0].contours = {0.5, 2, {1, 1, 1}};
+  scene.surfaces[0].contours = {0.5, 2, {1, 1, 1}, {}};
   const std::vector<double> rgba = picture_of(scene, Method::slab);
   for (int x = 0; x < size; ++x) {
     const double from = std::abs(std::remainder(x + 0.5, 16));
     const double green_of = rgba[4 * static_cast<std::size_t>(7 * size + x) + 1];
     EXPECT_NEAR(green_of, std::clamp(1.5 - from, 0.0, 1.0), 1e-4) << x;
+  }
+}
+
+TEST(Surfaces, ContoursLieAtLevelsWithAndWithoutAnInterval) {
+  constexpr int size = 64;  // values grow by 1 / 32 a pixel
+  Scene scene = empty_scene(size);
+  Shown shown = square(0, 1, {0, 0, 0});
+  // The first two are closer than a pixel: their lines add up. The last lies outside.
+  shown.contours = {0, 2, {1, 1, 1}, {-0.5, -0.49, 0.125, 7}};
+  scene.surfaces = {shown};
+  const auto line = [](double x, double level) {
+    return std::clamp(1.5 - std::abs(x + 0.5 - 32 - 32 * level), 0.0, 1.0);
+  };
+  for (const Method method : drawing_methods) {
+    const std::vector<double> rgba = picture_of(scene, method);
+    for (int x = 0; x < size; ++x) {
+      const double expected = std::min(line(x, -0.5) + line(x, -0.49) + line(x, 0.125), 1.0);
+      EXPECT_NEAR(rgba[4 * static_cast<std::size_t>(7 * size + x)], expected, 1e-4) << x;
+    }
+  }
+  scene.surfaces[0].contours = {0.5, 2, {1, 1, 1}, {0.125, 0.5}};
+  const std::vector<double> rgba = picture_of(scene, Method::slab);
+  for (int x = 0; x < size; ++x) {
+    const double even = std::clamp(1.5 - std::abs(std::remainder(x + 0.5, 16)), 0.0, 1.0);
+    EXPECT_NEAR(rgba[4 * static_cast<std::size_t>(7 * size + x)], std::max(even, line(x, 0.125)),
+                1e-4)
+        << x;
   }
 }
 

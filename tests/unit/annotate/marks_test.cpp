@@ -270,7 +270,9 @@ TEST(Legend, TellsWhereSurfacesAreAndWhatTheirColoursMean) {
     surface.isovalue.reset();
     surface.slice = protocol::SliceView{protocol::GridAxis::z, 1};
     surface.color.range = protocol::Range{0, 40};
-    surface.contours = protocol::ContoursView{5, 1, "#000000"};
+    surface.contours = protocol::ContoursView{5, 1, "#000000", {}};
+    view.surfaces.push_back(surface);
+    surface.contours = protocol::ContoursView{{}, 1, "#000000", {1.25, 33}};
     view.surfaces.push_back(surface);
   });
   Figure figure = empty_figure(shown);
@@ -279,6 +281,7 @@ TEST(Legend, TellsWhereSurfacesAreAndWhatTheirColoursMean) {
   EXPECT_THAT(written, Contains("surface where it is 12.5 kg m\u207b\u00b3"));
   EXPECT_THAT(written, testing::Not(Contains(HasSubstr("is 3"))));
   EXPECT_THAT(written, Contains("contours every 5 kg m\u207b\u00b3"));
+  EXPECT_THAT(written, Contains("contours at 1.25, 33 kg m\u207b\u00b3"));
   for (const char* tick : {"0", "10", "20", "30", "40"}) EXPECT_THAT(written, Contains(tick));
 }
 

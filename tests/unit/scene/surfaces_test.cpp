@@ -100,7 +100,7 @@ TEST(SurfaceView, AnIsosurfaceLiesWhereTheFieldHasItsValue) {
 TEST(SurfaceView, ASectionIsColouredByItsFieldOverTheDefaultRange) {
   auto dataset = weather_of_t();
   SurfaceView surface = layer(protocol::GridAxis::z, 1.5);
-  surface.contours = protocol::ContoursView{2, 1.5, "#ff0000"};
+  surface.contours = protocol::ContoursView{2, 1.5, "#ff0000", {17, 18.5}};
   View view = view_of(surface);
   view.image.height = 1440;
   const auto completed = complete(view, *dataset);
@@ -112,6 +112,7 @@ TEST(SurfaceView, ASectionIsColouredByItsFieldOverTheDefaultRange) {
   EXPECT_EQ(shown.ambient, 1);
   EXPECT_EQ(shown.contours.step, 2);
   EXPECT_EQ(shown.contours.width, 3);
+  EXPECT_EQ(shown.contours.levels, (std::vector<double>{17, 18.5}));
   ASSERT_EQ(shown.mesh->values.size(), 12U);
   EXPECT_EQ(shown.mesh->values.front(), 18);  // between 12 and 24
   EXPECT_EQ(shown.mesh->triangles.size(), 2U * 3 * 2);

@@ -10,6 +10,7 @@ const parts: readonly [label: string, key: string][] = [
   ["legend in the picture", "legend"],
   ["title", "title"],
   ["time", "stepTime"],
+  ["numbers on contours", "contourLabels"],
 ];
 
 export function addAnnotations(parent: GUI, kit: PanelKit): void {

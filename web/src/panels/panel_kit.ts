@@ -251,6 +251,28 @@ export class PanelKit {
     });
   }
 
+  // A text that is sent once it is entered; null from `set`: it is not understood, and the last one
+  // returns.
+  enteredText(folder: GUI, label: string, access: Access<string>): Controller {
+    const now = (): string => access.get(this.host.view()) ?? "";
+    const model = { value: now() };
+    const controller = folder.add(model, "value").name(label);
+    nameKey(access.pointer, label);
+    explain(controller.domElement, access.pointer);
+    const show = () => {
+      if (controller.domElement.contains(document.activeElement) || now() === model.value) return;
+      model.value = now();
+      controller.updateDisplay();
+    };
+    controller.onFinishChange((value: string) => {
+      const patch = access.set(value);
+      if (patch !== null) this.host.change(patch);
+      show();
+    });
+    this.onRefresh(show);
+    return controller;
+  }
+
   color(folder: GUI, label: string, access: Access<string>): Controller {
     const model = { value: access.get(this.host.view()) ?? "#000000" };
     return this.bind(new PickerBox(folder, model, "color"), label, model, access);

@@ -7,13 +7,15 @@ import { colorsIn, contrastColor } from "../view/contrast_color";
 import { fieldOptions } from "./controls";
 import { histogramBins } from "./histogram_view";
 import { focusControl, focusedControl } from "./panel_folders";
-import type { Access, PanelKit } from "./panel_kit";
+import { keyAccess, type Access, type PanelKit } from "./panel_kit";
 import {
   candidates,
+  contoursWith,
   facingAxis,
   firstIsosurface,
   isEdgeOn,
   keepsValue,
+  levelsIn,
   middleValue,
   noSurfaceText,
   type Axis,
@@ -94,6 +96,13 @@ class SurfacesPanel {
     this.controls = this.kit.again();
     this.surfaces().forEach((_, index) => this.addSurface(index));
     this.controls.note(this.folder, () => this.message);
+    if (this.surfaces().some((surface) => surface.contours != null)) {
+      this.controls.toggle(
+        this.folder,
+        "numbers on contours",
+        keyAccess<boolean>("/annotations/contourLabels"),
+      );
+    }
     if (this.surfaces().length >= surfacesMax) return;
     const add = (label: string, title: string, run: () => void) =>
       this.controls.action(this.folder, label, title, run);
@@ -403,9 +412,24 @@ class SurfacesPanel {
         index,
         "contours/interval",
         (s) => s.contours?.interval ?? 0,
-        (interval, s) => ({ contours: interval > 0 ? { ...s.contours, interval } : null }),
+        (interval, s) => ({
+          contours: contoursWith(s.contours, { interval: interval > 0 ? interval : null }),
+        }),
       ),
       { field: true },
+    );
+    this.controls.enteredText(
+      folder,
+      "contours at (values)",
+      this.access(
+        index,
+        "contours/levels",
+        (s) => (s.contours?.levels ?? []).join(" "),
+        (text, s) => {
+          const levels = levelsIn(text);
+          return levels === null ? null : { contours: contoursWith(s.contours, { levels }) };
+        },
+      ),
     );
   }
 }

@@ -134,3 +134,28 @@ export function isEdgeOn(dataset: Dataset, view: View, surface: SurfaceView): bo
   const way = sight(view, place);
   return way !== null && Math.abs(way[at]) < edge;
 }
+
+type Contours = NonNullable<SurfaceView["contours"]>;
+
+// Contours with a change; null: neither an interval nor levels are left.
+export function contoursWith(
+  before: Contours | null | undefined,
+  change: Pick<Contours, "interval" | "levels">,
+): Contours | null {
+  const next = { ...before, ...change };
+  const some = (next.interval ?? null) !== null || (next.levels ?? []).length > 0;
+  return some ? next : null;
+}
+
+const levelsMax = 64;
+
+// Values between spaces, commas or semicolons, in ascending order; null: not all are numbers, or
+// there are too many.
+export function levelsIn(text: string): number[] | null {
+  const words = text
+    .replaceAll("\u2212", "-")
+    .split(/[\s,;]+/)
+    .filter((word) => word !== "");
+  const values = [...new Set(words.map(Number))].sort((a, b) => a - b);
+  return values.every(Number.isFinite) && values.length <= levelsMax ? values : null;
+}

@@ -274,6 +274,22 @@ export const surfaceColors = ({ field, isovalue, color }: SurfaceView): string |
 const isSeen = ({ opacity = 1, contours = null }: SurfaceView): boolean =>
   opacity > 0 || contours !== null;
 
+// "contours every 5 K and at 273.15 K".
+function contoursText(
+  { interval = null, levels = [] }: NonNullable<SurfaceView["contours"]>,
+  units: string,
+): string {
+  const named = (text: string): string => `${text} ${units}`.trim();
+  const every = interval === null ? "" : named(`every ${formatNumber(interval)}`);
+  const numbers = levels.map((level) => formatNumber(level, 6));
+  const few = numbers.length <= 4;
+  const list = few
+    ? numbers.join(", ")
+    : `${numbers.length} levels from ${numbers[0]} to ${numbers.at(-1)}`;
+  const at = numbers.length === 0 ? "" : named(`at ${list}`);
+  return `contours ${[every, at].filter((part) => part !== "").join(" and ")}`;
+}
+
 // In the words of the server's legend.
 function surfaceEntry(dataset: Dataset, surface: SurfaceView): LegendEntry {
   const cut = fieldNamed(dataset, surface.field);
@@ -300,7 +316,7 @@ function surfaceEntry(dataset: Dataset, surface: SurfaceView): LegendEntry {
       isovalue === null
         ? "on a section"
         : `surface where ${where} is ${formatNumber(isovalue)} ${unitText(cut?.units)}`.trim(),
-      contours === null ? "" : `contours every ${formatNumber(contours.interval)} ${units}`.trim(),
+      contours === null ? "" : contoursText(contours, units),
     ),
     beyond: name === null ? [false, false] : beyondEnds(range, values),
     leftOut: "",

@@ -102,6 +102,7 @@ const figure: NonNullable<View["annotations"]> = {
   legend: true,
   title: true,
   stepTime: true,
+  contourLabels: true,
 };
 
 function ofParts(dataset: Dataset): Preset[] {

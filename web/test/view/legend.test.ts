@@ -60,6 +60,7 @@ test("the legend of a section has its own colours and its contours; unseen ones 
   const slice = { axis: "z", index: 1 } as const;
   const entries = surfaceLegend([
     { field: "temperature", slice, color: { range: [0, 30] }, contours: { interval: 2.5 } },
+    { field: "temperature", slice, color: { range: [0, 30] }, contours: { levels: [0, 12.25] } },
     { field: "temperature", slice, opacity: 0 },
     { field: "humidity", slice, opacity: 0, contours: { interval: 1 } },
   ]);
@@ -67,6 +68,7 @@ test("the legend of a section has its own colours and its contours; unseen ones 
     entries.map(({ title, units, range, note }) => [title, units, range, note]),
     [
       ["temperature", "K", [0, 30], "on a section, contours every 2.5 K"],
+      ["temperature", "K", [0, 30], "on a section, contours at 0, 12.25 K"],
       ["humidity", "K", [0, 30], "on a section, contours every 1 K"],
     ],
   );

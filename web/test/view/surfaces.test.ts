@@ -3,10 +3,12 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
   candidates,
+  contoursWith,
   facingAxis,
   firstIsosurface,
   isEdgeOn,
   keepsValue,
+  levelsIn,
   middleValue,
   noSurfaceText,
 } from "../../src/panels/surface_choice";
@@ -134,4 +136,21 @@ test("the legend of a surface marks the ends beyond which its field has values",
   assert.deepEqual(beyond({ isovalue: 250 }), [false, false], "one colour");
   const own = { isovalue: 250, color: { field: "t", range: [200, 300] } };
   assert.deepEqual(beyond(own), [false, false], "it has one value");
+});
+
+test("levels of contours are numbers in any order, between spaces, commas or semicolons", () => {
+  assert.deepEqual(levelsIn("280, 273.15;  -5 273.15"), [-5, 273.15, 280]);
+  assert.deepEqual(levelsIn("\u22125 1e3"), [-5, 1000]);
+  assert.deepEqual(levelsIn(" "), []);
+  assert.equal(levelsIn("280 K"), null);
+  assert.equal(levelsIn(Array.from({ length: 65 }, (_, n) => n).join(" ")), null);
+});
+
+test("contours remain while they have an interval or levels", () => {
+  assert.deepEqual(contoursWith(null, { levels: [1] }), { levels: [1] });
+  const both = contoursWith({ interval: 5, lineWidth: 2 }, { levels: [1] });
+  assert.deepEqual(both, { interval: 5, lineWidth: 2, levels: [1] });
+  assert.deepEqual(contoursWith(both, { interval: null })?.levels, [1]);
+  assert.equal(contoursWith({ interval: 5 }, { interval: null }), null);
+  assert.equal(contoursWith({ levels: [1] }, { levels: [] }), null);
 });
