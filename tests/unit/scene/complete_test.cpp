@@ -41,7 +41,8 @@ std::string told(const View& view) {
   };
   std::string out = view.dataset + vec(view.camera.eye.value()) + vec(view.camera.target.value()) +
                     std::to_string(view.camera.height.value()) + view.vector.field.name +
-                    std::to_string(view.vector.length.value()) +
+                    std::to_string(view.vector.length.value()) + " " +
+                    std::to_string(view.vector.stride.value()) + " " +
                     std::to_string(static_cast<int>(view.vector.color.by.value())) +
                     std::to_string(view.vector.color.range.value()[0]) + " " +
                     std::to_string(view.vector.color.range.value()[1]) +

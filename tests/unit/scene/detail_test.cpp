@@ -351,6 +351,7 @@ TEST(LevelOfRates, AreThoseOfTheData) {
       dataset_of(std::make_unique<FakeSource>(grid, std::vector<data::FieldInfo>{wind_info()}, 1));
   protocol::View view;
   view.vector.space = protocol::VectorSpace::world;
+  view.vector.stride = 1;
   view.image.width = view.image.height = 50;
   const Scene coarse = build_scene(*complete(view, *dataset), *dataset).value();
   ASSERT_EQ(coarse.level, (Level{1, 1, 0})) << "three layers remain three";
