@@ -310,6 +310,32 @@ TEST(Legend, LongUnitsLeaveTheirTextsReadable) {
   }
 }
 
+// The numbers of a strip neither touch each other nor leave the card.
+TEST(Legend, LongNumbersHaveRoom) {
+  for (const double high : {0.00032, 0.0002, 2e-9, 30000.0, 123456.0, 1.0, 0.07}) {
+    std::vector<data::FieldInfo> fields{scene::wind_info()};
+    const Shown shown(scene::atmosphere_grid(), fields, [&](protocol::View& view) {
+      view.vector.color.by = protocol::ColorBy::magnitude;
+      view.vector.color.range = protocol::Range{0, high};
+    });
+    Figure figure = empty_figure(shown);
+    const Style style = style_of(shown.subject());
+    add_legend(shown.subject(), style, figure);
+    std::vector<Rectangle> numbers;
+    for (const Item& item : figure.above) {
+      const Text* text = std::get_if<Text>(&item);
+      if (text != nullptr && text->align == 0.5) numbers.push_back(bounds_of(*text));
+    }
+    ASSERT_GE(numbers.size(), 3U) << high;
+    const Rectangle card = figure.taken.front();
+    EXPECT_GE(numbers.front().low.x, card.low.x) << high;
+    EXPECT_LE(numbers.back().high.x, card.high.x) << high;
+    for (std::size_t n = 1; n < numbers.size(); ++n) {
+      EXPECT_GT(numbers[n].low.x - numbers[n - 1].high.x, 0.2 * style.text) << high;
+    }
+  }
+}
+
 // A medium by height: the ticks are pressures, at the colours of their heights.
 TEST(Legend, TellsHeightsInTheCoordinatesOfTheData) {
   std::vector<data::FieldInfo> fields{scene::wind_info()};
