@@ -301,3 +301,52 @@ test("undo takes back changes in every folder, one after another", () =>
     },
     { path: '#!{"dataset":"climate","step":0}' },
   ));
+
+test("seeds are points, typed or picked, and followed for a length or over steps", () =>
+  withPage(
+    async (page) => {
+      const seeds = () =>
+        page.evaluate(
+          () => JSON.parse(decodeURIComponent(location.hash.slice(2))).vector?.trace?.seeds,
+        );
+      const until = async (holds, what) => {
+        for (let n = 0; n < 100; n++, await page.waitForTimeout(50)) {
+          if (holds((await seeds()) ?? {})) return;
+        }
+        assert.fail(`${what}: ${JSON.stringify(await seeds())}`);
+      };
+      assert.match(await page.locator("#legend").textContent(), /slower than/);
+      await control(page, "follow the flow", "input").check();
+      await choose(page, "lines through", /points/);
+      const box = page.locator(".seed-points textarea");
+      await box.fill("-60 40 250\n0, -45, 250");
+      await box.press("Tab");
+      await until(({ points }) => points?.length === 2, "two points are typed");
+      assert.deepEqual((await seeds()).points[1], [0, -45, 250]);
+      await box.fill("-60 40");
+      await box.press("Tab");
+      const words = page.locator(".seed-points .panel-note");
+      assert.match(await words.textContent(), /Point 1 needs three numbers: lon lat/);
+      const pick = page.locator(".seed-points button");
+      await pick.click();
+      await page.locator("#picture").click({ position: { x: 330, y: 250 } });
+      await until(({ points }) => points?.length === 3, "a point is picked");
+      assert.equal((await box.inputValue()).split("\n").length, 3);
+      await pick.click();
+      await choose(page, "followed", /for a length/);
+      await until(({ length }) => length > 0, "a length");
+      await finalPicture(page);
+      assertDrawn({ ...(await pixels(page)), covered: 1 });
+      assert.doesNotMatch(await page.locator("#legend").textContent(), /slower than|longest line/);
+      await page.locator(".seed-points").scrollIntoViewIfNeeded();
+      await shot(page, "seed-points");
+      await type(page, "paths over steps", 2);
+      await until(({ pathSteps }) => pathSteps === 2, "paths");
+      await finalPicture(page);
+      await choose(page, "lines through", /every sample/);
+      await box.waitFor({ state: "hidden" });
+      await finalPicture(page);
+      assert.match(await page.locator("#legend").textContent(), /slower than/);
+    },
+    { path: `#!${encodeURIComponent('{"dataset":"climate"}')}` },
+  ));

@@ -56,6 +56,11 @@ const lookFrom = (angles: Angles) =>
   (besideIsSteered() ? besideTurn : turn).to(app.cameras.viewFrom(angles));
 new PointerInput(canvas, moves, {
   clicked: (x, y, { altKey, pointerType }) => {
+    const { seeds } = panels;
+    if (seeds?.picking) {
+      void probe.sampleAt([x, y]).then((sample) => seeds.addSample(sample));
+      return;
+    }
     probe.pick([x, y], altKey && !embedded);
     if (pointerType === "touch") hover.tap([x, y]);
   },

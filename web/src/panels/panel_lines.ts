@@ -8,13 +8,15 @@ import { unitText } from "../view/legend_entries";
 import { keyAccess, type PanelKit } from "./panel_kit";
 import { namePart } from "../base/key_words";
 import { vectorsTitle } from "../view/words";
-import { addTrace } from "./panel_trace";
+import { addTrace, kindOf } from "./panel_seeds";
+import type { SeedPoints } from "./seed_points";
 import { addMark } from "./panel_mark";
 
-export function addLines(gui: GUI, kit: PanelKit): void {
+// Returns the points of seeds; null: there are no vectors.
+export function addLines(gui: GUI, kit: PanelKit): SeedPoints | null {
   const dataset = kit.host.dataset();
   const options = fieldOptions(dataset, "vector");
-  if (Object.keys(options).length === 0) return;
+  if (Object.keys(options).length === 0) return null;
   namePart("vector", vectorsTitle(dataset));
   const folder = kit.folder(gui, vectorsTitle(dataset), { open: true, key: "Vectors" });
   let named = Object.values(options)[0]!;
@@ -35,17 +37,24 @@ export function addLines(gui: GUI, kit: PanelKit): void {
   );
   const units = unitText(dataset.fields.find((field) => field.name === named)?.units);
   const per = units === "" ? "" : ` (${units})`;
+  const main = addMain(folder, kit, per);
   const parts = [
     field,
-    ...addMain(folder, kit, per),
+    ...main.controls,
     addLineColor(folder, kit, per),
     addShape(folder, kit),
     addMore(folder, kit, per),
   ];
   kit.showWhen((states) => states.lines, ...parts);
+  return main.points;
 }
 
-function addMain(folder: GUI, kit: PanelKit, per: string): Controller[] {
+interface MainControls {
+  controls: Controller[];
+  points: SeedPoints;
+}
+
+function addMain(folder: GUI, kit: PanelKit, per: string): MainControls {
   const { vector } = kit.host.view();
   const top = vector?.magnitudeRange?.[1] ?? 1;
   const length = vector?.length ?? 0.05;
@@ -53,7 +62,7 @@ function addMain(folder: GUI, kit: PanelKit, per: string): Controller[] {
     min: 0,
     max: Math.min(10, Number((5 * length).toPrecision(2))),
   });
-  addTrace(folder, kit);
+  const points = addTrace(folder, kit);
   const opacity = kit.number(folder, "opacity", keyAccess("/vector/opacity"));
   const least = kit.number(folder, `min |v|${per}`, keyAccess("/vector/minMagnitude"), {
     min: 0,
@@ -64,7 +73,10 @@ function addMain(folder: GUI, kit: PanelKit, per: string): Controller[] {
     max: 16,
     step: 1,
   });
-  return [long, opacity, least, stride];
+  // Lines through seeds have other lengths and numbers, and no weak part of them is left out.
+  const eachSample = (): boolean => kindOf(kit.host.view()) === "none";
+  kit.enableWhen(eachSample, long, least, stride);
+  return { controls: [long, opacity, least, stride], points };
 }
 
 function addLineColor(parent: GUI, kit: PanelKit, per: string): GUI {

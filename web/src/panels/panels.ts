@@ -19,6 +19,7 @@ import { addDifference, type DifferenceActions } from "./panel_difference";
 import { addLight } from "./panel_light";
 import { addLines } from "./panel_lines";
 import { addMedia } from "./panel_media";
+import type { SeedPoints } from "./seed_points";
 import { ProbePanel } from "./panel_probe";
 import { addPresets, type PresetSwitch } from "./panel_presets";
 import { addRegion } from "./panel_region";
@@ -40,6 +41,7 @@ export class Panels {
   private gui: GUI | null = null;
   private kit: PanelKit | null = null;
   probe: ProbePanel | null = null;
+  seeds: SeedPoints | null = null;
   cropping = (): boolean => false; // the folder of the region is open
   private readonly kept = new Kept();
   private of = ""; // id of the dataset for which the panels were built
@@ -68,7 +70,7 @@ export class Panels {
     const region = addRegion(data, kit, () => this.actions.cropped());
     this.cropping = () => !region._closed;
     this.probe = new ProbePanel(data, kit, () => this.actions.probed(), this.probePlace());
-    addLines(gui, kit);
+    this.seeds = addLines(gui, kit);
     addMedia(gui, kit);
     addSurfaces(gui, kit);
     addPlace(gui, kit, this.actions);

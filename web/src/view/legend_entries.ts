@@ -162,7 +162,11 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
   const range = (color.range ?? [0, 1]) as [number, number];
   const units = unitText(field?.units);
   const top = vector.magnitudeRange?.[1];
-  const longest = top === undefined ? "" : `longest line ${formatNumber(top)} ${units}`.trim();
+  // Lines through seeds have other lengths, and no weak part of them is left out.
+  const seeded = (vector.trace?.seeds ?? null) !== null;
+  const longest =
+    seeded || top === undefined ? "" : `longest line ${formatNumber(top)} ${units}`.trim();
+  const least = seeded ? 0 : (vector.minMagnitude ?? 0);
   const mapped = color.trueColors !== true;
   const heads = endAhead(vector);
   const darker = mapped && color.by !== "constant" ? fadingText(view) : "";
@@ -177,7 +181,7 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
     extinction: [],
     note: joined(longest, heads, darker),
     beyond: [false, false],
-    leftOut: leftOutText(vector.minMagnitude ?? 0, units),
+    leftOut: leftOutText(least, units),
   };
   switch (color.by) {
     case "worldZ": {
@@ -222,7 +226,7 @@ function linesEntry(dataset: Dataset, view: View): LegendEntry | null {
         ...entry,
         title: `${name}: magnitude`,
         units,
-        beyond: beyondEnds(range, drawnMagnitudes(field, vector.minMagnitude ?? 0)),
+        beyond: beyondEnds(range, drawnMagnitudes(field, least)),
       };
   }
 }

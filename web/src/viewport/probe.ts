@@ -96,7 +96,7 @@ export class Probe {
   }
 
   // In the probe's level also where the picture is empty.
-  private async sampleAt(at: [number, number]): Promise<Sample | null> {
+  async sampleAt(at: [number, number]): Promise<Sample | null> {
     const view = this.host.view();
     const seen =
       hoverOf.value === "level"
