@@ -285,22 +285,74 @@ for (const [name, viewport] of [
     ));
 }
 
-test("printing shows the first picture alone, and draws none of another size", () =>
-  withPage(async (page) => {
-    await compare(page);
-    const [first, second] = await views(page);
-    await page.emulateMedia({ media: "print" });
-    await page.waitForTimeout(400);
-    assert.equal(await page.locator("#beside").isVisible(), false);
-    const { x, width } = await page.locator("#picture").boundingBox();
-    assert.ok(Math.abs(x + width / 2 - 650) < 20, "in the middle of the paper");
-    await page.emulateMedia({ media: "screen" });
-    const after = await views(page);
-    assert.deepEqual(
-      after.map(({ image }) => image),
-      [first.image, second.image],
-    );
-  }));
+for (const [name, viewport] of [
+  ["wide", { width: 1300, height: 640 }],
+  ["paper", { width: 700, height: 1000 }],
+  ["phone", { width: 390, height: 844 }],
+]) {
+  test(`printing shows both pictures with captions and legends below them: ${name}`, () =>
+    withPage(
+      async (page) => {
+        await compare(page);
+        const [first, second] = await views(page);
+        await page.evaluate(() => window.dispatchEvent(new Event("beforeprint")));
+        await page.emulateMedia({ media: "print" });
+        await page.waitForTimeout(400);
+        await shot(page, `beside-printed-${name}`);
+        const box = async (id) => {
+          const { x, y, width, height } = await page.locator(id).boundingBox();
+          return { left: x, right: x + width, top: y, bottom: y + height, width };
+        };
+        const ids = ["#picture", "#print-caption", "#beside-picture", "#beside-words", "#legend"];
+        const [above, caption, below, words, legend] = await Promise.all(ids.map(box));
+        assert.equal(await page.locator(".beside-bar").isVisible(), false);
+        assert.ok(Math.abs(below.width - above.width) < 2, "of equal size");
+        assert.ok(Math.abs(above.left + above.right - viewport.width) < 40, "in the middle");
+        const order = [above, caption, below, words, legend];
+        for (let n = 1; n < order.length; n++) {
+          assert.ok(order[n].top >= order[n - 1].bottom - 1, `${ids[n]} below ${ids[n - 1]}`);
+        }
+        assert.match(await page.locator("#print-caption").innerText(), /step 1 of 8/);
+        assert.match(await page.locator("#beside-words").innerText(), /step 8 of 8/);
+        for (const entry of await page.locator(".legend-entry").all()) {
+          const { x, width } = await entry.boundingBox();
+          assert.ok(x >= 0 && x + width <= viewport.width && width > 200, `${x}, ${width}`);
+          assert.ok(await entry.locator(".legend-note").first().isVisible(), "with its note");
+        }
+        await page.emulateMedia({ media: "screen" });
+        const after = await views(page);
+        assert.deepEqual(
+          after.map(({ image }) => image),
+          [first.image, second.image],
+        );
+      },
+      { viewport },
+    ));
+}
+
+test("on a phone the pictures have the room: little lies over them, and the panel folds", () =>
+  withPage(
+    async (page) => {
+      await compare(page);
+      assert.equal(await page.locator("#panel").isVisible(), false);
+      const box = (id) => page.locator(id).boundingBox();
+      const [first, second] = [await box("#picture"), await box("#beside-picture")];
+      assert.ok(first.height > 300 && second.height > 300, `${first.height}, ${second.height}`);
+      const over = async (ids, picture) => {
+        const sizes = await Promise.all(ids.map(box));
+        const covered = sizes.reduce((sum, one) => sum + one.width * one.height, 0);
+        return covered / (picture.width * picture.height);
+      };
+      assert.ok((await over(["#legend"], first)) < 0.25);
+      assert.ok((await over([".beside-bar", "#beside-words"], second)) < 0.25);
+      assert.equal(await page.locator(".corner").isVisible(), false);
+      for (const id of ["#beside-dataset", "#beside-step", "#beside-swap", "#beside-close"]) {
+        const part = await box(id);
+        assert.ok(part.x >= 0 && part.x + part.width <= 390 && part.width >= 30, id);
+      }
+    },
+    { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true },
+  ));
 
 test("the panel subtracts another step, and the legend says so", () =>
   withPage(async (page) => {

@@ -125,7 +125,7 @@ const besideIsSteered = () => beside.hasOwnCamera && document.activeElement === 
 const steered = () => (besideIsSteered() ? besideMoves : moves);
 const panels = new Panels(panelBox, host, {
   ...comparable,
-  compare: () => beside.toggle(),
+  compare,
   reset: () => app.resetAll(),
   openView: (view) => app.openView(view),
   camera: () => app.cameras.camera(),
@@ -224,6 +224,13 @@ function togglePanel(): void {
   if (hidden && hadFocus) button.focus();
 }
 
+// On phones the room is for the pictures.
+function compare(): void {
+  beside.toggle();
+  const phone = "(max-width: 760px), (max-width: 1100px) and (max-height: 560px)";
+  if (beside.suffix !== "" && window.matchMedia(phone).matches) foldPanel();
+}
+
 function foldPanel(): void {
   if (!document.documentElement.classList.contains("no-panel")) togglePanel();
 }
@@ -315,7 +322,7 @@ const bindings: Binding[] = [
   { keys: ["e"], shown: "e", does: "errors as RMSE or PSNR", run: toggleErrorMetric },
   { keys: ["a"], shown: "a", does: "about this dataset", run: showAbout },
   { keys: ["d"], shown: "d", does: "datasets", run: () => cards.show() },
-  { keys: ["c"], shown: "c", does: "compare: a second picture", run: () => beside.toggle() },
+  { keys: ["c"], shown: "c", does: "compare: a second picture", run: compare },
   { keys: ["p"], shown: "p", does: "panel", run: togglePanel },
   { keys: ["s"], shown: "s", does: "save: pictures and views", run: openSaving },
   { keys: ["?"], shown: "?", does: "this list", run: () => help.showModal() },
