@@ -10,7 +10,8 @@
 
 namespace windsplat::cli {
 
-// Part of the memory limit for the daemon itself: program, libraries, threads, sessions, and one
+// Part of the memory limit for the daemon itself: program, libraries, threads, sessions, the lines
+// of the Earth (ground/atlas.hpp: 4.3 MB if every level was needed), and one
 // picture of 1920 x 1088 pixels that is drawn, measured and encoded (measured:
 // docs/benchmarks/server.md). Loaders, larger pictures and references are counted separately when
 // they are needed.

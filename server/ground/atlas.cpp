@@ -2,6 +2,7 @@
 #include "server/ground/atlas.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -72,6 +73,14 @@ bool separates(const Ends& ends, const Place& from, const Place& to) {
   return separates(ends, crossing_of(ends, from.latitude), from, to);
 }
 
+void Marked::count() {
+  std::uint64_t before = 0;
+  for (Word& word : words_) {
+    word.before = before;
+    before += static_cast<std::uint64_t>(std::popcount(word.set));
+  }
+}
+
 Level::Level(std::vector<Segment> segments, std::size_t coasts, int rows, double tolerance)
     : segments_(std::move(segments)),
       coasts_(coasts),
@@ -101,8 +110,7 @@ Level::Cells Level::cells(double west, double east, double south, double north) 
 
 // A segment is listed in all cells of its bounding box.
 void Level::set_index() {
-  const std::size_t count = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-  first_.assign(count + 1, 0);
+  crossed_.resize(cells_count());
   const auto each_cell = [this](const Segment& s, const auto& use) {
     const auto [west, east] = std::minmax(s.from[0], s.to[0]);
     const auto [south, north] = std::minmax(s.from[1], s.to[1]);
@@ -113,14 +121,20 @@ void Level::set_index() {
     }
   };
   for (const Segment& s : segments_) {
-    each_cell(s, [this](std::size_t cell) { ++first_[cell + 1]; });
+    each_cell(s, [this](std::size_t cell) { crossed_.mark(cell); });
   }
-  for (std::size_t cell = 0; cell < count; ++cell) first_[cell + 1] += first_[cell];
+  crossed_.count();
+  first_.assign(crossed_.rank(cells_count()) + 1, 0);
+  for (const Segment& s : segments_) {
+    each_cell(s, [this](std::size_t cell) { ++first_[crossed_.rank(cell)]; });
+  }
+  for (std::size_t n = 1; n < first_.size(); ++n) first_[n] += first_[n - 1];
   index_.resize(first_.back());
-  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-  for (std::size_t n = 0; n < segments_.size(); ++n) {
-    each_cell(segments_[n],
-              [&](std::size_t cell) { index_[next[cell]++] = static_cast<std::uint32_t>(n); });
+  // From the end of each cell to its beginning.
+  for (std::size_t n = segments_.size(); n-- > 0;) {
+    each_cell(segments_[n], [&](std::size_t cell) {
+      index_[--first_[crossed_.rank(cell)]] = static_cast<std::uint32_t>(n);
+    });
   }
 }
 
@@ -137,14 +151,14 @@ void Level::set_corners() {
       crossed[cell_at(x, 0)].push_back(latitude);
     }
   }
-  land_.resize(first_.size() - 1);
+  land_.resize(cells_count());
   for (int x = 0; x < width_; ++x) {
     const std::vector<double>& at = crossed[static_cast<std::size_t>(x)];
     for (int y = 0; y < height_; ++y) {
       const double south = -90.0 + y * cell_ + beside_y;
       const auto north_of =
           std::count_if(at.begin(), at.end(), [&](double c) { return c > south; });
-      land_[cell_at(x, y)] = static_cast<std::uint8_t>(north_of % 2);
+      land_[cell_at(x, y)] = north_of % 2 != 0;
     }
   }
 }
@@ -154,7 +168,7 @@ bool Level::is_land(const Place& place) const {
   const double longitude = wrapped(place.longitude, 0);
   const Cells in = cells(longitude, longitude, latitude, latitude);
   const Place corner{-180.0 + in.x * cell_ + beside_x, -90.0 + in.y * cell_ + beside_y};
-  bool land = land_[cell_at(in.x, in.y)] != 0;
+  bool land = land_[cell_at(in.x, in.y)];
   each(in, false, [&](const Segment& segment, bool) {
     if (separates(ends_near(segment, longitude), corner, {longitude, latitude})) land = !land;
   });
@@ -163,20 +177,39 @@ bool Level::is_land(const Place& place) const {
 
 std::size_t Level::bytes() const {
   return segments_.size() * sizeof(Segment) +
-         (first_.size() + index_.size()) * sizeof(std::uint32_t) + land_.size();
+         (first_.size() + index_.size()) * sizeof(std::uint32_t) + crossed_.bytes() +
+         land_.size() / 8;
 }
 
-const std::array<Level, levels>& atlas() {
-  static const std::array<Level, levels> all = read_levels();
-  return all;
+namespace {
+
+std::atomic<std::size_t> read_bytes{0};
+
+template <std::size_t number>
+const Level& kept_level() {
+  static const Level level = [] {
+    Level read = read_level(number);
+    read_bytes += read.bytes();
+    return read;
+  }();
+  return level;
 }
 
-const Level& level_for(double degrees_per_pixel) {
-  const auto& all = atlas();
-  for (std::size_t n = levels; n-- > 1;) {
-    if (all.at(n).tolerance() <= 0.5 * degrees_per_pixel) return all.at(n);
-  }
-  return all.front();
+}  // namespace
+
+const Level& atlas(std::size_t level) {
+  static_assert(levels == 3);
+  WINDSPLAT_CHECK(level < levels);
+  if (level == 0) return kept_level<0>();
+  return level == 1 ? kept_level<1>() : kept_level<2>();
+}
+
+std::size_t atlas_bytes() { return read_bytes; }
+
+std::size_t level_number(double degrees_per_pixel) {
+  std::size_t n = levels - 1;
+  while (n > 0 && tolerances.at(n) > 0.5 * degrees_per_pixel) --n;
+  return n;
 }
 
 }  // namespace windsplat::ground

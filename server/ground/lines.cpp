@@ -2,8 +2,11 @@
 
 #include <zlib.h>
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "server/base/check.hpp"
 
@@ -14,7 +17,7 @@ namespace windsplat::ground {
 
 namespace {
 
-constexpr std::size_t bytes_max = std::size_t{1} << 20U;
+constexpr std::size_t bytes_max = std::size_t{512} << 10U;
 
 // The file is part of the program: what is not of its form is a fault of the build.
 class Reader {
@@ -40,11 +43,15 @@ class Reader {
   std::size_t at_ = 0;
 };
 
-// Coasts come before borders.
-Level read_level(Reader& from, int rows, double tolerance) {
-  const auto steps = static_cast<double>(from.number());
+struct Lines {
   std::vector<Segment> segments;
-  std::size_t coasts = 0;
+  std::size_t coasts = 0;  // the first of them
+};
+
+// Of the level that follows. Coasts come before borders. Not `wanted`: passed over.
+Lines next_level(Reader& from, bool wanted) {
+  const auto steps = static_cast<double>(from.number());
+  Lines out;
   std::int64_t x = 0;
   std::int64_t y = 0;
   for (std::int64_t left = from.number(); left > 0; --left) {
@@ -54,15 +61,16 @@ Level read_level(Reader& from, int rows, double tolerance) {
     for (std::int64_t n = 0; n < points; ++n) {
       x += from.change();
       y += from.change();
+      if (!wanted) continue;
       const std::array<float, 2> here{static_cast<float>(static_cast<double>(x) / steps),
                                       static_cast<float>(static_cast<double>(y) / steps)};
-      if (n > 0) segments.push_back({last, here});
+      if (n > 0) out.segments.push_back({last, here});
       last = here;
     }
-    if (coast) coasts = segments.size();
+    if (coast) out.coasts = out.segments.size();
   }
-  segments.shrink_to_fit();
-  return {std::move(segments), coasts, rows, tolerance};
+  out.segments.shrink_to_fit();
+  return out;
 }
 
 }  // namespace
@@ -78,15 +86,18 @@ std::string embedded_lines() {
   return bytes;
 }
 
-std::array<Level, levels> read_levels() {
+Level read_level(std::size_t number) {
+  // Rows of cells from pole to pole, in the order of the file.
+  constexpr std::array<int, levels> rows{720, 360, 120};
   const std::string bytes = embedded_lines();
   Reader from(bytes);
-  // In the order of the file; tolerances as in scripts/ground_data.
-  Level fine = read_level(from, 720, 0.015);
-  Level middle = read_level(from, 360, 0.05);
-  Level coarse = read_level(from, 120, 0.2);
+  Lines lines;
+  for (std::size_t n = 0; n < levels; ++n) {
+    Lines next = next_level(from, n == number);
+    if (n == number) lines = std::move(next);
+  }
   WINDSPLAT_CHECK(from.is_at_end());
-  return {std::move(fine), std::move(middle), std::move(coarse)};
+  return {std::move(lines.segments), lines.coasts, rows.at(number), tolerances.at(number)};
 }
 
 }  // namespace windsplat::ground

@@ -1,7 +1,7 @@
 // The embedded file of lines -> levels. Its format: scripts/ground_data.
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <string>
 
 #include "server/ground/atlas.hpp"
@@ -11,6 +11,7 @@ namespace windsplat::ground {
 // The uncompressed bytes.
 std::string embedded_lines();
 
-std::array<Level, levels> read_levels();
+// A level of the atlas; those before it in the file are passed over.
+Level read_level(std::size_t number);
 
 }  // namespace windsplat::ground

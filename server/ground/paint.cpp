@@ -201,7 +201,7 @@ Color Paint::color(const Seen& seen) const {
   const Located at = map_->locate(seen.point);
   const Pixels pixels(at, seen);
   if (!pixels.is_regular()) {
-    return atlas().front().is_land(at.place) ? style_.land : style_.sea;
+    return atlas(0).is_land(at.place) ? style_.land : style_.sea;
   }
   const Level& level = level_for(pixels.degrees());
   Distances distances;
@@ -226,7 +226,8 @@ bool Paint::find_near(const Seen& middle, double pixels, Near& near) const {
   const Pixels to(at, middle);
   if (!to.is_regular()) return false;
   near.count = 0;
-  near.level = &level_for(to.degrees());
+  near.level_number = level_number(to.degrees());
+  near.level = &atlas(near.level_number);
   near.middle = at.place;
   // Along x and y both, and a quarter of that again for the bend.
   const double extent = 1.25 * std::sqrt(2.0) * pixels;
@@ -257,8 +258,8 @@ bool Paint::find_near(const Seen& middle, double pixels, Near& near) const {
   const double other_size =
       1.06 * std::sqrt(length_of_longitude(at.place.latitude) /
                        length_of_longitude(std::abs(at.place.latitude) + near.latitudes));
-  const bool same_level = near.level == &level_for(to.degrees() * other_size) &&
-                          near.level == &level_for(to.degrees() / other_size);
+  const bool same_level = near.level_number == level_number(to.degrees() * other_size) &&
+                          near.level_number == level_number(to.degrees() / other_size);
   near.is_even = near.count == 0 && same_level && !is_near_graticule(at.place, east, north);
   return true;
 }
@@ -280,7 +281,7 @@ Color Paint::color(const Seen& seen, const Near& near) const {
   const Pixels pixels(at, seen);
   const bool holds = std::abs(east) <= near.longitudes && pixels.is_regular() &&
                      std::abs(at.place.latitude - near.middle.latitude) <= near.latitudes &&
-                     near.level == &level_for(pixels.degrees());
+                     near.level_number == level_number(pixels.degrees());
   if (!holds) return color(seen);
   Distances distances;
   distances.is_land = near.is_land;

@@ -44,6 +44,7 @@ struct Near {
   static constexpr std::size_t most = 96;
   std::array<Line, most> lines;
   std::size_t count = 0;
+  std::size_t level_number = 0;
   const Level* level = nullptr;
   Place middle;
   bool is_land = false;

@@ -235,9 +235,9 @@ double heap_bytes() {
 }
 
 // Memory for a view and all that is kept after its second frame, without fields, which are no part
-// of the heap, and without the lines of the Earth, 5 MB once.
+// of the heap, and without the lines of the Earth, 4 MB once.
 double held_bytes(const View& view, const std::string& name, ThreadPool& pool) {
-  ground::atlas();
+  for (std::size_t n = 0; n < ground::levels; ++n) ground::atlas(n);
   const double before = heap_bytes();
   data::Dataset dataset(value_or_give_up(data::open_sample(name)), name, std::uint64_t{4} << 30U);
   const scene::Scene scene = value_or_give_up(scene::build_scene(view, dataset));

@@ -355,7 +355,7 @@ TEST(Ground, TerrainHasTheColorOfTheColumnBelow) {
       if (!std::isfinite(hit.along)) continue;
       const glm::dvec3 at = ray.from + hit.along * ray.along;
       // Only where a pixel around lies on one side of the coast.
-      const ground::Level& level = ground::atlas().front();
+      const ground::Level& level = ground::atlas(0);
       int land = 0;
       for (double dx = -2.4; dx < 2.5; dx += 0.6) {
         for (double dy = -4; dy < 4.1; dy += 1) {

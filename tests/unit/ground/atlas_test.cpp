@@ -6,9 +6,12 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <random>
 #include <set>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "server/ground/lines.hpp"
 
@@ -60,7 +63,8 @@ constexpr std::array<Known, 36> known{{{"Madrid", 40.42, -3.70, true},
                                        {"Tasman Sea", -38.0, 160.0, false}}};
 
 TEST(Atlas, KnowsLandAndSeaAtEveryLevel) {
-  for (const Level& level : atlas()) {
+  for (std::size_t n = 0; n < levels; ++n) {
+    const Level& level = atlas(n);
     for (const Known& at : known) {
       EXPECT_EQ(level.is_land({at.longitude, at.latitude}), at.land)
           << at.name << " at " << level.tolerance();
@@ -71,7 +75,7 @@ TEST(Atlas, KnowsLandAndSeaAtEveryLevel) {
 
 // A segment of this level passes through a corner of its cells, with a slope of 1.
 TEST(Atlas, ASegmentThroughACornerSeparatesLandAndSea) {
-  const Level& level = atlas().back();
+  const Level& level = atlas(levels - 1);
   EXPECT_FALSE(level.is_land({78.115, -68.795}));
   EXPECT_TRUE(level.is_land({78.93, -68.895}));
   EXPECT_TRUE(level.is_land({78.3, -69.2}));
@@ -82,9 +86,10 @@ TEST(Atlas, LandFollowsFromTheCoastsToTheNorthOfAPlace) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> longitudes(-180, 180);
   std::uniform_real_distribution<double> latitudes(-88, 88);
-  for (const Level& level : atlas()) {
+  for (std::size_t n = 0; n < levels; ++n) {
+    const Level& level = atlas(n);
     int land = 0;
-    for (int n = 0; n < 400; ++n) {
+    for (int trial = 0; trial < 400; ++trial) {
       const Place place{longitudes(random), latitudes(random)};
       std::set<const Segment*> crossed;
       const auto column = level.cells(place.longitude, place.longitude, -90, 90);
@@ -110,7 +115,8 @@ TEST(Atlas, LandFollowsFromTheCoastsToTheNorthOfAPlace) {
 // 29.2 % of the Earth are land, 0.3 % of it the ice shelves of Antarctica, which the data leave
 // out.
 TEST(Atlas, HasTheAreaOfTheContinents) {
-  for (const Level& level : atlas()) {
+  for (std::size_t n = 0; n < levels; ++n) {
+    const Level& level = atlas(n);
     double land = 0;
     double all = 0;
     for (double latitude = -89.5; latitude < 90; latitude += 1) {
@@ -137,7 +143,8 @@ TEST(Atlas, CoastsPassKnownCapes) {
                                        {"Cape St Vincent", 37.023, -8.996},
                                        {"Cape Comorin", 8.078, 77.541},
                                        {"Cape Wrath", 58.625, -5.000}}};
-  for (const Level& level : atlas()) {
+  for (std::size_t n = 0; n < levels; ++n) {
+    const Level& level = atlas(n);
     if (level.tolerance() > 0.1) continue;
     for (const Cape& cape : capes) {
       double nearest = 1e9;
@@ -159,7 +166,7 @@ TEST(Atlas, CoastsPassKnownCapes) {
 }
 
 TEST(Atlas, BordersSeparateNeighboursAndAreNoCoasts) {
-  const Level& level = atlas().front();
+  const Level& level = atlas(0);
   const auto alps = level.cells(7, 8, 45.9, 46.9);  // Italy and Switzerland
   int borders = 0;
   level.each(alps, true, [&](const Segment&, bool coast) { borders += coast ? 0 : 1; });
@@ -172,6 +179,42 @@ TEST(Atlas, TheCoarsestLevelWithinHalfAPixelIsChosen) {
   EXPECT_EQ(level_for(0.099).tolerance(), 0.015);
   EXPECT_EQ(level_for(0.101).tolerance(), 0.05);
   EXPECT_EQ(level_for(0.5).tolerance(), 0.2);
+}
+
+// In a process of its own, since other tests read other levels.
+TEST(AtlasDeathTest, ALevelIsReadWhenItIsFirstNeeded) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto is_lazy = [] {
+    if (atlas_bytes() != 0) return false;
+    for (const double degrees : {0.001, 0.2, 0.5}) level_number(degrees);
+    if (atlas_bytes() != 0) return false;
+    const std::size_t coarse = level_for(0.5).bytes();
+    level_for(0.7);
+    if (atlas_bytes() != coarse) return false;
+    const std::size_t middle = level_for(0.2).bytes();
+    return atlas_bytes() == coarse + middle;
+  };
+  EXPECT_EXIT(std::_Exit(is_lazy() ? 0 : 1), testing::ExitedWithCode(0), "");
+}
+
+TEST(Atlas, ThreadsThatNeedALevelGetOneAndTheSame) {
+  std::array<const Level*, 8> found{};
+  std::vector<std::thread> threads;
+  threads.reserve(found.size());
+  for (const Level*& level : found) {
+    threads.emplace_back([&level] { level = &level_for(0.2); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const Level* level : found) EXPECT_EQ(level, found[0]);
+}
+
+// As the comment of atlas() says.
+TEST(Atlas, LevelsTakeTheMemoryThatIsStated) {
+  constexpr std::array<double, levels> megabytes{3.03, 1.02, 0.21};
+  for (std::size_t n = 0; n < levels; ++n) {
+    EXPECT_NEAR(static_cast<double>(atlas(n).bytes()) * 1e-6, megabytes.at(n), 0.05) << n;
+    EXPECT_EQ(atlas(n).tolerance(), tolerances.at(n));
+  }
 }
 
 // As scripts/ground_data prints them.
