@@ -68,6 +68,25 @@ TEST_F(CostTest, CountsEveryKernelPositionAndSample) {
   EXPECT_LT(cost(unseen).kernels, samples);
 }
 
+// Not as many as there are samples.
+TEST_F(CostTest, CountsThePiecesOfLinesThroughSeeds) {
+  protocol::View seeded = view_;
+  seeded.vector.trace.emplace();
+  const double streamlets = cost(seeded).kernels;
+  seeded.vector.trace->seeds.emplace();
+  seeded.vector.trace->seeds->evenly = 100;
+  const double picture = 1280.0 * 720 / frame::Cost::pixels_a_kernel;
+  const double lines = cost(seeded).kernels - picture;
+  EXPECT_GE(lines, 100 * 500) << "a kernel for each piece";
+  EXPECT_EQ(cost(seeded).dominant, "/vector/trace/seeds");
+  seeded.vector.stride = 8;
+  EXPECT_DOUBLE_EQ(cost(seeded).kernels - picture, lines) << "the samples do not count";
+  seeded.vector.trace->seeds->evenly = 300;
+  EXPECT_NEAR(cost(seeded).kernels - picture, 3 * lines, 1e-6 * lines);
+  seeded.vector.trace->seeds->evenly = 1;
+  EXPECT_LT(cost(seeded).kernels, 0.1 * streamlets);
+}
+
 // Measured: some 50 ns a pixel of a ground and 100 to 220 ns of a surface, at 6 ns a kernel.
 TEST_F(CostTest, CountsThePixelsOfGroundsAndSurfaces) {
   constexpr double pixels = 1280 * 720;
