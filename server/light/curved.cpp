@@ -96,8 +96,26 @@ class Cells {
   const Lattice& lattice_;
 };
 
+}  // namespace
+
+Lattice even_grid(const Index& dims, const glm::dvec3& first, const glm::dvec3& cell) {
+  Lattice grid;
+  grid.dims = dims;
+  for (int c = 0; c < 3; ++c) {
+    const auto axis = static_cast<std::size_t>(c);
+    for (int i = 0; i < dims[axis]; ++i) grid.positions[axis].push_back(first[c] + i * cell[c]);
+    grid.spacing[axis].assign(grid.positions[axis].size(), cell[c]);
+    grid.box_min[c] = first[c] - 0.5 * cell[c];
+    grid.box_max[c] = first[c] + (dims[axis] - 0.5) * cell[c];
+  }
+  return grid;
+}
+
 // A rectilinear lattice of even cells around all cells.
-Lattice grid_around(const Cells& cells, std::size_t samples) {
+Lattice grid_around(const Lattice& lattice) {
+  WINDSPLAT_CHECK(lattice.places != nullptr);
+  const Cells cells(lattice);
+  const std::size_t samples = lattice.places->size();
   glm::dvec3 low(1e300);
   glm::dvec3 high(-1e300);
   glm::dvec3 width(0);
@@ -127,21 +145,19 @@ Lattice grid_around(const Cells& cells, std::size_t samples) {
     points *= box[c] / width[c] + 2;
   }
   const double scale = std::max(1.0, std::cbrt(points / static_cast<double>(points_most(samples))));
-  Lattice grid;
+  Index dims{};
+  glm::dvec3 first;
+  const glm::dvec3 cell = scale * width;
   for (int c = 0; c < 3; ++c) {
-    const auto axis = static_cast<std::size_t>(c);
-    const double cell = scale * width[c];
     // A cell more at both ends, so that every sample lies between points.
-    const int cells_inside = std::max(1, static_cast<int>(std::ceil(box[c] / cell)));
-    grid.dims[axis] = cells_inside + 2;
-    const double first = 0.5 * (low[c] + high[c]) - 0.5 * (cells_inside + 1) * cell;
-    for (int i = 0; i < grid.dims[axis]; ++i) grid.positions[axis].push_back(first + i * cell);
-    grid.spacing[axis].assign(grid.positions[axis].size(), cell);
-    grid.box_min[c] = first - 0.5 * cell;
-    grid.box_max[c] = first + (grid.dims[axis] - 0.5) * cell;
+    const int cells_inside = std::max(1, static_cast<int>(std::ceil(box[c] / cell[c])));
+    dims[static_cast<std::size_t>(c)] = cells_inside + 2;
+    first[c] = 0.5 * (low[c] + high[c]) - 0.5 * (cells_inside + 1) * cell[c];
   }
-  return grid;
+  return even_grid(dims, first, cell);
 }
+
+namespace {
 
 struct Weighted {
   float weight = 0;
@@ -185,6 +201,23 @@ void each_point(const Lattice& grid, const glm::dvec3& at, const glm::dmat3& edg
   }
 }
 
+// Lengthens edges that are shorter than those of the cells of the grid, whose points would see some
+// of such cells and miss others. Returns how many times larger the cell is then.
+double widen(const Lattice& grid, glm::dmat3& edges) {
+  double larger = 1;
+  for (int a = 0; a < 3; ++a) {
+    double widths = 0;  // of the grid
+    for (int c = 0; c < 3; ++c) {
+      const double cell = grid.spacing[static_cast<std::size_t>(c)].front();
+      widths = std::max(widths, std::abs(edges[a][c]) / cell);
+    }
+    if (!(widths > 0 && widths < 1)) continue;
+    edges[a] /= widths;
+    larger /= widths;
+  }
+  return larger;
+}
+
 // Extinctions at the points of the grid; each is summed in the order of the samples.
 std::vector<float> spread(const Lattice& lattice, const Cells& cells,
                           const std::vector<float>& extinctions, const Lattice& grid) {
@@ -195,12 +228,13 @@ std::vector<float> spread(const Lattice& lattice, const Cells& cells,
     const int from = grid.dims[2] * static_cast<int>(part) / parts;
     const int to = grid.dims[2] * (static_cast<int>(part) + 1) / parts;
     cells.each([&](std::size_t n, const Index& i) {
-      const glm::dmat3 edges = cells.edges(i);
+      glm::dmat3 edges = cells.edges(i);
       const double upright = glm::length(edges[0]) * glm::length(edges[1]) * glm::length(edges[2]);
       if (!(std::abs(glm::determinant(edges)) > 1e-6 * upright)) return;  // at a pole
+      const double share = 1 / widen(grid, edges);
       each_point(grid, cells.place(n), edges, from, to, [&](std::size_t at, double weight) {
-        points[at].weight += static_cast<float>(weight);
-        points[at].extinction += static_cast<float>(weight) * extinctions[n];
+        points[at].weight += static_cast<float>(share * weight);
+        points[at].extinction += static_cast<float>(share * weight) * extinctions[n];
       });
     });
   });
@@ -260,12 +294,27 @@ std::uint64_t curved_working_bytes(std::uint64_t samples) {
 
 SampleFactors curved_sunlight(const Lattice& lattice, const std::vector<float>& extinctions,
                               const glm::dvec3& sun, const CancelToken& cancel) {
+  const Lattice grid = grid_around(lattice);
+  return sunlight_at_samples(lattice, grid, grid_sunlight(lattice, extinctions, grid, sun, cancel));
+}
+
+SampleFactors grid_sunlight(const Lattice& lattice, const std::vector<float>& extinctions,
+                            const Lattice& grid, const glm::dvec3& sun, const CancelToken& cancel) {
+  return sunlight(grid, spread(lattice, Cells(lattice), extinctions, grid), sun, cancel);
+}
+
+double below_ground(const Lattice& lattice, const Lattice& grid, const glm::dvec3& sun) {
+  const int axis = layer_axis(grid, sun);
+  const double cell = grid.spacing[static_cast<std::size_t>(axis)].front();
+  const double share = lattice.inner_radius > 0 ? 0.5 : 1;
+  return share * cell / std::max(std::abs(sun[axis]), 0.1);
+}
+
+SampleFactors sunlight_at_samples(const Lattice& lattice, const Lattice& grid,
+                                  const SampleFactors& at_points) {
   WINDSPLAT_CHECK(lattice.places != nullptr);
   const Cells cells(lattice);
-  const Lattice grid = grid_around(cells, extinctions.size());
-  const SampleFactors at_points =
-      sunlight(grid, spread(lattice, cells, extinctions, grid), sun, cancel);
-  SampleFactors out(extinctions.size());
+  SampleFactors out(lattice.places->size());
   constexpr std::size_t block = 4096;
   const std::size_t blocks = (out.size() + block - 1) / block;
   const auto pool = few_threads(blocks / 8);

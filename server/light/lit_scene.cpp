@@ -1,10 +1,12 @@
 #include "server/light/lit_scene.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "protocol/utc_time.hpp"
@@ -147,24 +149,95 @@ std::string media_key(const char* what, const protocol::View& view,
   return key;
 }
 
-Result<void> add_sunlight(const protocol::View& view, const std::vector<std::string>& media,
-                          data::Dataset& dataset, Scene& scene) {
+// What computes and keeps sunlight.
+struct Kept {
+  const protocol::View& view;
+  const std::vector<std::string>& media;
+  data::Dataset& dataset;
+  const Scene& scene;
+
+  [[nodiscard]] std::vector<float> extinctions_of(const CancelToken& cancel) const {
+    return extinctions(scene.lattice, scene.scalars, scene.light->shadows, cancel);
+  }
+};
+
+using Places = std::shared_ptr<const surface::Transmittances>;
+
+Places at_points(const scene::Lattice& lattice, Factors factors) {
+  return std::make_shared<const surface::Transmittances>(
+      surface::Transmittances{lattice.positions, std::move(factors)});
+}
+
+// The grid around a curved lattice. Finding it takes a pass over the samples.
+Result<scene::Lattice> kept_grid(const Kept& kept) {
+  const std::string key = media_key("sunlight grid", kept.view, kept.media, kept.scene);
+  const auto numbers = kept.dataset.remembered(key, [&]() -> Result<std::vector<double>> {
+    const scene::Lattice grid = grid_around(kept.scene.lattice);
+    std::vector<double> out;
+    for (std::size_t a = 0; a < 3; ++a) {
+      out.insert(out.end(), {static_cast<double>(grid.dims[a]), grid.positions[a].front(),
+                             grid.spacing[a].front()});
+    }
+    return out;
+  });
+  if (!numbers) return numbers.error();
+  const std::vector<double>& n = *numbers;
+  return even_grid({static_cast<int>(n[0]), static_cast<int>(n[3]), static_cast<int>(n[6])},
+                   {n[1], n[4], n[7]}, {n[2], n[5], n[8]});
+}
+
+// Whether sunlight falls on what lies between samples: the body and isosurfaces.
+bool lights_places(const Scene& scene) {
+  const auto lit = [](const surface::Shown& shown) { return shown.ambient < 1; };
+  return scene.body || std::any_of(scene.surfaces.begin(), scene.surfaces.end(), lit);
+}
+
+// The transmittances at the points of the grid, and then at the samples from them.
+Result<Places> curved_places(const Kept& kept, const scene::Lattice& grid) {
+  const std::size_t samples = kept.scene.scalars.front().field->samples();
+  const std::size_t points =
+      grid.positions[0].size() * grid.positions[1].size() * grid.positions[2].size();
+  const CancelToken cancel = kept.dataset.cancellation();
+  const std::string key = media_key("sunlight at points", kept.view, kept.media, kept.scene);
+  auto factors = kept_factors(
+      kept.dataset, key, points, samples * sizeof(float) + curved_working_bytes(samples), [&] {
+        return grid_sunlight(kept.scene.lattice, kept.extinctions_of(cancel), grid,
+                             kept.scene.light->sun, cancel);
+      });
+  if (!factors) return factors.error();
+  return at_points(grid, std::move(*factors));
+}
+
+// The sunlight of samples, and of places if it falls on any.
+Result<SunAtPlaces> add_sunlight(const Kept& kept, Scene& scene) {
   const glm::dvec3& sun = scene.light->sun;
-  const std::string key = media_key("sunlight", view, media, scene);
+  const std::string key = media_key("sunlight", kept.view, kept.media, scene);
   const std::size_t samples = scene.scalars.front().field->samples();
   const bool curved = scene.lattice.places != nullptr;
+  const CancelToken cancel = kept.dataset.cancellation();
+  SunAtPlaces at_places;
+  std::optional<scene::Lattice> grid;
+  if (curved && lights_places(scene)) {
+    auto around = kept_grid(kept);
+    if (!around) return around.error();
+    grid = std::move(*around);
+    auto places = curved_places(kept, *grid);
+    if (!places) return places.error();
+    at_places.media = std::move(*places);
+    at_places.below = below_ground(scene.lattice, *grid, sun);
+  }
   const std::uint64_t working =
-      samples * sizeof(float) + (curved ? curved_working_bytes(samples) : 0);
-  const CancelToken cancel = dataset.cancellation();
-  auto factors = kept_factors(dataset, key, samples, working, [&scene, &sun, curved, &cancel] {
-    const std::vector<float> media =
-        extinctions(scene.lattice, scene.scalars, scene.light->shadows, cancel);
+      grid ? 0 : samples * sizeof(float) + (curved ? curved_working_bytes(samples) : 0);
+  auto factors = kept_factors(kept.dataset, key, samples, working, [&] {
+    if (grid) return sunlight_at_samples(scene.lattice, *grid, *at_places.media->factors);
+    const std::vector<float> media = kept.extinctions_of(cancel);
     return curved ? curved_sunlight(scene.lattice, media, sun, cancel)
                   : sunlight(scene.lattice, media, sun, cancel);
   });
   if (!factors) return factors.error();
+  if (!curved && lights_places(scene)) at_places.media = at_points(scene.lattice, *factors);
   scene.light->sunlight = std::move(*factors);
-  return {};
+  return at_places;
 }
 
 // Of level ground below a rectilinear lattice; null: of another body, or none.
@@ -215,21 +288,27 @@ Result<void> light_scene(const protocol::View& view, const std::vector<std::stri
     for (scene::ScalarLayer& layer : scene.scalars) {
       if (layer.shading == scene::Shading::gradient) layer.shading = scene::Shading::scatter;
     }
-    light_ground(scene);
-    return {};
   }
-  if (scene.scalars.empty()) {
-    light_ground(scene);
+  if (!sun->risen || scene.scalars.empty()) {
+    light_ground(scene, {});
+    light_surfaces(scene, {});
     return {};
   }
   for (std::size_t n = 0; n < scene.scalars.size(); ++n) {
     if (scene.scalars[n].shading != scene::Shading::gradient) continue;
     if (auto ok = add_relief(view, media[n], dataset, scene, scene.scalars[n]); !ok) return ok;
   }
-  if (auto ok = add_sunlight(view, media, dataset, scene); !ok) return ok;
+  auto at_places = add_sunlight({view, media, dataset, scene}, scene);
+  if (!at_places) return at_places.error();
   auto ground = ground_factors(view, media, dataset, scene);
   if (!ground) return ground.error();
-  light_ground(scene, std::move(*ground));
+  if (*ground) {
+    const auto& [x, y, z] = scene.lattice.positions;
+    at_places->ground = std::make_shared<const surface::Transmittances>(
+        surface::Transmittances{{x, y, {scene.lattice.box_min.z}}, std::move(*ground)});
+  }
+  light_ground(scene, *at_places);
+  light_surfaces(scene, *at_places);
   return {};
 }
 

@@ -446,12 +446,10 @@ Result<Scene> build_scene(const CompletedView& completed, data::Dataset& dataset
   auto body = make_body(view, scene.camera, *completed.placed(), dataset);
   if (!body) return body.error();
   scene.body = std::move(*body);
-  auto built = with_data(std::move(scene), std::move(*needed), completed, dataset);
-  if (!built) return built;
   auto surfaces = make_surfaces(completed, dataset);
   if (!surfaces) return surfaces.error();
-  built->surfaces = std::move(*surfaces);
-  return built;
+  scene.surfaces = std::move(*surfaces);
+  return with_data(std::move(scene), std::move(*needed), completed, dataset);
 }
 
 double detail_shown(const CompletedView& completed) {

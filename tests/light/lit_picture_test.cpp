@@ -25,6 +25,12 @@ void light_up(Scene& scene, const glm::dvec3& sun, double ambient, double streng
       scene.lattice, light::extinctions(scene.lattice, scene.scalars, shadows), scene.light->sun));
 }
 
+light::SunAtPlaces at_samples(const Scene& scene) {
+  return {std::make_shared<const surface::Transmittances>(
+              surface::Transmittances{scene.lattice.positions, scene.light->sunlight}),
+          nullptr, 0};
+}
+
 std::vector<double> picture(const Scene& scene, unsigned threads = 1) {
   if (scene.method == Method::reference) {
     ThreadPool pool(threads);
@@ -129,7 +135,7 @@ TEST(LitPicture, OfTheGroundHasTheShadowsOfClouds) {
   scene.body->height = scene.lattice.box_min.z;
   scene.body->color = {0.6F, 0.6F, 0.6F};
   light_up(scene, {0.8, 0, 1}, 0.2, 1, 0);
-  light::light_ground(scene);
+  light::light_ground(scene, at_samples(scene));
   const auto truth = truth::integrate(scene, 2);
   for (const Method method : {Method::kernel, Method::slab, Method::reference}) {
     scene.method = method;
@@ -151,7 +157,7 @@ TEST(LitPicture, OfAGlobeHasADayAndANightSide) {
   scene.body->color = {1, 1, 1};
   scene.light = scene::Light{{1, 0, 0}, 0.1, 1, 0, 1, {}};
   const auto unlit = picture(scene);
-  light::light_ground(scene);
+  light::light_ground(scene, {});
   const auto lit = picture(scene);
   const std::size_t row = 16 * 8;
   EXPECT_NEAR(lit[4 * (row + 4)], 0.1 * unlit[4 * (row + 4)], 1e-6);
