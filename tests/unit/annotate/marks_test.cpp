@@ -15,7 +15,9 @@
 #include <vector>
 
 #include "server/annotate/annotate.hpp"
+#include "server/annotate/box.hpp"
 #include "server/annotate/legend.hpp"
+#include "server/annotate/paint/type.hpp"
 #include "server/annotate/projector.hpp"
 #include "server/annotate/room.hpp"
 #include "server/scene/angles.hpp"

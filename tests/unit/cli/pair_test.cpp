@@ -107,19 +107,27 @@ TEST_F(Pair, IsTheSameInAJpegButForItsCompression) {
   EXPECT_LT(sum / static_cast<double>(jpeg->size()), 1);
 }
 
-TEST_F(Pair, HasOneCameraAndEqualDefaults) {
+TEST_F(Pair, HasEqualDefaults) {
   arguments_.beside = "tornado:20";
   const auto both = panels();
   const protocol::View& left = both[0].view;
   const protocol::View& right = both[1].view;
-  ASSERT_TRUE(left.camera.eye);
-  EXPECT_EQ(left.camera, right.camera);
   EXPECT_EQ(left.vector.length, right.vector.length);
   EXPECT_EQ(left.vector.min_magnitude, right.vector.min_magnitude);
   EXPECT_EQ(left.vector.magnitude_range, right.vector.magnitude_range);
   EXPECT_EQ(left.vector.color.range, right.vector.color.range);
   EXPECT_EQ(left.scalars->front().extinction, right.scalars->front().extinction);
   EXPECT_EQ(left.scalars->front().color.range, right.scalars->front().color.range);
+}
+
+// A flat box beside a cube, which is framed from elsewhere.
+TEST_F(Pair, HasTheCameraOfTheFirstWhateverTheSecondIs) {
+  arguments_.beside = "climate:24x16x8";
+  const auto both = panels();
+  EXPECT_EQ(both[0].view.camera, both[1].view.camera);
+  const auto alone = frame::complete(protocol::View{}, *both[1].dataset);
+  ASSERT_TRUE(alone);
+  EXPECT_NE(both[1].view.camera, alone->view().camera);
 }
 
 TEST_F(Pair, KeepsTheRangesThatAreGiven) {
