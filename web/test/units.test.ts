@@ -48,6 +48,8 @@ test("units that are written out become symbols", () => {
   }
   assert.equal(unitText("watts per meter2"), "W m⁻²");
   assert.equal(unitText("meter/second"), "m/s");
+  assert.equal(unitText("centimeter/s"), "cm/s");
+  assert.equal(unitText("millimetres per day"), "mm day⁻¹");
   assert.equal(unitText("degrees_Celsius"), "°C");
   assert.equal(unitText("Kelvin"), "K");
   assert.equal(unitText("percent"), "%");

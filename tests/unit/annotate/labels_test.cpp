@@ -86,6 +86,7 @@ TEST(UnitText, WritesNamesAsSymbols) {
   }
   EXPECT_EQ(unit_text("watts per meter2"), "W m\u207b\u00b2");
   EXPECT_EQ(unit_text("meter/second"), "m/s");
+  EXPECT_EQ(unit_text("centimeter/s"), "cm/s");
   EXPECT_EQ(unit_text("Kelvin"), "K");
   EXPECT_EQ(unit_text("degrees_Celsius"), "\u00b0C");
   EXPECT_EQ(unit_text("percent"), "%");

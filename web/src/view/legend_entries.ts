@@ -34,6 +34,7 @@ const raised: Record<string, string> = { "-": "⁻" };
 // Units that are written out, in the singular and lower case -> their symbols.
 const symbols: Record<string, string> = {
   ...{ meter: "m", metre: "m", kilometer: "km", kilometre: "km" },
+  ...{ centimeter: "cm", centimetre: "cm", millimeter: "mm", millimetre: "mm" },
   ...{ second: "s", sec: "s", minute: "min", hour: "h" },
   ...{ kelvin: "K", degk: "K", deg_k: "K", degree_kelvin: "K" },
   ...{ degc: "°C", deg_c: "°C", celsius: "°C", degree_c: "°C", degree_celsius: "°C", degree: "°" },

@@ -89,8 +89,10 @@ export function coordinateText(
   const { name } = dataset.axes[axisNames[n]!];
   const units = own ?? dataset.axes[axisNames[n]!].units;
   const unit = axisUnit(units);
-  const opposite = value < 0 ? { "°E": "°W", "°N": "°S" }[unit] : undefined;
-  const shown = opposite === undefined ? value : -value;
+  // Longitudes of columns may go on beyond a whole turn.
+  const place = unit === "°E" && Math.abs(value) > 360 ? value % 360 : value;
+  const opposite = place < 0 ? { "°E": "°W", "°N": "°S" }[unit] : undefined;
+  const shown = opposite === undefined ? place : -place;
   const text = `${formatNumber(shown)} ${opposite ?? unit}`.trim();
   if (called !== undefined) return `${called} ${text}`;
   return unit.startsWith("°") ? text : `${name} ${text}`;
