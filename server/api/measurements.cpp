@@ -2,10 +2,12 @@
 // into short jobs, so that pictures are drawn in between.
 #include "protocol/measurements.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,11 +16,13 @@
 #include <vector>
 
 #include "protocol/limits.hpp"
+#include "protocol/view.hpp"
 #include "server/api/positions.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/model/measure.hpp"
 #include "server/http/problem.hpp"
 #include "server/http/request_target.hpp"
+#include "server/tasks/catalogue.hpp"
 #include "server/tasks/run_guarded.hpp"
 
 namespace windsplat::api {
@@ -40,15 +44,29 @@ struct Subject {
   CancelToken cancel;
 };
 
-Result<DatasetPtr> find_dataset(const tasks::Catalogue& catalogue, const std::string& id) {
+// With `minus` and `minusStep` of the query the differences from that dataset or step, as those of
+// a view. Errors: not_found, invalid (grids, steps).
+Result<DatasetPtr> find_dataset(const tasks::Catalogue& catalogue, const std::string& id,
+                                http::QueryReader& query) {
   auto dataset = catalogue.find(id);
   if (!dataset) return make_error(ErrorKind::not_found, dataset.error().message);
-  return dataset;
+  const auto minus = query.text("minus");
+  const auto step = query.integer("minusStep", 0, std::numeric_limits<int>::max());
+  if (!minus && !step) return dataset;
+  protocol::View view;
+  view.dataset = id;
+  view.difference = protocol::DifferenceView{minus, step};
+  auto shown = tasks::find_shown(catalogue, view);
+  if (shown) return shown;
+  const Error& error = shown.error();
+  return make_error(error.kind, "query parameters 'minus' and 'minusStep': " +
+                                    (error.at.empty() ? error.message : error.at.front().detail));
 }
 
 Result<Subject> find_subject(tasks::Catalogue& catalogue, const std::string& id,
-                             const std::string& field, const http::Request& request) {
-  auto dataset = find_dataset(catalogue, id);
+                             const std::string& field, const http::Request& request,
+                             http::QueryReader& query) {
+  auto dataset = find_dataset(catalogue, id, query);
   if (!dataset) return dataset.error();
   const data::FieldInfo* found = (*dataset)->info().find(field);
   if (found == nullptr) {
@@ -143,8 +161,7 @@ struct HistogramQuery {
   std::size_t step = 0;
 };
 
-Result<HistogramQuery> read_histogram(const http::Request& request, const data::Dataset& dataset) {
-  http::QueryReader query(request.query);
+Result<HistogramQuery> read_histogram(http::QueryReader& query, const data::Dataset& dataset) {
   HistogramQuery out;
   out.step = static_cast<std::size_t>(read_step(query, dataset).value_or(0));
   out.request.bins = query.integer("bins", 1, limits::histogram_bins_max).value_or(histogram_bins);
@@ -179,23 +196,51 @@ http::Response histogram_response(const Subject& subject, const HistogramQuery& 
 
 // --- probe --------------------------------------------------------------------------------------
 
+struct ProbeQuery {
+  Position position;
+  int step = 0;
+  std::vector<std::string> fields;  // derived ones that are computed; others only if in memory
+};
+
+// "a,b"
+Result<std::vector<std::string>> read_fields(http::QueryReader& query,
+                                             const data::DatasetInfo& info) {
+  std::vector<std::string> out;
+  const std::string names = query.text("fields").value_or("");
+  for (std::size_t at = 0; at < names.size();) {
+    const std::size_t end = std::min(names.find(',', at), names.size());
+    out.push_back(names.substr(at, end - at));
+    at = end + 1;
+    if (info.find(out.back()) != nullptr) continue;
+    return make_error(ErrorKind::invalid, "query parameter 'fields': there is no field '" +
+                                              printable(out.back()) + "'");
+  }
+  return out;
+}
+
 http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& dataset,
-                              const Position& position, int step, const CancelToken& cancel) {
+                              const ProbeQuery& query, const CancelToken& cancel) {
   const data::DatasetInfo& info = dataset.info();
-  const auto located = locate(catalogue, dataset, position, cancel);
+  const auto located = locate(catalogue, dataset.minuend(), query.position, cancel);
   if (!located) return http::problem_response(located.error());
   protocol::ProbeDescription out;
   out.position = located->position;
-  out.step = step;
+  out.step = query.step;
   for (const data::FieldInfo& field : info.fields) {
     if (cancel.cancelled()) {
       return http::problem_response(make_error(ErrorKind::cancelled, "request cancelled"));
     }
-    const auto at_step = static_cast<std::size_t>(step);
-    // Derived fields only if a picture has needed them: computing all would take seconds.
-    const auto volume = field.derived ? dataset.resident_only().volume(field.name, at_step)
-                                      : load_field(catalogue, dataset, field.name, at_step, cancel);
-    if (!volume && field.derived) continue;
+    const auto at_step = static_cast<std::size_t>(query.step);
+    // Of derived fields those that are wanted or in memory: computing all would take seconds.
+    const bool is_wanted =
+        std::find(query.fields.begin(), query.fields.end(), field.name) != query.fields.end();
+    const bool is_optional = field.derived && !is_wanted;
+    const auto volume = is_optional ? dataset.resident_only().volume(field.name, at_step)
+                                    : load_field(catalogue, dataset, field.name, at_step, cancel);
+    if (!volume && is_optional) continue;
+    // Fields that cannot be subtracted have no difference.
+    if (!volume && !is_wanted && dataset.subtrahend() && volume.error().kind == ErrorKind::invalid)
+      continue;
     if (!volume) return http::problem_response(volume.error());
     out.fields.push_back(describe(field));
     out.values.push_back(data::value_at(**volume, located->place.index));
@@ -225,16 +270,18 @@ http::Response step_range(const Subject& subject, std::size_t step) {
 void answer_range_of_all(tasks::Backend& backend, Subject subject, const http::Request& request,
                          http::Reply reply) {
   auto of = subject.dataset->shared_info();
-  if (const auto known = backend.ranges.find(of, subject.field.name)) {
+  const bool is_difference = subject.dataset->subtrahend().has_value();  // its ranges are not kept
+  const auto known = is_difference ? std::nullopt : backend.ranges.find(of, subject.field.name);
+  if (known) {
     reply(range_response(*known, "all"));
     return;
   }
   const auto pass = pass_over(std::move(subject), request, std::move(reply));
   const auto range = std::make_shared<data::FieldRange>();
   pass->take = [range](const data::Volume& volume) { range->add(volume); };
-  pass->finish = [&ranges = backend.ranges, range, of = std::move(of),
+  pass->finish = [&ranges = backend.ranges, range, of = std::move(of), is_difference,
                   field = pass->subject.field.name] {
-    ranges.keep(of, field, *range);
+    if (!is_difference) ranges.keep(of, field, *range);
     return range_response(*range, "all");
   };
   go_on(backend.loads, pass, false);
@@ -244,12 +291,13 @@ void answer_range_of_all(tasks::Backend& backend, Subject subject, const http::R
 
 void get_histogram(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                    const std::string& field, const http::Request& request, http::Reply reply) {
-  auto subject = find_subject(catalogue, id, field, request);
+  http::QueryReader reader(request.query);
+  auto subject = find_subject(catalogue, id, field, request, reader);
   if (!subject) {
     reply(http::problem_response(subject.error()));
     return;
   }
-  const auto query = read_histogram(request, *subject->dataset);
+  const auto query = read_histogram(reader, *subject->dataset);
   if (!query) {
     reply(http::problem_response(query.error()));
     return;
@@ -262,32 +310,34 @@ void get_histogram(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, cons
 
 void get_probe(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                const http::Request& request, http::Reply reply) {
-  auto dataset = find_dataset(catalogue, id);
+  http::QueryReader query(request.query);
+  auto dataset = find_dataset(catalogue, id, query);
   if (!dataset) {
     reply(http::problem_response(dataset.error()));
     return;
   }
-  http::QueryReader query(request.query);
   const auto at = read_position(query, (*dataset)->info().grid);
   const int step = read_step(query, **dataset).value_or(0);
+  const auto wanted = read_fields(query, (*dataset)->info());
   const auto ok = query.finish();
-  if (!ok || !at) {
-    reply(http::problem_response(!ok ? ok.error() : at.error()));
+  if (!ok || !at || !wanted) {
+    reply(http::problem_response(!ok ? ok.error() : !at ? at.error() : wanted.error()));
     return;
   }
-  run_later(loads, request, std::move(reply), "a probe", dataset->get(),
-            [&catalogue, dataset = *dataset, at = *at, step, cancel = request.cancel] {
-              return probe_response(catalogue, *dataset, at, step, cancel);
-            });
+  run_later(
+      loads, request, std::move(reply), "a probe", dataset->get(),
+      [&catalogue, dataset = *dataset, at = *at, step, wanted = *wanted, cancel = request.cancel] {
+        return probe_response(catalogue, *dataset, {at, step, wanted}, cancel);
+      });
 }
 
 void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                 const std::string& field, const http::Request& request, http::Reply reply) {
   const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
-  auto subject = find_subject(catalogue, id, field, request);
+  http::QueryReader query(request.query);
+  auto subject = find_subject(catalogue, id, field, request, query);
   if (!subject) return refuse(subject.error());
   const data::DatasetInfo& info = subject->dataset->info();
-  http::QueryReader query(request.query);
   const auto position = read_position(query, info.grid);
   if (const auto ok = query.finish(); !ok) return refuse(ok.error());
   if (!position) return refuse(position.error());
@@ -300,7 +350,7 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
   const auto index = std::make_shared<std::array<int, 3>>();
   // Locating the position is slow among many columns, so it runs on a loading thread.
   pass->begin = [at = *position, series, index, &of = pass->subject]() -> Result<void> {
-    const auto found = locate(*of.catalogue, *of.dataset, at, of.cancel);
+    const auto found = locate(*of.catalogue, of.dataset->minuend(), at, of.cancel);
     if (!found) return found.error();
     *index = found->place.index;
     series->position = found->position;
@@ -316,9 +366,9 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
 void get_range(tasks::Backend& backend, const std::string& id, const std::string& field,
                const http::Request& request, http::Reply reply) {
   const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
-  auto subject = find_subject(backend.catalogue, id, field, request);
-  if (!subject) return refuse(subject.error());
   http::QueryReader query(request.query);
+  auto subject = find_subject(backend.catalogue, id, field, request, query);
+  if (!subject) return refuse(subject.error());
   const std::string of = query.text("of").value_or("step");
   const auto step = read_step(query, *subject->dataset);
   if (const auto ok = query.finish(); !ok) return refuse(ok.error());

@@ -358,6 +358,8 @@ test("the panel subtracts another step, and the legend says so", () =>
   withPage(async (page) => {
     await unfold(page, "Compare");
     await page.keyboard.press("]");
+    const asked = [];
+    page.on("request", (request) => asked.push(request.url()));
     await choose(page, "subtract", /a step/);
     await finalPicture(page);
     const shown = await page.evaluate(() => window.reported.at(-1).at(-1));
@@ -365,7 +367,15 @@ test("the panel subtracts another step, and the legend says so", () =>
     const [low, high] = shown.scalars[0].color.range;
     assert.equal(low, -high);
     assert.match(await page.locator("#legend").textContent(), /difference of/);
+    await page.keyboard.press("i");
+    await page.locator(".probe-values dt", { hasText: "cloud (difference)" }).waitFor();
+    await page.locator(".probe-values").scrollIntoViewIfNeeded();
     await shot(page, "difference");
+    const minus = (path) => asked.some((url) => url.includes(path) && url.includes("minusStep=0"));
+    assert.ok(minus("/probe?"), asked.join(" "));
+    await unfold(page, "Opacity curve");
+    await page.locator(".histogram-caption:visible", { hasText: /^[-−]/ }).first().waitFor();
+    assert.ok(minus("/histogram?"), asked.join(" "));
     await control(page, "subtract").selectOption({ label: "nothing" });
     await finalPicture(page);
     const after = await page.evaluate(() => window.reported.at(-1).at(-1));

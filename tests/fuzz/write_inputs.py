@@ -75,6 +75,7 @@ TARGETS = [
     "/v1/datasets/climate/frame.png?step=1&width=8&height=8&preset=top",
     "/v1/datasets/climate/frame.npy?width=4&height=4",
     "/v1/datasets/climate/probe?x=1&y=2&z=3&step=0",
+    "/v1/datasets/climate/probe?index=1,2,3&minus=tornado&minusStep=0&fields=wind,cloud",
     "/v1/datasets/climate/fields/wind/histogram?bins=8&range=0,1&log=true&clip=0.1&step=1",
     "/v1/datasets/climate/fields/wind/series?x=1&y=2&z=3",
     "/v1/datasets/climate/fields/wind/range?of=all", "/v1/datasets/climate?forget=true",

@@ -17,6 +17,8 @@ import {
   worldOf,
 } from "../src/view/sample_position";
 import type { Dataset, View } from "../src/wire/protocol";
+import { derivedIn } from "../src/view/view_fields";
+import { described } from "./page";
 import { timeEnds, seriesCurve } from "../src/panels/series_plot";
 
 const histogram = (counts: number[], change: Partial<Histogram> = {}): Histogram => ({
@@ -135,6 +137,38 @@ test("a series of the schema is parsed, and its ends are shown as times", async 
   await assert.rejects(strings.api.series("d", "t", [1, 2, 3], null), /not be understood/);
 });
 
+test("requests of values say what is subtracted, and which derived fields are wanted", async () => {
+  const both = { dataset: "a b", step: 0 };
+  const h = server(histogram([1, 2]));
+  await h.api.histogram("d", "t", 7, 64, both);
+  await h.api.histogram("d", "t", 7, 64, null);
+  const queries = (asked: string[]) => asked.map((url) => url.slice(url.indexOf("?")));
+  assert.deepEqual(queries(h.asked), [
+    "?step=7&bins=64&minus=a%20b&minusStep=0",
+    "?step=7&bins=64",
+  ]);
+  const r = server({ range: [1, 2], masked: 0, rangeOf: "step" });
+  await r.api.range("d", "t", 3, { step: 2 });
+  assert.deepEqual(queries(r.asked), ["?step=3&minusStep=2"]);
+  const p = server({ position: { x: 1, y: 2, z: 3 }, values: {} });
+  const derived = ["wind_speed", "a,b", "dew point"];
+  await p.api.probe("d", [1, 2, 3], null, { step: 4, difference: { dataset: "e" }, derived });
+  assert.deepEqual(queries(p.asked), ["?index=1,2,3&step=4&minus=e&fields=wind_speed,dew%20point"]);
+});
+
+test("derived fields of a view are those that it draws or colours by", () => {
+  const dataset = described("a", { fields: ["wind", "t", "speed", "shear", "vorticity"] });
+  for (const field of dataset.fields.slice(2)) field.dtype = "derived" as typeof field.dtype;
+  const view = {
+    vector: { field: "wind", color: { by: "scalar", field: "speed" } },
+    scalars: [{ field: "t" }],
+    surfaces: [{ field: "t", color: { field: "shear" } }],
+  } as View;
+  assert.deepEqual(derivedIn(dataset, view), ["speed", "shear"]);
+  const plain = { ...view, vector: { field: null, color: { by: "scalar", field: "speed" } } };
+  assert.deepEqual(derivedIn(dataset, plain as View), ["shear"]);
+});
+
 test("each request has its URL below the base path", async () => {
   const counted = histogram([1, 2]);
   const h = server(counted);
@@ -146,8 +180,8 @@ test("each request has its URL below the base path", async () => {
   assert.deepEqual((await r.api.range("d", "t", null)).range, [1, 2]);
   assert.deepEqual(r.asked, ["http://host/base/v1/datasets/d/fields/t/range?of=all"]);
   const p = server({ position: { x: 1, y: 2, z: 3 }, values: {} });
-  await p.api.probe("d", [1, 2, 3], null, 4);
-  await p.api.probe("d", [1, 2, 3], "h of z", 4);
+  await p.api.probe("d", [1, 2, 3], null, { step: 4 });
+  await p.api.probe("d", [1, 2, 3], "h of z", { step: 4 });
   assert.deepEqual(p.asked, [
     "http://host/base/v1/datasets/d/probe?index=1,2,3&step=4",
     "http://host/base/v1/datasets/d/probe?index=1,2,3&heightField=h%20of%20z&step=4",

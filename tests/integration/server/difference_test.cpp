@@ -1,12 +1,18 @@
 // Differences over REST and the stream: the same pictures as of a file that contains them.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "protocol/frame_header.hpp"
+#include "server/data/model/volume.hpp"
+#include "server/data/resident/store.hpp"
 #include "tests/integration/difference_files.hpp"
 #include "tests/integration/server/test_server.hpp"
 
@@ -152,6 +158,108 @@ TEST_F(Differences, FiguresSayWhatIsSubtracted) {
   EXPECT_THAT(figure, HasSubstr("step 2 of 3"));
   view.erase("difference");
   EXPECT_THAT(post(view, "image/svg+xml").body, testing::Not(HasSubstr("minus")));
+}
+
+// Values of differences: steps 1 and 0 of the same file, opened without a server.
+class ComparedValues : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto added = store_.add(small_file());
+    ASSERT_TRUE(added);
+    dataset_ = *added;
+    name_ = dataset_->info().first(windsplat::data::FieldKind::scalar)->name;
+    later_ = dataset_->volume(name_, 1).value();
+    first_ = dataset_->volume(name_, 0).value();
+  }
+  Answer answer(const std::string& what) {
+    return get(server_.port(), "/v1/datasets/small/" + what);
+  }
+  Json ask(const std::string& what) {
+    const Answer got = answer(what);
+    EXPECT_EQ(got.status, 200) << what << ' ' << got.body;
+    return json_of(got);
+  }
+  [[nodiscard]] float change(std::size_t sample) const {
+    return later_->component(0)[sample] - first_->component(0)[sample];
+  }
+
+  windsplat::data::Store store_{std::uint64_t{1} << 30};
+  std::shared_ptr<windsplat::data::Dataset> dataset_;
+  std::string name_;
+  std::shared_ptr<const windsplat::data::Volume> later_;
+  std::shared_ptr<const windsplat::data::Volume> first_;
+  TestServer server_;
+};
+
+TEST_F(ComparedValues, HistogramAndRangeOfADifferenceCountTheChangesOfAllSamples) {
+  float low = change(0);
+  float high = low;
+  std::size_t rising = 0;
+  for (std::size_t n = 0; n < later_->samples(); ++n) {
+    low = std::min(low, change(n));
+    high = std::max(high, change(n));
+    rising += change(n) > 0 ? 1 : 0;
+  }
+  ASSERT_LT(low, 0);
+  ASSERT_GT(rising, 0U);
+  const std::string field = "fields/" + name_;
+  const Json histogram = ask(field + "/histogram?step=1&minusStep=0");
+  EXPECT_EQ(histogram["range"][0].get<float>(), low);
+  EXPECT_EQ(histogram["range"][1].get<float>(), high);
+  const Json upper =
+      ask(field + "/histogram?step=1&minusStep=0&bins=1&range=1e-30," + std::to_string(2 * high));
+  EXPECT_EQ(upper["counts"][0], rising);
+  EXPECT_EQ(ask(field + "/range?step=1&minusStep=0")["range"], histogram["range"]);
+  EXPECT_EQ(ask(field + "/range?step=1&minus=small&minusStep=0")["range"], histogram["range"]);
+}
+
+// The ranges of a field and of its differences are kept apart.
+TEST_F(ComparedValues, RangeOfAllStepsOfADifferenceIsNotThatOfTheField) {
+  const std::string all = "fields/" + name_ + "/range?of=all";
+  const Json changes = ask(all + "&minusStep=0");
+  const Json values = ask(all);
+  EXPECT_LT(changes["range"][0].get<float>(), 0);
+  EXPECT_NE(values["range"], changes["range"]);
+  EXPECT_EQ(ask(all + "&minusStep=0"), changes);
+}
+
+TEST_F(ComparedValues, ProbeAndSeriesOfADifferenceAreTheChangesOfASample) {
+  constexpr std::size_t sample = (2 * 16 + 3) * 32 + 5;
+  const Json probe = ask("probe?index=5,3,2&step=1&minusStep=0");
+  EXPECT_EQ(probe["values"][name_]["value"].get<float>(), change(sample));
+  const Json series = ask("fields/" + name_ + "/series?index=5,3,2&minusStep=0");
+  EXPECT_EQ(series["values"][0], 0);
+  EXPECT_EQ(series["values"][1].get<float>(), change(sample));
+}
+
+TEST_F(ComparedValues, AProbeComputesTheDerivedFieldsThatItIsAskedFor) {
+  const auto& fields = dataset_->info().fields;
+  const auto derived =
+      std::find_if(fields.begin(), fields.end(), [](const auto& field) { return field.derived; });
+  ASSERT_NE(derived, fields.end());
+  EXPECT_FALSE(ask("probe?index=5,3,2&step=1")["values"].contains(derived->name));
+  const Json probe = ask("probe?index=5,3,2&step=1&fields=" + name_ + "," + derived->name);
+  const auto there = dataset_->volume(derived->name, 1).value();
+  const Json& value = probe["values"][derived->name]["value"];
+  EXPECT_EQ((derived->components.size() == 1 ? value : value[0]).get<float>(),
+            there->component(0)[(2 * 16 + 3) * 32 + 5]);
+  for (const auto& field : fields) {
+    if (field.derived) continue;
+    EXPECT_TRUE(probe["values"].contains(field.name)) << field.name;
+  }
+}
+
+TEST_F(ComparedValues, WhatCannotBeSubtractedIsRefused) {
+  const auto refused = [&](const std::string& what, int status, const std::string& words) {
+    const Answer got = answer(what);
+    EXPECT_EQ(got.status, status) << got.body;
+    EXPECT_THAT(json_of(got).value("detail", ""), testing::HasSubstr(words));
+  };
+  const std::string histogram = "fields/" + name_ + "/histogram?";
+  refused(histogram + "minus=gone", 404, "'minusStep': there is no dataset 'gone'");
+  refused(histogram + "minusStep=99", 422, "steps 0 to");
+  refused(histogram + "minusStep=-1", 422, "minusStep");
+  refused("probe?index=5,3,2&fields=nope", 422, "nope");
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ export function addDifference(gui: GUI, kit: PanelKit, actions: DifferenceAction
   kit.showWhen((states) => states.minusDataset, dataset);
   kit.note(folder, () => failure);
   kit.note(folder, () =>
-    host.view().difference ? "Histograms and probes show the field itself." : "",
+    host.view().difference ? "Histograms, probes and ranges are of the difference, too." : "",
   );
   kit.action(folder, "Side by side", "A second picture with the same camera (c)", () =>
     actions.compare(),

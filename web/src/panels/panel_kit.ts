@@ -347,13 +347,22 @@ export class PanelKit {
       step,
       dataKey: () => {
         const field = options.field();
-        return field === null || host.playing() ? null : `${host.view().step ?? 0} ${field}`;
+        const { step: at = 0, difference = null } = host.view();
+        return field === null || host.playing() ? null : JSON.stringify([at, field, difference]);
       },
-      load: () =>
-        host.api.histogram(dataset.id, options.field()!, host.view().step ?? 0, histogramBins),
-      of: () => (host.view().dataset === dataset.id ? options.field() : null),
+      load: () => {
+        const { step: at = 0, difference } = host.view();
+        return host.api.histogram(dataset.id, options.field()!, at, histogramBins, difference);
+      },
+      of: () => {
+        const { dataset: id, difference = null } = host.view();
+        const field = options.field();
+        return id !== dataset.id || field === null ? null : JSON.stringify([field, difference]);
+      },
+      title: () => (host.view().difference ? `difference of ${options.title()}` : options.title()),
       read: async (at) => {
-        const { range } = await host.api.range(dataset.id, options.field()!, at);
+        const { difference } = host.view();
+        const { range } = await host.api.range(dataset.id, options.field()!, at, difference);
         return view.element.isConnected ? range : null; // null if the panel has been rebuilt
       },
       ...(options.map === undefined

@@ -21,6 +21,7 @@ import {
 } from "../view/sample_position";
 import { timeEnds, drawSeries } from "./series_plot";
 import { formatNumber } from "../base/ticks";
+import { derivedIn } from "../view/view_fields";
 import type { View } from "../wire/protocol";
 
 const restMs = 150;
@@ -44,6 +45,7 @@ export class ProbePanel {
   private readonly maximum = make("p", "probe-words"); // the one that was gone to
   private maximumOf = ""; // scope of that maximum
   private series: Series | null = null;
+  private seriesOf = ""; // what was subtracted
   private position: Position | null = null; // that was read last
   private from: Position | null = null;
   private wanted = ""; // key of the last request
@@ -119,7 +121,14 @@ export class ProbePanel {
   }
 
   private key(): string {
-    return JSON.stringify([this.sample, this.kit.host.view().step ?? 0, this.heights()]);
+    const view = this.kit.host.view();
+    const { step = 0, difference = null } = view;
+    const derived = derivedIn(this.kit.host.dataset(), view);
+    return JSON.stringify([this.sample, step, this.heights(), difference, derived]);
+  }
+
+  private subject(field: string): string {
+    return this.kit.host.view().difference ? `difference of ${field}` : field;
   }
 
   // The field that gives the heights of samples in the view.
@@ -204,7 +213,7 @@ export class ProbePanel {
       const step = host.view().step ?? 0;
       const { range, places } =
         within === ""
-          ? await host.api.range(dataset.id, field, step)
+          ? await host.api.range(dataset.id, field, step, whole.difference)
           : await host.api.rangeIn({ ...whole, step }, dataset.id, field);
       if (scope !== this.scope()) return;
       const sample = places === undefined ? null : sampleOf(places.max);
@@ -215,7 +224,7 @@ export class ProbePanel {
       this.moveTo(sample);
       const units = dataset.fields.find(({ name }) => name === field)?.units ?? "";
       this.maximum.textContent =
-        `greatest ${field}${within}: ${valueText(range![1], units)} ` +
+        `greatest ${this.subject(field)}${within}: ${valueText(range![1], units)} ` +
         `at ${positionText(dataset, places!.max)}`;
       this.maximumOf = scope;
       this.maximum.hidden = false;
@@ -292,13 +301,15 @@ export class ProbePanel {
     this.wanted = key;
     const dataset = host.dataset();
     try {
-      const step = host.view().step ?? 0;
-      const answer = await host.api.probe(dataset.id, this.sample, this.heights(), step);
+      const view = host.view();
+      const { step = 0, difference } = view;
+      const of = { step, difference, derived: derivedIn(dataset, view) };
+      const answer = await host.api.probe(dataset.id, this.sample, this.heights(), of);
       const { values } = answer;
       if (key !== this.wanted) return;
       this.values.replaceChildren(
         ...Object.entries(values).flatMap(([name, { value, units }]) => [
-          make("dt", "", name),
+          make("dt", "", difference ? `${name} (difference)` : name),
           make("dd", "", valueText(value, units)),
         ]),
       );
@@ -318,8 +329,10 @@ export class ProbePanel {
     const [sample, field] = [this.sample, this.picker.value];
     this.showMessage("reading every step…");
     try {
-      const series = await host.api.series(dataset.id, field, sample, this.heights());
+      const { difference } = host.view();
+      const series = await host.api.series(dataset.id, field, sample, this.heights(), difference);
       if (sample === this.sample && field === this.picker.value) this.series = series;
+      this.seriesOf = JSON.stringify(difference ?? null);
       this.showMessage("");
     } catch (failure) {
       this.showMessage(failureText(failure), true);
@@ -328,7 +341,11 @@ export class ProbePanel {
   }
 
   private showSeries(): void {
-    const { series, plot } = this;
+    const { plot } = this;
+    if (this.seriesOf !== JSON.stringify(this.kit.host.view().difference ?? null)) {
+      this.series = null;
+    }
+    const { series } = this;
     plot.toggleAttribute("hidden", series === null);
     if (series === null) return;
     drawSeries(

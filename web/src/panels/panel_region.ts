@@ -99,7 +99,8 @@ function addFilter(folder: GUI, kit: PanelKit): void {
     const step = kit.host.view().step ?? 0;
     const isCurrent = () => choice === choices && kit.host.explicitView().dataset === dataset.id;
     try {
-      const { range } = await kit.host.api.range(dataset.id, field, step);
+      const { difference } = kit.host.view();
+      const { range } = await kit.host.api.range(dataset.id, field, step, difference);
       if (!isCurrent()) return;
       const [low, high] = range ?? [0, 1];
       kit.host.change({ region: { where: [{ field, range: [(low + high) / 2, high] }] } });

@@ -119,8 +119,8 @@ class SurfacesPanel {
 
   private async histogram(field: string): Promise<Histogram> {
     const { host } = this.kit;
-    const step = host.view().step ?? 0;
-    return host.api.histogram(host.dataset().id, field, step, histogramBins);
+    const { step = 0, difference } = host.view();
+    return host.api.histogram(host.dataset().id, field, step, histogramBins, difference);
   }
 
   // Reads values and then changes the surfaces, unless these have changed meanwhile.
@@ -193,13 +193,13 @@ class SurfacesPanel {
   private rangeOf(field: string): FieldRange | null {
     const { host } = this.kit;
     const { id } = host.dataset();
-    const step = host.view().step ?? 0;
-    const key = `${id} ${step} ${field}`;
+    const { step = 0, difference } = host.view();
+    const key = JSON.stringify([id, step, field, difference ?? null]);
     const known = this.ranges.get(key);
     if (known !== undefined) return known;
     if (this.ranges.size > rangesMax) this.ranges.clear();
     this.ranges.set(key, null);
-    host.api.range(id, field, step).then(
+    host.api.range(id, field, step, difference).then(
       (range) => {
         this.ranges.set(key, range);
         this.controls.refresh();

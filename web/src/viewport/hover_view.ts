@@ -6,6 +6,7 @@ import type { Api } from "../wire/api";
 import { make } from "../base/dom";
 import { Hover } from "./hover";
 import { featureLines, pixelAt, ringAt } from "../view/feature";
+import { derivedIn, fieldsIn } from "../view/view_fields";
 import { hoverLines } from "../view/sample_position";
 import type { Found } from "./probe";
 import type { Dataset, View } from "../wire/protocol";
@@ -86,11 +87,12 @@ export class HoverView {
     if (hoverOf.value === "feature") return this.pixel(at);
     const found = this.host.find(at);
     if (found === null) return null;
-    const { dataset, step = 0, vector, scalars, geometry } = this.host.view();
-    const fields = [vector?.field, scalars?.map(({ field }) => field)];
+    const view = this.host.view();
+    const { dataset, step = 0, geometry, difference } = view;
+    const fields = fieldsIn(view);
     return {
       sample: found,
-      key: JSON.stringify([dataset, step, found, fields, geometry?.heightField]),
+      key: JSON.stringify([dataset, step, found, fields, geometry?.heightField, difference]),
     };
   }
 
@@ -115,7 +117,9 @@ export class HoverView {
     }
     const { sample, axis } = target;
     const heights = view.geometry?.heightField ?? null;
-    const probe = await api.probe(dataset.id, sample, heights, view.step ?? 0, signal);
+    const { step = 0, difference } = view;
+    const of = { step, difference, derived: derivedIn(dataset, view) };
+    const probe = await api.probe(dataset.id, sample, heights, of, signal);
     return hoverLines(dataset, view, probe, axis);
   }
 

@@ -89,6 +89,15 @@ export interface OpeningJob {
   problem: { detail: string; status: number } | null;
 }
 
+// What is subtracted from the fields; null or undefined: nothing.
+export type Difference = View["difference"];
+
+export interface ProbeOf {
+  step: number;
+  difference?: Difference;
+  derived?: string[];
+}
+
 export interface Answer {
   ok: boolean;
   status: number;
@@ -121,14 +130,28 @@ export class Api {
     private readonly fetch: Fetch,
   ) {}
 
-  async histogram(id: string, field: string, step: number, bins: number): Promise<Histogram> {
-    const path = `${this.field(id, field)}/histogram?step=${step}&bins=${bins}`;
+  // Of the differences if there are any, like all that follow.
+  async histogram(
+    id: string,
+    field: string,
+    step: number,
+    bins: number,
+    difference?: Difference,
+  ): Promise<Histogram> {
+    const query = `step=${step}&bins=${bins}${minus(difference)}`;
+    const path = `${this.field(id, field)}/histogram?${query}`;
     return this.get<Histogram>(path, (a) => isRange(a.range) && Array.isArray(a.counts));
   }
 
   // The range of one step, or with null of all steps, which may take a long time.
-  async range(id: string, field: string, step: number | null): Promise<FieldRange> {
-    const path = `${this.field(id, field)}/range?${step === null ? "of=all" : `step=${step}`}`;
+  async range(
+    id: string,
+    field: string,
+    step: number | null,
+    difference?: Difference,
+  ): Promise<FieldRange> {
+    const query = `${step === null ? "of=all" : `step=${step}`}${minus(difference)}`;
+    const path = `${this.field(id, field)}/range?${query}`;
     return this.get<FieldRange>(path, (a) => a.range === null || isRange(a.range));
   }
 
@@ -139,14 +162,18 @@ export class Api {
   }
 
   // of: indices of the sample. With heights its position has the height of the sample there.
+  // derived: fields that the server computes for the answer.
   async probe(
     id: string,
     of: Vec3,
     heights: string | null,
-    step: number,
+    { step, difference, derived = [] }: ProbeOf,
     signal?: AbortSignal,
   ): Promise<Probe> {
-    const path = `${this.dataset(id)}/probe?${place(of, heights)}&step=${step}`;
+    const names = derived.filter((name) => !name.includes(",")).map(encodeURIComponent);
+    const fields = names.length === 0 ? "" : `&fields=${names.join(",")}`;
+    const query = `${place(of, heights)}&step=${step}${minus(difference)}${fields}`;
+    const path = `${this.dataset(id)}/probe?${query}`;
     return this.get<Probe>(path, (a) => isObject(a.position) && isObject(a.values), { signal });
   }
 
@@ -159,8 +186,14 @@ export class Api {
   }
 
   // Reads every step, so it may take a long time.
-  async series(id: string, field: string, of: Vec3, heights: string | null): Promise<Series> {
-    const path = `${this.field(id, field)}/series?${place(of, heights)}`;
+  async series(
+    id: string,
+    field: string,
+    of: Vec3,
+    heights: string | null,
+    difference?: Difference,
+  ): Promise<Series> {
+    const path = `${this.field(id, field)}/series?${place(of, heights)}${minus(difference)}`;
     return this.get<Series>(path, (a) => areTimes(a.times) && Array.isArray(a.values));
   }
 
@@ -253,6 +286,14 @@ async function understood<T>(
 
 const isJob = (a: Record<string, unknown>): boolean =>
   typeof a.id === "string" && typeof a.state === "string";
+
+const minus = (difference: Difference): string => {
+  const { dataset = null, step = null } = difference ?? {};
+  return (
+    (dataset === null ? "" : `&minus=${encodeURIComponent(dataset)}`) +
+    (step === null ? "" : `&minusStep=${step}`)
+  );
+};
 
 // Of the sample at these indices; heights: the field that places samples in the view.
 const place = (of: Vec3, heights: string | null): string =>
