@@ -95,7 +95,8 @@ export class SeedPoints {
     }
     const { host } = this.kit;
     try {
-      const answer = await host.api.probe(host.dataset().id, sample, null, host.view().step ?? 0);
+      const of = { step: host.view().step ?? 0 };
+      const answer = await host.api.probe(host.dataset().id, sample, null, of);
       const { x, y, z } = answer.position;
       if (this.row.isConnected) this.add([x, y, z]);
     } catch (failure) {
