@@ -180,7 +180,7 @@ bool shows_lines(const View& view) {
 // A stride counts samples of the data, the reference uses all of them, a section has its own, and
 // streamlets follow the field itself.
 bool is_drawn_in_full(const View& view) {
-  const bool strided = (shows_lines(view) && *view.vector.stride > 1) ||
+  const bool strided = (shows_lines(view) && view.vector.stride > 1) ||
                        std::any_of(view.scalars->begin(), view.scalars->end(),
                                    [](const auto& scalar) { return scalar.stride > 1; });
   const bool traced = shows_lines(view) && has_streamlets(view);
@@ -291,7 +291,7 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
   if (!factors) return factors.error();
   layer.length = from.length.value();
   layer.span = from.span;
-  layer.stride = from.stride.value();
+  layer.stride = from.stride;
   set_radii(from, view.image.height, layer);
   layer.mark = mark_of(from, view.image.height);
   set_colors(from, layer);
