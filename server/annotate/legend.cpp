@@ -101,9 +101,7 @@ void add_card(const LegendEntry& entry, const Point& corner, double em, const St
     if (tick.at < -beyond || tick.at > 1 + beyond) continue;
     const double x = left + tick.at * inner;
     figure.above.emplace_back(Line{{{x, line}, {x, line + 0.35 * em}}, 0.08 * em, style.color});
-    // Long numbers at the ends of the strip remain within the card.
-    const double half = 0.5 * std::min(inner, width_of(tick.text, tick_size * em)) + 0.3 * em;
-    const double middle = std::clamp(x, corner.x + half, corner.x + width - half);
+    const double middle = left + tick_middle(tick) * em;
     write(tick.text, {middle, line + 1.3 * em}, tick_size * em, 0.5, inner, style.color, figure);
   }
   line += (entry.ticks.empty() ? 0.3 : ticks_height) * em;

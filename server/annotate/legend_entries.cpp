@@ -16,6 +16,13 @@
 #include "server/scene/surfaces/make_surfaces.hpp"
 
 namespace windsplat::annotate {
+
+double tick_middle(const Tick& tick) {
+  const double half = 0.5 * std::min(width_of(tick.text, tick_size), strip_width);
+  return std::clamp(tick.at * strip_width, half - tick_overhang,
+                    strip_width + tick_overhang - half);
+}
+
 namespace {
 
 using Range = std::array<double, 2>;
@@ -82,7 +89,7 @@ std::vector<Tick> strip_ticks(const Range& range) {
     std::vector<Tick> ticks = even_ticks(range[0], range[1], parts);
     bool fits = true;
     for (std::size_t n = 1; n < ticks.size(); ++n) {
-      const double room = std::abs(ticks[n].at - ticks[n - 1].at) * strip_width;
+      const double room = std::abs(tick_middle(ticks[n]) - tick_middle(ticks[n - 1]));
       const double texts =
           width_of(ticks[n - 1].text, tick_size) + width_of(ticks[n].text, tick_size);
       if (0.5 * texts + apart > room) fits = false;

@@ -413,7 +413,7 @@ TEST(PathScene, VectorsOfTheStepsAndSegmentsMustFitTogether) {
   view.vector.trace->seeds->points.clear();
   view.vector.trace->seeds->pieces = 4096;
   view.vector.trace->seeds->evenly =
-      static_cast<int>(series / (4224 * trace::Segments::vertex_bytes));
+      static_cast<int>(series / (2 * 4224 * trace::Segments::vertex_bytes));
   const auto refused = refusal_of(view, dataset);
   EXPECT_EQ(refused.first, "/vector/trace/seeds");
   EXPECT_THAT(refused.second, HasSubstr("/vector/trace/seeds/pathSteps"));
