@@ -109,11 +109,10 @@ double room_of_tick(const std::array<Point, 2>& ends, double em) {
   return em * (width * across + height * down) / length_of(ends);
 }
 
-// The edge of the outline on which an axis is labelled: one with room for two ticks in the picture,
-// a vertical one for those of its ends.
+// The edge of the outline on which an axis is labelled: one with room for the ticks of its ends in
+// the picture.
 std::optional<Edge> labelled(const Box& box, std::size_t axis, double em, const Figure& figure) {
-  constexpr double room_of_ends = 0.7;  // of a tick
-  const double least = axis == 2 ? room_of_ends : 2;
+  const double least = axis == 2 ? 0.7 : 1;  // ticks
   std::optional<Edge> chosen;
   double best = 0;
   for (const Edge& edge : edges_along(axis)) {
@@ -154,18 +153,23 @@ std::vector<Tick> ticks_of(const data::Axis& axis, const AxisMap& map,
                            const std::array<double, 2>& range, int most) {
   const double first = map.value(range[0]);
   const double last = map.value(range[1]);
+  const bool degrees =
+      axis.kind == data::AxisKind::longitude || axis.kind == data::AxisKind::latitude;
   std::vector<Tick> ticks;
   if (map.single()) {
     const double value = axis.coordinates.front();
     ticks.push_back({value, map.position(value), coordinate_text(axis, value, 0)});
   } else if (map.even()) {
-    const bool degrees =
-        axis.kind == data::AxisKind::longitude || axis.kind == data::AxisKind::latitude;
-    const double step = degrees ? round_degrees(std::abs(last - first), most)
-                                : round_step(std::abs(last - first), most);
-    if (!(step > 0)) return ticks;
-    ticks = ticks_of_step(first, last, step);
-    for (Tick& tick : ticks) tick.text = coordinate_text(axis, tick.value, step);
+    // Steps of degrees are far apart: a short axis has closer ones than it has room for, so that
+    // two ticks tell the scale.
+    const int more = degrees ? 2 : 0;
+    for (int parts = most; ticks.size() < 2 && parts <= most + more; ++parts) {
+      const double step = degrees ? round_degrees(std::abs(last - first), parts)
+                                  : round_step(std::abs(last - first), parts);
+      if (!(step > 0)) return ticks;
+      ticks = ticks_of_step(first, last, step);
+      for (Tick& tick : ticks) tick.text = coordinate_text(axis, tick.value, step);
+    }
   } else {
     const double gap = (range[1] - range[0]) / (most + 1);
     ticks = uneven_ticks(first, last, gap, [&map](double value) { return map.position(value); });
@@ -178,7 +182,10 @@ std::vector<Tick> ticks_of(const data::Axis& axis, const AxisMap& map,
     ticks.clear();
     for (const double end : {first, last}) {
       const double value = std::clamp(end, *least, *greatest);
-      ticks.push_back({value, 0, number_text_of(value, digits)});
+      const double rounded = 0.1 * round_step(std::abs(last - first), 1);
+      ticks.push_back(
+          {value, 0,
+           degrees ? coordinate_text(axis, value, rounded) : number_text_of(value, digits)});
     }
   }
   for (Tick& tick : ticks) tick.at = map.position(tick.value);
@@ -261,7 +268,8 @@ void add_box(const Subject& subject, const Style& style, Figure& figure) {
 void add_axes(const Subject& subject, const Style& style, Figure& figure) {
   if (subject.completed.view().geometry.mapping == protocol::GeometryMapping::sphere) return;
   const Box box(subject);
-  for (std::size_t axis = 0; axis < 3; ++axis) add_axis(subject, axis, box, style, figure);
+  // Where two share a corner, the ends of the vertical one are written first.
+  for (const std::size_t axis : {0, 2, 1}) add_axis(subject, axis, box, style, figure);
 }
 
 }  // namespace windsplat::annotate

@@ -188,18 +188,67 @@ Framing with_room(const Framing& framing, const protocol::View& view) {
   return {room * framing.distance, room * framing.height, framing.shift};
 }
 
+// An em of texts, as a fraction of the height of the picture: 14 pixels in one of 1280 x 720, times
+// the size of all annotations and of one part.
+double em_of(const protocol::View& view, double size) {
+  const double narrow = view.image.width / 960.0 / view.image.height;
+  return 14 * std::min(view.annotations.size * size, protocol::limits::annotation_size_max) *
+         std::min(1 / 720.0, narrow);
+}
+
+bool has_room_for_texts(const protocol::View& view) {
+  return view.annotations.axes && view.geometry.mapping != protocol::GeometryMapping::sphere;
+}
+
 // The lower part of the picture that a row of a legend's cards takes below ticks, as a fraction of
-// the height. Texts have 14 pixels in a picture of 1280 x 720 (annotations.size).
+// the height.
 double share_of_legend(const protocol::View& view) {
   const protocol::AnnotationsView& shown = view.annotations;
-  const bool sphere = view.geometry.mapping == protocol::GeometryMapping::sphere;
-  if (!shown.axes || !shown.legend || sphere) return 0;
+  if (!has_room_for_texts(view) || !shown.legend) return 0;
   constexpr double card = 10;  // em, with its distance from the edge
   constexpr double share_most = 0.4;
-  const double narrow = view.image.width / 960.0 / view.image.height;
-  const double size =
-      std::min(shown.size * shown.legend_style.size, protocol::limits::annotation_size_max);
-  return std::min(card * 14 * size * std::min(1 / 720.0, narrow), share_most);
+  return std::min(card * em_of(view, shown.legend_style.size), share_most);
+}
+
+// The upper part that title and time take.
+double share_of_title(const protocol::View& view) {
+  const protocol::AnnotationsView& shown = view.annotations;
+  if (!has_room_for_texts(view)) return 0;
+  constexpr double line = 1.8;  // em
+  constexpr double share_most = 0.2;
+  const double lines = (shown.title ? line * em_of(view, shown.title_style.size) : 0) +
+                       (shown.step_time ? line * em_of(view, shown.step_time_style.size) : 0);
+  return std::min(lines, share_most);
+}
+
+// The part of the picture between title and legend, to which the data are fitted.
+struct FreePart {
+  double below = 0;  // of the height of the picture
+  double above = 0;
+  double fov_y = 0;
+  protocol::ImageView image;
+  [[nodiscard]] double share() const { return 1 - below - above; }
+};
+FreePart free_part(const protocol::View& view, double above) {
+  FreePart part;
+  part.below = share_of_legend(view);
+  part.above = above;
+  const double slope = std::tan(0.5 * view.camera.fov_y * radians_per_degree);
+  part.fov_y = 2 * std::atan(part.share() * slope) / radians_per_degree;
+  part.image = view.image;
+  part.image.height = std::max(1, static_cast<int>(std::lround(part.share() * view.image.height)));
+  return part;
+}
+
+// The target of the whole picture that shows in its free part what `framing`, which becomes that of
+// the whole picture, shows about `target`.
+glm::dvec3 moved(const glm::dvec3& target, const FreePart& part, const glm::dvec3& up,
+                 const protocol::View& view, Framing& framing) {
+  framing.height /= part.share();
+  const bool perspective = view.camera.projection == protocol::Projection::perspective;
+  const double slope = std::tan(0.5 * view.camera.fov_y * radians_per_degree);
+  const double height = perspective ? 2 * slope * framing.distance : framing.height;
+  return target - 0.5 * (part.below - part.above) * height * up;
 }
 
 // The whole box with the room that annotations need: above a legend, if it has ticks. `centred`:
@@ -210,20 +259,15 @@ struct Whole {
 };
 Whole place_box(const Lattice& lattice, const OrbitFrame& frame, const protocol::View& view,
                 double zoom, bool centred) {
-  const double share = share_of_legend(view);
-  const double slope = std::tan(0.5 * view.camera.fov_y * radians_per_degree);
-  const double upper_fov_y = 2 * std::atan((1 - share) * slope) / radians_per_degree;
-  protocol::ImageView upper = view.image;
-  upper.height = std::max(1, static_cast<int>(std::lround((1 - share) * upper.height)));
+  const FreePart part = free_part(view, 0);
   glm::dvec3 target = 0.5 * (lattice.box_min + lattice.box_max);
   const bool perspective = view.camera.projection == protocol::Projection::perspective;
-  const Frame framed = framed_box(lattice, frame, target, upper_fov_y, upper);
+  const Frame framed = framed_box(lattice, frame, target, part.fov_y, part.image);
   Framing framing = with_room(centred ? framed.centred(perspective) : framed.framing(), view);
   framing.distance = std::min(framing.distance / zoom, distance_max);
-  framing.height /= (1 - share) * zoom;
+  framing.height /= zoom;
   target += framing.shift.x * frame.right + framing.shift.y * frame.up;
-  const double height = perspective ? 2 * slope * framing.distance : framing.height;
-  target -= 0.5 * share * height * frame.up;
+  target = moved(target, part, frame.up, view, framing);
   return {framing, target};
 }
 
@@ -355,10 +399,12 @@ void face(const Face& plane, const Lattice& lattice, protocol::View& view) {
     high = glm::max(high, p);
   }
   const glm::dvec3 middle = 0.5 * (low + high);
-  const glm::dvec3 target = middle.x * frame.right + middle.y * frame.up + middle.z * frame.forward;
-  Frame framed(frame, target, camera.fov_y, view.image, nearest_to(lattice));
+  glm::dvec3 target = middle.x * frame.right + middle.y * frame.up + middle.z * frame.forward;
+  const FreePart part = free_part(view, share_of_title(view));
+  Frame framed(frame, target, part.fov_y, part.image, nearest_to(lattice));
   for (const glm::dvec3& point : points) framed.add(point, outline_reach(lattice));
-  const Framing framing = with_room(framed.framing(), view);
+  Framing framing = with_room(framed.framing(), view);
+  target = moved(target, part, frame.up, view, framing);
   camera.target = from_glm(target);
   camera.eye = from_glm(target - frame.forward * framing.distance);
   if (!camera.height) camera.height = std::max(framing.height, 1e-6);

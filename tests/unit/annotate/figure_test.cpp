@@ -180,6 +180,36 @@ TEST(Axes, AreFramedAboveTheLegend) {
   }
 }
 
+// A map of one layer, which is faced.
+TEST(Axes, OfOneLayerAreFramedAboveTheLegend) {
+  for (const auto projection :
+       {protocol::Projection::perspective, protocol::Projection::orthographic}) {
+    data::Grid grid = scene::atmosphere_grid();
+    grid.axes[0].coordinates = {0, 3, 6, 9};
+    grid.axes[2].coordinates = {500};
+    const Shown shown(grid, one_scalar(), [&](protocol::View& view) {
+      view.camera.projection = projection;
+      view.annotations.axes = true;
+      view.annotations.legend = true;
+    });
+    Figure legend = empty_figure(shown);
+    add_legend(shown.subject(), style_of(shown.subject()), legend);
+    ASSERT_THAT(legend.taken, SizeIs(1));
+    const scene::Lattice& lattice = shown.scene().lattice;
+    double lowest = 0;
+    for (int n = 0; n < 4; ++n) {
+      const auto at = shown.projector().pixel({(n & 1) != 0 ? lattice.box_max.x : lattice.box_min.x,
+                                               (n & 2) != 0 ? lattice.box_max.y : lattice.box_min.y,
+                                               lattice.positions[2][0]});
+      ASSERT_TRUE(at);
+      EXPECT_LT(at->y, legend.taken.front().low.y);
+      EXPECT_GT(at->y, 0);
+      lowest = std::max(lowest, at->y);
+    }
+    EXPECT_GT(lowest, 0.6 * legend.taken.front().low.y) << "it fills the part above";
+  }
+}
+
 TEST(Axes, HaveNoTicksWhereSomethingElseIsWritten) {
   const Shown shown(scene::atmosphere_grid(), one_scalar(),
                     [](protocol::View& view) { view.annotations.axes = true; });
@@ -216,6 +246,25 @@ TEST(Axes, LinesLeadFromTheirTicksToTheGround) {
   }
   const Shown bare(scene::atmosphere_grid(), one_scalar(), from_south(false));
   EXPECT_THAT(figure_of(bare.subject()).below, IsEmpty()) << "without a box";
+}
+
+// A steep box of a small region: the latitudes are foreshortened to a few lines of text.
+TEST(Axes, AShortOneOfLatitudesNamesDegrees) {
+  data::Grid grid = scene::atmosphere_grid();
+  for (const std::vector<double>& rows :
+       {std::vector<double>{30.9, 44.4, 57.9, 71.4}, {41, 44, 47, 50}}) {
+    grid.axes[1].coordinates = rows;
+    const Shown shown(grid, one_scalar(), [](protocol::View& view) {
+      view.annotations.axes = true;
+      view.camera.eye = protocol::Vec3{0, -3, 1};
+      view.geometry.scale = {1, 0.6, 2};
+    });
+    const auto written = texts(figure_of(shown.subject()).above);
+    const auto north = std::count_if(written.begin(), written.end(), [](const std::string& text) {
+      return text.find("\u00b0N") != std::string::npos;
+    });
+    EXPECT_GE(north, 2) << rows.front();
+  }
 }
 
 // An edge of 30 pixels has no room for round values: it has those of its outermost samples.
