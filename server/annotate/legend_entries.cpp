@@ -181,6 +181,7 @@ LegendEntry lines_entry(const Subject& subject) {
   const data::FieldInfo* const field = subject.info.find(vector.field.name);
   const std::string units = field == nullptr ? std::string() : unit_text(field->units);
   const Range& range = layer.color.range;
+  const bool seeded = vector.trace && vector.trace->seeds;
   LegendEntry entry;
   entry.colors = colors_of(layer.color);
   entry.ticks = strip_ticks(range);
@@ -212,7 +213,8 @@ LegendEntry lines_entry(const Subject& subject) {
       entry.title += "magnitude";
       entry.units = units;
       entry.beyond = beyond_ends(range, drawn_magnitudes(layer));
-      if (range[0] <= range[1] && entry.beyond[1]) {
+      // Lines through seeds are too few to count by the values of all samples.
+      if (range[0] <= range[1] && entry.beyond[1] && !seeded) {
         entry.notes.push_back(beyond_text(layer, range[1]));
       }
       break;
@@ -237,9 +239,12 @@ LegendEntry lines_entry(const Subject& subject) {
   const auto with_units = [&units](double value) {
     return number_text_of(value, 3) + (units.empty() ? "" : " " + units);
   };
-  std::string note = "longest line " + with_units(layer.magnitude_range[1]);
+  // Lines through seeds are as long as they are followed.
+  std::string note =
+      seeded ? std::string() : "longest line " + with_units(layer.magnitude_range[1]);
   note += end_ahead(layer);
-  entry.notes.push_back(note);
+  if (seeded && !note.empty()) note.erase(0, std::string_view(", ").size());
+  if (!note.empty()) entry.notes.push_back(note);
   if (!vector.color.true_colors && layer.color_by != LineColor::constant) {
     const std::string why = fading_text(subject.scene);
     if (!why.empty()) entry.notes.push_back(why);

@@ -436,6 +436,21 @@ TEST(Legend, TellsHowManyLinesLieBeyondItsColors) {
   EXPECT_THAT(written(1e3), Not(Contains(HasSubstr("lie beyond"))));
 }
 
+TEST(Legend, OfLinesThroughSeedsTellsNothingOfAllSamples) {
+  std::vector<data::FieldInfo> fields{scene::wind_info()};
+  const Shown shown(scene::atmosphere_grid(), fields, [&](protocol::View& view) {
+    view.vector.min_magnitude = 0;
+    view.vector.color.by = protocol::ColorBy::magnitude;
+    view.vector.color.range = protocol::Range{0, 255};
+    view.vector.trace.emplace().seeds.emplace();
+  });
+  Figure figure = empty_figure(shown);
+  add_legend(shown.subject(), style_of(shown.subject()), figure);
+  EXPECT_THAT(texts(figure.above), Contains("wind: magnitude"));
+  EXPECT_THAT(texts(figure.above), Not(Contains(HasSubstr("lie beyond"))));
+  EXPECT_THAT(texts(figure.above), Not(Contains(HasSubstr("longest line"))));
+}
+
 // Values of t are n: a layer of it shows a part of them.
 TEST(Legend, MarksTheEndsBeyondWhichASurfaceHasValues) {
   const auto marked = [](double low, double high, bool section) {
