@@ -300,15 +300,16 @@ bool StreamClient::fill(std::size_t bytes, int timeout_ms) {
 }
 
 std::optional<Message> StreamClient::next(int timeout_ms) {
+  const auto end = in_ms(timeout_ms);  // pings of the server do not move it
   while (true) {
-    if (!fill(2, timeout_ms)) return std::nullopt;
+    if (!fill(2, left_ms(end))) return std::nullopt;
     const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(buffer_[at]); };
     const std::size_t short_length = byte(1) & 0x7fU;
     const std::size_t length_bytes = short_length < 126 ? 0 : short_length == 126 ? 2 : 8;
-    if (!fill(2 + length_bytes, timeout_ms)) return std::nullopt;
+    if (!fill(2 + length_bytes, left_ms(end))) return std::nullopt;
     std::size_t length = length_bytes == 0 ? short_length : 0;
     for (std::size_t i = 0; i < length_bytes; ++i) length = length << 8 | byte(2 + i);
-    if (!fill(2 + length_bytes + length, timeout_ms)) return std::nullopt;
+    if (!fill(2 + length_bytes + length, left_ms(end))) return std::nullopt;
     Message message;
     message.kind = static_cast<Opcode>(byte(0) & 0x0fU);
     message.data = buffer_.substr(2 + length_bytes, length);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -30,7 +31,10 @@ class DifferenceStream : public StreamClient {
 
   bool reaches_final(std::uint32_t rev, const std::string& patch) {
     say(R"({"type":"patch","rev":)" + std::to_string(rev) + R"(,"t":1,"patch":)" + patch + "}");
-    while (const auto bytes = next_frame()) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(patience_ms);
+    while (std::chrono::steady_clock::now() < end) {
+      const auto bytes = next_frame();
+      if (!bytes) return false;
       const auto header = windsplat::protocol::parse_frame_header(
           {reinterpret_cast<const std::uint8_t*>(bytes->data()), bytes->size()});
       if (!header) return false;
