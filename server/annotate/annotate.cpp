@@ -54,6 +54,11 @@ bool any(const protocol::AnnotationsView& annotations) {
          annotations.contour_labels;
 }
 
+std::uint64_t working_bytes(const protocol::AnnotationsView& annotations,
+                            const scene::Scene& scene) {
+  return annotations.contour_labels ? contour_label_bytes(scene) : 0;
+}
+
 Figure figure_of(const Subject& subject) {
   const protocol::AnnotationsView& shown = subject.completed.view().annotations;
   const auto style = [&](const protocol::AnnotationStyleView& part) {

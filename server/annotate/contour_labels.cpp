@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -28,6 +29,10 @@ constexpr double off_chord = 0.2;     // of the middle of the arc, em, at most
 constexpr double facing_least = 0.3;  // cosine: more oblique surfaces squeeze their lines
 constexpr double clear_around = 0.4;  // of a text, em
 constexpr int lines_most = 60;        // of an interval, that are numbered
+// Segments of lines that are looked at for places: of a level, and in a picture. 4 million
+// triangles of a smooth field with 60 lines have 1.4 million.
+constexpr std::size_t level_segments_most = std::size_t{1} << 19U;
+constexpr std::size_t segments_most = std::size_t{1} << 21U;
 
 // A part of a contour in the picture, with the length up to each point.
 struct PictureLine {
@@ -39,6 +44,10 @@ struct PictureLine {
 
   [[nodiscard]] double length() const { return at.back(); }
 };
+
+// Of arrays that grow to twice their size.
+constexpr std::size_t picture_point_bytes =
+    2 * (sizeof(Point) + sizeof(glm::dvec3) + 2 * sizeof(double));
 
 // Where a number may be written.
 struct Spot {
@@ -105,11 +114,18 @@ OnLine along(const PictureLine& line, double at) {
           std::min(line.facing[n - 1], line.facing[n])};
 }
 
-std::optional<Spot> spot_at(const PictureLine& line, double at, double width, double size) {
+bool is_within(const Point& at, const Point& of) {
+  return at.x >= 0 && at.y >= 0 && at.x <= of.x && at.y <= of.y;
+}
+
+// of: the size of the picture.
+std::optional<Spot> spot_at(const PictureLine& line, double at, double width, double size,
+                            const Point& of) {
   const OnLine left = along(line, at - 0.5 * width);
   const OnLine right = along(line, at + 0.5 * width);
   const OnLine middle = along(line, at);
   if (std::min({left.facing, middle.facing, right.facing}) < facing_least) return std::nullopt;
+  if (!is_within(middle.point, of)) return std::nullopt;
   const double chord = distance(left.point, right.point);
   if (!(chord >= straight * width)) return std::nullopt;
   const double across = std::abs((right.point.x - left.point.x) * (middle.point.y - left.point.y) -
@@ -126,7 +142,8 @@ std::optional<Spot> spot_at(const PictureLine& line, double at, double width, do
 }
 
 // The spots of each part of a line, the best first.
-std::vector<std::vector<Spot>> spots_on(const PictureLine& line, double width, double size) {
+std::vector<std::vector<Spot>> spots_on(const PictureLine& line, double width, double size,
+                                        const Point& of) {
   std::vector<std::vector<Spot>> parts;
   const int count = std::max(1, static_cast<int>(std::min(line.length() / (spacing * size), 1e3)));
   const double each = line.length() / count;
@@ -136,7 +153,7 @@ std::vector<std::vector<Spot>> spots_on(const PictureLine& line, double width, d
       const double off = (k + 0.5) / places_tried - 0.5;  // of the part, from its middle
       const double at = (n + 0.5 + off) * each;
       if (at < 0.5 * width || at > line.length() - 0.5 * width) continue;
-      auto spot = spot_at(line, at, width, size);
+      auto spot = spot_at(line, at, width, size, of);
       if (!spot) continue;
       spot->badness += 0.2 * std::abs(off);
       spots.push_back(*spot);
@@ -190,6 +207,24 @@ Text text_at(const Spot& spot, std::string number, double size, const surface::C
   return text;
 }
 
+// The levels with the fewest segments, as many as `most` suffices for, which becomes less by
+// theirs. counts: of their segments.
+std::vector<double> with_few_segments(const std::vector<double>& levels,
+                                      const std::vector<std::size_t>& counts, std::size_t& most) {
+  std::vector<std::size_t> order(levels.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return counts[a] < counts[b]; });
+  std::vector<double> out;
+  for (const std::size_t n : order) {
+    if (counts[n] > std::min(most, level_segments_most)) break;
+    most -= counts[n];
+    out.push_back(levels[n]);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
 // One line with the places where its numbers may be.
 struct Numbered {
   std::string number;
@@ -198,9 +233,14 @@ struct Numbered {
   const surface::Shown* shown = nullptr;
 };
 
-void add_numbered(const surface::Shown& shown, const scene::Camera& camera, double size,
-                  std::vector<Numbered>& to) {
-  if (shown.mesh->values.empty()) return;
+bool is_contoured(const surface::Shown& shown) {
+  return !shown.mesh->values.empty() && (shown.contours.step > 0 || !shown.contours.levels.empty());
+}
+
+void add_numbered(const surface::Shown& shown, const Subject& subject, double size,
+                  std::size_t& segments, std::vector<Numbered>& to) {
+  if (!is_contoured(shown)) return;
+  const scene::Camera& camera = subject.scene.camera;
   double least = 1e300;
   double most = -1e300;
   for (const float value : shown.mesh->values) {
@@ -208,21 +248,28 @@ void add_numbered(const surface::Shown& shown, const scene::Camera& camera, doub
     least = std::min(least, static_cast<double>(value));
     most = std::max(most, static_cast<double>(value));
   }
-  const std::vector<double> levels = numbered_levels(shown.contours, least, most, lines_most);
-  std::vector<PictureLine> lines;
-  for (const auto& line : surface::contour_lines(*shown.mesh, levels)) {
-    add_lines(line, camera, lines);
-  }
-  for (const PictureLine& line : lines) {
-    Numbered one;
-    one.number = level_text(shown.contours, line.level);
-    one.length = line.length();
-    const double width = width_of(one.number, size);
-    if (one.length < 3 * width) continue;
-    one.parts = spots_on(line, width, size);
-    one.shown = &shown;
-    if (!one.parts.empty()) to.push_back(std::move(one));
-  }
+  std::vector<double> levels = numbered_levels(shown.contours, least, most, lines_most);
+  levels = with_few_segments(levels, surface::contour_segments(*shown.mesh, levels), segments);
+  std::string number;
+  double width = 0;
+  double level = std::nan("");
+  const auto add = [&](const surface::ContourLine& line) {
+    std::vector<PictureLine> parts;
+    add_lines(line, camera, parts);
+    if (line.level != level) {
+      level = line.level;
+      number = level_text(shown.contours, level);
+      width = width_of(number, size);
+    }
+    for (const PictureLine& part : parts) {
+      if (part.length() < 3 * width) continue;
+      Numbered one{number, part.length(), {}, &shown};
+      one.parts = spots_on(part, width, size,
+                           {static_cast<double>(camera.width), static_cast<double>(camera.height)});
+      if (!one.parts.empty()) to.push_back(std::move(one));
+    }
+  };
+  surface::each_contour_line(*shown.mesh, levels, add, subject.cancel);
 }
 
 // Takes away the spots that are hidden.
@@ -292,16 +339,28 @@ std::string level_text(const surface::Contours& contours, double level) {
   return number_text(level, last);
 }
 
+std::uint64_t contour_label_bytes(const scene::Scene& scene) {
+  std::size_t triangles = 0;
+  for (const surface::Shown& shown : scene.surfaces) {
+    if (is_contoured(shown)) triangles = std::max(triangles, shown.mesh->triangles.size());
+  }
+  if (triangles == 0) return 0;
+  const std::size_t segments = std::min(triangles, level_segments_most);
+  return surface::contour_line_bytes(segments) + segments * picture_point_bytes;
+}
+
 void add_contour_labels(const Subject& subject, const Style& style, Figure& figure) {
   const double size = text_size * style.text;
   std::vector<Numbered> lines;
+  std::size_t segments = segments_most;
   for (const surface::Shown& shown : subject.scene.surfaces) {
-    add_numbered(shown, subject.scene.camera, size, lines);
+    add_numbered(shown, subject, size, segments, lines);
   }
   remove_hidden(subject, lines);
   std::stable_sort(lines.begin(), lines.end(),
                    [](const Numbered& a, const Numbered& b) { return a.length > b.length; });
   for (const Numbered& line : lines) {
+    if (subject.cancel.cancelled()) return;
     for (const auto& part : line.parts) {
       for (const Spot& spot : part) {
         const std::vector<Rectangle> squares = covered_by(spot, size);

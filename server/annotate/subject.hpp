@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/annotate/figure.hpp"
+#include "server/base/cancel.hpp"
 #include "server/data/model/dataset_info.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/scene.hpp"
@@ -20,6 +21,7 @@ struct Subject {
   const data::DatasetInfo* subtracted = nullptr;  // of a difference: the dataset subtracted
   // Whether something opaque lies before each of some places in the world; empty: nowhere.
   std::function<std::vector<bool>(const std::vector<glm::dvec3>&)> hidden = {};
+  CancelToken cancel = {};  // ends the search for places of numbers
 };
 
 struct Style {

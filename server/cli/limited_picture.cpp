@@ -89,11 +89,12 @@ Result<Picture> LimitedPictures::draw_at(const scene::CompletedView& completed,
                                          const CancelToken& cancel) {
   frame::Encoding encoding = encoding_;
   encoding.measure = encoding.measure || completed.view().quality.max_error.has_value();
-  auto prepared = frame::prepare(completed, setting, dataset_, encoding);
+  data::Dataset dataset = dataset_.cancelled_by(cancel);
+  auto prepared = frame::prepare(completed, setting, dataset, encoding);
   if (!prepared) return prepared.error();
   // Prepared again from resident data, since a limit on the time does not include reading files.
   if (is_limited(completed.view())) {
-    prepared = frame::prepare(completed, setting, dataset_, encoding);
+    prepared = frame::prepare(completed, setting, dataset, encoding);
     if (!prepared) return prepared.error();
   }
   prepared->content = frame::known_viewpoint_of(completed, tables_).content;

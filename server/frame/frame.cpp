@@ -327,6 +327,30 @@ std::uint64_t bytes_beyond_kept(int width, int height, Format format, bool annot
 
 std::uint64_t surface_bytes(const scene::Scene& scene) { return engine::surface_bytes(scene); }
 
+namespace {
+
+// Errors: out_of_memory, cancelled.
+Result<annotate::Figure> make_figure(const scene::CompletedView& drawn, const scene::Scene& scene,
+                                     data::Dataset& dataset) {
+  std::shared_ptr<const void> held;
+  if (const std::uint64_t bytes = annotate::working_bytes(drawn.view().annotations, scene);
+      bytes > 0) {
+    auto reserved = dataset.reserve(bytes);
+    if (!reserved) return reserved.error();
+    held = std::move(*reserved);
+  }
+  const auto minus = dataset.subtrahend();
+  const CancelToken cancel = dataset.cancellation();
+  annotate::Figure figure = annotate::figure_of(
+      {drawn, scene, dataset.info(), minus ? minus->info.get() : nullptr,
+       [&](const std::vector<glm::dvec3>& at) { return hidden_places(scene, at, cancel); },
+       cancel});
+  if (cancel.cancelled()) return make_error(ErrorKind::cancelled, "annotations cancelled");
+  return figure;
+}
+
+}  // namespace
+
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
                          data::Dataset& dataset, const Encoding& encoding) {
   const Clock::time_point start = Clock::now();
@@ -336,10 +360,9 @@ Result<Prepared> prepare(const scene::CompletedView& completed, const quality::S
   if (!scene) return with_need(scene.error(), completed.view(), dataset);
   std::optional<annotate::Figure> figure;
   if (encoding.format != Format::npy && annotate::any(drawn->view().annotations)) {
-    const auto minus = dataset.subtrahend();
-    figure = annotate::figure_of(
-        {*drawn, *scene, dataset.info(), minus ? minus->info.get() : nullptr,
-         [&scene](const std::vector<glm::dvec3>& at) { return hidden_places(*scene, at); }});
+    auto made = make_figure(*drawn, *scene, dataset);
+    if (!made) return made.error();
+    figure = std::move(*made);
   }
   return Prepared{std::move(*drawn),
                   completed.view().image,

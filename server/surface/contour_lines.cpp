@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 
 namespace windsplat::surface {
 
@@ -21,6 +22,14 @@ struct Segment {
   std::array<MeshEdge, 2> ends{};
 };
 
+struct End {
+  MeshEdge edge = 0;
+  std::uint32_t segment = 0;
+};
+
+// Of Chains: two ends, a flag, and a point of a line, whose arrays grow to twice their size.
+constexpr std::size_t chain_bytes = 2 * sizeof(End) + 1 + 2 * 2 * sizeof(Point);
+
 class Chains {
  public:
   Chains(const Mesh& mesh, double level, const std::vector<Segment>& segments)
@@ -34,24 +43,21 @@ class Chains {
     });
   }
 
-  void add_all(std::vector<ContourLine>& to) {
+  using Use = std::function<void(const ContourLine&)>;
+
+  void each(const Use& use, const CancelToken& cancel) {
     // Open lines begin at an edge that only one of their segments has; the others are closed.
     for (std::size_t n = 0; n < ends_.size(); ++n) {
       const bool shared = (n > 0 && ends_[n - 1].edge == ends_[n].edge) ||
                           (n + 1 < ends_.size() && ends_[n + 1].edge == ends_[n].edge);
-      if (!shared) follow(ends_[n], to);
+      if (!shared) follow(ends_[n], use, cancel);
     }
-    for (const End& end : ends_) follow(end, to);
+    for (const End& end : ends_) follow(end, use, cancel);
   }
 
  private:
-  struct End {
-    MeshEdge edge = 0;
-    std::uint32_t segment = 0;
-  };
-
-  void follow(End from, std::vector<ContourLine>& to) {
-    if (used_[from.segment]) return;
+  void follow(End from, const Use& use, const CancelToken& cancel) {
+    if (used_[from.segment] || cancel.cancelled()) return;
     ContourLine line;
     line.level = level_;
     add_end(from.edge, line);
@@ -66,7 +72,7 @@ class Chains {
       if (next == ends_.end() || next->edge != from.edge) break;
       from.segment = next->segment;
     }
-    to.push_back(std::move(line));
+    use(line);
   }
 
   void add_end(MeshEdge edge, ContourLine& to) const {
@@ -104,12 +110,10 @@ Segment segment_of(const std::array<std::uint32_t, 3>& corners, const std::array
       {mesh_edge(from, corners.at((alone + 1) % 3)), mesh_edge(from, corners.at((alone + 2) % 3))}};
 }
 
-}  // namespace
-
-std::vector<ContourLine> contour_lines(const Mesh& mesh, const std::vector<double>& levels) {
-  std::vector<ContourLine> lines;
-  if (mesh.values.empty()) return lines;
-  std::vector<std::vector<Segment>> segments(levels.size());
+// Calls use(corners, values, first, last) for the levels [first, last) that a triangle crosses.
+template <class Use>
+void each_crossing(const Mesh& mesh, const std::vector<double>& levels, const Use& use) {
+  if (mesh.values.empty() || levels.empty()) return;
   for (const auto& corners : mesh.triangles) {
     std::array<double, 3> values{};
     for (std::size_t c = 0; c < 3; ++c)
@@ -118,15 +122,62 @@ std::vector<ContourLine> contour_lines(const Mesh& mesh, const std::vector<doubl
     const auto [least, most] = std::minmax({values[0], values[1], values[2]});
     const auto first = std::upper_bound(levels.begin(), levels.end(), least);
     const auto last = std::upper_bound(first, levels.end(), most);
-    for (auto level = first; level != last; ++level) {
-      segments[static_cast<std::size_t>(level - levels.begin())].push_back(
-          segment_of(corners, values, *level));
-    }
+    if (first == last) continue;
+    use(corners, values, static_cast<std::size_t>(first - levels.begin()),
+        static_cast<std::size_t>(last - levels.begin()));
   }
+}
+
+constexpr std::size_t segments_together = std::size_t{1} << 18U;
+
+}  // namespace
+
+std::vector<std::size_t> contour_segments(const Mesh& mesh, const std::vector<double>& levels) {
+  std::vector<std::size_t> begin(levels.size() + 1, 0);
+  std::vector<std::size_t> end(levels.size() + 1, 0);
+  each_crossing(mesh, levels, [&](const auto&, const auto&, std::size_t first, std::size_t last) {
+    ++begin[first];
+    ++end[last];
+  });
+  std::vector<std::size_t> counts(levels.size());
+  std::size_t crossing = 0;
   for (std::size_t n = 0; n < levels.size(); ++n) {
-    Chains(mesh, levels[n], segments[n]).add_all(lines);
+    crossing += begin[n];
+    crossing -= end[n];
+    counts[n] = crossing;
   }
-  return lines;
+  return counts;
+}
+
+void each_contour_line(const Mesh& mesh, const std::vector<double>& levels,
+                       const std::function<void(const ContourLine&)>& use,
+                       const CancelToken& cancel) {
+  const std::vector<std::size_t> counts = contour_segments(mesh, levels);
+  for (std::size_t from = 0; from < levels.size() && !cancel.cancelled();) {
+    std::size_t sum = counts[from];
+    std::size_t to = from + 1;
+    while (to < levels.size() && sum + counts[to] <= segments_together) sum += counts[to++];
+    std::vector<std::vector<Segment>> segments(to - from);
+    for (std::size_t n = from; n < to; ++n) segments[n - from].reserve(counts[n]);
+    const std::vector<double> some(levels.begin() + static_cast<std::ptrdiff_t>(from),
+                                   levels.begin() + static_cast<std::ptrdiff_t>(to));
+    each_crossing(
+        mesh, some,
+        [&](const auto& corners, const auto& values, std::size_t first, std::size_t last) {
+          for (std::size_t n = first; n < last; ++n) {
+            segments[n].push_back(segment_of(corners, values, some[n]));
+          }
+        });
+    for (std::size_t n = 0; n < some.size(); ++n) {
+      Chains(mesh, some[n], segments[n]).each(use, cancel);
+      segments[n] = {};
+    }
+    from = to;
+  }
+}
+
+std::size_t contour_line_bytes(std::size_t segments) {
+  return std::max(segments, segments_together) * sizeof(Segment) + segments * chain_bytes;
 }
 
 }  // namespace windsplat::surface

@@ -90,7 +90,11 @@ Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
                                     Loading loading) {
   auto prepared = frame::prepare(completed, setting, dataset, encoding);
   if (!prepared) {
-    if (loading == Loading::none) return prepared.error();
+    // The loader waits for memory.
+    if (loading == Loading::none) {
+      if (prepared.error().kind != ErrorKind::out_of_memory) return prepared.error();
+      return make_error(ErrorKind::not_resident, prepared.error().message);
+    }
     return with_dataset_name(prepared.error(), dataset.info().id);
   }
   return with_memory(std::move(*prepared), dataset, loading);
@@ -98,21 +102,22 @@ Result<PreparedPtr> prepare_picture(const scene::CompletedView& completed,
 
 Result<void> submit(Backend& backend, Drawing asked) {
   const auto drawing = std::make_shared<const Drawing>(std::move(asked));
-  return backend.renderer.submit({drawing->kind, drawing->owner, drawing->cancel,
-                                  [&backend, drawing](std::int64_t queue_us) {
-                                    data::Dataset resident = drawing->dataset->resident_only();
-                                    const Clock::time_point start = Clock::now();
-                                    auto picture = drawing->prepare(resident, Loading::none);
-                                    if (picture) {
-                                      if (*picture) (*picture)->frame.prepare_us = us_since(start);
-                                      draw(*drawing, *picture, queue_us, Loading::none);
-                                    } else if (picture.error().kind == ErrorKind::not_resident) {
-                                      load(backend, drawing);
-                                    } else {
-                                      drawing->fail(picture.error());
-                                    }
-                                  },
-                                  false, drawing->cost_ms, drawing->payer});
+  return backend.renderer.submit(
+      {drawing->kind, drawing->owner, drawing->cancel,
+       [&backend, drawing](std::int64_t queue_us) {
+         data::Dataset resident = drawing->dataset->resident_only().cancelled_by(drawing->cancel);
+         const Clock::time_point start = Clock::now();
+         auto picture = drawing->prepare(resident, Loading::none);
+         if (picture) {
+           if (*picture) (*picture)->frame.prepare_us = us_since(start);
+           draw(*drawing, *picture, queue_us, Loading::none);
+         } else if (picture.error().kind == ErrorKind::not_resident) {
+           load(backend, drawing);
+         } else {
+           drawing->fail(picture.error());
+         }
+       },
+       false, drawing->cost_ms, drawing->payer});
 }
 
 }  // namespace windsplat::tasks

@@ -49,8 +49,9 @@ bool meets(const SightLine& ray, const std::array<glm::dvec3, 3>& corners) {
 
 class Hiding {
  public:
-  explicit Hiding(const scene::Scene& scene)
+  Hiding(const scene::Scene& scene, const CancelToken& cancel)
       : scene_(scene),
+        cancel_(cancel),
         camera_(scene.camera),
         pixel_(2 * camera_.half_height / camera_.height),
         columns_((camera_.width + cell_side - 1) / cell_side),
@@ -62,9 +63,14 @@ class Hiding {
     for (std::size_t n = 0; n < places.size(); ++n) {
       rays_.push_back(ray_from(places[n]));
       const SightLine& ray = rays_.back();
-      const int column = static_cast<int>(std::floor(ray.pixel[0] / cell_side));
-      const int row = static_cast<int>(std::floor(ray.pixel[1] / cell_side));
-      if (!(ray.depth > 0) || column < 0 || row < 0 || column >= columns_ || row >= rows_) continue;
+      if (cancel_.cancelled()) continue;
+      const double across = ray.pixel[0] / cell_side;
+      const double down = ray.pixel[1] / cell_side;
+      if (!(ray.depth > 0) || !(across >= 0 && across < columns_) || !(down >= 0 && down < rows_)) {
+        continue;
+      }
+      const int column = static_cast<int>(across);
+      const int row = static_cast<int>(down);
       hidden[n] = behind_body(ray);
       if (!hidden[n]) cells_[cell_at(column, row)].push_back(static_cast<std::uint32_t>(n));
     }
@@ -121,6 +127,7 @@ class Hiding {
 
   void pass(const surface::Shown& shown) {
     for (const auto& ids : shown.mesh->triangles) {
+      if (cancel_.cancelled()) return;
       std::array<glm::dvec3, 3> corners;
       std::array<double, 2> low{1e300, 1e300};
       std::array<double, 2> high{-1e300, -1e300};
@@ -163,6 +170,7 @@ class Hiding {
   }
 
   const scene::Scene& scene_;
+  const CancelToken& cancel_;
   const scene::Camera& camera_;
   double pixel_;  // size at unit distance (perspective) or in the world
   int columns_, rows_;
@@ -172,8 +180,9 @@ class Hiding {
 
 }  // namespace
 
-std::vector<bool> hidden_places(const scene::Scene& scene, const std::vector<glm::dvec3>& places) {
-  return Hiding(scene).of(places);
+std::vector<bool> hidden_places(const scene::Scene& scene, const std::vector<glm::dvec3>& places,
+                                const CancelToken& cancel) {
+  return Hiding(scene, cancel).of(places);
 }
 
 }  // namespace windsplat::frame

@@ -4,8 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
@@ -256,6 +258,37 @@ TEST(ContourLabels, OfManyLinesNumberEvery2nd5thOr10th) {
   EXPECT_LE(numbered_levels({1e-30, 1, {}, {}}, -1e30, 1e30, 60).size(), 61U);
 }
 
+// 1.3 million segments of vertical lines, and a few hundred of another.
+TEST(ContourLabels, LeaveOutLevelsOfTooManySegments) {
+  const auto stripes = [](double x, double y) {
+    if (y > 0.5) return 2 + y;
+    return std::lround((x + 1) * 400) % 2 == 0 ? 0.0 : 1.0;
+  };
+  const auto few = [](double x, double y) {
+    return y > 0.5 ? 2 + y : std::lround((x + 1) * 400) % 40 == 0 ? 0.0 : 1.0;
+  };
+  for (const bool many : {true, false}) {
+    const auto mesh = valued_square(800, 0, many ? Function(stripes) : Function(few));
+    const Written written = written_on({shown_of(mesh, 0, {0.5, 2.75})});
+    std::vector<std::string> texts;
+    for (const Text& text : written.texts) texts.push_back(text.text);
+    EXPECT_THAT(texts, testing::Contains("2.75"));
+    const bool has_stripes = std::find(texts.begin(), texts.end(), "0.5") != texts.end();
+    EXPECT_EQ(has_stripes, !many);
+  }
+}
+
+TEST(ContourLabels, NeedMemoryForTheirLines) {
+  scene::Scene scene;
+  EXPECT_EQ(contour_label_bytes(scene), 0U);
+  scene.surfaces = {shown_of(valued_square(1000, 0, radius), 0)};
+  EXPECT_EQ(contour_label_bytes(scene), 0U);  // no contours
+  scene.surfaces = {shown_of(valued_square(1000, 0, radius), 0.1)};
+  const std::uint64_t bytes = contour_label_bytes(scene);
+  EXPECT_GT(bytes, std::uint64_t{64} << 20U);
+  EXPECT_LT(bytes, std::uint64_t{160} << 20U);
+}
+
 TEST(ContourLabels, AreTextsOfASvg) {
   const Written out =
       written_on({shown_of(valued_square(40, 0, [](double x, double) { return x; }), 0.5)});
@@ -267,9 +300,45 @@ TEST(ContourLabels, AreTextsOfASvg) {
   EXPECT_THAT(text, testing::ContainsRegex("transform=\"rotate\\(-?90.00 [0-9. ]*\\)\"[^>]*>0.5<"));
 }
 
+std::vector<surface::ContourLine> lines_of(const surface::Mesh& mesh,
+                                           const std::vector<double>& levels) {
+  std::vector<surface::ContourLine> lines;
+  surface::each_contour_line(mesh, levels, [&](const auto& line) { lines.push_back(line); });
+  return lines;
+}
+
+TEST(ContourLines, HaveAsManySegmentsAsAreCountedOfEachLevel) {
+  const auto mesh = valued_square(700, 0, radius);  // more than are followed at a time
+  std::vector<double> levels{-1};
+  for (int n = 0; n < 400; ++n) levels.push_back(0.0021 + 0.0033 * n);
+  const auto counts = surface::contour_segments(*mesh, levels);
+  std::vector<std::size_t> followed(levels.size(), 0);
+  surface::each_contour_line(*mesh, levels, [&](const auto& line) {
+    const auto at = std::find(levels.begin(), levels.end(), line.level) - levels.begin();
+    followed.at(static_cast<std::size_t>(at)) += line.places.size() - 1;
+  });
+  EXPECT_EQ(followed, counts);
+  EXPECT_EQ(counts[0], 0U);
+  EXPECT_GT(counts[200], 2000U);
+}
+
+TEST(ContourLines, EndWhenTheyAreCancelled) {
+  const auto mesh = valued_square(100, 0, radius);
+  const CancelToken cancel;
+  int lines = 0;
+  surface::each_contour_line(
+      *mesh, {0.2, 0.5, 1.2},
+      [&](const auto&) {
+        ++lines;
+        cancel.cancel();
+      },
+      cancel);
+  EXPECT_EQ(lines, 1);
+}
+
 TEST(ContourLines, AreClosedCirclesOfTheirRadiusAndOpenAtTheEdge) {
   const auto mesh = valued_square(100, 0, radius);
-  const auto lines = surface::contour_lines(*mesh, {0.5, 1.2, 3});
+  const auto lines = lines_of(*mesh, {0.5, 1.2, 3});
   ASSERT_EQ(lines.size(), 5U);  // a circle, and an arc in each corner
   EXPECT_EQ(lines[0].level, 0.5);
   EXPECT_EQ(lines[0].places.front(), lines[0].places.back());
@@ -293,7 +362,7 @@ TEST(ContourLines, HaveGapsWhereValuesAreMasked) {
   const auto mesh = valued_square(10, 0, [](double x, double y) {
     return std::abs(x - 0.2) < 1e-6 && std::abs(y - 0.2) < 1e-6 ? std::nan("") : x;
   });
-  const auto lines = surface::contour_lines(*mesh, {0.1, 0.7});
+  const auto lines = lines_of(*mesh, {0.1, 0.7});
   ASSERT_EQ(lines.size(), 3U);
   EXPECT_EQ(lines[0].level, 0.1);
   EXPECT_EQ(lines[1].level, 0.1);
