@@ -330,6 +330,26 @@ for (const [name, viewport] of [
     ));
 }
 
+// The parts of the bar lie apart within the second picture, and the dataset can be read.
+async function assertBarWithin(page) {
+  const ids = ["dataset", "step", "linked", "camera", "swap", "close"];
+  const box = (id) => page.locator(id).boundingBox();
+  const room = await box("#beside-picture");
+  const parts = await Promise.all(ids.map((id) => box(`#beside-${id}`)));
+  parts.forEach((part, n) => {
+    const inside = part.x >= room.x && part.x + part.width <= room.x + room.width;
+    assert.ok(inside && part.width >= (n === 0 ? 80 : 12), `${ids[n]} ${JSON.stringify(part)}`);
+    for (const other of parts.slice(n + 1)) {
+      const apart =
+        part.x + part.width <= other.x ||
+        other.x + other.width <= part.x ||
+        part.y + part.height <= other.y ||
+        other.y + other.height <= part.y;
+      assert.ok(apart, `${ids[n]} lies over another part`);
+    }
+  });
+}
+
 test("on a phone the pictures have the room: little lies over them, and the panel folds", () =>
   withPage(
     async (page) => {
@@ -346,12 +366,22 @@ test("on a phone the pictures have the room: little lies over them, and the pane
       assert.ok((await over(["#legend"], first)) < 0.25);
       assert.ok((await over([".beside-bar", "#beside-words"], second)) < 0.25);
       assert.equal(await page.locator(".corner").isVisible(), false);
-      for (const id of ["#beside-dataset", "#beside-step", "#beside-swap", "#beside-close"]) {
-        const part = await box(id);
-        assert.ok(part.x >= 0 && part.x + part.width <= 390 && part.width >= 30, id);
-      }
+      await assertBarWithin(page);
+      await shot(page, "beside-room-phone");
     },
     { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true },
+  ));
+
+test("on a wide and low phone the button folds the panel, too", () =>
+  withPage(
+    async (page) => {
+      await page.locator("#compare-button").click();
+      await bothFinal(page);
+      assert.equal(await page.locator("#panel").isVisible(), false);
+      await assertBarWithin(page);
+      await shot(page, "beside-room-low");
+    },
+    { viewport: { width: 844, height: 390 }, hasTouch: true, isMobile: true },
   ));
 
 test("the panel subtracts another step, and the legend says so", () =>

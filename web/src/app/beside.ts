@@ -106,7 +106,6 @@ export class BesidePicture {
     });
     byId("beside-swap", HTMLButtonElement).addEventListener("click", () => this.swap());
     byId("beside-close", HTMLButtonElement).addEventListener("click", () => this.show(null));
-    this.button.addEventListener("click", () => this.toggle());
   }
 
   // --- the page's address ----------------------------------------------------------------

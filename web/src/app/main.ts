@@ -364,6 +364,7 @@ onClick("datasets-button", () => cards.show());
 onClick("about-button", showAbout);
 onClick("cancel-button", () => app.cancelLoading());
 onClick("retry-button", () => app.connectNow());
+onClick("compare-button", compare);
 onClick("share-button", () => void app.copyLink());
 onClick("save-button", openSaving);
 panelSheet(byId("panel-handle", HTMLButtonElement), foldPanel);
