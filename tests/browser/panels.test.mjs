@@ -102,6 +102,27 @@ test("each preset has a picture of its own, and a click draws it", () =>
     }
   }));
 
+test("a preset without media comes while a histogram of one is read", () =>
+  withPage(
+    async (page) => {
+      const waiting = [];
+      await page.route(/\/histogram\?/, (route) => void waiting.push(route));
+      await unfold(page, "Opacity curve");
+      await page.locator("#panel .transfer-point").first().scrollIntoViewIfNeeded();
+      for (const until = Date.now() + 15_000; waiting.length === 0 && Date.now() < until;) {
+        await page.waitForTimeout(50);
+      }
+      assert.ok(waiting.length > 0, "a histogram was asked for");
+      await preset(page, /^Sections$/).click();
+      await finalPicture(page);
+      const answered = page.waitForResponse(/\/histogram\?/);
+      await Promise.all(waiting.map((route) => route.continue()));
+      await (await answered).finished();
+      await page.waitForTimeout(300); // an error of the page fails the test
+    },
+    { path: `#!${encodeURIComponent('{"dataset":"tornado"}')}` },
+  ));
+
 test("a preset keeps step and region, and undo restores the view before it", () =>
   withPage(
     async (page) => {

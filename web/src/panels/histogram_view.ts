@@ -106,7 +106,7 @@ export class HistogramView {
       this.data = null;
       this.fail(failureText(failure));
     }
-    this.draw();
+    if (this.element.isConnected) this.draw(); // otherwise its medium is gone
   }
 
   private fail(text: string): void {
