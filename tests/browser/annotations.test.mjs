@@ -8,6 +8,7 @@ import {
   pixels,
   sharedDaemon,
   shot,
+  type,
   unfold,
 } from "./support.mjs";
 
@@ -51,11 +52,11 @@ test("a title of one's own is drawn in place of the dataset's until it is emptie
     await control(page, "title", "input").check();
     await finalPicture(page);
     const { hash: dataset } = await pixels(page);
-    await control(page, "own title", "input").fill("Storm of 18 January");
+    await type(page, "own title", "Storm of 18 January");
     await finalPicture(page);
     assert.notEqual((await pixels(page)).hash, dataset);
     assert.equal(await control(page, "own title", "input").inputValue(), "Storm of 18 January");
-    await control(page, "own title", "input").fill("");
+    await type(page, "own title", "");
     await finalPicture(page);
     assert.equal((await pixels(page)).hash, dataset);
   }));

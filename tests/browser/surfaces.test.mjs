@@ -2,7 +2,8 @@
 // of those that are not seen.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { finalPicture, pixels, sharedDaemon, shot, somePicture, unfold } from "./support.mjs";
+import { control, finalPicture, pixels, sharedDaemon, shot, somePicture } from "./support.mjs";
+import { type, unfold } from "./support.mjs";
 
 const { withPage } = sharedDaemon();
 
@@ -112,6 +113,21 @@ test("a new isosurface is seen in the cloud of its field", () =>
       path: `#!${encodeURIComponent('{"dataset":"climate","vector":{"field":null}}')}`,
     },
   ));
+
+test("levels that are not understood are named, and stay to be corrected", () =>
+  withPage(async (page) => {
+    await add(page, "Add a level section");
+    const label = "contours at \\(values\\)";
+    const box = control(page, label, "input");
+    await type(page, label, "5 abc");
+    await page.locator(".panel-note:visible", { hasText: "“abc” is not a number" }).waitFor();
+    assert.equal(await box.inputValue(), "5 abc");
+    assert.equal(await box.getAttribute("aria-invalid"), "true");
+    await type(page, label, "5 2");
+    await finalPicture(page);
+    await page.locator(".panel-note", { hasText: "not a number" }).waitFor({ state: "hidden" });
+    assert.equal(await box.inputValue(), "2 5");
+  }));
 
 test("an isosurface has a value of its field, also after another field is chosen", () =>
   withPage(async (page) => {

@@ -1,6 +1,6 @@
 // What the server draws and writes around the data: box, axes, legend and the like.
 import type GUI from "lil-gui";
-import { keyAccess, type PanelKit } from "./panel_kit";
+import { keyAccess, patchAt, type PanelKit } from "./panel_kit";
 
 const parts: readonly [label: string, key: string][] = [
   ["box", "box"],
@@ -18,6 +18,11 @@ export function addAnnotations(parent: GUI, kit: PanelKit): void {
   for (const [label, key] of parts) {
     kit.toggle(folder, label, keyAccess<boolean>(`/annotations/${key}`));
   }
-  kit.text(folder, "own title", keyAccess<string | null>("/annotations/titleText"));
+  const pointer = "/annotations/titleText";
+  kit.text(folder, "own title", {
+    pointer,
+    get: (view) => view.annotations?.titleText,
+    set: (text) => patchAt(pointer, text === "" ? null : text),
+  });
   kit.number(folder, "text size", keyAccess<number>("/annotations/size"), { step: 0.05 });
 }

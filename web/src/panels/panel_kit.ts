@@ -241,33 +241,35 @@ export class PanelKit {
     return this.bind(controller, label, model, access);
   }
 
-  // A line of text; empty: null.
-  text(folder: GUI, label: string, access: Access<string | null>): Controller {
-    const model = { value: access.get(this.host.view()) ?? "" };
-    return this.bind(folder.add(model, "value"), label, model, {
-      pointer: access.pointer,
-      get: (view) => access.get(view) ?? "",
-      set: (value) => access.set(value === "" ? null : value),
-    });
-  }
-
-  // A text that is sent once it is entered; null from `set`: it is not understood, and the last one
-  // returns.
-  enteredText(folder: GUI, label: string, access: Access<string>): Controller {
+  // A line of text, sent once it is entered. `set` throws an Error whose message says what it does
+  // not understand: it is shown below, and the text stays to be corrected.
+  text(folder: GUI, label: string, access: Access<string>): Controller {
+    const { pointer } = access;
     const now = (): string => access.get(this.host.view()) ?? "";
     const model = { value: now() };
+    let refused = "";
     const controller = folder.add(model, "value").name(label);
-    nameKey(access.pointer, label);
-    explain(controller.domElement, access.pointer);
+    nameKey(pointer, label);
+    explain(controller.domElement, pointer);
+    const input = controller.domElement.querySelector("input")!;
+    const kit = this.again();
+    kit.note(folder, () => refused);
     const show = () => {
-      if (controller.domElement.contains(document.activeElement) || now() === model.value) return;
+      const isEdited = input === document.activeElement || refused !== "";
+      if (isEdited || now() === model.value) return;
       model.value = now();
       controller.updateDisplay();
     };
     controller.onFinishChange((value: string) => {
-      const patch = access.set(value);
-      if (patch !== null) this.host.change(patch);
-      show();
+      refused = "";
+      try {
+        const patch = access.set(value);
+        if (patch !== null) this.host.change(patch);
+      } catch (reason) {
+        refused = (reason as Error).message;
+      }
+      input.setAttribute("aria-invalid", String(refused !== ""));
+      kit.refresh();
     });
     this.onRefresh(show);
     return controller;

@@ -418,17 +418,14 @@ class SurfacesPanel {
       ),
       { field: true },
     );
-    this.controls.enteredText(
+    this.controls.text(
       folder,
       "contours at (values)",
       this.access(
         index,
         "contours/levels",
         (s) => (s.contours?.levels ?? []).join(" "),
-        (text, s) => {
-          const levels = levelsIn(text);
-          return levels === null ? null : { contours: contoursWith(s.contours, { levels }) };
-        },
+        (text, s) => ({ contours: contoursWith(s.contours, { levels: levelsIn(text) }) }),
       ),
     );
   }

@@ -33,6 +33,7 @@ export function pointsFrom(text: string, dataset: Dataset): Place[] {
     throw new Error(`At most ${pointsMax} points, not ${lines.length}.`);
   return lines.map((line, n) => {
     const numbers = line
+      .replaceAll("\u2212", "-")
       .trim()
       .split(/[\s,]+/)
       .map(Number);

@@ -147,15 +147,17 @@ export function contoursWith(
   return some ? next : null;
 }
 
-const levelsMax = 64;
+const levelsMax = 64; // of the view's schema
 
-// Values between spaces, commas or semicolons, in ascending order; null: not all are numbers, or
-// there are too many.
-export function levelsIn(text: string): number[] | null {
-  const words = text
-    .replaceAll("\u2212", "-")
-    .split(/[\s,;]+/)
-    .filter((word) => word !== "");
-  const values = [...new Set(words.map(Number))].sort((a, b) => a - b);
-  return values.every(Number.isFinite) && values.length <= levelsMax ? values : null;
+// Values between spaces, commas or semicolons, in ascending order. Throws an Error with a message.
+export function levelsIn(text: string): number[] {
+  const words = text.split(/[\s,;]+/).filter((word) => word !== "");
+  const values = words.map((word) => {
+    const value = Number(word.replaceAll("\u2212", "-"));
+    if (!Number.isFinite(value)) throw new Error(`“${word}” is not a number.`);
+    return value;
+  });
+  const levels = [...new Set(values)].sort((a, b) => a - b);
+  if (levels.length <= levelsMax) return levels;
+  throw new Error(`At most ${levelsMax} levels, not ${levels.length}.`);
 }

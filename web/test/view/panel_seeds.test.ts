@@ -34,7 +34,7 @@ test("choosing a kind leaves no seeds of another", () => {
 });
 
 test("points are typed one a line, and what is no point is named", () => {
-  assert.deepEqual(pointsFrom(" 10 20,300 \n-1 2e1 3\n", dataset), [
+  assert.deepEqual(pointsFrom(" 10 20,300 \n\u22121 2e1 3\n", dataset), [
     [10, 20, 300],
     [-1, 20, 3],
   ]);
