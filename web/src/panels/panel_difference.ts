@@ -56,17 +56,19 @@ export function addDifference(gui: GUI, kit: PanelKit, actions: DifferenceAction
     },
     offered,
   );
-  const number = kit.number(
-    folder,
-    `step subtracted (1 to ${steps})`,
-    {
-      pointer: "/difference/step",
-      get: ({ difference }) => (difference?.step ?? 0) + 1,
-      set: (counted) => ({ difference: { step: counted - 1 } }),
-    },
-    { min: 1, max: Math.max(2, steps), step: 1 },
-  );
-  kit.showWhen((states) => states.minusStep, number);
+  if (steps > 1) {
+    const number = kit.number(
+      folder,
+      `step subtracted (1 to ${steps})`,
+      {
+        pointer: "/difference/step",
+        get: ({ difference }) => (difference?.step ?? 0) + 1,
+        set: (counted) => ({ difference: { step: counted - 1 } }),
+      },
+      { min: 1, max: steps, step: 1 },
+    );
+    kit.showWhen((states) => states.minusStep, number);
+  }
   const dataset = kit.choice(
     folder,
     "dataset subtracted",
