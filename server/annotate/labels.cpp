@@ -206,6 +206,22 @@ std::string symbol_of(std::string_view word) {
   return known == unit_names.end() ? std::string(word) : known->symbol;
 }
 
+// The length of a degree of Celsius that is written in two words at the start of a text, as "DEG C";
+// 0: there is none.
+std::size_t celsius_at(std::string_view text) {
+  std::string lower(text.substr(0, std::string_view("degrees celsius").size()));
+  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const std::string_view degree : {"degrees", "degree", "deg"}) {
+    for (const std::string_view scale : {" celsius", " c"}) {
+      const std::size_t length = degree.size() + scale.size();
+      if (!lower.starts_with(degree) || !lower.substr(degree.size()).starts_with(scale)) continue;
+      const bool ends = text.size() == length || !(is_letter(text[length]) || text[length] == '_');
+      if (ends) return length;
+    }
+  }
+  return 0;
+}
+
 // The length of the power that follows a unit, as in "-1", "2", "**-1", "^2", and its digits.
 struct Power {
   std::size_t length = 0;
@@ -235,6 +251,11 @@ std::string unit_text(std::string_view units) {
     while (end < units.size() && (is_letter(units[end]) || units[end] == '_')) ++end;
     if (end == i) {
       out += units[i++];
+      continue;
+    }
+    if (const std::size_t celsius = celsius_at(units.substr(i)); celsius > 0) {
+      out += "\u00b0C";
+      i += celsius;
       continue;
     }
     const std::string_view word = units.substr(i, end - i);

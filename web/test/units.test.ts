@@ -51,6 +51,11 @@ test("units that are written out become symbols", () => {
   assert.equal(unitText("centimeter/s"), "cm/s");
   assert.equal(unitText("millimetres per day"), "mm day⁻¹");
   assert.equal(unitText("degrees_Celsius"), "°C");
+  for (const units of ["DEG C", "deg C", "Degrees Celsius", "degree c"]) {
+    assert.equal(unitText(units), "°C", units);
+  }
+  assert.equal(unitText("deg C m-1"), "°C m⁻¹");
+  assert.equal(unitText("deg Cel"), "deg Cel");
   assert.equal(unitText("Kelvin"), "K");
   assert.equal(unitText("percent"), "%");
   assert.equal(unitText("per mille"), "per mille");

@@ -89,6 +89,11 @@ TEST(UnitText, WritesNamesAsSymbols) {
   EXPECT_EQ(unit_text("centimeter/s"), "cm/s");
   EXPECT_EQ(unit_text("Kelvin"), "K");
   EXPECT_EQ(unit_text("degrees_Celsius"), "\u00b0C");
+  for (const char* units : {"DEG C", "deg C", "Degrees Celsius", "degree c"}) {
+    EXPECT_EQ(unit_text(units), "\u00b0C") << units;
+  }
+  EXPECT_EQ(unit_text("deg C m-1"), "\u00b0C m\u207b\u00b9");
+  EXPECT_EQ(unit_text("deg Cel"), "deg Cel");
   EXPECT_EQ(unit_text("percent"), "%");
   EXPECT_EQ(unit_text("per mille"), "per mille");
   EXPECT_EQ(unit_text("meteors"), "meteors");

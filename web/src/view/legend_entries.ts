@@ -52,8 +52,9 @@ function symbolOf(word: string): string {
 // "m s⁻¹". In CF, "1" means dimensionless, as "(0 - 1)" of ECMWF.
 export function unitText(units: string | undefined): string {
   if (units === undefined || units === "1" || units === "(0 - 1)") return "";
+  const celsius = units.replace(/\bdeg(?:rees?)? c(?:elsius)?\b/gi, "°C");
   const parts = /( per )?([A-Za-z_]+)(?:(?:\*\*|\^)?(-?\d+)(?=$|[ ./*]))?/g;
-  return units.replace(parts, (_, per: string | undefined, word: string, power = "") => {
+  return celsius.replace(parts, (_, per: string | undefined, word: string, power = "") => {
     const signed = per === undefined ? power : `-${power === "" ? "1" : power}`;
     const high = [...signed].map((sign) => raised[sign] ?? "").join("");
     return `${per === undefined ? "" : " "}${symbolOf(word)}${high}`;
