@@ -19,6 +19,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/annotate/paint/compose.hpp"
+#include "server/annotate/paint/overlay.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/data/samples/samples.hpp"
 #include "server/engine/kernels/dispatch.hpp"
@@ -48,8 +50,9 @@ struct Feature {
   std::string dataset;
   Change with;
   Change without;
-  bool alike = false;  // the picture should hardly change: the difference is measured
-  bool anew = false;   // nothing of a ground is kept between frames
+  bool alike = false;     // the picture should hardly change: the difference is measured
+  bool anew = false;      // nothing of a ground is kept between frames
+  bool prepared = false;  // the frame is also prepared: what lies over it is laid out
 };
 
 [[noreturn]] void give_up(const Error& error) {
@@ -73,7 +76,6 @@ data::Dataset& dataset_of(const std::string& name) {
   return *dataset;
 }
 
-void keep(View& /*view*/) {}
 void no_medium(View& view) { view.scalars.emplace(); }
 void no_lines(View& view) { view.vector.field = {protocol::FieldChoice::Kind::none, ""}; }
 
@@ -88,8 +90,10 @@ Change compositing(protocol::Compositing rule) {
   return [=](View& view) { view.method.compositing = rule; };
 }
 
+// Of every sample, whatever the stride of the default view.
 Change weakest_line(double of_range) {
   return [=](View& view) {
+    view.vector.stride = 1;
     view.vector.min_magnitude = of_range * view.vector.magnitude_range.value()[1];
   };
 }
@@ -164,6 +168,11 @@ void region(View& view) {
   view.region.x = {-15, 40};
   view.region.y = {30, 70};
 }
+void annotated(View& view) {
+  view.annotations.box = view.annotations.axes = view.annotations.north = true;
+  view.annotations.scale_bar = view.annotations.legend = true;
+  view.annotations.title = view.annotations.step_time = true;
+}
 void one_layer(View& view) { view.geometry.slice = {protocol::GridAxis::z, 8}; }
 
 // Every wind is rendered except where omitting winds is the feature, as in the figures of the
@@ -199,12 +208,13 @@ std::vector<Feature> features() {
       {"an isosurface, opacity 0.4", "climate", then(all, isosurface(0.4)), all},
       {"streamlets: to straight lines", "tornado", then(all, traced), all},
       {"samples outside of a region", "climate", all, then(all, region)},
+      {"annotations, all", "climate", then(all, annotated), all, false, false, true},
       {"overlap: span 7 to 1", "climate", all, then(all, no_overlap)},
       {"every other sample: stride 2", "climate", all, then(all, stride(2))},
       {"all layers but one: a slice", "climate", all, then(all, one_layer)},
       {"winds below 0.1 % of the range", "climate", weakest_line(0), weakest_line(1e-3), true},
       {"winds below 2 % of the range", "climate", weakest_line(0), weakest_line(0.02), true},
-      {"winds below the view's default", "climate", weakest_line(0), keep, true},
+      {"winds below the view's default", "climate", weakest_line(0), stride(1), true},
       {"optical depths below 1e-4", "climate", then(all, thinnest_splat(0)), all, true},
       {"optical depths below 1e-2", "climate", then(all, thinnest_splat(0)),
        then(all, thinnest_splat(1e-2)), true},
@@ -234,15 +244,31 @@ double heap_bytes() {
   return static_cast<double>(now.uordblks) + static_cast<double>(now.hblkhd);
 }
 
+frame::Prepared prepare(const View& view, data::Dataset& dataset) {
+  const auto completed = value_or_give_up(scene::complete(view, dataset));
+  return value_or_give_up(frame::prepare(completed, frame::own_setting(completed), dataset, {}));
+}
+
+// Returns what lies over the picture, if anything does.
+std::optional<annotate::Overlay> draw(const frame::Prepared& prepared, ThreadPool& pool,
+                                      engine::RenderSpace& space) {
+  value_or_give_up(engine::render(prepared.scene, pool, CancelToken(), space));
+  if (!prepared.figure) return std::nullopt;
+  auto overlay = value_or_give_up(annotate::Overlay::of(*prepared.figure));
+  annotate::composite(overlay, pool, space.image().rgba);
+  return overlay;
+}
+
 // Memory for a view and all that is kept after its second frame, without fields, which are no part
 // of the heap, and without the lines of the Earth, 4 MB once.
 double held_bytes(const View& view, const std::string& name, ThreadPool& pool) {
   for (std::size_t n = 0; n < ground::levels; ++n) ground::atlas(n);
   const double before = heap_bytes();
   data::Dataset dataset(value_or_give_up(data::open_sample(name)), name, std::uint64_t{4} << 30U);
-  const scene::Scene scene = value_or_give_up(scene::build_scene(view, dataset));
+  const frame::Prepared prepared = prepare(view, dataset);
   engine::RenderSpace space;
-  for (int n = 0; n < 2; ++n) value_or_give_up(engine::render(scene, pool, CancelToken(), space));
+  std::optional<annotate::Overlay> overlay;
+  for (int n = 0; n < 2; ++n) overlay = draw(prepared, pool, space);
   return heap_bytes() - before;
 }
 
@@ -261,15 +287,18 @@ void draw_once(const View& view, const std::string& name, Half& half) {
   half.rgba = bench::npy_values(drawn.bytes, drawn.width, drawn.height);
 }
 
-// Processor time of one thread, which other programs disturb least.
-double time_frame(const scene::Scene& scene, ThreadPool& pool, engine::RenderSpace& space) {
+// Processor time of one thread, which other programs disturb least. The frame is prepared anew if
+// `view` is given.
+double time_frame(frame::Prepared& prepared, const View* view, data::Dataset& dataset,
+                  ThreadPool& pool, engine::RenderSpace& space) {
   const auto now = [] {
     timespec at{};
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &at);
     return 1e3 * static_cast<double>(at.tv_sec) + 1e-6 * static_cast<double>(at.tv_nsec);
   };
   const double start = now();
-  value_or_give_up(engine::render(scene, pool, CancelToken(), space));
+  if (view != nullptr) prepared = prepare(*view, dataset);
+  draw(prepared, pool, space);
   benchmark::DoNotOptimize(space.image().rgba.data());
   return now() - start;
 }
@@ -279,24 +308,23 @@ void run_pair(benchmark::State& state, const Feature& feature, protocol::MethodN
               Pair& pair) {
   data::Dataset& dataset = dataset_of(feature.dataset);
   std::array<View, 2> views;
-  std::array<scene::Scene, 2> scenes;
   std::array<Half*, 2> halves{&pair.with, &pair.without};
   for (const std::size_t i : {0U, 1U}) {
     const View view = make_view(feature, i == 0 ? feature.with : feature.without, method);
     draw_once(view, feature.dataset, *halves[i]);
     views[i] = view;
   }
-  for (const std::size_t i : {0U, 1U}) {
-    scenes[i] = value_or_give_up(scene::build_scene(views[i], dataset));
-  }
+  std::array<frame::Prepared, 2> frames{prepare(views[0], dataset), prepare(views[1], dataset)};
   ThreadPool pool(1);
   std::array<engine::RenderSpace, 2> spaces;
   if (feature.anew) spaces[0].limit_grounds(0);
   std::size_t first = 0;
   while (state.KeepRunning()) {
     std::array<double, 2> ms{};
-    ms[first] = time_frame(scenes[first], pool, spaces[first]);
-    ms[1 - first] = time_frame(scenes[1 - first], pool, spaces[1 - first]);
+    for (const std::size_t i : {first, 1 - first}) {
+      const View* const anew = feature.prepared ? &views[i] : nullptr;
+      ms[i] = time_frame(frames[i], anew, dataset, pool, spaces[i]);
+    }
     first = 1 - first;
     pair.with.ms.push_back(ms[0]);
     pair.without.ms.push_back(ms[1]);
