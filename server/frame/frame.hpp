@@ -139,7 +139,8 @@ struct Prepared {
   std::int64_t prepare_us = 0;             // time of completing and preparing, counted in render_us
   std::optional<quality::Content> content;  // of the view, if it is known already
 };
-// Errors: those of the scene.
+// The search for places of numbers on contours ends with dataset.cancellation(). Errors: those of
+// the scene; out_of_memory, cancelled.
 Result<Prepared> prepare(const scene::CompletedView& completed, const quality::Setting& setting,
                          data::Dataset& dataset, const Encoding& encoding);
 // The setting at which the view is drawn unchanged.
