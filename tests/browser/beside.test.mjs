@@ -330,6 +330,30 @@ for (const [name, viewport] of [
     ));
 }
 
+test("a second picture with settings of its own has a legend of its own, also on paper", () =>
+  withPage(async (page) => {
+    await compare(page);
+    const legend = page.locator("#beside-legend");
+    assert.equal(await legend.isVisible(), false);
+    await page.locator("#beside-linked").uncheck();
+    await unfold(page, "Line colour");
+    await choose(page, "map", /^plasma$/);
+    await bothFinal(page);
+    const strips = () =>
+      page.evaluate(() =>
+        ["#legend", "#beside-legend"].map((id) => {
+          const strip = document.querySelector(`${id} .legend-lines .legend-strip`);
+          return strip && getComputedStyle(strip).backgroundImage;
+        }),
+      );
+    await legend.waitFor();
+    const [first, second] = await strips();
+    assert.ok(first !== second && second !== null, `${first} ${second}`);
+    await shot(page, "beside-legend");
+    await page.emulateMedia({ media: "print" });
+    assert.ok(await legend.isVisible());
+  }));
+
 // The parts of the bar lie apart within the second picture, and the dataset can be read.
 async function assertBarWithin(page) {
   const ids = ["dataset", "step", "linked", "camera", "swap", "close"];

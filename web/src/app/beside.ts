@@ -20,7 +20,10 @@ import type { Dataset, FrameHeader, ServerMessage, View } from "../wire/protocol
 import { failureText } from "../wire/api";
 import { problemText } from "../wire/requests";
 import type { CameraHost } from "../viewport/input";
+import { Legend } from "../viewport/legend";
 import { Viewport } from "../viewport/viewport";
+import { legendEntries } from "../view/legend_entries";
+import type { ColorMaps } from "../wire/color_maps";
 import { PatchAnswers } from "./patch_answers";
 import { openConnection, watchPresence } from "./server_link";
 
@@ -35,6 +38,7 @@ export interface BesideHost {
   openView(view: View): void; // shows another view in the first picture
   edited(): void; // what the address keeps has changed
   cameras: CameraHost; // of the first picture
+  maps: ColorMaps;
 }
 
 const same = ""; // the dataset of the first picture
@@ -55,12 +59,13 @@ export class BesidePicture {
   private readonly words = byId("beside-words", HTMLElement);
   private readonly button = byId("compare-button", HTMLButtonElement);
   private readonly viewport: Viewport;
+  private readonly legend: Legend;
   private readonly connection: Connection;
   private state = new ViewState();
   private answers = new PatchAnswers(this.state);
   private shows: Beside | null = null;
   private own: View | null = null; // settings that do not follow the first picture, all of them
-  private drawnCamera: Camera | null = null; // as the server drew it
+  private drawn: View | null = null; // as the server drew it
   private running = false;
   private choices = 0; // of datasets; answers to earlier ones are too late
   private caption = "";
@@ -71,6 +76,7 @@ export class BesidePicture {
     clock: Clock,
     private readonly host: BesideHost,
   ) {
+    this.legend = new Legend(byId("beside-legend", HTMLElement), host.maps);
     this.viewport = new Viewport(this.canvas, {
       decoded: ({ seq }, decodeMs) => this.acknowledge(seq, decodeMs),
       drawn: ({ header }) => this.onDrawn(header),
@@ -146,7 +152,7 @@ export class BesidePicture {
       const own = this.shows?.camera;
       if (own === undefined) return this.host.cameras.camera();
       const set = Object.entries(own).filter(([, value]) => value !== null);
-      const camera = { ...this.drawnCamera, ...Object.fromEntries(set) } as Camera;
+      const camera = { ...this.drawn?.camera, ...Object.fromEntries(set) } as Camera;
       return camera.eye && camera.target && camera.up ? camera : null;
     },
     setCamera: (camera) => {
@@ -293,6 +299,7 @@ export class BesidePicture {
     this.datasets.value = dataset;
     this.linked.checked = this.own === null && this.shows!.settings === undefined;
     this.sameCamera.checked = !this.hasOwnCamera;
+    this.showLegend();
     this.canvas.ariaLabel = spoken(this.hasOwnCamera);
     if (document.activeElement !== this.step) {
       this.step.value = step === undefined ? "" : String(step + 1);
@@ -326,8 +333,9 @@ export class BesidePicture {
       const view = chosen.view as View;
       this.caption = this.captionOf(view, header.step);
       this.showCaption();
+      this.drawn = view;
+      this.showLegend();
       const camera = view.camera as Camera;
-      this.drawnCamera = camera;
       const { azimuth, elevation } = anglesOf(camera);
       // As the server drew it.
       this.canvas.dataset.azimuth = azimuth.toFixed(1);
@@ -349,6 +357,14 @@ export class BesidePicture {
   private showCaption(): void {
     this.words.classList.remove("refused");
     this.words.textContent = this.caption;
+  }
+
+  // With settings of its own; otherwise the legend of the first picture is that of both. The page
+  // knows the fields of the first picture's dataset only.
+  private showLegend(): void {
+    const dataset = this.host.dataset();
+    const view = this.own === null ? null : this.drawn;
+    this.legend.show(view?.dataset === dataset.id ? legendEntries(dataset, view) : []);
   }
 
   private captionOf({ dataset = "" }: View, step: number): string {

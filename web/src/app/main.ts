@@ -112,6 +112,7 @@ const beside = new BesidePicture(document.baseURI, clock, {
   drawn: () => app.hasPicture(),
   answered: () => app.isOpen() && canvas.dataset.rev === canvas.dataset.wanted,
   cameras: app.cameras,
+  maps: app.maps,
   dataset: () => app.dataset(),
   explicitView: () => app.explicitView(),
   openView: (view) => app.openView(view),
