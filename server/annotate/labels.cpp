@@ -206,8 +206,8 @@ std::string symbol_of(std::string_view word) {
   return known == unit_names.end() ? std::string(word) : known->symbol;
 }
 
-// The length of a degree of Celsius that is written in two words at the start of a text, as "DEG C";
-// 0: there is none.
+// The length of a degree of Celsius that is written in two words at the start of a text, as "DEG
+// C"; 0: there is none.
 std::size_t celsius_at(std::string_view text) {
   std::string lower(text.substr(0, std::string_view("degrees celsius").size()));
   for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));

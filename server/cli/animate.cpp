@@ -241,6 +241,7 @@ Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& s
   Reports reports;
   const int total = plan.steps.count() * plan.per_step;
   std::vector<double> starts;  // of the motion
+  starts.reserve(panels.size());
   for (const Panel& panel : panels) starts.push_back(panel.view.vector.motion_time);
   Progress progress(total);
   for (int n = 0; n < total; ++n) {

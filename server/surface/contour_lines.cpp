@@ -28,7 +28,7 @@ struct End {
 };
 
 // Of Chains: two ends, a flag, and a point of a line, whose arrays grow to twice their size.
-constexpr std::size_t chain_bytes = 2 * sizeof(End) + 1 + 2 * 2 * sizeof(Point);
+constexpr std::size_t chain_bytes = 2 * sizeof(End) + 1 + 4 * sizeof(Point);
 
 class Chains {
  public:
