@@ -213,7 +213,6 @@ struct QualityView {
   bool operator==(const QualityView&) const = default;
 };
 
-// What is written and drawn around the data, each if it is set.
 // How one of the annotations differs from the others.
 struct AnnotationStyleView {
   double size = 1;                        // factor of that of all annotations
@@ -221,6 +220,7 @@ struct AnnotationStyleView {
   bool operator==(const AnnotationStyleView&) const = default;
 };
 
+// What is written and drawn around the data, each if it is set.
 struct AnnotationsView {
   bool box = false;
   bool axes = false;
