@@ -237,17 +237,16 @@ test("the view is restored on reload and in a second tab", () =>
     assertDrawn(await pixels(second));
   }));
 
-test("a link to an unknown dataset causes an alert, and the default is shown", () =>
+test("a link to an unknown dataset shows no other one until it is chosen", () =>
   withPage(
     async (page) => {
-      await page.locator("#alert").waitFor();
-      assert.match(await page.locator("#alert-text").textContent(), /nowhere/);
-      assert.equal(await page.locator("#dataset").inputValue(), "climate");
+      await page.locator("#datasets-note", { hasText: /no dataset “nowhere”/ }).waitFor();
+      await page.locator(".card").first().click();
+      await finalPicture(page);
+      assert.equal(await page.locator("#dataset").inputValue(), "tornado");
       assertDrawn(await pixels(page));
-      await page.locator("#alert-close").click();
-      assert.equal(await page.locator("#alert").isVisible(), false);
     },
-    { path: '#!{"dataset":"nowhere"}' },
+    { path: '#!{"dataset":"nowhere"}', settle: false },
   ));
 
 test("a link with a value out of range names the value and shows the remaining view", () =>
