@@ -11,6 +11,7 @@
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/measurements.hpp"
+#include "protocol/view/shown.hpp"
 #include "server/api/positions.hpp"
 #include "server/api/resources.hpp"
 #include "server/frame/pick/pick.hpp"
@@ -126,7 +127,7 @@ Result<Feature> feature_of(const PickRequest& asked, data::Dataset& dataset,
   out.field = found.medium ? field_of(*scene, view, *found.medium) : view.vector.field.name;
   out.value = found.value;
   if (const data::FieldInfo* field = dataset.info().find(out.field)) out.units = field->units;
-  out.position.index = scene::is_section(view.geometry)
+  out.position.index = protocol::is_section(view.geometry)
                            ? nearest_placed(exact->lattice(), found.place)
                            : found.sample;
   const scene::Lattice& lattice = exact->lattice();

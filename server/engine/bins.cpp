@@ -60,7 +60,7 @@ std::array<double, 3> kernel_reach(const Pass& pass, double line_reach, bool spl
     const double cell = pass.cell_max[a];
     const double moved = pass.line.shift[a] * cell;
     // Lines are clipped to the boxes of their kernels.
-    const double inside = std::min<double>(line_reach, pass.line.half_span * cell);
+    const double inside = std::min<double>(line_reach, pass.line.half_box[a] * cell);
     const double line = pass.has_lines != 0 && line_reach >= 0 ? inside + moved : 0;
     const double splat = splats ? kernels::footprint_radius * cell : 0;
     reach[a] = std::max(line, splat) * 1.0001;

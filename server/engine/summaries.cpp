@@ -44,6 +44,7 @@ void write_key(const kernels::Pass& pass, std::vector<std::uint32_t>& key) {
     // Rates are those of the samples that are drawn from the data.
     const int* const dims = line.merged != 0 ? line.data_dims : pass.dims;
     for (int a = 0; a < 3; ++a) add(key, line.halvings[a]);
+    add(key, line.data_stride);
     add(key, line.rate_x, dims[1]);
     add(key, line.rate_y);
     add(key, line.rate_z, dims[2]);

@@ -73,7 +73,9 @@ class Sampling {
       finer_[a] = std::exp2(-scene.level[a]);
     }
     for (const scene::ScalarLayer& layer : scene.scalars) stride_ = std::max(stride_, layer.stride);
-    if (scene.scalars.empty() && scene.vector) stride_ = scene.vector->stride;
+    if (!scene.vector) return;
+    if (scene.scalars.empty()) stride_ = scene.vector->stride;
+    for (const int places : scene.vector->drawn_places) merged_lines_ *= places;
   }
 
   // Row by row of the picture and by depth.
@@ -270,7 +272,8 @@ class Sampling {
     if (!drawn) return;
     const scene::VectorLayer& layer = *scene_.vector;
     const double whole = reference::length(drawn->extent);
-    const double most = layer.span * layer.stride * widest;
+    const double boxes = layer.stride * layer.data_stride / std::cbrt(merged_);
+    const double most = layer.span * boxes * widest;
     // Streamlets are not clipped, and are as long.
     const double kept = whole > most && !layer.streamlets ? most / whole : 1;
     const double across = std::hypot(reference::dot(drawn->extent, view_.right),
@@ -278,7 +281,7 @@ class Sampling {
     out.length = scale * across * kept;
     out.line_depth = std::abs(reference::dot(drawn->extent, view_.forward)) * kept;
     const double wide = width();
-    const double lines = each() * merged_ / std::pow(layer.stride, 3);
+    const double lines = each() * merged_lines_ / std::pow(layer.stride, 3);
     const double aspect = static_cast<double>(scene_.camera.width) / scene_.camera.height;
     out.cover = lines * layer_opacity() * wide * (out.length + wide) * columns * rows / aspect;
   }
@@ -292,7 +295,6 @@ class Sampling {
       auto next = samples_.neighbour(i, a, 1);
       if (!next) next = samples_.neighbour(i, a, -1);
       if (!next) continue;
-      ++count;
       const Medium other = samples_.medium(*next);
       const glm::dvec3 step = samples_.place(*next) - samples_.place(i);
       const double length2 = glm::dot(step, step);  // 0 where layers of terrain coincide
@@ -301,8 +303,12 @@ class Sampling {
         const glm::dvec3 change = here.color() - other.color();
         tint += along * glm::dot(change, change);
       }
-      const Line line_beside = line(*next);
-      if (!own.drawn || !line_beside.drawn) continue;
+      if (!own.drawn) continue;
+      const auto next_line = samples_.neighbour_line(i, a);
+      if (!next_line) continue;
+      ++count;
+      const Line line_beside = line(*next_line);
+      if (!line_beside.drawn) continue;
       ++beside;
       out.shade += glm::length(own.color - line_beside.color);
     }
@@ -316,13 +322,14 @@ class Sampling {
     const scene::VectorLayer& layer = *scene_.vector;
     return (layer.r1 + layer.r2 + 2 * layer.mark.halo) / scene_.camera.height;
   }
-  [[nodiscard]] double layer_opacity() const { return scene_.vector->opacity / merged_; }
+  [[nodiscard]] double layer_opacity() const { return scene_.vector->opacity / merged_lines_; }
 
   const scene::Scene& scene_;
   const CancelToken& cancel_;
   const reference::View view_;
   const DrawnSamples samples_;
-  double merged_ = 1;
+  double merged_ = 1;        // samples of the data in one of the level
+  double merged_lines_ = 1;  // lines of full detail in one
   std::array<double, 3> finer_{1, 1, 1};
   int stride_ = 1;
 };

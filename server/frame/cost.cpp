@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "protocol/view/shown.hpp"
 #include "server/data/model/coarsen.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/camera.hpp"
@@ -72,7 +73,7 @@ class Counting {
         visible_(visible_part(outline.camera, lattice_)),
         pixels_(static_cast<double>(outline.camera.width) * outline.camera.height),
         values_(level == std::array{0, 0, 0} ? 1 : 2) {
-    if (scene::is_section(view_.geometry)) {
+    if (protocol::is_section(view_.geometry)) {
       if (const auto section = scene::make_section(view_.geometry, lattice_)) {
         for (std::size_t a = 0; a < 3; ++a) samples_[a] = section->dims[a];
         cell_ = section->pitch;
@@ -140,6 +141,15 @@ class Counting {
     return count;
   }
 
+  // Of a level, no more than its samples.
+  [[nodiscard]] double lines(int stride) const {
+    double count = 1;
+    for (std::size_t a = 0; a < 3; ++a) {
+      count *= std::min(samples_[a], std::ceil(static_cast<double>(lattice_.dims[a]) / stride));
+    }
+    return count;
+  }
+
   [[nodiscard]] double drawn(double covered) const {
     return visible_.share * std::clamp(covered, covered_min, std::max(pixels_, covered_min)) /
            Cost::pixels_a_kernel;
@@ -166,7 +176,7 @@ class Counting {
     const double parts = vector.trace ? vector.trace->segments : 1;  // each is drawn as a line
     const double wide = width_of(vector);
     const double longish = length * visible_.px / parts;
-    const double count = parts * stops(vector.stride);
+    const double count = parts * lines(vector.stride);
     const double covering = count * drawn((longish + wide) * wide);
     add("/vector/stride", count);
     add(wide > longish ? "/vector/r2" : "/vector/length", covering);

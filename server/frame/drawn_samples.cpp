@@ -3,6 +3,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "server/data/model/coarsen.hpp"
 #include "server/data/model/volume.hpp"
 #include "server/light/shade.hpp"
 
@@ -41,6 +42,21 @@ std::optional<Index> DrawnSamples::neighbour(const Index& i, std::size_t a, int 
   next[a] += step;
   if (next[a] < low_[a] || next[a] >= high_[a]) return std::nullopt;
   return next;
+}
+
+std::optional<Index> DrawnSamples::neighbour_line(const Index& i, std::size_t a) const {
+  const scene::VectorLayer& layer = *scene_.vector;
+  const int halvings = layer.halvings[a];
+  const int stride = layer.data_stride;
+  if (stride == 1 || layer.drawn_places[a] > 1) {
+    const auto next = neighbour(i, a, layer.stride);
+    return next ? next : neighbour(i, a, -layer.stride);
+  }
+  const int samples = layer.data_dims[a];
+  const int own = ((i[a] << halvings) + stride / 2) / stride;
+  const int next = (own + 1) * stride < samples ? own + 1 : own - 1;
+  if (next < 0) return std::nullopt;
+  return neighbour(i, a, (data::strided_sample(next, stride, samples) >> halvings) - i[a]);
 }
 
 double DrawnSamples::edge(const Index& i, std::size_t a) const {

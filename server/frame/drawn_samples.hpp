@@ -65,6 +65,9 @@ class DrawnSamples {
   [[nodiscard]] std::size_t number(const Index& i) const;  // in a field
   [[nodiscard]] glm::dvec3 place(const Index& i) const;    // world units
   [[nodiscard]] std::optional<Index> neighbour(const Index& i, std::size_t a, int step) const;
+  // The sample of the next line along an axis, from that of a line; at the end of the axis of the
+  // one before.
+  [[nodiscard]] std::optional<Index> neighbour_line(const Index& i, std::size_t a) const;
   [[nodiscard]] double edge(const Index& i, std::size_t a) const;  // of its cell, world units
   [[nodiscard]] Medium medium(const Index& i) const;
   // Factors of colours at a sample by the light of the scene.

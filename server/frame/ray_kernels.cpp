@@ -48,6 +48,18 @@ void thin(std::vector<double>& rates, int halvings, std::size_t count) {
   rates = std::move(out);
 }
 
+// The boxes of the kernels at full detail, in cells of the level; of axes halved differently the
+// mean.
+void keep_boxes(scene::VectorLayer& lines) {
+  if (lines.halvings == std::array{0, 0, 0}) return;
+  const double halvings = lines.halvings[0] + lines.halvings[1] + lines.halvings[2];
+  const double box = lines.data_stride * std::exp2(-halvings / 3);
+  lines.span = box * (lines.overlap ? lines.span : 1.0);
+  lines.overlap = true;
+  lines.jitter_center *= box;
+  lines.jitter_stride *= box;
+}
+
 // The sample of a kernel position.
 Index sample_of(const reference::LayerGroup& layers, const Index& i) {
   Index out{};
@@ -123,6 +135,7 @@ RayKernels::RayKernels(const scene::Scene& scene, const Tolerances& marked)
       lines_->overlap = true;
       lines_->span = 1e9;
     }
+    keep_boxes(*lines_);
     thin(lines_->rate_x, lines_->halvings[1], scene.lattice.positions[1].size());
     thin(lines_->rate_z, lines_->halvings[2], scene.lattice.positions[2].size());
   }

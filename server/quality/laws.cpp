@@ -118,9 +118,14 @@ Terms terms_of(const Features& features) {
   return out;
 }
 
+double error_of_merged(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint);
+
 // By the law of the main cause alone.
 double error_of_cause(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   const Cause cause = cause_of(setting, viewpoint);
+  if (cause == Cause::merged && kind.lines && kind.lines_stride > 1) {
+    return error_of_merged(kind, setting, viewpoint);
+  }
   const Law& law = law_of(kind, cause);
   if (cause == Cause::kernel || cause == Cause::slab) {
     return std::exp(law.base) * tried_error(kind, setting, viewpoint);
@@ -132,6 +137,29 @@ double error_of_cause(const Kind& kind, const Setting& setting, const Viewpoint&
   const Terms terms = terms_of(features);
   return std::exp(
       std::min(std::inner_product(terms.begin(), terms.end(), law.slope.begin(), law.base), 0.0));
+}
+
+// Of lines with a stride. They are merged only by the halvings that exceed their stride, as if
+// there were no samples between them; before that by nothing but a smaller picture.
+double error_of_merged(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
+  Kind part = kind;
+  part.lines_stride = 1;
+  part.lines = false;
+  const double media = kind.medium ? error_of_cause(part, setting, viewpoint) : 0;
+  const int apart = std::ilogb(kind.lines_stride);
+  Viewpoint of_lines = viewpoint;
+  of_lines.detail = 0;
+  if (of_lines.content) {
+    of_lines.content->cell *= kind.lines_stride;
+    of_lines.content->finest_cell *= kind.lines_stride;
+  }
+  const Setting beyond{setting.method, setting.half_level, std::max(0, setting.coarser - apart),
+                       setting.thinner};
+  part.lines = true;
+  part.medium = false;
+  const bool changed = beyond.coarser > 0 || beyond.half_level > 0;
+  const double lines = changed ? error_of_cause(part, beyond, of_lines) : 0;
+  return std::hypot(media, lines);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "protocol/limits.hpp"
+#include "protocol/view/shown.hpp"
 
 namespace windsplat::quality {
 namespace {
@@ -73,7 +74,7 @@ bool is_allowed(const Setting& setting, const protocol::View& view, const Pictur
     const double thickness = view.method.slab_thickness / setting.thinner;
     if (!asked || thickness < protocol::limits::slab_thickness_min) return false;
   }
-  if (setting.coarser > 0 && view.method.detail == protocol::Detail::full) return false;
+  if (setting.coarser > 0 && protocol::is_drawn_in_full(view)) return false;
   if (setting.half_level == 0 && setting.sixteenths == 0) return true;
   return std::min(size.width, size.height) >= edge_min;
 }

@@ -68,7 +68,8 @@ std::optional<std::size_t> index_of(const Setting& setting);
 
 // Whether the server may use the setting for the view. A view of method kernel is drawn with slabs
 // only if it limits the error; slabs below the protocol's least thickness are excluded, as are
-// reduced pictures with an edge below 64 pixels, and coarser data if the view requires full detail.
+// reduced pictures with an edge below 64 pixels, and coarser data if those of the view are never
+// merged.
 bool is_allowed(const Setting& setting, const protocol::View& view);
 // The same, if the size of its picture is known.
 bool is_allowed(const Setting& setting, const protocol::View& view, const PictureSize& size);

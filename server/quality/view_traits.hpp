@@ -47,6 +47,7 @@ struct Kind {
   double thickness = 1;  // thickness of slabs, cells
   double rule = 0;       // error of approximate compositing, at the slab thickness of the view
   double stop = 0;       // error of early termination where the content is unknown
+  int lines_stride = 1;  // of lines, in samples
 };
 
 // Everything in a completed view that affects errors except camera, picture size and step, as a

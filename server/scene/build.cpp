@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "protocol/view/shown.hpp"
 #include "server/light/lit_scene.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
@@ -24,6 +25,11 @@ namespace windsplat::scene {
 
 namespace {
 
+using protocol::absorbs;
+using protocol::has_strided_lines;
+using protocol::is_drawn_in_full;
+using protocol::is_section;
+using protocol::shows_lines;
 using protocol::View;
 
 constexpr int table_entries = 256;
@@ -104,8 +110,10 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
   layer.magnitude_intensity = from.color.true_colors ? 0 : from.magnitude_intensity;
 }
 
-data::Coarsening drawn(data::Coarsening how) {
+// Of lines.
+data::Coarsening drawn(data::Coarsening how, const View& view) {
   how.reduction = data::Reduction::drawn;
+  how.stride = view.vector.stride;
   return how;
 }
 
@@ -133,7 +141,8 @@ struct Fields {
     return find(name, coarsening, kept_of(name, protocol::FilterOf::media));
   }
   [[nodiscard]] Needed of_lines(const std::string& name) const {
-    return find(name, drawn(coarsening), kept_of(name, protocol::FilterOf::lines));
+    return find(name, drawn(coarsening, completed.view()),
+                kept_of(name, protocol::FilterOf::lines));
   }
   // Samples of the data without those that the region leaves out.
   [[nodiscard]] data::Derivation kept_of(const std::string& name, protocol::FilterOf of) const {
@@ -173,34 +182,13 @@ struct NeededScene {
   std::vector<NeededMedium> media;
 };
 
-bool shows_lines(const View& view) {
-  return view.vector.field.kind == protocol::FieldChoice::Kind::named && view.vector.opacity > 0;
-}
-
-// A stride counts samples of the data, the reference uses all of them, a section has its own, and
-// streamlets follow the field itself.
-bool is_drawn_in_full(const View& view) {
-  const bool strided = (shows_lines(view) && view.vector.stride > 1) ||
-                       std::any_of(view.scalars->begin(), view.scalars->end(),
-                                   [](const auto& scalar) { return scalar.stride > 1; });
-  const bool traced = shows_lines(view) && has_streamlets(view);
-  return view.method.detail == protocol::Detail::full || strided || traced ||
-         is_section(view.geometry) || view.method.name == protocol::MethodName::reference;
-}
-
 MergeLimits merge_limits(const View& view) {
   MergeLimits limits;
-  if (!shows_lines(view)) return limits;
+  if (!shows_lines(view) || has_strided_lines(view)) return limits;  // a halving merges none
   VectorLayer layer;
   set_radii(view.vector, view.image.height, layer);
   limits.samples = std::min(limits.samples, 1 / layer.opacity);
   return limits;
-}
-
-// Extinctions that follow from the data are not yet known for an outline.
-bool absorbs(const protocol::ScalarView& scalar) {
-  return !scalar.extinction || std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
-                                           [](const auto& point) { return point[1] > 0; });
 }
 
 // A field and how it is reduced.
@@ -212,9 +200,9 @@ struct Shown {
 std::vector<Shown> shown_at(const View& view, const data::Coarsening& how) {
   std::vector<Shown> shown;
   if (shows_lines(view)) {
-    shown.push_back({view.vector.field.name, drawn(how)});
+    shown.push_back({view.vector.field.name, drawn(how, view)});
     if (view.vector.color.by == protocol::ColorBy::scalar) {
-      shown.push_back({view.vector.color.field.value(), drawn(how)});
+      shown.push_back({view.vector.color.field.value(), drawn(how, view)});
     }
   }
   for (const protocol::ScalarView& scalar : *view.scalars) {

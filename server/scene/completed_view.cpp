@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "protocol/limits.hpp"
+#include "protocol/view/shown.hpp"
 #include "server/base/ascii.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/scene/camera.hpp"

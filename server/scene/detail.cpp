@@ -139,12 +139,16 @@ void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pi
   layer.halvings = level;
   layer.data_dims = fine.dims;
   layer.first_sample = fine.first;
+  if (level == std::array{0, 0, 0}) return;
+  layer.data_stride = std::exchange(layer.stride, 1);
   double lines = 1;
-  double apart_px = 0;  // first to last sample of a group, at the nearest point of the box
+  double apart_px = 0;  // first to last line of a group, at the nearest point of the box
   for (std::size_t a = 0; a < 3; ++a) {
-    const double group = std::exp2(level[a]);
+    layer.drawn_places[a] = data::drawn_places(level[a], layer.data_stride);
+    const double group = layer.drawn_places[a];
+    const double apart = layer.data_stride * cell_size(fine, a);
     lines *= group;
-    apart_px = std::max(apart_px, (group - 1) * cell_size(fine, a) * pixels_per_unit);
+    apart_px = std::max(apart_px, (group - 1) * apart * pixels_per_unit);
   }
   const double together = lines * layer.opacity;
   layer.opacity = std::min(1.0, together);

@@ -53,9 +53,10 @@ Lattice coarsen_lattice(const Lattice& lattice, const std::array<int, 3>& level)
 std::vector<double> coarsen_along(const std::vector<double>& values,
                                   const std::vector<double>& widths, int halvings);
 
-// Adjusts the lines of a layer for this level: each represents n lines by the opacity
-// a' = min(1, n a). The excess over 1 increases its width, limited by the distance of the merged
-// samples on the screen, because lines within one pixel would hide each other.
+// Adjusts the lines of a layer for this level: each represents n lines of full detail, with a
+// stride fewer than samples, by the opacity a' = min(1, n a). The excess over 1 increases its
+// width, limited by the distance of the merged samples on the screen, because lines within one
+// pixel would hide each other.
 void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pixels_per_unit,
                  VectorLayer& layer);
 

@@ -350,11 +350,6 @@ std::array<float, 3> rounded(const glm::dvec3& place) {
 
 }  // namespace
 
-bool is_section(const protocol::GeometryView& geometry) {
-  return geometry.plane ||
-         (geometry.slice && geometry.slice->index != std::floor(geometry.slice->index));
-}
-
 Result<Section> make_section(const protocol::GeometryView& geometry, const Lattice& whole) {
   if (geometry.plane) {
     auto plane = make_plane(*geometry.plane, whole);

@@ -22,9 +22,6 @@ namespace windsplat::scene {
 // Largest number of samples of a plane; they take up to 48 bytes each.
 constexpr std::int64_t plane_samples_max = std::int64_t{1} << 22U;
 
-// Whether the view draws samples between those of the data.
-bool is_section(const protocol::GeometryView& geometry);
-
 // Has one sample along `axis`. The lattice of the data, `whole`, must outlive it and what is
 // derived from it, unless `owner` keeps it.
 struct Section {

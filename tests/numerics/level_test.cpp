@@ -145,5 +145,44 @@ TEST(Level, DrawsASubsetOfTheLines) {
   EXPECT_GT(sum, 10);
 }
 
+// At a level no wider than their stride, lines are those of full detail: of the same samples, in
+// the same places, as long and as opaque. Pictures differ by rounding alone, and of method kernel
+// by the order of lines whose kernels are close to each other; the medium, which lets the level be
+// chosen, is left out of both.
+TEST(Level, KeepsLinesWithAStrideAsTheyAre) {
+  const TrialField field{"turbulence", {29, 22, 18}, {1e3, 1e3, 1e3}};
+  const auto dataset = trial_dataset(field);
+  for (const int stride : {2, 3, 4, 7}) {
+    for (const double span : {1.0, 7.0}) {
+      protocol::View view = small_view(field, Shown::both);
+      view.image.width = 160;
+      view.image.height = 120;
+      view.vector.stride = stride;
+      view.vector.span = span;
+      const auto completed = scene::complete(view, *dataset);
+      auto coarser = scene::build_scene(completed->coarsened(stride >= 4 ? 2 : 1), *dataset);
+      auto full = scene::build_scene(*completed, *dataset);
+      ASSERT_TRUE(coarser) << coarser.error().message;
+      ASSERT_EQ(full->level, (std::array{0, 0, 0}));
+      ASSERT_GT(*std::max_element(coarser->level.begin(), coarser->level.end()), 0);
+      coarser->scalars.clear();
+      full->scalars.clear();
+      for (const scene::Method method : {scene::Method::kernel, scene::Method::slab}) {
+        coarser->method = full->method = method;
+        const auto level = render(*coarser, 2).image;
+        const auto whole = render(*full, 2).image;
+        double most = 0;
+        double sum = 0;
+        for (std::size_t i = 0; i < whole.rgba.size(); ++i) {
+          most = std::max(most, static_cast<double>(std::abs(level.rgba[i] - whole.rgba[i])));
+          sum += whole.rgba[i];
+        }
+        EXPECT_GT(sum, 30) << stride;
+        EXPECT_LT(most, method == scene::Method::slab ? 2e-3 : 0.04) << stride << ' ' << span;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace windsplat::test

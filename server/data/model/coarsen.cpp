@@ -224,18 +224,26 @@ class TwoValueReducer {
   Volume coarse_;
 };
 
-// The place in a group that the highest bits of a hash draw; lines of the engine's kernels repeat
-// it (drawn_samples in server/engine/kernels).
-std::size_t drawn_place(int halvings, std::uint32_t hash) {
-  return std::uint64_t{hash} >> static_cast<unsigned>(32 - halvings);
+// The sample that the highest bits of a hash draw from a group along an axis, if there is one;
+// lines of the engine's kernels repeat it (drawn_samples in server/engine/kernels).
+std::optional<std::size_t> drawn_sample(const Group& group, int halvings, int stride, int samples,
+                                        std::uint32_t hash) {
+  const auto places = static_cast<std::uint32_t>(drawn_places(halvings, stride));
+  const auto place = static_cast<int>((hash >> 16U) * places >> 16U);
+  const auto first = static_cast<int>(group.first);
+  const int kernel = (first + stride / 2) / stride + place;  // of the first whole one in the group
+  if (kernel * stride >= samples) return std::nullopt;
+  const int sample = strided_sample(kernel, stride, samples);
+  if (sample < first || sample >= first + static_cast<int>(group.count)) return std::nullopt;
+  return static_cast<std::size_t>(sample);
 }
 
 // Copies drawn samples, group by group. Hashes are of the group's indices alone.
 class Drawer {
  public:
-  Drawer(const Volume& fine, const std::array<int, 3>& halvings)
-      : fine_(fine), halvings_(halvings) {
-    for (std::size_t a = 0; a < 3; ++a) coarse_.dims[a] = halved(fine.dims[a], halvings[a]);
+  Drawer(const Volume& fine, const Coarsening& how)
+      : fine_(fine), halvings_(how.halvings), stride_(how.stride) {
+    for (std::size_t a = 0; a < 3; ++a) coarse_.dims[a] = halved(fine.dims[a], halvings_[a]);
     coarse_.components = fine.components;
     coarse_.values = Samples(coarse_.samples() * static_cast<std::size_t>(fine.components));
   }
@@ -264,7 +272,7 @@ class Drawer {
     }
   }
 
-  // Empty: a place beyond the last sample.
+  // Empty: no sample at the place that is drawn.
   [[nodiscard]] std::optional<std::size_t> drawn(const std::array<int, 3>& group) const {
     const auto hash =
         pcg3d({static_cast<std::uint32_t>(group[0]), static_cast<std::uint32_t>(group[1]),
@@ -272,15 +280,16 @@ class Drawer {
     std::size_t at = 0;
     for (std::size_t a = 3; a-- > 0;) {
       const Group along = group_at(static_cast<std::size_t>(group[a]), halvings_[a], fine_.dims[a]);
-      const std::size_t place = drawn_place(halvings_[a], hash[a]);
-      if (place >= along.count) return std::nullopt;
-      at = at * static_cast<std::size_t>(fine_.dims[a]) + along.first + place;
+      const auto sample = drawn_sample(along, halvings_[a], stride_, fine_.dims[a], hash[a]);
+      if (!sample) return std::nullopt;
+      at = at * static_cast<std::size_t>(fine_.dims[a]) + *sample;
     }
     return at;
   }
 
   const Volume& fine_;
   std::array<int, 3> halvings_;
+  int stride_;
   Volume coarse_;
 };
 
@@ -292,7 +301,7 @@ int halved(int samples, int halvings) {
 }
 
 Volume coarsen(const Volume& fine, const Coarsening& how) {
-  if (how.reduction == Reduction::drawn) return Drawer(fine, how.halvings).run();
+  if (how.reduction == Reduction::drawn) return Drawer(fine, how).run();
   return TwoValueReducer(fine, how).run();
 }
 
@@ -301,7 +310,8 @@ int reduced_components(int components, Reduction reduction) {
 }
 
 std::string key_of(const Coarsening& how) {
-  std::string key = how.reduction == Reduction::drawn ? "drawn" : "two values";
+  std::string key = "two values";
+  if (how.reduction == Reduction::drawn) key = "drawn " + std::to_string(how.stride) + ' ';
   for (std::size_t a = 0; a < 3; ++a) {
     key += std::to_string(how.halvings[a]) + ':';
     if (how.halvings[a] == 0 || how.reduction == Reduction::drawn) continue;

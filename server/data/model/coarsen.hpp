@@ -15,8 +15,22 @@ namespace windsplat::data {
 // keeps magnitudes and directions, and in expectation any sum over the samples (stochastic
 // simplification: Cook, Halstead, Planck, Ryu, SIGGRAPH 2007). The draw is among the places of a
 // whole group, also where the last group of an axis has fewer samples: a sample has the same
-// probability in every group.
+// probability in every group. With a stride, the draw is among the samples of strided kernels.
 enum class Reduction { two_values, drawn };
+
+// The sample of the n-th strided kernel along an axis: the middle one (the lower of two) of
+// `stride` samples, at the end of the axis of the remaining ones. n stride < samples.
+inline int strided_sample(int n, int stride, int samples) {
+  const int first = n * stride;
+  const int last = (first + stride < samples ? first + stride : samples) - 1;
+  return first + (last - first) / 2;
+}
+
+// The number of places among which one is drawn along an axis: a group of 2^halvings samples has at
+// most as many strided kernels that are whole.
+inline int drawn_places(int halvings, int stride) {
+  return ((1 << halvings) + stride - 1) / stride;
+}
 
 // halvings[a] = h: 2^h samples along axis a become one; the last group may be smaller.
 // widths[a]: cell widths along an axis, in any unit, since only ratios matter; only two values of
@@ -25,6 +39,7 @@ struct Coarsening {
   std::array<int, 3> halvings{0, 0, 0};
   std::array<std::vector<double>, 3> widths;
   Reduction reduction = Reduction::two_values;
+  int stride = 1;  // of kernels, in samples; drawn only
 };
 
 // Number of samples along an axis after `halvings` halvings.
@@ -33,9 +48,10 @@ int halved(int samples, int halvings);
 // two_values: of a scalar; the samples are weighted by the volumes of their cells, so that
 // integrals over space are preserved. O(samples), two passes over the source.
 //
-// drawn: a sample of each group with all its components, masked if that sample is or if the place
-// drawn lies beyond the last sample. The draw depends on the position of the group alone, so that
-// all fields of a level draw the same samples.
+// drawn: a sample of each group with all its components, masked if that sample is, if the place
+// drawn lies beyond the last sample, or if the group has no sample of a strided kernel there. The
+// draw depends on the position of the group alone, so that all fields of a level draw the same
+// samples.
 Volume coarsen(const Volume& fine, const Coarsening& how);
 
 // Components of the reduction of a field with `components`.

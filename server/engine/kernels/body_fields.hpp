@@ -65,9 +65,19 @@ KERNEL_INLINE Three<Kernel> fetch_vectors(const Pass& pass, const Rows& rows, in
           hn::IfThenElse(masked, zero, z)};
 }
 
+// Indices below 2^20 divided by the stride of the data, rounded down. Half an index more than a
+// multiple is farther from the next one than the product is from the quotient.
+KERNEL_INLINE UnsignedOf<Kernel> divided_by_stride(const LineStyle& line,
+                                                   UnsignedOf<Kernel> index) {
+  const hn::RebindToUnsigned<KernelTag> tag;
+  const hn::RebindToSigned<KernelTag> integers;
+  const Kernel number = from_integer<Kernel>(hn::BitCast(integers, index)) + all<Kernel>(0.5F);
+  return hn::BitCast(tag, hn::ConvertTo(integers, number * all<Kernel>(line.inverse_data_stride)));
+}
+
 // The samples of the data whose lines are drawn. At a coarser level, each is drawn from a group by
-// the highest bits of a hash (data::Reduction::drawn). Beyond the last sample, where the field is
-// masked, the last one.
+// the highest bits of a hash (data::Reduction::drawn). Where the group has no sample at that place
+// the field is masked, and the sample any one.
 KERNEL_INLINE Hash3<UnsignedOf<Kernel>> drawn_samples(const LineStyle& line, const Rows& rows,
                                                       int i) {
   const hn::RebindToUnsigned<KernelTag> tag;
@@ -78,10 +88,16 @@ KERNEL_INLINE Hash3<UnsignedOf<Kernel>> drawn_samples(const LineStyle& line, con
   const Hash3<UnsignedOf<Kernel>> group = {position(0), position(1), position(2)};
   if (line.merged == 0) return group;
   const auto drawn = [&](int a, UnsignedOf<Kernel> index, UnsignedOf<Kernel> bits) {
-    const int halvings = line.halvings[a];
-    const auto place = hn::ShiftRight<1>(hn::ShiftRightSame(bits, 31 - halvings));
-    const auto last = hn::Set(tag, static_cast<std::uint32_t>(line.data_dims[a] - 1));
-    return hn::Min(hn::ShiftLeftSame(index, halvings) + place, last);
+    const auto number = [&](int n) { return hn::Set(tag, static_cast<std::uint32_t>(n)); };
+    const auto place = hn::ShiftRight<16>(hn::ShiftRight<16>(bits) * number(line.drawn_places[a]));
+    const auto first = hn::ShiftLeftSame(index, line.halvings[a]);
+    const auto last = number(line.data_dims[a] - 1);
+    if (line.data_stride == 1) return hn::Min(first + place, last);
+    // The middle one of the samples of the kernel.
+    const auto kernel = divided_by_stride(line, first + number(line.data_stride / 2)) + place;
+    const auto low = hn::Min(kernel * number(line.data_stride), last);
+    const auto high = hn::Min(low + number(line.data_stride - 1), last);
+    return low + hn::ShiftRight<1>(high - low);
   };
   const Hash3<UnsignedOf<Kernel>> hash = pcg3d(group);
   return {drawn(0, group.x, hash.x), drawn(1, group.y, hash.y), drawn(2, group.z, hash.z)};

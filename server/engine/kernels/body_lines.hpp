@@ -15,11 +15,12 @@ struct Segments {
   Kernel phase;  // phase of the moving texture
 };
 
-// The samples of the data whose lines are drawn. At a coarser level, each is one of `count` samples
-// along an axis, at `place` relative to the kernel position, in cells of the level.
+// The samples of the data whose lines are drawn. At a coarser level, each is at `place` relative to
+// the kernel position along an axis, and the box of its kernel at full detail is `box` wide, both
+// in cells of the level.
 struct Origins {
   Hash3<UnsignedOf<Kernel>> sample;
-  Three<Kernel> place, count;
+  Three<Kernel> place, box;
 };
 
 KERNEL_INLINE Origins origins_of(const LineStyle& line, const Rows& rows, int i) {
@@ -29,20 +30,25 @@ KERNEL_INLINE Origins origins_of(const LineStyle& line, const Rows& rows, int i)
   if (line.merged == 0) return out;
   const hn::RebindToUnsigned<KernelTag> tag;
   const hn::RebindToSigned<KernelTag> integers;
-  const auto find = [&](int a, UnsignedOf<Kernel> sample, Kernel& place, Kernel& count) {
+  const auto find = [&](int a, UnsignedOf<Kernel> sample, Kernel& place, Kernel& box) {
     const int halvings = line.halvings[a];
     const auto group = hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i));
     const auto first = hn::ShiftLeftSame(group, halvings);
     const auto size = hn::Set(tag, 1U << static_cast<unsigned>(halvings));
-    const auto rest = hn::Set(tag, static_cast<std::uint32_t>(line.data_dims[a])) - first;
-    count = from_integer<Kernel>(hn::BitCast(integers, hn::Min(size, rest)));
+    const auto dims = hn::Set(tag, static_cast<std::uint32_t>(line.data_dims[a]));
+    const Kernel count = from_integer<Kernel>(hn::BitCast(integers, hn::Min(size, dims - first)));
     const Kernel middle =
         from_integer<Kernel>(hn::BitCast(integers, sample - first)) + all<Kernel>(0.5F);
     place = middle / count - all<Kernel>(0.5F);
+    box = one / count;
+    if (line.data_stride == 1) return;
+    const auto stride = hn::Set(tag, static_cast<std::uint32_t>(line.data_stride));
+    const auto before = divided_by_stride(line, sample) * stride;  // of the kernel
+    box = from_integer<Kernel>(hn::BitCast(integers, hn::Min(stride, dims - before))) / count;
   };
-  find(0, out.sample.x, out.place.x, out.count.x);
-  find(1, out.sample.y, out.place.y, out.count.y);
-  find(2, out.sample.z, out.place.z, out.count.z);
+  find(0, out.sample.x, out.place.x, out.box.x);
+  find(1, out.sample.y, out.place.y, out.box.y);
+  find(2, out.sample.z, out.place.z, out.box.z);
   return out;
 }
 
@@ -103,16 +109,16 @@ KERNEL_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
   const Kernel by_centre = all<Kernel>(line.jitter_center);
   const Kernel by_stride = all<Kernel>(line.jitter_stride);
   const auto centred = [&](UnsignedOf<Kernel> bits) { return unit_interval<Kernel>(bits) - half; };
-  // In cells of the data.
+  // In boxes of the kernels at full detail.
   const Three<Kernel> in_box = {by_centre * centred(centre.x), by_centre * centred(centre.y),
                                 by_centre * centred(centre.z)};
   Three<Kernel> moved = {hn::MulAdd(by_stride, centred(kernel.x), in_box.x),
                          hn::MulAdd(by_stride, centred(kernel.y), in_box.y),
                          hn::MulAdd(by_stride, centred(kernel.z), in_box.z)};
   if (line.merged != 0) {
-    moved = {moved.x / origins.count.x + origins.place.x,
-             moved.y / origins.count.y + origins.place.y,
-             moved.z / origins.count.z + origins.place.z};
+    moved = {hn::MulAdd(moved.x, origins.box.x, origins.place.x),
+             hn::MulAdd(moved.y, origins.box.y, origins.place.y),
+             hn::MulAdd(moved.z, origins.box.z, origins.place.z)};
   }
   Segments s;
   s.offset = cells.to_world(moved);
@@ -122,7 +128,7 @@ KERNEL_INLINE Segments place_segments(const LineStyle& line, const Rows& rows,
   if (line.moving != 0) s.phase = unit_interval<Kernel>(pcg3d(centre).x);
   Three<Kernel> along = cells.to_grid(s.extent);
   if (line.merged != 0) {
-    along = {along.x * origins.count.x, along.y * origins.count.y, along.z * origins.count.z};
+    along = {along.x / origins.box.x, along.y / origins.box.y, along.z / origins.box.z};
   }
   clip_to_box(line.half_span, in_box, along, s);
   return s;

@@ -226,7 +226,7 @@ void brick_reach(const Camera& camera, const Pass& pass, const Brick& brick, con
     float shift = 0;  // offset of its centre
     float square = 0;
     for (int a = 0; a < 3; ++a) {
-      box += pass.line.half_span * absolute(frame[c][a]) * cell[a];
+      box += pass.line.half_box[a] * absolute(frame[c][a]) * cell[a];
       shift += pass.line.shift[a] * absolute(frame[c][a]) * cell[a];
       square += frame[c][a] * frame[c][a] * cell[a] * cell[a];
     }

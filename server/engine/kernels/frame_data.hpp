@@ -84,13 +84,17 @@ struct LineStyle {
   float length;  // world units at full magnitude
   float inverse_full_magnitude;
   float min_magnitude;
-  float half_span;  // half the width of the kernel box, in cells of the data
+  float half_span;  // half the width of the kernel box, in boxes of one kernel at full detail
   // Lines of a coarser level; see data::Reduction::drawn.
   int merged;  // 0 at full detail
   int halvings[3];
   int data_dims[3];
-  float shift[3];  // bound on the distance of a line's centre from its position, in cells
-  float r1, r2;    // pixels
+  int data_stride;  // of the kernels at full detail
+  float inverse_data_stride;
+  int drawn_places[3];
+  float half_box[3];  // bound on half the width of the kernel box, in cells
+  float shift[3];     // bound on the distance of a line's centre from its position, in cells
+  float r1, r2;       // pixels
   float inverse_ramp;
   float opacity;
   float reach, steep;  // opacity of a pixel: clamp(reach - steep distance, 0, opacity)

@@ -28,6 +28,7 @@ void chain_lines(const trace::Segments& from, kernels::LineStyle& to) {
   // No vertex of a segment is farther from the other than half of this.
   to.length = static_cast<float>(2 * std::max(from.longest, static_cast<double>(to.length)));
   to.half_span = 1e9F;
+  std::fill(std::begin(to.half_box), std::end(to.half_box), to.half_span);
   for (const float*& component : to.velocity) component = nullptr;
   to.rate_x = to.rate_z = nullptr;
   to.merged = 0;

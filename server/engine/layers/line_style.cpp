@@ -22,16 +22,28 @@ double magnitude_scale(const scene::VectorLayer& from) {
   return trace::Segments::scale_of(from.magnitude_range[1]);
 }
 
+// The width of the box of one kernel at full detail in cells of the level, at most; at least 1.
+double widest_box(int halvings, int dims, int stride) {
+  const int group = 1 << halvings;
+  const int least = dims % group == 0 ? group : dims % group;  // samples of the smallest group
+  return std::max(1.0, static_cast<double>(stride) / least);
+}
+
 void set_detail(const scene::VectorLayer& from, kernels::LineStyle& to) {
-  to.merged = 0;
+  to.merged = from.halvings == std::array{0, 0, 0} ? 0 : 1;
+  to.data_stride = from.data_stride;
+  to.inverse_data_stride = 1.0F / static_cast<float>(from.data_stride);
   for (std::size_t a = 0; a < 3; ++a) {
     const int halvings = from.halvings[a];
     to.halvings[a] = halvings;
     to.data_dims[a] = from.data_dims[a];
     WINDSPLAT_CHECK(halvings >= 0 && halvings <= 15);  // products of indices fit in 32 bits
-    const double jitter = 0.5 * (from.jitter_center + from.jitter_stride);
-    to.shift[a] = static_cast<float>(halvings > 0 ? 0.5 + jitter : jitter);
-    if (halvings > 0) to.merged = 1;
+    to.drawn_places[a] = from.drawn_places[a];
+    const double box =
+        to.merged != 0 ? widest_box(halvings, from.data_dims[a], from.data_stride) : 1;
+    to.half_box[a] = static_cast<float>(box) * to.half_span;
+    const double jitter = 0.5 * (from.jitter_center + from.jitter_stride) * box;
+    to.shift[a] = static_cast<float>(to.merged != 0 ? 0.5 + jitter : jitter);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "protocol/view/shown.hpp"
 #include "server/scene/refusal.hpp"
 #include "server/scene/region/crop.hpp"
 #include "server/scene/traced/streamlines.hpp"

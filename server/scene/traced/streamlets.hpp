@@ -12,13 +12,6 @@
 
 namespace windsplat::scene {
 
-// Whether lines follow the flow.
-inline bool has_streamlets(const protocol::View& view) { return view.vector.trace.has_value(); }
-// Whether they are those through seeds.
-inline bool has_seeds(const protocol::View& view) {
-  return view.vector.trace && view.vector.trace->seeds;
-}
-
 // The streamlets of a layer whose fields are loaded, on the lattice of the whole data, or its lines
 // through seeds. Computed on first need, shared, counted and evicted like a level of a volume; what
 // they depend on is their key. `how`: that of the vectors of the layer. Errors: invalid at

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "protocol/view/shown.hpp"
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
@@ -272,7 +273,7 @@ TEST(Between, AtALayerEqualsTheLayer) {
       view.geometry.slice = SliceView{axis, 2};
       const auto layer = test::render(built(view, *dataset));
       view.geometry.slice->index = 2 + 1e-12;
-      EXPECT_TRUE(is_section(view.geometry));
+      EXPECT_TRUE(protocol::is_section(view.geometry));
       EXPECT_LE(test::largest_difference(layer, test::render(built(view, *dataset))), 1e-5F);
     }
   }

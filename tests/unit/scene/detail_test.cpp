@@ -197,6 +197,28 @@ TEST(MergeLines, AddUpTheirOpacityAndThenTheirWidth) {
   EXPECT_EQ(merged.opacity, layer.opacity);
 }
 
+TEST(MergeLines, CountLinesAndNotTheSamplesBetweenThem) {
+  const Lattice lattice = cube(200);
+  VectorLayer layer;
+  layer.opacity = 0.1;
+  layer.stride = 4;
+  VectorLayer merged = layer;
+  merge_lines(lattice, {2, 2, 1}, 50, merged);
+  EXPECT_EQ(merged.opacity, layer.opacity);
+  EXPECT_EQ(merged.stride, 1);
+  EXPECT_EQ(merged.data_stride, 4);
+
+  // Eight samples have two lines along two axes each.
+  merged = layer;
+  merge_lines(lattice, {3, 3, 0}, 50, merged);
+  EXPECT_DOUBLE_EQ(merged.opacity, 0.4);
+
+  merged = layer;
+  merge_lines(lattice, {0, 0, 0}, 50, merged);
+  EXPECT_EQ(merged.stride, 4);
+  EXPECT_EQ(merged.data_stride, 1);
+}
+
 class LevelOfAScene : public testing::Test {
  protected:
   void SetUp() override {
@@ -246,9 +268,28 @@ TEST_F(LevelOfAScene, IsFullWhereViewMethodOrStrideRequireIt) {
   view.method.name = protocol::MethodName::reference;
   expect_full("reference");
   view.method.name = protocol::MethodName::slab;
+  view.scalars = complete(view, *dataset)->view().scalars;
+  view.scalars->front().stride = 2;
+  expect_full("stride of a medium");
+  view.scalars->clear();
   view.vector.stride = 2;
-  expect_full("stride");
+  expect_full("stride of lines without a medium");
   EXPECT_NE(reduced.level, (Level{0, 0, 0}));
+}
+
+TEST_F(LevelOfAScene, KeepsLinesWithAStrideBesideAMedium) {
+  view.vector.stride = 3;
+  view.method.detail = protocol::Detail::full;
+  const Scene full = built();
+  view.method.detail = protocol::Detail::automatic;
+  const Scene scene = built();
+  EXPECT_GE(scene.level[0], 1);
+  EXPECT_EQ(scene.vector->field->dims, scene.lattice.dims);
+  EXPECT_EQ(scene.vector->opacity, full.vector->opacity) << "no line represents another";
+  std::int64_t lines = 0;
+  const auto& volume = *scene.vector->field;
+  for (std::size_t n = 0; n < volume.samples(); ++n) lines += std::isnan(volume.values[n]) ? 0 : 1;
+  EXPECT_EQ(lines, 22 * 22 * 22);  // 64 / 3, rounded up
 }
 
 TEST_F(LevelOfAScene, KeepsTheCameraAndItsDepthCue) {

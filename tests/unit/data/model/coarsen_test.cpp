@@ -3,10 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
+#include <numeric>
 #include <random>
+#include <set>
 
 #include "server/data/resident/store.hpp"
 #include "server/data/samples/samples.hpp"
@@ -143,10 +147,76 @@ TEST(CoarsenByDrawing, IsMaskedWhereTheDrawnSampleIs) {
   EXPECT_NEAR(there, 32 * 32 * 8, 6 * std::sqrt(32 * 32 * 16 / 4.0));
 }
 
+// Samples in the middle of every `stride` of `count`, the lower of two; at the end of the rest.
+std::set<int> middles_of(int count, int stride) {
+  std::set<int> out;
+  for (int first = 0; first < count; first += stride) {
+    out.insert((first + std::min(first + stride, count) - 1) / 2);
+  }
+  return out;
+}
+
+// Groups no wider than a stride have at most one of these samples: each is there once.
+TEST(CoarsenByDrawing, KeepsTheSamplesOfStridedKernels) {
+  const std::array<int, 3> dims{22, 13, 9};
+  std::vector<float> values(22 * 13 * 9);
+  std::iota(values.begin(), values.end(), 0.0F);
+  const Volume fine = volume_of(dims, 1, std::move(values));
+  using Levels = std::vector<std::array<int, 3>>;
+  for (const auto& [stride, levels] : std::map<int, Levels>{{2, {{1, 1, 1}, {0, 1, 0}}},
+                                                            {3, {{1, 1, 1}, {1, 0, 1}}},
+                                                            {4, {{1, 1, 1}, {2, 1, 2}}},
+                                                            {5, {{2, 2, 1}}}}) {
+    for (const auto& halvings : levels) {
+      Coarsening how = drawn(halvings);
+      how.stride = stride;
+      const Volume coarse = coarsen(fine, how);
+      std::set<int> found;
+      for (std::size_t n = 0; n < coarse.values.size(); ++n) {
+        if (std::isnan(coarse.values[n])) continue;
+        const int from = static_cast<int>(coarse.values[n]);
+        EXPECT_TRUE(found.insert(from).second) << from;
+        EXPECT_EQ(static_cast<int>(n) % coarse.dims[0], (from % 22) >> halvings[0]);
+      }
+      std::set<int> expected;
+      for (const int k : middles_of(9, stride)) {
+        for (const int j : middles_of(13, stride)) {
+          for (const int i : middles_of(22, stride)) expected.insert(i + 22 * (j + 13 * k));
+        }
+      }
+      EXPECT_EQ(found, expected) << stride;
+    }
+  }
+}
+
+// Four samples hold two kernels of a stride of two, of which one is drawn, and one or two of a
+// stride of three: of the 8 in 24 samples, each is drawn with probability 1/2.
+TEST(CoarsenByDrawing, DrawsKernelsOfAStrideEquallyOften) {
+  const int rows = 64 * 64;
+  for (const int stride : {2, 3}) {
+    const int side = 64 * stride;
+    std::vector<float> values;
+    for (int n = 0; n < 24 * side * side; ++n) values.push_back(static_cast<float>(n % 24));
+    Coarsening how = drawn({2, 0, 0});
+    how.stride = stride;
+    const Volume coarse = coarsen(volume_of({24, side, side}, 1, std::move(values)), how);
+    std::map<int, int> count;
+    for (const float v : coarse.values) {
+      if (!std::isnan(v)) ++count[static_cast<int>(v)];
+    }
+    ASSERT_EQ(count.size(), middles_of(24, stride).size());
+    for (const auto& [sample, n] : count) {
+      EXPECT_TRUE(middles_of(24, stride).contains(sample)) << sample;
+      EXPECT_NEAR(n, rows / 2, 6 * std::sqrt(rows) / 2) << sample;
+    }
+  }
+}
+
 TEST(CoarsenByDrawing, HasAKeyOfItsOwn) {
   const std::array<std::vector<double>, 3> widths{std::vector<double>(8, 1.0), {}, {}};
   EXPECT_NE(key_of({{1, 0, 0}, widths}), key_of({{1, 0, 0}, widths, Reduction::drawn}));
   EXPECT_EQ(key_of(drawn({1, 0, 0})), key_of({{1, 0, 0}, widths, Reduction::drawn}));
+  EXPECT_NE(key_of(drawn({1, 0, 0})), key_of({{1, 0, 0}, {}, Reduction::drawn, 2}));
 }
 
 TEST(CoarsenToTwoValues, KeepsTheIntegralOverUnevenCells) {
