@@ -318,7 +318,7 @@ Json vector_to_json(const VectorView& vector) {
            {"scale", numbers_to_json(vector.scale)},
            {"length", number_or_null(vector.length)},
            {"span", canonical_number(vector.span)},
-           {"stride", vector.stride},
+           {"stride", vector.stride ? Json(*vector.stride) : Json(nullptr)},
            {"r1", canonical_number(vector.r1)},
            {"r2", canonical_number(vector.r2)},
            {"opacity", canonical_number(vector.opacity)},

@@ -152,7 +152,7 @@ struct VectorView {
   Vec3 scale{1, 1, 1};
   std::optional<double> length;  // world units drawn at the top of magnitude_range
   double span = 7;               // kernel width in grid strides
-  int stride = 1;                // grid samples
+  std::optional<int> stride;     // grid samples
   double r1 = 0.6;               // pixels at a picture height of 720
   double r2 = 1.4;
   double opacity = 0.8;

@@ -13,7 +13,7 @@ inline bool shows_lines(const View& view) {
 }
 
 inline bool has_strided_lines(const View& view) {
-  return shows_lines(view) && view.vector.stride > 1;
+  return shows_lines(view) && view.vector.stride.value_or(1) > 1;
 }
 
 // Whether lines follow the flow.

@@ -171,12 +171,12 @@ class Counting {
     }
     double widest = 0;
     for (std::size_t a = 0; a < 3; ++a) widest = std::max(widest, scene::cell_size(lattice_, a));
-    const double box = std::max(vector.span, 1.0) * vector.stride * widest * 2;
+    const double box = std::max(vector.span, 1.0) * *vector.stride * widest * 2;
     const double length = vector.trace ? *vector.length : std::min(*vector.length, box);
     const double parts = vector.trace ? vector.trace->segments : 1;  // each is drawn as a line
     const double wide = width_of(vector);
     const double longish = length * visible_.px / parts;
-    const double count = parts * lines(vector.stride);
+    const double count = parts * lines(*vector.stride);
     const double covering = count * drawn((longish + wide) * wide);
     add("/vector/stride", count);
     add(wide > longish ? "/vector/r2" : "/vector/length", covering);

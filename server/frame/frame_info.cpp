@@ -36,7 +36,7 @@ const char* compositing_text(protocol::Compositing compositing) {
 int stride_of(const protocol::View& view) {
   const bool lines = view.vector.field.kind != protocol::FieldChoice::Kind::none;
   const bool medium = view.scalars && !view.scalars->empty();
-  return !lines && medium ? view.scalars->front().stride : view.vector.stride;
+  return !lines && medium ? view.scalars->front().stride : view.vector.stride.value_or(1);
 }
 
 protocol::StreamletCounts counts_of(const trace::Tally& tally) {

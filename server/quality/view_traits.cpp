@@ -88,7 +88,7 @@ SceneSignature signature_of(const protocol::View& completed) {
   signature.kind.lines = completed.vector.field.kind != protocol::FieldChoice::Kind::none;
   signature.kind.medium = !completed.scalars || !completed.scalars->empty();
   signature.kind.radius = completed.vector.r2 + completed.vector.mark.halo;
-  signature.kind.lines_stride = completed.vector.stride;
+  signature.kind.lines_stride = completed.vector.stride.value_or(1);
   signature.kind.thickness = completed.method.slab_thickness;
   if (signature.kind.medium) {
     signature.kind.rule = error_of_rule(completed.method.compositing);

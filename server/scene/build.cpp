@@ -113,7 +113,7 @@ void set_colors(const protocol::VectorView& from, VectorLayer& layer) {
 // Of lines.
 data::Coarsening drawn(data::Coarsening how, const View& view) {
   how.reduction = data::Reduction::drawn;
-  how.stride = view.vector.stride;
+  how.stride = view.vector.stride.value();
   return how;
 }
 
@@ -279,7 +279,7 @@ Result<NeededLines> needed_lines(const View& view, const Placed& placed, const F
   if (!factors) return factors.error();
   layer.length = from.length.value();
   layer.span = from.span;
-  layer.stride = from.stride;
+  layer.stride = from.stride.value();
   set_radii(from, view.image.height, layer);
   layer.mark = mark_of(from, view.image.height);
   set_colors(from, layer);

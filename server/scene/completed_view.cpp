@@ -14,15 +14,15 @@
 #include "protocol/limits.hpp"
 #include "protocol/view/shown.hpp"
 #include "server/base/ascii.hpp"
-#include "server/data/model/digest.hpp"
 #include "server/scene/camera.hpp"
 #include "server/scene/colormap.hpp"
 #include "server/scene/defaults.hpp"
+#include "server/scene/defaults/first_step.hpp"
+#include "server/scene/defaults/from_data.hpp"
 #include "server/scene/difference/difference.hpp"
 #include "server/scene/earth/ground.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/lines/mark.hpp"
-#include "server/scene/rates.hpp"
 #include "server/scene/refusal.hpp"
 #include "server/scene/region/crop.hpp"
 #include "server/scene/region/select.hpp"
@@ -84,159 +84,12 @@ Result<void> check_color_field(const protocol::VectorColorView& color,
   return {};
 }
 
-// Numbers that follow from a field at the first step (step_of_defaults) and from `arguments`:
-// computed once, so that later steps do not need the first step resident. `placed`: where it is
-// part of the grid, they follow from the samples of that part.
-template <class Make>
-Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* what,
-                                            const std::string& field,
-                                            const std::vector<double>& arguments, const Make& make,
-                                            const Placed* placed = nullptr) {
-  std::string key = what;
-  key += '/' + field + '/';
-  key += data::digest_of(
-      {reinterpret_cast<const char*>(arguments.data()), arguments.size() * sizeof(double)});
-  data::Derivation part;
-  if (placed != nullptr && placed->crop) {
-    part = kept_part(*placed, dataset.info().find(field)->components.size(), {});
-    key += data::digest_of(placed->region);
-  }
-  return dataset.remembered(key, [&]() -> Result<std::vector<double>> {
-    auto volume = dataset.derived(field, step_of_defaults(dataset), part);
-    if (!volume) return volume.error();
-    return make(**volume);
-  });
-}
-
-std::vector<double> numbers_of(const Range& range) { return {range.begin(), range.end()}; }
-
-// Placement and slice as part of a cache key.
-std::vector<double> numbers_of(const Lattice& lattice, const std::optional<Slice>& slice) {
-  std::vector<double> out{slice ? slice->axis + 1.0 : 0.0,
-                          slice ? static_cast<double>(slice->sample) : 0.0};
-  for (int a = 0; a < 3; ++a) {
-    out.push_back(lattice.box_min[a]);
-    out.push_back(lattice.box_max[a]);
-  }
-  out.insert(out.end(), lattice.positions[2].begin(), lattice.positions[2].end());
-  return out;
-}
-
-Result<void> complete_magnitudes(View& view, const Placed& placed,
-                                 const std::optional<Slice>& slice, data::Dataset& dataset) {
-  const Lattice& lattice = placed.lattice;
-  protocol::VectorView& vector = view.vector;
-  const bool named = vector.field.kind == FieldChoice::Kind::named;
-  const std::string& field = vector.field.name;
-  if (!vector.magnitude_range && named) {
-    const auto range = from_first_step(
-        dataset, "magnitudes", field, {},
-        [](const data::Volume& volume) { return numbers_of(default_magnitude_range(volume)); });
-    if (!range) return range.error();
-    vector.magnitude_range = Range{(*range)[0], (*range)[1]};
-  }
-  if (!vector.magnitude_range) vector.magnitude_range = Range{0, 1};
-  const Range& range = *vector.magnitude_range;
-  if (!vector.min_magnitude && named) {
-    // The check uses default lines, so that it does not depend on the other keys of the view's
-    // lines.
-    protocol::VectorView plain;
-    plain.length = default_length(lattice, plain.stride, slice);
-    plain.magnitude_range = vector.magnitude_range;
-    std::vector<double> arguments = numbers_of(lattice, slice);
-    arguments.insert(arguments.end(), {range[0], range[1], *plain.length});
-    const auto least = from_first_step(
-        dataset, "least magnitude", field, arguments,
-        [&](const data::Volume& volume) {
-          return std::vector{default_min_magnitude(plain, volume, lattice, slice)};
-        },
-        &placed);
-    if (!least) return least.error();
-    vector.min_magnitude = least->front();
-  }
-  if (!vector.min_magnitude) vector.min_magnitude = 0.0;
-  return {};
-}
-
 Result<void> check_vector(const protocol::VectorView& vector) {
   if (auto ok = check_map(vector.color.map, "/vector/color/map"); !ok) return ok;
   if (auto ok = check_color(vector.color.constant, "/vector/color/constant"); !ok) return ok;
   if (auto ok = check_color_range(vector.color.range, "/vector/color/range"); !ok) return ok;
   if (vector.r1 > vector.r2) return invalid_at("/vector/r1", "is greater than r2");
   return {};
-}
-
-Result<Range> first_scalar_range(const data::FieldInfo& field, data::Dataset& dataset) {
-  const auto range =
-      from_first_step(dataset, "range", field.name, {}, [&](const data::Volume& volume) {
-        return numbers_of(dataset.subtrahend() ? default_difference_range(volume)
-                                               : default_scalar_range(field, volume));
-      });
-  if (!range) return range.error();
-  return Range{(*range)[0], (*range)[1]};
-}
-
-Result<Range> first_rise_range(const View& view, const Placed& placed, data::Dataset& dataset) {
-  const protocol::VectorView& vector = view.vector;
-  const auto factors = component_factors(view, placed, *dataset.info().find(vector.field.name));
-  if (!factors) return factors.error();
-  const std::optional<Slice> slice = slice_of(view.geometry, placed.lattice);
-  std::vector<double> arguments = numbers_of(placed.lattice, slice);
-  arguments.insert(arguments.end(),
-                   {*vector.length, *vector.min_magnitude, (*vector.magnitude_range)[1],
-                    factors->scale.x, factors->scale.y, factors->scale.z});
-  if (const auto& rates = factors->rates) {
-    arguments.insert(arguments.end(), rates->x.begin(), rates->x.end());
-    arguments.push_back(rates->y);
-    arguments.insert(arguments.end(), rates->z.begin(), rates->z.end());
-  }
-  const auto range = from_first_step(
-      dataset, "rises", vector.field.name, arguments,
-      [&](const data::Volume& volume) {
-        return numbers_of(default_rise_range(vector, *factors, volume, slice));
-      },
-      &placed);
-  if (!range) return range.error();
-  return Range{(*range)[0], (*range)[1]};
-}
-
-// The range of the value that determines the colour.
-Result<Range> default_color_range(const View& view, const Placed& placed,
-                                  const std::array<double, 2>& depths, data::Dataset& dataset) {
-  const Lattice& lattice = placed.lattice;
-  const protocol::VectorView& vector = view.vector;
-  const bool lines = vector.field.kind == FieldChoice::Kind::named;
-  switch (*vector.color.by) {
-    case ColorBy::world_z: {
-      if (!lines) return height_range(lattice);
-      std::vector<double> arguments = numbers_of(lattice, std::nullopt);
-      arguments.push_back(*vector.min_magnitude);
-      const auto range = from_first_step(
-          dataset, "heights", vector.field.name, arguments,
-          [&](const data::Volume& volume) {
-            return numbers_of(default_height_range(vector, volume, lattice));
-          },
-          &placed);
-      if (!range) return range.error();
-      return Range{(*range)[0], (*range)[1]};
-    }
-    case ColorBy::screen_z:
-      return Range{depths[0], depths[1]};
-    case ColorBy::magnitude:
-      return default_magnitude_colors(vector);
-    case ColorBy::direction:
-      return Range{0, 360};
-    case ColorBy::scalar: {
-      if (!lines) break;
-      return first_scalar_range(*dataset.info().find(vector.color.field.value()), dataset);
-    }
-    case ColorBy::rise:
-      return lines ? first_rise_range(view, placed, dataset)
-                   : Result<Range>(Range{-*vector.length, *vector.length});
-    case ColorBy::constant:
-      break;
-  }
-  return Range{0, 1};
 }
 
 // Between closer points single precision, of which values and slopes are, does not suffice.
@@ -291,21 +144,6 @@ Result<void> outline_scalars(View& view, const data::DatasetInfo& info) {
   return {};
 }
 
-Result<void> complete_scalar(protocol::ScalarView& scalar, const Lattice& lattice,
-                             const std::optional<Slice>& slice, bool map, data::Dataset& dataset) {
-  if (scalar.color.range && scalar.extinction) return {};
-  const data::FieldInfo& field = *dataset.info().find(scalar.field);
-  const auto range = first_scalar_range(field, dataset);
-  if (!range) return range.error();
-  if (!scalar.color.range) scalar.color.range = *range;
-  if (!scalar.extinction) {
-    scalar.extinction = dataset.subtrahend()
-                            ? default_difference_extinction(field, *range, lattice, slice, map)
-                            : default_extinction(field, *range, lattice, slice, map);
-  }
-  return {};
-}
-
 // Checks that need neither data nor a placement.
 Result<void> check(const View& view, const data::DatasetInfo& info) {
   if (view.step < 0 || static_cast<std::size_t>(view.step) >= info.steps.size()) {
@@ -339,7 +177,11 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
     return invalid_at("/vector/trace",
                       "streamlets leave a slice or plane: set it to null, or vector.trace");
   }
-  if (!vector.length) vector.length = default_length(lattice, 1, slice_of(view.geometry, lattice));
+  if (!vector.length || !vector.stride) {
+    const LineSpacing spacing = spacing_of(view.geometry, lattice);
+    if (!vector.length) vector.length = spacing.length;
+    if (!vector.stride) vector.stride = spacing.stride;
+  }
   if (vector.trace && vector.trace->seeds) {
     const std::int64_t seeds = seeds_in(*vector.trace->seeds);
     if (seeds > protocol::limits::seeds_max) {
@@ -365,31 +207,6 @@ Result<Camera> complete_from_description(View& view, const data::DatasetInfo& in
   complete_heads(vector, view.image.background);
   if (auto ok = outline_scalars(view, info); !ok) return ok.error();
   return camera;
-}
-
-// The second pass: ranges and extinctions.
-Result<void> complete_from_data(View& view, const Camera& camera, const Placed& placed,
-                                data::Dataset& dataset) {
-  const Lattice& lattice = placed.lattice;
-  const std::optional<Slice> slice = slice_of(view.geometry, lattice);
-  if (auto ok = complete_magnitudes(view, placed, slice, dataset); !ok) return ok;
-  if (!view.vector.color.range) {
-    auto range = default_color_range(view, placed, view_depths(camera, lattice), dataset);
-    if (!range) return range.error();
-    view.vector.color.range = *range;
-  }
-  const bool map = draws_map(view, dataset.info());
-  for (protocol::ScalarView& scalar : *view.scalars) {
-    if (auto ok = complete_scalar(scalar, lattice, slice, map, dataset); !ok) return ok;
-  }
-  for (protocol::SurfaceView& surface : view.surfaces) {
-    const std::string field = color_field_of(surface);
-    if (field.empty() || surface.color.range) continue;
-    const auto range = first_scalar_range(*dataset.info().find(field), dataset);
-    if (!range) return range.error();
-    surface.color.range = *range;
-  }
-  return {};
 }
 
 // Errors: invalid at /geometry/plane, or a slice beyond the region.

@@ -10,7 +10,8 @@
 #include <limits>
 #include <string_view>
 
-#include "server/scene/camera.hpp"
+#include "server/scene/defaults/some_samples.hpp"
+#include "server/scene/defaults/spacing.hpp"
 #include "server/scene/lattice.hpp"
 #include "server/scene/surfaces/make_surfaces.hpp"
 
@@ -18,11 +19,7 @@ namespace windsplat::scene {
 
 namespace {
 
-constexpr std::size_t quantile_samples_max = std::size_t{1} << 15U;
-constexpr double length_spacings = 5.0;
-constexpr double coverage = 3.0;     // coverage of the projected box by lines
-constexpr double line_share = 0.75;  // mean length of the drawn lines relative to full length
-constexpr double value_max = 1e38;   // limit on numbers in a view
+constexpr double value_max = 1e38;  // limit on numbers in a view
 
 // A kind of scalar: words that identify it as part of its names, and short names that must match
 // exactly. Earlier kinds are preferred as media.
@@ -40,7 +37,7 @@ const std::vector<Kind>& kinds() {
        {"cl",  "cc",     "clt",  "clw",  "cli",  "clwc", "ciwc", "qc",  "qi",
         "tcc", "cldtot", "ql",   "qn",   "qcl",  "qcf",  "qci",  "lwc", "iwc",
         "cwc", "clwmr",  "icmr", "qliq", "qice", "rct",  "rit"},
-       {"clouds", 0.12, 12, true}},
+       {"clouds", 0.12, 12, true, false, false}},
       {{"energy"}, {}, {"inferno", 0.30, 6, false}},
       {{"smoke", "dust", "aerosol", "ash", "concentration", "tracer"},
        {},
@@ -55,8 +52,8 @@ const std::vector<Kind>& kinds() {
   return all;
 }
 
-const ScalarStyle body_style = {"grays", 0.0, 6, false};
-const ScalarStyle other_style = {"magma", 0.30, 8, false};
+const ScalarStyle body_style = {"grays", 0.0, 6, false, false, false};
+const ScalarStyle other_style = {"magma", 0.30, 8, false, true, true};
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -118,56 +115,6 @@ bool is_share(const data::FieldInfo& field, double whole, double most) {
   return most <= 0 || most > scalar_style(field).clear_below * whole;
 }
 
-// Indices of the samples that are shown.
-class SampleOrder {
- public:
-  SampleOrder(const std::array<int, 3>& dims, const std::optional<Slice>& slice) {
-    for (const int length : dims) all_ *= static_cast<std::size_t>(length);
-    if (!slice) return;
-    const auto axis = static_cast<std::size_t>(slice->axis);
-    length_ = static_cast<std::size_t>(dims.at(axis));
-    for (std::size_t a = 0; a < axis; ++a) stride_ *= static_cast<std::size_t>(dims[a]);
-    sample_ = static_cast<std::size_t>(slice->sample);
-  }
-  [[nodiscard]] std::size_t count() const { return all_ / length_; }
-  [[nodiscard]] std::size_t operator[](std::size_t n) const {
-    return (n / stride_ * length_ + sample_) * stride_ + n % stride_;
-  }
-
- private:
-  std::size_t all_ = 1;
-  std::size_t length_ = 1;  // length of the axis normal to the slice
-  std::size_t stride_ = 1;
-  std::size_t sample_ = 0;
-};
-
-// Calls body(index, value) for at most 2^15 unmasked samples spread evenly over the volume or over
-// its slice; the value of a vector is its magnitude.
-template <class Body>
-void for_some_samples(const data::Volume& volume, const std::optional<Slice>& slice,
-                      const Body& body) {
-  const SampleOrder order(volume.dims, slice);
-  const std::size_t samples = order.count();
-  const std::size_t count = std::min(samples, quantile_samples_max);
-  for (std::size_t n = 0; n < count; ++n) {
-    // Golden-ratio steps avoid aliasing with periods of the lattice.
-    const double turn = static_cast<double>(n) * 0.6180339887498949;
-    const double share = turn - std::floor(turn);
-    const std::size_t at =
-        order[samples <= quantile_samples_max
-                  ? n
-                  : std::min(samples - 1,
-                             static_cast<std::size_t>(share * static_cast<double>(samples)))];
-    double value = static_cast<double>(volume.component(0)[at]);
-    if (volume.components > 1) {
-      const double v = static_cast<double>(volume.component(1)[at]);
-      const double w = volume.components > 2 ? static_cast<double>(volume.component(2)[at]) : 0.0;
-      value = std::hypot(value, v, w);
-    }
-    if (std::isfinite(value)) body(at, value);
-  }
-}
-
 protocol::Range pick(std::vector<double>& values, double low, double high) {
   if (values.empty()) return {0, 0};
   const auto at = [&values](double quantile) {
@@ -178,9 +125,6 @@ protocol::Range pick(std::vector<double>& values, double low, double high) {
   const double lower = at(low);
   return {lower, at(high)};
 }
-
-// Increment for rounding to readable numbers, for values up to `most` > 0.
-double readable_grain(double most) { return std::pow(10.0, std::floor(std::log10(most))) / 20.0; }
 
 // A range within the limits of a view and of nonzero width.
 protocol::Range sound_range(double low, double high) {
@@ -237,36 +181,6 @@ double hidden_share(double min_magnitude, const data::Volume& volume) {
   return all == 0 ? 0 : static_cast<double>(hidden) / static_cast<double>(all);
 }
 
-double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
-                             const Lattice& lattice, const std::optional<Slice>& slice) {
-  const double top = (*vector.magnitude_range)[1];
-  const double least = std::max(0.0, top) / 100.0;
-  // Projected from the default viewpoint in a picture of the default size.
-  const protocol::ImageView image;
-  const OrbitFrame frame = orbit_frame(default_azimuth, front_elevation(lattice, image));
-  const Framing framing = frame_box(lattice, frame, {0, 0, 0}, 35, image);
-  const double pixel = framing.height / image.height;
-  const glm::dvec3 edge = lattice.box_max - lattice.box_min;
-  // A slice is assumed to be viewed along its normal.
-  const std::array<double, 3> sides = {edge.y * edge.z, edge.x * edge.z, edge.x * edge.y};
-  const double area =
-      slice ? sides.at(static_cast<std::size_t>(slice->axis))
-            : sides[2] * std::abs(frame.forward.z) + sides[1] * std::abs(frame.forward.y);
-  const double line = line_share * *vector.length * (vector.r1 + vector.r2) * pixel;
-  double lines = static_cast<double>(volume.samples());
-  for (std::size_t a = 0; a < 3; ++a) {
-    const bool across = slice && slice->axis == static_cast<int>(a);
-    const double strides =
-        across ? 1.0 : std::ceil(static_cast<double>(volume.dims[a]) / vector.stride);
-    lines *= strides / volume.dims[a];
-  }
-  const double shown = coverage * area / (line * lines);
-  if (!(shown < 1)) return least;
-  const double threshold = quantiles(volume, 1.0 - shown, 1.0, slice)[0];
-  const double grain = readable_grain(top);
-  return std::max(least, std::min(std::round(threshold / grain) * grain, 0.9 * top));
-}
-
 protocol::Range default_height_range(const protocol::VectorView& vector, const data::Volume& volume,
                                      const Lattice& lattice) {
   constexpr double below = 0.25;  // fraction of the width
@@ -285,8 +199,24 @@ protocol::Range default_height_range(const protocol::VectorView& vector, const d
           std::ceil(range[1] / grain) * grain};
 }
 
-protocol::Range default_magnitude_colors(const protocol::VectorView& vector) {
-  const protocol::Range& drawn = *vector.magnitude_range;
+double default_color_top(const data::Volume& volume) {
+  constexpr double far_beyond = 2.5;
+  const auto most = static_cast<double>(volume.range[1]);
+  const double nearly_all = quantiles(volume, 0.98, 0.98)[0];
+  double top = most;
+  if (most > far_beyond * nearly_all) {
+    top = std::min(far_beyond * nearly_all, quantiles(volume, 0.999, 0.999)[0]);
+    // For a flow that is almost zero nearly everywhere, use the maximum.
+    if (!(top > 1e-3 * most)) top = most;
+  }
+  if (!(top > 1e-29) || !std::isfinite(top)) return 0;
+  const double grain = readable_grain(top);
+  return std::min(std::ceil(top / grain * (1 - 1e-9)) * grain, value_max);
+}
+
+protocol::Range default_magnitude_colors(const protocol::VectorView& vector, double top) {
+  const protocol::Range drawn = {(*vector.magnitude_range)[0],
+                                 std::max((*vector.magnitude_range)[1], top)};
   const double grain = readable_grain(std::max(std::abs(drawn[0]), std::abs(drawn[1])));
   const double below = std::floor(0.7 * *vector.min_magnitude / grain) * grain;
   const double low = std::max(drawn[0], below);
@@ -437,22 +367,6 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
   const double clear = range[0] + signature.clear_below * (range[1] - range[0]);
   if (signature.clear_below <= 0) return {{range[0], 0}, {range[1], top}};
   return {{range[0], 0}, {clear, 0}, {range[1], top}};
-}
-
-double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice) {
-  double sum = 0;
-  int axes = 0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const bool wanted = a < 2 || axes == 0;  // the vertical only if there is no other
-    const bool across = slice && slice->axis == static_cast<int>(a);
-    if (!wanted || across || lattice.dims[a] < 2) continue;
-    sum += cell_size(lattice, a);
-    ++axes;
-  }
-  const double spacing = axes == 0 ? 0.2 : sum / axes;
-  const double length = length_spacings * spacing * stride;
-  const double grain = std::pow(10.0, std::floor(std::log10(length)) - 1.0);
-  return std::clamp(std::round(length / grain) * grain, 1e-9, 10.0);
 }
 
 protocol::ColorBy default_color_by(const data::Grid& grid, const std::optional<Slice>& slice) {

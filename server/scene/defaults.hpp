@@ -26,18 +26,18 @@ protocol::Range quantiles(const data::Volume& volume, double low, double high,
 // [0, top], with top such that about 2 % of the lines reach their full length.
 protocol::Range default_magnitude_range(const data::Volume& volume);
 
-// The magnitude exceeded by as many lines as cover the projected box about `coverage` times in the
-// length and width that the view sets: fewer leave gaps, more hide the flow behind the nearest
-// layer. At least a hundredth of the top of the range. For a slice, only its own lines and area
-// count.
-double default_min_magnitude(const protocol::VectorView& vector, const data::Volume& volume,
-                             const Lattice& lattice, const std::optional<Slice>& slice);
-
 // The share of unmasked samples whose magnitude is smaller, from at most 2^15 of them.
 double hidden_share(double min_magnitude, const data::Volume& volume);
 
-// Magnitudes from slightly below the weakest line drawn to the top of the range.
-protocol::Range default_magnitude_colors(const protocol::VectorView& vector);
+// The magnitude up to which colours reach by default: the greatest of the field, rounded up; where
+// that is more than 2.5 times as great as all but 2 % of the samples, that many times or all but
+// one in a thousand, whichever is less, since the few would keep most of the map for themselves.
+// 0 if every sample is masked or 0.
+double default_color_top(const data::Volume& volume);
+
+// Magnitudes from slightly below the weakest line drawn to `top`, or to the top of the magnitude
+// range if that is greater.
+protocol::Range default_magnitude_colors(const protocol::VectorView& vector, double top);
 
 // World heights that contain most of the drawn lines, with the lower end extended so that no line
 // has the darkest colours of a map.
@@ -57,6 +57,8 @@ struct ScalarStyle {
   double clear_below;  // fraction of the range without extinction
   double opacity;      // optical depth at the top of the range through the shortest edge of the box
   bool fraction;       // bounded by 0 and 1 or 100 %
+  bool transparent = true;  // its depth is seen through it (transparent_extinction)
+  bool generic = false;     // nothing is known of which values matter
 };
 ScalarStyle scalar_style(const data::FieldInfo& field);
 
@@ -91,10 +93,6 @@ std::vector<std::array<double, 2>> default_extinction(const data::FieldInfo& fie
 // Whether the media of a view are drawn as a map: those of a map, and of a slice or plane in which
 // they hide no lines, because it has none or they are laid over the media.
 bool draws_map(const protocol::View& view, const data::DatasetInfo& info);
-
-// The default length of lines at full magnitude: about five grid spacings per stride, for a slice
-// those of the axes in its plane.
-double default_length(const Lattice& lattice, int stride, const std::optional<Slice>& slice);
 
 // The default: by height if the unit of the vertical axis differs from that of the horizontal ones
 // (as in the atmosphere), otherwise by magnitude. By magnitude in a slice or plane, whose lines are

@@ -134,7 +134,7 @@ Result<Subject> make_subject(const std::string& name, std::shared_ptr<data::Data
 
 Knobs own_knobs(const protocol::View& view) {
   Knobs knobs;
-  knobs.stride = view.vector.stride;
+  knobs.stride = view.vector.stride.value();
   const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
   if (!lines && !view.scalars->empty()) knobs.stride = view.scalars->front().stride;
   knobs.span = view.vector.span;

@@ -53,7 +53,8 @@ void expect_within_limits(const windsplat::protocol::View& view) {
   expect(width >= 1 && height >= 1 && width <= limits::image_edge_max &&
              height <= limits::image_edge_max && width * height <= limits::image_pixels_max,
          "a picture's size is within the limits");
-  expect(view.vector.stride >= 1 && view.vector.stride <= limits::stride_max,
+  expect(!view.vector.stride ||
+             (*view.vector.stride >= 1 && *view.vector.stride <= limits::stride_max),
          "a stride is within the limits");
   expect(view.vector.span >= limits::span_min && view.vector.span <= limits::span_max,
          "a kernel is within the limits");

@@ -20,6 +20,8 @@ class CostTest : public testing::Test {
     view_.vector.magnitude_range = protocol::Range{0, 1};
     view_.vector.min_magnitude = 0;
     view_.vector.color.range = protocol::Range{0, 1};
+    view_.vector.stride = 1;
+    view_.vector.length = 0.1;
     view_.scalars.emplace();
     view_.method.name = protocol::MethodName::kernel;
     view_.method.detail = protocol::Detail::full;
@@ -103,6 +105,7 @@ TEST_F(CostTest, StrideReducesSamplesAndASliceLeavesOneLayer) {
   strided.vector.stride = 4;
   strided.vector.length = 0.001;
   protocol::View plain = view_;
+  plain.vector.stride = 1;
   plain.vector.length = 0.001;
   // At least 16 pixels are counted for each kernel; the rest is the cost of the picture.
   const double picture = 1280.0 * 720 / frame::Cost::pixels_a_kernel;

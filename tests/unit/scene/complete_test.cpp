@@ -41,7 +41,8 @@ std::string told(const View& view) {
   };
   std::string out = view.dataset + vec(view.camera.eye.value()) + vec(view.camera.target.value()) +
                     std::to_string(view.camera.height.value()) + view.vector.field.name +
-                    std::to_string(view.vector.length.value()) +
+                    std::to_string(view.vector.length.value()) + " " +
+                    std::to_string(view.vector.stride.value()) + " " +
                     std::to_string(static_cast<int>(view.vector.color.by.value())) +
                     std::to_string(view.vector.color.range.value()[0]) + " " +
                     std::to_string(view.vector.color.range.value()[1]) +
@@ -182,10 +183,11 @@ TEST(CompleteView, FullyMaskedFieldHasRanges) {
   EXPECT_EQ((*full.scalars)[0].color.range, (protocol::Range{0, 1}));
 }
 
-TEST(CompleteView, LinesAreAboutFiveGridSpacingsLong) {
-  auto dataset = sample_dataset("tornado", {32, 32, 32});
+TEST(CompleteView, FewLinesAreAboutFiveGridSpacingsLong) {
+  auto dataset = sample_dataset("tornado", {8, 8, 8});
   View view;
-  EXPECT_NEAR(*completed(view, *dataset).vector.length, 5 * 2.0 / 32, 0.02);
+  EXPECT_NEAR(*completed(view, *dataset).vector.length, 5 * 2.0 / 8, 0.06);
+  EXPECT_EQ(*completed(view, *dataset).vector.stride, 1);
 }
 
 TEST(CompleteView, ChangedLineKeyKeepsTheOtherDefaults) {

@@ -225,6 +225,7 @@ class LevelOfAScene : public testing::Test {
     dataset = sample_dataset("tornado", {64, 64, 64});
     view.image.width = 40;
     view.image.height = 30;
+    view.vector.stride = 1;
   }
   Scene built() {
     const auto completed = complete(view, *dataset);
@@ -391,6 +392,7 @@ TEST(LevelOfRates, AreThoseOfTheData) {
       dataset_of(std::make_unique<FakeSource>(grid, std::vector<data::FieldInfo>{wind_info()}, 1));
   protocol::View view;
   view.vector.space = protocol::VectorSpace::world;
+  view.vector.stride = 1;
   view.image.width = view.image.height = 50;
   const Scene coarse = build_scene(*complete(view, *dataset), *dataset).value();
   ASSERT_EQ(coarse.level, (Level{1, 1, 0})) << "three layers remain three";

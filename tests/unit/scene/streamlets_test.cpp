@@ -29,6 +29,7 @@ TEST(StreamletScene, IsAbsentByDefault) {
 TEST(StreamletScene, SegmentsAreKeptForEveryCamera) {
   auto dataset = sample_dataset("tornado", {16, 16, 16});
   View view = traced();
+  view.vector.stride = 1;
   const auto first = built(view, *dataset).vector->streamlets;
   ASSERT_NE(first, nullptr);
   EXPECT_GT(first->tally.lines, 100);
@@ -142,6 +143,7 @@ TEST(StreamletScene, BeyondTheMemoryLimitIsRefusedWithTheRemedy) {
   data::Dataset dataset(std::move(*source), "tornado", std::uint64_t{40} << 20U);
   View view = traced();
   view.vector.trace->segments = 64;
+  view.vector.stride = 1;
   const auto completed = complete(view, dataset);
   ASSERT_TRUE(completed) << completed.error().message;
   const auto refused = build_scene(*completed, dataset);

@@ -17,9 +17,10 @@ type Vector = NonNullable<View["vector"]>;
 const showsTheEarth = ({ mappings }: Dataset): boolean => mappings.includes("sphere");
 
 const noLines: Vector = { field: null };
-const streamletLength = 4; // of a straight line
-const strideMax = 3; // of streamlets, in strides of the default view
-const samplesPerStride = 20; // along the longest axis
+const streamletLength = 2.5; // of a straight line
+const sparser = 1.5; // strides of streamlets, in those of the default view
+const strideMax = 64;
+const samplesPerStride = 20; // along the longest axis, from which there are lines to spare
 
 const fieldNamed = ({ fields }: Dataset, name: string | null | undefined): Field | undefined =>
   fields.find((field) => field.name === name);
@@ -72,14 +73,15 @@ function mapCamera(dataset: Dataset, aspect: number): Partial<Camera> {
   return { projection, eye, target, up, height };
 }
 
-// Longer lines that follow the flow, fewer of them, so that they stay apart.
+// Longer lines that follow the flow, fewer of them: those of the default view only just stay apart.
 function streamlets(dataset: Dataset): Vector {
-  const { length, stride = 1 } = dataset.defaultView?.vector ?? {};
+  const { length, stride: ofLines } = dataset.defaultView?.vector ?? {};
+  const stride = ofLines ?? 1;
   const samples = Math.max(...axes.map((axis) => dataset.dims[axis]));
-  const sparser = Math.min(strideMax, Math.max(1, Math.floor(samples / samplesPerStride)));
+  const isDense = samples >= samplesPerStride * stride;
   return {
     trace: {},
-    stride: stride * sparser,
+    stride: Math.min(strideMax, isDense ? Math.ceil(sparser * stride) : stride),
     ...(length ? { length: Math.min(10, streamletLength * length) } : {}),
   };
 }

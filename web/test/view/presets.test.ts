@@ -79,9 +79,9 @@ test("streamlets are longer and fewer where there are samples to spare", () => {
   assert.deepEqual(
     [streamlets(10), streamlets(40), streamlets(500)],
     [
-      [0.2, 2],
-      [0.2, 4],
-      [0.2, 6],
+      [0.125, 2],
+      [0.125, 3],
+      [0.125, 3],
     ],
   );
 });
