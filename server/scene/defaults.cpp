@@ -161,12 +161,27 @@ protocol::Range height_range(const Lattice& lattice) {
   return {at.front() - 0.5 * width.front(), at.back() + 0.5 * width.back()};
 }
 
+double magnitude_of_nearly_all(const data::Volume& volume) {
+  constexpr double nearly_all = 0.98;  // of the samples
+  constexpr double weak = 0.25;        // of the sum of the magnitudes
+  std::vector<double> magnitudes;
+  double sum = 0;
+  for_some_samples(volume, std::nullopt, [&](std::size_t, double magnitude) {
+    magnitudes.push_back(magnitude);
+    sum += magnitude;
+  });
+  std::sort(magnitudes.begin(), magnitudes.end());
+  // A flow may lie between the samples visited.
+  if (!(sum > 0)) return static_cast<double>(volume.range[1]);
+  double below = 0;
+  std::size_t n = 0;
+  while (n + 1 < magnitudes.size() && below + magnitudes[n] < weak * sum) below += magnitudes[n++];
+  const double most = static_cast<double>(magnitudes.size() - 1);
+  return std::max(magnitudes[n], magnitudes[static_cast<std::size_t>(nearly_all * most)]);
+}
+
 protocol::Range default_magnitude_range(const data::Volume& volume) {
-  double top = quantiles(volume, 0.0, 0.98)[1];
-  // For a flow that is almost zero nearly everywhere, use the maximum.
-  if (!(top > 1e-3 * static_cast<double>(volume.range[1]))) {
-    top = static_cast<double>(volume.range[1]);
-  }
+  const double top = magnitude_of_nearly_all(volume);
   if (!(top > 1e-29) || !std::isfinite(top)) return {0, 1};
   return {0, std::min(nice_above(top), value_max)};
 }
@@ -202,12 +217,11 @@ protocol::Range default_height_range(const protocol::VectorView& vector, const d
 double default_color_top(const data::Volume& volume) {
   constexpr double far_beyond = 2.5;
   const auto most = static_cast<double>(volume.range[1]);
-  const double nearly_all = quantiles(volume, 0.98, 0.98)[0];
+  const double nearly_all = magnitude_of_nearly_all(volume);
   double top = most;
   if (most > far_beyond * nearly_all) {
-    top = std::min(far_beyond * nearly_all, quantiles(volume, 0.999, 0.999)[0]);
-    // For a flow that is almost zero nearly everywhere, use the maximum.
-    if (!(top > 1e-3 * most)) top = most;
+    const double few = quantiles(volume, 0.999, 0.999)[0];
+    top = std::clamp(few, nearly_all, far_beyond * nearly_all);
   }
   if (!(top > 1e-29) || !std::isfinite(top)) return 0;
   const double grain = readable_grain(top);

@@ -23,7 +23,13 @@ double nice_above(double value);
 protocol::Range quantiles(const data::Volume& volume, double low, double high,
                           const std::optional<Slice>& slice = std::nullopt);
 
-// [0, top], with top such that about 2 % of the lines reach their full length.
+// The magnitude that 98 % of the unmasked samples do not exceed, or, if that is greater, the one
+// below which a quarter of the sum of all magnitudes lies: of a flow that is nearly zero nearly
+// everywhere, the magnitude where there is a flow. From at most 2^15 samples.
+double magnitude_of_nearly_all(const data::Volume& volume);
+
+// [0, top], with top the magnitude of nearly all samples, so that lines of about 2 % reach their
+// full length.
 protocol::Range default_magnitude_range(const data::Volume& volume);
 
 // The share of unmasked samples whose magnitude is smaller, from at most 2^15 of them.

@@ -1,6 +1,8 @@
-// Numbers of a view that follow from the first step of a field, kept with the dataset.
+// Numbers of a view that follow from one step of a field, kept with the dataset.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,9 +16,33 @@
 
 namespace windsplat::scene {
 
-// Numbers that follow from a field at the first step (step_of_defaults) and from `arguments`:
-// computed once, so that later steps do not need the first step resident. `placed`: where it is
-// part of the grid, they follow from the samples of that part.
+// The step from which defaults of a field follow, whatever step is shown: step_of_defaults, or, if
+// the field is constant or masked there (clouds that have not formed), the first of the last step,
+// the middle one and those at a quarter and three quarters at which it is not. At most five steps
+// are read, and only once.
+inline Result<std::size_t> step_with_values(data::Dataset& dataset, const std::string& field) {
+  const std::size_t first = step_of_defaults(dataset);
+  const auto found = dataset.remembered("step/" + field, [&]() -> Result<std::vector<double>> {
+    const std::size_t last = dataset.info().steps.size() - 1;
+    std::vector<std::size_t> tried;
+    for (const std::size_t step : {first, last, last / 2, last / 4, last - last / 4}) {
+      if (std::find(tried.begin(), tried.end(), step) != tried.end()) continue;
+      const auto volume = dataset.volume(field, step);
+      if (!volume) return volume.error();
+      if ((*volume)->range[1] > (*volume)->range[0]) {
+        return std::vector{static_cast<double>(step)};
+      }
+      tried.push_back(step);
+    }
+    return std::vector{static_cast<double>(first)};
+  });
+  if (!found) return found.error();
+  return static_cast<std::size_t>(found->front());
+}
+
+// Numbers that follow from a field at that step and from `arguments`: computed once, so that later
+// steps do not need it resident. `placed`: where it is part of the grid, they follow from the
+// samples of that part.
 template <class Make>
 Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* what,
                                             const std::string& field,
@@ -32,7 +58,9 @@ Result<std::vector<double>> from_first_step(data::Dataset& dataset, const char* 
     key += data::digest_of(placed->region);
   }
   return dataset.remembered(key, [&]() -> Result<std::vector<double>> {
-    auto volume = dataset.derived(field, step_of_defaults(dataset), part);
+    const auto step = step_with_values(dataset, field);
+    if (!step) return step.error();
+    auto volume = dataset.derived(field, *step, part);
     if (!volume) return volume.error();
     return make(**volume);
   });

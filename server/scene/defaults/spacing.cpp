@@ -19,6 +19,7 @@ namespace {
 constexpr double coverage_most = 0.8;  // of the projected box by lines
 constexpr double gap_least = 3.0;      // between lines of a layer, line widths
 constexpr double strides_least = 2.0;  // length of the longest lines
+constexpr double long_least = 24.0;    // likewise, line widths
 constexpr double strides_most = 5.0;
 constexpr double line_share = 0.75;   // mean length of lines relative to the longest
 constexpr double widths_least = 2.0;  // length of the shortest lines that show a direction
@@ -123,7 +124,8 @@ LineSpacing default_spacing(const Lattice& lattice, const std::optional<Slice>& 
     const LineSpacing one{stride, stride * cell_of(lattice, slice)};
     const LineDensity density = line_density(one, lattice, slice);
     strides = std::min({coverage_most / density.coverage, density.gap / gap_least, strides_most});
-    if (strides >= strides_least || stride == stride_most) break;
+    const bool is_long = strides * density.apart_px >= long_least * line_width();
+    if ((strides >= strides_least && is_long) || stride == stride_most) break;
     if (!keeps_layers(stride + 1, lattice, slice)) break;
     ++stride;
   }

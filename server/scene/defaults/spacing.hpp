@@ -26,9 +26,11 @@ struct LineDensity {
 LineDensity line_density(const LineSpacing& spacing, const Lattice& lattice,
                          const std::optional<Slice>& slice);
 
-// The smallest stride with which lines of at least two strides cover at most 0.8 of the projected
-// box and keep three line widths apart, and their length, at most five strides. Axes of few samples
-// limit the stride: three layers of those that have five are drawn, and both ends of shorter ones.
+// The smallest stride with which lines of at least two strides and 24 line widths cover at most 0.8
+// of the projected box and keep three line widths apart, and their length, at most five strides.
+// Where the mean magnitude is a quarter of the top of the range, lines then have 6 widths on the
+// mean. Axes of few samples limit the stride: three layers of those that have five are drawn, and
+// both ends of shorter ones.
 LineSpacing default_spacing(const Lattice& lattice, const std::optional<Slice>& slice);
 
 // A length in strides, rounded to two digits; for a slice those of the axes in its plane.

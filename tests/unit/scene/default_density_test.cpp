@@ -10,6 +10,7 @@
 
 #include "server/scene/defaults.hpp"
 #include "server/scene/defaults/opacity.hpp"
+#include "server/scene/defaults/some_samples.hpp"
 #include "server/scene/defaults/spacing.hpp"
 #include "server/scene/lattice.hpp"
 #include "tests/unit/scene/fake.hpp"
@@ -76,8 +77,49 @@ TEST(DefaultSpacing, TheStrideIsTheSmallestThatSuffices) {
     ASSERT_GT(stride, 1);
     const LineSpacing denser{stride - 1, spaced_length(2, stride - 1, lattice, std::nullopt)};
     const LineDensity density = line_density(denser, lattice, std::nullopt);
-    EXPECT_TRUE(density.coverage > 0.76 || density.gap < 3.15) << dims[0];
+    // Lines as long as the coverage and the gap allow, in widths of 2 pixels.
+    const double longer = std::min({0.8 / density.coverage, density.gap / 3, 2.5});
+    const double widths = density.apart_px * density.apart_px / (4 * density.gap) * longer;
+    EXPECT_TRUE(density.coverage > 0.76 || density.gap < 3.15 || widths < 25.2) << dims[0];
   }
+}
+
+// Mean length of the lines drawn by default over their width of 2 pixels, in the plane of the
+// picture.
+double mean_widths(const Lattice& lattice, const data::Volume& speeds) {
+  const LineSpacing spacing = default_spacing(lattice, std::nullopt);
+  const protocol::Range range = default_magnitude_range(speeds);
+  const double least = default_min_magnitude(range, spacing, speeds, lattice, std::nullopt);
+  const LineDensity density = line_density(spacing, lattice, std::nullopt);
+  double sum = 0;
+  double lines = 0;
+  for_some_samples(speeds, std::nullopt, [&](std::size_t, double speed) {
+    if (speed < least) return;
+    sum += std::min(speed / range[1], 1.0);
+    ++lines;
+  });
+  return sum / lines * density.apart_px * density.apart_px / (4 * density.gap);
+}
+
+// With an exponential distribution of magnitudes their mean is a quarter of the top of the range.
+TEST(DefaultSpacing, LinesAreLongEnoughToTellHeadFromTail) {
+  for (const Dims& dims : {Dims{64, 64, 64}, Dims{200, 100, 40}, Dims{320, 160, 19},
+                           Dims{300, 300, 1}, Dims{90, 40, 12}}) {
+    std::size_t n = 0;
+    const data::Volume speeds = volume_of(dims, [&](double, double, double) {
+      return -10 * std::log(1 - std::fmod(0.6180339887498949 * static_cast<double>(++n), 1.0));
+    });
+    EXPECT_GE(mean_widths(box_lattice(dims), speeds), 5.5) << dims[0] << ' ' << dims[2];
+  }
+}
+
+TEST(DefaultSpacing, LinesOfTheClimateAreSixWidthsLongOnTheMean) {
+  auto dataset = sample_dataset("climate");
+  const auto view = complete({}, *dataset);
+  ASSERT_TRUE(view);
+  const auto wind = dataset->volume(view->view().vector.field.name, 0);
+  ASSERT_TRUE(wind);
+  EXPECT_GE(mean_widths(view->lattice(), **wind), 6);
 }
 
 TEST(DefaultSpacing, FewSamplesKeepAllTheirLinesAtFiveSpacings) {
@@ -151,6 +193,93 @@ TEST(DefaultLeastMagnitude, TheLinesLeftCoverFourFifthsOfTheBox) {
   covered *= whole / static_cast<double>(speeds.samples());
   EXPECT_GT(whole, 2) << "more than there is room for";
   EXPECT_NEAR(covered, 0.8, 0.08);
+}
+
+double cube_of(double value) { return value * value * value; }
+
+// A pole is not a flow that is zero nearly everywhere: at half the box from it lines are drawn.
+TEST(DefaultMagnitudes, OfFieldsThatFallOverDecadesShowMoreThanThePole) {
+  const auto off_center = [](double x, double y, double z) {
+    return 1 / cube_of(std::hypot(x - 0.31, y + 0.22, z - 0.13) + 1e-3);
+  };
+  const auto dipole = [](double x, double y, double z) {
+    const double r = std::hypot(x, y, z);
+    return std::sqrt(1 + 3 * z * z / (r * r)) / cube_of(r);
+  };
+  for (const auto& field : {std::function<double(double, double, double)>(off_center),
+                            std::function<double(double, double, double)>(dipole)}) {
+    const Dims dims = {64, 64, 64};
+    const data::Volume speeds = volume_of(dims, field);
+    const protocol::Range range = default_magnitude_range(speeds);
+    EXPECT_LT(range[1], 1e-2 * static_cast<double>(speeds.range[1]));
+    EXPECT_GT(range[1], quantiles(speeds, 0.97, 0.97)[0]);
+    const Lattice lattice = box_lattice(dims);
+    const double least = default_min_magnitude(range, default_spacing(lattice, std::nullopt),
+                                               speeds, lattice, std::nullopt);
+    EXPECT_LT(hidden_share(least, speeds), 0.6);
+    EXPECT_LT(default_color_top(speeds), 3 * range[1]);
+  }
+}
+
+TEST(DefaultMagnitudes, OfAFlowInAHundredthOfTheBoxAreThoseOfThatFlow) {
+  const data::Volume jet = volume_of({60, 60, 60}, [](double x, double y, double) {
+    return 1e-4 + 20 * std::exp(-(x * x + y * y) / 0.002);
+  });
+  EXPECT_GE(default_magnitude_range(jet)[1], 0.15 * static_cast<double>(jet.range[1]));
+  EXPECT_LE(default_magnitude_range(jet)[1], 1.2 * static_cast<double>(jet.range[1]));
+}
+
+// Zero at the first step, afterwards a ramp up to 0.002.
+class LateSource final : public data::Source {
+ public:
+  explicit LateSource(int steps, bool ever) : ever_(ever) {
+    info_ = FakeSource(atmosphere_grid(), {scalar_info("qc", "kg kg-1")}, steps).info();
+  }
+  [[nodiscard]] const data::DatasetInfo& info() const override { return info_; }
+  Result<data::Volume> read(std::size_t, std::size_t step) override {
+    ++reads;
+    data::Volume volume;
+    volume.dims = info_.grid.dims();
+    std::vector<float> values;
+    for (std::size_t n = 0; n < volume.samples(); ++n) {
+      const double share = static_cast<double>(n) / static_cast<double>(volume.samples());
+      values.push_back(step > 0 && ever_ ? static_cast<float>(0.002 * share) : 0.0F);
+    }
+    volume.values = std::move(values);
+    data::finish_volume(volume);
+    return volume;
+  }
+  int reads = 0;
+
+ private:
+  data::DatasetInfo info_;
+  bool ever_;
+};
+
+TEST(DefaultStep, CloudsThatFormLaterHaveTheirOwnRangeAtEveryStep) {
+  auto dataset = dataset_of(std::make_unique<LateSource>(12, true));
+  for (const int step : {0, 3, 11}) {
+    protocol::View view;
+    view.step = step;
+    const auto full = complete(view, *dataset);
+    ASSERT_TRUE(full);
+    const auto& scalars = *full->view().scalars;
+    ASSERT_EQ(scalars.size(), 1U);
+    EXPECT_NEAR((*scalars.front().color.range)[1], 0.002, 0.0004) << step;
+    EXPECT_LT(scalars.front().extinction->back()[0], 0.003) << step;
+  }
+}
+
+TEST(DefaultStep, AFieldThatNeverVariesIsReadAtFiveStepsAtMost) {
+  auto source = std::make_unique<LateSource>(400, false);
+  LateSource& late = *source;
+  auto dataset = dataset_of(std::move(source));
+  for (int round = 0; round < 2; ++round) {
+    const auto full = complete({}, *dataset);
+    ASSERT_TRUE(full);
+    EXPECT_EQ((*full->view().scalars->front().color.range)[1], 1);
+  }
+  EXPECT_LE(late.reads, 5);
 }
 
 TEST(DefaultColors, ReachTheGreatestMagnitude) {
