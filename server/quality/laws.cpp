@@ -139,27 +139,23 @@ double error_of_cause(const Kind& kind, const Setting& setting, const Viewpoint&
       std::min(std::inner_product(terms.begin(), terms.end(), law.slope.begin(), law.base), 0.0));
 }
 
-// Of lines with a stride. They are merged only by the halvings that exceed their stride, as if
-// there were no samples between them; before that by nothing but a smaller picture.
+// Where lines have a stride. They are merged only by the halvings that exceed it, as if there were
+// no samples between them; by the others only the medium is.
 double error_of_merged(const Kind& kind, const Setting& setting, const Viewpoint& viewpoint) {
   Kind part = kind;
   part.lines_stride = 1;
-  part.lines = false;
-  const double media = kind.medium ? error_of_cause(part, setting, viewpoint) : 0;
-  const int apart = std::ilogb(kind.lines_stride);
+  Kind medium = part;
+  medium.lines = false;
+  const double of_medium = kind.medium ? error_of_cause(medium, setting, viewpoint) : 0;
+  Setting beyond = setting;
+  beyond.coarser -= std::ilogb(kind.lines_stride);
+  if (beyond.coarser <= 0) return of_medium;
   Viewpoint of_lines = viewpoint;
-  of_lines.detail = 0;
   if (of_lines.content) {
     of_lines.content->cell *= kind.lines_stride;
     of_lines.content->finest_cell *= kind.lines_stride;
   }
-  const Setting beyond{setting.method, setting.half_level, std::max(0, setting.coarser - apart),
-                       setting.thinner};
-  part.lines = true;
-  part.medium = false;
-  const bool changed = beyond.coarser > 0 || beyond.half_level > 0;
-  const double lines = changed ? error_of_cause(part, beyond, of_lines) : 0;
-  return std::hypot(media, lines);
+  return std::max(of_medium, error_of_cause(part, beyond, of_lines));
 }
 
 }  // namespace

@@ -24,6 +24,7 @@ protocol::View small_view(const TrialField& field, Shown shown) {
   view.image.width = 96;
   view.image.height = 72;
   view.method.stop_transmittance = 0;
+  view.vector.stride = 1;  // lines alone with a stride are not merged
   if (shown == Shown::medium) view.vector.field = {protocol::FieldChoice::Kind::none, ""};
   view.scalars.emplace();
   if (shown != Shown::lines) {

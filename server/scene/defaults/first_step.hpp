@@ -23,7 +23,7 @@ namespace windsplat::scene {
 inline Result<std::size_t> step_with_values(data::Dataset& dataset, const std::string& field) {
   const std::size_t first = step_of_defaults(dataset);
   const auto found = dataset.remembered("step/" + field, [&]() -> Result<std::vector<double>> {
-    const std::size_t last = dataset.info().steps.size() - 1;
+    const std::size_t last = last_step(dataset);
     std::vector<std::size_t> tried;
     for (const std::size_t step : {first, last, last / 2, last / 4, last - last / 4}) {
       if (std::find(tried.begin(), tried.end(), step) != tried.end()) continue;

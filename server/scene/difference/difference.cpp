@@ -54,11 +54,17 @@ Result<void> check_difference(const protocol::View& view, const data::Dataset& d
   return {};
 }
 
+std::size_t last_step(const data::Dataset& dataset) {
+  const std::size_t last = dataset.info().steps.size() - 1;
+  const auto minus = dataset.subtrahend();
+  return minus && !minus->step ? std::min(last, minus->info->steps.size() - 1) : last;
+}
+
 std::size_t step_of_defaults(const data::Dataset& dataset) {
   const auto minus = dataset.subtrahend();
   if (!minus) return 0;
-  const std::size_t last = dataset.info().steps.size() - 1;
-  if (!minus->step) return std::min(last, minus->info->steps.size() - 1);
+  const std::size_t last = last_step(dataset);
+  if (!minus->step) return last;
   const bool own = minus->info.get() == &dataset.info();
   return !own || *minus->step < last - std::min(*minus->step, last) ? last : 0;
 }

@@ -29,6 +29,9 @@ Result<void> check_difference(const protocol::View& view, const data::Dataset& d
 // from the step subtracted, since defaults must not depend on the step shown.
 std::size_t step_of_defaults(const data::Dataset& dataset);
 
+// The last step that has values: of a difference at the same steps that of the dataset with fewer.
+std::size_t last_step(const data::Dataset& dataset);
+
 // Defaults of a scalar that is a difference: a diverging map over a range that is symmetric about
 // zero, where a medium is transparent and a map (draws_map) is as opaque as elsewhere.
 inline constexpr const char* difference_map = "coolwarm";

@@ -178,7 +178,8 @@ TEST(PixelTrials, FindErrorsThatFewPixelsHave) {
     const auto dataset = formula_dataset(member.field, member.formula);
     const auto number =
         3 * (100 * static_cast<std::uint32_t>(seen.member) + seen.scene) + seen.scene % 3;
-    const auto view = random_view(*dataset, number, seen.viewpoint, 640);
+    auto view = random_view(*dataset, number, seen.viewpoint, 640);
+    view.vector.stride = 1;
     const auto completed = scene::complete(view, *dataset).value();
     scene::Scene scene = scene::build_scene(completed, *dataset).value();
     const double tried = frame::content_of(scene)->trials->kernel;

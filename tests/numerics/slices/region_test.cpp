@@ -180,6 +180,7 @@ TEST(RegionPicture, OnAGlobeTheInnerSamplesAreThoseOfTheWhole) {
   view.geometry.mapping = protocol::GeometryMapping::sphere;
   view.vector.color.by = protocol::ColorBy::magnitude;
   view.vector.color.range = {0, 3};
+  view.vector.stride = 1;  // others count from the first sample of the region
   const auto inner = [](int i, int j, int) { return i >= 4 && i <= 12 && j >= 6 && j <= 11; };
   auto masked = winds(inner, data::AxisKind::longitude);
   const auto wanted = test::render(built(view, *masked));

@@ -212,6 +212,7 @@ double mean_change(const Frame& picture, const Frame& whole) {
 TEST_F(Measure, ChangeBySkippedLinesAndSplatsIsThatOfThePictureWithAllOfThem) {
   view.scalars.value()[0].min_optical_depth = 0.2;
   view.vector.min_magnitude = 0.3 * view.vector.magnitude_range.value()[1];
+  view.vector.stride = 1;
   const protocol::View skipping = view;
   for (const auto method : {protocol::MethodName::kernel, protocol::MethodName::slab}) {
     view = skipping;
