@@ -254,7 +254,7 @@ TEST(LeftOut, BoundIsWithinAFactorOfFourWhereMostVectorsAreLeftOut) {
     view.image.height = 120;
     view.method.name = protocol::MethodName::kernel;
     view.vector.stride = 1;
-    view.vector.length = 0.08;
+    view.vector.length = 0.05;
     view.scalars.emplace();
     auto completed = scene::complete(view, *dataset).value();
     const double top = completed.view().vector.magnitude_range.value()[1];
