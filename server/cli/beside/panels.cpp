@@ -20,15 +20,22 @@ Result<protocol::View> second_view(const ViewArguments& arguments,
                                    const protocol::ViewDocument& first) {
   std::vector<std::pair<std::string, std::string>> changes;
   if (!arguments.beside_step.empty()) changes.emplace_back("/step", arguments.beside_step);
+  bool names_dataset = false;
   for (const std::string& setting : arguments.beside_settings) {
     auto change = parse_setting("--beside-set", setting);
     if (!change) return change.error();
+    names_dataset = names_dataset || change->first == "/dataset";
     changes.push_back(std::move(*change));
   }
   const auto document = protocol::set_all(first, changes);
   if (!document) return of_second(document.error());
   protocol::View view = document->view();
   const protocol::View one = first.view();
+  if (names_dataset || view.dataset != one.dataset) {
+    return make_error_at(ErrorKind::invalid, "/dataset",
+                         "--beside-set: the dataset of the second picture is that of --beside "
+                         "DATASET, and without it that of the first");
+  }
   if (view.camera != one.camera) {
     return make_error_at(ErrorKind::invalid, "/camera",
                          "--beside-set: both pictures have the camera of the first");

@@ -286,6 +286,13 @@ TEST_F(Pair, RefusesWhatCannotBeLinked) {
   EXPECT_THAT(refused().message, HasSubstr("the camera of the first"));
   arguments_.beside_settings = {"/image/width=200"};
   EXPECT_THAT(refused().message, HasSubstr("the size of the first"));
+  arguments_.beside_settings = {"/dataset=\"climate\""};
+  EXPECT_THAT(refused().message, HasSubstr("that of --beside DATASET"));
+  ASSERT_FALSE(refused().at.empty());
+  EXPECT_EQ(refused().at.front().pointer, "/dataset");
+  arguments_.beside = "climate:24x16x8";
+  EXPECT_THAT(refused().message, HasSubstr("that of --beside DATASET"));
+  arguments_.beside.clear();
   arguments_.beside_settings = {"/quality/maxError=0.01"};
   EXPECT_THAT(refused().message, HasSubstr("budgetMs and maxError"));
   arguments_.beside_settings = {"/vector/field=current"};
