@@ -51,7 +51,10 @@ void complete_heads(protocol::VectorView& vector, const std::string& background)
   std::optional<double>& dark = vector.mark.tail_darkening;
   const bool unshaped = vector.mark.shape == protocol::MarkShape::line;
   const bool plain = unshaped && !vector.trace;
-  bool hued = unshaped && vector.color.true_colors;
+  // Along a line through a seed the magnitude varies, which its colours tell: a dark tail would
+  // change them over the whole of its length.
+  const bool seeded = vector.trace && vector.trace->seeds;
+  bool hued = unshaped && vector.color.true_colors && !seeded;
   if (plain && !white && !dark && is_dark(background) && !shows_white_heads(vector.color)) {
     white = 0;
     hued = true;
@@ -65,7 +68,8 @@ void draw_true_colors(protocol::VectorView& completed) {
   if (completed.color.true_colors) return;
   completed.color.true_colors = true;
   const bool unshaped = completed.mark.shape == protocol::MarkShape::line;
-  if (unshaped && completed.mark.tail_darkening == 0.0) {
+  const bool seeded = completed.trace && completed.trace->seeds;
+  if (unshaped && !seeded && completed.mark.tail_darkening == 0.0) {
     completed.mark.tail_darkening = default_darkening;
   }
 }

@@ -11,6 +11,7 @@
 #include "server/engine/render.hpp"
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
+#include "server/scene/lines/mark.hpp"
 #include "tests/unit/scene/fake.hpp"
 
 namespace windsplat::frame {
@@ -127,6 +128,28 @@ TEST(TrueColors, DarkenTheTailsOfPlainLinesUnlessGiven) {
   EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.mark.shape = MarkShape::arrow; }), 0);
   EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.trace.emplace(); }), 0.85);
   EXPECT_EQ(tail([](protocol::VectorView& lines) { lines.color.true_colors = false; }), 0);
+}
+
+// The magnitude varies along a line through a seed: one colour is one magnitude all along it.
+TEST(TrueColors, DoNotDarkenLinesThroughSeedsUnlessAsked) {
+  auto dataset = scene::sample_dataset("tornado", {8, 8, 8});
+  protocol::View view;
+  view.vector.color.true_colors = true;
+  view.vector.trace.emplace().seeds.emplace();
+  const auto tail_light = [&] {
+    return scene::build_scene(view, *dataset)->vector->mark.tail_light;
+  };
+  EXPECT_EQ(tail_light(), 1);
+  view.vector.mark.tail_darkening = 0.25;
+  EXPECT_EQ(tail_light(), 0.75);
+  protocol::View preset;
+  preset.vector.trace.emplace().seeds.emplace();
+  preset.vector.head_desaturation = 0.7;
+  const auto completed = scene::complete(preset, *dataset);
+  ASSERT_TRUE(completed);
+  protocol::VectorView lines = completed->view().vector;
+  scene::draw_true_colors(lines);
+  EXPECT_EQ(lines.mark.tail_darkening, 0.0);
 }
 
 }  // namespace
