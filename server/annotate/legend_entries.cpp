@@ -11,6 +11,7 @@
 #include "server/annotate/axes.hpp"
 #include "server/annotate/labels.hpp"
 #include "server/annotate/paint/type.hpp"
+#include "server/annotate/section_text.hpp"
 #include "server/image/tone_map.hpp"
 #include "server/scene/defaults.hpp"
 #include "server/scene/surfaces/make_surfaces.hpp"
@@ -356,7 +357,8 @@ LegendEntry surface_entry(const Subject& subject, const surface::Shown& shown,
     entry.notes.push_back("surface where " + (name.empty() ? "it" : cut_title) + " is " +
                           number_text_of(*view.isovalue, 4) + (units.empty() ? "" : " " + units));
   } else {
-    entry.notes.emplace_back("on a section");
+    entry.notes.push_back(view.plane ? section_text(subject, *view.plane)
+                                     : section_text(subject, *view.slice));
   }
   if (view.contours) entry.notes.push_back(contours_text(*view.contours, entry.units));
   return entry;
@@ -368,12 +370,20 @@ LegendEntry surface_entry(const Subject& subject, const surface::Shown& shown,
 // surfaces that are not seen.
 std::vector<LegendEntry> legend_entries(const Subject& subject) {
   std::vector<LegendEntry> entries;
-  if (subject.scene.vector) entries.push_back(lines_entry(subject));
+  const auto section = section_of_view(subject);
+  const auto add_section = [&section](LegendEntry& entry) {
+    if (section) entry.notes.insert(entry.notes.begin(), *section);
+  };
+  if (subject.scene.vector) {
+    entries.push_back(lines_entry(subject));
+    add_section(entries.back());
+  }
   auto layer = subject.scene.scalars.begin();
   for (const protocol::ScalarView& scalar : subject.completed.view().scalars.value()) {
     if (layer == subject.scene.scalars.end()) break;
     if (layer->extinction != scalar.extinction.value()) continue;
     entries.push_back(medium_entry(subject, *layer, scalar.field));
+    add_section(entries.back());
     ++layer;
   }
   auto shown = subject.scene.surfaces.begin();
