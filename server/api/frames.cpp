@@ -101,7 +101,8 @@ std::string picture_etag(const protocol::View& view, const data::Dataset& datase
                          const frame::Encoding& encoding) {
   return etag_of(protocol::encode_view(view) + '\n' + dataset.digest() + '\n' + WINDSPLAT_VERSION +
                  '\n' + std::string(media_type(encoding.format)) + ' ' +
-                 std::to_string(encoding.quality));
+                 std::to_string(encoding.quality) + ' ' +
+                 std::to_string(encoding.dots_per_inch.value_or(0)));
 }
 
 // The view of the request, with its preset and orbit.
@@ -328,6 +329,12 @@ std::optional<Orbit> read_orbit(http::QueryReader& query) {
   return orbit;
 }
 
+// The size on paper, of the formats that tell one: for others the parameter is unknown.
+std::optional<double> read_dots_per_inch(http::QueryReader& query, frame::Format format) {
+  if (format == frame::Format::jpeg || format == frame::Format::npy) return std::nullopt;
+  return query.number("dpi", frame::dots_per_inch_min, frame::dots_per_inch_max);
+}
+
 Result<Picture> read_query(const http::Request& request, frame::Format format) {
   http::QueryReader query(request.query);
   Picture picture;
@@ -342,6 +349,7 @@ Result<Picture> read_query(const http::Request& request, frame::Format format) {
   if (format == frame::Format::jpeg) {
     picture.encoding.quality = query.integer("quality", 1, 100).value_or(jpeg_quality_default);
   }
+  picture.encoding.dots_per_inch = read_dots_per_inch(query, format);
   if (const auto ok = query.finish(); !ok) return ok.error();
   const auto document = protocol::ViewDocument::parse(protocol::view_text(step, width, height));
   if (!document) return document.error();
@@ -352,9 +360,12 @@ Result<Picture> read_query(const http::Request& request, frame::Format format) {
 // --- POST /v1/frames ----------------------------------------------------------------------------
 
 Result<Picture> read_view(const http::Request& request, frame::Format format) {
+  http::QueryReader query(request.query);
+  Picture picture;
+  picture.encoding.dots_per_inch = read_dots_per_inch(query, format);
+  if (const auto ok = query.finish(); !ok) return ok.error();
   const auto document = protocol::ViewDocument::parse(request.body);
   if (!document) return document.error();
-  Picture picture;
   picture.view = document->view();
   picture.encoding.format = format;
   picture.encoding.quality = jpeg_quality_default;

@@ -78,7 +78,8 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
       Route{"GET", "/v1/presets", at_once(get_presets)},
       Route{"GET", route_stream, at_once(upgrade_required)},
 
-      Route{"POST", "/v1/frames", later(post_frame, backend, admission), {}, Charge::valid_picture},
+      Route{"POST", "/v1/frames", later(post_frame, backend, admission), Query::taken,
+            Charge::valid_picture},
       Route{"POST", "/v1/forecasts", later(post_forecast, backend)},
       Route{"POST", "/v1/picks", later(post_pick, backend), Query::taken, Charge::picture},
       Route{"POST", "/v1/references", later(post_reference, backend, admission, base_path),

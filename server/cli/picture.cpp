@@ -54,7 +54,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
   command
       .add_option("--dpi", arguments.dots_per_inch,
                   "Pixels to the inch of .pdf and .svg (300), and of .png if given")
-      ->check(CLI::Range(10, 2400))
+      ->check(CLI::Range(frame::dots_per_inch_min, frame::dots_per_inch_max))
       ->type_name("N");
   add_memory_option(command, arguments.memory);
   add_data_host_options(command, arguments.data_hosts);

@@ -36,6 +36,8 @@ namespace windsplat::frame {
 enum class Format { jpeg, png, npy, pdf, svg };
 
 inline constexpr double document_dots_per_inch = 300;  // of pdf and svg without a value
+inline constexpr double dots_per_inch_min = 10;
+inline constexpr double dots_per_inch_max = 2400;
 
 struct Encoding {
   Format format = Format::jpeg;

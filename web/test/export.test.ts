@@ -291,18 +291,24 @@ test("a busy server is retried after its Retry-After time, other errors are fina
     () => problem(429, "busy", { "Retry-After": "9999" }),
     () => new Response("picture"),
   );
-  await drawFrame(busy.fetch, "http://host/", {}, never, wait);
+  await drawFrame(busy.fetch, "http://host/", {}, never, { wait });
   assert.deepEqual(waits, [3000, 1000, 60_000]);
   const broken = server(() => problem(507, "needs 9 GB"));
-  await assert.rejects(drawFrame(broken.fetch, "http://host/", {}, never, wait), /^Error: needs 9/);
+  await assert.rejects(
+    drawFrame(broken.fetch, "http://host/", {}, never, { wait }),
+    /^Error: needs 9/,
+  );
   assert.equal(broken.asked.length, 1);
   const always = server(() => problem(429, "busy for ever"));
-  await assert.rejects(drawFrame(always.fetch, "http://host/", {}, never, wait), /busy for ever/);
+  await assert.rejects(
+    drawFrame(always.fetch, "http://host/", {}, never, { wait }),
+    /busy for ever/,
+  );
   assert.ok(always.asked.length <= 20);
   const html = server(() => new Response("<html>", { status: 502 }));
-  await assert.rejects(drawFrame(html.fetch, "http://host/", {}, never, wait), /HTTP 502/);
+  await assert.rejects(drawFrame(html.fetch, "http://host/", {}, never, { wait }), /HTTP 502/);
   const gone: FetchLike = () => Promise.reject(new TypeError("Failed to fetch"));
-  await assert.rejects(drawFrame(gone, "http://host/", {}, never, wait), /cannot be reached/);
+  await assert.rejects(drawFrame(gone, "http://host/", {}, never, { wait }), /cannot be reached/);
 });
 
 test("cancelling a wait rejects at once", async () => {

@@ -66,7 +66,7 @@ test("a saved picture has the chosen dots per inch", () =>
     await page.locator("#save-scale").selectOption("1");
     await page.locator("#save-dpi").fill("150");
     await page.locator("#save-dpi").press("Tab");
-    assert.match(await page.locator("#save-size").innerText(), /cm in print/);
+    assert.match(await page.locator("#save-size").innerText(), /mm in print/);
     const [download] = await Promise.all([
       page.waitForEvent("download", { timeout: 60_000 * patience }),
       page.locator("#save-picture").click(),

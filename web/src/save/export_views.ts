@@ -5,6 +5,19 @@ import type { View } from "../wire/protocol";
 const edgeMax = 8192; // pixels, as in the schema of the view
 export const framesMax = 2000;
 
+const millimetresToTheInch = 25.4;
+
+export type SizeUnit = "mm" | "px";
+
+// Pixels per CSS pixel of a picture of this width.
+export function scaleOf(width: number, unit: SizeUnit, dpi: number, cssWidth: number): number {
+  const pixels = unit === "mm" ? Math.round((width * dpi) / millimetresToTheInch) : width;
+  return pixels / Math.max(1, cssWidth);
+}
+
+export const millimetres = (pixels: number, dpi: number): number =>
+  (millimetresToTheInch * pixels) / dpi;
+
 export interface ExportSize {
   width: number; // pixels
   height: number;

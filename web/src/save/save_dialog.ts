@@ -5,11 +5,14 @@ import {
   exportSize,
   frameCount,
   framesMax,
+  millimetres,
+  scaleOf,
   type Animation,
   type AnimationKind,
   type ExportSize,
 } from "./export_views";
 import { savedViewList } from "./saved_view_list";
+import { aboutFormat, type PictureFormat } from "./picture_formats";
 import { button, Jobs, part } from "./save_jobs";
 import { animationJob, pictureJob, type SaveHost, type SaveSetting } from "./save_work";
 import { openFile } from "./saved_picture";
@@ -18,7 +21,7 @@ import { hasVideoEncoder } from "./video";
 
 const pictureScaleMax = 4;
 const animationScaleMax = 2;
-const centimetresToTheInch = 2.54;
+const paperWidth = 170; // mm, between the margins of A4
 const about: Record<string, string> = {
   zip: "Every frame lossless, with its view inside.",
   webm: "One file for players, not lossless; every frame at its time.",
@@ -41,10 +44,28 @@ function fill(host: SaveHost, dialog: HTMLElement): void {
   select("over").value = last < 1 ? "turn" : "steps";
 }
 
-const scaleChosen = (): string => select("scale").value;
+const formatChosen = (): PictureFormat => select("format").value as PictureFormat;
 
-const sizeChosen = (host: SaveHost, scaleMax: number): ExportSize =>
-  exportSize(...host.size(), Math.min(Number(scaleChosen()), scaleMax), host.pixelsMax());
+const hasWidth = (): boolean => ["mm", "px"].includes(select("scale").value);
+
+// Pixels per CSS pixel.
+function scaleChosen(host: SaveHost): number {
+  const chosen = select("scale").value;
+  if (chosen !== "mm" && chosen !== "px") return Number(chosen);
+  return scaleOf(number("width"), chosen, dotsPerInchChosen(), host.size()[0]);
+}
+
+// For the names of files.
+function sizeName(): string {
+  const chosen = select("scale").value;
+  return hasWidth() ? `${input("width").value}${chosen}` : `${chosen}x`;
+}
+
+function sizeChosen(host: SaveHost, scaleMax: number): ExportSize {
+  const scale = scaleChosen(host);
+  const wanted = hasWidth() ? scale : Math.min(scale, scaleMax);
+  return exportSize(...host.size(), wanted, host.pixelsMax());
+}
 
 // Typed values are rounded and clamped.
 function number(id: string): number {
@@ -56,6 +77,13 @@ function number(id: string): number {
 }
 
 const dotsPerInchChosen = (): number => number("dpi");
+
+// A width in pixels starts at that of the page, one in mm at that of a page of paper.
+function offerWidth(host: SaveHost): void {
+  if (!hasWidth()) return;
+  const millimetre = select("scale").value === "mm";
+  input("width").value = String(millimetre ? paperWidth : Math.round(host.size()[0]));
+}
 
 function animationChosen(): Animation {
   const over = select("over").value as AnimationKind;
@@ -78,13 +106,15 @@ function showChoices(host: SaveHost, dialog: HTMLElement, running: boolean): voi
   for (const choice of dialog.querySelectorAll<HTMLElement>(".of-steps, .of-frames")) {
     choice.hidden = choice.classList.contains("of-steps") !== (chosen.over === "steps");
   }
+  dialog.querySelector<HTMLElement>(".of-width")!.hidden = !hasWidth();
+  part("unit").textContent = select("scale").value === "mm" ? "mm" : "pixels";
   const { width, height, scale } = sizeChosen(host, pictureScaleMax);
-  const limited = scale < Number(scaleChosen()) ? ", the server's limit" : "";
-  const centimetres = (pixels: number): string =>
-    ((centimetresToTheInch * pixels) / dotsPerInchChosen()).toFixed(1);
+  const limited = scale < scaleChosen(host) ? ", the server's limit" : "";
+  const printed = (pixels: number): string =>
+    Math.round(millimetres(pixels, dotsPerInchChosen())).toString();
   part("size").textContent =
-    `${width} × ${height} pixels${limited}, ` +
-    `${centimetres(width)} × ${centimetres(height)} cm in print.`;
+    `${width} × ${height} pixels${limited}, ${printed(width)} × ${printed(height)} mm in print.`;
+  part("format-about").textContent = aboutFormat[formatChosen()];
   const count = frameCount(chosen);
   const small = sizeChosen(host, animationScaleMax);
   part("about").textContent =
@@ -110,7 +140,7 @@ export function saveDialog(host: SaveHost, baseUri: string): () => void {
   });
 
   const savePicture = (): Promise<void> =>
-    jobs.run(pictureJob(setting(pictureScaleMax), scaleChosen()));
+    jobs.run(pictureJob(setting(pictureScaleMax), formatChosen(), sizeName()));
 
   const saveAnimation = (): Promise<void> => {
     const chosen = animationChosen();
@@ -123,6 +153,7 @@ export function saveDialog(host: SaveHost, baseUri: string): () => void {
   webm.disabled = !hasVideoEncoder();
   if (webm.disabled) webm.text += " (needs WebCodecs: https or localhost)";
   fields("choices").addEventListener("change", show);
+  select("scale").addEventListener("change", () => offerWidth(host));
   button("save-picture").addEventListener("click", () => void savePicture());
   button("save-animation").addEventListener("click", () => void saveAnimation());
   const chooser = byId("picture-file", HTMLInputElement);

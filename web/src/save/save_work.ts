@@ -12,10 +12,17 @@ import {
   type Animation,
   type ExportSize,
 } from "./export_views";
-import { drawFrame, inOrder } from "../wire/frame_request";
+import { drawFrame, inOrder, type Asked } from "../wire/frame_request";
 import type { Dataset, View } from "../wire/protocol";
+import { isDocument, mediaTypes, withServerLegend, type PictureFormat } from "./picture_formats";
 import type { Job } from "./save_jobs";
-import { finishPicture, type FileTarget, type Shown } from "./saved_picture";
+import {
+  finishJpeg,
+  finishPicture,
+  hasOwnLegend,
+  type FileTarget,
+  type Shown,
+} from "./saved_picture";
 import { VideoFile } from "./video";
 import { Zip } from "./zip";
 
@@ -43,24 +50,37 @@ export interface SaveSetting {
   dotsPerInch: number; // the size of pictures in print
 }
 
-const draw = (baseUri: string, view: View, signal: AbortSignal): Promise<Blob> =>
-  drawFrame((url, options) => fetch(url, options), baseUri, view, signal);
+const draw = (baseUri: string, view: View, signal: AbortSignal, asked: Asked = {}): Promise<Blob> =>
+  drawFrame((url, options) => fetch(url, options), baseUri, view, signal, asked);
 
-// `scale`: the chosen scale, for the file name.
-export function pictureJob(
-  { host, baseUri, pixels, legend, dotsPerInch }: SaveSetting,
-  scale: string,
-): Job {
-  const view = pictureView(host.explicitView(), pixels);
+// `size`: the chosen size, for the file name.
+export function pictureJob(setting: SaveSetting, format: PictureFormat, size: string): Job {
+  const view = pictureView(setting.host.explicitView(), setting.pixels);
+  const suffix = format === "jpeg" ? "jpg" : format;
   return {
-    name: `${safeName(view.dataset ?? "")}-${view.step}-${scale}x.png`,
-    work: async (signal, report) => {
+    name: `${safeName(view.dataset ?? "")}-${view.step}-${size}.${suffix}`,
+    work: (signal, report) => {
       report("drawing…");
-      const drawn = await draw(baseUri, view, signal);
-      const picture = await finishPicture(drawn, view, pixels, legend, dotsPerInch);
-      return new Blob([picture], { type: "image/png" });
+      return drawPicture(setting, format, view, signal);
     },
   };
+}
+
+async function drawPicture(
+  { baseUri, pixels, legend, dotsPerInch }: SaveSetting,
+  format: PictureFormat,
+  view: View,
+  signal: AbortSignal,
+): Promise<Blob> {
+  const type = mediaTypes[format];
+  if (isDocument(format)) {
+    const shown = legend === null ? view : withServerLegend(view);
+    return draw(baseUri, shown, signal, { type, dotsPerInch });
+  }
+  const asked = hasOwnLegend(view, legend) ? {} : { type };
+  const drawn = await draw(baseUri, view, signal, asked);
+  const finish = format === "jpeg" ? finishJpeg : finishPicture;
+  return new Blob([await finish(drawn, view, pixels, legend, dotsPerInch)], { type });
 }
 
 export function animationJob(setting: SaveSetting, chosen: Animation, video: boolean): Job {

@@ -1,16 +1,18 @@
-// Saved pictures: view -> the server's lossless picture with the legend drawn in and the view
-// embedded; and a picture that is dropped on the page or chosen -> its view.
+// Saved pictures: view -> the server's picture with the legend drawn in, its size in print and, in
+// a lossless one, the view; and a picture that is dropped on the page or chosen -> its view.
 import type { ColorMaps } from "../wire/color_maps";
 import type { ExportSize } from "./export_views";
 import { legendEntries } from "../view/legend_entries";
 import { pictureCaption } from "../view/caption";
 import { drawLegend } from "./legend_picture";
+import { withJpegDensity } from "./jpeg_density";
 import { textOf, withDensity, withTexts, type Bytes } from "./png_text";
 import type { Dataset, View } from "../wire/protocol";
 import { isView } from "../wire/view_shape";
 import { completeView } from "../view/view_state";
 
 const keyword = "windsplat-view";
+const jpegQuality = 0.92; // of the browser's encoder
 const fileBytesMax = 400e6;
 const cardWidthMin = 228; // CSS pixels; on a phone the legend is narrower than its text
 
@@ -30,15 +32,38 @@ export async function finishPicture(
   legend: Shown | null,
   dotsPerInch: number,
 ): Promise<Bytes> {
-  const plain = legend === null || view.annotations?.legend === true; // or the server's legend
-  const picture = plain ? drawn : await withLegend(drawn, view, size, legend);
+  const picture = hasOwnLegend(view, legend) ? await withLegend(drawn, view, size, legend) : drawn;
   return withTexts(withDensity(await bytesOf(picture), dotsPerInch), {
     Software: "windsplat",
     [keyword]: JSON.stringify(view),
   });
 }
 
-async function withLegend(drawn: Blob, view: View, { scale }: ExportSize, shown: Shown) {
+// As JPEG: `drawn` is the server's JPEG, or with a legend its lossless picture.
+export async function finishJpeg(
+  drawn: Blob,
+  view: View,
+  size: ExportSize,
+  legend: Shown | null,
+  dotsPerInch: number,
+): Promise<Bytes> {
+  const picture = hasOwnLegend(view, legend)
+    ? await withLegend(drawn, view, size, legend, "image/jpeg")
+    : drawn;
+  return withJpegDensity(await bytesOf(picture), dotsPerInch);
+}
+
+// Whether the page draws the legend: not if the server has done so.
+export const hasOwnLegend = (view: View, legend: Shown | null): legend is Shown =>
+  legend !== null && view.annotations?.legend !== true;
+
+async function withLegend(
+  drawn: Blob,
+  view: View,
+  { scale }: ExportSize,
+  shown: Shown,
+  type = "image/png",
+): Promise<Blob> {
   const bitmap = await createImageBitmap(drawn, { colorSpaceConversion: "none" });
   const canvas = document.createElement("canvas");
   canvas.width = bitmap.width;
@@ -58,7 +83,7 @@ async function withLegend(drawn: Blob, view: View, { scale }: ExportSize, shown:
     },
     scale,
   );
-  const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done, "image/png"));
+  const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done, type, jpegQuality));
   if (blob === null) throw new Error("The picture is too large for this browser.");
   return blob;
 }

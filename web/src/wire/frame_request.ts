@@ -1,4 +1,4 @@
-// Views -> lossless pictures from POST v1/frames, in order, at most two requests at a time. If the
+// Views -> pictures from POST v1/frames, in order, at most two requests at a time. If the
 // server is busy, the request is repeated after the delay given in its answer.
 import type { View } from "./protocol";
 import { posted, refusalText } from "./requests";
@@ -25,16 +25,23 @@ export const waitFor: Wait = (ms, signal) =>
     else signal.addEventListener("abort", stop, { once: true });
   });
 
+export interface Asked {
+  type?: string; // media type; a lossless picture without it
+  dotsPerInch?: number; // of types that tell a size on paper
+  wait?: Wait;
+}
+
 export async function drawFrame(
   fetch: FetchLike,
   baseUri: string,
   view: View,
   signal: AbortSignal,
-  wait: Wait = waitFor,
+  { type = "image/png", dotsPerInch, wait = waitFor }: Asked = {},
 ): Promise<Blob> {
+  const query = dotsPerInch === undefined ? "" : `?dpi=${dotsPerInch}`;
   for (let tries = 1; ; tries++) {
-    const response = await fetch(new URL("v1/frames", baseUri).href, {
-      ...posted(view, { Accept: "image/png" }),
+    const response = await fetch(new URL(`v1/frames${query}`, baseUri).href, {
+      ...posted(view, { Accept: type }),
       signal,
     }).catch((failure: unknown) => {
       throw signal.aborted ? failure : new Error("The server cannot be reached.");
