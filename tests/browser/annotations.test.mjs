@@ -61,6 +61,47 @@ test("a title of one's own is drawn in place of the dataset's until it is emptie
     assert.equal((await pixels(page)).hash, dataset);
   }));
 
+test("size and colour of a part are its own, are offered while it is shown, and can be taken back", () =>
+  withPage(async (page) => {
+    await unfold(page, "Axes and labels", "Size and colour of each");
+    const row = (label) => control(page, label, "input");
+    for (const part of ["box", "legend", "title"]) {
+      assert.equal(await row(`${part} size`).isVisible(), false, part);
+    }
+    for (const label of ["title", "box"]) await row(label).check();
+    await finalPicture(page);
+    const { hash: plain } = await pixels(page);
+    await row("title in own colour").check();
+    await row("title colour").fill("#ff2000");
+    await finalPicture(page);
+    const { hash: colored } = await pixels(page);
+    assert.notEqual(colored, plain);
+    const red = await page.locator("#picture").evaluate((canvas) => {
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height / 5);
+      let count = 0;
+      for (let n = 0; n < data.length; n += 4) {
+        if (data[n] > 200 && data[n + 1] < 90 && data[n + 2] < 60) count += 1;
+      }
+      return count;
+    });
+    assert.ok(red > 50, `the title is red: ${red} pixels`);
+    await type(page, "title size", 2);
+    await finalPicture(page);
+    assert.notEqual((await pixels(page)).hash, colored);
+    await page.waitForFunction(() => location.hash.includes("ff2000"));
+    const { annotations } = await page.evaluate(() =>
+      JSON.parse(decodeURIComponent(location.hash.slice(2))),
+    );
+    assert.deepEqual(annotations.titleStyle, { size: 2, textColor: "#ff2000" });
+    assert.equal(annotations.boxStyle, undefined, "the box keeps its own");
+    await shot(page, "annotation-styles");
+    await type(page, "title size", 1);
+    await row("title in own colour").uncheck();
+    await finalPicture(page);
+    assert.equal(await row("title colour").isVisible(), false);
+    assert.equal((await pixels(page)).hash, plain);
+  }));
+
 // Keeps the pixels of the picture in the page.
 const keepPixels = (page) =>
   page.evaluate(() => {

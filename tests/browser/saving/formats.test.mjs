@@ -40,7 +40,11 @@ test("a PDF of 120 mm has that width on paper, and texts as texts", () =>
     const { name, text } = await saved(page, wanted);
     assert.equal(name, "tornado-0-120mm.pdf");
     assert.ok(text.startsWith("%PDF-"));
-    const box = text.match(/\/MediaBox\s*\[([^\]]*)\]/)[1].trim().split(/\s+/).map(Number);
+    const box = text
+      .match(/\/MediaBox\s*\[([^\]]*)\]/)[1]
+      .trim()
+      .split(/\s+/)
+      .map(Number);
     // 120 mm are 340.16 points of 1/72 inch; pixels of 1/200 inch are 0.36 points
     assert.ok(Math.abs(box[2] - 340.16) < 0.36, String(box));
     assert.ok(Math.abs(box[3] / box[2] - (await aspect(page))) < 0.01, String(box));

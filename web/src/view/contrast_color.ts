@@ -97,3 +97,7 @@ export function contrastColor(present: readonly string[]): string {
   if (room(neutral) >= apart) return neutral;
   return offered.reduce((best, color) => (room(color) > room(best) ? color : best));
 }
+
+// Black or white, whichever is read on this colour.
+export const inkOn = (background = "#000000"): string =>
+  labOf(background)[0] > 0.6 ? "#000000" : "#ffffff";

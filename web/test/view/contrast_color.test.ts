@@ -1,7 +1,7 @@
 // Colours of new surfaces: whatever is seen around them, they can be told from it.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { colorsIn, contrastColor } from "../../src/view/contrast_color";
+import { colorsIn, contrastColor, inkOn } from "../../src/view/contrast_color";
 import type { View } from "../../src/wire/protocol";
 
 type Channels = [number, number, number];
@@ -74,5 +74,14 @@ test("each further surface differs from those before", () => {
     const next = contrastColor(colorsIn({ ...cloud, surfaces } as View, () => white));
     assert.ok(!chosen.includes(next), `${next} after ${chosen.join()}`);
     chosen.push(next);
+  }
+});
+
+test("texts are black on light backgrounds and white on dark ones", () => {
+  for (const light of ["#ffffff", "#f0f0e8", "#ffff00", "#a0c8ff"]) {
+    assert.equal(inkOn(light), "#000000", light);
+  }
+  for (const dark of [undefined, "#000000", "#101820", "#0000ff", "#803000"]) {
+    assert.equal(inkOn(dark), "#ffffff", dark);
   }
 });
