@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
@@ -209,64 +210,6 @@ Json problem_json(const Problem& problem) {
   for (const FieldError& error : problem.errors) {
     out["errors"].push_back(Json{{"pointer", error.pointer}, {"detail", error.detail}});
   }
-  return out;
-}
-
-namespace {
-
-// With the error that was asked for, and whether it is kept.
-Json frame_error_json(const FrameInfo& info) {
-  Json out{{"value", number_or_null(info.error_value)}, {"kind", info.error_kind}};
-  if (info.error_asked && std::isfinite(info.error_value.value_or(NAN))) {
-    out["asked"] = *info.error_asked;
-    out["kept"] = *info.error_value <= *info.error_asked;
-  }
-  return out;
-}
-
-Json streamlets_json(const StreamletCounts& counts) {
-  return {{"lines", counts.lines},
-          {"segments", counts.segments},
-          {"evaluations", counts.evaluations},
-          {"ends",
-           {{"length", counts.by_length},
-            {"boundary", counts.by_boundary},
-            {"mask", counts.by_mask},
-            {"stagnation", counts.by_stagnation},
-            {"steps", counts.by_steps}}}};
-}
-
-}  // namespace
-
-Json frame_info_json(const FrameInfo& info) {
-  Json out{{"method", info.method},
-           {"compositing", info.compositing},
-           {"stride", info.stride},
-           {"slabThickness", number_or_null(info.slab_thickness)},
-           {"width", info.width},
-           {"height", info.height},
-           {"error", frame_error_json(info)},
-           {"jpegError", number_or_null(info.jpeg_error)},
-           {"skippedChange",
-            {{"value", number_or_null(info.skipped_change)}, {"kind", info.skipped_change_kind}}},
-           {"work",
-            {{"samples", info.samples},
-             {"culled", info.culled},
-             {"skippedVector", info.skipped_vector},
-             {"skippedScalar", info.skipped_scalar},
-             {"skippedBoth", info.skipped_both},
-             {"occluded", info.occluded},
-             {"pixelUpdates", info.pixel_updates},
-             {"exponentials", info.exponentials},
-             {"tiles", info.tiles},
-             {"tilesStopped", info.tiles_stopped},
-             {"skippedBound", number_or_null(info.skipped_bound)},
-             {"stopBound", number_or_null(info.stop_bound)},
-             {"fields", info.fields},
-             {"bytes", info.bytes},
-             {"variant", info.variant}}}};
-  if (info.streamlets) out["work"]["streamlets"] = streamlets_json(*info.streamlets);
-  if (!info.empty.empty()) out["empty"] = info.empty;
   return out;
 }
 

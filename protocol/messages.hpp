@@ -134,6 +134,13 @@ struct StreamletCounts {
   // Ends of lines, two each, by what ended them.
   std::int64_t by_length = 0, by_boundary = 0, by_mask = 0, by_stagnation = 0, by_steps = 0;
 };
+// What was computed and is held for a part that a view may add; zeros of an absent one.
+struct PartReport {
+  std::string part;
+  bool shown = false;
+  std::int64_t count = 0;
+  std::int64_t bytes = 0;
+};
 struct FrameInfo {
   std::string method = "kernel";
   std::string compositing = "analytic";
@@ -155,6 +162,7 @@ struct FrameInfo {
   std::int64_t bytes = 0;
   std::string variant;
   std::optional<StreamletCounts> streamlets;  // absent in JSON without streamlets
+  std::vector<PartReport> parts;
   std::string empty;  // why the picture shows nothing of the data; absent in JSON if empty
 };
 // RFC 9457.

@@ -390,6 +390,8 @@ Result<void> draw(const Prepared& prepared, data::Dataset& dataset, ThreadPool& 
   drawn.height = scene.camera.height;
   drawn.work = std::move(*work);
   name_fields(scene, prepared.completed, drawn.work);
+  drawn.parts = parts_of(prepared.completed, scene, workspace.figure ? &*workspace.figure : nullptr,
+                         workspace.space.ground_bytes());
   drawn.view = prepared.completed.view();
   const bool transparent = drawn.work.variant.reference && is_transparent(workspace.space.image());
   auto missing = missing_surfaces(prepared, dataset);

@@ -17,6 +17,7 @@
 #include "server/base/thread_pool.hpp"
 #include "server/data/resident/dataset.hpp"
 #include "server/engine/render.hpp"
+#include "server/frame/report/parts.hpp"
 #include "server/image/encode.hpp"
 #include "server/image/jpeg_encoder.hpp"
 #include "server/image/ycc.hpp"
@@ -78,6 +79,7 @@ struct Frame {
   std::optional<quality::Content> content;  // if it was described
   quality::Halvings halvings{};             // of the data, by the size of the picture
   engine::WorkReport work;
+  PartCounts parts{};
   std::string empty;           // why the picture shows nothing of the data; empty if it shows some
   std::int64_t render_us = 0;  // time of scene and engine, including the tone mapping of JPEG tiles
   std::int64_t measure_us = 0;

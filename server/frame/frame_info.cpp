@@ -1,6 +1,10 @@
 // Converts the report of a frame to the terms of the protocol.
 #include "server/frame/frame_info.hpp"
 
+#include <array>
+#include <cstddef>
+#include <vector>
+
 namespace windsplat::frame {
 namespace {
 
@@ -46,6 +50,17 @@ protocol::StreamletCounts counts_of(const trace::Tally& tally) {
           ended(End::boundary), ended(End::masked), ended(End::stagnation), ended(End::steps)};
 }
 
+constexpr std::array<const char*, parts_count> part_names{
+    "ground", "surfaces", "streamlets", "seeds", "light", "region", "difference", "annotations"};
+
+std::vector<protocol::PartReport> reports_of(const PartCounts& parts) {
+  std::vector<protocol::PartReport> out;
+  for (std::size_t n = 0; n < parts_count; ++n) {
+    out.push_back({part_names.at(n), parts.at(n).shown, parts.at(n).count, parts.at(n).bytes});
+  }
+  return out;
+}
+
 }  // namespace
 
 protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
@@ -79,6 +94,7 @@ protocol::FrameInfo frame_info(const Frame& frame, const protocol::View& view) {
   info.bytes = work.bytes;
   info.variant = engine::text_of(work.variant);
   if (work.streamlets) info.streamlets = counts_of(*work.streamlets);
+  info.parts = reports_of(frame.parts);
   info.empty = frame.empty;
   return info;
 }

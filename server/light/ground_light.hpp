@@ -21,6 +21,8 @@ class GroundLight {
 
   // Factor of the colour of the body at a place in the world, at most 1.
   [[nodiscard]] double factor(const glm::dvec3& place) const;
+  // Null: 1 everywhere.
+  [[nodiscard]] const surface::Transmittances* transmittances() const { return media_.get(); }
 
  private:
   scene::Light light_;

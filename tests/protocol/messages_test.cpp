@@ -295,7 +295,8 @@ TEST(Shapes, FrameInfoContainsEveryCount) {
       "work":{"samples":972800,"culled":1,"skippedVector":2,"skippedScalar":3,"skippedBoth":4,
               "occluded":5,"pixelUpdates":6,"exponentials":7,"tiles":300,"tilesStopped":8,
               "skippedBound":0.25,"stopBound":0.125,
-              "fields":["wind"],"bytes":3891200,"variant":"vector perspective"}})"));
+              "fields":["wind"],"bytes":3891200,"variant":"vector perspective",
+              "parts":[]}})"));
 }
 
 TEST(Shapes, FrameInfoCountsStreamletsWhereTheyAreTraced) {
@@ -307,6 +308,21 @@ TEST(Shapes, FrameInfoCountsStreamletsWhereTheyAreTraced) {
   EXPECT_EQ(Json::parse(json)["work"]["streamlets"],
             Json::parse(R"({"lines":10,"segments":40,"evaluations":500,
                 "ends":{"length":12,"boundary":3,"mask":2,"stagnation":1,"steps":2}})"));
+}
+
+TEST(Shapes, FrameInfoHasARowForEachPart) {
+  FrameInfo info = frame_info();
+  for (const char* part : {"ground", "surfaces", "streamlets", "seeds", "light", "region",
+                           "difference", "annotations"}) {
+    info.parts.push_back({part, true, 12, 34});
+  }
+  info.parts[1] = {"surfaces", false, 0, 0};
+  const std::string json = encode_frame_info(info);
+  expect_shape("frameInfo", json);
+  const Json parts = Json::parse(json)["work"]["parts"];
+  ASSERT_EQ(parts.size(), 8U);
+  EXPECT_EQ(parts[0], Json::parse(R"({"part":"ground","shown":true,"count":12,"bytes":34})"));
+  EXPECT_EQ(parts[1], Json::parse(R"({"part":"surfaces","shown":false,"count":0,"bytes":0})"));
 }
 
 TEST(Shapes, ErrorsSayWhatWasAskedAndWhetherItIsKept) {

@@ -21,7 +21,7 @@ import {
   slicePatch,
   sliceText,
 } from "../src/panels/controls";
-import { methodText, workLines } from "../src/viewport/frame_text";
+import { methodText, partsLine, workLines } from "../src/viewport/frame_text";
 import { legendEntries, sampleHeights } from "../src/view/legend_entries";
 import type { ChosenMessage, Dataset, Field, View } from "../src/wire/protocol";
 import { compassTicks } from "../src/base/ticks";
@@ -255,6 +255,17 @@ test("levels are at their axis positions unless the grid is curved", () => {
   assert.notEqual(sampleHeights(dataset, {}), null);
   assert.equal(sampleHeights(dataset, { geometry: { mapping: "sphere" } }), null);
   assert.equal(sampleHeights(dataset, { geometry: { heightField: "zg" } }), null);
+});
+
+test("the HUD tells what was computed and is held for the parts of the picture", () => {
+  const ground = { part: "ground", shown: true, count: 921_600, bytes: 3_400_000 } as const;
+  const surfaces = { part: "surfaces", shown: false, count: 0, bytes: 0 } as const;
+  const region = { part: "region", shown: true, count: 120, bytes: 0 } as const;
+  assert.equal(
+    partsLine({ parts: [ground, surfaces, region] }),
+    "ground 921.6 k pixels 3.4 MB · region 120 samples outside",
+  );
+  assert.equal(partsLine({ parts: [surfaces] }), "");
 });
 
 test("the HUD names method and compositing, and the samples that were skipped", () => {

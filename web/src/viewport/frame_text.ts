@@ -139,6 +139,29 @@ function changeText(change: ChosenMessage["skippedChange"], bound: number | null
   return bound === null ? "" : ` · change ≤ ${formatNumber(bound, 2)}`;
 }
 
+const countedIn = {
+  ground: "pixels",
+  surfaces: "triangles",
+  streamlets: "pieces",
+  seeds: "pieces",
+  light: "samples",
+  region: "samples outside",
+  difference: "values",
+  annotations: "items",
+};
+
+// What was computed and is held for the parts that the view adds to lines and clouds. Empty: the
+// picture has none of them.
+export function partsLine({ parts }: Pick<ChosenMessage["work"], "parts">): string {
+  return parts
+    .filter(({ shown }) => shown)
+    .map(({ part, count, bytes }) => {
+      const held = bytes > 0 ? ` ${formatNumber(bytes / 1e6, 2)} MB` : "";
+      return `${part} ${many(count)} ${countedIn[part]}${held}`;
+    })
+    .join(" · ");
+}
+
 // The work drawn, the work left out, and the cost.
 export function workLines({
   work,
@@ -153,4 +176,8 @@ export function workLines({
     `${many(work.pixelUpdates)} pixel updates · ${many(work.exponentials)} exponentials` +
       ` · ${work.variant}`,
   ];
+}
+
+export function workText(chosen: ChosenMessage): string {
+  return [...workLines(chosen), partsLine(chosen.work)].filter((line) => line !== "").join("\n");
 }

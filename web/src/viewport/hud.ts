@@ -13,7 +13,7 @@ import {
   paceText,
   scaleText,
   stepsText,
-  workLines,
+  workText,
   type FrameState,
   type LabelText,
 } from "./frame_text";
@@ -114,7 +114,7 @@ export class Hud {
       `queue ${ms(header.queueUs / 1e3)} · render ${ms(header.renderUs / 1e3)} · ` +
       `encode ${ms(header.encodeUs / 1e3)} · net ${msOrDash(this.network)} · ` +
       `decode ${ms(frame.decodeMs)} · latency ${msOrDash(this.latency)} ms`;
-    this.work.textContent = chosen === null ? "" : workLines(chosen).join("\n");
+    this.work.textContent = chosen === null ? "" : workText(chosen);
     this.showRate();
   }
 
