@@ -31,7 +31,7 @@ TEST_F(PrintSize, DocumentsHaveSoManyPixelsToTheInch) {
   EXPECT_THAT(post("?dpi=100", "application/pdf").body, HasSubstr("144 72"));  // 1/72 inch
   const std::string path = "/v1/datasets/small/frame.svg?width=200&height=100&dpi=";
   const Answer one = get(port(), path + "100");
-  EXPECT_THAT(one.body, HasSubstr(inches));
+  EXPECT_THAT(one.body, HasSubstr(R"(width="2.00in")"));
   EXPECT_NE(one.header("etag"), get(port(), path + "200").header("etag"));
 }
 
