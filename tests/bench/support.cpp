@@ -48,6 +48,7 @@ protocol::View view_of(const Workload& workload) {
   view.dataset = dataset.info().id;
   view.image.width = workload.width;
   view.image.height = workload.height;
+  view.vector.stride = 1;  // every sample, whatever the defaults
   // Must precede the computation of defaults, so that hidden fields are never loaded.
   const std::string preset = workload.preset;
   if (preset == "clouds") view.vector.field = {protocol::FieldChoice::Kind::none, ""};

@@ -1,6 +1,4 @@
 // What the legend says of where sections lie.
-#include "server/annotate/section_text.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "server/annotate/legend.hpp"
+#include "server/annotate/section_text.hpp"
 #include "tests/unit/annotate/shown.hpp"
 
 namespace windsplat::annotate {

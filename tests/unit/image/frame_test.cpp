@@ -430,6 +430,7 @@ TEST_F(Produce, FrameInfoNamesMethodsAndSlabs) {
 TEST_F(Produce, ReportContainsTheLevelAndActualSettings) {
   view.image.width = 10;
   view.image.height = 8;
+  view.vector.stride = 1;  // kernels of another stride are counted beside those of the medium
   const auto coarse = produce_as(Format::png);
   view.method.detail = protocol::Detail::full;
   const auto full = produce_as(Format::png);

@@ -151,11 +151,11 @@ TEST(Report, MarksPointsWithTheViewsOwnSettings) {
   Subject subject = vectors_only()[0];
   subject.view.method.slab_thickness = 0.5;
   scene.view = subject.view;
-  const auto point = [&](scene::Method method, double thickness, int stride) {
+  const auto point = [&](scene::Method method, double thickness, int strides) {
     Point one;
     one.setting = {method, scene::Compositing::analytic, own_knobs(subject)};
     one.setting.knobs.slab_thickness = thickness;
-    one.setting.knobs.stride = stride;
+    one.setting.knobs.stride *= strides;
     scene.points.push_back(one);
   };
   point(scene::Method::kernel, 1, 2);

@@ -67,7 +67,7 @@ TEST(Sweep, OmitsContentTheSceneLacks) {
 TEST(Scene, AppliesItsParametersAndScalesLinesWithThePicture) {
   const Subject subject = standard_subject("soft", false).value();
   Setting setting{Method::slab, Compositing::cd, own_knobs(subject)};
-  setting.knobs.stride = 2;
+  setting.knobs.stride *= 2;
   setting.knobs.span = 3;
   setting.knobs.slab_thickness = 0.5;
   setting.knobs.stop_transmittance = 0.25;
@@ -75,7 +75,7 @@ TEST(Scene, AppliesItsParametersAndScalesLinesWithThePicture) {
   const scene::Scene scene = scene_at(subject, setting).value();
   EXPECT_EQ(scene.method, Method::slab);
   EXPECT_EQ(scene.compositing, Compositing::cd);
-  EXPECT_EQ(scene.vector->stride, 2);
+  EXPECT_EQ(scene.vector->stride, 2 * *subject.view.vector.stride);
   EXPECT_EQ(scene.scalars.at(0).stride, 2);
   EXPECT_EQ(scene.vector->span, 3);
   EXPECT_EQ(scene.slab_thickness, 0.5);
