@@ -84,6 +84,16 @@ std::optional<double> along_axis(const data::Axis& axis, double at) {
   return std::nullopt;
 }
 
+// Whether a height, depth, pressure or number lies between those of the first and the last level:
+// no data are beyond. Other axes are of cells, and the outermost ones reach half a cell further.
+bool is_between_levels(const data::Axis& vertical, double at) {
+  const std::vector<double>& c = vertical.coordinates;
+  if (c.size() < 2 || vertical.kind == data::AxisKind::cartesian) return true;
+  const auto [low, high] = std::minmax(c.front(), c.back());
+  const double slack = 1e-9 * (high - low);
+  return at >= low - slack && at <= high + slack;
+}
+
 // Longitude and latitude within the quadrilaterals of columns, by the method of Newton from the
 // nearest column.
 class CellSearch {
@@ -181,7 +191,8 @@ Result<dvec3> PlaceSearch::index_of(const Vec3& at, const std::string& pointer,
   for (std::size_t a = columns_ ? 2 : 0; a < 3; ++a) {
     const data::Axis& axis = a == 2 ? vertical_ : grid_.axes.at(a);
     const auto along = along_axis(axis, at.at(a));
-    if (!along) return invalid_at(pointer, which + outside(a, at.at(a), axis, region_));
+    const bool beyond = a == 2 && !is_between_levels(vertical_, at.at(a));
+    if (!along || beyond) return invalid_at(pointer, which + outside(a, at.at(a), axis, region_));
     index[static_cast<glm::length_t>(a)] = *along;
   }
   return index;

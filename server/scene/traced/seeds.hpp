@@ -25,8 +25,8 @@ class PlaceSearch {
   PlaceSearch(const Placed& placed, const data::Axis& vertical, const CancelToken& cancel = {});
 
   // Linear between the samples; along an axis of one sample 0. Errors: invalid at `pointer`, with
-  // the range of the data or of the region, if it is more than half a cell outside; the text begins
-  // with `which`.
+  // the range of the data or of the region, if it is above or below all levels, or along
+  // another axis more than half a cell outside; the text begins with `which`.
   [[nodiscard]] Result<glm::dvec3> index_of(const protocol::Vec3& at, const std::string& pointer,
                                             const std::string& which = "") const;
 

@@ -120,7 +120,7 @@ TEST(SeededScene, ASeedOutsideIsRefusedWithItsPlaceAndTheRange) {
   EXPECT_EQ(point.first, "/vector/trace/seeds/points/1");
   EXPECT_THAT(point.second, HasSubstr("y = 40 is outside of the data, -10 to 10 degrees_north"));
   View line = seeded();
-  line.vector.trace->seeds->line = protocol::SeedLineView{{0, 0, 500}, {30, 0, 100}, 5};
+  line.vector.trace->seeds->line = protocol::SeedLineView{{0, 0, 500}, {30, 0, 100}, 2};
   const auto end = refusal_of(line, *dataset);
   EXPECT_EQ(end.first, "/vector/trace/seeds/line/to");
   EXPECT_THAT(end.second, HasSubstr("250 to 1000 hPa"));
@@ -132,6 +132,19 @@ TEST(SeededScene, ASeedOutsideIsRefusedWithItsPlaceAndTheRange) {
   EXPECT_TRUE(build_scene(seeded({{10, 14.9, 500}}), *dataset));
   EXPECT_TRUE(build_scene(seeded({{-350, 0, 500}}), *dataset));
   EXPECT_FALSE(build_scene(seeded({{10, 15.1, 500}}), *dataset));
+}
+
+// There are no data below the lowest level and above the highest.
+TEST(SeededScene, ASeedBeyondTheOutermostLevelsIsRefused) {
+  auto dataset = wind_dataset(1);
+  for (const double level : {1000.0, 250.0, 999.0, 251.0}) {
+    EXPECT_TRUE(build_scene(seeded({{10, 0, level}}), *dataset)) << level;
+  }
+  for (const double level : {1001.0, 249.0, 1240.0}) {
+    const auto refused = refusal_of(seeded({{10, 0, level}}), *dataset);
+    EXPECT_EQ(refused.first, "/vector/trace/seeds/points/0") << level;
+    EXPECT_THAT(refused.second, HasSubstr("is outside of the data, 250 to 1000 hPa"));
+  }
 }
 
 TEST(SeededScene, ARegionHasItsOwnRange) {
