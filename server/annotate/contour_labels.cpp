@@ -14,6 +14,7 @@
 #include "server/annotate/labels.hpp"
 #include "server/annotate/paint/type.hpp"
 #include "server/annotate/projector.hpp"
+#include "server/annotate/room.hpp"
 #include "server/image/tone_map.hpp"
 #include "server/surface/contour_lines.hpp"
 
@@ -180,13 +181,11 @@ std::vector<Rectangle> covered_by(const Spot& spot, double size) {
   return squares;
 }
 
-bool is_free(const std::vector<Rectangle>& squares, const Figure& figure) {
+bool is_free(const std::vector<Rectangle>& squares, const Figure& figure,
+             const Occupied& occupied) {
   return std::all_of(squares.begin(), squares.end(), [&](const Rectangle& a) {
     return a.low.x >= 0 && a.low.y >= 0 && a.high.x <= figure.width && a.high.y <= figure.height &&
-           std::none_of(figure.taken.begin(), figure.taken.end(), [&a](const Rectangle& b) {
-             return a.low.x < b.high.x && b.low.x < a.high.x && a.low.y < b.high.y &&
-                    b.low.y < a.high.y;
-           });
+           !occupied.meets(a);
   });
 }
 
@@ -359,12 +358,16 @@ void add_contour_labels(const Subject& subject, const Style& style, Figure& figu
   remove_hidden(subject, lines);
   std::stable_sort(lines.begin(), lines.end(),
                    [](const Numbered& a, const Numbered& b) { return a.length > b.length; });
+  if (lines.empty()) return;
+  constexpr double cell = 4;  // em
+  Occupied occupied(figure, cell * size);
   for (const Numbered& line : lines) {
     if (subject.cancel.cancelled()) return;
     for (const auto& part : line.parts) {
       for (const Spot& spot : part) {
         const std::vector<Rectangle> squares = covered_by(spot, size);
-        if (!is_free(squares, figure)) continue;
+        if (!is_free(squares, figure, occupied)) continue;
+        for (const Rectangle& square : squares) occupied.add(square);
         figure.taken.insert(figure.taken.end(), squares.begin(), squares.end());
         figure.above.emplace_back(text_at(spot, line.number, size, line.shown->contours.color));
         break;

@@ -1,6 +1,7 @@
 #include "server/annotate/room.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "server/annotate/paint/type.hpp"
@@ -80,17 +81,60 @@ bool is_taken(const Figure& figure, const Point& at) {
   });
 }
 
-bool add_if_free(Text text, Figure& figure) {
+bool is_free(const Text& text, const Figure& figure) {
   const Rectangle box = bounds_of(text);
   const bool inside =
       box.low.x >= 0 && box.low.y >= 0 && box.high.x <= figure.width && box.high.y <= figure.height;
-  if (!inside || std::any_of(figure.taken.begin(), figure.taken.end(),
-                             [&](const Rectangle& other) { return overlap(box, other); })) {
-    return false;
-  }
-  figure.taken.push_back(box);
+  return inside && std::none_of(figure.taken.begin(), figure.taken.end(),
+                                [&](const Rectangle& other) { return overlap(box, other); });
+}
+
+bool add_if_free(Text text, Figure& figure) {
+  if (!is_free(text, figure)) return false;
+  figure.taken.push_back(bounds_of(text));
   figure.above.emplace_back(std::move(text));
   return true;
+}
+
+Occupied::Occupied(const Figure& figure, double cell)
+    : cell_(std::max(cell, 1.0)),
+      columns_(count_of(figure.width)),
+      rows_(count_of(figure.height)),
+      cells_(columns_ * rows_) {
+  for (const Rectangle& one : figure.taken) add(one);
+}
+
+std::size_t Occupied::count_of(int pixels) const {
+  return static_cast<std::size_t>(std::max(std::ceil(pixels / cell_), 1.0));
+}
+
+// Rectangles beyond the edges of the picture belong to its outermost cells.
+std::array<std::size_t, 2> Occupied::cells_between(double low, double high,
+                                                   std::size_t count) const {
+  const double last = static_cast<double>(count) - 1;
+  return {static_cast<std::size_t>(std::clamp(std::floor(low / cell_), 0.0, last)),
+          static_cast<std::size_t>(std::clamp(std::floor(high / cell_), 0.0, last))};
+}
+
+void Occupied::add(const Rectangle& one) {
+  const auto [left, right] = cells_between(one.low.x, one.high.x, columns_);
+  const auto [top, bottom] = cells_between(one.low.y, one.high.y, rows_);
+  for (std::size_t y = top; y <= bottom; ++y) {
+    for (std::size_t x = left; x <= right; ++x) cells_[y * columns_ + x].push_back(one);
+  }
+}
+
+bool Occupied::meets(const Rectangle& one) const {
+  const auto [left, right] = cells_between(one.low.x, one.high.x, columns_);
+  const auto [top, bottom] = cells_between(one.low.y, one.high.y, rows_);
+  for (std::size_t y = top; y <= bottom; ++y) {
+    for (std::size_t x = left; x <= right; ++x) {
+      const auto& near = cells_[y * columns_ + x];
+      const auto met = [&one](const Rectangle& other) { return overlap(one, other); };
+      if (std::any_of(near.begin(), near.end(), met)) return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace windsplat::annotate

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/annotate/figure.hpp"
 
@@ -27,8 +29,31 @@ bool move_inside(const Figure& figure, Text& text);
 // Whether something else is written at a point.
 bool is_taken(const Figure& figure, const Point& at);
 
-// Adds a text over the picture if it lies within the picture and no rectangle taken. Its own is
-// taken then.
+// Whether a text lies within the picture and meets no rectangle taken.
+bool is_free(const Text& text, const Figure& figure);
+
+// Adds a text over the picture if it is free. Its rectangle is taken then.
 bool add_if_free(Text text, Figure& figure);
+
+// Rectangles by the cells of a grid over the picture that they meet, for many of them: those taken
+// of the figure, and those added.
+class Occupied {
+ public:
+  // cell: width of a cell in pixels, best about that of the rectangles.
+  Occupied(const Figure& figure, double cell);
+
+  void add(const Rectangle& one);
+  // Whether one of them overlaps; an edge in common is none.
+  [[nodiscard]] bool meets(const Rectangle& one) const;
+
+ private:
+  [[nodiscard]] std::size_t count_of(int pixels) const;
+  [[nodiscard]] std::array<std::size_t, 2> cells_between(double low, double high,
+                                                         std::size_t count) const;
+
+  double cell_;
+  std::size_t columns_, rows_;
+  std::vector<std::vector<Rectangle>> cells_;  // row by row
+};
 
 }  // namespace windsplat::annotate
