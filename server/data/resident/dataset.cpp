@@ -13,8 +13,6 @@ namespace {
 
 using VolumePtr = std::shared_ptr<const Volume>;
 
-constexpr std::size_t remembered_max = 256;
-
 }  // namespace
 
 Dataset::Dataset(std::unique_ptr<Source> source, std::string id, std::uint64_t bytes_max)
@@ -201,20 +199,11 @@ void Dataset::keep(std::string key, std::any value) {
 
 Result<std::vector<double>> Dataset::remembered(
     const std::string& of, const std::function<Result<std::vector<double>>()>& make) {
-  const std::string key = name_of_subtrahend() + of;
-  {
-    const std::lock_guard lock(state_->mutex);
-    for (const auto& [known, numbers] : state_->remembered) {
-      if (known == key) return numbers;
-    }
-  }
-  auto numbers = make();
-  if (numbers) {
-    const std::lock_guard lock(state_->mutex);
-    state_->remembered.emplace_back(key, *numbers);
-    if (state_->remembered.size() > remembered_max) state_->remembered.pop_front();
-  }
-  return numbers;
+  using Meeting = Remembered::Meeting;
+  const Meeting meeting = manner_ == Manner::resident_only ? Meeting::leave
+                          : manner_ == Manner::in_turn     ? Meeting::disregard
+                                                           : Meeting::wait;
+  return state_->remembered.get(name_of_subtrahend() + of, meeting, cancellation(), make);
 }
 
 void Dataset::evict() {

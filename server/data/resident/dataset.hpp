@@ -131,7 +131,10 @@ class Dataset {
   void keep(std::string key, std::any value);
 
   // A few numbers derived from the data and identified by `key`: computed once and cached (the last
-  // 256 keys), so that the volumes need not stay resident. Failures are not cached.
+  // 256 keys), so that the volumes need not stay resident. Failures are not cached. While a thread
+  // computes them, others wait for the result, and compute it if that one fails; a handle that is
+  // resident_only() does not wait, and what one in_turn() computes is not waited for. Errors: those
+  // of `make`; cancelled, by cancellation() during the wait; not_resident.
   Result<std::vector<double>> remembered(const std::string& key,
                                          const std::function<Result<std::vector<double>>()>& make);
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <any>
 #include <cstdint>
-#include <deque>
 #include <exception>
 #include <map>
 #include <memory>
@@ -19,6 +18,7 @@
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/model/packed.hpp"
 #include "server/data/resident/dataset.hpp"
+#include "server/data/resident/remembered.hpp"
 #include "server/data/resident/sizes.hpp"
 #include "server/data/resident/turnstile.hpp"
 
@@ -179,6 +179,7 @@ struct Dataset::State {
   Reservation charged;  // memory of the info
   const Storage storage;
   Turnstile turnstile;  // guards the source
+  Remembered remembered;
 
   mutable std::mutex mutex;  // guards all members below
   Counts counts;
@@ -187,7 +188,6 @@ struct Dataset::State {
   bool forgotten = false;
   std::map<std::pair<std::size_t, std::size_t>, Seen> seen;  // keyed by field and step
   std::map<std::size_t, float> errors;                       // packing errors, by field
-  std::deque<std::pair<std::string, std::vector<double>>> remembered;
   std::string kept_key;
   std::any kept_value;
 };
