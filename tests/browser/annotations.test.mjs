@@ -61,7 +61,7 @@ test("a title of one's own is drawn in place of the dataset's until it is emptie
     assert.equal((await pixels(page)).hash, dataset);
   }));
 
-test("size and colour of a part are its own and can be taken back", () =>
+test("size and colour of a part are its own while it is shown, and can be taken back", () =>
   withPage(async (page) => {
     await unfold(page, "Axes and labels", "Size and colour of each");
     const row = (label) => control(page, label, "input");

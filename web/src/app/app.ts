@@ -272,7 +272,7 @@ export class App {
   // --- the server ----------------------------------------------------------------------
 
   private firstView(explicit: View): View {
-    const [width, height] = this.parts.viewport.size();
+    const [width, height] = this.parts.viewport.askedSize();
     return { ...explicit, image: { ...explicit.image, width, height } };
   }
 

@@ -263,7 +263,7 @@ export class BesidePicture {
     }
     this.writeBar();
     if (!this.connection.live || !this.connection.ready || !this.hasSettings()) return;
-    const next = besideView(this.host.view(), this.shows, this.viewport.size(), this.own);
+    const next = besideView(this.host.view(), this.shows, this.viewport.askedSize(), this.own);
     const text = JSON.stringify(next);
     if (text === this.sent) return;
     this.sent = text;

@@ -68,11 +68,13 @@ export function observeVisibility(element: Element, report: (visible: boolean) =
   new IntersectionObserver((entries) => report(entries.at(-1)!.isIntersecting)).observe(element);
 }
 
-// After the picture's place has changed its size, once that rests. Paper shows the present picture;
-// its size on paper is none to draw at.
+// Paper shows the present picture; its size on paper is none to draw at.
+export const isPrinting = (): boolean => window.matchMedia("print").matches;
+
+// After the picture's place has changed its size, once that rests.
 export const afterResizing = (run: () => void): (() => void) =>
   debounced(() => {
-    if (!window.matchMedia("print").matches) run();
+    if (!isPrinting()) run();
   }, 120);
 
 // Runs `run` once, `ms` after the last call.

@@ -3,6 +3,7 @@
 // Frames of video are all decoded.
 // Frames of any size fill the canvas. The displayed state is also published as data attributes of
 // the canvas (seq, rev, step, state, level, width, height) for tests and style sheets.
+import { isPrinting } from "../base/dom";
 import { frameState } from "./frame_text";
 import type { Frame, FrameHeader } from "../wire/protocol";
 import { clamp } from "../base/values";
@@ -71,6 +72,7 @@ export class Viewport {
   pixelsMax = pixelsMax; // limit of the server
   private drawn: FrameHeader | null = null; // newest drawn frame of this session
   private readonly context: CanvasRenderingContext2D;
+  private onScreen: [number, number] | null = null; // size() when it was asked for last
   private session = 0;
   private decoding = 0;
   // the newest frame while decodesMax others are being decoded
@@ -108,6 +110,12 @@ export class Viewport {
   size(): [number, number] {
     const { clientWidth, clientHeight } = this.canvas;
     return pictureSize(clientWidth, clientHeight, window.devicePixelRatio, this.pixelsMax);
+  }
+
+  // The size to ask the server for: on paper that of the screen.
+  askedSize(): [number, number] {
+    if (this.onScreen === null || !isPrinting()) this.onScreen = this.size();
+    return this.onScreen;
   }
 
   // seq restarts with each session.
