@@ -17,6 +17,7 @@
 #include "server/light/sunlight.hpp"
 #include "server/scene/build.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/surfaces/ball.hpp"
 
 namespace windsplat::test {
 namespace {
@@ -26,37 +27,11 @@ using scene::Scene;
 
 constexpr surface::Color colors_of_ball{0.5F, 1, 0.25F};
 
-// A ball of the isosurface of r^2.
-surface::Shown sunny_ball(double radius, double opacity = 1) {
-  constexpr int side = 41;
-  std::vector<double> at;
-  for (int n = 0; n < side; ++n) at.push_back(-1 + 2.0 * n / (side - 1));
-  std::vector<float> values;
-  for (const double z : at) {
-    for (const double y : at) {
-      for (const double x : at) values.push_back(static_cast<float>(x * x + y * y + z * z));
-    }
-  }
-  surface::Samples samples;
-  samples.dims = {side, side, side};
-  samples.positions = {at.data(), at.data(), at.data()};
-  surface::Cut cut;
-  cut.level = radius * radius;
-  cut.values = values.data();
-  ThreadPool pool(1);
-  surface::Shown shown;
-  shown.mesh = std::make_shared<surface::Mesh>(surface::extract(samples, cut, nullptr, pool));
-  shown.opacity = opacity;
-  shown.colors = {colors_of_ball};
-  shown.ambient = 0.3;
-  return shown;
-}
-
 Scene ball_scene(const glm::dvec3& sun, double ambient, double strength) {
   Scene scene;
   scene.lattice = even_lattice({2, 2, 2}, {1, 1, 1});
   scene.light = scene::Light{glm::normalize(sun), ambient, strength, 0, 1, {}};
-  scene.surfaces = {sunny_ball(0.7)};
+  scene.surfaces = {ball(0.7, 1, colors_of_ball, 41)};
   return scene;
 }
 

@@ -13,6 +13,7 @@
 #include "server/engine/kernels/dispatch.hpp"
 #include "server/engine/reference/reference.hpp"
 #include "tests/numerics/scenes.hpp"
+#include "tests/numerics/surfaces/ball.hpp"
 
 namespace windsplat::test {
 namespace {
@@ -41,32 +42,6 @@ Shown square(double z, double opacity, Color color, double half = 5) {
   shown.mesh = std::move(mesh);
   shown.opacity = opacity;
   shown.colors = {color};
-  return shown;
-}
-
-// The isosurface of r^2 on 33^3 samples over [-1, 1]^3.
-Shown ball(double radius, double opacity, Color color) {
-  constexpr int side = 33;
-  std::vector<double> at;
-  for (int n = 0; n < side; ++n) at.push_back(-1 + 2.0 * n / (side - 1));
-  std::vector<float> values;
-  for (const double z : at) {
-    for (const double y : at) {
-      for (const double x : at) values.push_back(static_cast<float>(x * x + y * y + z * z));
-    }
-  }
-  surface::Samples samples;
-  samples.dims = {side, side, side};
-  samples.positions = {at.data(), at.data(), at.data()};
-  surface::Cut cut;
-  cut.level = radius * radius;
-  cut.values = values.data();
-  ThreadPool pool(1);
-  Shown shown;
-  shown.mesh = std::make_shared<Mesh>(surface::extract(samples, cut, nullptr, pool));
-  shown.opacity = opacity;
-  shown.colors = {color};
-  shown.ambient = 0.3;
   return shown;
 }
 
