@@ -2,12 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <functional>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <vector>
 
 #include "server/data/samples/samples.hpp"
 #include "server/light/ground_light.hpp"
+#include "server/light/sunlight.hpp"
 #include "server/scene/build.hpp"
 
 namespace windsplat::test {
@@ -120,6 +124,35 @@ TEST_F(LightOfAView, OnTheGroundHasPassedTheLowestCellsWhole) {
     most = std::max(most, sample - ground);
   }
   EXPECT_GT(most, 0.01);
+}
+
+// Below a sun overhead the optical depth is the sum over the layers of cells, by the law of Beer
+// and Lambert.
+TEST_F(LightOfAView, OnTheGroundIsThatOfTheColumnAbove) {
+  view.light->elevation = 90;
+  view.light->ambient = 0;
+  view.light->brightness = 1;
+  view.ground.show = protocol::GroundShow::on;
+  const auto scene = built();
+  ASSERT_TRUE(scene.body && scene.body->light);
+  const auto& [x, y, z] = scene.lattice.positions;
+  const std::vector<float> extinctions =
+      light::extinctions(scene.lattice, scene.scalars, scene.light->shadows);
+  const std::size_t columns = x.size() * y.size();
+  double least = 1;
+  for (std::size_t n = 0; n < columns; ++n) {
+    double depth = 0;
+    double bottom = scene.lattice.box_min.z;
+    for (std::size_t k = 0; k < z.size(); ++k) {
+      const double top = k + 1 < z.size() ? 0.5 * (z[k] + z[k + 1]) : scene.lattice.box_max.z;
+      depth += static_cast<double>(extinctions[k * columns + n]) * (top - bottom);
+      bottom = top;
+    }
+    const glm::dvec3 place(x[n % x.size()], y[n / x.size()], scene.body->height);
+    EXPECT_NEAR(scene.body->light->factor(place), std::exp(-depth), 1e-4) << n;
+    least = std::min(least, std::exp(-depth));
+  }
+  EXPECT_LT(least, 0.5) << "no clouds";
 }
 
 // Noon at the equator on the day of an equinox.

@@ -426,10 +426,8 @@ TEST_F(CliAccess, EmbeddersAreOriginsAndNothingElse) {
   };
   Process daemon(serve({"--allow-embed", "https://a.example,http://localhost:8080"}));
   EXPECT_THAT(policy(daemon), HasSubstr("'self' https://a.example http://localhost:8080"));
-  for (const char* bad :
-       {"a.example", "https://", "https://*", "https://a.example/", "https://a.example/page",
-        "https://a.example:", "https://a.example:0", "https://a.example:65536", "ftp://a.example",
-        "https://a.example; script-src *", "https://a.example\r\nX: y", "*", "'self'"}) {
+  // One of the syntax and one that would add a header; Framing.* has the others.
+  for (const char* bad : {"a.example", "https://a.example\r\nX: y"}) {
     const Outcome outcome = refused({"--allow-embed", bad});
     EXPECT_EQ(outcome.code, 2) << bad;
     EXPECT_THAT(outcome.err, HasSubstr("--allow-embed")) << bad;

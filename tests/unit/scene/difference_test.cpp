@@ -15,10 +15,10 @@ using protocol::DifferenceView;
 using testing::HasSubstr;
 
 // Temperature 250 + n + s (n - 20) K at sample n of 36 and step s; its difference from step 0 is
-// s (n - 20), from -20 s to 15 s. Heights of 1000 m a level, 10 m more with each step.
+// s (n - 20), from -20 s to 15 s. Heights of `rise` m a level, 10 m more with each step.
 class Warming final : public data::Source {
  public:
-  Warming() {
+  explicit Warming(double rise = 1000) : rise_(rise) {
     info_.id = "warming";
     info_.grid = atmosphere_grid();
     info_.fields = {scalar_info("temperature", "K"), wind_info(), scalar_info("height", "m")};
@@ -36,7 +36,7 @@ class Warming final : public data::Source {
          ++n) {
       const auto at = static_cast<double>(n);
       const auto s = static_cast<double>(step);
-      const double height = 1000 * static_cast<double>(n / 12 + 1) + 10 * s;
+      const double height = rise_ * static_cast<double>(n / 12 + 1) + 10 * s;
       values.push_back(static_cast<float>(field == 2 ? height : 250 + at + s * (at - 20)));
     }
     volume.values = std::move(values);
@@ -45,6 +45,7 @@ class Warming final : public data::Source {
   }
 
  private:
+  double rise_;
   data::DatasetInfo info_;
 };
 
@@ -130,6 +131,26 @@ TEST(DifferenceView, HeightsArePlacedByTheFieldItself) {
   ASSERT_TRUE(without) << without.error().message;
   EXPECT_EQ(with->lattice().box_max, without->lattice().box_max);
   EXPECT_GT(with->lattice().box_max.z, 0.01) << "levels are apart";
+}
+
+TEST(DifferenceView, HeightsOfTheDatasetSubtractedPlaceNothing) {
+  protocol::View view = temperature_minus(0);
+  view.difference->dataset = "higher";
+  view.geometry.height_field = "height";
+  view.geometry.vertical = protocol::VerticalPlacement::metric;  // otherwise any rise fills the box
+  const auto opened = [](double rise) {
+    return data::Dataset(std::make_unique<Warming>(rise), "warming", std::uint64_t{1} << 24U);
+  };
+  const data::Dataset higher = opened(3000);
+  data::Dataset difference = with_difference(view, opened(1000), &higher).value();
+  const auto with = complete(view, difference);
+  ASSERT_TRUE(with) << with.error().message;
+  view.difference.reset();
+  data::Dataset plain = opened(1000);  // of its own, for places are kept with the data
+  const auto without = complete(view, plain);
+  ASSERT_TRUE(without) << without.error().message;
+  EXPECT_EQ(with->lattice().box_max, without->lattice().box_max);
+  EXPECT_EQ(with->lattice().box_min, without->lattice().box_min);
 }
 
 TEST(DifferenceView, IsRefusedWhereItCannotBeShown) {
