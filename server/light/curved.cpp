@@ -81,12 +81,13 @@ class Cells {
     return out;
   }
 
-  // Calls visit(number, index) for the samples that are drawn.
+  // Calls visit(number, index) for the samples that are drawn, until it is cancelled.
   template <class Visit>
-  void each(const Visit& visit) const {
+  void each(const CancelToken& cancel, const Visit& visit) const {
     Index i{};
     for (i[2] = 0; i[2] < lattice_.dims[2]; ++i[2]) {
       for (i[1] = 0; i[1] < lattice_.dims[1]; ++i[1]) {
+        if (cancel.cancelled()) return;
         for (i[0] = 0; i[0] < lattice_.drawn(0); ++i[0]) visit(number(i), i);
       }
     }
@@ -112,7 +113,7 @@ Lattice even_grid(const Index& dims, const glm::dvec3& first, const glm::dvec3& 
 }
 
 // A rectilinear lattice of even cells around all cells.
-Lattice grid_around(const Lattice& lattice) {
+Lattice grid_around(const Lattice& lattice, const CancelToken& cancel) {
   WINDSPLAT_CHECK(lattice.places != nullptr);
   const Cells cells(lattice);
   const std::size_t samples = lattice.places->size();
@@ -120,7 +121,7 @@ Lattice grid_around(const Lattice& lattice) {
   glm::dvec3 high(-1e300);
   glm::dvec3 width(0);
   std::size_t count = 0;
-  cells.each([&](std::size_t n, const Index& i) {
+  cells.each(cancel, [&](std::size_t n, const Index& i) {
     const glm::dmat3 edges = cells.edges(i);
     const glm::dvec3 at = cells.place(n);
     glm::dvec3 reach(0);
@@ -136,6 +137,7 @@ Lattice grid_around(const Lattice& lattice) {
     high = glm::max(high, at + reach);
     ++count;
   });
+  if (cancel.cancelled()) return even_grid({1, 1, 1}, glm::dvec3(0), glm::dvec3(1));
   WINDSPLAT_CHECK(count > 0);
   const glm::dvec3 box = high - low;
   const double edge = std::max({box.x, box.y, box.z});
@@ -220,14 +222,15 @@ double widen(const Lattice& grid, glm::dmat3& edges) {
 
 // Extinctions at the points of the grid; each is summed in the order of the samples.
 std::vector<float> spread(const Lattice& lattice, const Cells& cells,
-                          const std::vector<float>& extinctions, const Lattice& grid) {
+                          const std::vector<float>& extinctions, const Lattice& grid,
+                          const CancelToken& cancel) {
   std::vector<Weighted> points(product(grid.dims));
   const auto pool = few_threads(points.size() / 65536);
   const int parts = static_cast<int>(pool->size());
   pool->run(static_cast<std::size_t>(parts), [&](std::size_t part, unsigned) {
     const int from = grid.dims[2] * static_cast<int>(part) / parts;
     const int to = grid.dims[2] * (static_cast<int>(part) + 1) / parts;
-    cells.each([&](std::size_t n, const Index& i) {
+    cells.each(cancel, [&](std::size_t n, const Index& i) {
       glm::dmat3 edges = cells.edges(i);
       const double upright = glm::length(edges[0]) * glm::length(edges[1]) * glm::length(edges[2]);
       if (!(std::abs(glm::determinant(edges)) > 1e-6 * upright)) return;  // at a pole
@@ -294,13 +297,14 @@ std::uint64_t curved_working_bytes(std::uint64_t samples) {
 
 SampleFactors curved_sunlight(const Lattice& lattice, const std::vector<float>& extinctions,
                               const glm::dvec3& sun, const CancelToken& cancel) {
-  const Lattice grid = grid_around(lattice);
+  const Lattice grid = grid_around(lattice, cancel);
+  if (cancel.cancelled()) return {};
   return sunlight_at_samples(lattice, grid, grid_sunlight(lattice, extinctions, grid, sun, cancel));
 }
 
 SampleFactors grid_sunlight(const Lattice& lattice, const std::vector<float>& extinctions,
                             const Lattice& grid, const glm::dvec3& sun, const CancelToken& cancel) {
-  return sunlight(grid, spread(lattice, Cells(lattice), extinctions, grid), sun, cancel);
+  return sunlight(grid, spread(lattice, Cells(lattice), extinctions, grid, cancel), sun, cancel);
 }
 
 double below_ground(const Lattice& lattice, const Lattice& grid, const glm::dvec3& sun) {

@@ -26,8 +26,8 @@ scene::SampleFactors curved_sunlight(const scene::Lattice& lattice,
                                      const std::vector<float>& extinctions, const glm::dvec3& sun,
                                      const CancelToken& cancel = {});
 
-// The grid: only dims, positions, spacing and box are set.
-scene::Lattice grid_around(const scene::Lattice& lattice);
+// The grid: only dims, positions, spacing and box are set. Of one cell if cancelled.
+scene::Lattice grid_around(const scene::Lattice& lattice, const CancelToken& cancel = {});
 // The same from its dims, its first point and the size of its cells.
 scene::Lattice even_grid(const std::array<int, 3>& dims, const glm::dvec3& first,
                          const glm::dvec3& cell);

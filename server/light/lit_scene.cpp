@@ -13,6 +13,7 @@
 #include "server/light/curved.hpp"
 #include "server/light/ground_light.hpp"
 #include "server/light/ground_rays.hpp"
+#include "server/light/kept_grid.hpp"
 #include "server/light/relief.hpp"
 #include "server/light/sun.hpp"
 #include "server/light/sunlight.hpp"
@@ -21,6 +22,7 @@ namespace windsplat::light {
 
 namespace {
 
+using light::append;
 using protocol::LightView;
 using scene::SampleFactors;
 using scene::Scene;
@@ -47,16 +49,6 @@ Result<Sun> sun_of(const LightView& view, bool globe) {
     direction = sun_direction(*days, view.sun_at->longitude, view.sun_at->latitude);
   }
   return Sun{sun_vector(direction), globe || direction.elevation >= 0};
-}
-
-// All bytes of the numbers, which clients choose: two views with the same digest could be found.
-void append(double number, std::string& key) {
-  key.append(reinterpret_cast<const char*>(&number), sizeof number);
-}
-
-void append(const std::string& text, std::string& key) {
-  append(static_cast<double>(text.size()), key);
-  key += text;
 }
 
 void append(const std::optional<protocol::Range>& range, std::string& key) {
@@ -89,20 +81,9 @@ void append(const protocol::RegionView& region, std::string& key) {
 std::string key_of(const char* what, const protocol::View& view, const Scene& scene,
                    const glm::dvec3& sun) {
   std::string key = what;
-  const protocol::GeometryView& geometry = view.geometry;
-  append(static_cast<double>(geometry.mapping), key);
-  append(static_cast<double>(geometry.vertical), key);
-  append(geometry.height_field.value_or(""), key);
+  append_lattice(view.geometry, scene, key);
   append(view.region, key);
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto c = static_cast<glm::length_t>(a);
-    append(geometry.scale[a], key);
-    append(scene.level[a], key);
-    append(scene.lattice.dims[a], key);
-    append(scene.lattice.box_min[c], key);
-    append(scene.lattice.box_max[c], key);
-    append(sun[c], key);
-  }
+  for (glm::length_t c = 0; c < 3; ++c) append(sun[c], key);
   return key;
 }
 
@@ -168,24 +149,6 @@ Places at_points(const scene::Lattice& lattice, Factors factors) {
       surface::Transmittances{lattice.positions, std::move(factors)});
 }
 
-// The grid around a curved lattice. Finding it takes a pass over the samples.
-Result<scene::Lattice> kept_grid(const Kept& kept) {
-  const std::string key = media_key("sunlight grid", kept.view, kept.media, kept.scene);
-  const auto numbers = kept.dataset.remembered(key, [&]() -> Result<std::vector<double>> {
-    const scene::Lattice grid = grid_around(kept.scene.lattice);
-    std::vector<double> out;
-    for (std::size_t a = 0; a < 3; ++a) {
-      out.insert(out.end(), {static_cast<double>(grid.dims[a]), grid.positions[a].front(),
-                             grid.spacing[a].front()});
-    }
-    return out;
-  });
-  if (!numbers) return numbers.error();
-  const std::vector<double>& n = *numbers;
-  return even_grid({static_cast<int>(n[0]), static_cast<int>(n[3]), static_cast<int>(n[6])},
-                   {n[1], n[4], n[7]}, {n[2], n[5], n[8]});
-}
-
 // Whether sunlight falls on what lies between samples: the body and isosurfaces.
 bool lights_places(const Scene& scene) {
   const auto lit = [](const surface::Shown& shown) { return shown.ambient < 1; };
@@ -218,7 +181,7 @@ Result<SunAtPlaces> add_sunlight(const Kept& kept, Scene& scene) {
   SunAtPlaces at_places;
   std::optional<scene::Lattice> grid;
   if (curved && lights_places(scene)) {
-    auto around = kept_grid(kept);
+    auto around = kept_grid(kept.view.geometry, scene, kept.dataset);
     if (!around) return around.error();
     grid = std::move(*around);
     auto places = curved_places(kept, *grid);
