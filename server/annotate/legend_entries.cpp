@@ -361,6 +361,9 @@ LegendEntry surface_entry(const Subject& subject, const surface::Shown& shown,
                                      : section_text(subject, *view.slice));
   }
   if (view.contours) entry.notes.push_back(contours_text(*view.contours, entry.units));
+  if (shown.mesh->triangles.empty()) {
+    entry.notes.emplace_back("nothing of it lies in the data shown");
+  }
   return entry;
 }
 

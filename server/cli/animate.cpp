@@ -232,8 +232,10 @@ Error interrupted(int done, int total) {
 struct Reports {
   std::string lines;
   int exceeding = 0;
-  int empty = 0;            // pictures that show nothing of the data
-  std::string first_empty;  // why the first of them does
+  int empty = 0;              // pictures that show nothing of the data
+  std::string first_empty;    // why the first of them does
+  int lacking = 0;            // pictures that show something, but not all surfaces
+  std::string first_lacking;  // why the first of them does not
 };
 
 Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& sheets,
@@ -261,6 +263,9 @@ Result<Reports> draw_all(const Plan& plan, std::vector<Panel>& panels, Sheets& s
     if (auto done = write_output(plan.pattern.name(n), sheet->bytes); !done) return done.error();
     if (!sheet->exceeded.empty()) ++reports.exceeding;
     if (!sheet->empty.empty() && reports.empty++ == 0) reports.first_empty = sheet->empty;
+    if (!sheet->empty_surfaces.empty() && reports.lacking++ == 0) {
+      reports.first_lacking = sheet->empty_surfaces;
+    }
     reports.lines += sheet->reports;
   }
   progress.show(total);
@@ -287,6 +292,10 @@ Result<void> animate(const AnimateArguments& arguments, const CancelToken& cance
   if (reports->empty > 0) {
     complain(std::to_string(reports->empty) +
              " pictures show nothing of the data; the first: " + reports->first_empty);
+  }
+  if (reports->lacking > 0) {
+    complain("a surface is empty in " + std::to_string(reports->lacking) +
+             " pictures; in the first: " + reports->first_lacking);
   }
   if (arguments.report.empty()) return {};
   const std::string& lines = reports->lines;

@@ -14,6 +14,7 @@
 #include "server/frame/measure.hpp"
 #include "server/quality/pick.hpp"
 #include "server/quality/setting.hpp"
+#include "server/scene/surfaces/make_surfaces.hpp"
 #include "server/tasks/error_report.hpp"
 
 namespace windsplat::cli {
@@ -102,10 +103,19 @@ Result<Picture> LimitedPictures::draw_at(const scene::CompletedView& completed,
   if (!drawn) return drawn.error();
   encode_ms_a_pixel_ =
       milliseconds(drawn->encode_us) / (static_cast<double>(drawn->width) * drawn->height);
-  Picture picture{std::move(*drawn), {}};
+  Picture picture{std::move(*drawn), {}, {}};
   picture.info = frame::frame_info(picture.frame, picture.frame.view);
   tasks::report_error(picture.frame, tasks::observed_in(picture.frame, setting), setting, encoding,
                       tables_, picture.info);
+  const auto& surfaces = prepared->scene.surfaces;
+  const bool lacks_one =
+      std::any_of(surfaces.begin(), surfaces.end(),
+                  [](const surface::Shown& shown) { return shown.mesh->triangles.empty(); });
+  if (lacks_one && picture.frame.empty.empty()) {
+    auto reasons = scene::why_no_surfaces(prepared->completed, dataset);
+    if (!reasons) return reasons.error();
+    picture.empty_surfaces = std::move(*reasons);
+  }
   return picture;
 }
 

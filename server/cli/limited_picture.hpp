@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "protocol/messages.hpp"
 #include "protocol/view.hpp"
@@ -19,6 +20,8 @@ namespace windsplat::cli {
 struct Picture {
   frame::Frame frame;
   protocol::FrameInfo info;  // with the error, if it was measured or estimated
+  // Why surfaces have no part in a picture that shows something else.
+  std::vector<std::string> empty_surfaces;
 };
 
 // Draws the pictures of a command one after another. A view with quality.budgetMs or

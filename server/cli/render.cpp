@@ -47,6 +47,7 @@ Result<void> render(const RenderArguments& arguments) {
   if (!sheet) return sheet.error();
   if (!sheet->exceeded.empty()) complain(sheet->exceeded);
   if (!sheet->empty.empty()) complain("the picture shows nothing of the data: " + sheet->empty);
+  if (!sheet->empty_surfaces.empty()) complain("a surface is empty: " + sheet->empty_surfaces);
   auto written = write_output(arguments.output, sheet->bytes);
   if (!written || arguments.report.empty()) return written;
   const std::string& text = sheet->reports;

@@ -41,6 +41,11 @@ Result<Sheet> Sheets::draw(const CancelToken& cancel) {
     sheet.reports += report_line(*picture);
     add_text(exceeded_limits(*picture), pair, n, sheet.exceeded);
     add_text(picture->frame.empty, pair, n, sheet.empty);
+    std::string reasons;
+    for (const std::string& reason : picture->empty_surfaces) {
+      reasons += (reasons.empty() ? "" : "; ") + reason;
+    }
+    add_text(reasons, pair, n, sheet.empty_surfaces);
     frames.at(n) = std::move(picture->frame);
   }
   if (!pair) {

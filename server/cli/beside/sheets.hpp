@@ -20,6 +20,7 @@ struct Sheet {
   // On each limit that a picture exceeds; why a picture shows nothing of the data. Empty: none.
   std::string exceeded;
   std::string empty;
+  std::string empty_surfaces;  // why a picture that shows something lacks some of its surfaces
 };
 
 // Draws the pictures of a command one after another.

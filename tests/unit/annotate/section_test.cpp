@@ -63,6 +63,22 @@ TEST(Legend, TellsWhereSectionsLie) {
   EXPECT_THAT(of_view([](protocol::View&) {}), Not(Contains(HasSubstr("section"))));
 }
 
+// Values of the field are those of a float at each sample, below a thousand.
+TEST(Legend, TellsWhichIsosurfaceIsEmpty) {
+  const auto texts_of = [](double isovalue) {
+    const Shown shown(scene::atmosphere_grid(), one_scalar(), [&](protocol::View& view) {
+      protocol::SurfaceView& surface = view.surfaces.emplace_back();
+      surface.field = "cloud";
+      surface.isovalue = isovalue;
+    });
+    Figure figure = empty_figure(shown);
+    add_legend(shown.subject(), style_of(shown.subject()), figure);
+    return texts(figure.above);
+  };
+  EXPECT_THAT(texts_of(5000), Contains("nothing of it lies in the data shown"));
+  EXPECT_THAT(texts_of(12.5), Not(Contains("nothing of it lies in the data shown")));
+}
+
 TEST(Legend, TellsWhereASectionOfOtherGridsLies) {
   using protocol::GridAxis;
   using protocol::SliceView;
