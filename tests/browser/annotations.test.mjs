@@ -71,7 +71,7 @@ test("size and colour of a part are its own while it is shown, and can be taken 
     for (const label of ["title", "box"]) await row(label).check();
     await finalPicture(page);
     const { hash: plain } = await pixels(page);
-    await row("title in own colour").check();
+    await row("own title colour").check();
     await row("title colour").fill("#ff2000");
     await finalPicture(page);
     const { hash: colored } = await pixels(page);
@@ -96,7 +96,7 @@ test("size and colour of a part are its own while it is shown, and can be taken 
     assert.equal(annotations.boxStyle, undefined, "the box keeps its own");
     await shot(page, "annotation-styles");
     await type(page, "title size", 1);
-    await row("title in own colour").uncheck();
+    await row("own title colour").uncheck();
     await finalPicture(page);
     assert.equal(await row("title colour").isVisible(), false);
     assert.equal((await pixels(page)).hash, plain);

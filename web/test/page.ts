@@ -283,7 +283,12 @@ export class Page {
     const { app } = this;
     const ignore = { show: () => {}, setAxes: () => {}, mark: () => {}, steps: () => {} };
     return {
-      viewport: { canvas: new Element(), size: () => [800, 600], newSession: () => {} },
+      viewport: {
+        canvas: new Element(),
+        size: () => [800, 600],
+        askedSize: () => [800, 600],
+        newSession: () => {},
+      },
       hud: ignore,
       legend: ignore,
       gizmo: ignore,

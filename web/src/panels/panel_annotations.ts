@@ -6,12 +6,13 @@ import { keyAccess, patchAt, type PanelKit } from "./panel_kit";
 type Key =
   "box" | "axes" | "north" | "scaleBar" | "legend" | "title" | "stepTime" | "contourLabels";
 
-// name: of the part in the labels of its size and colour; null: it has none of its own.
+// name: of the part in the labels of its size and colour, short enough for these; null: it has none
+// of its own.
 const parts: readonly { label: string; key: Key; name: string | null }[] = [
   { label: "box", key: "box", name: "box" },
   { label: "axes", key: "axes", name: "axes" },
-  { label: "north arrow", key: "north", name: "north arrow" },
-  { label: "scale bar", key: "scaleBar", name: "scale bar" },
+  { label: "north arrow", key: "north", name: "arrow" },
+  { label: "scale bar", key: "scaleBar", name: "bar" },
   { label: "legend in the picture", key: "legend", name: "legend" },
   { label: "title", key: "title", name: "title" },
   { label: "time", key: "stepTime", name: "time" },
@@ -59,7 +60,7 @@ function addColor(
 ): void {
   const { get } = keyAccess<string>(pointer);
   const own = (): boolean => typeof get(kit.host.view()) === "string";
-  const choose = kit.toggle(folder, `${name} in own colour`, {
+  const choose = kit.toggle(folder, `own ${name} colour`, {
     pointer,
     get: own,
     set: (on) => patchAt(pointer, on ? inkOn(kit.host.view().image?.background) : null),

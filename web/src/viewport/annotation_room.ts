@@ -10,8 +10,16 @@ export const shownAnnotations = (annotations: Annotations | undefined): string[]
     .filter(([, on]) => on === true)
     .map(([name]) => name);
 
+// The largest of those that the page's overlays lie beside, as a factor; the server draws at most
+// four times the usual size.
+export function annotationSize(annotations: Annotations | undefined): number {
+  const { size = 1, titleStyle, stepTimeStyle, northStyle, scaleBarStyle } = annotations ?? {};
+  const beside = [titleStyle, stepTimeStyle, northStyle, scaleBarStyle];
+  return Math.min(4, size * Math.max(...beside.map((style) => style?.size ?? 1)));
+}
+
 export function leaveRoom(root: HTMLElement, { annotations }: View): void {
   const shown = shownAnnotations(annotations).join(" ");
   if (root.dataset.annotations !== shown) root.dataset.annotations = shown;
-  root.style.setProperty("--annotation-size", String(annotations?.size ?? 1));
+  root.style.setProperty("--annotation-size", String(annotationSize(annotations)));
 }
