@@ -32,6 +32,7 @@ windsplat_bench(bench_left_out ${bench_dir}/scenes/skipped_changes.cpp
   ${naive_dir}/trial_fields.cpp)
 windsplat_bench(bench_estimates ${bench_dir}/scenes/scene_set.cpp
   ${bench_dir}/scenes/time_estimates.cpp ${bench_dir}/scenes/odd_estimates.cpp
+  ${bench_dir}/scenes/part_estimates.cpp
   ${naive_dir}/trial_fields.cpp
   ${naive_dir}/family/family.cpp)
 windsplat_bench(bench_pool)

@@ -21,10 +21,21 @@ namespace {
 
 constexpr double footprint = 5.9;   // area of a splat in cells: pi 1.37^2
 constexpr double covered_min = 16;  // pixels: kernels are drawn into blocks of 4 x 4
-// Measured (bench_left_out): 55 ns for each pixel of a picture whose ground is painted anew, 100 to
-// 220 ns for one of a surface, and 6 ns for a kernel.
-constexpr double kernels_a_painted_pixel = 9;
-constexpr double kernels_a_surface_pixel = 30;
+// Kernels of 6 ns that take as long, fitted to what bench_estimates --parts=fitted measured: a
+// pixel of a ground that shows land and sea, and of a plain one; of a surface a triangle, a sample
+// that is searched for it and a pixel; the light of a sample, also of a bent lattice. They were 12
+// to 15; 1 to 5; 230 to 370, 2.5 to 6 and 3 to 4; 3 to 20, and 120.
+constexpr double kernels_a_painted_pixel = 12;
+constexpr double kernels_a_plain_pixel = 3;
+constexpr double kernels_a_triangle = 240;
+constexpr double kernels_a_searched_sample = 6;
+constexpr double kernels_a_surface_pixel = 3;
+constexpr double kernels_a_lit_sample = 18;
+constexpr double kernels_a_bent_lit_sample = 120;
+// Means of the same surfaces over the number of samples to the power 2/3, that of a face of a cube:
+// 2.4 to 11.5 and 2.1 to 3.1. Noise may have as many triangles as samples.
+constexpr double isosurface_triangles = 5;
+constexpr double section_triangles = 2.7;
 // Measured with 150 and 600 lines: a piece takes 2.3 us (tornado) to 3.0 us (climate) to trace and
 // draw; lines had 0.4 to 0.7 of the pieces that they may have.
 constexpr double kernels_a_traced_piece = 400;
@@ -70,6 +81,7 @@ class Counting {
         lattice_(outline.lattice),
         is_of_earth_(grid.columns || (grid.axes[0].kind == data::AxisKind::longitude &&
                                       grid.axes[1].kind == data::AxisKind::latitude)),
+        bent_(outline.bent),
         visible_(visible_part(outline.camera, lattice_)),
         pixels_(static_cast<double>(outline.camera.width) * outline.camera.height),
         values_(level == std::array{0, 0, 0} ? 1 : 2) {
@@ -96,12 +108,11 @@ class Counting {
     for (std::size_t n = 0; n < view_.scalars->size(); ++n) {
       add_medium((*view_.scalars)[n], "/scalars/" + std::to_string(n));
     }
-    if (may_show_ground()) add("/ground", kernels_a_painted_pixel * pixels_);
-    // A surface reads every sample, and its fragments may fill the picture.
+    if (may_show_ground()) {
+      add("/ground", (is_of_earth_ ? kernels_a_painted_pixel : kernels_a_plain_pixel) * pixels_);
+    }
     for (std::size_t n = 0; n < view_.surfaces.size(); ++n) {
-      double samples = 1;
-      for (const int count : lattice_.dims) samples *= count;
-      add("/surfaces/" + std::to_string(n), samples + kernels_a_surface_pixel * pixels_);
+      add_surface(view_.surfaces[n], "/surfaces/" + std::to_string(n));
     }
     // Every column is compared with every edge, a sixteenth of a kernel each.
     double points = 0;
@@ -109,9 +120,11 @@ class Counting {
       for (const auto& ring : rings) points += static_cast<double>(ring.size());
     }
     if (points > 0) add("/region/polygon", points * lattice_.dims[0] * lattice_.dims[1] / 16);
-    // The sunlight of a sample takes about as long as half a kernel, once for each sun.
-    if (view_.light && !view_.scalars->empty()) {
-      add("/light", 0.5 * samples_[0] * samples_[1] * samples_[2]);
+    // Once for each sun; slices are drawn unlit.
+    const bool sliced = view_.geometry.slice || scene::is_section(view_.geometry);
+    if (view_.light && !view_.scalars->empty() && !sliced) {
+      const double one = bent_ ? kernels_a_bent_lit_sample : kernels_a_lit_sample;
+      add("/light", one * samples_[0] * samples_[1] * samples_[2]);
     }
     if (view_.method.name == protocol::MethodName::slab) {
       const double deep = std::hypot(samples_[0], samples_[1], samples_[2]);
@@ -196,6 +209,20 @@ class Counting {
     return std::hypot(box.x, box.y, box.z);
   }
 
+  // Every sample is searched for the surface; its triangles may lie anywhere in the picture.
+  void add_surface(const protocol::SurfaceView& surface, const std::string& pointer) {
+    double samples = 1;
+    for (const int count : lattice_.dims) samples *= count;
+    const double square = std::pow(samples, 2.0 / 3);
+    double triangles = (surface.isovalue ? isosurface_triangles : section_triangles) * square;
+    if (surface.slice) {
+      const auto axis = static_cast<std::size_t>(surface.slice->axis);
+      triangles = 2 * samples / lattice_.dims.at(axis);
+    }
+    add(pointer, kernels_a_searched_sample * samples + kernels_a_triangle * triangles +
+                     kernels_a_surface_pixel * pixels_);
+  }
+
   void add_medium(const protocol::ScalarView& scalar, const std::string& pointer) {
     // A default extinction absorbs light.
     const bool absorbs =
@@ -211,6 +238,7 @@ class Counting {
   const protocol::View& view_;
   const scene::Lattice& lattice_;
   const bool is_of_earth_;
+  const bool bent_;
   const VisiblePart visible_;
   const double pixels_;
   const double values_;  // of a medium at each sample

@@ -5,6 +5,7 @@
 //   bench_estimates --list=FILE
 //   bench_estimates --times=SIDE    forecast and measured times of generated scenes
 //   bench_estimates --family-times=N  the same for N members of each kind of generated data
+//   bench_estimates --parts=fitted|judged  what grounds, surfaces and light add
 //   bench_estimates --odd=SCENES      views of unusual sizes, eyes and lattices
 //   bench_estimates                 the time of forecasts
 #include <array>
@@ -28,6 +29,7 @@
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "tests/bench/scenes/odd_estimates.hpp"
+#include "tests/bench/scenes/part_estimates.hpp"
 #include "tests/bench/scenes/time_estimates.hpp"
 #include "tests/bench/support.hpp"
 #include "tests/bench/text_table.hpp"
@@ -214,6 +216,11 @@ int main(int argc, char** argv) {
   if (!listed.empty()) list(read(listed));
   if (side > 0) list_times(side);
   if (family > 0) list_family_times(family, 2);
+  const std::string parts = take_option(argc, argv, "--parts");
+  if (!parts.empty()) {
+    list_parts(parts == "judged");
+    return 0;
+  }
   const int odd = number("--odd", 0);
   if (odd > 0) list_odd(odd);
   if (measured.empty() && listed.empty() && side <= 0 && family <= 0 && odd <= 0) time_forecasts();

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "server/access/cost_limits.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/data/samples/samples.hpp"
@@ -49,6 +51,7 @@ class CostTest : public testing::Test {
 };
 
 constexpr double samples = 100 * 80 * 60;
+constexpr double pixels = 1280 * 720;
 
 TEST_F(CostTest, CountsEveryKernelPositionAndSample) {
   EXPECT_GE(cost(view_).kernels, samples);
@@ -87,17 +90,63 @@ TEST_F(CostTest, CountsThePiecesOfLinesThroughSeeds) {
   EXPECT_LT(cost(seeded).kernels, 0.1 * streamlets);
 }
 
-// Measured: some 50 ns a pixel of a ground and 100 to 220 ns of a surface, at 6 ns a kernel.
-TEST_F(CostTest, CountsThePixelsOfGroundsAndSurfaces) {
-  constexpr double pixels = 1280 * 720;
-  protocol::View ground = view_;
-  ground.ground.show = protocol::GroundShow::on;
-  EXPECT_GE(cost(ground).kernels, cost(view_).kernels + 5 * pixels);
-  protocol::View surface = view_;
-  surface.surfaces.emplace_back();
-  surface.surfaces[0].field = medium().field;
-  surface.surfaces[0].isovalue = 0.5;
-  EXPECT_GE(cost(surface).kernels, cost(view_).kernels + samples + 20 * pixels);
+// Measured: 70 ns a pixel of a ground with land and sea, 20 ns of a plain one, at 6 ns a kernel.
+TEST_F(CostTest, CountsThePixelsOfGrounds) {
+  const auto ground_of = [&](protocol::View view) {
+    view.ground.show = protocol::GroundShow::off;
+    const double without = cost(view).kernels;
+    view.ground.show = protocol::GroundShow::on;
+    return cost(view).kernels - without;
+  };
+  const double plain = ground_of(view_);
+  EXPECT_GE(plain, 2 * pixels);
+  dataset_ = store_.add("climate:36x18x4").value();
+  EXPECT_GE(ground_of(view_), 3 * plain) << "land and sea";
+}
+
+// An isosurface of a smooth field has some triangles for each sample of a face of the lattice, an
+// oblique section two for each cell that it cuts, and a layer two for each of its cells.
+TEST_F(CostTest, CountsTheTrianglesOfSurfacesAndTheSamplesSearchedForThem) {
+  const double plain = cost(view_).kernels;
+  const auto added = [&](const protocol::SurfaceView& surface, int times) {
+    protocol::View view = view_;
+    for (int n = 0; n < times; ++n) view.surfaces.push_back(surface);
+    return cost(view).kernels - plain;
+  };
+  protocol::SurfaceView surface;
+  surface.field = medium().field;
+  surface.isovalue = 0.5;
+  const double isosurface = added(surface, 1);
+  // 100 ns a triangle at least.
+  EXPECT_GE(isosurface, samples + pixels + 3 * std::pow(samples, 2.0 / 3) * 100 / 6);
+  EXPECT_NEAR(added(surface, 3), 3 * isosurface, 1e-6 * isosurface);
+  surface.isovalue.reset();
+  surface.plane = protocol::PlaneView{{0, 0, 0}, {0.3, 1, 0.2}};
+  const double section = added(surface, 1);
+  EXPECT_LT(section, isosurface);
+  surface.plane.reset();
+  surface.slice = protocol::SliceView{protocol::GridAxis::x, 3};  // 80 x 60
+  const double short_layer = added(surface, 1);
+  EXPECT_LT(short_layer, section);
+  surface.slice = protocol::SliceView{protocol::GridAxis::z, 3};  // 100 x 80
+  EXPECT_GT(added(surface, 1), short_layer);
+}
+
+// Measured: some 100 ns for the sunlight of a sample, more on a lattice that is bent.
+TEST_F(CostTest, CountsTheSamplesOfLight) {
+  protocol::View clouds = view_;
+  clouds.scalars = {medium()};
+  const auto light_of = [&](protocol::View view) {
+    const double unlit = cost(view).kernels;
+    view.light.emplace();
+    return cost(view).kernels - unlit;
+  };
+  EXPECT_EQ(light_of(view_), 0) << "no medium";
+  EXPECT_GE(light_of(clouds), 5 * samples);
+  EXPECT_LE(light_of(clouds), 50 * samples);
+  protocol::View sliced = clouds;
+  sliced.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 3};
+  EXPECT_EQ(light_of(sliced), 0) << "drawn unlit";
 }
 
 TEST_F(CostTest, StrideReducesSamplesAndASliceLeavesOneLayer) {
