@@ -121,7 +121,7 @@ class Counting {
     }
     if (points > 0) add("/region/polygon", points * lattice_.dims[0] * lattice_.dims[1] / 16);
     // Once for each sun; slices are drawn unlit.
-    const bool sliced = view_.geometry.slice || scene::is_section(view_.geometry);
+    const bool sliced = view_.geometry.slice || protocol::is_section(view_.geometry);
     if (view_.light && !view_.scalars->empty() && !sliced) {
       const double one = bent_ ? kernels_a_bent_lit_sample : kernels_a_lit_sample;
       add("/light", one * samples_[0] * samples_[1] * samples_[2]);
