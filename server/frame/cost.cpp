@@ -224,11 +224,7 @@ class Counting {
   }
 
   void add_medium(const protocol::ScalarView& scalar, const std::string& pointer) {
-    // A default extinction absorbs light.
-    const bool absorbs =
-        !scalar.extinction || std::any_of(scalar.extinction->begin(), scalar.extinction->end(),
-                                          [](const auto& point) { return point[1] > 0; });
-    if (!absorbs) return;
+    if (!protocol::absorbs(scalar)) return;
     const double face = (cell_[0] * cell_[1] + cell_[1] * cell_[2] + cell_[2] * cell_[0]) / 3;
     const double covered = footprint * face * scalar.stride * scalar.stride * visible_.px2;
     const double count = stops(scalar.stride);
