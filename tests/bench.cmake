@@ -63,7 +63,7 @@ windsplat_smoke(stages bench_stages --smoke)
 windsplat_smoke(estimates bench_estimates --measure=bench_estimates.csv --list=bench_estimates.csv
   --members=1 --scenes=1 --views=1)
 windsplat_smoke(direction bench_direction --smoke)
-windsplat_smoke(left_out bench_left_out --trials=24 --field=front)
+windsplat_smoke(left_out bench_left_out --trials=24 --field=front --smoke)
 windsplat_smoke(light bench_light --smoke)
 windsplat_smoke(picture bench_picture --benchmark_filter=640x480 --benchmark_min_time=0.001)
 file(WRITE ${PROJECT_BINARY_DIR}/bench_views.jsonl "{\"image\":{\"width\":32,\"height\":24}}\n")

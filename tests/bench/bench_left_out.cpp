@@ -2,8 +2,9 @@
 // drawn in turns by one thread, as a table on stdout and optionally as Markdown:
 //
 //   bench_left_out [--markdown=FILE] [--benchmark_filter=REGEX] [--benchmark_out=FILE]
-//   bench_left_out --trials=HEIGHT [--field=NAME]    what tolerances leave out of pictures of
-//   generated fields
+//   bench_left_out --trials=HEIGHT [--field=NAME] [--smoke]    what tolerances leave out of
+//   pictures of generated fields of all samples and of a third of them along each axis (--smoke:
+//   these alone)
 #include <benchmark/benchmark.h>
 #include <malloc.h>
 
@@ -348,8 +349,10 @@ int run(int argc, char** argv) {
   if (!trials.empty()) {
     const std::string field = bench::take_option(argc, argv, "--field");
     const int height = std::atoi(trials.c_str());  // NOLINT(cert-err34-c): 0 is refused
+    const bool smoke = !bench::take_option(argc, argv, "--smoke").empty();
     if (height < 1 || argc > 1) return 2;
-    std::fputs(bench::markdown(bench::skipped_changes(height, field)).c_str(), stdout);
+    const std::vector<int> reductions = smoke ? std::vector{3} : std::vector{1, 3};
+    std::fputs(bench::markdown(bench::skipped_changes(height, field, reductions)).c_str(), stdout);
     return 0;
   }
   benchmark::Initialize(&argc, argv);

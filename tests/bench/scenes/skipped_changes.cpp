@@ -113,18 +113,18 @@ class TrialViews {
 
 }  // namespace
 
-Table skipped_changes(int height, const std::string& only) {
+Table skipped_changes(int height, const std::string& only, const std::vector<int>& reductions) {
   Table table{
       {"field", "samples", "change", "bound", "measured", "estimated", "pixel updates", "time"}};
-  for (const int reduction : {1, 3}) {
+  for (const int reduction : reductions) {
     for (test::TrialField field : test::trial_fields()) {
       if (!only.empty() && field.name != only) continue;
       for (int& samples : field.dims) samples /= reduction;
       const Ranges found = TrialViews(field, height).run();
-      table.push_back({field.name, reduction == 1 ? "all" : "a third", found.truth.text("%.2g"),
-                       found.bound.text("%.2g"), found.measured.text("%.4f"),
-                       found.estimated.text("%.2f"), found.updates.text("%.1f"),
-                       found.time.text("%.2f")});
+      table.push_back({field.name, reduction == 1 ? "all" : "1/" + std::to_string(reduction),
+                       found.truth.text("%.2g"), found.bound.text("%.2g"),
+                       found.measured.text("%.4f"), found.estimated.text("%.2f"),
+                       found.updates.text("%.1f"), found.time.text("%.2f")});
     }
   }
   return table;
