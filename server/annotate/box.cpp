@@ -109,19 +109,50 @@ double room_of_tick(const std::array<Point, 2>& ends, double em) {
   return em * (width * across + height * down) / length_of(ends);
 }
 
-// The edge of the outline on which an axis is labelled: one with room for the ticks of its ends in
-// the picture.
+bool is_on_floor(const Edge& edge) {
+  return edge.axis < 2 && !edge.high.at(edge.axis == 0 ? 1 : 0);
+}
+
+// Whether labels beside an edge of the floor that the sides above it surround lie over a strip of
+// these sides only that is not wider than they are: where the upper edge, which belongs to the
+// outline then, is near.
+bool is_near_outline(const Box& box, const Edge& edge, double em) {
+  if (!is_on_floor(edge) || box.facing(edge) != 0) return false;
+  Edge upper = edge;
+  upper.high.at(edge.axis == 0 ? 1 : 0) = true;
+  const auto ends = box.pixels(edge);
+  const auto above = box.pixels(upper);
+  if (box.facing(upper) != 1 || !ends || !above || !(length_of(*ends) > 0)) return false;
+  const Point across{-((*ends)[1].y - (*ends)[0].y) / length_of(*ends),
+                     ((*ends)[1].x - (*ends)[0].x) / length_of(*ends)};
+  double widest = 0;
+  for (std::size_t n = 0; n < 2; ++n) {
+    widest = std::max(widest, std::abs(((*above).at(n).x - (*ends).at(n).x) * across.x +
+                                       ((*above).at(n).y - (*ends).at(n).y) * across.y));
+  }
+  return widest <= room_of_tick({Point{0, 0}, across}, em);
+}
+
+// The edge on which an axis is labelled: one of the outline, of x and y also one of the floor near
+// it, with room for the ticks of its ends in the picture. Those of the floor come first, where what
+// is read are places on the ground.
 std::optional<Edge> labelled(const Box& box, std::size_t axis, double em, const Figure& figure) {
   const double least = axis == 2 ? 0.7 : 1;  // ticks
   std::optional<Edge> chosen;
-  double best = 0;
+  std::array<double, 2> best{};
   for (const Edge& edge : edges_along(axis)) {
-    if (box.facing(edge) != 1) continue;
+    if (box.facing(edge) != 1 && !is_near_outline(box, edge, em)) continue;
     const auto whole = box.pixels(edge);
     const auto ends = whole ? visible_part(figure, *whole, 0) : std::nullopt;
     if (!ends || !(length_of(*ends) > 0)) continue;
     if (length_of(*ends) < least * room_of_tick(*ends, em)) continue;
-    const double score = axis == 2 ? -((*ends)[0].x + (*ends)[1].x) : (*ends)[0].y + (*ends)[1].y;
+    const double x = (*ends)[0].x + (*ends)[1].x;
+    const double y = (*ends)[0].y + (*ends)[1].y;
+    // Of two of the floor at the same height the right one: the vertical axis is on the left.
+    constexpr double share = 0.05;
+    const bool floor = is_on_floor(edge);
+    const std::array<double, 2> score{floor ? 1.0 : 0.0,
+                                      axis == 2 ? -x : y + (floor ? share * x : 0)};
     if (!chosen || score > best) {
       chosen = edge;
       best = score;

@@ -9,9 +9,10 @@ namespace windsplat::annotate {
 // under it. Exact for any data, which the box contains. Nothing on a globe.
 void add_box(const Subject& subject, const Style& style, Figure& figure);
 
-// Adds ticks, their values and the name of each axis along an edge of the outline of the box, of x
-// and y the lowest and of z the leftmost one. An axis of one sample has one tick. An axis that
-// appears shorter than two texts, or has no edge in the outline, is left out.
+// Adds ticks, their values and the name of each axis along an edge of the box: of x and y the
+// lowest of the floor that belongs to the outline or lies within a label's width of it, otherwise
+// the lowest of the outline, and of z the leftmost one. An axis of one sample has one tick. An axis
+// that appears shorter than two texts, or has no edge in the outline, is left out.
 void add_axes(const Subject& subject, const Style& style, Figure& figure);
 
 }  // namespace windsplat::annotate

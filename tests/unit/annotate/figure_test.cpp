@@ -219,8 +219,49 @@ TEST(Axes, HaveNoTicksWhereSomethingElseIsWritten) {
   EXPECT_THAT(figure.above, IsEmpty());
 }
 
-// Seen from the south and above, latitudes are labelled at the top of the box; a line on the side
-// behind the data leads from each label to the bottom, where the ground is.
+// The place in the box where the tick of a latitude of zero begins, from two candidates.
+bool equator_is_at(const Shown& shown, double x, double z) {
+  const auto at = shown.projector().pixel({x, shown.scene().lattice.positions[1][1], z});
+  const Figure figure = figure_of(shown.subject());
+  for (std::size_t n = 0; at && n + 1 < figure.above.size(); ++n) {
+    const Line* const mark = std::get_if<Line>(&figure.above[n]);
+    const Text* const text = std::get_if<Text>(&figure.above[n + 1]);
+    if (mark == nullptr || text == nullptr || text->text != "0\u00b0") continue;
+    const Point& from = mark->points.front();
+    if (std::hypot(from.x - at->x, from.y - at->y) < 1e-6) return true;
+  }
+  return false;
+}
+
+// Latitudes lead to places on the ground: they are labelled at the floor of a box, unless labels
+// there would lie over its sides. Longitudes begin at 10 degrees, so that only one zero is written.
+TEST(Axes, OfTheGroundAreLabelledAtTheFloorWhereTheOutlineIsNear) {
+  data::Grid grid = scene::atmosphere_grid();
+  for (double& longitude : grid.axes[0].coordinates) longitude += 10;
+  const auto seen = [&grid](const protocol::Vec3& eye, double tall) {
+    return Shown(grid, one_scalar(), [&](protocol::View& view) {
+      view.annotations.axes = true;
+      view.camera.eye = eye;
+      view.geometry.scale = {1, 1, tall};
+    });
+  };
+  for (const auto& [eye, tall] : {std::pair(protocol::Vec3{0, -3, 2}, 0.15),
+                                  {protocol::Vec3{3, -3, 2}, 0.15},
+                                  {protocol::Vec3{3, -3, 2}, 3.0}}) {
+    const Shown shown = seen(eye, tall);
+    const scene::Lattice& lattice = shown.scene().lattice;
+    EXPECT_TRUE(equator_is_at(shown, lattice.box_max.x, lattice.box_min.z)) << eye[0] << tall;
+  }
+  const Shown high = seen({0, -2.5, 3}, 6);
+  const scene::Lattice& lattice = high.scene().lattice;
+  EXPECT_FALSE(equator_is_at(high, lattice.box_min.x, lattice.box_min.z) ||
+               equator_is_at(high, lattice.box_max.x, lattice.box_min.z));
+  EXPECT_TRUE(equator_is_at(high, lattice.box_min.x, lattice.box_max.z) ||
+              equator_is_at(high, lattice.box_max.x, lattice.box_max.z));
+}
+
+// Seen from the south and above, latitudes of a high box are labelled at its top; a line on the
+// side behind the data leads from each label to the bottom, where the ground is.
 TEST(Axes, LinesLeadFromTheirTicksToTheGround) {
   const auto from_south = [](bool box) {
     return [box](protocol::View& view) {
