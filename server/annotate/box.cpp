@@ -234,45 +234,87 @@ void add_lines(const std::vector<std::array<Point, 2>>& lines, const Style& styl
   }
 }
 
+// An axis along an edge of the box while its ticks are written.
+class LabelledAxis {
+ public:
+  LabelledAxis(const Subject& subject, std::size_t axis, const Box& box, const Edge& edge,
+               const Style& style, Figure& figure)
+      : axis_(axis),
+        box_(box),
+        edge_(edge),
+        with_lines_(subject.completed.view().annotations.box),
+        style_(style),
+        figure_(figure),
+        out_(outward(*box.pixels(edge), *box.centre())) {}
+
+  // crowded: also where there is no room for the text; the tick stands alone then.
+  void add(const Tick& tick, bool crowded) {
+    const auto at = box_.pixel(edge_, tick.at);
+    if (!at) return;
+    const Point end{at->x + mark() * out_.x, at->y + mark() * out_.y};
+    if (!visible_part(figure_, {*at, end}, 0)) return;
+    const Text text = beside(tick.text, {end.x + gap() * out_.x, end.y + gap() * out_.y}, out_,
+                             style_.text, style_, style_.color);
+    if (!crowded && !is_free(text, figure_)) return;
+    if (with_lines_) add_lines(box_.lines_at(axis_, tick.at), style_, figure_);
+    if (is_taken(figure_, *at) || is_taken(figure_, end)) return;
+    figure_.above.emplace_back(Line{{*at, end}, style_.line, style_.color});
+    if (add_if_free(text, figure_)) ++labels_;
+    widest_ = std::max(widest_, width_of(text.text, text.size));
+  }
+  [[nodiscard]] int labels() const { return labels_; }
+
+  // ends: of the edge in the picture.
+  void add_title(const std::string& title, const std::array<Point, 2>& ends) {
+    if (title.empty()) return;
+    const double away =
+        mark() + 3 * gap() + style_.text * std::abs(out_.y) + widest_ * std::abs(out_.x);
+    const Point middle{0.5 * (ends[0].x + ends[1].x) + away * out_.x,
+                       0.5 * (ends[0].y + ends[1].y) + away * out_.y};
+    Text text = beside(title, middle, out_, style_.text, style_, style_.quiet);
+    if (move_inside(figure_, text)) add_if_free(std::move(text), figure_);
+  }
+
+ private:
+  [[nodiscard]] double mark() const { return 0.45 * style_.text; }
+  [[nodiscard]] double gap() const { return 0.35 * style_.text; }
+
+  std::size_t axis_;
+  const Box& box_;
+  const Edge& edge_;
+  bool with_lines_;
+  const Style& style_;
+  Figure& figure_;
+  Point out_;
+  int labels_ = 0;
+  double widest_ = 0;
+};
+
 void add_axis(const Subject& subject, std::size_t axis, const Box& box, const Style& style,
               Figure& figure) {
   const auto edge = labelled(box, axis, style.text, figure);
   const auto map = axis_map(subject, axis);
-  const auto centre = box.centre();
-  if (!edge || !map || !centre) return;
+  if (!edge || !map || !box.centre()) return;
   const auto whole = *box.pixels(*edge);
   const auto ends = *visible_part(figure, whole, 0);
-  const Point out = outward(whole, *centre);
   const data::Axis drawn = drawn_axis(subject, axis);
-  const bool with_lines = subject.completed.view().annotations.box;
   // As many in the picture as have room there, up to 10.
   constexpr double ticks_most = 90;
   const double shown = std::clamp(length_of(ends) / room_of_tick(ends, style.text), 1.0, 10.0);
   const auto most = static_cast<int>(
       std::clamp(std::floor(shown) * length_of(whole) / length_of(ends), 1.0, ticks_most));
-  const double mark = 0.45 * style.text;
-  const double gap = 0.35 * style.text;
-  double widest = 0;
-  for (const Tick& tick : ticks_of(drawn, *map, box.range(axis), most)) {
-    const auto at = box.pixel(*edge, tick.at);
-    if (!at) continue;
-    const Point end{at->x + mark * out.x, at->y + mark * out.y};
-    if (!visible_part(figure, {*at, end}, 0)) continue;
-    if (with_lines) add_lines(box.lines_at(axis, tick.at), style, figure);
-    if (is_taken(figure, *at) || is_taken(figure, end)) continue;
-    figure.above.emplace_back(Line{{*at, end}, style.line, style.color});
-    const Text text = beside(tick.text, {end.x + gap * out.x, end.y + gap * out.y}, out, style.text,
-                             style, style.color);
-    add_if_free(text, figure);
-    widest = std::max(widest, width_of(text.text, text.size));
+  LabelledAxis labels(subject, axis, box, *edge, style, figure);
+  for (const Tick& tick : ticks_of(drawn, *map, box.range(axis), most)) labels.add(tick, true);
+  // One value tells no scale: where others had no room, closer ones are written between them.
+  constexpr double long_enough = 3;  // em
+  constexpr int closer_most = 6;
+  const bool is_long = length_of(ends) >= long_enough * style.text && !map->single();
+  for (int more = 1; is_long && labels.labels() < 2 && more <= closer_most; ++more) {
+    for (const Tick& tick : ticks_of(drawn, *map, box.range(axis), most + more)) {
+      if (labels.labels() < 2) labels.add(tick, false);
+    }
   }
-  const std::string title = axis_title(drawn);
-  if (title.empty()) return;
-  const double away = mark + 3 * gap + style.text * std::abs(out.y) + widest * std::abs(out.x);
-  const Point middle{0.5 * (ends[0].x + ends[1].x) + away * out.x,
-                     0.5 * (ends[0].y + ends[1].y) + away * out.y};
-  Text text = beside(title, middle, out, style.text, style, style.quiet);
-  if (move_inside(figure, text)) add_if_free(std::move(text), figure);
+  labels.add_title(axis_title(drawn), ends);
 }
 
 }  // namespace

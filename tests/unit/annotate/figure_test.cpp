@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
@@ -321,6 +322,50 @@ TEST(Axes, AShortVerticalOneHasItsEnds) {
   EXPECT_THAT(written, Contains("120"));
   EXPECT_THAT(written, Contains("870"));
   EXPECT_THAT(written, Contains("height (m)"));
+}
+
+// Flat boxes of levels of pressure: where the value of one end has no room beside a longitude,
+// another one is written.
+TEST(Axes, AShortLogarithmicOneHasTwoValues) {
+  data::Grid grid = scene::atmosphere_grid();
+  grid.axes[0].coordinates = {-180, -90, 0, 90, 180};
+  grid.axes[1].coordinates = {-90, -45, 0, 45, 90};
+  int seen = 0;
+  for (const std::vector<double>& levels :
+       {std::vector<double>{1000, 850, 700, 500, 300, 200, 100, 50, 20, 10},
+        {1000, 500, 100},
+        {925, 700, 400, 100},
+        {300, 200, 100}}) {
+    grid.axes[2].coordinates = levels;
+    for (const double tall : {0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 1.0, 1.5}) {
+      for (const double height : {1.5, 2.0, 2.5, 3.0, 3.5}) {
+        const Shown shown(grid, one_scalar(), [&](protocol::View& view) {
+          view.annotations.axes = true;
+          view.image.width = 900;
+          view.image.height = 600;
+          view.camera.eye = protocol::Vec3{0, -2.2, height};
+          view.geometry.scale = {1, 1, tall};
+        });
+        const scene::Lattice& lattice = shown.scene().lattice;
+        const auto low = shown.projector().pixel(lattice.box_min);
+        const auto high =
+            shown.projector().pixel({lattice.box_min.x, lattice.box_min.y, lattice.box_max.z});
+        ASSERT_TRUE(low && high);
+        const double em = style_of(shown.subject()).text;
+        if (std::hypot(high->x - low->x, high->y - low->y) < 3.5 * em) continue;
+        if (std::min(high->x, low->x) < 5 * em || low->y > 600 - 4 * em) continue;
+        const auto written = texts(figure_of(shown.subject()).above);
+        const auto pressures =
+            std::count_if(written.begin(), written.end(), [](const std::string& text) {
+              return std::isdigit(static_cast<unsigned char>(text.front())) != 0 &&
+                     text.find("\u00b0") == std::string::npos;
+            });
+        EXPECT_GE(pressures, 2) << levels.size() << " levels, scale " << tall << ' ' << height;
+        ++seen;
+      }
+    }
+  }
+  EXPECT_GT(seen, 30);
 }
 
 TEST(Axes, OfMapProjectionsAreInKilometres) {
