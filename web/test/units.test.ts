@@ -35,6 +35,7 @@ test("ticks have the decimals of their step", () => {
     ["0.9998", "0.9999", "1", "1.0001", "1.0002"],
   );
   assert.equal(stepNumber(0.30000000000000004, 0.1), "0.3");
+  assert.equal(stepNumber(0.12345, 0.01), "0.12");
   assert.equal(stepNumber(2.5e7, 5e6), "2.5e7");
   assert.deepEqual(
     axisTicks([0, 1], [0, 0.5, 1], [101301, 101302, 101303]).map(({ text }) => text),

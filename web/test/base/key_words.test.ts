@@ -77,6 +77,15 @@ test("the type that JSON expects is left out where no control can send it", () =
   );
 });
 
+test("what the server says of its documents is said as people say it", () => {
+  const range = entryText("/vector/magnitudeRange", "must ascend by at least 1e-6");
+  assert.match(range, /: the second value must exceed the first by at least 1e-6$/);
+  const slice = entryText("/geometry/slice", "requires the mapping flat: use geometry.slice");
+  assert.match(slice, /requires the shape “flat”: use “Place, /);
+  const unknown = entryText("/vector/glow", "unknown key; known keys: color, field, length");
+  assert.match(unknown, /: is not known to this server$/);
+});
+
 test("repeated parts have ordinals: words up to the fourth, then numbers", () => {
   const names = [0, 3, 4, 10, 20, 21, 22, 110].map((at) => keyName(`/surfaces/${at}`));
   const counted = ["first", "fourth", "5th", "11th", "21st", "22nd", "23rd", "111th"];
