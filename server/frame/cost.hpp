@@ -1,5 +1,6 @@
 // Upper bound on the work of a picture, from its view and the description of its dataset, before
-// any data are read or the picture is queued.
+// any data are read or the picture is queued; of grounds, surfaces and light the work expected of
+// the first picture that shows them.
 #pragma once
 
 #include <cstdint>
