@@ -269,10 +269,13 @@ class LabelledAxis {
     if (title.empty()) return;
     const double away =
         mark() + 3 * gap() + style_.text * std::abs(out_.y) + widest_ * std::abs(out_.x);
-    const Point middle{0.5 * (ends[0].x + ends[1].x) + away * out_.x,
-                       0.5 * (ends[0].y + ends[1].y) + away * out_.y};
-    Text text = beside(title, middle, out_, style_.text, style_, style_.quiet);
-    if (move_inside(figure_, text)) add_if_free(std::move(text), figure_);
+    // Best in the middle; on short axes it may have room beyond an end only.
+    for (const double part : {0.5, 0.35, 0.65, 0.2, 0.8, 0.0, 1.0, -0.2, 1.2}) {
+      const Point at{ends[0].x + part * (ends[1].x - ends[0].x) + away * out_.x,
+                     ends[0].y + part * (ends[1].y - ends[0].y) + away * out_.y};
+      Text text = beside(title, at, out_, style_.text, style_, style_.quiet);
+      if (move_inside(figure_, text) && add_if_free(text, figure_)) return;
+    }
   }
 
  private:

@@ -361,6 +361,7 @@ TEST(Axes, AShortLogarithmicOneHasTwoValues) {
                      text.find("\u00b0") == std::string::npos;
             });
         EXPECT_GE(pressures, 2) << levels.size() << " levels, scale " << tall << ' ' << height;
+        EXPECT_THAT(written, Contains("pressure (hPa)")) << tall << ' ' << height;
         ++seen;
       }
     }
