@@ -55,3 +55,15 @@ test("has no empty sections", () => {
     ["Data", "Fields"],
   );
 });
+
+test("longitudes and latitudes have the sides of the Earth", () => {
+  const axes = {
+    ...dataset.axes,
+    x: axis("lon", "degrees_east", [-10, 0, 25]),
+    y: axis("lat", "degrees_north", [72, 55]),
+  };
+  const [data] = aboutSections({ ...dataset, axes } as unknown as Dataset);
+  const rows = Object.fromEntries(data!.rows);
+  assert.equal(rows.lon, "10 °W to 25 °E, 3 samples");
+  assert.equal(rows.lat, "72 to 55 °N, 2 samples");
+});

@@ -3,6 +3,7 @@ import { byId, make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
 import { readableTime } from "../base/time_text";
 import { unitText } from "../view/legend_entries";
+import { axisUnit, valueOnAxis } from "../view/sample_position";
 import type { Dataset } from "../wire/protocol";
 
 type Axis = Dataset["axes"]["x"];
@@ -18,11 +19,14 @@ const withUnits = (text: string, units: string): string =>
 
 function axisRow(axis: Axis): Row {
   const { coordinates } = axis;
-  const first = formatNumber(coordinates[0] ?? NaN);
-  const last = formatNumber(coordinates.at(-1) ?? NaN);
-  const range = coordinates.length > 1 ? `${first} to ${last}` : first;
+  const [first, last] = [coordinates[0] ?? NaN, coordinates.at(-1) ?? NaN];
+  const text = (value: number): string => valueOnAxis(value, axis.units);
+  // One unit serves both unless one lies west or south.
+  const isPlace = axisUnit(axis.units).startsWith("°");
+  const from = isPlace && Math.min(first, last) < 0 ? text(first) : formatNumber(first);
+  const range = coordinates.length > 1 ? `${from} to ${text(last)}` : text(first);
   const samples = coordinates.length === 1 ? "one sample" : `${coordinates.length} samples`;
-  return [axis.name, `${withUnits(range, unitText(axis.units))}, ${samples}`];
+  return [axis.name, `${range}, ${samples}`];
 }
 
 function stepsText({ count, times }: Dataset["steps"]): string {

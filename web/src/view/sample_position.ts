@@ -78,6 +78,16 @@ export function valueText(value: Value, units: string): string {
 export const axisUnit = (units: string): string =>
   ({ degrees_east: "°E", degrees_north: "°N" })[units] ?? unitText(units);
 
+// A coordinate with its unit: "23.5 °W", "12 km".
+export function valueOnAxis(value: number, units: string): string {
+  const unit = axisUnit(units);
+  // Longitudes of columns may go on beyond a whole turn.
+  const place = unit === "°E" && Math.abs(value) > 360 ? value % 360 : value;
+  const opposite = place < 0 ? { "°E": "°W", "°N": "°S" }[unit] : undefined;
+  const shown = opposite === undefined ? place : -place;
+  return `${formatNumber(shown)} ${opposite ?? unit}`.trim();
+}
+
 // A coordinate as text: "23.5 °W", "x 12 km". own: its unit if it is not that of the axis.
 export function coordinateText(
   dataset: Dataset,
@@ -88,14 +98,9 @@ export function coordinateText(
 ): string {
   const { name } = dataset.axes[axisNames[n]!];
   const units = own ?? dataset.axes[axisNames[n]!].units;
-  const unit = axisUnit(units);
-  // Longitudes of columns may go on beyond a whole turn.
-  const place = unit === "°E" && Math.abs(value) > 360 ? value % 360 : value;
-  const opposite = place < 0 ? { "°E": "°W", "°N": "°S" }[unit] : undefined;
-  const shown = opposite === undefined ? place : -place;
-  const text = `${formatNumber(shown)} ${opposite ?? unit}`.trim();
+  const text = valueOnAxis(value, units);
   if (called !== undefined) return `${called} ${text}`;
-  return unit.startsWith("°") ? text : `${name} ${text}`;
+  return axisUnit(units).startsWith("°") ? text : `${name} ${text}`;
 }
 
 // A position in the coordinates and units of an answer.
