@@ -88,7 +88,8 @@ test("size and colour of a part are its own while it is shown, and can be taken 
     await type(page, "title size", 2);
     await finalPicture(page);
     assert.notEqual((await pixels(page)).hash, colored);
-    await page.waitForFunction(() => location.hash.includes("ff2000"));
+    // The address is written with a delay.
+    await page.waitForFunction(() => decodeURIComponent(location.hash).includes('"size":2'));
     const { annotations } = await page.evaluate(() =>
       JSON.parse(decodeURIComponent(location.hash.slice(2))),
     );
