@@ -17,7 +17,7 @@ namespace {
 
 using data::AxisKind;
 
-constexpr double rounding = 1e-9;
+constexpr double coordinate_rounding = 1e-9;
 
 // The value between neighbours of a list at an index that need not be whole.
 double at_index(const std::vector<double>& values, double index) {
@@ -125,11 +125,11 @@ std::string section_text(const Subject& subject, const protocol::PlaneView& plan
   const glm::dvec3 point(plane.point[0], plane.point[1], plane.point[2]);
   const glm::dvec3 normal =
       glm::normalize(glm::dvec3(plane.normal[0], plane.normal[1], plane.normal[2]));
-  const bool vertical = std::abs(normal.z) <= rounding;
+  const bool vertical = std::abs(normal.z) <= coordinate_rounding;
   const std::string kind = vertical ? "vertical section" : "oblique section";
   const bool bent = scene::is_bent(subject.completed.view().geometry);
   for (int a = 0; a < 3 && !bent; ++a) {
-    if (std::abs(normal[a]) < 1 - rounding) continue;
+    if (std::abs(normal[a]) < 1 - coordinate_rounding) continue;
     const auto text = coordinate_at(subject, static_cast<std::size_t>(a), point[a]);
     return text ? "section at " + *text : kind;
   }
