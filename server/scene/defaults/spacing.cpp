@@ -141,8 +141,13 @@ double default_min_magnitude(const protocol::Range& magnitude_range, const LineS
                    [&](std::size_t, double magnitude) { magnitudes.push_back(magnitude); });
   std::sort(magnitudes.begin(), magnitudes.end(), std::greater<>());
   const double grain = top > 0 ? readable_grain(top) : 1.0;
+  // Below the greatest magnitude by more than the rounding of floats: of a uniform flow, all lines
+  // are drawn.
+  const double greatest = magnitudes.empty() ? 0.0 : (1 - 1e-6) * magnitudes.front();
   const auto readable = [&](double magnitude) {
-    return std::max(std::max(0.0, top) / 100.0, std::round(magnitude / grain) * grain);
+    double rounded = std::round(magnitude / grain) * grain;
+    if (rounded > greatest) rounded = std::max(0.0, rounded - grain);
+    return std::max(std::max(0.0, top) / 100.0, rounded);
   };
   // The longest line has apart^2 / (gap w) pixels.
   const LineDensity density = line_density(spacing, lattice, slice);

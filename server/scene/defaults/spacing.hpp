@@ -40,8 +40,8 @@ double spaced_length(double strides, int stride, const Lattice& lattice,
 // The magnitude below which lines are left out. Where the stride suffices, these are the ones that
 // are shorter than twice their width and show no direction, but at most the weaker half; otherwise
 // all but those that cover 0.8 of the projected box: more would hide the flow behind the nearest
-// layer. At least a hundredth of the top of the range. For a slice, only its own lines and area
-// count.
+// layer. At least a hundredth of the top of the range; otherwise below the greatest magnitude, so
+// that a uniform flow is drawn. For a slice, only its own lines and area count.
 double default_min_magnitude(const protocol::Range& magnitude_range, const LineSpacing& spacing,
                              const data::Volume& volume, const Lattice& lattice,
                              const std::optional<Slice>& slice);

@@ -217,6 +217,21 @@ TEST(DefaultLeastMagnitude, TheLinesLeftCoverFourFifthsOfTheBox) {
   EXPECT_NEAR(covered, 0.8, 0.08);
 }
 
+// Whether the stride suffices, or lines give way to others: those of the greatest magnitude stay,
+// though no number as readable as the threshold lies just below it.
+TEST(DefaultLeastMagnitude, IsBelowTheMagnitudeOfAUniformFlow) {
+  for (const Dims& dims : {Dims{40, 30, 20}, Dims{400, 200, 2}, Dims{9, 1, 1}, Dims{1, 1, 1}}) {
+    const Lattice lattice = box_lattice(dims);
+    const LineSpacing spacing = default_spacing(lattice, std::nullopt);
+    for (const double speed : {0.123, 0.35, 1.0, 5.196, 7.77, 31.99, 1e-12, 3e30}) {
+      const data::Volume speeds = volume_of(dims, [&](double, double, double) { return speed; });
+      const double least = default_min_magnitude(default_magnitude_range(speeds), spacing, speeds,
+                                                 lattice, std::nullopt);
+      EXPECT_LT(least, speeds.range[0]) << speed;
+    }
+  }
+}
+
 double cube_of(double value) { return value * value * value; }
 
 // A pole is not a flow that is zero nearly everywhere: at half the box from it lines are drawn.
