@@ -146,6 +146,40 @@ TEST(Level, DrawsASubsetOfTheLines) {
   EXPECT_GT(sum, 10);
 }
 
+// The same with a stride, of a group with one, some or none of the lines, up to a group for the
+// whole of an axis.
+TEST(Level, DrawsASubsetOfTheLinesWithAStride) {
+  const TrialField field{"turbulence", {53, 38, 27}, {1e3, 1e3, 1e3}};
+  const auto dataset = trial_dataset(field);
+  for (const int stride : {2, 3, 5, 8, 13}) {
+    protocol::View view = small_view(field, Shown::both);
+    view.vector.stride = stride;
+    view.vector.min_magnitude = 0;
+    const auto completed = scene::complete(view, *dataset);
+    auto full = scene::build_scene(*completed, *dataset);
+    ASSERT_TRUE(full) << full.error().message;
+    full->scalars.clear();
+    const auto all = render(*full, 2).image;
+    for (const int coarser : {1, 2, 3, 5}) {
+      auto level = scene::build_scene(completed->coarsened(coarser), *dataset);
+      ASSERT_TRUE(level) << level.error().message;
+      level->scalars.clear();
+      level->vector->opacity = full->vector->opacity;
+      level->vector->r1 = full->vector->r1;
+      level->vector->r2 = full->vector->r2;
+      const auto some = render(*level, 2).image;
+      double sum = 0;
+      double beyond = 0;
+      for (std::size_t i = 3; i < all.rgba.size(); i += 4) {
+        beyond = std::max(beyond, static_cast<double>(some.rgba[i] - all.rgba[i]));
+        sum += some.rgba[i];
+      }
+      EXPECT_GT(sum, 0) << stride << ' ' << coarser;
+      EXPECT_LT(beyond, 2e-3) << stride << ' ' << coarser;
+    }
+  }
+}
+
 // At a level no wider than their stride, lines are those of full detail: of the same samples, in
 // the same places, as long and as opaque. Pictures differ by rounding alone, and of method kernel
 // by the order of lines whose kernels are close to each other; the medium, which lets the level be
