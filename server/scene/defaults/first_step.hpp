@@ -19,7 +19,8 @@ namespace windsplat::scene {
 // The step from which defaults of a field follow, whatever step is shown: step_of_defaults, or, if
 // the field is constant or masked there (clouds that have not formed), the first of the last step,
 // the middle one and those at a quarter and three quarters at which it is not. At most five steps
-// are read, and only once.
+// are read, and only once; of later ones none that cannot be read, since a file may be cut off
+// before its last step. Errors: those of volume(); cancelled, between steps.
 inline Result<std::size_t> step_with_values(data::Dataset& dataset, const std::string& field) {
   const std::size_t first = step_of_defaults(dataset);
   const auto found = dataset.remembered("step/" + field, [&]() -> Result<std::vector<double>> {
@@ -27,12 +28,17 @@ inline Result<std::size_t> step_with_values(data::Dataset& dataset, const std::s
     std::vector<std::size_t> tried;
     for (const std::size_t step : {first, last, last / 2, last / 4, last - last / 4}) {
       if (std::find(tried.begin(), tried.end(), step) != tried.end()) continue;
+      tried.push_back(step);
+      if (dataset.cancellation().cancelled()) {
+        return make_error(ErrorKind::cancelled, "request cancelled");
+      }
       const auto volume = dataset.volume(field, step);
+      const bool unreadable = !volume && volume.error().kind == ErrorKind::bad_data;
+      if (unreadable && step != first) continue;
       if (!volume) return volume.error();
       if ((*volume)->range[1] > (*volume)->range[0]) {
         return std::vector{static_cast<double>(step)};
       }
-      tried.push_back(step);
     }
     return std::vector{static_cast<double>(first)};
   });

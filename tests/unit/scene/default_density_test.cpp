@@ -6,9 +6,12 @@
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <memory>
+#include <utility>
 #include <vector>
 
+#include "server/base/cancel.hpp"
 #include "server/scene/defaults.hpp"
 #include "server/scene/defaults/opacity.hpp"
 #include "server/scene/defaults/some_samples.hpp"
@@ -275,6 +278,8 @@ class LateSource final : public data::Source {
   [[nodiscard]] const data::DatasetInfo& info() const override { return info_; }
   Result<data::Volume> read(std::size_t, std::size_t step) override {
     ++reads;
+    if (on_read) on_read();
+    if (step >= unreadable_from) return make_error(ErrorKind::bad_data, "the file ends");
     data::Volume volume;
     volume.dims = info_.grid.dims();
     std::vector<float> values;
@@ -287,6 +292,8 @@ class LateSource final : public data::Source {
     return volume;
   }
   int reads = 0;
+  std::function<void()> on_read;
+  std::size_t unreadable_from = std::numeric_limits<std::size_t>::max();
 
  private:
   data::DatasetInfo info_;
@@ -317,6 +324,29 @@ TEST(DefaultStep, AFieldThatNeverVariesIsReadAtFiveStepsAtMost) {
     EXPECT_EQ((*full->view().scalars->front().color.range)[1], 1);
   }
   EXPECT_LE(late.reads, 5);
+}
+
+// As of a file that is still being written.
+TEST(DefaultStep, StepsThatCannotBeReadAreLeftOut) {
+  auto source = std::make_unique<LateSource>(12, true);
+  source->unreadable_from = 9;
+  auto dataset = dataset_of(std::move(source));
+  const auto full = complete({}, *dataset);
+  ASSERT_TRUE(full) << full.error().message;
+  EXPECT_NEAR((*full->view().scalars->front().color.range)[1], 0.002, 0.0004) << "that of step 5";
+}
+
+TEST(DefaultStep, ACancelledRequestReadsNoFurtherStep) {
+  auto source = std::make_unique<LateSource>(400, false);
+  LateSource& late = *source;
+  auto dataset = dataset_of(std::move(source));
+  CancelToken cancel;
+  late.on_read = [&] { cancel.cancel(); };
+  data::Dataset handle = dataset->cancelled_by(cancel);
+  const auto none = complete({}, handle);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().kind, ErrorKind::cancelled);
+  EXPECT_EQ(late.reads, 1);
 }
 
 TEST(DefaultColors, ReachTheGreatestMagnitude) {
