@@ -296,13 +296,15 @@ Result<std::string> hidden_vectors(const protocol::View& view, data::Dataset& da
       [&](const data::Volume& volume) { return std::vector{hidden_share(least, volume)}; });
   if (!share) return share.error();
   if (share->front() < told_least) return std::string();
+  const auto step = step_with_values(dataset, vector.field.name);
+  if (!step) return step.error();
   std::ostringstream text;
   text << std::setprecision(3) << "the default view shows no vectors of "
        << in_quotes(vector.field.name) << " shorter than " << least;
   const data::FieldInfo* const field = dataset.info().find(vector.field.name);
   if (field != nullptr && !field->units.empty()) text << ' ' << printable(field->units, 80);
   text << " (/vector/minMagnitude): about " << std::lround(100 * share->front())
-       << " % of those at the first step";
+       << " % of those at " << (*step == 0 ? "the first step" : "step " + std::to_string(*step));
   return text.str();
 }
 

@@ -75,8 +75,9 @@ struct ViewOutline {
 // Loads nothing. Errors: those of complete() that need no data.
 Result<ViewOutline> outline(const protocol::View& view, const data::DatasetInfo& info);
 
-// How many vectors of the first step the view leaves out by /vector/minMagnitude, for notes; empty:
-// less than a hundredth. Errors: those of loading the field.
+// How many vectors the view leaves out by /vector/minMagnitude at the step from which defaults
+// follow, which it names, for notes; empty: less than a hundredth. Errors: those of loading the
+// field.
 Result<std::string> hidden_vectors(const protocol::View& view, data::Dataset& dataset);
 
 }  // namespace windsplat::scene

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -272,8 +273,10 @@ TEST(DefaultMagnitudes, OfAFlowInAHundredthOfTheBoxAreThoseOfThatFlow) {
 // Zero at the first step, afterwards a ramp up to 0.002.
 class LateSource final : public data::Source {
  public:
-  explicit LateSource(int steps, bool ever) : ever_(ever) {
-    info_ = FakeSource(atmosphere_grid(), {scalar_info("qc", "kg kg-1")}, steps).info();
+  explicit LateSource(int steps, bool ever,
+                      const data::FieldInfo& field = scalar_info("qc", "kg kg-1"))
+      : ever_(ever) {
+    info_ = FakeSource(atmosphere_grid(), {field}, steps).info();
   }
   [[nodiscard]] const data::DatasetInfo& info() const override { return info_; }
   Result<data::Volume> read(std::size_t, std::size_t step) override {
@@ -282,8 +285,9 @@ class LateSource final : public data::Source {
     if (step >= unreadable_from) return make_error(ErrorKind::bad_data, "the file ends");
     data::Volume volume;
     volume.dims = info_.grid.dims();
+    volume.components = static_cast<int>(info_.fields.front().components.size());
     std::vector<float> values;
-    for (std::size_t n = 0; n < volume.samples(); ++n) {
+    for (std::size_t n = 0; n < volume.samples() * info_.fields.front().components.size(); ++n) {
       const double share = static_cast<double>(n) / static_cast<double>(volume.samples());
       values.push_back(step > 0 && ever_ ? static_cast<float>(0.002 * share) : 0.0F);
     }
@@ -334,6 +338,16 @@ TEST(DefaultStep, StepsThatCannotBeReadAreLeftOut) {
   const auto full = complete({}, *dataset);
   ASSERT_TRUE(full) << full.error().message;
   EXPECT_NEAR((*full->view().scalars->front().color.range)[1], 0.002, 0.0004) << "that of step 5";
+}
+
+TEST(DefaultStep, VectorsThatAreNotShownAreCountedAtTheStepThatIsNamed) {
+  auto dataset = dataset_of(std::make_unique<LateSource>(12, true, wind_info()));
+  const auto full = complete({}, *dataset);
+  ASSERT_TRUE(full) << full.error().message;
+  protocol::View view = full->view();
+  view.vector.min_magnitude = 1;  // none is as long
+  const std::string text = hidden_vectors(view, *dataset).value();
+  EXPECT_NE(text.find("100 % of those at step 11"), std::string::npos) << text;
 }
 
 TEST(DefaultStep, ACancelledRequestReadsNoFurtherStep) {
