@@ -134,6 +134,35 @@ Lattice coarsen_lattice(const Lattice& lattice, const std::array<int, 3>& level)
   return out;
 }
 
+namespace {
+
+bool is_even(const std::vector<double>& spacing) {
+  constexpr double rounding = 1e-9;
+  const auto [least, most] = std::minmax_element(spacing.begin(), spacing.end());
+  return *most - *least <= rounding * *most;
+}
+
+// Places and boxes of the samples of an uneven axis, in widths of their groups.
+void place_in_groups(const Lattice& fine, std::size_t a, int halvings, VectorLayer& layer) {
+  const auto& spacing = fine.spacing[a];
+  const auto stride = static_cast<std::size_t>(layer.data_stride);
+  const std::vector<double> centres = coarsen_along(fine.positions[a], spacing, halvings);
+  std::size_t group = 0;
+  each_group(spacing.size(), halvings, [&](std::size_t first, std::size_t end) {
+    const double width = width_of(spacing, first, end);
+    for (std::size_t i = first; i < end; ++i) {
+      const std::size_t kernel = i / stride * stride;
+      const double box = width_of(spacing, kernel, std::min(kernel + stride, spacing.size()));
+      layer.group_place[a].push_back(
+          static_cast<float>((fine.positions[a][i] - centres[group]) / width));
+      layer.group_box[a].push_back(static_cast<float>(box / width));
+    }
+    ++group;
+  });
+}
+
+}  // namespace
+
 void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pixels_per_unit,
                  VectorLayer& layer) {
   layer.halvings = level;
@@ -145,6 +174,8 @@ void merge_lines(const Lattice& fine, const std::array<int, 3>& level, double pi
   double apart_px = 0;  // first to last line of a group, at the nearest point of the box
   for (std::size_t a = 0; a < 3; ++a) {
     layer.drawn_places[a] = data::drawn_places(level[a], layer.data_stride);
+    const bool even = is_even(fine.spacing[a]) || (level[a] == 0 && layer.data_stride == 1);
+    if (!even) place_in_groups(fine, a, level[a], layer);
     const double group = layer.drawn_places[a];
     const double apart = layer.data_stride * cell_size(fine, a);
     lines *= group;

@@ -133,7 +133,7 @@ struct VectorLayer {
   double span = 7;
   int stride = 1;
   // At a coarser level a sample is drawn from a group of samples of the data
-  // (data::Reduction::drawn), and its line keeps, on an evenly spaced axis, the position, jitter
+  // (data::Reduction::drawn), and its line keeps the position, jitter
   // and kernel box that it has at full detail.
   // `stride` is then 1, data_stride that of its kernel at full detail, and drawn_places the number
   // of places along each axis among which the sample is drawn (data::drawn_places).
@@ -141,6 +141,9 @@ struct VectorLayer {
   std::array<int, 3> data_dims{1, 1, 1};
   int data_stride = 1;
   std::array<int, 3> drawn_places{1, 1, 1};
+  // By sample of the data along each axis: from the centre of its group to its own place, and the
+  // box of its kernel at full detail, both in widths of the group. Empty: evenly spaced samples.
+  std::array<std::vector<float>, 3> group_place, group_box;
   // Jitter follows from the index of a sample among those of the data: of the lattice's first one,
   // at full detail. Along x later samples may lie beyond a seam, and count on.
   std::array<int, 3> first_sample{0, 0, 0};

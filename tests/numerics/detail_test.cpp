@@ -45,6 +45,7 @@ scene::Scene at_level(const scene::Scene& full, const Level& level) {
   if (scene.vector) {
     data::Coarsening drawn = how;
     drawn.reduction = data::Reduction::drawn;
+    drawn.stride = scene.vector->stride;
     scene.vector->field = coarser(scene.vector->field, drawn);
     scene::merge_lines(full.lattice, level, scene::pixels_per_unit(full.camera, full.lattice),
                        *scene.vector);
@@ -139,6 +140,39 @@ TEST(Detail, SmallLinesKeepTheirMeanOpacity) {
         << opacity;
     EXPECT_NEAR(mean_alpha(render(at_level(full, {1, 0, 1})).image), whole, 0.04 * whole)
         << opacity;
+  }
+}
+
+// Layers that become wider, as those of an atmosphere: lines keep the place and the box that they
+// have at full detail, also along an axis that is not halved.
+TEST(Detail, LinesWithAStrideAlongUnevenAxesAreThoseOfFullDetail) {
+  scene::Scene full;
+  std::array<std::vector<double>, 3> spacing;
+  for (int n = 0; n < 23; ++n) spacing[0].push_back(0.05 * (1 + 0.4 * std::sin(n)));
+  for (int n = 0; n < 20; ++n) spacing[1].push_back(0.05);
+  for (int n = 0; n < 17; ++n) spacing[2].push_back(0.01 * std::pow(1.2, n));
+  full.lattice = make_lattice(spacing);
+  full.camera = look({0, 0, 0}, {0.35, 1, -0.4}, 5, 160, 120, true, 0.3);
+  full.stop_transmittance = 0;
+  full.method = scene::Method::slab;
+  const auto swirl = [](int c, double x, double y, double z) {
+    return static_cast<float>(
+        std::array{-y, x, 0.3 * std::cos(5 * z)}.at(static_cast<std::size_t>(c)));
+  };
+  full.vector = plain_lines(make_volume(full.lattice, 3, swirl), {1, 1, 1});
+  full.vector->length = 0.3;
+  full.vector->jitter_center = 0.6;
+  full.vector->jitter_stride = 0.5;
+  for (const int stride : {2, 3, 5}) {
+    for (const double span : {1.0, 5.0}) {
+      full.vector->stride = stride;
+      full.vector->span = span;
+      const engine::Rendered whole = render(full);
+      EXPECT_GT(mean_alpha(whole.image), 0.002);
+      for (const Level& level : {Level{1, 1, 0}, Level{1, 1, 1}, Level{0, 1, 1}}) {
+        EXPECT_LT(largest_difference(render(at_level(full, level)), whole), 2e-3) << stride << span;
+      }
+    }
   }
 }
 

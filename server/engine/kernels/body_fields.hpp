@@ -65,7 +65,7 @@ KERNEL_INLINE Three<Kernel> fetch_vectors(const Pass& pass, const Rows& rows, in
           hn::IfThenElse(masked, zero, z)};
 }
 
-// Indices below 2^20 divided by the stride of the data, rounded down. Half an index more than a
+// Indices below 2^22 divided by the stride of the data, rounded down. Half an index more than a
 // multiple is farther from the next one than the product is from the quotient.
 KERNEL_INLINE UnsignedOf<Kernel> divided_by_stride(const LineStyle& line,
                                                    UnsignedOf<Kernel> index) {
@@ -103,21 +103,22 @@ KERNEL_INLINE Hash3<UnsignedOf<Kernel>> drawn_samples(const LineStyle& line, con
   return {drawn(0, group.x, hash.x), drawn(1, group.y, hash.y), drawn(2, group.z, hash.z)};
 }
 
+KERNEL_INLINE Kernel looked_up(const float* table, UnsignedOf<Kernel> indices) {
+  alignas(64) std::uint32_t index[pair_kernels];
+  alignas(64) float lanes[pair_kernels];
+  hn::Store(indices, hn::RebindToUnsigned<KernelTag>(), index);
+  for (int k = 0; k < kernel_lanes; ++k) lanes[k] = table[index[k]];
+  return load<Kernel>(lanes);
+}
+
 // Factors from the components of vectors of the field to those drawn.
 KERNEL_INLINE Three<Kernel> rates_of(const LineStyle& line, const Rows& rows, int i) {
   const Kernel one = all<Kernel>(1.0F);
   const Kernel rate_y = all<Kernel>(line.rate_y);
   if (line.rate_x == nullptr && line.rate_z == nullptr) return {one, rate_y, one};
-  const auto look_up = [&](const float* rates, UnsignedOf<Kernel> samples) {
-    if (rates == nullptr) return one;
-    alignas(64) std::uint32_t sample[pair_kernels];
-    alignas(64) float lanes[pair_kernels];
-    hn::Store(samples, hn::RebindToUnsigned<KernelTag>(), sample);
-    for (int k = 0; k < kernel_lanes; ++k) lanes[k] = rates[sample[k]];
-    return load<Kernel>(lanes);
-  };
   const Hash3<UnsignedOf<Kernel>> sample = drawn_samples(line, rows, i);
-  return {look_up(line.rate_x, sample.y), rate_y, look_up(line.rate_z, sample.z)};
+  return {line.rate_x == nullptr ? one : looked_up(line.rate_x, sample.y), rate_y,
+          line.rate_z == nullptr ? one : looked_up(line.rate_z, sample.z)};
 }
 
 // Vectors whose largest component is zero or of moderate size. Compared as integers: a denormal,

@@ -31,6 +31,11 @@ KERNEL_INLINE Origins origins_of(const LineStyle& line, const Rows& rows, int i)
   const hn::RebindToUnsigned<KernelTag> tag;
   const hn::RebindToSigned<KernelTag> integers;
   const auto find = [&](int a, UnsignedOf<Kernel> sample, Kernel& place, Kernel& box) {
+    if (line.group_box[a] != nullptr) {
+      place = looked_up(line.group_place[a], sample);
+      box = looked_up(line.group_box[a], sample);
+      return;
+    }
     const int halvings = line.halvings[a];
     const auto group = hn::BitCast(tag, hn::Load(integers, rows.sample[a] + i));
     const auto first = hn::ShiftLeftSame(group, halvings);

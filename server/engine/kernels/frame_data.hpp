@@ -92,6 +92,9 @@ struct LineStyle {
   int data_stride;  // of the kernels at full detail
   float inverse_data_stride;
   int drawn_places[3];
+  // By sample of the data: scene::VectorLayer::group_place and group_box; null: an even axis.
+  const float* group_place[3];
+  const float* group_box[3];
   float half_box[3];  // bound on half the width of the kernel box, in cells
   float shift[3];     // bound on the distance of a line's centre from its position, in cells
   float r1, r2;       // pixels
