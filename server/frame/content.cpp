@@ -130,6 +130,14 @@ class Sampling {
     return frame::light_changes(samples_, rays_through(seen), cancel_);
   }
 
+  // Through the kernels with lines, where few samples have one.
+  [[nodiscard]] std::vector<RayThrough> tried_rays(const std::vector<Seen>& seen) const {
+    std::vector<RayThrough> rays = rays_through(seen);
+    if (!scene_.vector) return rays;
+    for (RayThrough& ray : rays) ray.sample = samples_.line_of(ray.sample);
+    return rays;
+  }
+
   [[nodiscard]] std::vector<RayThrough> rays_through(const std::vector<Seen>& seen) const {
     std::vector<RayThrough> rays;
     rays.reserve(seen.size());
@@ -413,7 +421,7 @@ std::optional<quality::Content> content_of(const scene::Scene& scene, const Canc
   roots(light.shifts, out.shifts);
   out.order = std::sqrt(light.order.sum);
   out.step_cell = light.cell.value();
-  const PixelTrials tried = pixel_trials(scene, sampling.rays_through(seen), cancel);
+  const PixelTrials tried = pixel_trials(scene, sampling.tried_rays(seen), cancel);
   if (cancel.cancelled()) return std::nullopt;
   const bool beside = scene.camera.perspective && tried.trials && shows_anything(*tried.trials);
   if (seen.empty() && beside) out = of_cells_at_the_eye(scene.camera);

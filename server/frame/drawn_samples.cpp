@@ -59,6 +59,20 @@ std::optional<Index> DrawnSamples::neighbour_line(const Index& i, std::size_t a)
   return neighbour(i, a, (data::strided_sample(next, stride, samples) >> halvings) - i[a]);
 }
 
+Index DrawnSamples::line_of(const Index& i) const {
+  const scene::VectorLayer& layer = *scene_.vector;
+  const bool whole = layer.halvings == std::array{0, 0, 0};
+  const int stride = layer.stride * layer.data_stride;
+  Index out = i;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (scene_.slice && scene_.slice->axis == static_cast<int>(a)) continue;
+    const int samples = whole ? scene_.lattice.drawn(static_cast<int>(a)) : layer.data_dims[a];
+    const int kernel = (i[a] << layer.halvings[a]) / stride;
+    out[a] = data::strided_sample(kernel, stride, samples) >> layer.halvings[a];
+  }
+  return out;
+}
+
 double DrawnSamples::edge(const Index& i, std::size_t a) const {
   auto next = neighbour(i, a, 1);
   if (!next) next = neighbour(i, a, -1);

@@ -68,6 +68,8 @@ class DrawnSamples {
   // The sample of the next line along an axis, from that of a line; at the end of the axis of the
   // one before.
   [[nodiscard]] std::optional<Index> neighbour_line(const Index& i, std::size_t a) const;
+  // The sample of the kernel with a line that represents a sample.
+  [[nodiscard]] Index line_of(const Index& i) const;
   [[nodiscard]] double edge(const Index& i, std::size_t a) const;  // of its cell, world units
   [[nodiscard]] Medium medium(const Index& i) const;
   // Factors of colours at a sample by the light of the scene.

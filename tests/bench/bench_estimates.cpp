@@ -139,6 +139,12 @@ void list(const Measurements& measurements) {
     }
     for (const Row& row : rows) {
       const quality::Setting& setting = quality::settings[row.setting];
+      // Lines with a stride stay while the medium is merged, whose law gives the error.
+      const bool apart = kind.lines && kind.lines_stride > 1 &&
+                         quality::cause_of(setting, viewpoint) == quality::Cause::merged;
+      if (apart && setting.coarser > std::ilogb(kind.lines_stride)) continue;
+      quality::Kind merged = kind;
+      merged.lines = kind.lines && !apart;
       const quality::Forecast before = untaught->forecast(row.setting, viewpoint);
       const quality::Forecast after = calibrated->forecast(row.setting, viewpoint);
       const quality::Forecast typical = untaught->forecast(row.setting, unknown);
@@ -148,9 +154,9 @@ void list(const Measurements& measurements) {
                   after_final->forecast(row.setting, viewpoint).error, after.error,
                   quality::error_bound(before), quality::error_bound(after), typical.error,
                   quality::error_bound(typical), moved.error, quality::error_bound(moved),
-                  static_cast<int>(quality::cause_of(setting, viewpoint)), at[1] % 3);
+                  static_cast<int>(quality::cause_of(setting, viewpoint)), apart ? 1 : at[1] % 3);
       std::printf(",%.4g", quality::tried_error(kind, setting, viewpoint));
-      for (const double feature : quality::features_of(kind, setting, viewpoint)) {
+      for (const double feature : quality::features_of(merged, setting, viewpoint)) {
         std::printf(",%.5g", feature);
       }
       std::printf("\n");

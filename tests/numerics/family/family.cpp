@@ -296,6 +296,10 @@ protocol::View random_view(data::Dataset& dataset, std::uint32_t scene, std::uin
     vector.min_magnitude = uniform(of_scene, 0, 0.4) * (*vector.magnitude_range)[1];
   }
   const double density = logarithmic(of_scene, 0.1, 20);
+  if (content != medium && uniform(of_scene, 0, 1) < 0.5) {  // dense short lines
+    *view.vector.length /= *view.vector.stride;
+    view.vector.stride = 1;
+  }
   for (protocol::ScalarView& layer : *view.scalars) {
     for (auto& point : *layer.extinction) point[1] *= density;
   }

@@ -277,7 +277,7 @@ TEST(Table, FarAwayEstimatesKeepTheBiasOfTheScene) {
   const double factor = 4;
   table.add(half, sight_at(0), {factor * prior_of(half, sight_at(0)), {}});
   const double far = table.forecast(half, sight_at(60)).error / prior_of(half, sight_at(60));
-  EXPECT_GT(far, 1.3);
+  EXPECT_GT(far, 1.2);
   EXPECT_LT(far, factor);
 }
 
