@@ -18,7 +18,7 @@ import {
   type Animation,
 } from "../src/save/export_views";
 import { drawFrame, inOrder, waitFor, type FetchLike } from "../src/wire/frame_request";
-import { layoutCards } from "../src/save/legend_picture";
+import { layoutCards, wrapNote } from "../src/save/legend_picture";
 import type { LegendEntry } from "../src/view/legend_entries";
 import { crc32, textOf, utf8, withDensity, withTexts, type Bytes } from "../src/save/png_text";
 import type { View } from "../src/wire/protocol";
@@ -405,4 +405,26 @@ test("legend cards never overlap or leave the picture", () => {
       if (width === 1136) assert.equal(shrink, 1);
     }
   }
+});
+
+test("notes of a saved legend are wrapped, after commas where that fits", () => {
+  const widthOf = (text: string): number => text.length;
+  const note = "longest line 50 m s⁻¹, white end ahead, weaker and farther lines are darker";
+  assert.deepEqual(wrapNote(note, 40, widthOf), [
+    "longest line 50 m s⁻¹, white end ahead,",
+    "weaker and farther lines are darker",
+  ]);
+  assert.deepEqual(wrapNote(note, 23, widthOf), [
+    "longest line 50 m s⁻¹,",
+    "white end ahead,",
+    "weaker and farther",
+    "lines are darker",
+  ]);
+  assert.deepEqual(wrapNote("short", 3, widthOf), ["short"], "a word is not broken");
+  assert.deepEqual(wrapNote(note, 100, widthOf), [note]);
+
+  // A card with one more line is one line higher.
+  const high = (notes: string[]) =>
+    layoutCards([entry(0, [0, 1])], 268, 1136, 818, [notes]).cards[1]!.height;
+  assert.equal(high(["one", "two"]) - high(["one"]), 18);
 });

@@ -33,23 +33,43 @@ const quiet = "#a3afbf";
 const notesOf = (entry: LegendEntry): string[] =>
   [entry.note, entry.leftOut].filter((note) => note !== "");
 
-const heightOf = (entry: LegendEntry): number =>
-  stripTop + stripHeight + (entry.range === null ? 0 : 21) + 18 * notesOf(entry).length + 6;
+const heightOf = (entry: LegendEntry, lines: number): number =>
+  stripTop + stripHeight + (entry.range === null ? 0 : 21) + 18 * lines + 6;
+
+// Lines of a note that are no wider than `wide`, unless a single word is: broken after commas where
+// that fits, else between words. widthOf: of a text, in the unit of `wide`.
+export function wrapNote(note: string, wide: number, widthOf: (text: string) => number): string[] {
+  const pack = (parts: string[]): string[] => {
+    const lines: string[] = [];
+    for (const part of parts) {
+      const longer = lines.length === 0 ? part : `${lines.at(-1)} ${part}`;
+      if (lines.length > 0 && widthOf(longer) <= wide) lines[lines.length - 1] = longer;
+      else lines.push(part);
+    }
+    return lines;
+  };
+  const phrases = pack(note.split(/(?<=,) /));
+  return phrases.flatMap((phrase) =>
+    widthOf(phrase) <= wide ? [phrase] : pack(phrase.split(" ")),
+  );
+}
 
 // Cards in rows from the lower left, preceded by the caption above them. `shrink` is the factor by
-// which the cards are drawn smaller; the positions are in unshrunk pixels.
+// which the cards are drawn smaller; the positions are in unshrunk pixels. notes: lines below the
+// ticks of each entry.
 export function layoutCards(
   entries: LegendEntry[],
   cardWidth: number,
   width: number,
   height: number,
+  notes = entries.map(notesOf),
 ): { cards: Card[]; shrink: number } {
   const wide = Math.min(cardWidth, width - 2 * edge);
   const columns = Math.max(1, Math.floor((width - 2 * edge + gap) / (cardWidth + gap)));
   const rows: number[] = []; // the greatest card height in each row
   entries.forEach((entry, n) => {
     const row = Math.floor(n / columns);
-    rows[row] = Math.max(rows[row] ?? 0, heightOf(entry));
+    rows[row] = Math.max(rows[row] ?? 0, heightOf(entry, notes[n]!.length));
   });
   const total = rows.reduce((sum, row) => sum + row + gap, captionHeight + edge);
   const shrink = Math.min(1, (heightShare * height) / total);
@@ -58,7 +78,7 @@ export function layoutCards(
   entries.forEach((entry, n) => {
     const column = n % columns;
     if (column === 0) bottom += gap + rows[n / columns]!;
-    const high = heightOf(entry);
+    const high = heightOf(entry, notes[n]!.length);
     const x = edge + column * (wide + gap);
     cards.push({ x, y: bottom - high, width: wide, height: high });
   });
@@ -71,7 +91,14 @@ export function drawLegend(
   scale: number, // pixels per CSS pixel
 ): void {
   const { width, height } = context.canvas;
-  const { cards, shrink } = layoutCards(entries, cardWidth, width / scale, height / scale);
+  const page = [width / scale, height / scale] as const;
+  const wide = Math.min(cardWidth, page[0] - 2 * edge) - 2 * pad;
+  context.font = `11px ${font}`;
+  const widthOf = (line: string): number => context.measureText(line).width;
+  const notes = entries.map((entry) =>
+    notesOf(entry).flatMap((note) => wrapNote(note, wide, widthOf)),
+  );
+  const { cards, shrink } = layoutCards(entries, cardWidth, ...page, notes);
   const write = (line: string, x: number, y: number, style: string, color: string, max: number) => {
     context.font = `${style} ${font}`;
     context.fillStyle = color;
@@ -92,9 +119,8 @@ export function drawLegend(
   const [head, ...rest] = cards as [Card, ...Card[]];
   write(caption, head.x + pad, head.y + 17, "600 12px", text, head.width - 2 * pad);
   entries.forEach((entry, n) => {
-    const { x, y, width } = rest[n]!;
+    const { x, y } = rest[n]!;
     const left = x + pad;
-    const wide = width - 2 * pad;
     context.font = `12px ${font}`;
     const units = context.measureText(entry.units).width;
     write(entry.title, left, y + 19, "600 12px", text, wide - (units > 0 ? units + 10 : 0));
@@ -111,7 +137,7 @@ export function drawLegend(
     }
     context.textAlign = "left";
     if (entry.range !== null) line += 21;
-    for (const note of notesOf(entry)) {
+    for (const note of notes[n]!) {
       write(note, left, line + 14, "11px", quiet, wide);
       line += 18;
     }
