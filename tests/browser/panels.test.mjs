@@ -250,7 +250,7 @@ test("the legend shows surfaces, and the range of their colours can be set", () 
     await unfold(page, "Surfaces");
     await page.locator("#panel button", { hasText: /^Add a level section$/ }).click();
     const card = page.locator(".legend-surface");
-    await card.locator(".legend-note", { hasText: /^on a section$/ }).waitFor();
+    await card.locator(".legend-note", { hasText: /^section at \d+ hPa$/ }).waitFor();
     await finalPicture(page);
     const surface = (label) =>
       page

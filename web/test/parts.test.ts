@@ -3,7 +3,8 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { gesture, MoveQueue } from "../src/viewport/input";
-import { legendEntries, sampleHeights, unitText } from "../src/view/legend_entries";
+import { legendEntries, sampleHeights } from "../src/view/legend_entries";
+import { unitText } from "../src/view/unit_text";
 import { hashOfView, viewOfHash } from "../src/view/link";
 import {
   densityOf,
@@ -201,8 +202,7 @@ test("each colouring has its unit, a constant colour has no range", () => {
   assert.equal(units({ by: "screenZ", range: [1, 3] }), "");
   assert.equal(units({ by: "rise", range: [-0.02, 0.02] }), "");
   const [constant] = legendEntries(dataset, vector({ by: "constant", constant: "#ff0000" }));
-  assert.equal(constant!.range, null);
-  assert.equal(constant!.color, "#ff0000");
+  assert.deepEqual([constant!.range, constant!.color], [null, "#ff0000"]);
   assert.match(constant!.note, /60 m s⁻¹/);
 });
 

@@ -2,7 +2,7 @@
 import { byId, make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
 import { readableTime } from "../base/time_text";
-import { unitText } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import { axisUnit, valueOnAxis } from "../view/sample_position";
 import type { Dataset } from "../wire/protocol";
 

@@ -1,7 +1,7 @@
 // Rules of the panel's controls: which of them apply to a view, the options that a dataset offers,
 // and patches that keep dependent values consistent. Pure: (dataset, view) -> options, text,
 // patches.
-import { unitText } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import type { Dataset, Field, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 import type { Patch } from "../view/view_state";

@@ -11,7 +11,7 @@ import { PictureStore } from "../base/picture_store";
 import { Folders, type FolderOptions } from "./panel_folders";
 import { nameKey } from "../base/key_words";
 import { histogramBins, HistogramView } from "./histogram_view";
-import { unitText } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import type { RangeMode } from "./range_choice";
 import { formatNumber } from "../base/ticks";
 import type { CurveSource } from "./transfer_view";

@@ -4,7 +4,7 @@ import type { Controller } from "lil-gui";
 import { colorByPatch, colorField, fieldOptions } from "./controls";
 import type { Range } from "../wire/api";
 import { colorScale } from "../view/color_scale";
-import { unitText } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import { keyAccess, type PanelKit } from "./panel_kit";
 import { namePart } from "../base/key_words";
 import { vectorsTitle } from "../view/words";

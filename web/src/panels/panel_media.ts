@@ -3,7 +3,7 @@ import type GUI from "lil-gui";
 import type { Range } from "../wire/api";
 import { fieldOptions } from "./controls";
 import { volumesTitle } from "../view/words";
-import { unitText } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import {
   curveOf,
   densityOf,

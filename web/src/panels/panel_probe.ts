@@ -6,7 +6,7 @@ import { checkLabel, debounced, make, makeSvg, numberBox } from "../base/dom";
 import { wayText } from "../view/distance";
 import { hoverOf, hoverOn } from "../view/hover_setting";
 import { sampleOf } from "../view/feature";
-import { unitText } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import type { PanelKit } from "./panel_kit";
 import {
   axisNames,

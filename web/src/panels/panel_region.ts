@@ -6,7 +6,7 @@ import { make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
 import { fieldOptions, showsTheEarth } from "./controls";
 import { vectorsTitle } from "../view/words";
-import { unitText } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import { axisNames, axisUnit } from "../view/sample_position";
 import { polygonFrom } from "../view/geo_polygon";
 import type { PanelKit } from "./panel_kit";

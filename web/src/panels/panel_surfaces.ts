@@ -1,6 +1,7 @@
 // The surfaces panel: isosurfaces and sections of scalar fields, each with colours and opacity.
 import type GUI from "lil-gui";
-import { surfaceColors, unitText } from "../view/legend_entries";
+import { surfaceColors } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import { failureText, type FieldRange, type Histogram } from "../wire/api";
 import type { SurfaceView } from "../wire/protocol";
 import { colorsIn, contrastColor } from "../view/contrast_color";

@@ -4,7 +4,7 @@ import type { FieldRange, Histogram } from "../wire/api";
 import type { Dataset, SurfaceView, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 import { dot, length, subtract, times, type Vec3 } from "../base/vec3";
-import { unitText } from "../view/legend_entries";
+import { unitText } from "../view/unit_text";
 import { neat, quantile } from "../view/histogram";
 
 export type Axis = "x" | "y" | "z";

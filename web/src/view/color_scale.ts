@@ -1,7 +1,8 @@
 // The ends of the colours of lines as the legend shows them: coordinates of the vertical axis in
 // place of world heights, and units. Pure.
 import { axisNames } from "./sample_position";
-import { sampleHeights, unitText } from "./legend_entries";
+import { sampleHeights } from "./legend_entries";
+import { unitText } from "./unit_text";
 import type { Dataset, View } from "../wire/protocol";
 
 // Linear between the samples and beyond the outermost two; both lists have the same length, and

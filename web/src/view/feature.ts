@@ -3,7 +3,7 @@ import type { Feature, Position } from "../wire/api";
 import type { Dataset, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 import { clamp } from "../base/values";
-import { unitText } from "./legend_entries";
+import { unitText } from "./unit_text";
 import { coordinateText, axisNames, type Sample } from "./sample_position";
 
 // Below this share of a pixel's opacity the text tells the share.

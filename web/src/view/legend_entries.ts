@@ -3,6 +3,8 @@
 import type { Dataset, Field, ScalarView, SurfaceView, View } from "../wire/protocol";
 import { axisTicks, compassTicks, formatNumber, linearTicks, type LegendTick } from "../base/ticks";
 import { clamp } from "../base/values";
+import { sectionOfView, sectionText } from "./section_text";
+import { unitText } from "./unit_text";
 
 export interface LegendEntry {
   kind: "lines" | "medium" | "surface";
@@ -26,39 +28,6 @@ const titleMax = 30; // characters; longer titles do not fit over a strip
 export function fieldTitle(field: Field | undefined, name: string): string {
   const text = field?.longName ? field.longName : name.replaceAll("_", " ");
   return text.length > titleMax ? name : text;
-}
-
-const raised: Record<string, string> = { "-": "⁻" };
-[..."⁰¹²³⁴⁵⁶⁷⁸⁹"].forEach((sign, digit) => (raised[String(digit)] = sign));
-
-// Units that are written out, in the singular and lower case -> their symbols.
-const symbols: Record<string, string> = {
-  ...{ meter: "m", metre: "m", kilometer: "km", kilometre: "km" },
-  ...{ centimeter: "cm", centimetre: "cm", millimeter: "mm", millimetre: "mm" },
-  ...{ second: "s", sec: "s", minute: "min", hour: "h" },
-  ...{ kelvin: "K", degk: "K", deg_k: "K", degree_kelvin: "K" },
-  ...{ degc: "°C", deg_c: "°C", celsius: "°C", degree_c: "°C", degree_celsius: "°C", degree: "°" },
-  ...{ pascal: "Pa", hectopascal: "hPa", millibar: "mbar", kilogram: "kg", gram: "g" },
-  ...{ joule: "J", watt: "W", newton: "N", volt: "V", percent: "%" },
-};
-
-function symbolOf(word: string): string {
-  const name = word.toLowerCase();
-  const singular = name.startsWith("degrees_") ? name.replace("s_", "_") : name.replace(/s$/, "");
-  return symbols[name] ?? symbols[singular] ?? word;
-}
-
-// As people write it: "m s-1", "m s**-1", "m s^-1", "meter second-1", "meters per second" ->
-// "m s⁻¹". In CF, "1" means dimensionless, as "(0 - 1)" of ECMWF.
-export function unitText(units: string | undefined): string {
-  if (units === undefined || units === "1" || units === "(0 - 1)") return "";
-  const celsius = units.replace(/\bdeg(?:rees?)? c(?:elsius)?\b/gi, "°C");
-  const parts = /( per )?([A-Za-z_]+)(?:(?:\*\*|\^)?(-?\d+)(?=$|[ ./*]))?/g;
-  return celsius.replace(parts, (_, per: string | undefined, word: string, power = "") => {
-    const signed = per === undefined ? power : `-${power === "" ? "1" : power}`;
-    const high = [...signed].map((sign) => raised[sign] ?? "").join("");
-    return `${per === undefined ? "" : " "}${symbolOf(word)}${high}`;
-  });
 }
 
 // World heights of the samples under a view's geometry; null unless the geometry only stretches the
@@ -297,7 +266,7 @@ function contoursText(
 }
 
 // In the words of the server's legend.
-function surfaceEntry(dataset: Dataset, surface: SurfaceView): LegendEntry {
+function surfaceEntry(dataset: Dataset, view: View, surface: SurfaceView): LegendEntry {
   const cut = fieldNamed(dataset, surface.field);
   const cutTitle = fieldTitle(cut, surface.field);
   const name = surfaceColors(surface);
@@ -320,7 +289,7 @@ function surfaceEntry(dataset: Dataset, surface: SurfaceView): LegendEntry {
     extinction: [],
     note: joined(
       isovalue === null
-        ? "on a section"
+        ? sectionText(dataset, view, surface)
         : `surface where ${where} is ${formatNumber(isovalue)} ${unitText(cut?.units)}`.trim(),
       contours === null ? "" : contoursText(contours, units),
     ),
@@ -357,6 +326,11 @@ export function legendEntries(dataset: Dataset, view: View): LegendEntry[] {
   const media = (view.scalars ?? []).map((layer) => mediumEntry(dataset, layer));
   const surfaces = (view.surfaces ?? [])
     .filter(isSeen)
-    .map((surface) => surfaceEntry(dataset, surface));
-  return [...(lines === null ? [] : [lines]), ...media, ...surfaces];
+    .map((surface) => surfaceEntry(dataset, view, surface));
+  const section = sectionOfView(dataset, view);
+  const cut = [...(lines === null ? [] : [lines]), ...media].map((entry) => ({
+    ...entry,
+    note: joined(section, entry.note),
+  }));
+  return [...cut, ...surfaces];
 }

@@ -1,7 +1,7 @@
 // World positions of samples in a view, and the sample nearest to a position. Pure.
 import type { Position, Probe, Value } from "../wire/api";
 import type { Vec3 } from "../base/vec3";
-import { unitText } from "./legend_entries";
+import { unitText } from "./unit_text";
 import type { Dataset, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 

@@ -67,9 +67,9 @@ test("the legend of a section has its own colours and its contours; unseen ones 
   assert.deepEqual(
     entries.map(({ title, units, range, note }) => [title, units, range, note]),
     [
-      ["temperature", "K", [0, 30], "on a section, contours every 2.5 K"],
-      ["temperature", "K", [0, 30], "on a section, contours at 0, 12.25 K"],
-      ["humidity", "K", [0, 30], "on a section, contours every 1 K"],
+      ["temperature", "K", [0, 30], "section at z = 1 m, contours every 2.5 K"],
+      ["temperature", "K", [0, 30], "section at z = 1 m, contours at 0, 12.25 K"],
+      ["humidity", "K", [0, 30], "section at z = 1 m, contours every 1 K"],
     ],
   );
 });
