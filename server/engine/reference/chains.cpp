@@ -1,9 +1,10 @@
 // Segments of curved lines -> lines on the screen.
+#include "server/engine/reference/chains.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "server/engine/reference/kernels.hpp"
 #include "server/light/shade.hpp"
 
 namespace windsplat::engine::reference {
@@ -102,46 +103,55 @@ void set_dashes(const Segments& from, std::size_t v, double cycles, Ribbon& line
 
 }  // namespace
 
-void list_chains(const Scene& scene, const View& view, const VectorLayer& layer, Kernels& kernels) {
+std::optional<Ribbon> make_segment(const Scene& scene, const View& view, const VectorLayer& layer,
+                                   std::size_t vertex) {
   const Segments& from = *layer.streamlets;
+  const float scaled_magnitude = from.magnitudes[vertex];
+  if (vertex + 1 >= from.vertices() || scaled_magnitude < 0 ||
+      scaled_magnitude == Segments::not_drawn) {
+    return std::nullopt;
+  }
+  const Joint a = joint_at(view, from, vertex);
+  const Joint b = joint_at(view, from, vertex + 1);
+  Ribbon line;
+  line.q0 = static_cast<double>(from.q[vertex]);
+  line.q1 = static_cast<double>(from.q[vertex + 1]);
+  if (!place_ends(view, a, b, line)) return std::nullopt;
+  line.chained = true;
+  line.r1 = layer.r1;
+  line.r2 = layer.r2;
+  line.opacity = layer.opacity;
+  line.desaturation = layer.head_desaturation;
+  line.perspective = view.perspective;
+  line.mark = layer.mark;
+  line.whole = line.q0 + 0.5;
+  line.whole_rise = line.q1 - line.q0;
+  line.moving = layer.moving;
   const double full = layer.magnitude_range[1];
-  // The scale of the magnitudes of the segments, a power of two.
+  const double depth = 0.5 * (a.at[2] + b.at[2]);
+  // The scale of the magnitudes of the segments is a power of two.
   const double scale = from.magnitude_scale;
-  for (std::size_t v = 0; v + 1 < from.vertices(); ++v) {
-    if (from.magnitudes[v] < 0 || from.magnitudes[v] == Segments::not_drawn) continue;
-    const Joint a = joint_at(view, from, v);
-    const Joint b = joint_at(view, from, v + 1);
-    Ribbon line;
-    line.q0 = static_cast<double>(from.q[v]);
-    line.q1 = static_cast<double>(from.q[v + 1]);
-    if (!place_ends(view, a, b, line)) continue;
-    line.chained = true;
-    line.r1 = layer.r1;
-    line.r2 = layer.r2;
-    line.opacity = layer.opacity;
-    line.desaturation = layer.head_desaturation;
-    line.perspective = view.perspective;
-    line.mark = layer.mark;
-    line.whole = line.q0 + 0.5;
-    line.whole_rise = line.q1 - line.q0;
-    line.moving = layer.moving;
-    const double depth = 0.5 * (a.at[2] + b.at[2]);
-    const double magnitude = static_cast<double>(from.magnitudes[v]) / scale;
-    const double strong = fraction_of(magnitude, layer.magnitude_range[0], full);
-    const double far = fraction_of(depth, scene.depth_cue.near, scene.depth_cue.far);
-    const double lit = scene.light ? light::line_light(*scene.light, from.samples[v]) : 1;
-    const double dim =
-        lit * (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
-    double value = static_cast<double>(from.colors[v]);
-    if (layer.color_by == LineColor::magnitude) value /= scale;
-    line.color = scaled(color_at(layer, value, depth), dim);
-    if (layer.moving && !from.turns.empty()) {
-      set_dashes(from, v, layer.motion_cycles, line);
-    } else if (layer.moving) {
-      const double part = full > 0 ? std::min(magnitude / full, 1.0) : 1.0;
-      line.phase = static_cast<double>(from.phases[v]) + layer.motion_cycles * part;
-    }
-    kernels.ribbons.push_back(line);
+  const double magnitude = static_cast<double>(scaled_magnitude) / scale;
+  const double strong = fraction_of(magnitude, layer.magnitude_range[0], full);
+  const double far = fraction_of(depth, scene.depth_cue.near, scene.depth_cue.far);
+  const double lit = scene.light ? light::line_light(*scene.light, from.samples[vertex]) : 1;
+  const double dim =
+      lit * (1 - layer.magnitude_intensity * (1 - strong)) * (1 - scene.depth_cue.strength * far);
+  double value = static_cast<double>(from.colors[vertex]);
+  if (layer.color_by == LineColor::magnitude) value /= scale;
+  line.color = scaled(color_at(layer, value, depth), dim);
+  if (layer.moving && !from.turns.empty()) {
+    set_dashes(from, vertex, layer.motion_cycles, line);
+  } else if (layer.moving) {
+    const double part = full > 0 ? std::min(magnitude / full, 1.0) : 1.0;
+    line.phase = static_cast<double>(from.phases[vertex]) + layer.motion_cycles * part;
+  }
+  return line;
+}
+
+void list_chains(const Scene& scene, const View& view, const VectorLayer& layer, Kernels& kernels) {
+  for (std::size_t v = 0; v + 1 < layer.streamlets->vertices(); ++v) {
+    if (const auto line = make_segment(scene, view, layer, v)) kernels.ribbons.push_back(*line);
   }
 }
 

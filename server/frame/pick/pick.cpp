@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/engine/reference/body.hpp"
+#include "server/engine/reference/chains.hpp"
 #include "server/engine/reference/profile.hpp"
 #include "server/engine/reference/ray.hpp"
 #include "server/frame/pick/kernels_near.hpp"
@@ -35,6 +36,7 @@ struct Candidate {
   Vec place{};            // world units
   std::array<double, 2> at{};
   double depth = 0;  // of a line
+  double value = 0;  // of a line: the magnitude
   // Opacity that it adds to the pixel, and this times its depth.
   double weight = 0;
   double moment = 0;
@@ -59,6 +61,11 @@ std::array<double, 2> projected(const reference::View& view, const Vec& centre) 
   return {view.half_width + centre[0] / scale, view.half_height + centre[1] / scale};
 }
 
+// Lines that are followed through the field in place of straight ones through the samples.
+bool has_segments(const scene::Scene& scene) {
+  return scene.vector && scene.vector->streamlets != nullptr;
+}
+
 class PixelLight {
  public:
   PixelLight(const scene::Scene& scene, double x, double y)
@@ -70,9 +77,11 @@ class PixelLight {
   // False: cancelled.
   bool gather(const std::vector<reference::LayerGroup>& groups, const CancelToken& cancel) {
     for (const reference::LayerGroup& group : groups) {
+      if (group.lines == nullptr && group.media.empty()) continue;
       const auto visit = [&](const reference::KernelPosition& position) { add(group, position); };
       if (!visit_near(scene_, view_, group, ray_, cancel, visit)) return false;
     }
+    if (has_segments(scene_) && !gather_segments(cancel)) return false;
     if (scene_.body) {
       const auto body = reference::body_surface(*scene_.body, view_, ray_.x, ray_.y);
       if (body.opacity > 0) lines_.push_back({body.depth, body.opacity, 0, std::nullopt});
@@ -119,7 +128,7 @@ class PixelLight {
       out.medium = medium;
       out.sample = one.sample;
       out.place = one.place;
-      out.value = value_of(one, medium);
+      out.value = medium ? scene_.scalars[*medium].field->values[one.index] : one.value;
       out.share = most / (1 - transmittance_);
       out.depth = one.moment / one.weight;
       out.at = one.at;
@@ -163,12 +172,73 @@ class PixelLight {
     if (!line) return;
     const auto hit = reference::hit_ribbon(*line, ray_.x, ray_.y);
     if (hit.opacity <= 0) return;
-    one.is_line = true;
     one.at = {0.5 * (line->x0 + line->x1), 0.5 * (line->y0 + line->y1)};
+    one.value = magnitude_at(*one.group->lines->field, one.index);
+    keep_line(hit, one);
+  }
+
+  void keep_line(const reference::RibbonHit<double>& hit, Candidate one) {
+    one.is_line = true;
     one.depth = hit.depth;
     const double light = std::max({hit.color[0], hit.color[1], hit.color[2]});
     lines_.push_back({hit.depth, hit.opacity, hit.opacity * light, candidates_.size()});
     candidates_.push_back(one);
+  }
+
+  // The segments of curved lines that the ray meets; false: cancelled.
+  bool gather_segments(const CancelToken& cancel) {
+    const scene::VectorLayer& layer = *scene_.vector;
+    const trace::Segments& from = *layer.streamlets;
+    const double wide = (scene::outer_radius(layer) + 1) * view_.pixel;
+    // From the ray, to both sides of it along a plane of constant view depth, world units: a vertex
+    // lies within this of it if a point of its segment covers the pixel.
+    const double reach = from.longest * (1 + ray_.length);
+    for (std::size_t v = 0; v + 1 < from.vertices(); ++v) {
+      if (v % 65536 == 0 && cancel.cancelled()) return false;
+      if (from.magnitudes[v] < 0) continue;
+      if (candidates_.size() >= candidates_max) return true;
+      Vec from_eye{};
+      for (std::size_t a = 0; a < 3; ++a) {
+        from_eye.at(a) = static_cast<double>(from.places[v].at(a)) - view_.eye.at(a);
+      }
+      const double depth = reference::dot(from_eye, view_.forward);
+      const Vec aside =
+          reference::plus(reference::plus(from_eye, -1, ray_.origin), -depth, ray_.direction);
+      const double far = view_.perspective ? std::max(depth + from.longest, 0.0) : 1;
+      if (reference::length(aside) > reach + wide * far) continue;
+      add_segment(v);
+    }
+    return true;
+  }
+
+  void add_segment(std::size_t v) {
+    const scene::VectorLayer& layer = *scene_.vector;
+    const trace::Segments& from = *layer.streamlets;
+    const auto line = reference::make_segment(scene_, view_, layer, v);
+    if (!line) return;
+    const auto hit = reference::hit_ribbon(*line, ray_.x, ray_.y);
+    if (hit.opacity <= 0) return;
+    const double ux = line->x1 - line->x0;
+    const double uy = line->y1 - line->y0;
+    const double along = (ray_.x - line->x0) * ux + (ray_.y - line->y0) * uy;
+    const double part = std::clamp(along / std::max(ux * ux + uy * uy, 1e-12), 0.0, 1.0);
+    Candidate one;
+    one.index = from.samples[v];
+    const auto columns = static_cast<std::size_t>(scene_.lattice.dims[0]);
+    const auto rows = static_cast<std::size_t>(scene_.lattice.dims[1]);
+    one.sample = {static_cast<int>(one.index % columns),
+                  static_cast<int>(one.index / columns % rows),
+                  static_cast<int>(one.index / columns / rows)};
+    one.at = {line->x0 + part * ux, line->y0 + part * uy};
+    one.place = place_at(one.at, hit.depth);
+    one.value = static_cast<double>(from.magnitudes[v]) / from.magnitude_scale;
+    keep_line(hit, one);
+  }
+
+  // World units.
+  [[nodiscard]] Vec place_at(const std::array<double, 2>& at, double depth) const {
+    const PictureRay to = picture_ray(view_, at[0], at[1]);
+    return reference::plus(reference::plus(view_.eye, 1, to.origin), depth, to.direction);
   }
 
   // Lines that are combined by `or`, before the body and behind it: one of them, which gives the
@@ -253,13 +323,10 @@ class PixelLight {
     return out;
   }
 
-  [[nodiscard]] double value_of(const Candidate& one,
-                                const std::optional<std::size_t>& medium) const {
-    if (medium) return scene_.scalars[*medium].field->values[one.index];
+  [[nodiscard]] static double magnitude_at(const data::Volume& field, std::size_t index) {
     double square = 0;
-    const data::Volume& field = *one.group->lines->field;
     for (int c = 0; c < field.components; ++c) {
-      square += std::pow(static_cast<double>(field.component(c)[one.index]), 2);
+      square += std::pow(static_cast<double>(field.component(c)[index]), 2);
     }
     return std::sqrt(square);
   }
@@ -279,7 +346,10 @@ class PixelLight {
 
 Result<std::optional<Picked>> pick(const scene::Scene& scene, double x, double y,
                                    const CancelToken& cancel) {
-  const std::vector<reference::LayerGroup> groups = reference::group_layers(scene);
+  std::vector<reference::LayerGroup> groups = reference::group_layers(scene);
+  if (has_segments(scene)) {
+    for (reference::LayerGroup& group : groups) group.lines = nullptr;
+  }
   PixelLight light(scene, x, y);
   const bool gathered = light.gather(groups, cancel);
   if (light.is_full()) {

@@ -105,6 +105,33 @@ TEST_F(Picks, TheValueIsThatOfTheSampleAndItsStep) {
   EXPECT_NEAR(found["at"][1].get<double>(), static_cast<double>(most / width), 20);
 }
 
+// The straight lines through the samples are not drawn, and were reported nonetheless.
+TEST_F(Picks, OfTracedLinesOnlyThoseThatAreDrawnAreRead) {
+  const Json seeds = {{"seeds", {{"evenly", 12}, {"length", 0.3}}}};
+  for (const Json& trace : {seeds, Json::object()}) {
+    Json view = view_of_lines();
+    view["vector"] = {{"trace", trace}, {"magnitudeIntensity", 0}};
+    const std::vector<float> lit = opacities(view);
+    int read = 0;
+    int none = 0;
+    for (int y = 1; y < height; y += 6) {
+      for (int x = 1; x < width; x += 6) {
+        const float opacity = lit[static_cast<std::size_t>(y * width + x)];
+        if (opacity > 0 && opacity < 0.05F) continue;
+        const Json found = feature(view, x, y);
+        ASSERT_EQ(found.is_object(), opacity > 0) << trace << ' ' << x << ' ' << y;
+        ++(opacity > 0 ? read : none);
+        if (!found.is_object()) continue;
+        EXPECT_EQ(found["layer"], "lines");
+        EXPECT_NEAR(found["at"][0].get<double>(), x + 0.5, 2);
+        EXPECT_NEAR(found["at"][1].get<double>(), y + 0.5, 2);
+      }
+    }
+    EXPECT_GT(read, 10) << trace;
+    EXPECT_GT(none, 10) << trace;
+  }
+}
+
 // Also where the page cannot compute positions: on the globe and in a slice between two levels.
 TEST_F(Picks, MediaArePickedInEveryGeometry) {
   for (const Json& geometry : {Json::object(), Json{{"mapping", "sphere"}},

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -49,6 +52,38 @@ void add_lines(Scene& scene, const std::vector<std::pair<int, float>>& at, doubl
   scene.vector->opacity = opacity;
 }
 
+// Chains of straight segments, each of one magnitude, as drawn lines that were followed through a
+// field. The middle of a segment is nearest to the sample that `nearest` numbers.
+struct ChainOfTest {
+  std::vector<glm::dvec3> places;
+  float magnitude = 1;
+  std::uint32_t nearest = 0;
+};
+
+std::shared_ptr<const trace::Segments> segments_of(const std::vector<ChainOfTest>& chains) {
+  trace::Segments out;
+  for (const ChainOfTest& chain : chains) {
+    const std::size_t count = chain.places.size();
+    for (std::size_t n = 0; n < count; ++n) {
+      const glm::dvec3& at = chain.places[n];
+      const bool inner = n > 0 && n + 1 < count;
+      const glm::dvec3 way = inner ? glm::normalize(chain.places[n + 1] - at) +
+                                         glm::normalize(at - chain.places[n - 1])
+                                   : glm::dvec3(0);
+      out.places.push_back(
+          {static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)});
+      for (int c = 0; c < 3; ++c) out.tangents.at(c).push_back(static_cast<float>(way[c]));
+      out.q.push_back(static_cast<float>(n) / static_cast<float>(count - 1) - 0.5F);
+      out.magnitudes.push_back(n + 1 < count ? chain.magnitude : trace::Segments::none);
+      out.phases.push_back(0);
+      out.colors.push_back(chain.magnitude);
+      out.samples.push_back(chain.nearest);
+      if (n > 0) out.longest = std::max(out.longest, glm::length(at - chain.places[n - 1]));
+    }
+  }
+  return std::make_shared<const trace::Segments>(std::move(out));
+}
+
 std::optional<Picked> picked(const Scene& scene, double x, double y) {
   const auto found = pick(scene, x, y, {});
   EXPECT_TRUE(found);
@@ -91,6 +126,31 @@ TEST(Pick, WhatIsNotDrawnIsNotPicked) {
   add_lines(scene, {{2, 5.0F}, {6, 40.0F}}, 1);
   scene.vector->min_magnitude = 15;
   EXPECT_EQ(picked(scene, 49.5, 49.5)->value, 40);
+}
+
+// A line through the sample in the middle was followed 0.4 above it, 19.8 pixels of 2 / 99.
+TEST(Pick, LinesThatAreFollowedArePickedWhereTheyRun) {
+  Scene scene = front_view();
+  add_lines(scene, {{4, 5.0F}}, 0.75);
+  scene.vector->streamlets =
+      segments_of({{{{-0.5, 0, 0.4}, {-0.1, 0, 0.4}, {0.3, 0, 0.4}, {0.5, 0, 0.6}},
+                    7.5F,
+                    4 + 9 * (4 + 9 * 6)}});
+  EXPECT_FALSE(picked(scene, 49.5, 49.5));  // the straight line through the sample is not drawn
+  for (const double x : {37.5, 44.5, 49.5, 60.5}) {
+    const auto found = picked(scene, x, 49.5 - 20);
+    ASSERT_TRUE(found) << x;
+    EXPECT_FALSE(found->medium);
+    EXPECT_EQ(found->value, 7.5);
+    EXPECT_EQ(found->sample, (std::array{4, 4, 6}));
+    EXPECT_NEAR(found->share, 1, 1e-9);
+    EXPECT_NEAR(found->depth, 4, 1e-6);
+    EXPECT_NEAR(found->at[0], x, 1e-4);
+    EXPECT_NEAR(found->at[1], 49.5 - 19.8, 1e-4);
+    EXPECT_NEAR(found->place[0], 2.0 / 99 * (x - 49.5), 1e-5);
+    EXPECT_NEAR(found->place[2], 0.4, 1e-5);
+  }
+  EXPECT_FALSE(picked(scene, 37.5, 49.5 - 24));
 }
 
 // A line of opacity o behind a medium of opacity A has the share (1 - A) o of 1 - (1 - A)(1 - o).
@@ -232,6 +292,25 @@ void expect_strongest_everywhere(const Scene& scene) {
 }
 
 TEST(Pick, NoOtherKernelContributesMore) { expect_strongest_everywhere(test::cloudy_scene(8, 60)); }
+
+// Lines that wind through a medium, beside which the eye is close to some.
+TEST(Pick, NoOtherSegmentContributesMore) {
+  Scene scene = test::cloudy_scene(8, 60);
+  std::vector<ChainOfTest> chains;
+  for (int n = 0; n < 60; ++n) {
+    ChainOfTest chain;
+    chain.magnitude = 0.1F * static_cast<float>(n % 7 + 1);
+    const double radius = 0.1 + 0.015 * n;
+    for (int step = 0; step <= 12; ++step) {
+      const double turn = 0.5 * step + 1.7 * n;
+      chain.places.emplace_back(radius * std::cos(turn), radius * std::sin(turn),
+                                0.15 * step - 0.9 + 0.003 * n);
+    }
+    chains.push_back(std::move(chain));
+  }
+  scene.vector->streamlets = segments_of(chains);
+  expect_strongest_everywhere(scene);
+}
 
 TEST(Pick, NoOtherKernelOfACurvedLatticeContributesMore) {
   Scene scene = test::cloudy_scene(8, 60);
