@@ -126,7 +126,7 @@ std::string section_text(const Subject& subject, const protocol::PlaneView& plan
   const glm::dvec3 normal =
       glm::normalize(glm::dvec3(plane.normal[0], plane.normal[1], plane.normal[2]));
   const bool vertical = std::abs(normal.z) <= coordinate_rounding;
-  const std::string kind = vertical ? "vertical section" : "oblique section";
+  std::string kind = vertical ? "vertical section" : "oblique section";
   const bool bent = scene::is_bent(subject.completed.view().geometry);
   for (int a = 0; a < 3 && !bent; ++a) {
     if (std::abs(normal[a]) < 1 - coordinate_rounding) continue;
