@@ -296,6 +296,17 @@ QualityView read_quality(const Json& json, const std::string& pointer, Faults& f
 
 // --- writing ------------------------------------------------------------------------------------
 
+Json camera_to_json(const CameraView& camera) {
+  Json out{{"projection", nullptr},
+           {"eye", numbers_or_null(camera.eye)},
+           {"target", numbers_or_null(camera.target)},
+           {"up", numbers_to_json(camera.up)},
+           {"fovY", canonical_number(camera.fov_y)},
+           {"height", number_or_null(camera.height)}};
+  if (camera.projection) out["projection"] = name_of(*camera.projection, projection_names);
+  return out;
+}
+
 Json geometry_to_json(const GeometryView& geometry) {
   return Json{{"scale", numbers_to_json(geometry.scale)},
               {"vertical", name_of(geometry.vertical, vertical_names)},
@@ -407,13 +418,7 @@ Json view_to_json(const View& view) {
   return Json{{"dataset", view.dataset},
               {"step", view.step},
               {"difference", difference_to_json(view.difference)},
-              {"camera",
-               {{"projection", name_of(view.camera.projection, projection_names)},
-                {"eye", numbers_or_null(view.camera.eye)},
-                {"target", numbers_or_null(view.camera.target)},
-                {"up", numbers_to_json(view.camera.up)},
-                {"fovY", canonical_number(view.camera.fov_y)},
-                {"height", number_or_null(view.camera.height)}}},
+              {"camera", camera_to_json(view.camera)},
               {"image",
                {{"width", view.image.width},
                 {"height", view.image.height},

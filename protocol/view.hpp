@@ -30,9 +30,9 @@ enum class Detail { automatic, full };
 enum class MediumShading { scatter, gradient, none };
 
 struct CameraView {
-  Projection projection = Projection::perspective;
-  std::optional<Vec3> eye;     // world
-  std::optional<Vec3> target;  // world
+  std::optional<Projection> projection;  // default: orthographic where the eye faces a slice
+  std::optional<Vec3> eye;               // world
+  std::optional<Vec3> target;            // world
   Vec3 up{0, 0, 1};
   double fov_y = 35;             // degrees, perspective
   std::optional<double> height;  // world height of the picture at the target, orthographic

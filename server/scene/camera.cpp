@@ -61,6 +61,11 @@ void each_outline_point(const Lattice& lattice, const Visit& visit) {
   }
 }
 
+bool is_perspective(const protocol::CameraView& camera) {
+  return camera.projection.value_or(protocol::Projection::perspective) ==
+         protocol::Projection::perspective;
+}
+
 // The distance, height and shift that show the points, which may reach that much farther, with a
 // margin.
 class Frame {
@@ -245,7 +250,7 @@ FreePart free_part(const protocol::View& view, double above) {
 glm::dvec3 moved(const glm::dvec3& target, const FreePart& part, const glm::dvec3& up,
                  const protocol::View& view, Framing& framing) {
   framing.height /= part.share();
-  const bool perspective = view.camera.projection == protocol::Projection::perspective;
+  const bool perspective = is_perspective(view.camera);
   const double slope = std::tan(0.5 * view.camera.fov_y * radians_per_degree);
   const double height = perspective ? 2 * slope * framing.distance : framing.height;
   return target - 0.5 * (part.below - part.above) * height * up;
@@ -261,7 +266,7 @@ Whole place_box(const Lattice& lattice, const OrbitFrame& frame, const protocol:
                 double zoom, bool centred) {
   const FreePart part = free_part(view, 0);
   glm::dvec3 target = 0.5 * (lattice.box_min + lattice.box_max);
-  const bool perspective = view.camera.projection == protocol::Projection::perspective;
+  const bool perspective = is_perspective(view.camera);
   const Frame framed = framed_box(lattice, frame, target, part.fov_y, part.image);
   Framing framing = with_room(centred ? framed.centred(perspective) : framed.framing(), view);
   framing.distance = std::min(framing.distance / zoom, distance_max);
@@ -414,10 +419,15 @@ void face(const Face& plane, const Lattice& lattice, protocol::View& view) {
 
 void complete_camera(protocol::View& view, const Lattice& lattice) {
   protocol::CameraView& camera = view.camera;
-  if (camera.eye && camera.target && camera.height) return;
-  if (!camera.eye && !camera.target) {
-    if (const auto plane = face_of(view.geometry, lattice)) return face(*plane, lattice, view);
+  const bool placed = camera.eye || camera.target;
+  const auto plane = placed ? std::nullopt : face_of(view.geometry, lattice);
+  if (!camera.projection) {
+    // Ground and ticks lie before or behind a slice, so that perspective would displace them.
+    camera.projection =
+        plane ? protocol::Projection::orthographic : protocol::Projection::perspective;
   }
+  if (plane) return face(*plane, lattice, view);
+  if (camera.eye && camera.target && camera.height) return;
   const OrbitFrame frame =
       orbit_frame(front_azimuth(lattice), front_elevation(lattice, view.image));
   if (!camera.eye && !camera.target) {
@@ -438,7 +448,7 @@ void complete_camera(protocol::View& view, const Lattice& lattice) {
 Result<Camera> resolve_camera(const protocol::View& completed, const Lattice& lattice) {
   const protocol::CameraView& from = completed.camera;
   Camera camera;
-  camera.perspective = from.projection == protocol::Projection::perspective;
+  camera.perspective = is_perspective(from);
   camera.eye = to_glm(from.eye.value());
   const glm::dvec3 view_line = to_glm(from.target.value()) - camera.eye;
   const double distance = glm::length(view_line);

@@ -51,9 +51,9 @@ void orbit(protocol::View& view, const Lattice& lattice, double azimuth, double 
 // Fills in what the view does not state of its camera: it looks from front_azimuth() and
 // front_elevation() and shows the whole box in the middle of the picture. If the view states
 // neither eye nor target and shows a slice or plane, or data of one sample along one axis without a
-// height field, it looks along its normal, from the side
-// nearer to that, and shows the part in the box; `up` becomes north if it is parallel to the
-// normal.
+// height field, it looks along its normal, from the side nearer to that, in parallel projection
+// unless the view states another, and shows the part in the box; `up` becomes north if it is
+// parallel to the normal.
 void complete_camera(protocol::View& view, const Lattice& lattice);
 
 // The camera of a completed view. Errors: invalid with a pointer (eye equal to target; up parallel

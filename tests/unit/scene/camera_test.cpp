@@ -324,6 +324,50 @@ TEST(Camera, DefaultFacesTheSliceOrPlaneWithTheUsualMargin) {
   }
 }
 
+// Ground and ticks lie on the floor of the box, or at its other sides, not in the slice.
+TEST(Camera, DefaultShowsPointsBeforeAndBehindAFacedSliceAtItsPlaces) {
+  auto dataset = atmosphere();
+  const Lattice lattice = *place_lattice(dataset->info().grid, {});
+  for (const Shown& shown : shown_sections()) {
+    protocol::View view;
+    view.geometry = shown.geometry;
+    const auto full = complete(view, *dataset);
+    ASSERT_TRUE(full) << shown.name;
+    EXPECT_EQ(full->view().camera.projection, protocol::Projection::orthographic) << shown.name;
+    const glm::dvec3 depth = lattice.box_max.z * shown.forward;
+    for (const glm::dvec3& corner : {lattice.box_min, lattice.box_max}) {
+      const Pixel at = project(full->camera(), corner);
+      for (const glm::dvec3& other : {corner - depth, corner + depth}) {
+        const Pixel beyond = project(full->camera(), other);
+        EXPECT_NEAR(at.x, beyond.x, 1e-6) << shown.name;
+        EXPECT_NEAR(at.y, beyond.y, 1e-6) << shown.name;
+      }
+    }
+  }
+}
+
+TEST(Camera, AnotherViewIsInPerspectiveUnlessItStatesAProjection) {
+  auto dataset = atmosphere();
+  const auto projection_of = [&](const protocol::View& view) {
+    return complete(view, *dataset).value().view().camera.projection.value();
+  };
+  using protocol::Projection;
+  EXPECT_EQ(projection_of({}), Projection::perspective);
+  protocol::View slice;
+  slice.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 1};
+  protocol::View aside = slice;
+  aside.camera.eye = protocol::Vec3{0.3, -2, 1};
+  EXPECT_EQ(projection_of(aside), Projection::perspective);
+  protocol::View globe = slice;
+  globe.geometry.mapping = protocol::GeometryMapping::sphere;
+  EXPECT_EQ(projection_of(globe), Projection::perspective);
+  slice.camera.projection = Projection::perspective;
+  EXPECT_EQ(projection_of(slice), Projection::perspective);
+  protocol::View whole;
+  whole.camera.projection = Projection::orthographic;
+  EXPECT_EQ(projection_of(whole), Projection::orthographic);
+}
+
 TEST(Camera, DefaultFacesDataOfOneSampleAlongOneAxis) {
   const auto forward = [](const std::array<int, 3>& dims, protocol::GeometryView geometry) {
     auto dataset = sample_dataset("climate", dims);

@@ -43,7 +43,9 @@ export class CameraControl {
   setCamera(camera: Camera): void {
     const { eye, target, up, height, projection } = roundedCamera(camera);
     const patch: Patch = { eye, target, up, height };
-    if (projection !== this.model.view().camera?.projection) patch.projection = projection;
+    // A stated eye is in perspective by default, also where the server chose otherwise.
+    const stated = this.model.state.document.camera?.projection ?? "perspective";
+    if (projection !== stated) patch.projection = projection;
     this.host.change({ camera: patch });
   }
 
