@@ -164,18 +164,22 @@ protocol::Range height_range(const Lattice& lattice) {
 double magnitude_of_nearly_all(const data::Volume& volume) {
   constexpr double nearly_all = 0.98;  // of the samples
   constexpr double weak = 0.25;        // of the sum of the magnitudes
+  // One in a thousand of 2^15: lines with a stride hardly meet a place of so few, and one bad
+  // sample may exceed the sum of all others.
+  constexpr std::size_t few_samples = 32;
   std::vector<double> magnitudes;
-  double sum = 0;
-  for_some_samples(volume, std::nullopt, [&](std::size_t, double magnitude) {
-    magnitudes.push_back(magnitude);
-    sum += magnitude;
-  });
+  for_some_samples(volume, std::nullopt,
+                   [&](std::size_t, double magnitude) { magnitudes.push_back(magnitude); });
   std::sort(magnitudes.begin(), magnitudes.end());
-  // A flow may lie between the samples visited.
-  if (!(sum > 0)) return static_cast<double>(volume.range[1]);
+  // A flow may lie in a few of the samples visited, or between them.
+  if (magnitudes.empty() || !(magnitudes.back() > 0)) return static_cast<double>(volume.range[1]);
+  std::size_t summed = magnitudes.size() - std::min(few_samples, magnitudes.size());
+  if (summed == 0 || !(magnitudes[summed - 1] > 0)) summed = magnitudes.size();
+  double sum = 0;
+  for (std::size_t n = 0; n < summed; ++n) sum += magnitudes[n];
   double below = 0;
   std::size_t n = 0;
-  while (n + 1 < magnitudes.size() && below + magnitudes[n] < weak * sum) below += magnitudes[n++];
+  while (n + 1 < summed && below + magnitudes[n] < weak * sum) below += magnitudes[n++];
   const double most = static_cast<double>(magnitudes.size() - 1);
   return std::max(magnitudes[n], magnitudes[static_cast<std::size_t>(nearly_all * most)]);
 }

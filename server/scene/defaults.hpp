@@ -24,8 +24,8 @@ protocol::Range quantiles(const data::Volume& volume, double low, double high,
                           const std::optional<Slice>& slice = std::nullopt);
 
 // The magnitude that 98 % of the unmasked samples do not exceed, or, if that is greater, the one
-// below which a quarter of the sum of all magnitudes lies: of a flow that is nearly zero nearly
-// everywhere, the magnitude where there is a flow. From at most 2^15 samples.
+// below which a quarter of the sum of all magnitudes lies (of a flow in a small part of the box).
+// From at most 2^15 samples, the 32 greatest of which are not summed unless all others are 0.
 double magnitude_of_nearly_all(const data::Volume& volume);
 
 // [0, top], with top the magnitude of nearly all samples, so that lines of about 2 % reach their
