@@ -117,9 +117,10 @@ Curve gradient_ramp(double clear, const protocol::Range& range, const data::Volu
   return curve;
 }
 
-double two_digits(double value) {
+// Down to two digits, those of whole grains not at all.
+double two_digits_below(double value) {
   const double grain = std::pow(10.0, std::floor(std::log10(value)) - 1);
-  return std::round(value / grain) * grain;
+  return std::floor(value / grain * (1 + 1e-12)) * grain;
 }
 
 }  // namespace
@@ -154,9 +155,9 @@ Curve transparent_extinction(const ScalarStyle& style, const protocol::Range& ra
   Curve curve = style.generic
                     ? gradient_ramp(clear_end(style, range, volume), range, volume, lattice)
                     : ramp(range[0] + style.clear_below * (range[1] - range[0]), range);
-  const double most = nice_above(style.opacity / shortest);
+  const double most = two_digits_below(style.opacity / shortest);
   const double seen = mean_extinction(curve, volume, lattice) * mean_chord(lattice);
-  const double top = seen * most > depth_most ? two_digits(depth_most / seen) : most;
+  const double top = seen * most > depth_most ? two_digits_below(depth_most / seen) : most;
   for (auto& [value, extinction] : curve) extinction *= top;
   return curve;
 }

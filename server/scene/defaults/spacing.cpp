@@ -113,8 +113,10 @@ LineDensity line_density(const LineSpacing& spacing, const Lattice& lattice,
 double spaced_length(double strides, int stride, const Lattice& lattice,
                      const std::optional<Slice>& slice) {
   const double length = strides * cell_of(lattice, slice) * stride;
-  const double grain = std::pow(10.0, std::floor(std::log10(length)) - 1.0);
-  return std::clamp(std::round(length / grain) * grain, 1e-9, protocol::limits::line_length_max);
+  // Lengths of whole grains remain as they are.
+  const double grain = std::pow(10.0, std::floor(std::log10(length)) - 2.0);
+  const double rounded = std::floor(length / grain * (1 + 1e-12)) * grain;
+  return std::clamp(rounded, 1e-9, protocol::limits::line_length_max);
 }
 
 LineSpacing default_spacing(const Lattice& lattice, const std::optional<Slice>& slice) {

@@ -33,7 +33,7 @@ LineDensity line_density(const LineSpacing& spacing, const Lattice& lattice,
 // both ends of shorter ones.
 LineSpacing default_spacing(const Lattice& lattice, const std::optional<Slice>& slice);
 
-// A length in strides, rounded to two digits; for a slice those of the axes in its plane.
+// A length in strides, rounded down to three digits; for a slice those of the axes in its plane.
 double spaced_length(double strides, int stride, const Lattice& lattice,
                      const std::optional<Slice>& slice);
 
