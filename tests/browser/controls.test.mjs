@@ -75,7 +75,7 @@ test("every number is sent under its key and kept in the link", () =>
 const visible = [
   ["Winds", "length", 0.1],
   ["Winds", "opacity", 0.2],
-  ["Winds", "sampling stride", 3],
+  ["Winds", "sampling stride", 5],
   ["Line shape", "edge radius r2", 4],
   ["Line shape", "head whitening", 0],
   ["Kernels and jitter", "jitter of centre", 0],

@@ -121,6 +121,13 @@ test("undo of the camera preserves the played step, and a resize adds no entry",
 
 // --- the value under the cursor --------------------------------------------------------------
 
+// So that there is one at every place of the picture.
+async function drawEveryLine(page) {
+  await unfold(page, "Winds");
+  await type(page, "sampling stride", 1);
+  await finalPicture(page);
+}
+
 const probeText = /^([\d.]+) °([EW]), ([\d.]+) °([NS])(?: · level|, level) ([\d.]+) hPa$/;
 
 // The server's probe at the place that the text names.
@@ -139,6 +146,7 @@ async function probed(place) {
 
 test("the value under the cursor is that of the sample which the picture shows there", () =>
   withPage(async (page) => {
+    await drawEveryLine(page);
     const hover = page.locator("#hover");
     const box = await pictureBox(page);
     const answered = page.waitForResponse(/\/picks\?/);
@@ -165,6 +173,7 @@ test("the value under the cursor is that of the sample which the picture shows t
 
 test("alt + click goes to the sample that is seen, and a button to the maximum", () =>
   withPage(async (page) => {
+    await drawEveryLine(page);
     const box = await pictureBox(page);
     const answered = page.waitForResponse(/\/picks\?/);
     await page.locator("#picture").click({
@@ -238,6 +247,7 @@ test("by choice the value under the cursor is the one in the probe's level", () 
 
 test("no hover requests during a drag or when switched off", () =>
   withPage(async (page) => {
+    await drawEveryLine(page);
     const hover = page.locator("#hover");
     const box = await pictureBox(page);
     const at = [box.x + 0.5 * box.width, box.y + 0.55 * box.height];
