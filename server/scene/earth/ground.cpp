@@ -116,17 +116,18 @@ bool is_below_sea(const data::Axis& vertical) {
          std::min(heights.front(), heights.back()) < 0;
 }
 
-// Beneath data of the Earth, seen from above: a map below one layer, or below levels of the
-// atmosphere. Coasts at the bottom of a sea would be at a wrong place, and an eye below the ground
-// would see nothing else.
-bool is_ground_by_default(const protocol::GeometryView& geometry, const Camera& camera,
-                          const Placed& placed) {
+// Beneath data of the Earth, seen from above: a map below one layer, below levels of the
+// atmosphere, and below lines in a sea. A medium alone shows where land is by its gaps, beside
+// which coasts at the floor would be others. An eye below the ground would see nothing else.
+bool is_ground_by_default(const protocol::View& view, const Camera& camera, const Placed& placed) {
   const Lattice& lattice = placed.lattice;
+  const protocol::GeometryView& geometry = view.geometry;
   const bool below = camera.perspective ? camera.eye.z < lattice.box_min.z : camera.forward.z > 0;
   if (below || !map_of(geometry, placed)) return false;
   const bool one_layer =
       lattice.dims[2] == 1 || (geometry.slice && geometry.slice->axis == protocol::GridAxis::z);
-  return one_layer || !is_below_sea(placed.grid.axes[2]);
+  const bool lines = view.vector.field.kind == protocol::FieldChoice::Kind::named;
+  return one_layer || lines || !is_below_sea(placed.grid.axes[2]);
 }
 
 }  // namespace
@@ -160,8 +161,7 @@ Result<std::optional<Body>> make_body(const protocol::View& view, const Camera& 
   const bool sphere = view.geometry.mapping == GeometryMapping::sphere;
   const bool asked = view.ground.show == protocol::GroundShow::on;
   const bool automatic = view.ground.show == protocol::GroundShow::automatic;
-  const bool shown =
-      asked || (automatic && (sphere || is_ground_by_default(view.geometry, camera, placed)));
+  const bool shown = asked || (automatic && (sphere || is_ground_by_default(view, camera, placed)));
   if (!shown) return std::optional<Body>();
   Body body;
   // Not by default: moving frames cannot afford its rays.

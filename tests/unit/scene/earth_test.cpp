@@ -129,26 +129,29 @@ TEST(Earth, LiesBelowTheAtmosphereByDefault) {
   EXPECT_FALSE(has_default_ground(along_degrees(), off));
 }
 
-// Coasts at the floor of a sea would be at a wrong place; those below one layer are not.
-TEST(Earth, IsNoFloorOfASeaByDefault) {
+// Lines alone do not tell where the land is; a medium does, above a floor whose coasts lie aside.
+TEST(Earth, LiesBelowASeaByDefaultWhereLinesAreDrawn) {
   data::Grid depths = along_degrees();
   depths.axes[2].kind = data::AxisKind::depth;
-  EXPECT_FALSE(has_default_ground(depths));
-  View layer;
+  data::Grid terms = along_degrees();
+  terms.axes[2].standard_name = "ocean_s_coordinate_g2";
+  data::Grid negative = along_degrees();
+  negative.axes[2].kind = data::AxisKind::height;
+  for (double& height : negative.axes[2].coordinates) height -= 1e6;
+  View without;
+  without.vector.field = {protocol::FieldChoice::Kind::none, ""};
+  for (const data::Grid& sea : {depths, terms, negative}) {
+    EXPECT_TRUE(has_default_ground(sea));
+    EXPECT_FALSE(has_default_ground(sea, without));
+  }
+  EXPECT_TRUE(has_default_ground(along_degrees(), without));
+  View layer = without;
   layer.geometry.slice = protocol::SliceView{protocol::GridAxis::z, 0};
   EXPECT_TRUE(has_default_ground(depths, layer));
   layer.geometry.slice->axis = protocol::GridAxis::x;
   EXPECT_FALSE(has_default_ground(depths, layer));
-  data::Grid surface = depths;
-  surface.axes[2].coordinates = {depths.axes[2].coordinates.front()};
-  EXPECT_TRUE(has_default_ground(surface));
-  data::Grid terms = along_degrees();
-  terms.axes[2].standard_name = "ocean_s_coordinate_g2";
-  EXPECT_FALSE(has_default_ground(terms));
-  data::Grid negative = along_degrees();
-  negative.axes[2].kind = data::AxisKind::height;
-  for (double& height : negative.axes[2].coordinates) height -= 1e6;
-  EXPECT_FALSE(has_default_ground(negative));
+  depths.axes[2].coordinates = {depths.axes[2].coordinates.front()};
+  EXPECT_TRUE(has_default_ground(depths, without));
 }
 
 // It would hide all data.
