@@ -19,7 +19,7 @@ import {
 import { patchAt, valueAt } from "../src/panels/panel_kit";
 import type { Dataset, View } from "../src/wire/protocol";
 import { problemText } from "../src/wire/requests";
-import { axisTicks, formatBytes, formatNumber, linearTicks, niceTicks } from "../src/base/ticks";
+import { formatBytes, formatNumber, linearTicks, niceTicks } from "../src/base/ticks";
 import { readableTime } from "../src/base/time_text";
 import { pictureSize } from "../src/viewport/viewport";
 import type { Camera } from "../src/view/camera";
@@ -171,14 +171,6 @@ test("height labels are levels of the vertical axis at their positions", () => {
   assert.ok(Math.abs(at["1000"]! - (0.24 - 0.12) / 0.39) < 1e-9);
   assert.ok(Math.abs(at["500"]! - 0.24 / 0.39) < 1e-9);
   assert.ok(at["1000"]! < at["500"]!, "low pressure is at the top");
-});
-
-test("round levels are preferred where space is short", () => {
-  const ticks = axisTicks([0, 1], [0.5, 0.52, 0.54], [510, 500, 490], 0.2);
-  assert.deepEqual(
-    ticks.map((tick) => tick.text),
-    ["500"],
-  );
 });
 
 test("stretching the volume moves the levels along", () => {

@@ -1,7 +1,7 @@
 // What the page writes instead of world units, and numbers and units as people write them.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { axisTicks, linearTicks, stepNumber } from "../src/base/ticks";
+import { linearTicks, stepNumber, unevenTicks } from "../src/base/ticks";
 import { colorScale } from "../src/view/color_scale";
 import { beyondEnds, legendEntries } from "../src/view/legend_entries";
 import { unitText } from "../src/view/unit_text";
@@ -39,8 +39,26 @@ test("ticks have the decimals of their step", () => {
   assert.equal(stepNumber(0.12345, 0.01), "0.12");
   assert.equal(stepNumber(2.5e7, 5e6), "2.5e7");
   assert.deepEqual(
-    axisTicks([0, 1], [0, 0.5, 1], [101301, 101302, 101303]).map(({ text }) => text),
-    ["101301", "101302", "101303"],
+    unevenTicks([101301, 101303], 0.17, (value) => (value - 101301) / 2).map(({ text }) => text),
+    ["101301", "101301.5", "101302", "101302.5", "101303"],
+  );
+});
+
+test("round levels are preferred where space is short", () => {
+  const textsOf = (range: [number, number], place: (value: number) => number) =>
+    unevenTicks(range, 0.17, place).map(({ text }) => text);
+  // As the server's legend writes levels of 10 to 1000 hPa that are placed by their logarithm.
+  assert.deepEqual(
+    textsOf([1000, 10], (value) => 0.205 + 0.1716 * Math.log(1000 / value)),
+    ["50", "200", "1000"],
+  );
+  assert.deepEqual(
+    textsOf([0, 3], (value) => value / 3),
+    ["0", "1", "2", "3"],
+  );
+  assert.deepEqual(
+    textsOf([5, 5], () => 0.5),
+    [],
   );
 });
 

@@ -88,35 +88,37 @@ export function compassTicks(range: readonly [number, number]): LegendTick[] {
   }));
 }
 
-// Rank of a number's roundness: 1, 10, 100 before 5, then 2, then all others.
-function roughness(value: number): number {
-  if (value === 0) return 0;
-  const mantissa = Number(
-    (Math.abs(value) / 10 ** Math.floor(Math.log10(Math.abs(value)))).toFixed(6),
-  );
-  const order = [1, 5, 2].indexOf(mantissa);
-  return order < 0 ? 3 : order;
+// The step of 1, 2 or 5 times a power of ten that divides a positive range into at most `most`
+// parts.
+function roundStep(range: number, most: number): number {
+  const rough = range / most;
+  const power = 10 ** Math.floor(Math.log10(rough) + 1e-9);
+  return [1, 2, 5, 10].map((digit) => digit * power).find((s) => s >= rough * (1 - 1e-9))!;
 }
 
-// Ticks of a strip over world heights, labelled with the coordinates of the vertical axis: samples
-// within the range, the roundest first, no two closer than `gap`.
-export function axisTicks(
-  range: readonly [number, number],
-  places: number[],
-  coordinates: number[],
-  gap = 0.16,
+// Round values within a range, in either order, at the positions that `place` gives them, the
+// roundest first, none nearer than `gap` to another: for axes that are not even, as the server's
+// legend has them. In order of value.
+export function unevenTicks(
+  [one, other]: readonly [number, number],
+  gap: number,
+  place: (value: number) => number,
 ): LegendTick[] {
-  const [low, high] = range;
-  const samples = coordinates
-    .map((value, n) => ({ value, at: (places[n]! - low) / (high - low) }))
-    .filter(({ at }) => at >= -1e-6 && at <= 1 + 1e-6)
-    .sort((a, b) => roughness(a.value) - roughness(b.value));
-  const chosen: { value: number; at: number }[] = [];
-  for (const sample of samples) {
-    if (chosen.some(({ at }) => Math.abs(at - sample.at) < gap)) continue;
-    chosen.push(sample);
+  const [least, most] = [Math.min(one, other), Math.max(one, other)];
+  // Over a wide ratio, a value of few digits is rounder: 300 before 320.
+  const multipleMost = least > 0 && most > 3 * least ? 10 : Infinity;
+  const found: (LegendTick & { value: number })[] = [];
+  const finest = 100; // parts
+  for (let parts = 1; parts <= finest && most > least; parts *= 2) {
+    const step = roundStep(most - least, parts);
+    const first = Math.ceil(least / step - 1e-9);
+    for (let n = first; n <= first + parts && n <= multipleMost; n++) {
+      const value = Number((n * step).toPrecision(12));
+      if (value > most + 1e-9 * step) break;
+      const at = place(value);
+      if (!Number.isFinite(at) || found.some((tick) => Math.abs(tick.at - at) < gap)) continue;
+      found.push({ value, at, text: stepNumber(value, step) });
+    }
   }
-  chosen.sort((a, b) => a.at - b.at);
-  const texts = distinctNumbers(chosen.map(({ value }) => value));
-  return chosen.map(({ at }, n) => ({ at, text: texts[n]! }));
+  return found.sort((a, b) => a.value - b.value).map(({ at, text }) => ({ at, text }));
 }

@@ -1,10 +1,18 @@
 // Legend of a drawn view: title, unit, range and ticks of each colour strip.
 // Pure: (complete view, dataset) -> entries.
 import type { Dataset, Field, ScalarView, SurfaceView, View } from "../wire/protocol";
-import { axisTicks, compassTicks, formatNumber, linearTicks, type LegendTick } from "../base/ticks";
+import {
+  compassTicks,
+  formatNumber,
+  linearTicks,
+  unevenTicks,
+  type LegendTick,
+} from "../base/ticks";
 import { clamp } from "../base/values";
 import { sectionOfView, sectionText } from "./section_text";
 import { unitText } from "./unit_text";
+
+type Axis = Dataset["axes"]["z"];
 
 export interface LegendEntry {
   kind: "lines" | "medium" | "surface";
@@ -23,11 +31,11 @@ export interface LegendEntry {
 const fieldNamed = (dataset: Dataset, name: string): Field | undefined =>
   dataset.fields.find((field) => field.name === name);
 
-const titleMax = 30; // characters; longer titles do not fit over a strip
+const titleMax = 40; // characters, as in the server's legend
 
 export function fieldTitle(field: Field | undefined, name: string): string {
-  const text = field?.longName ? field.longName : name.replaceAll("_", " ");
-  return text.length > titleMax ? name : text;
+  const longName = field?.longName ?? "";
+  return longName === "" || longName.length > titleMax ? name.replaceAll("_", " ") : longName;
 }
 
 // World heights of the samples under a view's geometry; null unless the geometry only stretches the
@@ -42,21 +50,39 @@ export function sampleHeights(dataset: Dataset, view: View): number[] | null {
   return dataset.axes.z.world.map((z) => z * factor);
 }
 
-const verticalTitles: Record<string, string> = {
-  pressure: "pressure level",
-  height: "height",
-  depth: "depth",
-  level: "level",
-};
+// Interpolates `to` at x between neighbours of `from`, which ascends or descends; linear beyond.
+function between(from: number[], to: number[], x: number): number {
+  const sign = Math.sign(from.at(-1)! - from[0]!);
+  const after = from.findIndex((at, n) => n > 0 && sign * at > sign * x);
+  const n = after < 0 ? from.length - 1 : after;
+  return to[n - 1]! + ((to[n]! - to[n - 1]!) * (x - from[n - 1]!)) / (from[n]! - from[n - 1]!);
+}
+
+// Ticks of a strip over world heights at round coordinates of the vertical axis, only of the data:
+// beyond them the colours have no value. heights: of the samples.
+function heightTicks(range: [number, number], heights: number[], axis: Axis): LegendTick[] {
+  if (heights.length < 2) return [];
+  const byLog = axis.kind === "pressure" && axis.coordinates.every((value) => value > 0);
+  const values = byLog ? axis.coordinates.map(Math.log) : axis.coordinates;
+  const valueAt = (height: number): number => {
+    const value = between(heights, values, clamp(height, heights[0]!, heights.at(-1)!));
+    return byLog ? Math.exp(value) : value;
+  };
+  const place = (value: number): number =>
+    (between(values, heights, byLog ? Math.log(value) : value) - range[0]) / (range[1] - range[0]);
+  const gap = 0.17;
+  return unevenTicks([valueAt(range[0]), valueAt(range[1])], gap, place);
+}
 
 function heightEntry(dataset: Dataset, view: View, range: [number, number]) {
   const axis = dataset.axes.z;
   const heights = sampleHeights(dataset, view);
-  const ticks = heights === null ? [] : axisTicks(range, heights, axis.coordinates);
+  const ticks = heights === null ? [] : heightTicks(range, heights, axis);
   if (ticks.length < 2) {
     return { what: "height", units: "", ticks: [], note: endsText(range, "low", "high") };
   }
-  const what = verticalTitles[axis.kind] ?? axis.name;
+  const isNamed = axis.kind === "pressure" || axis.kind === "height" || axis.kind === "depth";
+  const what = isNamed ? axis.kind : axis.name.replaceAll("_", " ");
   return { what, units: unitText(axis.units), ticks, note: "" };
 }
 

@@ -218,7 +218,8 @@ export const presetsOf = (dataset: Dataset, aspect: number): Preset[] => [
     key: "figure",
     title: "Figure",
     about: "With box, axes, legend and title, for a paper",
-    view: { annotations: figure },
+    // Colours that can be read on the strip, as with --figure of the command line.
+    view: { annotations: figure, vector: { color: { trueColors: true } } },
   },
 ];
 

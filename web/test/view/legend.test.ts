@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { legendEntries } from "../../src/view/legend_entries";
-import type { View } from "../../src/wire/protocol";
+import type { Dataset, View } from "../../src/wire/protocol";
 import { described } from "../page";
 
 test("the legend names the end of a line that is ahead", () => {
@@ -88,4 +88,20 @@ test("the legend says that the values are differences, without the range of the 
   const difference = entry({ difference: { step: 0 } });
   assert.equal(difference.title, "difference of wind: magnitude");
   assert.deepEqual(difference.beyond, [false, false]);
+});
+
+test("the legend has the words of the server's legend", () => {
+  const dataset = described("gcm", { fields: ["wind", "cloud_cover"] });
+  const titles = (longName: string, kind: Dataset["axes"]["z"]["kind"]) => {
+    const fields = dataset.fields.map((field) => ({ ...field, longName }));
+    const z = { ...dataset.axes.z, kind };
+    return legendEntries({ ...dataset, fields, axes: { ...dataset.axes, z } } as Dataset, {
+      vector: { field: "wind", color: { by: "worldZ", range: [-1, 1] } },
+      scalars: [{ field: "cloud_cover" }],
+    }).map(({ title }) => title);
+  };
+  const [lines, cloud] = titles("percent cloudiness as a fraction", "height");
+  assert.deepEqual([lines, cloud], ["wind: height", "percent cloudiness as a fraction"]);
+  assert.equal(titles("", "depth")[0], "wind: depth");
+  assert.equal(titles("a name of more than forty characters, cut", "height")[1], "cloud cover");
 });

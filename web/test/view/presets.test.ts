@@ -135,3 +135,7 @@ test("only a view that the server refuses is given up", () => {
   }
   assert.equal(isRefusedView(new TypeError("network")), false);
 });
+
+test("a figure has the colours of its legend, as one of the command line", () => {
+  assert.equal(viewOf(storm(40), "figure").vector?.color?.trueColors, true);
+});
