@@ -1,5 +1,6 @@
 // Measurements and jobs -> JSON; dataset request -> its path.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -165,14 +166,16 @@ std::string encode_range(const RangeDescription& range) {
 std::string encode_pick(const std::optional<PickedFeature>& feature) {
   Json out{{"feature", nullptr}};
   if (feature) {
-    out["feature"] = {{"layer", feature->is_line ? "lines" : "medium"},
+    constexpr std::array<const char*, 3> layers{"lines", "medium", "surface"};
+    out["feature"] = {{"layer", layers.at(static_cast<std::size_t>(feature->layer))},
                       {"field", feature->field},
-                      {"value", canonical_number(feature->value)},
+                      {"value", number_or_null(feature->value)},
                       {"units", feature->units},
                       {"position", position_json(feature->position)},
                       {"share", canonical_number(feature->share)},
                       {"depth", canonical_number(feature->depth)},
                       {"at", numbers_json({feature->at[0], feature->at[1]})}};
+    if (feature->surface) out["feature"]["surface"] = *feature->surface;
   }
   return dump(out);
 }

@@ -67,11 +67,15 @@ struct RangeDescription {
   std::optional<std::array<PositionDescription, 2>> places;
 };
 
-// The sample that contributes most to a pixel.
+// A line, a part of a medium or a surface.
+enum class PickedLayer { lines, medium, surface };
+
+// What contributes most to a pixel.
 struct PickedFeature {
-  bool is_line = false;  // otherwise of a medium
+  PickedLayer layer = PickedLayer::lines;
+  std::optional<int> surface;  // its number in /surfaces of the view
   std::string field;
-  double value = 0;  // of a vector the magnitude
+  std::optional<double> value;  // of a vector the magnitude; empty: masked there
   std::string units;
   PositionDescription position;
   double share = 0;            // of the pixel's opacity

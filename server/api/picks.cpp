@@ -1,4 +1,4 @@
-// Picks: a posted view and a pixel of its picture -> the sample that contributes most to it. Draws
+// Picks: a posted view and a pixel of its picture -> what contributes most to it. Draws
 // nothing; the view is completed and its scene built as for a picture.
 #include <cmath>
 #include <cstddef>
@@ -19,6 +19,7 @@
 #include "server/scene/build.hpp"
 #include "server/scene/completed_view.hpp"
 #include "server/scene/section.hpp"
+#include "server/scene/surfaces/make_surfaces.hpp"
 
 namespace windsplat::api {
 namespace {
@@ -106,6 +107,39 @@ std::string field_of(const scene::Scene& scene, const protocol::View& completed,
   return "";
 }
 
+// Numbers count the surfaces of a scene, which are those of the view that are seen.
+std::size_t surface_of(const protocol::View& view, std::size_t shown) {
+  std::size_t n = 0;
+  for (; n < view.surfaces.size(); ++n) {
+    if (scene::is_seen(view.surfaces[n]) && shown-- == 0) break;
+  }
+  return n;
+}
+
+// The field that colours the surface; of one colour, the field that is constant on it.
+void describe_surface(const frame::Picked& found, const protocol::View& view,
+                      protocol::PickedFeature& out) {
+  const std::size_t number = surface_of(view, *found.surface);
+  const protocol::SurfaceView& surface = view.surfaces.at(number);
+  out.layer = protocol::PickedLayer::surface;
+  out.surface = static_cast<int>(number);
+  out.field = scene::color_field_of(surface);
+  if (out.field.empty()) {
+    out.field = surface.field;
+    out.value = surface.isovalue;
+  } else if (!std::isnan(found.value)) {
+    out.value = found.value;
+  }
+}
+
+void describe_layer(const frame::Picked& found, const scene::Scene& scene,
+                    const protocol::View& view, protocol::PickedFeature& out) {
+  if (found.surface) return describe_surface(found, view, out);
+  out.layer = found.medium ? protocol::PickedLayer::medium : protocol::PickedLayer::lines;
+  out.field = found.medium ? field_of(scene, view, *found.medium) : view.vector.field.name;
+  out.value = found.value;
+}
+
 using Feature = std::optional<protocol::PickedFeature>;
 
 Result<Feature> feature_of(const PickRequest& asked, data::Dataset& dataset,
@@ -122,12 +156,10 @@ Result<Feature> feature_of(const PickRequest& asked, data::Dataset& dataset,
   if (!*picked) return Feature();
   const frame::Picked& found = **picked;
   protocol::PickedFeature out;
-  out.is_line = !found.medium;
   const protocol::View& view = exact->view();
-  out.field = found.medium ? field_of(*scene, view, *found.medium) : view.vector.field.name;
-  out.value = found.value;
+  describe_layer(found, *scene, view, out);
   if (const data::FieldInfo* field = dataset.info().find(out.field)) out.units = field->units;
-  out.position.index = protocol::is_section(view.geometry)
+  out.position.index = found.surface || protocol::is_section(view.geometry)
                            ? nearest_placed(exact->lattice(), found.place)
                            : found.sample;
   const scene::Lattice& lattice = exact->lattice();

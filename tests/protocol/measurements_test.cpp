@@ -81,7 +81,7 @@ TEST(Measurements, PickHasItsShape) {
   expect_shape("pick", encode_pick(std::nullopt));
   EXPECT_EQ(Json::parse(encode_pick(std::nullopt)), (Json{{"feature", nullptr}}));
   PickedFeature feature;
-  feature.is_line = true;
+  feature.layer = PickedLayer::lines;
   feature.field = "wind";
   feature.value = 57.25;
   feature.units = "m/s";
@@ -95,8 +95,17 @@ TEST(Measurements, PickHasItsShape) {
   EXPECT_EQ(told["value"], 57.25);
   EXPECT_EQ(told["at"], Json({120.5, 80}));
   EXPECT_EQ(told["position"]["index"]["z"], 2);
-  feature.is_line = false;
+  EXPECT_FALSE(told.contains("surface"));
+  feature.layer = PickedLayer::medium;
   EXPECT_EQ(Json::parse(encode_pick(feature))["feature"]["layer"], "medium");
+  feature.layer = PickedLayer::surface;
+  feature.surface = 2;
+  feature.value.reset();
+  expect_shape("pick", encode_pick(feature));
+  const Json masked = Json::parse(encode_pick(feature))["feature"];
+  EXPECT_EQ(masked["layer"], "surface");
+  EXPECT_EQ(masked["surface"], 2);
+  EXPECT_TRUE(masked["value"].is_null());
 }
 
 TEST(Measurements, ForecastHasItsShape) {

@@ -50,6 +50,9 @@ test("the text has value, unit and place, and the share where it is small", () =
   ]);
   const thin = { ...feature, field: "cloud", value: 0.25, units: "1", share: 0.034 };
   assert.equal(featureLines(grid, thin)[0], "cloud 0.25 · 3.4 % of this point");
+  const section: Feature = { ...feature, layer: "surface", field: "ta", value: 251.2, units: "K" };
+  assert.equal(featureLines(grid, section)[0], "ta 251.2 K");
+  assert.equal(featureLines(grid, { ...section, value: null })[0], "ta masked");
 });
 
 test("a pick posts the view with the pixel; null is an answer, anything else none", async () => {

@@ -1,4 +1,4 @@
-// Lines and splats on the ray of a pixel -> their shares of its opacity -> the largest.
+// Lines, splats and surfaces on the ray of a pixel -> their shares of its opacity -> the largest.
 #include "server/frame/pick/pick.hpp"
 
 #include <algorithm>
@@ -12,6 +12,7 @@
 #include "server/engine/reference/profile.hpp"
 #include "server/engine/reference/ray.hpp"
 #include "server/frame/pick/kernels_near.hpp"
+#include "server/frame/pick/surfaces_near.hpp"
 #include "server/frame/ray_kernels.hpp"
 
 namespace windsplat::frame {
@@ -27,16 +28,19 @@ constexpr int pieces_each = 8;
 // Samples that may meet the pixel, about 150 bytes each.
 constexpr std::size_t candidates_max = std::size_t{1} << 22U;
 
-// A line or a splat on the ray.
+enum class Kind { line, splat, surface };
+
+// What the ray meets.
 struct Candidate {
-  const reference::LayerGroup* group = nullptr;
-  bool is_line = false;
+  const reference::LayerGroup* group = nullptr;  // of a splat or a straight line
+  Kind kind = Kind::splat;
+  std::size_t surface = 0;
   std::array<int, 3> sample{};
   std::size_t index = 0;  // of the sample in a field
   Vec place{};            // world units
   std::array<double, 2> at{};
-  double depth = 0;  // of a line
-  double value = 0;  // of a line: the magnitude
+  double depth = 0;  // of a line or a surface
+  double value = 0;  // of a line the magnitude
   // Opacity that it adds to the pixel, and this times its depth.
   double weight = 0;
   double moment = 0;
@@ -47,6 +51,7 @@ struct LineOnRay {
   double opacity = 0;
   double light = 0;                      // its brightest channel, premultiplied
   std::optional<std::size_t> candidate;  // empty: the body
+  bool solid = false;                    // the body or a surface
 };
 
 struct SplatStretch {
@@ -64,6 +69,14 @@ std::array<double, 2> projected(const reference::View& view, const Vec& centre) 
 // Lines that are followed through the field in place of straight ones through the samples.
 bool has_segments(const scene::Scene& scene) {
   return scene.vector && scene.vector->streamlets != nullptr;
+}
+
+double magnitude_at(const data::Volume& field, std::size_t index) {
+  double square = 0;
+  for (int c = 0; c < field.components; ++c) {
+    square += std::pow(static_cast<double>(field.component(c)[index]), 2);
+  }
+  return std::sqrt(square);
 }
 
 class PixelLight {
@@ -84,8 +97,9 @@ class PixelLight {
     if (has_segments(scene_) && !gather_segments(cancel)) return false;
     if (scene_.body) {
       const auto body = reference::body_surface(*scene_.body, view_, ray_.x, ray_.y);
-      if (body.opacity > 0) lines_.push_back({body.depth, body.opacity, 0, std::nullopt});
+      if (body.opacity > 0) lines_.push_back({body.depth, body.opacity, 0, std::nullopt, true});
     }
+    if (!gather_surfaces(cancel)) return false;
     if (scene_.vector && scene_.vector->combine_or) keep_strongest();
     std::stable_sort(lines_.begin(), lines_.end(),
                      [](const LineOnRay& a, const LineOnRay& b) { return a.depth < b.depth; });
@@ -122,10 +136,12 @@ class PixelLight {
     double most = picked_least;
     for (const Candidate& one : candidates_) {
       if (one.weight < most) continue;
-      const auto [medium, part] = one.is_line ? Part{} : strongest_medium(one);
+      const auto [medium, part] = one.kind == Kind::splat ? strongest_medium(one) : Part{};
       if (one.weight * part < most) continue;
       most = one.weight * part;
       out.medium = medium;
+      out.surface.reset();
+      if (one.kind == Kind::surface) out.surface = one.surface;
       out.sample = one.sample;
       out.place = one.place;
       out.value = medium ? scene_.scalars[*medium].field->values[one.index] : one.value;
@@ -178,10 +194,10 @@ class PixelLight {
   }
 
   void keep_line(const reference::RibbonHit<double>& hit, Candidate one) {
-    one.is_line = true;
+    one.kind = Kind::line;
     one.depth = hit.depth;
     const double light = std::max({hit.color[0], hit.color[1], hit.color[2]});
-    lines_.push_back({hit.depth, hit.opacity, hit.opacity * light, candidates_.size()});
+    lines_.push_back({hit.depth, hit.opacity, hit.opacity * light, candidates_.size(), false});
     candidates_.push_back(one);
   }
 
@@ -241,24 +257,49 @@ class PixelLight {
     return reference::plus(reference::plus(view_.eye, 1, to.origin), depth, to.direction);
   }
 
-  // Lines that are combined by `or`, before the body and behind it: one of them, which gives the
-  // opacity of all, the brightest. Those before the body are before the medium.
+  bool gather_surfaces(const CancelToken& cancel) {
+    for (const SheetOnRay& sheet : sheets_on_ray(scene_, view_, ray_, cancel)) {
+      const double opacity = scene_.surfaces[sheet.surface].opacity;
+      if (opacity <= 0 || candidates_.size() >= candidates_max) continue;
+      Candidate one;
+      one.kind = Kind::surface;
+      one.surface = sheet.surface;
+      one.at = {ray_.x, ray_.y};
+      one.depth = sheet.depth;
+      one.place = place_at(one.at, sheet.depth);
+      one.value = sheet.value;
+      lines_.push_back({sheet.depth, opacity, 0, candidates_.size(), true});
+      candidates_.push_back(one);
+    }
+    return !cancel.cancelled();
+  }
+
+  // Lines that are combined by `or`, between the body or a surface and the next: one of them, which
+  // gives the opacity of all, the brightest. Those before the first are before the medium.
   void keep_strongest() {
-    std::optional<LineOnRay> body;
-    std::array<std::optional<LineOnRay>, 2> kept;
-    if (!lines_.empty() && !lines_.back().candidate) body = lines_.back();
+    std::vector<LineOnRay> solid;
     for (const LineOnRay& line : lines_) {
-      if (!line.candidate) continue;
-      auto& best = kept.at(body && line.depth >= body->depth ? 1 : 0);
+      if (line.solid) solid.push_back(line);
+    }
+    std::stable_sort(solid.begin(), solid.end(),
+                     [](const LineOnRay& a, const LineOnRay& b) { return a.depth < b.depth; });
+    std::vector<std::optional<LineOnRay>> kept(solid.size() + 1);
+    for (const LineOnRay& line : lines_) {
+      if (line.solid) continue;
+      std::size_t before = 0;
+      while (before < solid.size() && solid[before].depth <= line.depth) ++before;
+      auto& best = kept[before];
       const double opacity = best ? std::max(best->opacity, line.opacity) : line.opacity;
       if (!best || line.light > best->light) best = line;
       best->opacity = opacity;
     }
     lines_.clear();
-    if (kept[0]) kept[0]->depth = lowest;
-    if (kept[1]) kept[1]->depth = body->depth;
-    for (const auto& one : {kept[0], body, kept[1]}) {
-      if (one) lines_.push_back(*one);
+    for (std::size_t n = 0; n < kept.size(); ++n) {
+      if (kept[n]) {
+        kept[n]->depth = n == 0 ? lowest : solid[n - 1].depth;
+        lines_.push_back(*kept[n]);
+      }
+      if (n < solid.size()) lines_.push_back(solid[n]);
     }
   }
 
@@ -321,14 +362,6 @@ class PixelLight {
     }
     out.part /= all;
     return out;
-  }
-
-  [[nodiscard]] static double magnitude_at(const data::Volume& field, std::size_t index) {
-    double square = 0;
-    for (int c = 0; c < field.components; ++c) {
-      square += std::pow(static_cast<double>(field.component(c)[index]), 2);
-    }
-    return std::sqrt(square);
   }
 
   const scene::Scene& scene_;

@@ -158,6 +158,62 @@ TEST_F(Picks, MediaArePickedInEveryGeometry) {
   }
 }
 
+// Lines below an opaque section were reported as all that is seen, and the section never.
+TEST_F(Picks, WhatAnOpaqueSectionHidesIsNotRead) {
+  Json section = view_of_lines();
+  section["surfaces"] = {{{"field", "cloud"}, {"isovalue", 0.3}, {"opacity", 0}},
+                         {{"field", "cloud"}, {"slice", {{"axis", "z"}, {"index", 2}}}}};
+  section["vector"] = {{"field", nullptr}};
+  Json both = section;
+  both["vector"] = {{"r1", 6}, {"r2", 8}, {"opacity", 1}};
+  const std::vector<float> covered = opacities(section);
+  int lines = 0;
+  int sections = 0;
+  for (int y = 2; y < height; y += 5) {
+    for (int x = 2; x < width; x += 5) {
+      if (covered[static_cast<std::size_t>(y * width + x)] < 1) continue;
+      const Json plain = feature(section, x, y);
+      ASSERT_TRUE(plain.is_object()) << x << ' ' << y;
+      EXPECT_EQ(plain["layer"], "surface");
+      EXPECT_EQ(plain["surface"], 1);
+      EXPECT_EQ(plain["field"], "cloud");
+      EXPECT_EQ(plain["share"], 1);
+      EXPECT_EQ(plain["position"]["index"]["z"], 2);
+      EXPECT_NEAR(plain["at"][0].get<double>(), x + 0.5, 1e-9);
+      const Json found = feature(both, x, y);
+      ASSERT_TRUE(found.is_object()) << x << ' ' << y;
+      if (found["layer"] == "surface") {
+        EXPECT_EQ(found["value"], plain["value"]);
+        ++sections;
+        continue;
+      }
+      EXPECT_EQ(found["layer"], "lines");
+      EXPECT_LE(found["depth"].get<double>(), plain["depth"].get<double>()) << x << ' ' << y;
+      ++lines;
+    }
+  }
+  EXPECT_GT(lines, 5);
+  EXPECT_GT(sections, 10);
+}
+
+TEST_F(Picks, AnIsosurfaceReadsItsOwnValueOrThatOfItsColours) {
+  Json view = view_of_lines();
+  view["vector"] = {{"field", nullptr}};
+  view["surfaces"] = {{{"field", "cloud"}, {"isovalue", 0.3}}};
+  const std::vector<float> lit = opacities(view);
+  const auto most = std::max_element(lit.begin(), lit.end()) - lit.begin();
+  ASSERT_EQ(lit[static_cast<std::size_t>(most)], 1);
+  const auto x = static_cast<int>(most % width);
+  const auto y = static_cast<int>(most / width);
+  Json found = feature(view, x, y);
+  ASSERT_TRUE(found.is_object());
+  EXPECT_EQ(found["layer"], "surface");
+  EXPECT_EQ(found["value"], 0.3);
+  view["surfaces"][0]["color"] = {{"field", "cloud"}};
+  found = feature(view, x, y);
+  EXPECT_NEAR(found["value"].get<double>(), 0.3, 1e-4);
+}
+
 TEST_F(Picks, AnEmptyPixelHasNoFeature) {
   Json view = view_of_lines();
   view["vector"]["minMagnitude"] = 1e6;

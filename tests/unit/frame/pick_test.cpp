@@ -204,6 +204,90 @@ TEST(Pick, TheGroundHidesWhatLiesBehindIt) {
   EXPECT_NEAR(found->share, 0.5, 1e-9);  // the other half is the ground
 }
 
+// A section across the view at `y`, of two triangles that touch in the middle of the picture, with
+// the values 10 + 5 x + 2 z.
+surface::Shown section_at(double y, double opacity) {
+  surface::Mesh mesh;
+  for (const auto& [x, z] : {std::pair{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}) {
+    mesh.places.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
+    mesh.normals.push_back({0, 1, 0});
+    mesh.values.push_back(static_cast<float>(10 + 5 * x + 2 * z));
+  }
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  surface::Shown shown;
+  shown.mesh = std::make_shared<const surface::Mesh>(std::move(mesh));
+  shown.opacity = opacity;
+  shown.colors = {{0.5F, 0.5F, 0.5F}};
+  return shown;
+}
+
+TEST(Pick, AnOpaqueSectionHidesWhatLiesBehindItAndIsPicked) {
+  Scene scene = front_view();
+  add_lines(scene, {{6, 5.0F}}, 1);
+  scene.surfaces = {section_at(0, 1)};
+  const auto found = picked(scene, 49.5, 49.5);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->surface, std::optional<std::size_t>(0));
+  EXPECT_FALSE(found->medium);
+  EXPECT_NEAR(found->value, 10, 1e-6);
+  EXPECT_NEAR(found->share, 1, 1e-12);
+  EXPECT_NEAR(found->depth, 4, 1e-9);
+  constexpr double away = 10 * 2.0 / 99;  // 10 pixels
+  const auto aside = picked(scene, 59.5, 39.5);
+  ASSERT_TRUE(aside);
+  EXPECT_NEAR(aside->value, 10 + 7 * away, 1e-6);
+  EXPECT_NEAR(aside->place[0], away, 1e-9);
+  EXPECT_NEAR(aside->place[1], 0, 1e-9);
+  EXPECT_NEAR(aside->place[2], away, 1e-9);
+  EXPECT_EQ(aside->at, (std::array{59.5, 39.5}));
+  EXPECT_FALSE(picked(scene, 49.5 + 26, 49.5));  // beside it
+}
+
+TEST(Pick, ALineBeforeASectionIsPickedAndSoIsOneThatItHardlyHides) {
+  Scene scene = front_view();
+  add_lines(scene, {{2, 5.0F}}, 1);
+  scene.surfaces = {section_at(0, 1)};
+  EXPECT_FALSE(picked(scene, 49.5, 49.5)->surface);
+  EXPECT_EQ(picked(scene, 49.5, 49.5)->value, 5);
+  // Behind a section of opacity o a line that is opaque has the share 1 - o.
+  scene.surfaces = {section_at(-0.6, 0.25)};
+  EXPECT_FALSE(picked(scene, 49.5, 49.5)->surface);
+  EXPECT_NEAR(picked(scene, 49.5, 49.5)->share, 0.75, 1e-9);
+  scene.surfaces = {section_at(-0.6, 0.6)};
+  EXPECT_TRUE(picked(scene, 49.5, 49.5)->surface);
+  EXPECT_NEAR(picked(scene, 49.5, 49.5)->share, 0.6, 1e-9);
+}
+
+// Of two sections of opacity 0.5 the nearer, with 0.5 of 0.75; of one behind the eye nothing.
+TEST(Pick, SectionsCountFromTheEyeOnwards) {
+  Scene scene = front_view();
+  scene.surfaces = {section_at(0.4, 0.5), section_at(-0.4, 0.5)};
+  EXPECT_EQ(picked(scene, 45.5, 49.5)->surface, std::optional<std::size_t>(1));
+  EXPECT_NEAR(picked(scene, 45.5, 49.5)->share, 2.0 / 3, 1e-9);
+  scene.camera = test::look({0, 0, 0}, {0, 1, 0}, 0.1, 99, 99, true, 0.5);
+  EXPECT_EQ(picked(scene, 45.5, 49.5)->surface, std::optional<std::size_t>(0));
+  EXPECT_NEAR(picked(scene, 45.5, 49.5)->depth, 0.5, 1e-6);
+  scene.surfaces = {section_at(-0.4, 0.5)};
+  EXPECT_FALSE(picked(scene, 45.5, 49.5));
+}
+
+// Lines that are combined by `or` are so between one section and the next.
+TEST(Pick, CombinedLinesBehindAnOpaqueSectionAreNotPicked) {
+  Scene scene = front_view();
+  add_lines(scene, {{2, 5.0F}, {6, 40.0F}}, 0.5);
+  scene.vector->combine_or = true;
+  scene.vector->magnitude_range = {0, 40};
+  scene.vector->magnitude_intensity = 1;
+  scene.vector->length = 2.4;
+  EXPECT_EQ(picked(scene, 49.5, 49.5)->value, 40);  // the brighter
+  scene.surfaces = {section_at(0, 1)};
+  scene.vector->opacity = 0.8;
+  const auto found = picked(scene, 49.5, 49.5);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->value, 5);
+  EXPECT_NEAR(found->share, 0.8, 1e-9);
+}
+
 TEST(Pick, CancelledPicksEndWithAnError) {
   Scene scene = front_view();
   add_lines(scene, {{6, 5.0F}}, 1);

@@ -31,7 +31,8 @@ export const sampleOf = ({ index }: Position): Sample | null =>
 // Lines beside the cursor: the value and where it is.
 export function featureLines(dataset: Dataset, feature: Feature): string[] {
   const { field, value, units, position, share } = feature;
-  const text = `${field} ${formatNumber(value)} ${unitText(units)}`.trim();
+  const told = value === null ? "masked" : `${formatNumber(value)} ${unitText(units)}`;
+  const text = `${field} ${told}`.trim();
   const part = share < wholeShare ? ` · ${formatNumber(100 * share, 2)} % of this point` : "";
   const places = axisNames.map((name, n) => {
     const called = name === "z" ? "level" : undefined;

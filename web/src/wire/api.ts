@@ -41,9 +41,9 @@ export interface Probe {
 
 // The sample that contributes most to a pixel.
 export interface Feature {
-  layer: "lines" | "medium";
+  layer: "lines" | "medium" | "surface";
   field: string;
-  value: number; // of a vector the magnitude
+  value: number | null; // of a vector the magnitude; null: masked there
   units: string;
   position: Position;
   share: number; // of the pixel's opacity
