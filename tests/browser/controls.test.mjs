@@ -296,7 +296,7 @@ test("a globe is offered for longitudes, and heights replace the vertical axis",
     await choose(page, "shape", /^sphere/);
     assert.equal(await lastPatch(page, "geometry", "mapping"), "sphere");
     await choose(page, "shape", /^flat/);
-    await type(page, "vertical exaggeration", 3);
+    await type(page, "vertical stretch", 3);
     assert.deepEqual(await lastPatch(page, "geometry", "scale"), [1, 1, 3]);
     await type(page, "stretch in x", 2);
     assert.deepEqual(await lastPatch(page, "geometry", "scale"), [2, 1, 3]);

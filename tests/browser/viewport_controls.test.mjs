@@ -192,10 +192,10 @@ test("alt + click goes to the sample that is seen, and a button to the maximum",
     };
     for (const axis of ["x", "y", "z"]) await close(axis, position[axis]);
     const range = page.waitForResponse(/\/fields\/wind\/range\?/);
-    await page.getByRole("button", { name: "Go to maximum" }).click();
+    await page.getByRole("button", { name: "Go to maximum of this step" }).click();
     const { places } = await (await range).json();
     for (const axis of ["x", "y", "z"]) await close(axis, places.max[axis]);
-    await page.getByText(/^greatest wind: [\d.]+ m s⁻¹ at /).waitFor();
+    await page.getByText(/^greatest wind at this step: [\d.]+ m s⁻¹ at /).waitFor();
     // Within a region it is the greatest there.
     await unfold(page, "Region");
     const [from, to] = places.max.x > 0 ? [-120, -60] : [60, 120];
@@ -203,11 +203,11 @@ test("alt + click goes to the sample that is seen, and a button to the maximum",
       await type(page, `lon ${end}.*`, value);
     await finalPicture(page);
     const part = page.waitForResponse(/\/fields\/wind\/range$/);
-    await page.getByRole("button", { name: "Go to maximum" }).click();
+    await page.getByRole("button", { name: "Go to maximum of this step" }).click();
     const found = (await (await part).json()).places.max;
     assert.ok(found.x >= from && found.x <= to, `${found.x} is outside ${from} to ${to}`);
     for (const axis of ["x", "y", "z"]) await close(axis, found[axis]);
-    await page.getByText(/^greatest wind in the region: [\d.]+ m s⁻¹ at /).waitFor();
+    await page.getByText(/^greatest wind in the region at this step: [\d.]+ m s⁻¹ at /).waitFor();
     assert.ok(await page.locator("#probe-mark").isVisible());
     await shot(page, "maximum-in-region");
   }));

@@ -314,13 +314,13 @@ test("the vertical exaggeration follows the scales, and is 1 to scale", () => {
   const z = { ...dataset.axes.z, kind: "height" };
   const wide = { ...pressures, axes: { ...dataset.axes, z } } as Dataset;
   const text = (geometry: View["geometry"]) => exaggerationText(wide, { geometry });
-  assert.match(text({}), /drawn 15 times/);
-  assert.match(text({ scale: [1, 2, 4] }), /drawn 30 times/);
+  assert.equal(text({}), "A vertical stretch of 1 draws heights 15 times as high as to scale.");
+  assert.match(text({ scale: [1, 2, 4] }), /stretch of 4 draws heights 30 times/);
   assert.equal(text({ vertical: "metric" }), "Heights are drawn to scale.");
   assert.equal(text({ mapping: "sphere" }), "");
   assert.equal(text({ heightField: "height" }), "");
   assert.equal(text({ vertical: "index" }), "");
   assert.equal(exaggerationText(dataset, {}), "", "unknown");
-  assert.match(exaggerationText(pressures, {}), /drawn about 15 times/);
+  assert.match(exaggerationText(pressures, {}), /heights about 15 times/);
   assert.equal(exaggerationText(pressures, { geometry: { vertical: "linear" } }), "");
 });

@@ -170,7 +170,8 @@ export function exaggerationText(dataset: Dataset, view: View): string {
   const times = (base * (scale?.[2] ?? 1)) / (scale?.[across] ?? 1);
   if (!byPressure && Math.abs(times - 1) < 0.005) return "Heights are drawn to scale.";
   const shown = byPressure ? `about ${formatNumber(times, 2)}` : formatNumber(times, 3);
-  return `Heights are drawn ${shown} times as high as to scale.`;
+  const stretch = formatNumber(scale?.[2] ?? 1, 3);
+  return `A vertical stretch of ${stretch} draws heights ${shown} times as high as to scale.`;
 }
 
 // Colours the lines by a different quantity: the old range has the wrong unit and is removed, and a

@@ -53,7 +53,7 @@ function addShape(folder: GUI, kit: PanelKit): void {
   if (Object.keys(mappings).length < 2) {
     kit.showWhen(() => kit.host.view().geometry?.mapping !== "flat", mapping);
   }
-  addStretch(folder, kit, "vertical exaggeration", 2);
+  addStretch(folder, kit, "vertical stretch", 2);
   kit.note(folder, () => exaggerationText(dataset, kit.host.view()));
   kit.choice(folder, "vertical axis", keyAccess("/geometry/vertical"), {
     automatic: "auto",

@@ -192,7 +192,7 @@ export class ProbePanel {
     field.append(...fields.map(({ name }) => new Option(name, name)));
     if (fields.some(({ name }) => name === drawn)) field.value = drawn!;
     field.setAttribute("aria-label", "Field whose maximum to go to");
-    const button = make("button", "", "Go to maximum");
+    const button = make("button", "", "Go to maximum of this step");
     button.title = "Move the probe to the greatest value of this step; of vectors, the fastest";
     button.addEventListener("click", () => {
       button.disabled = true;
@@ -224,7 +224,7 @@ export class ProbePanel {
       this.moveTo(sample);
       const units = dataset.fields.find(({ name }) => name === field)?.units ?? "";
       this.maximum.textContent =
-        `greatest ${this.subject(field)}${within}: ${valueText(range![1], units)} ` +
+        `greatest ${this.subject(field)}${within} at this step: ${valueText(range![1], units)} ` +
         `at ${positionText(dataset, places!.max)}`;
       this.maximumOf = scope;
       this.maximum.hidden = false;
