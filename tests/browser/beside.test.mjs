@@ -222,6 +222,20 @@ test("step and swap, by keyboard alone; the way out gives the room and the focus
     assert.equal(await width(), alone);
   }));
 
+test("the dialog for pictures says that the first of two is saved", () =>
+  withPage(async (page) => {
+    const note = page.locator("#save-first");
+    await finalPicture(page);
+    await page.locator("#save-button").click();
+    await page.locator("#save[open]").waitFor();
+    assert.equal(await note.isVisible(), false, "there is one picture");
+    await page.keyboard.press("Escape");
+    await compare(page);
+    await page.locator("#save-button").click();
+    await note.waitFor({ state: "visible" });
+    assert.match(await note.textContent(), /the first is saved/);
+  }));
+
 test("the address keeps the comparison", () =>
   withPage(async (page) => {
     await compare(page);

@@ -97,6 +97,7 @@ function showChoices(host: SaveHost, dialog: HTMLElement, running: boolean): voi
   fields("views").disabled = running;
   button("keep-button").disabled = !open;
   if (!open) return;
+  part("first").hidden = host.beside() === null;
   const vector = host.view().vector;
   const [steps, , flow] = select("over").options;
   steps!.disabled = host.dataset().steps.count < 2;
