@@ -140,6 +140,8 @@ test("the legend states the slow limit, and the probe labels times", async (t) =
   await shot(page, "left-out-1280");
   await page.setViewportSize({ width: 390, height: 844 });
   await finalPicture(page);
+  const ahead = page.locator(".legend-lines .legend-note", { hasText: "end ahead" });
+  assert.ok(await ahead.isVisible(), "phones are told which end is ahead, too");
   await shot(page, "left-out-390");
   assert.deepEqual(page.faults, []);
 });

@@ -114,6 +114,8 @@ class PresetPictures {
     const url = this.kit.pictures.find(key);
     if (url !== undefined && tile.image.src !== url) tile.image.src = url;
     tile.button.hidden = this.refused.has(key);
+    const isAwaited = !tile.image.hasAttribute("src") && this.tries < triesMax;
+    tile.button.setAttribute("aria-busy", String(isAwaited));
   }
 
   private stop(): void {
@@ -153,6 +155,7 @@ class PresetPictures {
       if (isRefusedView(failure)) this.refused.add(key);
       else {
         this.tries += 1;
+        for (const one of this.tiles) this.show(one);
         this.startSoon(busyMs);
         return false;
       }
