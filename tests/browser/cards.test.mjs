@@ -259,7 +259,7 @@ for (const [name, options] of [
         const covered = [...document.querySelectorAll(".legend-entry, .hud")].map(area);
         return covered.reduce((a, b) => a + b, 0) / area(document.querySelector("#picture"));
       });
-      assert.ok(share < 0.3, `${Math.round(100 * share)} % covered`);
+      assert.ok(share < 0.35, `${Math.round(100 * share)} % covered`);
       const wide = await page.evaluate(
         () => document.documentElement.scrollWidth - document.documentElement.clientWidth,
       );

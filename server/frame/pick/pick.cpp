@@ -145,7 +145,7 @@ class PixelLight {
       out.sample = one.sample;
       out.place = one.place;
       out.value = medium ? scene_.scalars[*medium].field->values[one.index] : one.value;
-      out.share = most / (1 - transmittance_);
+      out.share = std::min(1.0, most / (1 - transmittance_));  // rounding
       out.depth = one.moment / one.weight;
       out.at = one.at;
     }
