@@ -77,7 +77,7 @@ test("sections of other grids tell heights, kilometres, or rows and columns", ()
   assert.equal(ofSurface(slice("z", 1), globe), "section at 500 hPa");
 });
 
-test("a layer of the whole view is told by lines and volumes", () => {
+test("a layer of the whole view is told by lines and media", () => {
   const geometry = { slice: { axis: "z", index: 2 } } as const;
   const entries = legendEntries(atmosphere, {
     geometry,
