@@ -5,6 +5,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/measurements.hpp"
+#include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/files/files.hpp"
 #include "server/data/files/locate_parts.hpp"
@@ -141,7 +142,7 @@ void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
 http::Response delete_dataset(tasks::Catalogue& catalogue, const std::string& id,
                               const http::Request& request) {
   http::QueryReader query(request.query);
-  const bool forget = query.boolean("forget").value_or(false);
+  const bool forget = read_boolean(query, parameters::forget).value_or(false);
   if (const auto ok = query.finish(); !ok) return http::problem_response(ok.error());
   const auto dataset = catalogue.find(id);
   if (!dataset) {

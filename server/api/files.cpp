@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "protocol/folder.hpp"
+#include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/files/folder_list.hpp"
 #include "server/data/open/content.hpp"
@@ -13,7 +14,6 @@ namespace windsplat::api {
 namespace {
 
 constexpr int entries_default = 200;
-constexpr int entries_max = 500;
 
 struct Page {
   std::string folder;
@@ -24,9 +24,9 @@ struct Page {
 Result<Page> page_of(const http::Request& request) {
   http::QueryReader query(request.query);
   Page page;
-  page.folder = query.text("folder").value_or("");
-  page.after = query.text("after").value_or("");
-  page.limit = query.integer("limit", 1, entries_max).value_or(entries_default);
+  page.folder = read_text(query, parameters::folder).value_or("");
+  page.after = read_text(query, parameters::after).value_or("");
+  page.limit = read_integer(query, parameters::limit).value_or(entries_default);
   if (const auto ok = query.finish(); !ok) return ok.error();
   while (page.folder.ends_with('/') && page.folder.size() > 1) page.folder.pop_back();
   return page;

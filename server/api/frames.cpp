@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "protocol/codec.hpp"
-#include "protocol/limits.hpp"
+#include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
 #include "server/frame/frame_info.hpp"
 #include "server/http/negotiate.hpp"
@@ -26,9 +26,6 @@ namespace windsplat::api {
 namespace {
 
 constexpr int jpeg_quality_default = 90;
-constexpr double angle_max = 36000;  // degrees
-constexpr double zoom_min = 1e-3;
-constexpr double zoom_max = 1e3;
 
 struct Orbit {
   double azimuth = scene::default_azimuth;
@@ -318,9 +315,9 @@ void submit_picture(tasks::Backend& backend, access::Admission& admission, Pictu
 // --- GET /v1/datasets/{id}/frame.* --------------------------------------------------------------
 
 std::optional<Orbit> read_orbit(http::QueryReader& query) {
-  const auto azimuth = query.number("azimuth", -angle_max, angle_max);
-  const auto elevation = query.number("elevation", -90, 90);
-  const auto zoom = query.number("zoom", zoom_min, zoom_max);
+  const auto azimuth = read_number(query, parameters::azimuth);
+  const auto elevation = read_number(query, parameters::elevation);
+  const auto zoom = read_number(query, parameters::zoom);
   if (!azimuth && !elevation && !zoom) return std::nullopt;
   Orbit orbit;
   orbit.azimuth = azimuth.value_or(orbit.azimuth);
@@ -332,7 +329,7 @@ std::optional<Orbit> read_orbit(http::QueryReader& query) {
 // The size on paper, of the formats that tell one: for others the parameter is unknown.
 std::optional<double> read_dots_per_inch(http::QueryReader& query, frame::Format format) {
   if (format == frame::Format::jpeg || format == frame::Format::npy) return std::nullopt;
-  return query.number("dpi", frame::dots_per_inch_min, frame::dots_per_inch_max);
+  return read_number(query, parameters::dpi);
 }
 
 Result<Picture> read_query(const http::Request& request, frame::Format format) {
@@ -341,13 +338,14 @@ Result<Picture> read_query(const http::Request& request, frame::Format format) {
   picture.encoding.format = format;
   picture.encoding.quality = jpeg_quality_default;
   picture.encoding.describe = true;
-  const auto step = query.integer("step");
-  const auto width = query.integer("width");
-  const auto height = query.integer("height");
+  const auto step = query.integer(parameters::step.name);
+  const auto width = query.integer(parameters::width.name);
+  const auto height = query.integer(parameters::height.name);
   picture.orbit = read_orbit(query);
-  picture.preset = query.text("preset").value_or("");
+  picture.preset = read_text(query, parameters::preset).value_or("");
   if (format == frame::Format::jpeg) {
-    picture.encoding.quality = query.integer("quality", 1, 100).value_or(jpeg_quality_default);
+    picture.encoding.quality =
+        read_integer(query, parameters::quality).value_or(jpeg_quality_default);
   }
   picture.encoding.dots_per_inch = read_dots_per_inch(query, format);
   if (const auto ok = query.finish(); !ok) return ok.error();

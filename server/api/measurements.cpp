@@ -17,6 +17,7 @@
 
 #include "protocol/limits.hpp"
 #include "protocol/view.hpp"
+#include "server/api/operations/parameters.hpp"
 #include "server/api/positions.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/model/measure.hpp"
@@ -50,8 +51,8 @@ Result<DatasetPtr> find_dataset(const tasks::Catalogue& catalogue, const std::st
                                 http::QueryReader& query) {
   auto dataset = catalogue.find(id);
   if (!dataset) return make_error(ErrorKind::not_found, dataset.error().message);
-  const auto minus = query.text("minus");
-  const auto step = query.integer("minusStep", 0, std::numeric_limits<int>::max());
+  const auto minus = read_text(query, parameters::minus);
+  const auto step = read_integer(query, parameters::minus_step);
   if (!minus && !step) return dataset;
   protocol::View view;
   view.dataset = id;
@@ -82,7 +83,7 @@ Result<std::shared_ptr<const data::Volume>> load(const Subject& subject, std::si
 }
 
 std::optional<int> read_step(http::QueryReader& query, const data::Dataset& dataset) {
-  return query.integer("step", 0, static_cast<int>(dataset.info().steps.size()) - 1);
+  return read_integer(query, parameters::step, static_cast<int>(dataset.info().steps.size()) - 1);
 }
 
 protocol::ProbedField describe(const data::FieldInfo& field) {
@@ -164,10 +165,10 @@ struct HistogramQuery {
 Result<HistogramQuery> read_histogram(http::QueryReader& query, const data::Dataset& dataset) {
   HistogramQuery out;
   out.step = static_cast<std::size_t>(read_step(query, dataset).value_or(0));
-  out.request.bins = query.integer("bins", 1, limits::histogram_bins_max).value_or(histogram_bins);
-  out.request.range = query.pair("range", -limits::value_max, limits::value_max);
-  out.request.logarithmic = query.boolean("log").value_or(false);
-  const auto clip = query.number("clip", 0, limits::histogram_clip_max);
+  out.request.bins = read_integer(query, parameters::bins).value_or(histogram_bins);
+  out.request.range = read_pair(query, parameters::range);
+  out.request.logarithmic = read_boolean(query, parameters::log).value_or(false);
+  const auto clip = read_number(query, parameters::clip);
   if (const auto ok = query.finish(); !ok) return ok.error();
   out.request.clip = clip.value_or(0);
   if (out.request.range && clip) {
@@ -206,7 +207,7 @@ struct ProbeQuery {
 Result<std::vector<std::string>> read_fields(http::QueryReader& query,
                                              const data::DatasetInfo& info) {
   std::vector<std::string> out;
-  const std::string names = query.text("fields").value_or("");
+  const std::string names = read_text(query, parameters::fields).value_or("");
   for (std::size_t at = 0; at < names.size();) {
     const std::size_t end = std::min(names.find(',', at), names.size());
     out.push_back(names.substr(at, end - at));
@@ -369,7 +370,7 @@ void get_range(tasks::Backend& backend, const std::string& id, const std::string
   http::QueryReader query(request.query);
   auto subject = find_subject(backend.catalogue, id, field, request, query);
   if (!subject) return refuse(subject.error());
-  const std::string of = query.text("of").value_or("step");
+  const std::string of = read_text(query, parameters::range_of).value_or("step");
   const auto step = read_step(query, *subject->dataset);
   if (const auto ok = query.finish(); !ok) return refuse(ok.error());
   if (of != "step" && of != "all") {

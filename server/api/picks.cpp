@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "protocol/codec.hpp"
-#include "protocol/limits.hpp"
 #include "protocol/measurements.hpp"
 #include "protocol/view/shown.hpp"
+#include "server/api/operations/parameters.hpp"
 #include "server/api/positions.hpp"
 #include "server/api/resources.hpp"
 #include "server/frame/pick/pick.hpp"
@@ -24,8 +24,6 @@
 namespace windsplat::api {
 namespace {
 
-namespace limits = protocol::limits;
-
 struct PickRequest {
   protocol::View view;
   double x = 0, y = 0;  // pixels
@@ -34,8 +32,8 @@ struct PickRequest {
 Result<PickRequest> read_request(tasks::Backend& backend, const http::Request& request) {
   PickRequest out;
   http::QueryReader query(request.query);
-  const auto x = query.number("x", 0, limits::image_edge_max);
-  const auto y = query.number("y", 0, limits::image_edge_max);
+  const auto x = read_number(query, parameters::pixel_x);
+  const auto y = read_number(query, parameters::pixel_y);
   if (const auto ok = query.finish(); !ok) return ok.error();
   if (!x || !y) {
     return make_error(ErrorKind::malformed,

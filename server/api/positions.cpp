@@ -5,13 +5,11 @@
 #include <string_view>
 #include <utility>
 
-#include "protocol/limits.hpp"
+#include "server/api/operations/parameters.hpp"
 #include "server/scene/bend.hpp"
 #include "server/scene/place.hpp"
 
 namespace windsplat::api {
-
-namespace limits = protocol::limits;
 
 Result<std::shared_ptr<const data::Volume>> load_field(tasks::Catalogue& catalogue,
                                                        const data::Dataset& dataset,
@@ -28,9 +26,8 @@ Result<std::shared_ptr<const data::Volume>> load_field(tasks::Catalogue& catalog
 namespace {
 
 std::array<std::optional<double>, 3> read_place(http::QueryReader& query) {
-  return {query.number("x", -limits::coordinate_max, limits::coordinate_max),
-          query.number("y", -limits::coordinate_max, limits::coordinate_max),
-          query.number("z", -limits::coordinate_max, limits::coordinate_max)};
+  return {read_number(query, parameters::x), read_number(query, parameters::y),
+          read_number(query, parameters::z)};
 }
 
 // "i,j,k"
@@ -50,8 +47,8 @@ std::optional<std::array<int, 3>> indices_in(std::string_view text) {
 }  // namespace
 
 Result<Position> read_position(http::QueryReader& query, const data::Grid& grid) {
-  Position out{read_place(query), {}, query.text("heightField")};
-  const auto index = query.text("index");
+  Position out{read_place(query), {}, read_text(query, parameters::height_field)};
+  const auto index = read_text(query, parameters::index);
   if (!index) return out;
   if (out.at[0] || out.at[1] || out.at[2]) {
     return make_error(ErrorKind::invalid,

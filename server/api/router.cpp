@@ -47,10 +47,9 @@ bool matches(std::string_view path, const Segments& given, PathValues& values) {
 // Files of the page. Links to them may have query parameters added by other sites.
 Route page_route(const std::vector<std::string>& embedders) {
   return {
-      "GET", "",
+      "GET", "", Operation{.any_query = true},
       [&embedders](const PathValues& values, const http::Request& request,
-                   const http::Reply& reply) { reply(get_page(embedders, values[0], request)); },
-      Query::taken};
+                   const http::Reply& reply) { reply(get_page(embedders, values[0], request)); }};
 }
 
 std::string page_file(const Segments& path) {
@@ -144,9 +143,8 @@ void Router::answer(const http::Request& request, const std::optional<Resource>&
     reply(method_not_allowed(request.method, allow));
   } else if (lacks_slash(base_path_, request)) {
     reply({308, "", {{"Location", base_path_}}, {}});
-  } else if (route->query == Query::refused && !request.query.empty()) {
-    const auto unknown = http::QueryReader(request.query).finish();
-    reply(http::problem_response(unknown.error()));
+  } else if (const auto known = check_query(route->operation, request.query); !known) {
+    reply(http::problem_response(known.error()));
   } else if (auto refusal = refused_by_quota(admission_, *route, request)) {
     reply(std::move(*refusal));
   } else {

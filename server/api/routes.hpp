@@ -1,4 +1,5 @@
-// The table of routes: every path and method of the API, what it takes, and its handler.
+// The table of routes: every path and method of the API, what it takes and answers, and its
+// handler.
 #pragma once
 
 #include <atomic>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "server/access/admission.hpp"
+#include "server/api/operations/operation.hpp"
 #include "server/api/server_options.hpp"
 #include "server/http/exchange.hpp"
 #include "server/tasks/backend.hpp"
@@ -19,7 +21,6 @@ using PathValues = std::vector<std::string>;
 using Handler = std::function<void(const PathValues& values, const http::Request& request,
                                    const http::Reply& reply)>;
 
-enum class Query { refused, taken };
 enum class Charge {
   none,
   picture,       // counts as a picture of the address, before the handler is called
@@ -31,10 +32,10 @@ enum class Place {
 };
 
 struct Route {
-  const char* method;  // GET includes HEAD
-  const char* path;    // "{...}" stands for one segment
+  const char* method;   // GET includes HEAD
+  const char* path;     // "{...}" stands for one segment
+  Operation operation;  // what it takes and answers, also in the documents of the API
   Handler handler;
-  Query query = Query::refused;
   Charge charge = Charge::none;
   Place place = Place::base;
   const char* name = path;  // name by which requests are logged and counted

@@ -1,0 +1,115 @@
+// Pictures of views and what they show.
+#include "server/api/operations/operations.hpp"
+#include "server/api/operations/parameters.hpp"
+
+namespace windsplat::api::operations {
+namespace {
+
+constexpr std::string_view pictures_group = "Pictures";
+
+Answer picture(MediaTypes media) {
+  return {200,
+          "The picture; Windsplat-Frame tells method, work and error.",
+          {},
+          std::move(media),
+          {"ETag", "Server-Timing", "Windsplat-Frame", "Vary"}};
+}
+
+struct FormatWords {
+  std::string_view id;
+  std::string_view summary;
+  std::string_view media;
+};
+
+FormatWords words_of(frame::Format format) {
+  switch (format) {
+    case frame::Format::jpeg:
+      return {"drawJpeg", "A dataset as JPEG", "image/jpeg"};
+    case frame::Format::png:
+      return {"drawPng", "A dataset as PNG", "image/png"};
+    case frame::Format::npy:
+      return {"drawNpy", "A dataset as an array of linear premultiplied RGBA", "application/x-npy"};
+    case frame::Format::pdf:
+      return {"drawPdf", "A dataset as PDF", "application/pdf"};
+    case frame::Format::svg:
+      return {"drawSvg", "A dataset as SVG", "image/svg+xml"};
+  }
+  return {};
+}
+
+}  // namespace
+
+Operation draw_view() {
+  return {.id = "drawView",
+          .group = pictures_group,
+          .summary = "A view rendered to a picture",
+          .description = "Accept selects JPEG (the default), PNG, NPY, PDF or SVG.",
+          .query = {parameters::dpi},
+          .body = view_body("The view, which names its dataset."),
+          .answers = {picture({"image/jpeg", "image/png", "application/x-npy", "application/pdf",
+                               "image/svg+xml"}),
+                      not_modified()},
+          .problems = {404, 406, 422, 507}};
+}
+
+Operation draw_dataset(frame::Format format) {
+  const FormatWords words = words_of(format);
+  Operation out{
+      .id = words.id,
+      .group = pictures_group,
+      .summary = words.summary,
+      .description = "The default view of the dataset, from a chosen side.",
+      .query = {parameters::width, parameters::height, parameters::azimuth, parameters::elevation,
+                parameters::zoom, parameters::step, parameters::preset},
+      .answers = {picture({words.media}), not_modified()},
+      .problems = {404, 413, 422, 507}};
+  if (format == frame::Format::jpeg) {
+    out.query.push_back(parameters::quality);
+  } else if (format != frame::Format::npy) {
+    out.query.push_back(parameters::dpi);
+  }
+  return out;
+}
+
+Operation forecast_view() {
+  return {.id = "forecastView",
+          .group = pictures_group,
+          .summary = "Expected time and error of a view at each setting",
+          .description = "Nothing is rendered or loaded.",
+          .body = view_body("The view, which names its dataset."),
+          .answers = {json_answer("The settings, fastest first.", "forecast")},
+          .problems = {404, 409, 422, 507}};
+}
+
+Operation pick_feature() {
+  return {.id = "pickFeature",
+          .group = pictures_group,
+          .summary = "What a pixel of a view shows",
+          .query = {parameters::pixel_x, parameters::pixel_y},
+          .body = view_body("The view, which names its dataset."),
+          .answers = {json_answer("The line, part of a medium or surface.", "pick")},
+          .problems = {404, 422, 507}};
+}
+
+Operation draw_reference() {
+  return {.id = "drawReference",
+          .group = pictures_group,
+          .summary = "The rendering integral of a view, in a job",
+          .description =
+              "The result of the job has the address of the picture, and the error of "
+              "the view's own picture.",
+          .body = view_body("The view, which names its dataset."),
+          .answers = {job_answer()},
+          .problems = {404, 422, 507}};
+}
+
+Operation read_reference() {
+  return {.id = "readReference",
+          .group = pictures_group,
+          .summary = "The picture of a finished reference",
+          .description = "The id ends in .png.",
+          .answers = {{200, "The picture.", {}, {"image/png"}, {"ETag"}}, not_modified()},
+          .problems = {404}};
+}
+
+}  // namespace windsplat::api::operations

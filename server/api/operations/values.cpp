@@ -1,0 +1,63 @@
+// Values of the fields of a dataset.
+#include "server/api/operations/operations.hpp"
+#include "server/api/operations/parameters.hpp"
+
+namespace windsplat::api::operations {
+namespace {
+
+constexpr std::string_view values_group = "Values";
+
+}  // namespace
+
+Operation probe_fields() {
+  return {.id = "probeFields",
+          .group = values_group,
+          .summary = "The value of every field at the nearest sample",
+          .description = "Of derived fields those in memory, and those in `fields`.",
+          .query = {parameters::x, parameters::y, parameters::z, parameters::height_field,
+                    parameters::index, parameters::step, parameters::fields, parameters::minus,
+                    parameters::minus_step},
+          .answers = {json_answer("The sample and its values.", "probe")},
+          .problems = {404, 422, 507}};
+}
+
+Operation count_values() {
+  return {.id = "countValues",
+          .group = values_group,
+          .summary = "Histogram of a field",
+          .query = {parameters::bins, parameters::range, parameters::clip, parameters::log,
+                    parameters::step, parameters::minus, parameters::minus_step},
+          .answers = {json_answer("The counts.", "histogram")},
+          .problems = {404, 422, 507}};
+}
+
+Operation read_series() {
+  return {.id = "readSeries",
+          .group = values_group,
+          .summary = "A field at one position over all steps",
+          .query = {parameters::x, parameters::y, parameters::z, parameters::height_field,
+                    parameters::index, parameters::minus, parameters::minus_step},
+          .answers = {json_answer("One value a step.", "series")},
+          .problems = {404, 413, 422, 507}};
+}
+
+Operation read_range() {
+  return {
+      .id = "readRange",
+      .group = values_group,
+      .summary = "Range of a field at a step, or at all steps",
+      .query = {parameters::range_of, parameters::step, parameters::minus, parameters::minus_step},
+      .answers = {json_answer("The range; of a step with the samples of its ends.", "fieldRange")},
+      .problems = {404, 413, 422, 507}};
+}
+
+Operation read_range_in_view() {
+  return {.id = "readRangeInView",
+          .group = values_group,
+          .summary = "Range of a field at the step and in the region of a view",
+          .body = view_body("The view; its dataset is that of the path."),
+          .answers = {json_answer("The range with the samples of its ends.", "fieldRange")},
+          .problems = {404, 422, 507}};
+}
+
+}  // namespace windsplat::api::operations
