@@ -17,8 +17,8 @@
 
 #include "protocol/limits.hpp"
 #include "protocol/view.hpp"
+#include "server/api/measure/positions.hpp"
 #include "server/api/operations/parameters.hpp"
-#include "server/api/positions.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/model/measure.hpp"
 #include "server/http/problem.hpp"

@@ -1,5 +1,5 @@
 // A position -> the nearest sample, with the heights of a view.
-#include "server/api/positions.hpp"
+#include "server/api/measure/positions.hpp"
 
 #include <charconv>
 #include <string_view>

@@ -7,7 +7,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/measurements.hpp"
-#include "server/api/positions.hpp"
+#include "server/api/measure/positions.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/model/measure.hpp"
 #include "server/http/problem.hpp"
