@@ -62,6 +62,8 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(host_parts ${SYSTEM_PYTHON} tests/integration/host_parts.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(addresses ${SYSTEM_PYTHON} tests/integration/addresses.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(hardening python3 tests/tidy/check_hardening.py $<TARGET_FILE:windsplat>)

@@ -66,6 +66,10 @@ void post_range(tasks::Backend& backend, const std::string& id, const std::strin
 
 void get_frame(tasks::Backend& backend, access::Admission& admission, frame::Format format,
                const std::string& id, const http::Request& request, http::Reply reply);
+// The picture of a saved view, with the same parameters.
+void get_view_frame(tasks::Backend& backend, access::Admission& admission,
+                    const views::SavedViews& views, frame::Format format, const std::string& id,
+                    const http::Request& request, http::Reply reply);
 void post_frame(tasks::Backend& backend, access::Admission& admission, const http::Request& request,
                 http::Reply reply);
 

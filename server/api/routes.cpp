@@ -1,5 +1,7 @@
 #include "server/api/routes.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <type_traits>
 #include <utility>
 
@@ -56,6 +58,44 @@ constexpr frame::Format npy = frame::Format::npy;
 constexpr frame::Format pdf = frame::Format::pdf;
 constexpr frame::Format svg = frame::Format::svg;
 constexpr const char* frame_name = "/v1/datasets/{id}/frame";
+constexpr const char* view_frame_name = "/v1/views/{id}/frame";
+
+// Pictures at addresses of their own, in every format.
+std::vector<Route> frame_routes(tasks::Backend& backend, access::Admission& admission,
+                                const views::SavedViews& views) {
+  return {
+      Route{"GET", "/v1/datasets/{id}/frame.jpg", operations::draw_dataset(jpeg),
+            later(get_frame, backend, admission, jpeg), Charge::valid_picture, Place::base,
+            frame_name},
+      Route{"GET", "/v1/datasets/{id}/frame.png", operations::draw_dataset(png),
+            later(get_frame, backend, admission, png), Charge::valid_picture, Place::base,
+            frame_name},
+      Route{"GET", "/v1/datasets/{id}/frame.npy", operations::draw_dataset(npy),
+            later(get_frame, backend, admission, npy), Charge::valid_picture, Place::base,
+            frame_name},
+      Route{"GET", "/v1/datasets/{id}/frame.pdf", operations::draw_dataset(pdf),
+            later(get_frame, backend, admission, pdf), Charge::valid_picture, Place::base,
+            frame_name},
+      Route{"GET", "/v1/datasets/{id}/frame.svg", operations::draw_dataset(svg),
+            later(get_frame, backend, admission, svg), Charge::valid_picture, Place::base,
+            frame_name},
+      Route{"GET", "/v1/views/{id}/frame.jpg", operations::draw_saved_view(jpeg),
+            later(get_view_frame, backend, admission, views, jpeg), Charge::valid_picture,
+            Place::base, view_frame_name},
+      Route{"GET", "/v1/views/{id}/frame.png", operations::draw_saved_view(png),
+            later(get_view_frame, backend, admission, views, png), Charge::valid_picture,
+            Place::base, view_frame_name},
+      Route{"GET", "/v1/views/{id}/frame.npy", operations::draw_saved_view(npy),
+            later(get_view_frame, backend, admission, views, npy), Charge::valid_picture,
+            Place::base, view_frame_name},
+      Route{"GET", "/v1/views/{id}/frame.pdf", operations::draw_saved_view(pdf),
+            later(get_view_frame, backend, admission, views, pdf), Charge::valid_picture,
+            Place::base, view_frame_name},
+      Route{"GET", "/v1/views/{id}/frame.svg", operations::draw_saved_view(svg),
+            later(get_view_frame, backend, admission, views, svg), Charge::valid_picture,
+            Place::base, view_frame_name},
+  };
+}
 
 }  // namespace
 
@@ -68,7 +108,7 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
   metrics::Metrics& metrics = backend.metrics;
   views::SavedViews& views = *options.views;
   const std::string& base_path = options.base_path;
-  return {
+  std::vector<Route> rows{
       Route{"GET", "/livez", operations::read_live(), at_once(get_livez), Charge::none,
             Place::root},
       Route{"GET", "/readyz", operations::read_ready(), at_once(get_readyz, draining), Charge::none,
@@ -112,21 +152,6 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
             later(get_dataset, catalogue, loads)},
       Route{"DELETE", "/v1/datasets/{id}", operations::release_dataset(),
             at_once(delete_dataset, catalogue)},
-      Route{"GET", "/v1/datasets/{id}/frame.jpg", operations::draw_dataset(jpeg),
-            later(get_frame, backend, admission, jpeg), Charge::valid_picture, Place::base,
-            frame_name},
-      Route{"GET", "/v1/datasets/{id}/frame.png", operations::draw_dataset(png),
-            later(get_frame, backend, admission, png), Charge::valid_picture, Place::base,
-            frame_name},
-      Route{"GET", "/v1/datasets/{id}/frame.npy", operations::draw_dataset(npy),
-            later(get_frame, backend, admission, npy), Charge::valid_picture, Place::base,
-            frame_name},
-      Route{"GET", "/v1/datasets/{id}/frame.pdf", operations::draw_dataset(pdf),
-            later(get_frame, backend, admission, pdf), Charge::valid_picture, Place::base,
-            frame_name},
-      Route{"GET", "/v1/datasets/{id}/frame.svg", operations::draw_dataset(svg),
-            later(get_frame, backend, admission, svg), Charge::valid_picture, Place::base,
-            frame_name},
       Route{"GET", "/v1/datasets/{id}/probe", operations::probe_fields(),
             later(get_probe, catalogue, loads), Charge::picture},
       Route{"GET", "/v1/datasets/{id}/fields/{field}/histogram", operations::count_values(),
@@ -138,6 +163,8 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
       Route{"POST", "/v1/datasets/{id}/fields/{field}/range", operations::read_range_in_view(),
             later(post_range, backend), Charge::picture},
   };
+  std::ranges::move(frame_routes(backend, admission, views), std::back_inserter(rows));
+  return rows;
 }
 
 }  // namespace windsplat::api

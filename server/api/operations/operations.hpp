@@ -23,6 +23,7 @@ Operation read_asyncapi_page();
 // pictures.cpp
 Operation draw_view();
 Operation draw_dataset(frame::Format format);
+Operation draw_saved_view(frame::Format format);
 Operation forecast_view();
 Operation pick_feature();
 Operation draw_reference();

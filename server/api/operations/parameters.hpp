@@ -30,6 +30,17 @@ inline constexpr Parameter dpi{"dpi", Kind::number,
                                "Pixels to the inch: sets the size of PDF and SVG on paper, and is "
                                "written into PNG; JPEG and NPY have none and refuse it.",
                                frame::dots_per_inch_min, frame::dots_per_inch_max};
+inline constexpr Parameter time{"datetime", Kind::text,
+                                "Time of a step (RFC 3339), instead of its number."};
+inline constexpr Parameter nearest{
+    "nearest", Kind::boolean, "Whether the step nearest to datetime may have another time.", 0,
+    0,         "false"};
+inline constexpr Parameter drawn_fields{
+    "field", Kind::names, "The fields that are drawn, and no others: at most one vector."};
+inline constexpr Parameter color_map{"colormap", Kind::text,
+                                     "Name of a colour map, as listed by /v1/colormaps."};
+inline constexpr Parameter annotate{
+    "annotate", Kind::names, "true, false, or the annotations that are drawn, and no others."};
 inline constexpr Parameter pixel_x{
     "x", Kind::number, "Pixels from the left edge of the picture.", 0, limits::image_edge_max, "",
     {},  true};

@@ -16,25 +16,47 @@ Answer picture(MediaTypes media) {
 }
 
 struct FormatWords {
-  std::string_view id;
-  std::string_view summary;
+  std::string_view dataset_id;
+  std::string_view view_id;
+  std::string_view dataset_summary;
+  std::string_view view_summary;
   std::string_view media;
 };
 
 FormatWords words_of(frame::Format format) {
   switch (format) {
     case frame::Format::jpeg:
-      return {"drawJpeg", "A dataset as JPEG", "image/jpeg"};
+      return {"drawJpeg", "drawViewJpeg", "A dataset as JPEG", "A saved view as JPEG",
+              "image/jpeg"};
     case frame::Format::png:
-      return {"drawPng", "A dataset as PNG", "image/png"};
+      return {"drawPng", "drawViewPng", "A dataset as PNG", "A saved view as PNG", "image/png"};
     case frame::Format::npy:
-      return {"drawNpy", "A dataset as an array of linear premultiplied RGBA", "application/x-npy"};
+      return {"drawNpy", "drawViewNpy", "A dataset as an array of linear premultiplied RGBA",
+              "A saved view as an array of linear premultiplied RGBA", "application/x-npy"};
     case frame::Format::pdf:
-      return {"drawPdf", "A dataset as PDF", "application/pdf"};
+      return {"drawPdf", "drawViewPdf", "A dataset as PDF", "A saved view as PDF",
+              "application/pdf"};
     case frame::Format::svg:
-      return {"drawSvg", "A dataset as SVG", "image/svg+xml"};
+      return {"drawSvg", "drawViewSvg", "A dataset as SVG", "A saved view as SVG", "image/svg+xml"};
   }
   return {};
+}
+
+// The picture of a view, changed by the parameters of an address.
+Operation draw_address(frame::Format format) {
+  Operation out{.group = pictures_group,
+                .query = {parameters::width, parameters::height, parameters::azimuth,
+                          parameters::elevation, parameters::zoom, parameters::step,
+                          parameters::time, parameters::nearest, parameters::drawn_fields,
+                          parameters::color_map, parameters::annotate, parameters::preset},
+                .answers = {picture({words_of(format).media}), not_modified()},
+                .problems = {404, 413, 422, 507}};
+  if (format == frame::Format::jpeg) {
+    out.query.push_back(parameters::quality);
+  } else if (format != frame::Format::npy) {
+    out.query.push_back(parameters::dpi);
+  }
+  return out;
 }
 
 }  // namespace
@@ -53,21 +75,18 @@ Operation draw_view() {
 }
 
 Operation draw_dataset(frame::Format format) {
-  const FormatWords words = words_of(format);
-  Operation out{
-      .id = words.id,
-      .group = pictures_group,
-      .summary = words.summary,
-      .description = "The default view of the dataset, from a chosen side.",
-      .query = {parameters::width, parameters::height, parameters::azimuth, parameters::elevation,
-                parameters::zoom, parameters::step, parameters::preset},
-      .answers = {picture({words.media}), not_modified()},
-      .problems = {404, 413, 422, 507}};
-  if (format == frame::Format::jpeg) {
-    out.query.push_back(parameters::quality);
-  } else if (format != frame::Format::npy) {
-    out.query.push_back(parameters::dpi);
-  }
+  Operation out = draw_address(format);
+  out.id = words_of(format).dataset_id;
+  out.summary = words_of(format).dataset_summary;
+  out.description = "The default view of the dataset, changed by the parameters.";
+  return out;
+}
+
+Operation draw_saved_view(frame::Format format) {
+  Operation out = draw_address(format);
+  out.id = words_of(format).view_id;
+  out.summary = words_of(format).view_summary;
+  out.description = "The saved view, changed by the parameters.";
   return out;
 }
 

@@ -1,12 +1,12 @@
-// Pictures: a query or a posted view becomes a render job; the response has the encoded picture and
-// its report.
+// Pictures: a query, a saved or a posted view becomes a render job; the response has the encoded
+// picture and its report.
 #include <algorithm>
 #include <array>
 #include <functional>
 #include <utility>
 
 #include "protocol/codec.hpp"
-#include "server/api/operations/parameters.hpp"
+#include "server/api/pictures/frame_query.hpp"
 #include "server/api/resources.hpp"
 #include "server/frame/frame_info.hpp"
 #include "server/http/negotiate.hpp"
@@ -24,24 +24,6 @@
 
 namespace windsplat::api {
 namespace {
-
-constexpr int jpeg_quality_default = 90;
-
-struct Orbit {
-  double azimuth = scene::default_azimuth;
-  double elevation = scene::default_elevation;
-  double zoom = 1;
-};
-
-// The request, validated as far as possible without loading data.
-struct Picture {
-  protocol::View view;
-  frame::Encoding encoding;
-  std::string preset;  // nullopt: none
-  std::optional<Orbit> orbit;
-  std::string if_none_match;
-  frame::Cost cost;  // cost of the view before preset and orbit, which change only the camera
-};
 
 std::string_view media_type(frame::Format format) {
   switch (format) {
@@ -312,47 +294,18 @@ void submit_picture(tasks::Backend& backend, access::Admission& admission, Pictu
   }
 }
 
-// --- GET /v1/datasets/{id}/frame.* --------------------------------------------------------------
-
-std::optional<Orbit> read_orbit(http::QueryReader& query) {
-  const auto azimuth = read_number(query, parameters::azimuth);
-  const auto elevation = read_number(query, parameters::elevation);
-  const auto zoom = read_number(query, parameters::zoom);
-  if (!azimuth && !elevation && !zoom) return std::nullopt;
-  Orbit orbit;
-  orbit.azimuth = azimuth.value_or(orbit.azimuth);
-  orbit.elevation = elevation.value_or(orbit.elevation);
-  orbit.zoom = zoom.value_or(orbit.zoom);
-  return orbit;
-}
-
-// The size on paper, of the formats that tell one: for others the parameter is unknown.
-std::optional<double> read_dots_per_inch(http::QueryReader& query, frame::Format format) {
-  if (format == frame::Format::jpeg || format == frame::Format::npy) return std::nullopt;
-  return read_number(query, parameters::dpi);
-}
-
-Result<Picture> read_query(const http::Request& request, frame::Format format) {
-  http::QueryReader query(request.query);
-  Picture picture;
-  picture.encoding.format = format;
-  picture.encoding.quality = jpeg_quality_default;
-  picture.encoding.describe = true;
-  const auto step = query.integer(parameters::step.name);
-  const auto width = query.integer(parameters::width.name);
-  const auto height = query.integer(parameters::height.name);
-  picture.orbit = read_orbit(query);
-  picture.preset = read_text(query, parameters::preset).value_or("");
-  if (format == frame::Format::jpeg) {
-    picture.encoding.quality =
-        read_integer(query, parameters::quality).value_or(jpeg_quality_default);
+// Requests that are refused do not count as a picture of the address.
+void check_and_submit(tasks::Backend& backend, access::Admission& admission, Picture picture,
+                      std::shared_ptr<data::Dataset> dataset, const http::Request& request,
+                      http::Reply reply) {
+  auto checked = backend.check(picture.view);
+  if (!checked) {
+    reply(http::problem_response(checked.error()));
+    return;
   }
-  picture.encoding.dots_per_inch = read_dots_per_inch(query, format);
-  if (const auto ok = query.finish(); !ok) return ok.error();
-  const auto document = protocol::ViewDocument::parse(protocol::view_text(step, width, height));
-  if (!document) return document.error();
-  picture.view = document->view();
-  return picture;
+  picture.cost = std::move(checked->cost);
+  submit_picture(backend, admission, std::move(picture), std::move(dataset), request,
+                 std::move(reply));
 }
 
 // --- POST /v1/frames ----------------------------------------------------------------------------
@@ -383,20 +336,34 @@ void get_frame(tasks::Backend& backend, access::Admission& admission, frame::For
     reply(http::problem_response(make_error(ErrorKind::not_found, dataset.error().message)));
     return;
   }
-  auto picture = read_query(request, format);
+  auto picture = read_picture(request, format, protocol::ViewDocument(), (*dataset)->info());
   if (!picture) {
     reply(http::problem_response(picture.error()));
     return;
   }
   picture->view.dataset = id;
-  auto checked = backend.check(picture->view);
-  if (!checked) {
-    reply(http::problem_response(checked.error()));
-    return;
+  check_and_submit(backend, admission, std::move(*picture), std::move(*dataset), request,
+                   std::move(reply));
+}
+
+void get_view_frame(tasks::Backend& backend, access::Admission& admission,
+                    const views::SavedViews& views, frame::Format format, const std::string& id,
+                    const http::Request& request, http::Reply reply) {
+  const auto refuse = [&](const Error& error) { reply(http::problem_response(error)); };
+  const auto saved = views.find(id);
+  if (!saved) return refuse(saved.error());
+  const protocol::View view = saved->view.view();
+  if (view.dataset.empty()) {
+    return refuse(make_error_at(ErrorKind::invalid, "/dataset", "the saved view names no dataset"));
   }
-  picture->cost = std::move(checked->cost);
-  submit_picture(backend, admission, std::move(*picture), std::move(*dataset), request,
-                 std::move(reply));
+  const auto of = backend.catalogue.find(view.dataset);
+  if (!of) return refuse(make_error(ErrorKind::not_found, of.error().message));
+  auto picture = read_picture(request, format, saved->view, (*of)->info());
+  if (!picture) return refuse(picture.error());
+  auto dataset = tasks::find_shown(backend.catalogue, picture->view);
+  if (!dataset) return refuse(dataset.error());
+  check_and_submit(backend, admission, std::move(*picture), std::move(*dataset), request,
+                   std::move(reply));
 }
 
 void post_frame(tasks::Backend& backend, access::Admission& admission, const http::Request& request,

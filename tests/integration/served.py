@@ -1,0 +1,70 @@
+"""A daemon on a free port of this machine, and requests to it."""
+import http.client
+import json
+import subprocess
+import time
+import urllib.parse
+
+
+class Answer:
+    def __init__(self, response):
+        self.status = response.status
+        self.headers = response.headers
+        self.body = response.read()
+
+    def json(self):
+        return json.loads(self.body)
+
+    def detail(self):
+        """Status and detail of a problem; the invalid values follow."""
+        problem = self.json()
+        return self.status, problem.get("detail", "") + "".join(
+            f' {one["pointer"]} {one["detail"]}' for one in problem.get("errors", []))
+
+
+class Daemon:
+    def __init__(self, program, *arguments, log=subprocess.DEVNULL):
+        self.process = subprocess.Popen(
+            [program, "serve", *map(str, arguments), "--listen", "127.0.0.1:0"],
+            stdout=subprocess.PIPE, stderr=log, text=True)
+        self.root = self.process.stdout.readline().strip()
+        self.host = urllib.parse.urlsplit(self.root).netloc
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.end()
+
+    def end(self):
+        self.process.terminate()
+        try:
+            self.process.communicate(timeout=30)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.communicate()
+
+    def ask(self, method, path, body=None, headers=None):
+        client = http.client.HTTPConnection(self.host, timeout=60)
+        try:
+            client.request(method, path, body, headers or {})
+            return Answer(client.getresponse())
+        finally:
+            client.close()
+
+    def get(self, path, **headers):
+        return self.ask("GET", path, headers={name.replace("_", "-"): value
+                                              for name, value in headers.items()})
+
+    def post(self, path, document):
+        return self.ask("POST", path, json.dumps(document), {"Content-Type": "application/json"})
+
+    def finished(self, job, seconds=30):
+        """The state of a job, by its location, once it has ended."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            state = self.get(job).json()
+            if state["state"] not in ("queued", "running"):
+                return state
+            time.sleep(0.02)
+        raise AssertionError(state)
