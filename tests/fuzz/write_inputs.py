@@ -78,6 +78,7 @@ TARGETS = [
     "/v1/datasets/climate/frame.svg?field=wind,cloud&colormap=magma&annotate=box,title&dpi=72",
     "/v1/views/0123456789/frame.png?step=1&annotate=true",
     "/v1/datasets/climate/probe?x=1&y=2&z=3&step=0",
+    "/v1/datasets/climate/probe?lon=1&lat=2&level=500",
     "/v1/datasets/climate/probe?index=1,2,3&minus=tornado&minusStep=0&fields=wind,cloud",
     "/v1/datasets/climate/fields/wind/histogram?bins=8&range=0,1&log=true&clip=0.1&step=1",
     "/v1/datasets/climate/fields/wind/series?x=1&y=2&z=3",

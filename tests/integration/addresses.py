@@ -50,6 +50,22 @@ def write_globe(path, calendar="standard", since="2001-02-28"):
             variable[:] = rng.random(shape) * (1 if name == "cloud" else 20)
 
 
+def write_columns(path):
+    """A map whose columns have longitudes and latitudes of their own."""
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("y", 9)
+        file.createDimension("x", 12)
+        rows, columns = np.meshgrid(np.arange(9), np.arange(12), indexing="ij")
+        for name, units, values in (("lat", "degrees_north", 48 + 0.5 * rows + 0.1 * columns),
+                                    ("lon", "degrees_east", 10 + 0.5 * columns - 0.1 * rows)):
+            axis = file.createVariable(name, "f8", ("y", "x"))
+            axis.units = units
+            axis[:] = values
+        variable = file.createVariable("t", "f4", ("y", "x"))
+        variable.units, variable.coordinates = "K", "lon lat"
+        variable[:] = rows * 100 + columns
+
+
 class Addresses(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -246,6 +262,69 @@ class Addresses(unittest.TestCase):
         same = self.daemon.get(f"/v1/datasets/globe/frame.png?{SIZE}&datetime=2001-03-01",
                                If_None_Match=tag)
         self.assertEqual(same.status, 304)
+
+
+class Probes(unittest.TestCase):
+    """Positions as longitude, latitude and level."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(prefix="windsplat-probes-")
+        folder = pathlib.Path(cls.folder.name)
+        write_globe(folder / "globe.nc")
+        write_columns(folder / "rotated.nc")
+        with netCDF4.Dataset(folder / "globe.nc") as file:
+            cls.t = np.array(file["t"][:])
+        cls.daemon = Daemon(PROGRAM, folder / "globe.nc", folder / "rotated.nc", "tornado")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.daemon.end()
+        cls.folder.cleanup()
+
+    def probe(self, dataset, query):
+        return self.daemon.get(f"/v1/datasets/{dataset}/probe?{query}")
+
+    def test_the_sample_is_the_nearest_one_of_the_file(self):
+        for longitude, latitude, level in ((31, -14, 690), (-17, 44, 1000), (355, 71, 410)):
+            answer = self.probe("globe", f"lon={longitude}&lat={latitude}&level={level}&step=2")
+            self.assertEqual(answer.status, 200, answer.body)
+            x = np.argmin(np.abs((LONGITUDES - longitude + 180) % 360 - 180))
+            y = np.argmin(np.abs(LATITUDES - latitude))
+            z = np.argmin(np.abs(np.array(LEVELS) - level))
+            value = answer.json()["values"]["t"]["value"]
+            self.assertEqual(np.float32(value), self.t[2, z, y, x])
+            self.assertEqual(answer.body, self.probe(
+                "globe", f"x={longitude}&y={latitude}&z={level}&step=2").body)
+
+    def test_a_series_takes_them_too(self):
+        answer = self.daemon.get("/v1/datasets/globe/fields/t/series?lon=30&lat=-15&level=700")
+        self.assertEqual(answer.status, 200, answer.body)
+        self.assertTrue(np.array_equal(np.float32(answer.json()["values"]), self.t[:, 1, 4, 2]))
+
+    def test_columns_of_a_curved_grid_have_longitudes(self):
+        by_name = self.probe("rotated", "lon=12.1&lat=50.9")
+        self.assertEqual(by_name.status, 200, by_name.body)
+        self.assertEqual(by_name.body, self.probe("rotated", "x=12.1&y=50.9").body)
+
+    def test_data_without_longitudes_refuse_them(self):
+        for query in ("lon=0&lat=0&level=0", "lat=0&x=0&z=0"):
+            status, detail = self.probe("tornado", query).detail()
+            self.assertEqual(status, 422)
+            self.assertIn("no longitudes and latitudes", detail)
+            self.assertIn("'x' and 'y'", detail)
+        self.assertEqual(self.probe("tornado", "x=0&y=0&level=0.1").body,
+                         self.probe("tornado", "x=0&y=0&z=0.1").body)
+
+    def test_positions_that_contradict_are_refused(self):
+        for query, text in (("lon=0&x=0&lat=0&level=700", "'x' and 'lon'"),
+                            ("index=0,0,0&lat=0", "mutually exclusive"),
+                            ("lon=0&lat=91&level=700", "'lat' must be -90 to 90"),
+                            ("lon=0&lat=0&level=700&heightField=t", "'level'"),
+                            ("lon=0&level=700", "y is required")):
+            status, detail = self.probe("globe", query).detail()
+            self.assertEqual(status, 422, query)
+            self.assertIn(text, detail)
 
 
 def main():

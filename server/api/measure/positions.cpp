@@ -25,9 +25,58 @@ Result<std::shared_ptr<const data::Volume>> load_field(tasks::Catalogue& catalog
 
 namespace {
 
-std::array<std::optional<double>, 3> read_place(http::QueryReader& query) {
-  return {read_number(query, parameters::x), read_number(query, parameters::y),
-          read_number(query, parameters::z)};
+struct PlaceQuery {
+  std::array<std::optional<double>, 3> axes;        // x, y, z
+  std::array<std::optional<double>, 3> geographic;  // lon, lat, level
+};
+constexpr std::array<std::string_view, 3> axis_names{"x", "y", "z"};
+constexpr std::array<std::string_view, 3> geographic_names{"lon", "lat", "level"};
+
+PlaceQuery read_place(http::QueryReader& query) {
+  return {{read_number(query, parameters::x), read_number(query, parameters::y),
+           read_number(query, parameters::z)},
+          {read_number(query, parameters::longitude), read_number(query, parameters::latitude),
+           read_number(query, parameters::level)}};
+}
+
+bool is_given(const std::array<std::optional<double>, 3>& place) {
+  return place[0] || place[1] || place[2];
+}
+
+std::string described(const data::Axis& axis) {
+  std::string text = "'" + printable(axis.name, 60) + "'";
+  if (!axis.units.empty()) text += " in " + printable(axis.units, 40);
+  return text;
+}
+
+// lon, lat and level are x, y and z of data whose columns have longitude and latitude. Errors:
+// invalid, also if both are given.
+Result<std::array<std::optional<double>, 3>> place_along_axes(const PlaceQuery& place,
+                                                              const data::Grid& grid,
+                                                              bool has_heights) {
+  const auto refuse = [](const std::string& why) { return make_error(ErrorKind::invalid, why); };
+  auto out = place.axes;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (!place.geographic.at(a)) continue;
+    if (out.at(a)) {
+      return refuse("query parameters '" + std::string(axis_names.at(a)) + "' and '" +
+                    std::string(geographic_names.at(a)) + "' are mutually exclusive");
+    }
+    out.at(a) = place.geographic.at(a);
+  }
+  if ((place.geographic[0] || place.geographic[1]) && !is_geographic(grid)) {
+    return refuse(
+        "query parameters 'lon' and 'lat': the data have no longitudes and latitudes; "
+        "their axes are " +
+        described(grid.axes[0]) + " and " + described(grid.axes[1]) +
+        ", of which 'x' and 'y' are coordinates");
+  }
+  if (place.geographic[2] && has_heights) {
+    return refuse(
+        "query parameter 'level' is a coordinate of the vertical axis; with "
+        "'heightField' the height is 'z'");
+  }
+  return out;
 }
 
 // "i,j,k"
@@ -46,13 +95,25 @@ std::optional<std::array<int, 3>> indices_in(std::string_view text) {
 
 }  // namespace
 
+bool is_geographic(const data::Grid& grid) {
+  const auto& [x, y, z] = grid.axes;
+  return grid.columns || (x.kind == data::AxisKind::longitude && !x.units.starts_with("rad") &&
+                          y.kind == data::AxisKind::latitude && !y.units.starts_with("rad"));
+}
+
 Result<Position> read_position(http::QueryReader& query, const data::Grid& grid) {
-  Position out{read_place(query), {}, read_text(query, parameters::height_field)};
+  const PlaceQuery place = read_place(query);
+  Position out{{}, {}, read_text(query, parameters::height_field)};
   const auto index = read_text(query, parameters::index);
-  if (!index) return out;
-  if (out.at[0] || out.at[1] || out.at[2]) {
+  if (!index) {
+    const auto at = place_along_axes(place, grid, out.height_field.has_value());
+    if (!at) return at.error();
+    out.at = *at;
+    return out;
+  }
+  if (is_given(place.axes) || is_given(place.geographic)) {
     return make_error(ErrorKind::invalid,
-                      "query parameters 'index' and 'x', 'y', 'z' are mutually exclusive");
+                      "query parameters 'index' and those of coordinates are mutually exclusive");
   }
   out.index = indices_in(*index);
   if (!out.index) {

@@ -25,8 +25,12 @@ struct Position {
   std::optional<std::string> height_field;
 };
 
-// Errors: malformed or invalid, also those of other parameters of the query.
+// The parameters x, y, z or lon, lat, level; or index. Errors: malformed or invalid, also lon and
+// lat of data without them; those of other parameters remain in the query.
 Result<Position> read_position(http::QueryReader& query, const data::Grid& grid);
+
+// Whether every column has a longitude and a latitude in degrees.
+bool is_geographic(const data::Grid& grid);
 
 struct Located {
   data::Place place;

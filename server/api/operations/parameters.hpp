@@ -64,6 +64,12 @@ inline constexpr Parameter z{
     "z", Kind::number,
     "Coordinate of the vertical axis; with heightField a height in the unit of that field.",
     -limits::coordinate_max, limits::coordinate_max};
+inline constexpr Parameter longitude{
+    "lon", Kind::number, "Degrees; refused where columns have no longitudes.", -360, 360};
+inline constexpr Parameter latitude{"lat", Kind::number,
+                                    "Degrees; refused where columns have no latitudes.", -90, 90};
+inline constexpr Parameter level{"level", Kind::number, "Coordinate of the vertical axis, as z.",
+                                 -limits::coordinate_max, limits::coordinate_max};
 inline constexpr Parameter index{
     "index", Kind::indices,
     "Sample i,j,k, counted from 0 at the west, south and bottom, instead of x, y and z."};
