@@ -147,3 +147,5 @@ else()
 endif()
 windsplat_fault_test(table faults.py --slack=${fault_slack})
 windsplat_fault_test(signals signals.py --slack=${fault_slack})
+
+include(${CMAKE_CURRENT_LIST_DIR}/clients/python.cmake)

@@ -1,0 +1,139 @@
+"""Starts and ends the program `windsplat serve` for a client on the same machine."""
+from __future__ import annotations
+
+import collections
+import os
+import pathlib
+import queue
+import shutil
+import subprocess
+import threading
+import time
+import weakref
+from typing import IO, Any, Mapping, Sequence
+
+from .errors import StartFailed
+
+LOG_LINES = 200
+
+
+def find_program(program: str | os.PathLike[str] | None = None) -> str:
+    """The program: the argument, $WINDSPLAT, or `windsplat` in PATH. Raises StartFailed."""
+    named = (("argument program", program), ("$WINDSPLAT", os.environ.get("WINDSPLAT")))
+    for source, name in named:
+        if name:
+            found = shutil.which(os.fspath(name))
+            if found is None:
+                raise StartFailed(f"{source}: '{os.fspath(name)}' is not a program")
+            return found
+    found = shutil.which("windsplat")
+    if found is None:
+        raise StartFailed(
+            "the program windsplat was not found in PATH: install it, name it by the environment "
+            "variable WINDSPLAT or the argument program, or use windsplat.connect(url)"
+        )
+    return found
+
+
+def arguments_of(options: Mapping[str, Any]) -> list[str]:
+    """Options of the command line: threads=2 is --threads 2, True a flag, a list repeats one."""
+    out: list[str] = []
+    for key, value in options.items():
+        name = "--" + key.replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            out.append(name)
+            continue
+        many = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+        for one in value if many else [value]:
+            out += [name, os.fspath(one) if isinstance(one, os.PathLike) else str(one)]
+    return out
+
+
+def _read_lines(pipe: IO[str], sink: Any) -> None:
+    with pipe:
+        for line in pipe:
+            sink(line.rstrip("\n"))
+    sink(None)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+class Process:
+    """A running `windsplat serve`, ended by close(), at exit, or when it is collected."""
+
+    def __init__(
+        self, program: str, files: Sequence[str], options: Mapping[str, Any], timeout: float
+    ) -> None:
+        command = [program, "serve", "--listen", "127.0.0.1:0", *arguments_of(options), *files]
+        # A group of its own, so that an interrupt of the notebook's kernel does not end it.
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=True,
+        )
+        self._process = process
+        self._lines: collections.deque[str] = collections.deque(maxlen=LOG_LINES)
+        self._finalizer = weakref.finalize(self, _end, process)
+        urls: queue.Queue[str | None] = queue.Queue()
+        lines = self._lines
+
+        def keep(line: str | None) -> None:
+            if line is not None:
+                lines.append(line)
+
+        assert process.stdout is not None and process.stderr is not None
+        reader = threading.Thread(target=_read_lines, args=(process.stderr, keep), daemon=True)
+        reader.start()
+        threading.Thread(
+            target=_read_lines, args=(process.stdout, urls.put), daemon=True
+        ).start()
+        self.url = self._wait_for_url(urls, reader, timeout)
+
+    def _wait_for_url(
+        self, urls: queue.Queue[str | None], reader: threading.Thread, timeout: float
+    ) -> str:
+        end = time.monotonic() + timeout
+        while True:
+            try:
+                line = urls.get(timeout=max(0.0, end - time.monotonic()))
+            except queue.Empty:
+                self.close()
+                raise StartFailed(f"windsplat serve was not ready after {timeout:g} s") from None
+            if line is None:
+                reader.join(5)
+                code = self._process.wait()
+                said = "\n".join(self._lines) or "without a message"
+                raise StartFailed(f"windsplat serve ended with exit code {code}: {said}")
+            if line.startswith("http"):
+                return line.strip()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def log(self) -> str:
+        """The last lines that the server wrote to its log."""
+        return "\n".join(self._lines)
+
+    def close(self) -> None:
+        self._finalizer()
+
+
+def is_below(path: pathlib.Path, folder: pathlib.Path) -> bool:
+    return path == folder or folder in path.parents

@@ -1,0 +1,281 @@
+"""A dataset of a server: its fields, axes and times, values at places, and views of it."""
+from __future__ import annotations
+
+import dataclasses
+import datetime
+from typing import TYPE_CHECKING, Any, Mapping
+
+from ._documents import suggestion
+from .errors import NotFound
+from .view import View
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from .server import Server
+
+
+@dataclasses.dataclass(frozen=True)
+class Field:
+    """A field that can be drawn or probed."""
+
+    name: str
+    kind: str
+    """scalar or vector."""
+    units: str
+    long_name: str
+    standard_name: str
+    components: tuple[str, ...]
+    derived: bool
+    """Whether the server computes it from others."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """A time step."""
+
+    index: int
+    value: float
+    """The coordinate, in the unit of the dataset's time axis."""
+    text: str
+    """The time as text, in UTC where the unit tells; else the value and its unit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Position:
+    """The sample that was read."""
+
+    index: tuple[int, int, int]
+    """Numbers of the sample along x, y and z, from 0 at the west, south and bottom."""
+    x: float
+    y: float
+    z: float
+    units: Mapping[str, str]
+
+
+@dataclasses.dataclass(frozen=True)
+class Probe:
+    """Values of the fields at a sample; None: masked."""
+
+    position: Position
+    step: int
+    values: Mapping[str, float | list[float] | None]
+    units: Mapping[str, str]
+
+    def __getitem__(self, field: str) -> float | list[float] | None:
+        return self.values[field]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Series:
+    """A field at a sample over all steps."""
+
+    position: Position
+    times: NDArray[Any]
+    """As Dataset.times."""
+    values: NDArray[np.float64]
+    """Shape (steps), of a vector (steps, 3); masked ones are NaN."""
+    units: str
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Histogram:
+    """Counts of the samples of a field at a step."""
+
+    counts: NDArray[np.int64]
+    edges: NDArray[np.float64]
+    """One more than counts."""
+    below: int
+    above: int
+    masked: int
+
+
+def _position(document: Mapping[str, Any]) -> Position:
+    index = document["index"]
+    return Position((index["x"], index["y"], index["z"]), document["x"], document["y"],
+                    document["z"], document.get("units", {}))
+
+
+class Dataset:
+    """A dataset that a server has opened."""
+
+    def __init__(self, server: Server, id: str) -> None:
+        self.server = server
+        self.id = id
+        self._description: dict[str, Any] | None = None
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """The whole description of the server (GET /v1/datasets/{id}), asked for once."""
+        if self._description is None:
+            self._description = self.server.http.get(f"v1/datasets/{_quoted(self.id)}")
+        assert self._description is not None
+        return self._description
+
+    def refresh(self) -> None:
+        """Forgets the description, for example after the files have changed."""
+        self._description = None
+
+    @property
+    def title(self) -> str:
+        return str(self.description.get("title", ""))
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Numbers of samples along z, y and x."""
+        dims = self.description["dims"]
+        return dims["z"], dims["y"], dims["x"]
+
+    @property
+    def fields(self) -> dict[str, Field]:
+        """Fields by name; derived ones too."""
+        return {one["name"]: Field(one["name"], one["kind"], one.get("units", ""),
+                                   one.get("longName", ""), one.get("standardName", ""),
+                                   tuple(one.get("components", ())), one["dtype"] == "derived")
+                for one in self.description["fields"]}
+
+    @property
+    def steps(self) -> list[Step]:
+        return [Step(index, one["value"], one["text"])
+                for index, one in enumerate(self.description["steps"]["times"])]
+
+    @property
+    def times(self) -> NDArray[Any]:
+        """The times of the steps as numpy's datetime64[ms], UTC; without dates float64
+        coordinates. Raises ValueError for dates that no other calendar has (30 February)."""
+        return self._as_times(self.description["steps"]["times"])
+
+    def _as_times(self, times: list[Mapping[str, Any]]) -> NDArray[Any]:
+        import numpy as np
+
+        if " since " not in (self.description.get("timeUnits") or ""):
+            return np.array([one["value"] for one in times], dtype=np.float64)
+        texts = [str(one["text"]).removesuffix("Z") for one in times]
+        try:
+            return np.array(texts, dtype="datetime64[ms]")
+        except ValueError as error:
+            raise ValueError(f"{self.id}: {error}: its calendar has dates that datetime64 has "
+                             "not; see dataset.steps") from None
+
+    def step_at(self, time: Any) -> int:
+        """The step nearest to a time: a text as 2001-01-01T06:00, datetime or datetime64; a
+        number where the steps have no dates."""
+        import numpy as np
+
+        times = self.times
+        if times.dtype.kind == "M":
+            if isinstance(time, datetime.datetime) and time.tzinfo is not None:
+                time = time.astimezone(datetime.timezone.utc).replace(tzinfo=None)
+            if isinstance(time, str):
+                time = time.removesuffix("Z")
+            distance = np.abs(times - np.datetime64(time, "ms"))
+        else:
+            distance = np.abs(times - float(time))
+        return int(np.argmin(distance))
+
+    def coordinates(self, axis: str) -> NDArray[np.float64]:
+        """The coordinates of the axis x, y or z, in its unit."""
+        import numpy as np
+
+        return np.array(self.description["axes"][axis]["coordinates"], dtype=np.float64)
+
+    @property
+    def default_view(self) -> dict[str, Any]:
+        """What keys of a view are if they are not set."""
+        view = self.description["defaultView"]
+        assert isinstance(view, dict)
+        return view
+
+    def view(
+        self, *, size: tuple[int, int] | None = None, step: int | None = None, **keys: Any
+    ) -> View:
+        """A view of the dataset. size: width and height, pixels; keys: parts of the document."""
+        out = View({"dataset": self.id}, dataset=self)
+        if size is not None:
+            out = out.size(*size)
+        if step is not None:
+            out = out.at(step)
+        return out.patch(keys) if keys else out
+
+    def probe(
+        self, x: float | None = None, y: float | None = None, z: float | None = None, *,
+        index: tuple[int, int, int] | None = None, step: int = 0,
+        fields: list[str] | None = None,
+    ) -> Probe:
+        """The value of every field at the sample nearest to a place in the coordinates of the
+        axes (longitude and latitude where there are), or with a number along each axis.
+        `fields` computes derived ones, too."""
+        document = self.server.http.get(
+            f"v1/datasets/{_quoted(self.id)}/probe", **_place(x, y, z, index), step=step,
+            fields=",".join(fields) if fields else None)
+        values = document["values"]
+        return Probe(_position(document["position"]), document["step"],
+                     {name: one["value"] for name, one in values.items()},
+                     {name: one.get("units", "") for name, one in values.items()})
+
+    def series(
+        self, field: str, x: float | None = None, y: float | None = None,
+        z: float | None = None, *, index: tuple[int, int, int] | None = None,
+    ) -> Series:
+        """A field at one place over all steps."""
+        import numpy as np
+
+        document = self.server.http.get(f"{self._field(field)}/series", **_place(x, y, z, index))
+        vector = self.fields[field].kind == "vector"
+        hole = [np.nan] * 3 if vector else np.nan
+        values = np.array([hole if one is None else one for one in document["values"]],
+                          dtype=np.float64)
+        return Series(_position(document["position"]), self._as_times(document["times"]), values,
+                      document.get("units", ""))
+
+    def histogram(
+        self, field: str, *, bins: int | None = None, range: tuple[float, float] | None = None,
+        step: int = 0,
+    ) -> Histogram:
+        """Counts of the values of a field at a step (of vectors of the magnitudes)."""
+        import numpy as np
+
+        ends = None if range is None else f"{range[0]!r},{range[1]!r}"
+        document = self.server.http.get(f"{self._field(field)}/histogram", bins=bins, range=ends,
+                                        step=step)
+        counts = np.array(document["counts"], dtype=np.int64)
+        low, high = document["range"]
+        return Histogram(counts, np.linspace(low, high, len(counts) + 1), document["below"],
+                         document["above"], document["masked"])
+
+    def range(self, field: str, *, step: int | None = None) -> tuple[float, float]:
+        """Least and greatest value of a field at a step; None: at all steps."""
+        document = self.server.http.get(f"{self._field(field)}/range", step=step,
+                                        of="all" if step is None else "step")
+        low, high = document["range"]
+        return low, high
+
+    def close(self, forget: bool = False) -> None:
+        """Releases the memory of the data at the server; `forget` removes the dataset from the
+        list."""
+        self.server.http.request("DELETE", f"v1/datasets/{_quoted(self.id)}",
+                                 params={"forget": "true"} if forget else None)
+
+    def _field(self, field: str) -> str:
+        if field not in self.fields:
+            raise NotFound(404, "Not Found", f"dataset '{self.id}' has no field '{field}': "
+                           + suggestion(field, list(self.fields)))
+        return f"v1/datasets/{_quoted(self.id)}/fields/{_quoted(field)}"
+
+    def __repr__(self) -> str:
+        return f"<Dataset '{self.id}' of {self.server.url}>"
+
+
+def _quoted(text: str) -> str:
+    import urllib.parse
+
+    return urllib.parse.quote(text, safe="")
+
+
+def _place(
+    x: float | None, y: float | None, z: float | None, index: tuple[int, int, int] | None
+) -> dict[str, Any]:
+    if index is not None:
+        return {"index": ",".join(str(int(one)) for one in index)}
+    return {"x": x, "y": y, "z": z}

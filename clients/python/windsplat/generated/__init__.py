@@ -1,0 +1,1 @@
+"""Written by generate_view_types.py."""

@@ -1,0 +1,215 @@
+"""Movies: pictures of several views in one file."""
+from __future__ import annotations
+
+import base64
+import concurrent.futures
+import contextlib
+import dataclasses
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import tempfile
+import zipfile
+import zlib
+from typing import Any, Callable, Iterable, Iterator, Mapping, Sequence
+
+from .errors import MovieFailed
+from .view import View
+
+CODECS: Mapping[str, Sequence[str]] = {
+    # Players expect 4:2:0, which needs even edges.
+    ".mp4": ("-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
+    ".webm": ("-c:v", "libvpx-vp9", "-crf", "30", "-b:v", "0", "-pix_fmt", "yuv420p"),
+}
+KINDS = {".mp4": "video/mp4", ".webm": "video/webm", ".apng": "image/png"}
+SUFFIXES = (*CODECS, ".apng", ".zip")
+PNG_START = b"\x89PNG\r\n\x1a\n"
+INLINE_BYTES_MAX = 20_000_000  # of a movie in the text of a notebook
+
+
+@dataclasses.dataclass(frozen=True)
+class Movie:
+    """A movie on disk. Jupyter plays it."""
+
+    path: pathlib.Path
+    frames: int
+    fps: float
+    width: int
+    height: int
+
+    def _repr_mimebundle_(
+        self, include: Any = None, exclude: Any = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        data: dict[str, Any] = {"text/plain": repr(self)}
+        kind = KINDS.get(self.path.suffix.lower())
+        if kind is None or self.path.stat().st_size > INLINE_BYTES_MAX:
+            return data, {}
+        text = base64.b64encode(self.path.read_bytes()).decode("ascii")
+        if kind == "image/png":
+            data[kind] = text
+            return data, {kind: {"width": self.width, "height": self.height}}
+        data["text/html"] = (f'<video controls loop width="{self.width}" height="{self.height}" '
+                             f'src="data:{kind};base64,{text}"></video>')
+        return data, {}
+
+
+def _png_of(view: View) -> bytes:
+    return view.frame("png").bytes
+
+
+def pictures(views: Iterable[View], workers: int) -> Iterator[bytes]:
+    """The pictures of views as PNG, in order; at most `workers` requests at a time."""
+    with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+        waiting: list[concurrent.futures.Future[bytes]] = []
+        try:
+            for view in views:
+                waiting.append(pool.submit(_png_of, view))
+                if len(waiting) > workers:
+                    yield waiting.pop(0).result()
+            while waiting:
+                yield waiting.pop(0).result()
+        finally:
+            for one in waiting:
+                one.cancel()
+
+
+def _chunks(png: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Types and contents of the chunks of a PNG file (ISO/IEC 15948, 5.3)."""
+    place = len(PNG_START)
+    while place < len(png):
+        (length,) = struct.unpack_from(">I", png, place)
+        yield png[place + 4 : place + 8], png[place + 8 : place + 8 + length]
+        place += length + 12
+
+
+def _size_of(png: bytes) -> tuple[int, int]:
+    """Width and height, which a PNG file begins with."""
+    width, height = struct.unpack_from(">II", png, 16)
+    return width, height
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def write_apng(path: pathlib.Path, count: int, frames: Iterator[bytes], fps: float) -> None:
+    """An animated PNG (PNG, third edition, 5.6 and 11.3.6): each picture is that of a frame; it
+    is repeated for ever. Other viewers show the first frame."""
+    delay = (max(1, round(1000 / fps)), 1000)  # numerator and denominator, seconds
+    serial = 0
+    with path.open("wb") as file:
+        for index, png in enumerate(frames):
+            parts = list(_chunks(png))
+            head = parts[0][1]
+            if index == 0:
+                first = head
+                file.write(PNG_START + _chunk(b"IHDR", head))
+                file.write(_chunk(b"acTL", struct.pack(">II", count, 0)))
+            elif head != first:
+                raise MovieFailed("the pictures of a movie have different sizes or colours")
+            width, height = struct.unpack_from(">II", head)
+            file.write(_chunk(b"fcTL", struct.pack(">IIIIIHHBB", serial, width, height, 0, 0,
+                                                   *delay, 0, 0)))
+            serial += 1
+            for kind, data in parts:
+                if kind == b"IDAT" and index == 0:
+                    file.write(_chunk(b"IDAT", data))
+                elif kind == b"IDAT":
+                    file.write(_chunk(b"fdAT", struct.pack(">I", serial) + data))
+                    serial += 1
+        file.write(_chunk(b"IEND", b""))
+
+
+def write_zip(path: pathlib.Path, count: int, frames: Iterator[bytes]) -> None:
+    """A ZIP of frame_0000.png and so on."""
+    digits = max(4, len(str(count - 1)))
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as file:
+        for index, png in enumerate(frames):
+            file.writestr(f"frame_{index:0{digits}d}.png", png)
+
+
+def write_video(path: pathlib.Path, suffix: str, frames: Iterator[bytes], fps: float,
+                program: str) -> None:
+    """Pictures encoded by the program ffmpeg."""
+    command = [program, "-loglevel", "error", "-y", "-f", "image2pipe", "-framerate", f"{fps:g}",
+               "-c:v", "png", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+               *CODECS[suffix], "-f", suffix[1:], os.fspath(path)]
+    with tempfile.TemporaryFile() as said:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said) as process:
+            assert process.stdin is not None
+            try:
+                with contextlib.suppress(BrokenPipeError):  # it says why below
+                    for png in frames:
+                        process.stdin.write(png)
+                with contextlib.suppress(BrokenPipeError):
+                    process.stdin.close()
+            except BaseException:
+                process.kill()
+                raise
+        if process.returncode != 0:
+            said.seek(0)
+            text = said.read().decode("utf-8", "replace").strip()[-500:]
+            raise MovieFailed(f"ffmpeg ended with exit code {process.returncode}: {text}")
+
+
+def movie(
+    path: str | os.PathLike[str], views: Iterable[View], fps: float = 12, *, workers: int = 2,
+    progress: Callable[[int, int], object] | None = None,
+) -> Movie:
+    """Writes the pictures of views, in order, as a movie.
+
+    path: .mp4 or .webm need the program ffmpeg; .apng (an animated PNG, which browsers and
+        Jupyter show) and .zip (PNG files) need nothing.
+    views: all of one size, for example view.turn(36).
+    workers: requests at a time, 1 to 16.
+    progress: called with the number of frames done and of all.
+
+    A file is only written if all frames could be drawn. Raises MovieFailed, and what
+    view.frame() raises.
+    """
+    out = pathlib.Path(path)
+    suffix = out.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ValueError(f"'{os.fspath(path)}' does not end in {', '.join(SUFFIXES)}")
+    if not 0.1 <= fps <= 120:
+        raise ValueError(f"fps must be 0.1 to 120, not {fps:g}")
+    if not 1 <= workers <= 16:
+        raise ValueError(f"workers must be 1 to 16, not {workers}")
+    every = list(views)
+    if not every:
+        raise ValueError("a movie needs at least one view")
+    program = None
+    if suffix in CODECS:
+        program = shutil.which("ffmpeg")
+        if program is None:
+            raise MovieFailed(f"the program ffmpeg, which writes {suffix}, was not found; "
+                              "install it or use .apng or .zip")
+    size = (0, 0)
+
+    def counted() -> Iterator[bytes]:
+        nonlocal size
+        for index, png in enumerate(pictures(every, workers)):
+            this = _size_of(png)
+            if index and this != size:
+                raise MovieFailed(f"frame {index} has {this[0]} x {this[1]} pixels, "
+                                  f"the first {size[0]} x {size[1]}")
+            size = this
+            yield png
+            if progress is not None:
+                progress(index + 1, len(every))
+
+    part = out.with_name(f".{out.name}.part")
+    try:
+        if suffix == ".apng":
+            write_apng(part, len(every), counted(), fps)
+        elif suffix == ".zip":
+            write_zip(part, len(every), counted())
+        else:
+            assert program is not None
+            write_video(part, suffix, counted(), fps, program)
+        part.replace(out)
+    finally:
+        part.unlink(missing_ok=True)
+    return Movie(out, len(every), fps, *size)

@@ -1,0 +1,239 @@
+"""The view: an immutable document that determines a picture, with methods that derive others."""
+from __future__ import annotations
+
+import copy
+import json
+import math
+import os
+import pathlib
+import urllib.parse
+from typing import TYPE_CHECKING, Any, Iterable, Literal, Mapping, Sequence, TypeVar
+
+from . import _camera
+from ._documents import at_pointer, check, merged, own_schema, plain
+from .errors import InvalidView
+from .frame import FORMATS, Format, Frame, Report, format_of
+from .generated.view_types import UNSET, ViewDocument, ViewParts
+
+if TYPE_CHECKING:
+    from .dataset import Dataset
+    from .jupyter import IFrame
+    from .movie import Movie
+
+SelfView = TypeVar("SelfView", bound="View")
+
+
+class View(ViewParts):
+    """Everything that determines a picture except its encoding.
+
+    A view is never changed: each method returns another one. Methods named like the parts of the
+    document (camera, image, geometry, ground, vector, scalars, surfaces, region, light, ...) set
+    some of their keys and keep the others; None returns a key to the default of the dataset.
+    """
+
+    def __init__(
+        self, document: ViewDocument | Mapping[str, Any] | None = None,
+        *, dataset: Dataset | None = None,
+    ) -> None:
+        self._document = plain(document or {})
+        self._dataset = dataset
+        try:
+            check(self._document, own_schema())
+        except InvalidView:
+            if dataset is None:
+                raise
+            check(self._document, dataset.server.view_schema)  # a newer server knows more keys
+
+    def _like(self: SelfView, document: Mapping[str, Any]) -> SelfView:
+        return type(self)(document, dataset=self._dataset)
+
+    def _merged(self: SelfView, key: str, given: Mapping[str, Any]) -> SelfView:
+        return self.patch({key: {name: one for name, one in given.items() if one is not UNSET}})
+
+    def _listed(self: SelfView, key: str, items: Sequence[Any]) -> SelfView:
+        return self.patch({key: [{"field": one} if isinstance(one, str) else one
+                                 for one in items]})
+
+    # --- documents -----------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """A copy of the document, with the keys that were set."""
+        document = copy.deepcopy(self._document)
+        assert isinstance(document, dict)
+        return document
+
+    def to_json(self, indent: int | None = 2) -> str:
+        """The document as text: what `windsplat render --view FILE` reads."""
+        return json.dumps(self._document, indent=indent)
+
+    @property
+    def dataset(self) -> Dataset:
+        """The dataset that is shown. Raises ValueError for a view of none."""
+        if self._dataset is None:
+            raise ValueError("this view belongs to no dataset: make it by dataset.view()")
+        return self._dataset
+
+    def get(self, pointer: str, default: Any = None) -> Any:
+        """The value at a JSON pointer such as /camera/eye; `default`: it is not set."""
+        value: Any = self._document
+        for key in pointer.split("/")[1:]:
+            if isinstance(value, list) and key.isdigit() and int(key) < len(value):
+                value = value[int(key)]
+            elif isinstance(value, dict) and key in value:
+                value = value[key]
+            else:
+                return default
+        return copy.deepcopy(value)
+
+    def patch(self: SelfView, patch: Mapping[str, Any]) -> SelfView:
+        """The view after a merge patch (RFC 7396): None removes a key, which returns it to its
+        default; except at /vector/field, where it means "draw no lines"."""
+        return self._like(merged(self._document, plain(patch)))
+
+    def set(self: SelfView, pointer: str | None = None, value: Any = None, **keys: Any) -> SelfView:
+        """The view with the value at a JSON pointer, set("/camera/fovY", 30), or with keys of the
+        document, set(step=3, image={"background": "#ffffff"})."""
+        out = self if pointer is None else self.patch(at_pointer(pointer, plain(value)))
+        return out.patch(keys) if keys else out
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, View) and self._document == other._document
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(self._document, sort_keys=True))
+
+    def __repr__(self) -> str:
+        return f"<View: {json.dumps(self._document)}>"
+
+    # --- shortcuts -----------------------------------------------------------------------------
+
+    def size(self: SelfView, width: int, height: int) -> SelfView:
+        """The view with a picture of this size, pixels."""
+        return self.patch({"image": {"width": width, "height": height}})
+
+    def at(self: SelfView, step: int | None = None, *, time: Any = None) -> SelfView:
+        """The view at a step, or at the step nearest to a time (text, datetime, datetime64)."""
+        if (step is None) == (time is None):
+            raise ValueError("give either step or time")
+        if step is None:
+            step = self.dataset.step_at(time)
+        return self.patch({"step": int(step)})
+
+    def look(
+        self: SelfView, azimuth: float = 0, elevation: float = 30, zoom: float = 1,
+        projection: Literal["perspective", "orthographic"] | None = UNSET,
+    ) -> SelfView:
+        """The view from a side, at the distance from which the box of the data, or of the region,
+        just fits the picture.
+
+        azimuth: degrees: 0 looks north, 90 west (from the east), as in the REST interface.
+        elevation: degrees of the eye above the horizon, -90 to 90.
+        zoom: above 1 closer.
+        """
+        keys = _camera.looking(self.dataset.description, self._document, azimuth, elevation, zoom)
+        if projection is not UNSET:
+            keys["projection"] = projection
+        return self.patch({"camera": keys})
+
+    def turn(self: SelfView, frames: int, degrees: float = 360) -> list[SelfView]:
+        """Views on a turn about the vertical axis through the target, for `windsplat.movie`. A
+        full turn ends one frame before its start, so that it can be repeated."""
+        eye, target = self.get("/camera/eye"), self.get("/camera/target")
+        if eye is None or target is None:
+            camera = self.dataset.default_view["camera"]
+            eye, target = eye or camera["eye"], target or camera["target"]
+        full = math.isclose(abs(degrees) % 360, 0, abs_tol=1e-9)
+        parts = frames if full else max(1, frames - 1)
+        x, y = eye[0] - target[0], eye[1] - target[1]
+        out = []
+        for index in range(frames):
+            angle = math.radians(degrees * index / parts)
+            c, s = math.cos(angle), math.sin(angle)
+            turned = [target[0] + c * x - s * y, target[1] + s * x + c * y, eye[2]]
+            out.append(self.patch({"camera": {"eye": turned, "target": target}}))
+        return out
+
+    def volume(self: SelfView, field: str, **keys: Any) -> SelfView:
+        """The view with one more translucent medium of a scalar field; keys are those of
+        ScalarView: color, extinction, shading, ..."""
+        one = {"field": field, **keys}
+        return self.patch({"scalars": [*(self.get("/scalars") or []), one]})
+
+    def isosurface(self: SelfView, field: str, value: float, **keys: Any) -> SelfView:
+        """The view with one more isosurface; keys are those of SurfaceView: opacity, color, ..."""
+        return self._with_surface({"field": field, "isovalue": value, **keys})
+
+    def section(self: SelfView, field: str, axis: Literal["x", "y", "z"], index: float,
+                **keys: Any) -> SelfView:
+        """The view with one more section through a layer of the grid; keys are those of
+        SurfaceView: opacity, color, contours, ..."""
+        return self._with_surface({"field": field, "slice": {"axis": axis, "index": index},
+                                   **keys})
+
+    def _with_surface(self: SelfView, one: Mapping[str, Any]) -> SelfView:
+        return self.patch({"surfaces": [*(self.get("/surfaces") or []), one]})
+
+    # --- pictures ------------------------------------------------------------------------------
+
+    def frame(self, format: Format = "png", *, dpi: float | None = None) -> Frame:
+        """The picture of the view.
+
+        format: png, jpeg, npy (linear premultiplied RGBA as float32), pdf or svg.
+        dpi: pixels to the inch, 10 to 2400; of pdf, svg and png only.
+        """
+        if format not in FORMATS:
+            raise ValueError(f"format '{format}' is none of {', '.join(FORMATS)}")
+        http = self.dataset.server.http
+        answer = http.request("POST", "v1/frames", json=self._document, accept=FORMATS[format],
+                              params={"dpi": dpi})
+        document = json.loads(answer.headers.get("Windsplat-Frame", "{}"))
+        timing = {}
+        for part in answer.headers.get("Server-Timing", "").split(","):
+            name, _, duration = part.strip().partition(";dur=")
+            if duration:
+                timing[name] = float(duration)
+        default = self.dataset.default_view["image"]
+        width = self.get("/image/width", default["width"])
+        height = self.get("/image/height", default["height"])
+        return Frame(answer.content, format, int(width), int(height), Report(document, timing))
+
+    def save(self, path: str | os.PathLike[str], *, dpi: float | None = None) -> pathlib.Path:
+        """Writes the picture; the suffix names the format: .png, .jpg, .npy, .pdf or .svg."""
+        return self.frame(format_of(path), dpi=dpi).save(path)
+
+    def movie(
+        self, path: str | os.PathLike[str], steps: Iterable[int] | None = None, fps: float = 12,
+        *, workers: int = 2, progress: Any = None,
+    ) -> Movie:
+        """A movie of the steps of the dataset, by default of all of them (see
+        windsplat.movie)."""
+        from .movie import movie
+
+        chosen = range(len(self.dataset.steps)) if steps is None else steps
+        return movie(path, [self.at(int(step)) for step in chosen], fps, workers=workers,
+                     progress=progress)
+
+    # --- Jupyter and the page ------------------------------------------------------------------
+
+    @property
+    def url(self) -> str:
+        """The address of the page with this view."""
+        return f"{self.dataset.server.url}#!{urllib.parse.quote(self.to_json(None))}"
+
+    def widget(self, width: int | str = "100%", height: int = 450) -> IFrame:
+        """A live view for Jupyter: the page without its panels, in a frame. The address has to
+        be one that the browser reaches, and the server has to permit the notebook's page to show
+        it (option --allow-embed; Server.start does so for Jupyter on this machine)."""
+        from .jupyter import IFrame
+
+        hash = urllib.parse.quote(self.to_json(None))
+        return IFrame(f"{self.dataset.server.url}?embed#!{hash}", width, height)
+
+    def _repr_mimebundle_(
+        self, include: Any = None, exclude: Any = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What Jupyter shows: the picture as JPEG."""
+        if self._dataset is None:
+            return {"text/plain": repr(self)}, {}
+        data, metadata = self.frame("jpeg")._repr_mimebundle_()
+        return {**data, "text/plain": repr(self)}, metadata

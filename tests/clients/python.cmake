@@ -1,0 +1,11 @@
+# Tests of the Python client (clients/python) against the real daemon, by Debian's Python.
+function(windsplat_python_test name)
+  add_test(NAME clients.python_${name} COMMAND ${SYSTEM_PYTHON} -W ignore -m unittest ${ARGN}
+    WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}/tests/clients/python)
+  set_tests_properties(clients.python_${name} PROPERTIES LABELS integration TIMEOUT 300
+    ENVIRONMENT "PYTHONDONTWRITEBYTECODE=1;WINDSPLAT=$<TARGET_FILE:windsplat>")
+endfunction()
+
+if(NOT WINDSPLAT_SANITIZE)
+  windsplat_python_test(api test_documents test_server test_frames)
+endif()

@@ -1,0 +1,273 @@
+"""Pictures, movies and streams of views, against the real daemon."""
+import asyncio
+import io
+import math
+import os
+import pathlib
+import stat
+import struct
+import tempfile
+import unittest
+import unittest.mock
+import zipfile
+
+import numpy as np
+import PIL.Image
+from support import shared_server, windsplat
+
+# Instead of ffmpeg: writes its arguments and the number of PNG files of its input to the output.
+ENCODER = """#!/usr/bin/python3
+import sys
+data = sys.stdin.buffer.read()
+if "-fail" in sys.argv[0]:
+    sys.exit("no such codec")
+open(sys.argv[-1], "w").write(f"{data.count(b'IHDR')} " + " ".join(sys.argv[1:-1]))
+"""
+
+
+class Frames(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server, _ = shared_server()
+        cls.view = cls.server["tornado:24"].view(size=(96, 64))
+
+    def test_pixels_are_those_of_the_picture(self):
+        frame = self.view.frame()
+        self.assertEqual((frame.width, frame.height, frame.format), (96, 64, "png"))
+        self.assertEqual(frame.image.size, (96, 64))
+        pixels = frame.array
+        self.assertEqual((pixels.shape, pixels.dtype), ((64, 96, 3), np.uint8))
+        self.assertGreater(pixels.max(), 100)
+        np.testing.assert_array_equal(pixels, np.asarray(PIL.Image.open(io.BytesIO(frame.bytes))))
+        self.assertEqual(frame.bytes, self.view.frame().bytes)
+
+    def test_linear_pixels_over_black_are_the_encoded_ones(self):
+        view = self.view.image(background="#000000").ground(show="off")
+        linear = view.frame("npy").array
+        self.assertEqual((linear.shape, linear.dtype), ((64, 96, 4), np.float32))
+        # The transfer function of sRGB (IEC 61966-2-1).
+        light = np.clip(linear[..., :3], 0, 1)
+        coded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+        difference = np.abs(255 * coded - view.frame().array.astype(float))
+        self.assertLessEqual(difference.max(), 1.01)
+
+    def test_the_report_tells_method_error_and_times(self):
+        report = self.view.method(name="kernel").frame("jpeg").report
+        self.assertEqual(report.method, "kernel")
+        self.assertIn(report.error.kind, ("estimated", "measured", "unknown"))
+        self.assertGreater(report.work["samples"], 0)
+        self.assertEqual(set(report.timing), {"queue", "render", "encode"})
+        empty = self.view.vector(field=None).scalars().frame().report.empty
+        self.assertIsInstance(empty, str)
+        limited = self.view.quality(maxError=0.05).frame().report.error
+        self.assertEqual((limited.asked, limited.kept), (0.05, True))
+
+    def test_files_are_named_by_format(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, start in (("a.png", b"\x89PNG"), ("a.jpg", b"\xff\xd8"), ("a.pdf", b"%PDF"),
+                                ("a.svg", b"<svg"), ("a.npy", b"\x93NUMPY")):
+                path = self.view.save(pathlib.Path(folder) / name)
+                self.assertEqual(path.read_bytes()[: len(start)], start)
+            with self.assertRaisesRegex(ValueError, "a.bmp"):
+                self.view.save("a.bmp")
+            with self.assertRaisesRegex(ValueError, "format png"):
+                self.view.frame().save("a.jpg")
+
+    def test_the_server_refuses_what_the_schema_cannot(self):
+        with self.assertRaises(windsplat.InvalidView) as caught:
+            self.view.volume("velocty").frame()
+        self.assertEqual(caught.exception.errors[0].pointer[:10], "/scalars/0")
+
+    def test_jupyter_gets_a_picture_with_its_size_and_a_text(self):
+        data, metadata = self.view._repr_mimebundle_()
+        self.assertEqual(set(data), {"text/plain", "image/jpeg"})
+        self.assertEqual(metadata["image/jpeg"], {"width": 96, "height": 64})
+        self.assertTrue(data["image/jpeg"].startswith("/9j/"))  # base64 of a JPEG
+        html = self.view.widget(height=300)._repr_html_()
+        self.assertIn(f'<iframe src="{self.server.url}?embed#!%7B%22dataset%22%3A', html)
+        self.assertIn("height: 300px", html)
+
+
+class Looking(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server, _ = shared_server()
+        cls.dataset = cls.server["tornado:24"]
+
+    def test_the_box_fits_the_picture_from_every_side(self):
+        for azimuth, elevation in ((0, 90), (30, 40), (90, 0), (200, -35), (-45, 10)):
+            with self.subTest(azimuth=azimuth, elevation=elevation):
+                view = self.dataset.view(size=(96, 64)).look(azimuth, elevation)
+                camera = view.get("/camera")
+                eye, target = np.array(camera["eye"]), np.array(camera["target"])
+                forward = (target - eye) / np.linalg.norm(target - eye)
+                right = np.cross(forward, camera["up"])
+                right /= np.linalg.norm(right)
+                up = np.cross(right, forward)
+                world = self.dataset.description["world"]
+                tangent = math.tan(math.radians(35 / 2))
+                worst = 0
+                for corner in range(8):
+                    point = np.array([world["max" if corner >> k & 1 else "min"][k]
+                                      for k in range(3)]) - eye
+                    depth = point @ forward
+                    worst = max(worst, abs(point @ up) / depth / tangent,
+                                abs(point @ right) / depth / tangent / 1.5)
+                self.assertLess(worst, 1)
+                self.assertGreater(worst, 0.85)
+
+    def test_sides_are_those_of_the_rest_interface(self):
+        # Azimuth 90 looks west, so that the eye is in the east.
+        eye = self.dataset.view().look(90, 0).get("/camera/eye")
+        self.assertGreater(eye[0], 1)
+        self.assertAlmostEqual(eye[1], self.dataset.view().look(90, 0).get("/camera/target")[1])
+        query = f"v1/datasets/tornado%3A24/frame.npy?width=96&height=64&azimuth={210}&elevation=25"
+        theirs = np.load(io.BytesIO(self.server.http.request("GET", query).content))[..., 3]
+        ours = self.dataset.view(size=(96, 64)).look(210, 25).frame("npy").array[..., 3]
+        self.assertGreater(np.corrcoef(theirs.ravel(), ours.ravel())[0, 1], 0.7)
+
+    def test_a_turn_keeps_the_distance(self):
+        view = self.dataset.view().look(20, 30)
+        target = np.array(view.get("/camera/target"))
+        turn = [np.array(one.get("/camera/eye")) - target for one in view.turn(8)]
+        np.testing.assert_allclose([np.linalg.norm(one) for one in turn], np.linalg.norm(turn[0]))
+        np.testing.assert_allclose(turn[4][:2], -turn[0][:2])
+        half = view.turn(3, degrees=180)
+        np.testing.assert_allclose(np.array(half[2].get("/camera/eye"))[:2] - target[:2],
+                                   turn[4][:2], atol=1e-12)
+
+
+class Movies(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server, _ = shared_server()
+        cls.view = cls.server["climate:48x24x8"].view(size=(63, 40))
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def encoder(self, name="ffmpeg"):
+        program = self.folder / "bin" / name
+        program.parent.mkdir(exist_ok=True)
+        program.write_text(ENCODER)
+        program.chmod(program.stat().st_mode | stat.S_IXUSR)
+        return str(program)
+
+    def test_an_animated_png_has_the_frames_of_the_steps(self):
+        seen = []
+        path = self.folder / "a.apng"
+        movie = self.view.movie(path, steps=[0, 3, 6], fps=8,
+                                progress=lambda done, count: seen.append((done, count)))
+        self.assertEqual((movie.frames, movie.width, movie.height), (3, 63, 40))
+        self.assertEqual(seen, [(1, 3), (2, 3), (3, 3)])
+        with PIL.Image.open(path) as image:
+            self.assertEqual((image.n_frames, image.info["duration"]), (3, 125))
+            for index, step in enumerate((0, 3, 6)):
+                image.seek(index)
+                np.testing.assert_array_equal(np.asarray(image.convert("RGB")),
+                                              self.view.at(step).frame().array)
+        data, metadata = movie._repr_mimebundle_()
+        self.assertEqual(metadata["image/png"], {"width": 63, "height": 40})
+        self.assertEqual(list(self.folder.iterdir()), [path])
+
+    def test_a_zip_has_all_steps_in_order(self):
+        self.view.movie(self.folder / "a.zip", workers=3)
+        with zipfile.ZipFile(self.folder / "a.zip") as file:
+            names = file.namelist()
+            self.assertEqual(names, [f"frame_{k:04d}.png" for k in range(8)])
+            self.assertEqual(file.read(names[5]), self.view.at(5).frame().bytes)
+
+    def test_videos_are_encoded_by_ffmpeg(self):
+        folder = str(pathlib.Path(self.encoder()).parent)
+        with unittest.mock.patch.dict(os.environ, {"PATH": folder}):
+            windsplat.movie(self.folder / "a.mp4", self.view.turn(3), fps=24)
+        text = (self.folder / "a.mp4").read_text()
+        self.assertTrue(text.startswith("3 "))
+        for words in ("-f image2pipe", "-framerate 24", "-c:v libx264", "-f mp4"):
+            self.assertIn(words, text)
+
+    def test_without_ffmpeg_other_kinds_are_named_and_nothing_is_written(self):
+        with unittest.mock.patch.dict(os.environ, {"PATH": "/nowhere"}):
+            with self.assertRaisesRegex(windsplat.MovieFailed, "ffmpeg.*not found.*apng"):
+                self.view.movie(self.folder / "a.webm")
+        with unittest.mock.patch("shutil.which", lambda _: self.encoder("ffmpeg-fail")):
+            with self.assertRaisesRegex(windsplat.MovieFailed, "no such codec"):
+                self.view.movie(self.folder / "a.mp4", steps=[0])
+        with self.assertRaisesRegex(windsplat.MovieFailed, "frame 1 has 64 x 40"):
+            windsplat.movie(self.folder / "a.zip", [self.view, self.view.size(64, 40)])
+        with self.assertRaises(windsplat.InvalidView):
+            windsplat.movie(self.folder / "a.zip", [self.view, self.view.at(99)])
+        self.assertEqual([path.name for path in self.folder.iterdir()], ["bin"])
+
+
+class Streams(unittest.IsolatedAsyncioTestCase):
+    def setUp(self):
+        self.server, _ = shared_server()
+        self.view = self.server["climate:48x24x8"].view(size=(96, 64))
+
+    async def test_a_view_at_rest_gets_a_final_frame(self):
+        async with self.server.stream(self.view) as stream:
+            self.assertEqual(stream.hello["protocol"], "windsplat.v1")
+            async for frame in stream:
+                self.assertEqual(frame.rev, 1)
+                if frame.final:
+                    break
+            self.assertEqual(frame.image.size, (96, 64))
+            self.assertIn(frame.report.method, ("slab", "kernel"))
+            self.assertEqual(frame.report.document["view"]["dataset"], "climate:48x24x8")
+
+    async def test_patches_change_the_view_and_equal_ones_do_not(self):
+        async with self.server.stream(self.view) as stream:
+            first = await stream.final()
+            self.assertEqual(await stream.patch({"step": 4}), 2)
+            second = await stream.final()
+            self.assertEqual((second.step, second.rev), (4, 2))
+            self.assertNotEqual(first.bytes, second.bytes)
+            await stream.patch({"step": 4})
+            self.assertEqual((await stream.final(timeout=20)).seq, second.seq)
+            await stream.show(self.view.at(1))
+            self.assertEqual((await stream.final()).step, 1)
+
+    async def test_a_refused_patch_is_a_problem_and_the_stream_goes_on(self):
+        async with self.server.stream(self.view) as stream:
+            await stream.final()
+            with self.assertRaisesRegex(windsplat.InvalidView, "did you mean 'step'"):
+                await stream.patch({"stpe": 1})
+            await stream.patch({"vector": {"field": "nothing"}})
+            with self.assertRaises(windsplat.InvalidView) as caught:
+                await stream.final()
+            self.assertEqual(caught.exception.errors[0].pointer, "/vector/field")
+            self.assertEqual(stream.document, self.view.to_dict())
+            await stream.patch({"step": 2})
+            self.assertEqual((await stream.final()).step, 2)
+
+    async def test_all_steps_are_played_if_frames_are_acknowledged(self):
+        async with self.server.stream(self.view) as stream:
+            steps = [(await stream.final()).step]
+            await stream.play(0, 7, fps=60, loop=False, drop=False)
+            async for frame in stream:
+                steps.append(frame.step)
+                if frame.step == 7:
+                    break
+            self.assertEqual(sorted(set(steps)), list(range(8)))
+
+    async def test_a_slow_loop_gets_no_more_frames_than_it_acknowledges(self):
+        async with self.server.stream(self.view) as stream:
+            await stream.final()
+            await stream.play(0, 7, fps=60)
+            frame = await stream.__anext__()
+            await asyncio.sleep(0.5)
+            # The frame in hand, and at most framesInFlightMax - 1 others on their way.
+            later = await stream.__anext__()
+            self.assertLessEqual(later.seq, frame.seq + 1)
+
+    async def test_a_lost_server_is_told(self):
+        with self.assertRaises(windsplat.ConnectionFailed):
+            async with windsplat.Server("http://127.0.0.1:9/").stream(self.view):
+                pass
+
+
+if __name__ == "__main__":
+    unittest.main()

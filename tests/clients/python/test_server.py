@@ -1,0 +1,211 @@
+"""Servers, datasets and values, against the real daemon; refusals against prepared answers."""
+import os
+import tempfile
+import threading
+import time
+import unittest
+import unittest.mock
+
+import numpy as np
+from support import PROGRAM, Prepared, shared_server, start, windsplat
+
+
+def problem(status, **more):
+    return {"type": "about:blank", "title": "Refused", "status": status, "detail": "no", **more}
+
+
+class Start(unittest.TestCase):
+    def test_a_server_ends_with_its_block(self):
+        with start("tornado:16") as server:
+            self.assertEqual(list(server.datasets), ["tornado:16"])
+            self.assertRegex(server.version, r"^\d+\.\d+\.\d+")
+            url = server.url
+        with self.assertRaises(windsplat.ConnectionFailed):
+            windsplat.connect(url)
+
+    def test_a_program_that_is_not_there_is_named(self):
+        with self.assertRaisesRegex(windsplat.StartFailed, "argument program.*'/nowhere/w'"):
+            windsplat.Server.start(program="/nowhere/w")
+        with unittest.mock.patch.dict(os.environ, {"PATH": "/nowhere"}):
+            os.environ.pop("WINDSPLAT", None)
+            with self.assertRaisesRegex(windsplat.StartFailed, "PATH.*WINDSPLAT.*connect"):
+                windsplat.Server.start()
+        with unittest.mock.patch.dict(os.environ, {"WINDSPLAT": "/nowhere/x"}):
+            with self.assertRaisesRegex(windsplat.StartFailed, r"\$WINDSPLAT: '/nowhere/x'"):
+                windsplat.Server.start()
+
+    def test_what_the_program_says_is_in_the_error(self):
+        with self.assertRaisesRegex(windsplat.StartFailed, "exit code 2.*--max-pixels.*'many'"):
+            start("tornado:16", max_pixels="many")
+        with self.assertRaisesRegex(windsplat.StartFailed, "nowhere.nc"):
+            start("nowhere.nc", strict=True)
+
+    def test_one_dataset_is_opened_by_open(self):
+        with unittest.mock.patch.dict(os.environ, {"WINDSPLAT": PROGRAM}):
+            dataset = windsplat.open("tornado:16", threads=1)
+        with dataset.server:
+            self.assertEqual(dataset.shape, (16, 16, 16))
+
+    def test_a_wrong_token_is_refused_and_a_right_one_accepted(self):
+        with tempfile.NamedTemporaryFile("w") as file:
+            file.write("0123456789abcdefX\n")
+            file.flush()
+            with start("tornado:16", token_file=file.name) as server:
+                with self.assertRaises(windsplat.Unauthorized) as caught:
+                    windsplat.connect(server.url)
+                self.assertEqual(caught.exception.status, 401)
+                with windsplat.connect(server.url, token="0123456789abcdefX") as there:
+                    self.assertEqual(list(there.datasets), ["tornado:16"])
+
+
+class Refusals(unittest.TestCase):
+    def test_a_refused_request_is_repeated_when_the_server_says(self):
+        refused = (503, {"Retry-After": "1"}, problem(503))
+        with Prepared(refused, (429, {"Retry-After": "0"}, problem(429)),
+                      (200, {}, {"version": "1.2.3"})) as there:
+            begin = time.monotonic()
+            self.assertEqual(windsplat.Server(there.url).version, "1.2.3")
+            self.assertGreaterEqual(time.monotonic() - begin, 1)
+            self.assertEqual(there.requests, ["GET /v1"] * 3)
+
+    def test_a_wait_beyond_the_patience_is_not_begun(self):
+        with Prepared((429, {"Retry-After": "30"}, problem(429))) as there:
+            with self.assertRaises(windsplat.Busy) as caught:
+                windsplat.connect(there.url, patience=5)
+            self.assertEqual(caught.exception.retry_after, 30)
+            self.assertEqual(there.requests, ["GET /v1"])
+
+    def test_errors_name_each_value_by_its_pointer(self):
+        errors = [{"pointer": "/a/0", "detail": "x"}, {"pointer": "", "detail": "y"}]
+        with Prepared((422, {}, problem(422, errors=errors, requestId="r1"))) as there:
+            with self.assertRaises(windsplat.InvalidView) as caught:
+                windsplat.connect(there.url)
+            error = caught.exception
+            self.assertEqual([(one.pointer, one.detail) for one in error.errors],
+                             [("/a/0", "x"), ("", "y")])
+            self.assertEqual((error.status, error.title, error.detail, error.request_id),
+                             (422, "Refused", "no", "r1"))
+
+    def test_a_job_that_takes_too_long_is_a_timeout(self):
+        job = {"id": "1", "kind": "dataset", "state": "running", "result": None, "problem": None}
+        with Prepared((202, {}, job), (200, {}, job)) as there:
+            with self.assertRaises(windsplat.JobTimeout) as caught:
+                windsplat.Server(there.url).open("a.nc", timeout=0.2)
+            self.assertIsInstance(caught.exception, TimeoutError)
+
+    def test_addresses(self):
+        self.assertEqual(windsplat.Server("localhost:8080").url, "http://localhost:8080/")
+        self.assertEqual(windsplat.Server("https://a.example/b/?c#d").url, "https://a.example/b/")
+        with self.assertRaises(ValueError):
+            windsplat.Server("ftp://a.example")
+
+
+class Values(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server, cls.folder = shared_server()
+        cls.dataset = cls.server["climate:48x24x8"]
+
+    def test_fields_and_times(self):
+        fields = self.dataset.fields
+        self.assertEqual((fields["wind"].kind, fields["wind"].units), ("vector", "m s-1"))
+        self.assertTrue(fields["wind_speed"].derived)
+        times = self.dataset.times
+        self.assertEqual(times.dtype, np.dtype("datetime64[ms]"))
+        self.assertEqual(times[1] - times[0], np.timedelta64(6, "h"))
+        self.assertEqual(self.dataset.step_at("2001-01-01T11:00"), 2)
+        self.assertEqual(self.dataset.step_at(times[5]), 5)
+        self.assertEqual(self.dataset.view().at(time=times[3]).get("/step"), 3)
+        self.assertEqual(self.dataset.shape, (8, 24, 48))
+        self.assertEqual(self.dataset.coordinates("z")[0], 1000)
+
+    def test_probes_series_histograms_and_ranges_agree(self):
+        probe = self.dataset.probe(10, 40, 500, step=2, fields=["wind_speed"])
+        series = self.dataset.series("wind", 10, 40, 500)
+        np.testing.assert_allclose(series.values[2], probe["wind"])
+        self.assertAlmostEqual(np.linalg.norm(probe["wind"]), probe["wind_speed"], places=4)
+        self.assertEqual(len(series.times), len(self.dataset.steps))
+        again = self.dataset.probe(index=probe.position.index, step=2)
+        self.assertEqual(again["cloud"], probe["cloud"])
+        low, high = self.dataset.range("cloud", step=1)
+        histogram = self.dataset.histogram("cloud", bins=8, step=1)
+        self.assertEqual(histogram.counts.sum() + histogram.masked, np.prod(self.dataset.shape))
+        self.assertEqual((histogram.edges[0], histogram.edges[-1]), (low, high))
+        every = self.dataset.range("cloud")
+        self.assertTrue(every[0] <= low and every[1] >= high)
+
+    def test_names_are_suggested(self):
+        with self.assertRaisesRegex(windsplat.NotFound, "did you mean 'tornado:24'"):
+            self.server["tornado24"]
+        with self.assertRaisesRegex(windsplat.NotFound, "did you mean 'cloud'"):
+            self.dataset.range("clouds")
+
+
+class Open(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        import netCDF4
+
+        cls.server, cls.folder = shared_server()
+        for number in range(2):
+            with netCDF4.Dataset(cls.folder / f"part_{number}.nc", "w") as file:
+                for name, size in (("time", 1), ("z", 3), ("y", 4), ("x", 5)):
+                    file.createDimension(name, size)
+                    file.createVariable(name, "f8", (name,))[:] = np.arange(size) + (
+                        number if name == "time" else 0)
+                file["time"].units = "days since 2020-02-28"
+                file.createVariable("t", "f4", ("time", "z", "y", "x"))[:] = number + np.arange(
+                    60, dtype="f4").reshape(1, 3, 4, 5)
+        # Another field at the time of part_0, for lists of files.
+        with netCDF4.Dataset(cls.folder / "part_0.nc") as file, netCDF4.Dataset(
+                cls.folder / "other.nc", "w") as other:
+            for name in ("time", "z", "y", "x"):
+                other.createDimension(name, len(file.dimensions[name]))
+                other.createVariable(name, "f8", (name,))[:] = file[name][:]
+            other["time"].units = file["time"].units
+            other.createVariable("q", "f4", ("time", "z", "y", "x"))[:] = 2 * file["t"][:]
+        (cls.folder / "bad.nc").write_bytes(b"CDF\x01 and no more")
+
+    def test_files_patterns_and_lists(self):
+        one = self.server.open("part_0.nc")
+        self.assertEqual((one.id, len(one.steps)), ("part_0", 1))
+        series = self.server.open(self.folder / "part_?.nc")
+        self.assertEqual(list(series.times), [np.datetime64("2020-02-28"),
+                                              np.datetime64("2020-02-29")])
+        self.assertEqual(series.range("t"), (0, 60))
+        listed = self.server.open(["part_0.nc", "other.nc"], title="Two parts")
+        self.assertEqual(listed.title, "Two parts")
+        self.assertLessEqual({"t", "q"}, set(listed.fields))
+
+    def test_what_cannot_be_opened_is_a_problem(self):
+        with self.assertRaises(windsplat.Problem) as caught:
+            self.server.open("bad.nc")
+        self.assertIn("bad.nc", caught.exception.detail)
+        with self.assertRaises(windsplat.NotFound):
+            self.server.open("nowhere.nc")
+        with self.assertRaisesRegex(ValueError, "is not below the folder"):
+            self.server.open("/etc/passwd")
+
+    def test_a_dataset_is_forgotten(self):
+        dataset = self.server.open("part_1.nc")
+        dataset.close(forget=True)
+        self.assertNotIn("part_1", self.server.datasets)
+
+
+class Threads(unittest.TestCase):
+    def test_a_server_may_be_used_from_several_threads(self):
+        server, _ = shared_server()
+        view = server["tornado:24"].view(size=(64, 48))
+        pictures = []
+        threads = [threading.Thread(target=lambda: pictures.append(view.frame().bytes))
+                   for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(len(pictures), 8)
+        self.assertEqual(len(set(pictures)), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
