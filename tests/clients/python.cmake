@@ -8,4 +8,5 @@ endfunction()
 
 if(NOT WINDSPLAT_SANITIZE)
   windsplat_python_test(api test_documents test_server test_frames)
+  windsplat_python_test(xarray test_xarray)
 endif()
