@@ -14,7 +14,7 @@ RUN scripts/setup build web
 COPY . .
 RUN cmake --preset release -DWINDSPLAT_TESTS=OFF -DWINDSPLAT_WERROR=OFF \
     && cmake --build --preset release --target windsplat \
-    && cmake --install build/release --prefix /opt/windsplat --strip
+    && cmake --install build/release --prefix /opt/windsplat --component runtime --strip
 
 FROM ${BASE}
 RUN apt-get -q update \

@@ -51,7 +51,8 @@ if(vtk_folder MATCHES "^${WINDSPLAT_VTK_ROOT}/")
   # Libraries that are not installed find each other by DT_RPATH only.
   target_link_options(windsplat-vtk PRIVATE -Wl,--disable-new-dtags -Wl,-rpath,${vtk_folder}
     -Wl,-rpath-link,${vtk_folder})
-  install(CODE "message(WARNING \"windsplat-vtk uses VTK's libraries in ${vtk_folder}: keep it\")")
+  install(CODE "message(WARNING \"windsplat-vtk uses VTK's libraries in ${vtk_folder}: keep it\")"
+    COMPONENT vtk)
 endif()
 add_dependencies(windsplat windsplat-vtk)
-install(TARGETS windsplat-vtk RUNTIME DESTINATION bin)
+install(TARGETS windsplat-vtk RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT vtk)
