@@ -46,6 +46,8 @@ set(drawn_options --count=340)
 if(WINDSPLAT_SANITIZE)
   set(drawn_options --count=68 --peak-mib=1500)  # sanitizers retain freed memory
 endif()
+windsplat_program_test(service_manager python3 tests/integration/service_manager.py
+  --program=$<TARGET_FILE:windsplat>)
 # Mutated datasets: opened, compared with the known values, rendered.
 windsplat_program_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py
   --program=$<TARGET_FILE:windsplat> ${drawn_options})

@@ -23,6 +23,7 @@ namespace windsplat::api {
 struct ServerOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 8080;  // 0: any free port, returned by port()
+  int listen_socket = -1;     // listens already, instead of on the above; owned by the server
   std::string base_path = "/";
   // Answer only requests whose Host is a loopback name or the host of an allowed origin, as a
   // protection against DNS rebinding.
@@ -52,6 +53,9 @@ struct ServerOptions {
   // Phases of a drain: when rendering is cancelled, and when connections are closed.
   std::chrono::milliseconds drain_cancel_after{6000};
   std::chrono::milliseconds drain_abort_after{8000};
+  // Called on the network thread at this interval while it works; zero: never.
+  std::chrono::milliseconds alive_every{0};
+  std::function<void()> alive;
 };
 
 }  // namespace windsplat::api

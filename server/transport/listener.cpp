@@ -76,6 +76,21 @@ Result<void> Listener::listen(const std::string& address, std::uint16_t port) {
   return {};
 }
 
+Result<void> Listener::adopt(int socket) {
+  sockaddr_storage name{};
+  socklen_t size = sizeof name;
+  ErrorCode fault;
+  const bool known = ::getsockname(socket, reinterpret_cast<sockaddr*>(&name), &size) == 0;
+  acceptor_.assign(known && name.ss_family == AF_INET6 ? Tcp::v6() : Tcp::v4(), socket, fault);
+  if (!fault) acceptor_.set_option(asio::socket_base::send_buffer_size(send_buffer_bytes), fault);
+  if (!fault) endpoint_ = acceptor_.local_endpoint(fault);
+  if (fault) {
+    return make_error(ErrorKind::internal,
+                      "cannot listen on the socket that was passed: " + fault.message());
+  }
+  return {};
+}
+
 void Listener::start() {
   if (waiting_.use_count() == 1 && acceptor_.is_open()) accept();
 }

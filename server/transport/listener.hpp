@@ -25,6 +25,8 @@ class Listener {
   // `address` is an IP address or host name of this machine. Errors: internal, naming address and
   // port.
   Result<void> listen(const std::string& address, std::uint16_t port);
+  // Takes a TCP socket that listens already. Errors: internal.
+  Result<void> adopt(int socket);
   [[nodiscard]] boost::asio::ip::tcp::endpoint endpoint() const { return endpoint_; }
 
   // Starts accepting. A further call resumes after an allocation failure stopped the accept loop,

@@ -39,6 +39,7 @@ struct Server::State {
             io, [this](asio::ip::tcp::socket socket) { accepted(std::move(socket)); },
             [this] { parts.metrics.accept_failed(); }),
         look_timer(io),
+        alive_timer(io),
         cancel_timer(io),
         abort_timer(io) {
     parts.connections.on_empty([this] {
@@ -128,9 +129,23 @@ struct Server::State {
     }
   }
 
+  // The network thread works; the timer runs until the end of a drain.
+  void tell_alive() {
+    if (parts.options.alive_every.count() == 0) return;
+    alive_timer.expires_after(parts.options.alive_every);
+    alive_timer.async_wait([this](boost::system::error_code fault) {
+      telling_alive = false;
+      if (fault) return;
+      parts.options.alive();
+      tell_alive();
+    });
+    telling_alive = true;
+  }
+
   // Periodic operations that schedule themselves; one that failed to allocate its next step is
   // restarted here.
   void go_on() {
+    if (!telling_alive) tell_alive();
     if (parts.draining && !drain_timers_set) begin_drain();
     if (parts.draining) return;
     listener.start();
@@ -196,6 +211,7 @@ struct Server::State {
     parts.connections.each(
         [](Connection& connection) { connection.abort(); });  // accepted during the drain
     look_timer.cancel();
+    alive_timer.cancel();
     cancel_timer.cancel();
     abort_timer.cancel();
     try {
@@ -216,10 +232,12 @@ struct Server::State {
       parts.options.tls ? std::make_unique<HandshakeThread>() : nullptr};
   Listener listener;
   asio::steady_timer look_timer;
+  asio::steady_timer alive_timer;
   asio::steady_timer cancel_timer;
   asio::steady_timer abort_timer;
   const CancelToken never;        // for work that cannot be cancelled
   bool checking_files = false;    // a file check is scheduled or running
+  bool telling_alive = false;     // the next call of `alive` is scheduled
   bool drain_timers_set = false;  // the timers of a drain run
   std::thread ending;             // ends pending reads when a drain takes a long time
 };
@@ -232,6 +250,7 @@ Server::~Server() = default;
 
 Result<void> Server::listen() {
   const api::ServerOptions& options = state_->parts.options;
+  if (options.listen_socket >= 0) return state_->listener.adopt(options.listen_socket);
   return state_->listener.listen(options.address, options.port);
 }
 

@@ -52,7 +52,8 @@ class Staged(unittest.TestCase):
         found = files_below(self.root)
         documents = "usr/share/doc/windsplat"
         for name in ("usr/bin/windsplat", "usr/lib/systemd/system/windsplat.service",
-                     "etc/default/windsplat", f"{documents}/README.md", f"{documents}/CHANGELOG.md",
+                     "usr/lib/systemd/system/windsplat.socket", "etc/default/windsplat",
+                     f"{documents}/README.md", f"{documents}/CHANGELOG.md",
                      f"{documents}/LICENSE", f"{documents}/docs/user/deployment.md",
                      f"{documents}/examples/windsplat.json"):
             self.assertIn(name, found)

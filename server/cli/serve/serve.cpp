@@ -19,6 +19,7 @@
 #include "server/cli/command.hpp"
 #include "server/cli/open_store.hpp"
 #include "server/cli/serve/config_file.hpp"
+#include "server/cli/serve/service_manager.hpp"
 #include "server/cli/serve/settings.hpp"
 #include "server/cli/signals.hpp"
 #include "server/data/files/url.hpp"
@@ -50,7 +51,8 @@ void configure_log(const ServeArguments& arguments) {
 // when the datasets are open.
 class Control {
  public:
-  explicit Control(const CLI::App& given) : given_(given) {}
+  Control(const CLI::App& given, std::shared_ptr<const ServiceManager> manager)
+      : given_(given), manager_(std::move(manager)) {}
 
   // Applies requests received before the server existed.
   void arm(transport::Server& server, std::shared_ptr<data::Store> store,
@@ -80,6 +82,7 @@ class Control {
     const std::lock_guard lock(mutex_);
     if (server_ == nullptr) _exit(exit_ok);
     log::info("draining");  // log it before the drain can complete
+    manager_->stopping();
     server_->drain();
   }
 
@@ -108,7 +111,7 @@ class Control {
 
   // May block on a disk, so only `change` takes the lock.
   void take_over(const std::function<void(transport::Access)>& change) {
-    const auto fresh = read_settings(given_);
+    const auto fresh = read_settings(given_, *manager_);
     if (!fresh) return refuse(fresh.error());
     const ServeSettings& settings = **fresh;
     // The address does not change at a reload, so check the rule for the current one.
@@ -140,6 +143,7 @@ class Control {
   }
 
   const CLI::App& given_;
+  std::shared_ptr<const ServiceManager> manager_;
   std::shared_ptr<data::Store> store_;
   std::unique_ptr<ServeSettings> started_;
   std::shared_ptr<transport::TlsContext> tls_;  // the newest one
@@ -199,9 +203,11 @@ std::function<Result<data::Location>(const std::string&)> locate_on(const Fetche
 }
 
 int serve(const CLI::App& given) {
-  const auto control = std::make_shared<Control>(given);
+  auto manager = ServiceManager::from_environment();
+  if (!manager) return answer(manager.error());
+  const auto control = std::make_shared<Control>(given, *manager);
   SignalWatch signals([control] { control->drain(); }, [control] { control->reload(); });
-  auto settings = read_settings(given);
+  auto settings = read_settings(given, **manager);
   if (!settings) return answer(settings.error());
   const ServeArguments arguments = (*settings)->arguments;
   configure_log(arguments);
@@ -225,6 +231,8 @@ int serve(const CLI::App& given) {
   auto views = views::SavedViews::open({arguments.state_dir});
   if (!views) return answer(views.error());
   options.views = std::move(*views);
+  options.alive_every = (*manager)->alive_every();
+  options.alive = [told = *manager] { told->alive(); };
   transport::Server server(std::move(options), store,
                            std::make_shared<ThreadPool>(arguments.threads));
   if (const auto ok = server.listen(); !ok) return answer(ok.error());
@@ -234,6 +242,7 @@ int serve(const CLI::App& given) {
   if (const auto ok = write_stdout(url + "\n"); !ok) {
     code = answer(ok.error());
   } else {
+    (*manager)->ready("serving " + url);
     server.run();
     if (*fetcher) (*fetcher)->end();
     log::info("drained");

@@ -213,15 +213,18 @@ void warn_of(const ServeSettings& settings) {
   }
 }
 
-Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given) {
+Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given,
+                                                     const ServiceManager& manager) {
   auto settings = std::make_unique<ServeSettings>();
   add_serve_options(settings->command, settings->arguments);
   give_again(given, settings->command);
   if (const std::string& path = settings->arguments.config; !path.empty()) {
     if (const auto ok = apply_config(settings->command, path); !ok) return ok.error();
   }
+  if (manager.socket()) settings->arguments.listen = manager.socket()->address;
   auto options = server_options(settings->arguments);
   if (!options) return options.error();
+  if (manager.socket()) options->listen_socket = manager.socket()->descriptor;
   settings->options = std::move(*options);
   return settings;
 }

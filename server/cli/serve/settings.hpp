@@ -6,6 +6,7 @@
 
 #include "server/base/error.hpp"
 #include "server/cli/serve/options.hpp"
+#include "server/cli/serve/service_manager.hpp"
 #include "server/transport/server.hpp"
 
 namespace windsplat::cli {
@@ -17,8 +18,10 @@ struct ServeSettings {
 };
 
 // Settings from `given` (command line and environment) and the current configuration, token and
-// certificate. Errors name the option or file and the reason.
-Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given);
+// certificate. A socket of the service manager takes the place of --listen. Errors name the option
+// or file and the reason.
+Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given,
+                                                     const ServiceManager& manager);
 
 // Logs insecure but permitted settings: secrets that others can read or that are sent unencrypted,
 // an expired certificate.
