@@ -115,6 +115,19 @@ if(NOT WINDSPLAT_SANITIZE)
     SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endif()
 
+# The recipes of docs/user/deploy, with the servers that are installed.
+if(NOT WINDSPLAT_SANITIZE)
+  function(windsplat_deploy_test name)
+    add_test(NAME deploy.${name} COMMAND ${SYSTEM_PYTHON} ${ARGN}
+      --program=$<TARGET_FILE:windsplat> WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+    set_tests_properties(deploy.${name} PROPERTIES LABELS integration TIMEOUT 120
+      SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+  endfunction()
+  windsplat_deploy_test(nginx tests/deploy/proxies.py --server=nginx)
+  windsplat_deploy_test(caddy tests/deploy/proxies.py --server=caddy)
+  windsplat_deploy_test(files tests/deploy/files.py)
+endif()
+
 # Longer runs of the short tests above.
 function(windsplat_long_test name)
   add_test(NAME thorough.${name} COMMAND ${ARGN} --program=$<TARGET_FILE:windsplat>
