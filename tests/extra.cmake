@@ -115,7 +115,7 @@ if(NOT WINDSPLAT_SANITIZE)
     SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endif()
 
-# The recipes of docs/user/deploy, with the servers that are installed.
+# The recipes of docs/user/deploy, with the servers that are installed, and the web site.
 if(NOT WINDSPLAT_SANITIZE)
   function(windsplat_deploy_test name)
     add_test(NAME deploy.${name} COMMAND ${SYSTEM_PYTHON} ${ARGN}
@@ -126,6 +126,7 @@ if(NOT WINDSPLAT_SANITIZE)
   windsplat_deploy_test(nginx tests/deploy/proxies.py --server=nginx)
   windsplat_deploy_test(caddy tests/deploy/proxies.py --server=caddy)
   windsplat_deploy_test(files tests/deploy/files.py)
+  windsplat_deploy_test(site tests/deploy/site.py)
 endif()
 
 # Longer runs of the short tests above.

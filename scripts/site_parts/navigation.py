@@ -1,0 +1,35 @@
+"""The order of the site's pages, by readers."""
+import fnmatch
+
+# Pages are taken by the first pattern that they match; what matches none is in "More".
+SECTIONS = {
+    "Start": ["README.md", "docs/gallery/README.md", "docs/gallery/*.md"],
+    "Use": ["docs/user/page.md", "docs/user/command-line.md", "docs/user/formats.md",
+            "docs/user/hosts.md"],
+    "Program": ["docs/user/api.md", "reference/rest.md", "docs/design/wire-format.md",
+                "clients/*/README.md", "reference/cpp.md"],
+    "Operate": ["docs/user/deployment.md", "docs/user/deploy/*.md",
+                "docs/user/configuration.md", "docs/user/metrics.md", "SECURITY.md"],
+    "Accuracy and speed": ["docs/benchmarks/README.md", "docs/benchmarks/*.md"],
+    "Contribute": ["CONTRIBUTING.md", "ARCHITECTURE.md", "docs/design/overview.md",
+                   "docs/design/*.md", "CHANGELOG.md"],
+}
+REST = "More"
+
+
+def tree(titles):
+    """mkdocs' `nav` of the pages, whose titles are given by path."""
+    left = sorted(titles)
+    nav = []
+    for section, patterns in [*SECTIONS.items(), (REST, ["*"])]:
+        pages = []
+        for pattern in patterns:
+            found = [path for path in left if fnmatch.fnmatchcase(path, pattern)]
+            # * matches / here; patterns name whole folders.
+            found = [path for path in found
+                     if pattern == "*" or path.count("/") == pattern.count("/")]
+            pages += found
+            left = [path for path in left if path not in found]
+        if pages:
+            nav.append({section: [{titles[path]: path} for path in pages]})
+    return nav
