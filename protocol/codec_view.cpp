@@ -6,6 +6,7 @@
 #include "protocol/codec_names.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/view/codec_annotations.hpp"
+#include "protocol/view/codec_camera.hpp"
 #include "protocol/view/codec_difference.hpp"
 #include "protocol/view/codec_ground.hpp"
 #include "protocol/view/codec_light.hpp"
@@ -22,25 +23,10 @@ namespace {
 using limits::value_max;
 
 constexpr NumberRange fraction{0, 1};
-constexpr NumberRange world{-limits::world_max, limits::world_max};
 constexpr NumberRange field_value{-value_max, value_max};
 constexpr IntegerRange stride_range{1, limits::stride_max};
 
 // --- reading ------------------------------------------------------------------------------------
-
-CameraView read_camera(const Json& json, const std::string& pointer, Faults& faults) {
-  CameraView camera;
-  ObjectReader reader(json, pointer, faults);
-  reader.choice("projection", camera.projection, projection_names);
-  reader.numbers("eye", camera.eye, world);
-  reader.numbers("target", camera.target, world);
-  reader.numbers("up", camera.up, world);
-  reader.number("fovY", camera.fov_y, {limits::fov_min, limits::fov_max});
-  reader.number("height", camera.height, {limits::view_height_min, limits::world_max});
-  reader.finish();
-  check_direction(camera.up, reader.at("up"), faults);
-  return camera;
-}
 
 ImageView read_image(const Json& json, const std::string& pointer, Faults& faults) {
   ImageView image;
@@ -295,17 +281,6 @@ QualityView read_quality(const Json& json, const std::string& pointer, Faults& f
 }
 
 // --- writing ------------------------------------------------------------------------------------
-
-Json camera_to_json(const CameraView& camera) {
-  Json out{{"projection", nullptr},
-           {"eye", numbers_or_null(camera.eye)},
-           {"target", numbers_or_null(camera.target)},
-           {"up", numbers_to_json(camera.up)},
-           {"fovY", canonical_number(camera.fov_y)},
-           {"height", number_or_null(camera.height)}};
-  if (camera.projection) out["projection"] = name_of(*camera.projection, projection_names);
-  return out;
-}
 
 Json geometry_to_json(const GeometryView& geometry) {
   return Json{{"scale", numbers_to_json(geometry.scale)},

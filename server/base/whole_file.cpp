@@ -46,23 +46,6 @@ int write_and_close(int file, std::string_view bytes, Sync sync = Sync::later) {
 
 constexpr int links_max = 40;  // as in Linux
 
-// The descriptor of a path such as /dev/stdout, /dev/fd/3 or a link to one of them; otherwise -1.
-int inherited_descriptor(fs::path path) {
-  std::error_code fault;
-  for (int i = 0; i < links_max; ++i) {
-    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-    if (fs::equivalent(folder, "/proc/self/fd", fault)) {
-      const std::string name = path.filename().native();
-      int number = -1;
-      const auto [end, bad] = std::from_chars(name.data(), name.data() + name.size(), number);
-      return bad == std::errc() && end == name.data() + name.size() ? number : -1;
-    }
-    if (!fs::is_symlink(fs::symlink_status(path, fault))) return -1;
-    path = folder / fs::read_symlink(path, fault);
-  }
-  return -1;
-}
-
 // Writes to a descriptor without reopening or truncating it, so that other output is kept.
 Result<void> write_to_descriptor(int number, const fs::path& path, std::string_view bytes) {
   const int file = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
@@ -93,6 +76,22 @@ int create(const fs::path& path) {
 }
 
 }  // namespace
+
+int inherited_descriptor(fs::path path) {
+  std::error_code fault;
+  for (int i = 0; i < links_max; ++i) {
+    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    if (fs::equivalent(folder, "/proc/self/fd", fault)) {
+      const std::string name = path.filename().native();
+      int number = -1;
+      const auto [end, bad] = std::from_chars(name.data(), name.data() + name.size(), number);
+      return bad == std::errc() && end == name.data() + name.size() ? number : -1;
+    }
+    if (!fs::is_symlink(fs::symlink_status(path, fault))) return -1;
+    path = folder / fs::read_symlink(path, fault);
+  }
+  return -1;
+}
 
 fs::path end_of_links(fs::path path) {
   std::error_code fault;

@@ -24,6 +24,10 @@ std::filesystem::path end_of_links(std::filesystem::path path);
 // The temporary name of a file until it is complete, unique to this process, in the same folder.
 std::filesystem::path part_of(const std::filesystem::path& target);
 
+// The descriptor of this process that a path names, such as /dev/stdout, /dev/fd/3 or a link to one
+// of them; otherwise -1. To write to it, duplicate it: opening the path would begin at its start.
+int inherited_descriptor(std::filesystem::path path);
+
 // Whether a path is a pipe, a device or a descriptor of this process.
 bool is_stream(const std::filesystem::path& path);
 

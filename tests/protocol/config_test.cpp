@@ -6,7 +6,7 @@
 namespace windsplat::protocol {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using Kind = ConfigEntry::Kind;
 
 TEST(Config, HoldsTextsNumbersBooleansAndLists) {
