@@ -124,7 +124,9 @@ TEST(MovieWriter, FailuresOfFfmpegAreReportedWithItsMessageAndLeaveNoFile) {
         Writer::open(folder.file("out.mp4"), options_of(folder, Container::mp4, 640, 360), {});
     ASSERT_TRUE(writer) << writer.error().message;
     siginfo_t about{};
-    if (has_ended) ASSERT_EQ(::waitid(P_ALL, 0, &about, WEXITED | WNOWAIT), 0);
+    if (has_ended) {
+      ASSERT_EQ(::waitid(P_ALL, 0, &about, WEXITED | WNOWAIT), 0);
+    }
     const auto done = write_pictures(**writer, 640, 360, 5);
     ASSERT_FALSE(done);
     EXPECT_THAT(done.error().message, AllOf(HasSubstr("ffmpeg ended with code 69"),
