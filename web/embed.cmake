@@ -8,11 +8,17 @@ endif()
 
 file(GLOB_RECURSE web_sources CONFIGURE_DEPENDS
   ${CMAKE_CURRENT_LIST_DIR}/src/* ${CMAKE_CURRENT_LIST_DIR}/report/*
-  ${CMAKE_CURRENT_LIST_DIR}/scripts/*.mjs)
+  ${CMAKE_CURRENT_LIST_DIR}/scripts/*.mjs
+  ${PROJECT_SOURCE_DIR}/clients/js/src/*.ts)
+# Made by the command itself.
+list(FILTER web_sources EXCLUDE REGEX clients/js/src/generated/)
 list(APPEND web_sources
   ${CMAKE_CURRENT_LIST_DIR}/index.html
   ${CMAKE_CURRENT_LIST_DIR}/package.json
   ${CMAKE_CURRENT_LIST_DIR}/package-lock.json
+  ${CMAKE_CURRENT_LIST_DIR}/tsconfig.json
+  ${PROJECT_SOURCE_DIR}/clients/js/package.json
+  ${PROJECT_SOURCE_DIR}/clients/js/tsconfig.json
   ${PROJECT_SOURCE_DIR}/protocol/view.schema.json
   ${PROJECT_SOURCE_DIR}/protocol/messages.schema.json
   ${PROJECT_SOURCE_DIR}/protocol/study.schema.json)

@@ -26,8 +26,10 @@ CLEAN = {
     "tests/CMakeLists.txt": "windsplat_test(unit_base unit/base unit windsplat_base)\n",
     "tests/unit/base/error_test.cpp": "TEST(Error, NamesTheCause) {\n}\n",
     "web/src/base/text.ts": "export const text = 1;\n",
-    "web/src/wire/api.ts": 'import type { View } from "../../generated/view";\n',
-    "web/src/app/app.ts": 'import {\n  api,\n} from "../wire/api";\nimport "../base/text";\n',
+    "web/src/view/link.ts": 'import type { View } from "@windsplat/client";\n',
+    "web/src/app/app.ts": 'import {\n  link,\n} from "../view/link";\nimport "../base/text";\n',
+    "clients/js/src/wire/api.ts": 'import type { View } from "../generated/view";\n',
+    "clients/js/src/index.ts": 'export * from "./wire/api";\n',
     "web/src/styles/base.css": "p {}\n",
     "web/report/text.ts": 'import type { Study } from "../generated/study";\n',
     "web/report/main.ts": 'import { short } from "./text";\n',
@@ -76,8 +78,20 @@ class Planted(unittest.TestCase):
         self.expect(check_web_imports)
 
     def test_import_against_the_order_of_web_folders(self):
-        self.plant("web/src/base/dom.ts", '\nexport { api } from "../wire/api";\n')
-        self.expect(check_web_imports, "base/dom.ts:2: base may not import web/src/wire/api")
+        self.plant("web/src/base/dom.ts", '\nexport { link } from "../view/link";\n')
+        self.plant("clients/js/src/base/a.ts", 'import { api } from "../wire/api";\n')
+        self.expect(check_web_imports, "base/a.ts:1: base may not import clients/js/src/wire/api",
+                    "base/dom.ts:2: base may not import web/src/view/link")
+
+    def test_imports_around_the_modules_of_the_client(self):
+        self.plant("web/src/app/a.ts", 'import { api } from "@windsplat/client/wire/api";\n')
+        self.plant("web/src/app/b.ts", 'import { api } from "../../../clients/js/src/wire/api";\n')
+        self.plant("clients/js/src/view/a.ts", 'import { api } from "@windsplat/client";\n')
+        self.plant("clients/js/src/view/b.ts", 'import "../../../../web/src/view/link";\n')
+        self.expect(check_web_imports, "clients/js/src/index is no file of clients/js/src",
+                    "view/b.ts:1: web/src/view/link is no file of clients/js/src",
+                    "app/a.ts:1: clients/js/src/wire/api is no file of web/src",
+                    "app/b.ts:1: clients/js/src/wire/api is no file of web/src")
 
     def test_cyclic_imports(self):
         self.plant("web/src/view/a.ts", 'import type { B } from "./b";\n')
@@ -90,7 +104,7 @@ class Planted(unittest.TestCase):
         self.plant("web/src/extra/a.ts", "\n")
         self.plant("web/src/save/a.ts", 'import { run } from "../../scripts/build";\n')
         self.expect(check_web_imports, "main.ts: belongs in a folder", "extra/a.ts: no rule",
-                    "web/scripts/build is no file of the page")
+                    "web/scripts/build is no file of web/src")
 
     def test_imports_of_the_report(self):
         self.plant("web/report/a.ts", 'import { text } from "../src/base/text";\n')

@@ -1,5 +1,6 @@
-// protocol/*.schema.json -> web/generated/*.ts, so that the schemas define the page's types. The
-// files are not committed; every build and test generates them.
+// protocol/*.schema.json -> clients/js/src/generated/*.ts and web/generated/study.ts, so that the
+// schemas define the types of the client and of the report. The files are not committed; every
+// build and test generates them.
 import { mkdir, readFile, rename, writeFile } from "node:fs/promises";
 import { dirname, join } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
@@ -7,7 +8,8 @@ import { compile } from "json-schema-to-typescript";
 
 const web = join(dirname(fileURLToPath(import.meta.url)), "..");
 const protocol = join(web, "..", "protocol");
-const schemas = ["view", "messages", "study"];
+const client = join(web, "..", "clients", "js", "src", "generated");
+const schemas = { view: client, messages: client, study: join(web, "generated") };
 
 // json-schema-to-typescript reads drafts before 2020-12, which define tuples by `items` and not by
 // `prefixItems`.
@@ -45,13 +47,13 @@ function collectRanges(node, pointer, ranges) {
   return ranges;
 }
 
-async function generateRanges(outDir) {
+async function generateRanges() {
   const schema = JSON.parse(await readFile(join(protocol, "view.schema.json"), "utf8"));
   const ranges = JSON.stringify(collectRanges(schema, "", {}), null, 1);
   const text = `// Made from protocol/view.schema.json by web/scripts/types.mjs.
 export const viewRanges: Readonly<Record<string, readonly [number, number]>> = ${ranges};
 `;
-  await writeIfChanged(join(outDir, "view_ranges.ts"), text);
+  await writeIfChanged(join(client, "view_ranges.ts"), text);
 }
 
 // A sample value of the schema's shape: objects with their required keys, lists of variable length
@@ -84,7 +86,7 @@ function collectKeys(schema, keys) {
   return keys;
 }
 
-async function generateKeys(outDir) {
+async function generateKeys() {
   const schema = JSON.parse(await readFile(join(protocol, "view.schema.json"), "utf8"));
   const entries = Object.entries(collectKeys(schema, {}))
     .filter(([, sample]) => !["0", "{}", "false"].includes(JSON.stringify(sample)))
@@ -94,14 +96,14 @@ async function generateKeys(outDir) {
   const text = `// Made from protocol/view.schema.json by web/scripts/types.mjs.
 export const viewKeys: Readonly<Record<string, unknown>> = {\n${lines}};
 `;
-  await writeIfChanged(join(outDir, "view_keys.ts"), text);
+  await writeIfChanged(join(client, "view_keys.ts"), text);
 }
 
-export async function generateTypes(outDir = join(web, "generated")) {
-  await mkdir(outDir, { recursive: true });
-  await generateRanges(outDir);
-  await generateKeys(outDir);
-  for (const name of schemas) {
+export async function generateTypes() {
+  for (const folder of Object.values(schemas)) await mkdir(folder, { recursive: true });
+  await generateRanges();
+  await generateKeys();
+  for (const [name, folder] of Object.entries(schemas)) {
     const path = join(protocol, `${name}.schema.json`);
     const schema = toOlderDraft(JSON.parse(await readFile(path, "utf8")));
     const text = await compile(schema, schema.title, {
@@ -111,7 +113,7 @@ export async function generateTypes(outDir = join(web, "generated")) {
       format: false,
       maxItems: 3,
     });
-    await writeIfChanged(join(outDir, `${name}.ts`), text);
+    await writeIfChanged(join(folder, `${name}.ts`), text);
   }
 }
 

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { aboutSections } from "../src/app/about";
-import type { Dataset } from "../src/wire/protocol";
+import type { Dataset } from "@windsplat/client";
 
 const axis = (name: string, units: string, coordinates: number[]) => ({
   name,

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Address } from "../src/app/address";
 import { hashOfView } from "../src/view/link";
-import type { View } from "../src/wire/protocol";
+import type { View } from "@windsplat/client";
 import type { Status } from "../src/app/status";
 
 class Visit {

@@ -17,8 +17,8 @@ import {
   zoom,
   type Box,
   type Camera,
-} from "../src/view/camera";
-import { dot, subtract, type Vec3 } from "../src/base/vec3";
+} from "@windsplat/client";
+import { dot, subtract, type Vec3 } from "@windsplat/client/parts";
 import { gizmoArms } from "../src/viewport/gizmo";
 
 const near = (a: number, b: number, message = ""): void =>

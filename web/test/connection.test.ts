@@ -10,9 +10,12 @@ import {
   type ConnectionState,
   type MessageLike,
   type SocketLike,
-} from "../src/wire/connection";
-import type { Frame, HelloMessage, ServerMessage } from "../src/wire/protocol";
-import { logIn, reachOf, type AskServer, type Reach } from "../src/wire/reach";
+  logIn,
+  reachOf,
+  type AskServer,
+  type Reach,
+} from "@windsplat/client/parts";
+import type { Frame, HelloMessage, ServerMessage } from "@windsplat/client";
 
 class FakeSocket implements SocketLike {
   binaryType = "blob";

@@ -23,7 +23,7 @@ import {
 } from "../src/panels/controls";
 import { methodText, partsLine, workLines } from "../src/viewport/frame_text";
 import { legendEntries, sampleHeights } from "../src/view/legend_entries";
-import type { ChosenMessage, Dataset, Field, View } from "../src/wire/protocol";
+import type { ChosenMessage, Dataset, Field, View } from "@windsplat/client";
 import { compassTicks } from "../src/base/ticks";
 
 const axis = (name: string, kind: Dataset["axes"]["x"]["kind"], coordinates: number[]) => ({

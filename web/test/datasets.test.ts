@@ -4,8 +4,8 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bestDataset, pickerEntries, withState } from "../src/app/dataset_list";
 import { hashOfView } from "../src/view/link";
-import type { View } from "../src/wire/protocol";
-import { mergeView } from "../src/view/view_state";
+import type { View } from "@windsplat/client";
+import { mergeView } from "@windsplat/client/parts";
 import { described, Page, problem, summaryOf } from "./page";
 
 const tooBig =

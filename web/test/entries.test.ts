@@ -4,8 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { entryOf, openEntry, type EntryApi } from "../src/app/entries";
 import { entryControls } from "../src/app/entry_picker";
-import { Refusal, type OpeningJob } from "../src/wire/api";
-import type { Dataset, View } from "../src/wire/protocol";
+import { ProblemError, type OpeningJob, type Dataset, type View } from "@windsplat/client";
 import { described, Page, problem } from "./page";
 
 const members = (chosen: string): Dataset["choices"] => [
@@ -229,7 +228,7 @@ test("a running job is asked again, and cancelled once it is not wanted", async 
   };
   await assert.rejects(
     openEntry(failing, entry, () => true, sleep),
-    Refusal,
+    ProblemError,
   );
 });
 

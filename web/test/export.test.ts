@@ -8,7 +8,7 @@ import { join } from "node:path";
 import { getEventListeners } from "node:events";
 import { test } from "node:test";
 import { deflateSync } from "node:zlib";
-import { anglesOf, distanceOf, type Camera } from "../src/view/camera";
+import { anglesOf, distanceOf, type Camera, type View } from "@windsplat/client";
 import {
   exportSize,
   frameCount,
@@ -17,11 +17,10 @@ import {
   progressText,
   type Animation,
 } from "../src/save/export_views";
-import { drawFrame, inOrder, waitFor, type FetchLike } from "../src/wire/frame_request";
+import { drawFrame, inOrder, waitFor, type FetchLike } from "@windsplat/client/parts";
 import { layoutCards, wrapNote } from "../src/save/legend_picture";
 import type { LegendEntry } from "../src/view/legend_entries";
 import { crc32, textOf, utf8, withDensity, withTexts, type Bytes } from "../src/save/png_text";
-import type { View } from "../src/wire/protocol";
 import { parseView } from "../src/save/saved_picture";
 import { Zip } from "../src/save/zip";
 import { problem, server } from "./server";
@@ -296,7 +295,7 @@ test("a busy server is retried after its Retry-After time, other errors are fina
   const broken = server(() => problem(507, "needs 9 GB"));
   await assert.rejects(
     drawFrame(broken.fetch, "http://host/", {}, never, { wait }),
-    /^Error: needs 9/,
+    /^ProblemError: needs 9/,
   );
   assert.equal(broken.asked.length, 1);
   const always = server(() => problem(429, "busy for ever"));

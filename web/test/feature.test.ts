@@ -1,9 +1,8 @@
 // What a pixel of the picture shows: its position and text, and the requests that ask for it.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { Api, type Feature } from "../src/wire/api";
+import { Api, type Feature, type Dataset, type View } from "@windsplat/client";
 import { featureLines, pixelAt, ringAt, sampleOf } from "../src/view/feature";
-import type { Dataset, View } from "../src/wire/protocol";
 
 const axis = (name: string, units: string) => ({ name, units });
 const grid = {

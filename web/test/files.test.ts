@@ -2,8 +2,8 @@
 // and of an unsolicited `error`.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { fitView, shapeOf } from "../src/view/fit_view";
-import type { View } from "../src/wire/protocol";
+import { fitView, shapeOf } from "@windsplat/client/parts";
+import type { View } from "@windsplat/client";
 import { described, Page, problem } from "./page";
 
 const gone = 'dataset "storm" has steps 0 to 2';

@@ -10,7 +10,7 @@ import {
   pointText,
   valueOn,
 } from "../src/panels/forecast";
-import type { ForecastPoint } from "../src/wire/api";
+import type { ForecastPoint } from "@windsplat/client";
 
 test("an axis contains its values, omits those without logarithm, and has a minimum width", () => {
   const axis = axisOver([0, Number.NaN, 5, 200], 30);

@@ -8,13 +8,12 @@ import {
   encodingLabel,
   errorLabel,
   FrameRate,
-  frameState,
   networkMs,
   markText,
   scaleText,
 } from "../src/viewport/frame_text";
-import { parseFrameHeader, type FrameHeader } from "../src/wire/protocol";
-import { pictureRect } from "../src/viewport/viewport";
+import { frameState, pictureRect } from "@windsplat/client/parts";
+import { parseFrameHeader, type FrameHeader } from "@windsplat/client";
 
 interface Change {
   flags?: number;

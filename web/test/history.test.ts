@@ -2,8 +2,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { differences, ViewHistory } from "../src/view/history";
-import type { View } from "../src/wire/protocol";
-import { mergeView } from "../src/view/view_state";
+import type { View } from "@windsplat/client";
+import { mergeView } from "@windsplat/client/parts";
 
 // A user with a view and a clock that is set by the test.
 class Desk {

@@ -3,9 +3,17 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 import { Ajv2020 } from "ajv/dist/2020.js";
-import { Api, type Answer, type Histogram } from "../src/wire/api";
-import { pointInPlane, project, type Camera } from "../src/view/camera";
-import type { Vec3 } from "../src/base/vec3";
+import {
+  Api,
+  type Answer,
+  type Histogram,
+  pointInPlane,
+  project,
+  type Camera,
+  type Dataset,
+  type View,
+} from "@windsplat/client";
+import type { Vec3 } from "@windsplat/client/parts";
 import { barPath, clipRange, neat, quantile, RangeDrag, valueAt } from "../src/view/histogram";
 import {
   coordinatesOf,
@@ -16,7 +24,6 @@ import {
   valueText,
   worldOf,
 } from "../src/view/sample_position";
-import type { Dataset, View } from "../src/wire/protocol";
 import { derivedIn } from "../src/view/view_fields";
 import { described } from "./page";
 import { timeEnds, seriesCurve } from "../src/panels/series_plot";
@@ -198,7 +205,7 @@ test("errors show the text of the server or of the page", async () => {
     { title: "Not Found", status: 404, detail: "there is no such field" },
     404,
   );
-  await assert.rejects(refused.api.range("d", "t", null), /^Error: there is no such field$/);
+  await assert.rejects(refused.api.range("d", "t", null), /^ProblemError: there is no such field$/);
   await assert.rejects(server("<html>", 502).api.range("d", "t", null), /HTTP 502/);
   await assert.rejects(server({ range: [1] }).api.range("d", "t", null), /not be understood/);
   await assert.rejects(server({ counts: [1] }).api.histogram("d", "t", 0, 8), /not be understood/);

@@ -9,10 +9,10 @@ import type {
   DatasetSummary,
   ServerMessage,
   View,
-} from "../src/wire/protocol";
+} from "@windsplat/client";
 import { Status } from "../src/app/status";
 import { TimeBar } from "../src/app/time_bar";
-import type { DrawnFrame } from "../src/viewport/viewport";
+import type { DrawnFrame } from "@windsplat/client/parts";
 
 class Element {
   dataset: Record<string, string> = {};

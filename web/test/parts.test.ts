@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { gesture, MoveQueue } from "../src/viewport/input";
+import { gesture, MoveQueue, pictureSize } from "@windsplat/client/parts";
 import { legendEntries, sampleHeights } from "../src/view/legend_entries";
 import { unitText } from "../src/view/unit_text";
 import { hashOfView, viewOfHash } from "../src/view/link";
@@ -17,12 +17,10 @@ import {
   type Layer,
 } from "../src/panels/media";
 import { patchAt, valueAt } from "../src/panels/panel_kit";
-import type { Dataset, View } from "../src/wire/protocol";
-import { problemText } from "../src/wire/requests";
+import type { Dataset, View, Camera } from "@windsplat/client";
+import { problemText } from "../src/base/problem_text";
 import { formatBytes, formatNumber, linearTicks, niceTicks } from "../src/base/ticks";
 import { readableTime } from "../src/base/time_text";
-import { pictureSize } from "../src/viewport/viewport";
-import type { Camera } from "../src/view/camera";
 
 const dataset: Dataset = {
   id: "gcm",

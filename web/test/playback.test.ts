@@ -4,8 +4,8 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { paceText, stepsText } from "../src/viewport/frame_text";
 import { Playback } from "../src/app/playback";
-import type { ClientMessage, StatsMessage } from "../src/wire/protocol";
-import { completeView } from "../src/view/view_state";
+import type { ClientMessage, StatsMessage } from "@windsplat/client";
+import { completeView } from "@windsplat/client/parts";
 
 class Page {
   sent: ClientMessage[] = [];

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { controlStates, hasErrorLimit, qualityHint } from "../src/panels/controls";
 import { hashOfView, viewOfHash } from "../src/view/link";
-import type { View } from "../src/wire/protocol";
+import type { View } from "@windsplat/client";
 import { described, Page } from "./page";
 
 function shown(): Page {

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { errorMetric } from "../src/base/error_text";
-import type { View } from "../src/wire/protocol";
+import type { View } from "@windsplat/client";
 import { progressText, Reference, referenceView, type Job } from "../src/viewport/reference";
 
 const job = (change: Partial<Job>): Job => ({

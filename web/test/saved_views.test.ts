@@ -4,8 +4,9 @@ import { test } from "node:test";
 import { parseView } from "../src/save/saved_picture";
 import { SavedViews, savedViewsMax } from "../src/save/saved_views";
 import { hashOfView, viewOfHash } from "../src/view/link";
-import type { View } from "../src/wire/protocol";
-import { linkMax, loadView, shortLinkHash, shortLinkId, storeView } from "../src/wire/short_link";
+import type { View } from "@windsplat/client";
+import { linkMax, shortLinkHash, shortLinkId } from "../src/view/short_link";
+import { loadView, storeView } from "@windsplat/client/parts";
 import { problem, server } from "./server";
 
 class Store {

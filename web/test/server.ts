@@ -1,5 +1,5 @@
 // A simulated server for the tests of requests.
-import type { FetchLike } from "../src/wire/frame_request";
+import type { FetchLike } from "@windsplat/client/parts";
 
 export const problem = (status: number, detail: string, headers: Record<string, string> = {}) =>
   new Response(JSON.stringify({ type: "about:blank", title: "No", status, detail }), {

@@ -1,10 +1,9 @@
 // The opacity curve editor and the colour range, without the user interface.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Range } from "../src/wire/api";
+import type { Range, View } from "@windsplat/client";
 import type { Curve } from "../src/panels/media";
 import { RangeFollower, type RangeMode, type RangeSource } from "../src/panels/range_choice";
-import type { View } from "../src/wire/protocol";
 import { UndoControl } from "../src/app/undo_control";
 import {
   addPoint,

@@ -7,7 +7,7 @@ import { beyondEnds, legendEntries } from "../src/view/legend_entries";
 import { unitText } from "../src/view/unit_text";
 import { opacityText } from "../src/panels/transfer";
 import { isGeographic } from "../src/viewport/gizmo";
-import type { Dataset, View } from "../src/wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 const grid = (kind: string, units: string, coordinates: number[]) =>
   ({

@@ -12,7 +12,7 @@ import {
   parseServerMessage,
   WireError,
   type ClientMessage,
-} from "../src/wire/protocol";
+} from "@windsplat/client";
 
 interface Case {
   kind: string;

@@ -1,8 +1,7 @@
 // The announcement of video: withdrawn after a failure of the decoder, and tried again.
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
-import { VideoOffer } from "../src/app/video_offer";
-import { videoUse } from "../src/view/video_setting";
+import { offerVideo, videoUse } from "../src/view/video_setting";
 
 const minute = 60_000;
 
@@ -12,7 +11,7 @@ class Page {
   private now = 0;
   private timers = new Map<number, { due: number; run: () => void }>();
   private last = 0;
-  readonly offer = new VideoOffer(
+  readonly offer = offerVideo(
     {
       setTimeout: (run, ms) => {
         this.timers.set(++this.last, { due: this.now + ms, run });

@@ -1,9 +1,15 @@
 // Merge patches, and the view after patches are accepted, refused or replaced.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { View } from "../src/wire/protocol";
-import { completeView, mergePatch, mergeView } from "../src/view/view_state";
-import { ViewState, withDefaults, type Patch } from "../src/view/view_state";
+import type { View } from "@windsplat/client";
+import {
+  completeView,
+  mergePatch,
+  mergeView,
+  ViewState,
+  withDefaults,
+  type Patch,
+} from "@windsplat/client/parts";
 
 test("merge patches follow RFC 7396", () => {
   const rows: [unknown, unknown, unknown][] = [

@@ -2,8 +2,8 @@
 // interrupted by other input, and the requests for the value under the cursor.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Probe } from "../src/wire/api";
 import {
+  type Probe,
   anglesOf,
   between,
   cameraFrame,
@@ -16,13 +16,12 @@ import {
   rollOf,
   withProjection,
   type Camera,
-} from "../src/view/camera";
-import type { Vec3 } from "../src/base/vec3";
+  type Dataset,
+  type View,
+} from "@windsplat/client";
+import { type Vec3, MoveQueue, twist, wheelZoom, Turn } from "@windsplat/client/parts";
 import { Hover, type HoverTarget } from "../src/viewport/hover";
-import { MoveQueue, twist, wheelZoom } from "../src/viewport/input";
 import { hoverLines, placeText } from "../src/view/sample_position";
-import type { Dataset, View } from "../src/wire/protocol";
-import { Turn } from "../src/viewport/camera_turn";
 
 const near = (a: number, b: number, slack = 1e-9): void =>
   assert.ok(Math.abs(a - b) <= slack * Math.max(1, Math.abs(b)), `${a} is not ${b}`);

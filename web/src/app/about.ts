@@ -4,7 +4,7 @@ import { formatNumber } from "../base/ticks";
 import { readableTime } from "../base/time_text";
 import { unitText } from "../view/unit_text";
 import { axisUnit, valueOnAxis } from "../view/sample_position";
-import type { Dataset } from "../wire/protocol";
+import type { Dataset } from "@windsplat/client";
 
 type Axis = Dataset["axes"]["x"];
 type Row = readonly [name: string, text: string];

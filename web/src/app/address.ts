@@ -1,12 +1,11 @@
 // Keeps the view in the page's address: view -> `#!{...}`, debounced, and back. If a view is too
 // long for a link, the server stores a copy and `#!view=ID` is copied to the clipboard; the page's
 // address always contains the whole view, so that it remains valid after a server restart.
-import { failureText } from "../wire/api";
-import { debounced } from "../base/dom";
-import type { FetchLike } from "../wire/frame_request";
+import { failureText } from "../base/problem_text";
+import { debounced, type FetchLike, loadView, storeView } from "@windsplat/client/parts";
 import { hashOfView, viewOfHash, withoutSize } from "../view/link";
-import type { View } from "../wire/protocol";
-import { linkMax, loadView, shortLinkHash, shortLinkId, storeView } from "../wire/short_link";
+import type { View } from "@windsplat/client";
+import { linkMax, shortLinkHash, shortLinkId } from "../view/short_link";
 import type { Status } from "./status";
 
 export interface AddressHost {

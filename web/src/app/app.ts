@@ -3,35 +3,43 @@
 // not on each other.
 import { Address } from "./address";
 import type { AppParts } from "./app_parts";
-import { PatchAnswers } from "./patch_answers";
-import { Api } from "../wire/api";
-import { anglesOf, distanceOf, rollOf } from "../view/camera";
-import { CameraControl } from "../view/camera_control";
-import { ColorMaps } from "../wire/color_maps";
-import type { Clock, Connection, ConnectionState } from "../wire/connection";
-import { Flow } from "../view/flow";
-import { scaleText, type FrameState } from "../viewport/frame_text";
-import { loadHelpTexts } from "../panels/help_texts";
-import { leaveRoom } from "../viewport/annotation_room";
-import { legendEntries } from "../view/legend_entries";
-import { DatasetOpener } from "./dataset_opener";
-import { openEntry } from "./entries";
-import { Playback } from "./playback";
 import {
+  PatchAnswers,
+  CameraControl,
+  ColorMaps,
+  type Clock,
+  type Connection,
+  type ConnectionState,
+  type FrameState,
+  openConnection,
+  watchPresence,
+  type VideoOffer,
+  ViewModel,
+  type Outgoing,
+  type Patch,
+  type DrawnFrame,
+} from "@windsplat/client/parts";
+import {
+  Api,
   type Dataset,
   type ErrorMessage,
   type HelloMessage,
   type ServerMessage,
   type View,
-} from "../wire/protocol";
-import { problemText } from "../wire/requests";
-import { openConnection, watchPresence } from "./server_link";
+} from "@windsplat/client";
+import { Flow } from "../view/flow";
+import { scaleText } from "../viewport/frame_text";
+import { loadHelpTexts } from "../panels/help_texts";
+import { leaveRoom } from "../viewport/annotation_room";
+import { markCamera } from "../viewport/camera_marks";
+import { legendEntries } from "../view/legend_entries";
+import { DatasetOpener } from "./dataset_opener";
+import { openEntry } from "./entries";
+import { Playback } from "./playback";
+import { problemText } from "../base/problem_text";
 import { UndoControl } from "./undo_control";
+import { offerVideo } from "../view/video_setting";
 import { nightText } from "../view/sun_at";
-import { VideoOffer } from "./video_offer";
-import { ViewModel } from "../view/view_model";
-import type { Outgoing, Patch } from "../view/view_state";
-import type { DrawnFrame } from "../viewport/viewport";
 
 export class App {
   readonly maps = new ColorMaps();
@@ -67,7 +75,7 @@ export class App {
         this.parts.viewport.show(frame).catch(() => this.onBroken(frame.header.seq));
       },
     });
-    this.video = new VideoOffer(clock, {
+    this.video = offerVideo(clock, {
       send: (message) => void this.connection.send(message),
       note: (text) => this.parts.status.note(text),
     });
@@ -332,8 +340,6 @@ export class App {
       case "error":
         this.onError(message);
         break;
-      default:
-        break;
     }
   }
 
@@ -417,9 +423,8 @@ export class App {
     entries.show(choices);
     timeBar.setDataset(this.dataset());
     gizmo.setAxes(axes);
-    const { count } = steps;
-    const { x, y, z } = dims;
-    facts.textContent = `${x} × ${y} × ${z} · ${count} step${count === 1 ? "" : "s"}`;
+    const stepsText = `${steps.count} step${steps.count === 1 ? "" : "s"}`;
+    facts.textContent = `${dims.x} × ${dims.y} × ${dims.z} · ${stepsText}`;
     facts.title = `${title} — ${source} (${format})`;
     document.title = `${title} · windsplat`;
   }
@@ -442,12 +447,7 @@ export class App {
     const camera = this.model.camera();
     if (camera !== null) {
       this.parts.gizmo.show(camera);
-      const { azimuth, elevation } = anglesOf(camera);
-      const { dataset } = this.parts.viewport.canvas;
-      dataset.azimuth = azimuth.toFixed(1);
-      dataset.elevation = elevation.toFixed(1);
-      dataset.distance = distanceOf(camera).toFixed(4);
-      dataset.roll = rollOf(camera).toFixed(1);
+      markCamera(this.parts.viewport.canvas, camera);
     }
   }
 

@@ -12,7 +12,7 @@ import type { Panels } from "../panels/panels";
 import type { Probe } from "../viewport/probe";
 import type { Status } from "./status";
 import type { TimeBar } from "./time_bar";
-import type { Viewport } from "../viewport/viewport";
+import type { Viewport } from "@windsplat/client/parts";
 
 export interface AppParts {
   viewport: Viewport;

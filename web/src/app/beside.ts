@@ -1,7 +1,13 @@
 // The second picture beside the first: a session of its own whose view follows that of the first,
 // except for its dataset and step, and for its settings and camera while they are not linked. What
 // the user chooses in its bar -> its view -> its picture.
-import { anglesOf, distanceOf, type Camera } from "../view/camera";
+import {
+  type Camera,
+  type Dataset,
+  type FrameHeader,
+  type ServerMessage,
+  type View,
+} from "@windsplat/client";
 import {
   besideSuffix,
   besideView,
@@ -11,21 +17,26 @@ import {
   withOwnSettings,
   type Beside,
 } from "../view/beside";
-import { roundedCamera } from "../view/camera_control";
-import { ViewState } from "../view/view_state";
-import { afterResizing, byId } from "../base/dom";
+import {
+  roundedCamera,
+  ViewState,
+  afterResizing,
+  type Clock,
+  type Connection,
+  type ConnectionState,
+  type CameraHost,
+  Viewport,
+  type ColorMaps,
+  PatchAnswers,
+  openConnection,
+  watchPresence,
+} from "@windsplat/client/parts";
+import { byId } from "../base/dom";
 import { pictureCaption } from "../view/caption";
-import type { Clock, Connection, ConnectionState } from "../wire/connection";
-import type { Dataset, FrameHeader, ServerMessage, View } from "../wire/protocol";
-import { failureText } from "../wire/api";
-import { problemText } from "../wire/requests";
-import type { CameraHost } from "../viewport/input";
+import { failureText, problemText } from "../base/problem_text";
+import { markCamera } from "../viewport/camera_marks";
 import { Legend } from "../viewport/legend";
-import { Viewport } from "../viewport/viewport";
 import { legendEntries } from "../view/legend_entries";
-import type { ColorMaps } from "../wire/color_maps";
-import { PatchAnswers } from "./patch_answers";
-import { openConnection, watchPresence } from "./server_link";
 
 export interface BesideHost {
   view(): View; // of the first picture, with all known values
@@ -335,12 +346,7 @@ export class BesidePicture {
       this.showCaption();
       this.drawn = view;
       this.showLegend();
-      const camera = view.camera as Camera;
-      const { azimuth, elevation } = anglesOf(camera);
-      // As the server drew it.
-      this.canvas.dataset.azimuth = azimuth.toFixed(1);
-      this.canvas.dataset.elevation = elevation.toFixed(1);
-      this.canvas.dataset.distance = distanceOf(camera).toFixed(4);
+      markCamera(this.canvas, view.camera as Camera); // as the server drew it
     }
     this.settleUnchanged();
     this.follow(); // changes that had to wait

@@ -1,9 +1,9 @@
 // The datasets as cards with small pictures: dataset list -> the dataset to open. Pictures are
 // loaded one after another, and only for visible cards.
-import { failureText, type Api } from "../wire/api";
+import { failureText } from "../base/problem_text";
+import type { Api, DatasetSummary } from "@windsplat/client";
 import { failureNote, type DatasetList } from "./dataset_list";
 import { make, whenClosed } from "../base/dom";
-import type { DatasetSummary } from "../wire/protocol";
 
 export interface CardsHost {
   api: Api;

@@ -1,6 +1,6 @@
 // The available datasets: the server's list and later reports on single datasets -> the entries of
 // the picker and the dataset to open first.
-import type { Dataset, DatasetSummary } from "../wire/protocol";
+import type { Dataset, DatasetSummary } from "@windsplat/client";
 
 export interface PickerEntry {
   id: string;

@@ -2,19 +2,24 @@
 // message and the matching view; `opened` and refusals -> the open dataset or its replacement.
 import { failureNote, type DatasetList } from "./dataset_list";
 import { entryOf, entryText, type Entry } from "./entries";
-import { fitView, shapeOf } from "../view/fit_view";
-import type {
-  ClientMessage,
-  Dataset,
-  DatasetSummary,
-  ErrorMessage,
-  OpenedMessage,
-  View,
-} from "../wire/protocol";
-import { failureText, Refusal } from "../wire/api";
+import {
+  fitView,
+  shapeOf,
+  type ViewModel,
+  type Outgoing,
+  type Patch,
+} from "@windsplat/client/parts";
+import {
+  type ClientMessage,
+  type Dataset,
+  type DatasetSummary,
+  type ErrorMessage,
+  type OpenedMessage,
+  type View,
+  ProblemError,
+} from "@windsplat/client";
+import { failureText } from "../base/problem_text";
 import type { Status } from "./status";
-import type { ViewModel } from "../view/view_model";
-import type { Outgoing, Patch } from "../view/view_state";
 
 export interface DatasetOpenerHost {
   sendMessage(message: ClientMessage): void;
@@ -291,7 +296,7 @@ export class DatasetOpener {
     const { model, status, list } = this;
     const { open } = model;
     const id = view.dataset ?? "";
-    const code = failure instanceof Refusal ? failure.status : 0;
+    const code = failure instanceof ProblemError ? failure.status : 0;
     if (id !== open?.id && list.has(id)) {
       this.request(id, model.state.replace(view)); // it is listed under this very name
     } else if (open === null) {

@@ -1,7 +1,7 @@
 // The embedded view (`?embed`): the picture alone, as other pages show it in a frame. What needs
 // the whole page, as files, saved views and the login, is behind a link to it.
 import { hashOfView } from "../view/link";
-import type { View } from "../wire/protocol";
+import type { View } from "@windsplat/client";
 import { byId } from "../base/dom";
 import type { Binding } from "./keyboard";
 

@@ -1,7 +1,6 @@
 // Other entries of the dimensions of a dataset (members, bands, reference times): ids and choices
 // -> a request to the server -> the opened dataset.
-import { Refusal, type Api, type OpeningJob } from "../wire/api";
-import type { Dataset } from "../wire/protocol";
+import { ProblemError, type Api, type OpeningJob, type Dataset } from "@windsplat/client";
 
 export interface Entry {
   from: string; // id of a listed dataset of the same files
@@ -45,7 +44,7 @@ export async function openEntry(
 }
 
 // The id of the dataset that the job opens. Returns null, and cancels the request, once it is no
-// longer wanted. A refused request fails with a Refusal.
+// longer wanted. A refused request fails with a ProblemError.
 export async function resultOf(
   api: Pick<Api, "job" | "cancelJob">,
   started: OpeningJob,
@@ -63,7 +62,7 @@ export async function resultOf(
   }
   if (!wanted()) return null;
   if (job.result === null) {
-    throw new Refusal(job.problem?.detail ?? job.state, job.problem?.status ?? 0);
+    throw new ProblemError(job.problem?.detail ?? job.state, job.problem?.status ?? 0);
   }
   return job.result;
 }

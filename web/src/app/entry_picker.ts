@@ -3,7 +3,7 @@
 // them with the keyboard keeps the focus.
 import { make } from "../base/dom";
 import { readableTime } from "../base/time_text";
-import type { Dataset } from "../wire/protocol";
+import type { Dataset } from "@windsplat/client";
 
 type Choice = Dataset["choices"][number];
 

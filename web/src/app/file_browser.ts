@@ -2,8 +2,8 @@
 // dataset that is opened. Without a data root the server lists nothing, and a hint says how to add
 // data.
 import { byId, make } from "../base/dom";
-import { failureText, type Api } from "../wire/api";
-import type { Folder } from "../wire/folder";
+import { failureText } from "../base/problem_text";
+import type { Api, Folder } from "@windsplat/client";
 import { resultOf } from "./entries";
 import { folderNote, folderRows, folderTrail, type FolderRow } from "./folder_rows";
 

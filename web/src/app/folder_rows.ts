@@ -1,5 +1,5 @@
 // A folder of the server -> the rows of the file browser. Pure.
-import type { Folder } from "../wire/folder";
+import type { Folder } from "@windsplat/client";
 
 export interface FolderRow {
   name: string;

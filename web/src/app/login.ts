@@ -1,7 +1,7 @@
 // Asks for the token once the server demands one, as after its token was changed. The page and its
 // view stay as they are.
 import { byId, whenClosed } from "../base/dom";
-import { logIn } from "../wire/reach";
+import { logIn } from "@windsplat/client/parts";
 
 export class Login {
   private readonly dialog = byId("login", HTMLDialogElement);

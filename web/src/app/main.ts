@@ -1,6 +1,6 @@
 // Assembles the page (parts, key bindings, buttons) and starts the application.
 import { takeBeside } from "../view/beside";
-import { drag, pan, roll, withProjection, zoom, type Angles } from "../view/camera";
+import { drag, pan, roll, withProjection, zoom, type Angles } from "@windsplat/client";
 import { pictureCaption } from "../view/caption";
 import { About } from "./about";
 import { App } from "./app";
@@ -10,14 +10,14 @@ import { DatasetList } from "./dataset_list";
 import { embeddedKeys, isEmbedded, openLink, takesWheel } from "./embed";
 import { entryOf, openEntry } from "./entries";
 import { EntryPicker } from "./entry_picker";
-import { afterResizing, byId, make } from "../base/dom";
+import { afterResizing, MoveQueue, PointerInput, Turn, Viewport } from "@windsplat/client/parts";
+import { byId, make } from "../base/dom";
 import { toggleErrorMetric } from "../base/error_text";
 import { FileBrowser } from "./file_browser";
 import { Gizmo, looks } from "../viewport/gizmo";
 import { hoverOn } from "../view/hover_setting";
 import { HoverView } from "../viewport/hover_view";
 import { Hud } from "../viewport/hud";
-import { MoveQueue, PointerInput } from "../viewport/input";
 import { bindKeys, modText, type Binding } from "./keyboard";
 import { Legend } from "../viewport/legend";
 import { Login } from "./login";
@@ -31,8 +31,6 @@ import { saveDialog } from "../save/save_dialog";
 import { takeDrops, type FileTarget } from "../save/saved_picture";
 import { Status } from "./status";
 import { TimeBar } from "./time_bar";
-import { Turn } from "../viewport/camera_turn";
-import { Viewport } from "../viewport/viewport";
 
 const clock = {
   setTimeout: (run: () => void, ms: number) => window.setTimeout(run, ms),

@@ -1,6 +1,6 @@
 // Playback state and direction. The server advances the steps; the page sends `play` and `pause`
 // and follows the steps of the arriving frames.
-import type { ClientMessage } from "../wire/protocol";
+import type { ClientMessage } from "@windsplat/client";
 import type { Direction } from "./time_bar";
 
 export interface PlaybackHost {

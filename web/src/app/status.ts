@@ -1,6 +1,6 @@
 // Status text: connection, loading with a progress bar, and errors. An error is shown until it is
 // dismissed or the failed operation succeeds; less important messages never overwrite it.
-import type { ConnectionState } from "../wire/connection";
+import type { ConnectionState } from "@windsplat/client/parts";
 import { countedFromOne } from "../base/step_text";
 import { byId } from "../base/dom";
 

@@ -1,6 +1,6 @@
 // The bar below the picture: time step, playback in both directions, speed. It displays the state
 // passed to it and reports the user's input; it stores no step itself.
-import type { Dataset } from "../wire/protocol";
+import type { Dataset } from "@windsplat/client";
 import { byId } from "../base/dom";
 import { readableTime } from "../base/time_text";
 

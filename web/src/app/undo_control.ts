@@ -1,7 +1,7 @@
 // User interface of undo and redo: keys, two buttons and status text. Pointer and key events
 // anywhere on the page delimit the undo entries.
 import { ViewHistory } from "../view/history";
-import type { View } from "../wire/protocol";
+import type { View } from "@windsplat/client";
 
 export interface UndoControlHost {
   document(): View; // explicit keys only

@@ -67,21 +67,3 @@ export function observeVisibility(element: Element, report: (visible: boolean) =
   // Several changes may arrive together; the last one is current.
   new IntersectionObserver((entries) => report(entries.at(-1)!.isIntersecting)).observe(element);
 }
-
-// Paper shows the present picture; its size on paper is none to draw at.
-export const isPrinting = (): boolean => window.matchMedia("print").matches;
-
-// After the picture's place has changed its size, once that rests.
-export const afterResizing = (run: () => void): (() => void) =>
-  debounced(() => {
-    if (!isPrinting()) run();
-  }, 120);
-
-// Runs `run` once, `ms` after the last call.
-export function debounced(run: () => void, ms: number): () => void {
-  let timer: number | undefined;
-  return () => {
-    window.clearTimeout(timer);
-    timer = window.setTimeout(run, ms);
-  };
-}

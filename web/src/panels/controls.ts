@@ -2,9 +2,9 @@
 // and patches that keep dependent values consistent. Pure: (dataset, view) -> options, text,
 // patches.
 import { unitText } from "../view/unit_text";
-import type { Dataset, Field, View } from "../wire/protocol";
+import type { Dataset, Field, View } from "@windsplat/client";
 import { formatNumber } from "../base/ticks";
-import type { Patch } from "../view/view_state";
+import type { Patch } from "@windsplat/client/parts";
 
 export type Options = Record<string, string>; // label -> value in the view document
 export type SliceAxis = "x" | "y" | "z";

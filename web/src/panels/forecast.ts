@@ -2,8 +2,8 @@
 // Pure.
 import { errorName, errorText, type ErrorMetric } from "../base/error_text";
 import { formatNumber } from "../base/ticks";
-import { clamp } from "../base/values";
-import type { ForecastPoint } from "../wire/api";
+import { clamp } from "@windsplat/client/parts";
+import type { ForecastPoint } from "@windsplat/client";
 
 export interface Axis {
   low: number; // > 0

@@ -1,8 +1,10 @@
 // Plot of error against time in the Quality panel: the server's forecast for the view's settings,
 // the displayed frame, and the budget and error limit as handles. The forecast is requested while
 // the plot is visible and the view is at rest.
-import { failureText, type Forecast } from "../wire/api";
-import { debounced, make, makeSvg, setAttributes, svgText, observeVisibility } from "../base/dom";
+import { failureText } from "../base/problem_text";
+import type { Forecast, FrameHeader, View } from "@windsplat/client";
+import { debounced, clamp } from "@windsplat/client/parts";
+import { make, makeSvg, setAttributes, svgText, observeVisibility } from "../base/dom";
 import { errorMetric, errorName, errorText, errorWord } from "../base/error_text";
 import {
   axisOver,
@@ -16,9 +18,7 @@ import {
   valueOn,
   type Axis,
 } from "./forecast";
-import type { FrameHeader, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
-import { clamp } from "../base/values";
 
 export interface ForecastHost {
   view(): View;

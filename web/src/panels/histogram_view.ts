@@ -1,19 +1,13 @@
 // A histogram in the panel: fetched while it is visible and playback is paused. Dragging over it,
 // or over the colours below it, chooses a range; a medium's opacity curve is edited on top of it.
-import { failureText, type Histogram, type Range } from "../wire/api";
-import {
-  checkLabel,
-  debounced,
-  make,
-  makeSvg,
-  setAttributes,
-  observeVisibility,
-} from "../base/dom";
+import { failureText } from "../base/problem_text";
+import type { Histogram, Range } from "@windsplat/client";
+import { checkLabel, make, makeSvg, setAttributes, observeVisibility } from "../base/dom";
+import { debounced, clamp } from "@windsplat/client/parts";
 import { barPath, clipRange, positionOf, RangeDrag, valueAt } from "../view/histogram";
 import { oriented, RangeChoice, type RangeSource } from "./range_choice";
 import { formatNumber } from "../base/ticks";
 import { TransferView, type CurveSource } from "./transfer_view";
-import { clamp } from "../base/values";
 
 export const histogramBins = 128;
 const restMs = 250; // time without a change before it is fetched again

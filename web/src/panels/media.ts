@@ -1,7 +1,7 @@
 // Model of the media panel: which media are on, and the opacity curve with its two parameters,
 // density and threshold. Pure.
-import type { ScalarView } from "../wire/protocol";
-import { clamp } from "../base/values";
+import type { ScalarView } from "@windsplat/client";
+import { clamp } from "@windsplat/client/parts";
 
 export type Curve = [number, number][]; // (value, extinction per world unit), values ascending
 

@@ -2,8 +2,8 @@
 import type GUI from "lil-gui";
 import { make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
-import type { Vec3 } from "../base/vec3";
-import { distanceOf, type Camera } from "../view/camera";
+import type { Vec3 } from "@windsplat/client/parts";
+import { distanceOf, type Camera } from "@windsplat/client";
 import { cameraChange, cameraPatch, cameraText } from "../view/camera_text";
 import type { PanelKit } from "./panel_kit";
 

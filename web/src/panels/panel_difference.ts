@@ -1,6 +1,6 @@
 // The difference: what is subtracted from the fields, another step or another dataset.
 import type GUI from "lil-gui";
-import { failureText } from "../wire/api";
+import { failureText } from "../base/problem_text";
 import { keyAccess, type PanelKit } from "./panel_kit";
 
 export interface DifferenceActions {

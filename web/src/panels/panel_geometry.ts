@@ -1,6 +1,6 @@
 // The section of the data that is drawn, the place of the data in the world, and the camera.
 import type GUI from "lil-gui";
-import { withProjection, type Camera } from "../view/camera";
+import { withProjection, type Camera, type Dataset } from "@windsplat/client";
 import {
   exaggerationText,
   fieldOptions,
@@ -21,7 +21,6 @@ import { addAnnotations } from "./panel_annotations";
 import { addCameraNumbers } from "./panel_camera";
 import { addGround } from "./panel_ground";
 import { keyAccess, type PanelKit } from "./panel_kit";
-import type { Dataset } from "../wire/protocol";
 
 type Mapping = Dataset["mappings"][number];
 

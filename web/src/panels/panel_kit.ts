@@ -1,10 +1,16 @@
 // Controls of the panels: each shows one key of the view and changes it by a merge patch. Labels
 // are defined here; explanations (titles) and limits come from the schema of the view.
 import GUI, { Controller, type NumberController } from "lil-gui";
-import { viewRanges } from "../../generated/view_ranges";
+import {
+  viewRanges,
+  type Api,
+  type Range,
+  type Dataset,
+  type FrameHeader,
+  type View,
+} from "@windsplat/client";
 import { explain } from "./help_texts";
-import type { Api, Range } from "../wire/api";
-import type { ColorMaps } from "../wire/color_maps";
+import { type ColorMaps, type Patch, clamp } from "@windsplat/client/parts";
 import { controlStates, type ControlStates, type Options } from "./controls";
 import { make } from "../base/dom";
 import { PictureStore } from "../base/picture_store";
@@ -15,9 +21,6 @@ import { unitText } from "../view/unit_text";
 import type { RangeMode } from "./range_choice";
 import { formatNumber } from "../base/ticks";
 import type { CurveSource } from "./transfer_view";
-import type { Dataset, FrameHeader, View } from "../wire/protocol";
-import type { Patch } from "../view/view_state";
-import { clamp } from "../base/values";
 
 export interface PanelHost {
   view(): View; // with all known defaults

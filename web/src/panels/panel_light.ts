@@ -4,7 +4,7 @@ import type { Controller } from "lil-gui";
 import { depthCuePatch } from "./controls";
 import { keyAccess, type PanelKit } from "./panel_kit";
 import { minuteOf, sunAtStep } from "../view/sun_at";
-import type { View } from "../wire/protocol";
+import type { View } from "@windsplat/client";
 
 type Light = NonNullable<View["light"]>;
 

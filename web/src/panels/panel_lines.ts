@@ -2,7 +2,7 @@
 import type GUI from "lil-gui";
 import type { Controller } from "lil-gui";
 import { colorByPatch, colorField, fieldOptions } from "./controls";
-import type { Range } from "../wire/api";
+import type { Range } from "@windsplat/client";
 import { colorScale } from "../view/color_scale";
 import { unitText } from "../view/unit_text";
 import { keyAccess, type PanelKit } from "./panel_kit";

@@ -1,6 +1,6 @@
 // The media panel: up to four scalar fields, each with a switch, field, colours and opacity.
 import type GUI from "lil-gui";
-import type { Range } from "../wire/api";
+import type { Range, ScalarView } from "@windsplat/client";
 import { fieldOptions } from "./controls";
 import { volumesTitle } from "../view/words";
 import { unitText } from "../view/unit_text";
@@ -16,7 +16,6 @@ import {
   type Layer,
 } from "./media";
 import type { Access, PanelKit } from "./panel_kit";
-import type { ScalarView } from "../wire/protocol";
 import { namePart } from "../base/key_words";
 import { isRamp } from "./transfer";
 

@@ -2,8 +2,7 @@
 // the pictures are visible; a change of the view ends the request that is under way.
 import type GUI from "lil-gui";
 import { make, observeVisibility } from "../base/dom";
-import { Refusal } from "../wire/api";
-import type { View } from "../wire/protocol";
+import { ProblemError, type View } from "@windsplat/client";
 import type { PanelKit } from "./panel_kit";
 import { presetsOf, presetView, type Preset } from "../view/presets";
 
@@ -19,7 +18,7 @@ const refusedCodes = [400, 422]; // of a view that the server does not draw
 
 // Whether asking again would be in vain; a login, a busy server or a lost connection may change.
 export const isRefusedView = (failure: unknown): boolean =>
-  failure instanceof Refusal && refusedCodes.includes(failure.status);
+  failure instanceof ProblemError && refusedCodes.includes(failure.status);
 
 export function addPresets(gui: GUI, kit: PanelKit, actions: PresetSwitch): void {
   const folder = kit.folder(gui, "Views to start from", { open: true });

@@ -1,8 +1,10 @@
 // The probe panel: a position in the coordinates of the axes -> the values of all fields there, and
 // of one field over time. While the folder is open the probe is on and marked on the picture.
 import type GUI from "lil-gui";
-import { failureText, type Position, type Series } from "../wire/api";
-import { checkLabel, debounced, make, makeSvg, numberBox } from "../base/dom";
+import { failureText } from "../base/problem_text";
+import type { Position, Series, View } from "@windsplat/client";
+import { checkLabel, make, makeSvg, numberBox } from "../base/dom";
+import { debounced } from "@windsplat/client/parts";
 import { wayText } from "../view/distance";
 import { hoverOf, hoverOn } from "../view/hover_setting";
 import { sampleOf } from "../view/feature";
@@ -22,7 +24,6 @@ import {
 import { timeEnds, drawSeries } from "./series_plot";
 import { formatNumber } from "../base/ticks";
 import { derivedIn } from "../view/view_fields";
-import type { View } from "../wire/protocol";
 
 const restMs = 150;
 

@@ -1,7 +1,7 @@
 // The region: ranges of the axes, a filter by another field, and a polygon from a GeoJSON file.
 import type GUI from "lil-gui";
 import type { Controller } from "lil-gui";
-import { failureText } from "../wire/api";
+import { failureText } from "../base/problem_text";
 import { make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
 import { fieldOptions, showsTheEarth } from "./controls";
@@ -10,7 +10,7 @@ import { unitText } from "../view/unit_text";
 import { axisNames, axisUnit } from "../view/sample_position";
 import { polygonFrom } from "../view/geo_polygon";
 import type { PanelKit } from "./panel_kit";
-import type { Dataset, View } from "../wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 type Ends = [number, number];
 const everywhere = ""; // no filter

@@ -7,7 +7,7 @@ import { axisNames, axisUnit } from "../view/sample_position";
 import { extentOf } from "./panel_region";
 import { keyAccess, type PanelKit } from "./panel_kit";
 import { SeedPoints, type Place } from "./seed_points";
-import type { Dataset, View } from "../wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 type Seeds = NonNullable<NonNullable<NonNullable<View["vector"]>["trace"]>["seeds"]>;
 export type SeedKind = "none" | "evenly" | "points" | "line" | "plane";

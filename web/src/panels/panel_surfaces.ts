@@ -2,8 +2,8 @@
 import type GUI from "lil-gui";
 import { surfaceColors } from "../view/legend_entries";
 import { unitText } from "../view/unit_text";
-import { failureText, type FieldRange, type Histogram } from "../wire/api";
-import type { SurfaceView } from "../wire/protocol";
+import { failureText } from "../base/problem_text";
+import type { FieldRange, Histogram, SurfaceView } from "@windsplat/client";
 import { colorsIn, contrastColor } from "../view/contrast_color";
 import { fieldOptions } from "./controls";
 import { histogramBins } from "./histogram_view";

@@ -2,7 +2,7 @@
 import type GUI from "lil-gui";
 import { fieldOptions } from "./controls";
 import { keyAccess, type PanelKit } from "./panel_kit";
-import type { Dataset } from "../wire/protocol";
+import type { Dataset } from "@windsplat/client";
 
 export interface FlowSwitch {
   flowing(): boolean;

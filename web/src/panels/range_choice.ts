@@ -1,6 +1,7 @@
 // Source of the colour range: the dataset's default, the displayed step, all steps, or numbers
 // entered by the user. The picker's choice determines the range in the view.
-import { failureText, type Range } from "../wire/api";
+import { failureText } from "../base/problem_text";
+import type { Range } from "@windsplat/client";
 import { make } from "../base/dom";
 
 export type RangeMode = "default" | "step" | "all" | "custom";

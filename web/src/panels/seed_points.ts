@@ -5,9 +5,9 @@ import { make } from "../base/dom";
 import { nameKey } from "../base/key_words";
 import { explain } from "./help_texts";
 import { axisNames, type Sample } from "../view/sample_position";
-import { failureText } from "../wire/api";
+import { failureText } from "../base/problem_text";
 import type { PanelKit } from "./panel_kit";
-import type { Dataset, View } from "../wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 export type Place = [number, number, number];
 

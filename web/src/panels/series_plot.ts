@@ -1,5 +1,5 @@
 // One value over the time steps: numbers -> an SVG with gaps at missing values.
-import type { SeriesTime } from "../wire/api";
+import type { SeriesTime } from "@windsplat/client";
 import { makeSvg, svgText } from "../base/dom";
 import { formatNumber } from "../base/ticks";
 import { readableTime } from "../base/time_text";

@@ -1,9 +1,8 @@
 // What a new surface shows: a field that has values, a value between them, and a section that the
 // camera does not see edge-on.
-import type { FieldRange, Histogram } from "../wire/api";
-import type { Dataset, SurfaceView, View } from "../wire/protocol";
+import type { FieldRange, Histogram, Dataset, SurfaceView, View } from "@windsplat/client";
 import { formatNumber } from "../base/ticks";
-import { dot, length, subtract, times, type Vec3 } from "../base/vec3";
+import { dot, length, subtract, times, type Vec3 } from "@windsplat/client/parts";
 import { unitText } from "../view/unit_text";
 import { neat, quantile } from "../view/histogram";
 

@@ -1,10 +1,10 @@
 // Model of a medium's opacity curve editor: points moved, added and removed, their positions on a
 // linear or logarithmic scale, and the curve as a path. Pure.
-import type { Range } from "../wire/api";
+import type { Range } from "@windsplat/client";
 import { neat } from "../view/histogram";
 import { densityOf, type Curve } from "./media";
 import { formatNumber } from "../base/ticks";
-import { clamp } from "../base/values";
+import { clamp } from "@windsplat/client/parts";
 
 export const pointsMax = 64;
 const valueMax = 1e38; // limits of the protocol

@@ -1,6 +1,6 @@
 // The opacity curve editor over a histogram: points to drag, add and remove, and the same as a
 // table of numbers. During a drag at most one change per display frame is sent.
-import type { Range } from "../wire/api";
+import type { Range } from "@windsplat/client";
 import { checkLabel, make, makeSvg, numberBox, setAttributes } from "../base/dom";
 import { neat, positionOf } from "../view/histogram";
 import type { Curve } from "./media";
@@ -19,7 +19,7 @@ import {
   type Scale,
 } from "./transfer";
 import { formatNumber } from "../base/ticks";
-import { clamp } from "../base/values";
+import { clamp } from "@windsplat/client/parts";
 
 export interface CurveSource {
   curve(): Curve; // never empty

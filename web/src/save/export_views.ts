@@ -1,6 +1,5 @@
 // Export: (explicit view, choices) -> views to render, their size and progress text. Pure.
-import { orbit, type Camera } from "../view/camera";
-import type { View } from "../wire/protocol";
+import { orbit, type Camera, type View } from "@windsplat/client";
 
 const edgeMax = 8192; // pixels, as in the schema of the view
 export const framesMax = 2000;

@@ -1,5 +1,5 @@
 // Formats of saved pictures: what the server is asked for, and what a file holds. Pure.
-import type { View } from "../wire/protocol";
+import type { View } from "@windsplat/client";
 
 export type PictureFormat = "png" | "jpeg" | "svg" | "pdf";
 

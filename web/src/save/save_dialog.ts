@@ -16,7 +16,7 @@ import { aboutFormat, type PictureFormat } from "./picture_formats";
 import { button, Jobs, part } from "./save_jobs";
 import { animationJob, pictureJob, type SaveHost, type SaveSetting } from "./save_work";
 import { openFile } from "./saved_picture";
-import { clamp } from "../base/values";
+import { clamp } from "@windsplat/client/parts";
 import { hasVideoEncoder } from "./video";
 
 const pictureScaleMax = 4;

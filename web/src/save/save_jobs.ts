@@ -1,5 +1,5 @@
 // Jobs of the Save dialog: work -> progress bar, result text, and a file to download.
-import { failureText } from "../wire/api";
+import { failureText } from "../base/problem_text";
 import { byId, make, whenClosed } from "../base/dom";
 import { formatBytes } from "../base/ticks";
 

@@ -1,8 +1,8 @@
 // The jobs of the Save dialog: view and choices -> a picture, or the frames of an animation in one
 // file, rendered by the server.
 import type { Beside } from "../view/beside";
-import type { Camera } from "../view/camera";
-import type { ColorMaps } from "../wire/color_maps";
+import type { Camera, Dataset, View } from "@windsplat/client";
+import { type ColorMaps, drawFrame, inOrder, type Asked } from "@windsplat/client/parts";
 import {
   frameCount,
   framesMax,
@@ -12,8 +12,6 @@ import {
   type Animation,
   type ExportSize,
 } from "./export_views";
-import { drawFrame, inOrder, type Asked } from "../wire/frame_request";
-import type { Dataset, View } from "../wire/protocol";
 import { isDocument, mediaTypes, withServerLegend, type PictureFormat } from "./picture_formats";
 import type { Job } from "./save_jobs";
 import {

@@ -1,15 +1,13 @@
 // Saved pictures: view -> the server's picture with the legend drawn in, its size in print and, in
 // a lossless one, the view; and a picture that is dropped on the page or chosen -> its view.
-import type { ColorMaps } from "../wire/color_maps";
+import { type ColorMaps, isView, completeView } from "@windsplat/client/parts";
 import type { ExportSize } from "./export_views";
 import { legendEntries } from "../view/legend_entries";
 import { pictureCaption } from "../view/caption";
 import { drawLegend } from "./legend_picture";
 import { withJpegDensity } from "./jpeg_density";
 import { textOf, withDensity, withTexts, type Bytes } from "./png_text";
-import type { Dataset, View } from "../wire/protocol";
-import { isView } from "../wire/view_shape";
-import { completeView } from "../view/view_state";
+import type { Dataset, View } from "@windsplat/client";
 
 const keyword = "windsplat-view";
 const jpegQuality = 0.92; // of the browser's encoder

@@ -1,8 +1,8 @@
 // Named views saved in this browser's storage: a list, newest first. Stored content is untrusted
 // and checked.
 import { besideOf, type Beside } from "../view/beside";
-import type { View } from "../wire/protocol";
-import { isView } from "../wire/view_shape";
+import type { View } from "@windsplat/client";
+import { isView } from "@windsplat/client/parts";
 
 export interface SavedView {
   id: string; // permanent, because other tabs change the same list

@@ -1,6 +1,6 @@
 // Pictures -> a WebM video by the browser's encoder (WebCodecs): every picture once, at its time,
 // as fast as the browser encodes. Only pages from https or localhost have an encoder.
-import { clamp } from "../base/values";
+import { clamp } from "@windsplat/client/parts";
 import { webmFile, type EncodedPicture, type VideoTrack } from "./webm";
 
 // VP9, profile 0, level 5.1, 8 bits (up to 4096 x 2176 pixels), or else VP8.

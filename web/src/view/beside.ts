@@ -1,9 +1,7 @@
 // What a second picture beside the first one shows: the view of the first with another dataset or
 // step, and with settings or a camera of its own; and how the page's address keeps that.
-import type { View } from "../wire/protocol";
-import { isView } from "../wire/view_shape";
-import { isObject } from "../base/values";
-import { departure, mergeView, type Patch } from "./view_state";
+import type { View } from "@windsplat/client";
+import { isView, isObject, departure, mergeView, type Patch } from "@windsplat/client/parts";
 
 export interface Beside {
   dataset?: string; // undefined: that of the first picture

@@ -1,10 +1,7 @@
 // The camera as text, to be copied and pasted: camera -> JSON, and JSON of a camera or of a view
 // -> patch. Pure.
-import { viewRanges } from "../../generated/view_ranges";
-import { isObject } from "../base/values";
-import { length, subtract, type Vec3 } from "../base/vec3";
-import type { Camera } from "./camera";
-import type { Patch } from "./view_state";
+import { viewRanges, type Camera } from "@windsplat/client";
+import { isObject, length, subtract, type Vec3, type Patch } from "@windsplat/client/parts";
 
 const digits = (v: number): number => Number(v.toFixed(6));
 

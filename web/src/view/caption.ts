@@ -1,6 +1,6 @@
 // The caption of a picture that leaves the page: dataset, step and time.
 import { readableTime } from "../base/time_text";
-import type { Dataset } from "../wire/protocol";
+import type { Dataset } from "@windsplat/client";
 
 export function pictureCaption({ title, steps }: Dataset, step: number): string {
   const time = readableTime(steps.times[step]?.text ?? "");

@@ -3,7 +3,7 @@
 import { axisNames } from "./sample_position";
 import { sampleHeights } from "./legend_entries";
 import { unitText } from "./unit_text";
-import type { Dataset, View } from "../wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 // Linear between the samples and beyond the outermost two; both lists have the same length, and
 // `from` is strictly monotonic.

@@ -1,6 +1,6 @@
 // A colour for something new in the picture that can be told from what is there already: colours of
 // media, surfaces and background -> one colour. Pure.
-import type { View } from "../wire/protocol";
+import type { View } from "@windsplat/client";
 
 type Color = readonly [number, number, number];
 

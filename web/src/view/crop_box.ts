@@ -1,10 +1,8 @@
 // The box of a region in the world: its faces, and how they move along the axes. Only for flat
 // grids, whose axes are straight. Pure.
-import { cameraFrame, degree, type Camera } from "./camera";
+import { cameraFrame, degree, type Camera, type Dataset, type View } from "@windsplat/client";
 import { axisNames, nearestIndex, worldFactors } from "./sample_position";
-import { clamp } from "../base/values";
-import { add, dot, subtract, times, type Vec3 } from "../base/vec3";
-import type { Dataset, View } from "../wire/protocol";
+import { clamp, add, dot, subtract, times, type Vec3 } from "@windsplat/client/parts";
 
 export type Ends = [number, number];
 

@@ -1,6 +1,5 @@
 // Distance and direction between two positions of probes. Pure.
-import type { Position } from "../wire/api";
-import type { Dataset } from "../wire/protocol";
+import type { Position, Dataset } from "@windsplat/client";
 import { formatNumber } from "../base/ticks";
 import { axisUnit } from "./sample_position";
 

@@ -1,8 +1,7 @@
 // What a pixel of the picture shows, as the server answers a pick: position and text. Pure.
-import type { Feature, Position } from "../wire/api";
-import type { Dataset, View } from "../wire/protocol";
+import type { Feature, Position, Dataset, View } from "@windsplat/client";
 import { formatNumber } from "../base/ticks";
-import { clamp } from "../base/values";
+import { clamp } from "@windsplat/client/parts";
 import { unitText } from "./unit_text";
 import { coordinateText, axisNames, type Sample } from "./sample_position";
 

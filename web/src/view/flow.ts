@@ -1,7 +1,7 @@
 // Animates the lines: advances /vector/motion/time while the motion is on, at most `flowFps` times
 // a second and never before the frame of the last patch has arrived. Time, timers and the page's
 // state are injected.
-import { clamp } from "../base/values";
+import { clamp } from "@windsplat/client/parts";
 
 export const flowFps = 15;
 const intervalMs = 1000 / flowFps;

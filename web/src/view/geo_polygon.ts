@@ -1,5 +1,5 @@
 // The text of a GeoJSON file -> the polygon of a region. Pure.
-import type { RegionView } from "../wire/protocol";
+import type { RegionView } from "@windsplat/client";
 
 export type RegionPolygon = NonNullable<RegionView["polygon"]>;
 type Rings = number[][][];

@@ -1,6 +1,6 @@
 // Histogram calculations: bars, quantiles, and ranges chosen by dragging. Pure.
-import type { Histogram, Range } from "../wire/api";
-import { clamp } from "../base/values";
+import type { Histogram, Range } from "@windsplat/client";
+import { clamp } from "@windsplat/client/parts";
 
 // Outline of the bars as an SVG path; each bar is one unit wide and at most 1 high, y downward.
 export function barPath(counts: number[], log: boolean): string {

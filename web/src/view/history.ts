@@ -3,8 +3,8 @@
 // restores only what the user's change affected, so undoing a camera change does not affect the
 // current step.
 import { withoutSize } from "./link";
-import type { View } from "../wire/protocol";
-import { isObject } from "../base/values";
+import type { View } from "@windsplat/client";
+import { isObject } from "@windsplat/client/parts";
 
 type Node = Record<string, unknown>;
 

@@ -1,6 +1,6 @@
 // Legend of a drawn view: title, unit, range and ticks of each colour strip.
 // Pure: (complete view, dataset) -> entries.
-import type { Dataset, Field, ScalarView, SurfaceView, View } from "../wire/protocol";
+import type { Dataset, Field, ScalarView, SurfaceView, View } from "@windsplat/client";
 import {
   compassTicks,
   formatNumber,
@@ -8,7 +8,7 @@ import {
   unevenTicks,
   type LegendTick,
 } from "../base/ticks";
-import { clamp } from "../base/values";
+import { clamp } from "@windsplat/client/parts";
 import { sectionOfView, sectionText } from "./section_text";
 import { unitText } from "./unit_text";
 

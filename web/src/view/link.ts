@@ -1,7 +1,7 @@
 // View <-> the part of the address after `#`: `#!{...}`, so that a link restores the view. The
 // picture size depends on the window and is omitted.
-import type { View } from "../wire/protocol";
-import { isView } from "../wire/view_shape";
+import type { View } from "@windsplat/client";
+import { isView } from "@windsplat/client/parts";
 
 const start = "#!";
 

@@ -1,6 +1,6 @@
 // The datasets that can be compared with the open one: the others of the list, and the other
 // entries (members of an ensemble and the like) of its own files.
-import type { Dataset, DatasetSummary } from "../wire/protocol";
+import type { Dataset, DatasetSummary } from "@windsplat/client";
 
 type Known = Pick<DatasetSummary, "id" | "title" | "state">;
 

@@ -1,7 +1,14 @@
 // Views to start from, each where the data allow it. Pure: (dataset, shape of the picture) -> views
 // whose other keys have the dataset's defaults.
-import { frameBox, type Box, type Camera } from "./camera";
-import type { Dataset, Field, ScalarView, View } from "../wire/protocol";
+import {
+  frameBox,
+  type Box,
+  type Camera,
+  type Dataset,
+  type Field,
+  type ScalarView,
+  type View,
+} from "@windsplat/client";
 import { isCloud, vectorsTitle } from "./words";
 
 export interface Preset {

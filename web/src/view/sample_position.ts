@@ -1,8 +1,7 @@
 // World positions of samples in a view, and the sample nearest to a position. Pure.
-import type { Position, Probe, Value } from "../wire/api";
-import type { Vec3 } from "../base/vec3";
+import type { Position, Probe, Value, Dataset, View } from "@windsplat/client";
+import type { Vec3 } from "@windsplat/client/parts";
 import { unitText } from "./unit_text";
-import type { Dataset, View } from "../wire/protocol";
 import { formatNumber } from "../base/ticks";
 
 export const axisNames = ["x", "y", "z"] as const;

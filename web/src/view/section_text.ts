@@ -1,9 +1,8 @@
 // Where a section lies, in the coordinates of the data and the words of the server's legend:
 // "section at 500 hPa", "section at 45°N", "vertical section through 10°E, 45°N". Pure.
 import { formatNumber } from "../base/ticks";
-import { clamp } from "../base/values";
-import { add, dot, subtract, times, type Vec3 } from "../base/vec3";
-import type { Dataset, SurfaceView, View } from "../wire/protocol";
+import { clamp, add, dot, subtract, times, type Vec3 } from "@windsplat/client/parts";
+import type { Dataset, SurfaceView, View } from "@windsplat/client";
 import { axisNames, worldFactors } from "./sample_position";
 import { unitText } from "./unit_text";
 

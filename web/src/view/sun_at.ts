@@ -1,5 +1,5 @@
 // Time and place at which the sun of a view stands.
-import type { Dataset, View } from "../wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 type SunAt = NonNullable<NonNullable<View["light"]>["sunAt"]>;
 

@@ -1,5 +1,5 @@
 // Which fields a view draws or colours by.
-import type { Dataset, View } from "../wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 const named = (names: (string | null | undefined)[]): string[] =>
   names.filter((name): name is string => typeof name === "string");

@@ -1,5 +1,5 @@
 // What scientists call the parts of a dataset: its vectors and its volumes.
-import type { Dataset, Field } from "../wire/protocol";
+import type { Dataset, Field } from "@windsplat/client";
 import { isSpeed } from "./legend_entries";
 
 const wordsOf = ({ name, standardName, longName }: Field): string =>

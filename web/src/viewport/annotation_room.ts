@@ -1,6 +1,6 @@
 // Which annotations the drawn picture has and how large their texts are, for the style sheet
 // (annotations.css), which keeps the page's own overlays out of their way.
-import type { View } from "../wire/protocol";
+import type { View } from "@windsplat/client";
 
 type Annotations = NonNullable<View["annotations"]>;
 

@@ -1,7 +1,8 @@
 // A frame's header as text for the HUD: state, size relative to the full picture, error, and frame
 // rate. Pure.
+import type { FrameState } from "@windsplat/client/parts";
 import { errorName, errorText, type ErrorMetric } from "../base/error_text";
-import type { ChosenMessage, FrameHeader, StatsMessage } from "../wire/protocol";
+import type { ChosenMessage, FrameHeader, StatsMessage } from "@windsplat/client";
 import { formatNumber } from "../base/ticks";
 
 export interface LabelText {
@@ -67,20 +68,10 @@ export function scaleText(width: number, full: number): string {
   return `${Math.max(1, Math.round((100 * width) / full))} %`;
 }
 
-export type FrameState = "moving" | "refining" | "final";
-
 // `scale` is that of scaleText: a size, which alone would be read as progress.
 export function markText(state: FrameState | "offline", scale: string): string {
   if (scale === "" || state === "final" || state === "offline") return state;
   return `${state === "moving" ? "preview" : state}, ${scale} size`;
-}
-
-// A non-final frame of a view that was already shown is "refining": the server improves it while
-// the view rests.
-export function frameState(header: FrameHeader, before: FrameHeader | null): FrameState {
-  if (header.final) return "final";
-  const again = before !== null && before.rev === header.rev && before.step === header.step;
-  return again && !before.final ? "refining" : "moving";
 }
 
 // Latency beyond the server's own work, in ms, from sending the patch to receiving the frame. Only

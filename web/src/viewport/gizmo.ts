@@ -1,9 +1,8 @@
 // The axis gizmo shows the orientation of the volume. Its six ends are buttons that set the view
 // direction: east, north and up (or x, y, z) and their opposites.
-import { cameraFrame, type Angles, type Camera } from "../view/camera";
-import { dot, type Vec3 } from "../base/vec3";
+import { cameraFrame, type Angles, type Camera, type Dataset } from "@windsplat/client";
+import { dot, type Vec3 } from "@windsplat/client/parts";
 import { make, makeSvg } from "../base/dom";
-import type { Dataset } from "../wire/protocol";
 
 const reach = 36; // length of the longest arm, percent of the gizmo's size
 

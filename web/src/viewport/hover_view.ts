@@ -2,14 +2,13 @@
 // and a ring around the sample that it is read from. It is the sample that the picture shows there,
 // which the server finds, or by choice the one in the probe's level. It can be switched on or off
 // for the session; on touch screens a tap shows it and the next touch hides it.
-import type { Api } from "../wire/api";
+import type { Api, Dataset, View } from "@windsplat/client";
 import { make } from "../base/dom";
 import { Hover } from "./hover";
 import { featureLines, pixelAt, ringAt } from "../view/feature";
 import { derivedIn, fieldsIn } from "../view/view_fields";
 import { hoverLines } from "../view/sample_position";
 import type { Found } from "./probe";
-import type { Dataset, View } from "../wire/protocol";
 import { hoverOf, hoverOn } from "../view/hover_setting";
 
 export interface HoverViewHost {

@@ -14,17 +14,16 @@ import {
   scaleText,
   stepsText,
   workText,
-  type FrameState,
   type LabelText,
 } from "./frame_text";
+import type { FrameState, DrawnFrame } from "@windsplat/client/parts";
 import {
   frameHeaderBytes,
   type ChosenMessage,
   type FrameHeader,
   type StatsMessage,
-} from "../wire/protocol";
+} from "@windsplat/client";
 import { formatBytes } from "../base/ticks";
-import type { DrawnFrame } from "./viewport";
 
 const rateEveryMs = 1000;
 const key = "windsplat.frame-times"; // in the browser's storage: "shown"

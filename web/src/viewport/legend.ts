@@ -2,7 +2,7 @@
 // changed.
 import { make, makeSvg } from "../base/dom";
 import { curvePoints, type LegendEntry } from "../view/legend_entries";
-import type { ColorMaps } from "../wire/color_maps";
+import type { ColorMaps } from "@windsplat/client/parts";
 
 const stripHeight = 10; // height in the coordinates of the curve
 

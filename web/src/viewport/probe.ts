@@ -1,12 +1,19 @@
 // The probe on the picture: clicks -> probe position, probe position -> a mark. The probe is on
 // while its folder in the panel is open. A click moves it to the sample that the picture shows
 // there, or by choice to the one in the slice or in its own level.
-import { cameraFrame, degree, pointInPlane, project, type Camera } from "../view/camera";
+import {
+  cameraFrame,
+  degree,
+  pointInPlane,
+  project,
+  type Camera,
+  type Api,
+  type Dataset,
+  type View,
+} from "@windsplat/client";
 import { axisNames, sampleAt, worldOf, type Sample } from "../view/sample_position";
 import { pixelAt, sampleOf } from "../view/feature";
 import { hoverOf } from "../view/hover_setting";
-import type { Api } from "../wire/api";
-import type { Dataset, View } from "../wire/protocol";
 
 // below this angle positions in a horizontal plane are too inaccurate
 const edgewiseMax = Math.sin(8 * degree);

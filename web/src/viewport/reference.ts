@@ -1,8 +1,8 @@
 // The reference picture of the view: requested by the first press, rendered by a job of the server,
 // shown while the key is held, discarded when the view changes. Pure except for its host.
-import { failureText } from "../wire/api";
+import { failureText } from "../base/problem_text";
 import { errorMetric, errorName, errorText } from "../base/error_text";
-import type { View } from "../wire/protocol";
+import type { View } from "@windsplat/client";
 
 export interface Job {
   id: string;

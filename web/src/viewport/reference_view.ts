@@ -1,16 +1,16 @@
 // The reference on the page: its picture over the current one, its status in the corner, and the
 // button with the same function as the key.
 import { byId } from "../base/dom";
-import type { View } from "../wire/protocol";
+import type { View } from "@windsplat/client";
 import { Reference } from "./reference";
-import { posted, refusalText } from "../wire/requests";
+import { posted, refusal } from "@windsplat/client/parts";
 
 async function request(method: string, path: string, body?: View): Promise<unknown> {
   const response = await fetch(new URL(path, document.baseURI), {
     ...(body === undefined ? { method } : posted(body)),
     keepalive: method === "DELETE", // the request may be sent while the page unloads
   });
-  if (!response.ok) throw new Error(await refusalText(response));
+  if (!response.ok) throw await refusal(response);
   return response.json().catch(() => null);
 }
 

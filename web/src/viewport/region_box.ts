@@ -2,8 +2,8 @@
 // moves the face along its axis from sample to sample; arrow keys do the same. Shown while the
 // folder Region of the panel is open.
 import { makeSvg, setAttributes } from "../base/dom";
-import { clamp } from "../base/values";
-import { project, type Camera } from "../view/camera";
+import { clamp, type Vec3, type Patch } from "@windsplat/client/parts";
+import { project, type Camera, type Dataset, type View } from "@windsplat/client";
 import {
   alongAxis,
   cropBox,
@@ -18,9 +18,6 @@ import {
   type Face,
 } from "../view/crop_box";
 import { axisNames, coordinateText } from "../view/sample_position";
-import type { Vec3 } from "../base/vec3";
-import type { Dataset, View } from "../wire/protocol";
-import type { Patch } from "../view/view_state";
 
 export interface RegionBoxHost {
   on(): boolean; // a dataset is open, and so is the folder of its region

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { bytesText, folderNote, folderRows, folderTrail } from "../../src/app/folder_rows";
-import type { Folder } from "../../src/wire/folder";
+import type { Folder } from "@windsplat/client";
 
 const folder: Folder = {
   folder: "runs",

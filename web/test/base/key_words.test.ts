@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
 import { entryText, keyName, learnKeys, nameKey, namePart } from "../../src/base/key_words";
-import { problemText } from "../../src/wire/requests";
+import { problemText } from "../../src/base/problem_text";
 
 interface Schema {
   properties?: Record<string, Schema>;

@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { exportSize, millimetres, scaleOf } from "../../src/save/export_views";
 import { withJpegDensity } from "../../src/save/jpeg_density";
 import { withServerLegend } from "../../src/save/picture_formats";
-import { drawFrame } from "../../src/wire/frame_request";
+import { drawFrame } from "@windsplat/client/parts";
 import { server } from "../server";
 
 // The marker segments of a JPEG up to its scan, by the structure in ITU-T T.81, annex B.

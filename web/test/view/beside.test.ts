@@ -12,7 +12,7 @@ import {
 } from "../../src/view/beside";
 import { hashOfView, viewOfHash } from "../../src/view/link";
 import { otherDatasets } from "../../src/view/others";
-import type { Dataset, View } from "../../src/wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 const first: View = {
   dataset: "a",

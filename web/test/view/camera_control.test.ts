@@ -1,11 +1,8 @@
 // The camera's patches: a camera that the server chose stays as it is when it is moved.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Camera } from "../../src/view/camera";
-import { CameraControl } from "../../src/view/camera_control";
-import { ViewModel } from "../../src/view/view_model";
-import type { Patch } from "../../src/view/view_state";
-import type { ChosenMessage, Dataset, View } from "../../src/wire/protocol";
+import type { Camera, ChosenMessage, Dataset, View } from "@windsplat/client";
+import { CameraControl, ViewModel, type Patch } from "@windsplat/client/parts";
 
 const chosen: Camera = {
   projection: "orthographic",

@@ -1,7 +1,7 @@
 // The camera as text that is copied and pasted.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { Camera } from "../../src/view/camera";
+import type { Camera } from "@windsplat/client";
 import { cameraPatch, cameraText } from "../../src/view/camera_text";
 import { pictureCaption } from "../../src/view/caption";
 import { described } from "../page";

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { colorsIn, contrastColor, inkOn } from "../../src/view/contrast_color";
-import type { View } from "../../src/wire/protocol";
+import type { View } from "@windsplat/client";
 
 type Channels = [number, number, number];
 

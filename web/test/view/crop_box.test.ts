@@ -1,7 +1,7 @@
 // The box of the region: faces, drags along axes and ranges, against closed forms.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { project, type Camera } from "../../src/view/camera";
+import { project, type Camera, type Dataset, type View } from "@windsplat/client";
 import {
   alongAxis,
   cropBox,
@@ -16,8 +16,7 @@ import {
   worldAt,
   type Face,
 } from "../../src/view/crop_box";
-import { add, times, type Vec3 } from "../../src/base/vec3";
-import type { Dataset, View } from "../../src/wire/protocol";
+import { add, times, type Vec3 } from "@windsplat/client/parts";
 import { described } from "../page";
 
 const near = (value: number | null, wanted: number, slack = 1e-9): void =>

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { legendEntries } from "../../src/view/legend_entries";
-import type { Dataset, View } from "../../src/wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 import { described } from "../page";
 
 test("the legend names the end of a line that is ahead", () => {

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { kindOf, reachOf, reachPatch, seedsFor } from "../../src/panels/panel_seeds";
 import { pointsFrom, pointsText, withPoint } from "../../src/panels/seed_points";
 import { legendEntries } from "../../src/view/legend_entries";
-import type { Dataset, View } from "../../src/wire/protocol";
+import type { Dataset, View } from "@windsplat/client";
 
 const axis = (...coordinates: number[]) => ({ name: "", units: "", coordinates });
 const dataset = {

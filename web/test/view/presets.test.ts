@@ -1,11 +1,9 @@
 // The views that a dataset offers to start from.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { project, type Camera } from "../../src/view/camera";
+import { project, type Camera, ProblemError, type Dataset, type View } from "@windsplat/client";
 import { isRefusedView } from "../../src/panels/panel_presets";
 import { presetsOf, presetView } from "../../src/view/presets";
-import { Refusal } from "../../src/wire/api";
-import type { Dataset, View } from "../../src/wire/protocol";
 import { described, type Described } from "../page";
 
 const keysOf = (dataset: Dataset): string[] => presetsOf(dataset, 1.6).map(({ key }) => key);
@@ -129,9 +127,10 @@ test("sections show the speed where there is one, across the shorter horizontal 
 });
 
 test("only a view that the server refuses is given up", () => {
-  for (const status of [400, 422]) assert.ok(isRefusedView(new Refusal("", status)), `${status}`);
+  for (const status of [400, 422])
+    assert.ok(isRefusedView(new ProblemError("", status)), `${status}`);
   for (const status of [401, 403, 404, 409, 429, 500, 503]) {
-    assert.equal(isRefusedView(new Refusal("", status)), false, `${status}`);
+    assert.equal(isRefusedView(new ProblemError("", status)), false, `${status}`);
   }
   assert.equal(isRefusedView(new TypeError("network")), false);
 });

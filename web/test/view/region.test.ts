@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { earthRadiusKm, greatCircleKm, initialBearing, wayText } from "../../src/view/distance";
 import { offersDegrees } from "../../src/panels/panel_region";
 import { polygonFrom, positionsMax } from "../../src/view/geo_polygon";
-import type { Dataset } from "../../src/wire/protocol";
+import type { Dataset } from "@windsplat/client";
 import { described } from "../page";
 
 const near = (value: number | null, wanted: number, slack = 1e-9): void =>

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { legendEntries } from "../../src/view/legend_entries";
-import type { Dataset, SurfaceView, View } from "../../src/wire/protocol";
+import type { Dataset, SurfaceView, View } from "@windsplat/client";
 import { described } from "../page";
 
 const axis = (name: string, kind: Dataset["axes"]["x"]["kind"], units: string, at: number[]) => ({

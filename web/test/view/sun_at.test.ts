@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { minuteOf, nightText, sunAtStep, sunHeight } from "../../src/view/sun_at";
-import type { View } from "../../src/wire/protocol";
+import type { View } from "@windsplat/client";
 import { described } from "../page";
 
 test("times in UTC are cut to the minute, others are none", () => {

@@ -13,9 +13,8 @@ import {
   noSurfaceText,
 } from "../../src/panels/surface_choice";
 import { legendEntries } from "../../src/view/legend_entries";
-import { completeView } from "../../src/view/view_state";
-import type { Histogram } from "../../src/wire/api";
-import type { Dataset, View } from "../../src/wire/protocol";
+import { completeView } from "@windsplat/client/parts";
+import type { Histogram, Dataset, View } from "@windsplat/client";
 import { described } from "../page";
 
 const histogram = (counts: number[], change: Partial<Histogram> = {}): Histogram => ({

@@ -1,8 +1,8 @@
 // The page's view between a change and its picture.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { ViewModel } from "../../src/view/view_model";
-import type { ChosenMessage, Dataset, View } from "../../src/wire/protocol";
+import { ViewModel } from "@windsplat/client/parts";
+import type { ChosenMessage, Dataset, View } from "@windsplat/client";
 
 const defaults: View = {
   dataset: "a",

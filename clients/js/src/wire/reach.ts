@@ -1,6 +1,6 @@
 // What the server says when the stream cannot be opened, which a browser does not tell, and the
 // login that it may ask for.
-import { refusalText } from "./requests";
+import { refusal } from "./requests";
 
 // silent: no answer, or only that of a proxy without its server; answers: the server is there, and
 // the reason lies elsewhere; login: it asks for a token.
@@ -42,7 +42,7 @@ export async function logIn(
       redirect: "manual", // the answer leads to the page, which is shown already
     });
     if (answer.type === "opaqueredirect" || answer.ok) return null;
-    return answer.status === 401 ? "Invalid token." : await refusalText(answer);
+    return answer.status === 401 ? "Invalid token." : (await refusal(answer)).message;
   } catch {
     return "The server did not answer.";
   }

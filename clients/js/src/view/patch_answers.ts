@@ -1,7 +1,7 @@
 // Outcomes of patches: drawn frames, `unchanged` messages and refusals -> the confirmed changes of
 // the view and the `chosen` message of each frame.
 import type { ChosenMessage, FrameHeader, UnchangedMessage } from "../wire/protocol";
-import type { ViewState } from "../view/view_state";
+import type { ViewState } from "./view_state";
 
 const chosenKept = 8; // number of `chosen` messages stored until their frames arrive
 

@@ -1,6 +1,6 @@
 // The wire format: bytes of a binary message -> frame header and picture; text -> typed server
 // message. All functions are pure; malformed input throws a WireError.
-import type { ClientMessage, Dataset, ServerMessage } from "../../generated/messages";
+import type { ClientMessage, Dataset, ServerMessage } from "../generated/messages";
 import { isObject } from "../base/values";
 
 export type {
@@ -17,8 +17,8 @@ export type {
   ServerMessage,
   StatsMessage,
   UnchangedMessage,
-} from "../../generated/messages";
-export type { RegionView, ScalarView, SurfaceView, View } from "../../generated/view";
+} from "../generated/messages";
+export type { RegionView, ScalarView, SurfaceView, View } from "../generated/view";
 
 export const subprotocol = "windsplat.v1";
 export const frameHeaderBytes = 64;

@@ -1,8 +1,8 @@
 // Checks whether a value from a link, a file or the storage has the shape of a view: arrays,
 // objects, strings and finite numbers where the page expects them. Permitted values and unknown
 // keys are checked by the server.
-import { viewKeys } from "../../generated/view_keys";
-import { viewRanges } from "../../generated/view_ranges";
+import { viewKeys } from "../generated/view_keys";
+import { viewRanges } from "../generated/view_ranges";
 import type { View } from "./protocol";
 import { isObject } from "../base/values";
 

@@ -2,7 +2,7 @@
 // injected, so that tests can simulate the server.
 import type { Folder } from "./folder";
 import type { Dataset, DatasetSummary, View } from "./protocol";
-import { notUnderstood, posted, refusalText } from "./requests";
+import { notUnderstood, posted, refusal } from "./requests";
 import { isObject } from "../base/values";
 import type { Vec3 } from "../base/vec3";
 
@@ -103,16 +103,6 @@ export interface Answer {
   status: number;
   json(): Promise<unknown>;
   blob(): Promise<Blob>;
-}
-
-// The server's refusal of a request, with its HTTP status.
-export class Refusal extends Error {
-  constructor(
-    text: string,
-    readonly status: number,
-  ) {
-    super(text);
-  }
 }
 
 export type Fetch = (url: string, init?: RequestInit) => Promise<Answer>;
@@ -269,7 +259,7 @@ export class Api {
   private async answer(path: string, init?: RequestInit): Promise<Answer> {
     const response = await this.fetch(new URL(path, this.baseUri).href, init);
     if (response.ok) return response;
-    throw new Refusal(await refusalText(response), response.status);
+    throw await refusal(response);
   }
 }
 
@@ -298,7 +288,3 @@ const minus = (difference: Difference): string => {
 // Of the sample at these indices; heights: the field that places samples in the view.
 const place = (of: Vec3, heights: string | null): string =>
   `index=${of.join(",")}${heights === null ? "" : `&heightField=${encodeURIComponent(heights)}`}`;
-
-// Message of a failed promise.
-export const failureText = (failure: unknown): string =>
-  failure instanceof Error ? failure.message : String(failure);

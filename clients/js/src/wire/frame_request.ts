@@ -1,7 +1,7 @@
 // Views -> pictures from POST v1/frames, in order, at most two requests at a time. If the
 // server is busy, the request is repeated after the delay given in its answer.
 import type { View } from "./protocol";
-import { posted, refusalText } from "./requests";
+import { posted, refusal } from "./requests";
 import { clamp } from "../base/values";
 
 export type FetchLike = (url: string, options: RequestInit) => Promise<Response>;
@@ -48,7 +48,7 @@ export async function drawFrame(
     });
     if (response.ok) return response.blob();
     if (tries === triesMax || !busyCodes.includes(response.status)) {
-      throw new Error(await refusalText(response));
+      throw await refusal(response);
     }
     const after = Number(response.headers.get("Retry-After") ?? 1);
     await wait(1000 * clamp(after || 1, 1, waitMaxS), signal);

@@ -3,8 +3,8 @@
 // Frames of video are all decoded.
 // Frames of any size fill the canvas. The displayed state is also published as data attributes of
 // the canvas (seq, rev, step, state, level, width, height) for tests and style sheets.
-import { isPrinting } from "../base/dom";
-import { frameState } from "./frame_text";
+import { isPrinting } from "../base/resizing";
+import { frameState } from "./frame_state";
 import type { Frame, FrameHeader } from "../wire/protocol";
 import { clamp } from "../base/values";
 import { VideoPictures } from "./video_pictures";

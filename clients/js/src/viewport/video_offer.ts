@@ -1,8 +1,7 @@
 // Announces to the server that this browser decodes video, unless the user or a fault forbids it.
 import type { ClientMessage } from "../wire/protocol";
 import type { Clock } from "../wire/connection";
-import { videoUse } from "../view/video_setting";
-import { decodesVideo, videoCodec } from "../viewport/video_pictures";
+import { decodesVideo, videoCodec } from "./video_pictures";
 
 const retryFirstMs = 60_000; // doubled by each failure
 const retryMostMs = 3_600_000;
@@ -10,6 +9,7 @@ const retryMostMs = 3_600_000;
 export interface VideoOfferHost {
   send(message: ClientMessage): void;
   note(text: string): void; // to the user
+  wanted(): boolean; // the user allows video; call changed() when this has changed
 }
 
 export class VideoOffer {
@@ -21,13 +21,13 @@ export class VideoOffer {
   constructor(
     private readonly clock: Clock,
     private readonly host: VideoOfferHost,
-  ) {
-    videoUse.watch(() => {
-      this.told = false;
-      this.retryMs = retryFirstMs;
-      this.mend();
-      this.announce(true);
-    });
+  ) {}
+
+  changed(): void {
+    this.told = false;
+    this.retryMs = retryFirstMs;
+    this.mend();
+    this.announce(true);
   }
 
   // After each hello; a server that hears nothing sends no video.
@@ -58,12 +58,12 @@ export class VideoOffer {
   }
 
   private announce(withdraw: boolean): void {
-    if (videoUse.value === "never" || this.broken) {
+    if (!this.host.wanted() || this.broken) {
       if (withdraw) this.host.send({ type: "video", codecs: [] });
       return;
     }
     void decodesVideo().then((decodes) => {
-      if (decodes && videoUse.value === "auto" && !this.broken) {
+      if (decodes && this.host.wanted() && !this.broken) {
         this.host.send({ type: "video", codecs: [videoCodec] });
       }
     });

@@ -6,8 +6,8 @@ import {
   type Clock,
   type ConnectionEvents,
   type SocketLike,
-} from "../wire/connection";
-import { reachOf } from "../wire/reach";
+} from "./connection";
+import { reachOf } from "./reach";
 
 const presenceMs = 60_000;
 
