@@ -174,7 +174,7 @@ const char* Router::route(const http::Request& request, const http::Reply& reply
 }
 
 std::vector<const char*> Router::route_names() const {
-  std::vector<const char*> names{route_login, route_page, route_other};
+  std::vector<const char*> names{route_login, route_page, route_preflight, route_other};
   for (const Route& route : routes_) {
     if (std::strcmp(names.back(), route.name) != 0) names.push_back(route.name);
   }

@@ -12,6 +12,9 @@
 
 namespace windsplat::api {
 
+// The name by which preflights (http/cors.hpp) are counted, of whatever path.
+inline constexpr const char* route_preflight = "preflight";
+
 // Whether the path identifies the stream.
 bool names_stream(const http::Request& request);
 

@@ -35,7 +35,8 @@ void add_network_options(CLI::App& command, ServeArguments& arguments) {
       ->capture_default_str();
   command
       .add_option("--allow-origin", arguments.origins,
-                  "Additional web origin whose pages may connect; may be repeated")
+                  "Additional web origin whose pages may connect and whose scripts may read "
+                  "answers (CORS); may be repeated")
       ->envname("WINDSPLAT_ALLOW_ORIGIN")
       ->allow_extra_args(false)
       ->delimiter(',')

@@ -19,6 +19,7 @@
 #include "server/cli/serve/config_file.hpp"
 #include "server/cli/serve/listen_address.hpp"
 #include "server/cli/settings_file.hpp"
+#include "server/http/cors.hpp"
 #include "server/http/framing.hpp"
 
 namespace windsplat::cli {
@@ -121,11 +122,22 @@ Result<void> check_embedders(const std::vector<std::string>& origins) {
                                               "' is not an origin such as https://site.example");
 }
 
+Result<void> check_origins(const std::vector<std::string>& origins) {
+  const auto bad = std::find_if_not(origins.begin(), origins.end(),
+                                    [](const auto& text) { return http::is_origin(text); });
+  if (bad == origins.end()) return {};
+  return make_error(ErrorKind::malformed,
+                    "--allow-origin '" + printable(*bad) +
+                        "' is not an origin such as https://site.example (scheme, host and port "
+                        "without a path; no wildcard)");
+}
+
 Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   const auto listen = parse_listen_address(arguments.listen);
   if (!listen) return listen.error();
   if (const auto ok = check_exposure(arguments, listen->loopback); !ok) return ok.error();
   if (const auto ok = check_host_names(arguments.hosts); !ok) return ok.error();
+  if (const auto ok = check_origins(arguments.origins); !ok) return ok.error();
   if (const auto ok = check_embedders(arguments.embedders); !ok) return ok.error();
   if (!is_base_path(arguments.base_path)) {
     return make_error(ErrorKind::malformed, "--base-path '" + printable(arguments.base_path) +

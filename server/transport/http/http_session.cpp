@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/access/address.hpp"
+#include "server/http/cors.hpp"
 #include "server/http/http_checks.hpp"
 #include "server/http/problem.hpp"
 #include "server/transport/http/current_request.hpp"
@@ -31,7 +32,7 @@ class HttpSession final : public Connection, public HttpOwner {
         current_{blank_request(), api::route_other, std::chrono::steady_clock::now()},
         wire_(*this, std::move(wire), visitor_.reserve.has_value()),
         reader_(*this, wire_, current_),
-        writer_(*this, wire_, context.metrics, context.admission, context.draining, current_),
+        writer_(*this, wire_, context, current_),
         work_(*this, wire_) {}
   ~HttpSession() override { context_.connections.remove(id_); }
   HttpSession(const HttpSession&) = delete;
@@ -74,6 +75,7 @@ class HttpSession final : public Connection, public HttpOwner {
     if (auto refusal = context_.admission.request(visitor_, request, health)) {
       return refuse(std::move(*refusal));
     }
+    if (is_preflight()) return reader_.read_body();
     const bool upgrade =
         http::asks_for_websocket(request, message.version()) && api::names_stream(request);
     if (upgrade) current_.route = api::route_stream;
@@ -85,6 +87,10 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   void on_request() override {
+    if (is_preflight()) {
+      current_.route = api::route_preflight;
+      return writer_.send(http::preflight_response());
+    }
     if (auto answer =
             answer_login(context_.options, context_.admission, current_.request, wire_.secure())) {
       current_.route = api::route_login;
@@ -140,6 +146,10 @@ class HttpSession final : public Connection, public HttpOwner {
     request.peer = id_;
     request.address = access::counted_address(visitor_.peer);
     return request;
+  }
+
+  [[nodiscard]] bool is_preflight() const {
+    return http::is_preflight(current_.request, context_.options.allow_origins);
   }
 
   void next_request() {

@@ -9,8 +9,10 @@
 
 #include "protocol/limits.hpp"
 #include "server/base/log.hpp"
+#include "server/http/cors.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
+#include "server/transport/http/http_session.hpp"
 
 namespace windsplat::transport {
 namespace {
@@ -26,27 +28,22 @@ std::int64_t micros_since(Clock::time_point since) {
 
 }  // namespace
 
-ResponseWriter::ResponseWriter(HttpOwner& owner, HttpWire& wire, metrics::Metrics& metrics,
-                               access::Admission& admission, const std::atomic<bool>& draining,
+ResponseWriter::ResponseWriter(HttpOwner& owner, HttpWire& wire, const HttpContext& context,
                                CurrentRequest& current)
-    : owner_(owner),
-      wire_(wire),
-      metrics_(metrics),
-      admission_(admission),
-      draining_(draining),
-      current_(current) {}
+    : owner_(owner), wire_(wire), context_(context), current_(current) {}
 
 void ResponseWriter::send(http::Response response) {
   const http::Request& request = current_.request;
   current_.keep_alive =
-      current_.keep_alive && !response.close && !draining_ && !wire_.is_of_reserve();
+      current_.keep_alive && !response.close && !context_.draining && !wire_.is_of_reserve();
   http::name_request(response, request.id);
+  http::share_with_origins(response, request, context_.options.allow_origins);
   // Applies to every port of the host, and other programs listen on this machine's loopback.
   if (const std::string host = request.header("Host");
       wire_.secure() && !host.empty() && !http::names_loopback(host)) {
     response.headers.emplace_back("Strict-Transport-Security", hsts);
   }
-  metrics_.answered(current_.route, response.status);
+  context_.metrics.answered(current_.route, response.status);
   response_ = std::move(response);
   head_ = http::response_head(response_, current_.keep_alive);
   const auto body = current_.is_head ? std::span<const std::uint8_t>{} : response_.body.bytes;
@@ -66,15 +63,15 @@ void ResponseWriter::send(http::Response response) {
 
 void ResponseWriter::send_nothing() {
   constexpr int client_has_gone = 499;
-  metrics_.answered(current_.route, client_has_gone);
+  context_.metrics.answered(current_.route, client_has_gone);
   log_access(client_has_gone, 0);
 }
 
 void ResponseWriter::on_sent(std::size_t bytes, Clock::time_point since) {
-  metrics_.bytes_sent(metrics::Metrics::Over::http, bytes);
-  admission_.sent(current_.request.address, bytes);
+  context_.metrics.bytes_sent(metrics::Metrics::Over::http, bytes);
+  context_.admission.sent(current_.request.address, bytes);
   if (response_.content_type.starts_with("image/")) {
-    metrics_.stage_took(metrics::Metrics::Stage::write, micros_since(since));
+    context_.metrics.stage_took(metrics::Metrics::Stage::write, micros_since(since));
   }
   log_access(response_.status, bytes);
 }
@@ -83,8 +80,8 @@ void ResponseWriter::on_sent(std::size_t bytes, Clock::time_point since) {
 void ResponseWriter::log_access(int status, std::size_t bytes) const {
   if (current_.quiet) return;
   const std::string_view route = current_.route;
-  const bool often =
-      route == "/livez" || route == "/readyz" || route == "/metrics" || route == api::route_page;
+  const bool often = route == "/livez" || route == "/readyz" || route == "/metrics" ||
+                     route == api::route_page || route == api::route_preflight;
   log::write(often ? log::Level::debug : log::Level::info, "request",
              {{"request", current_.request.id},
               {"method", current_.request.method},

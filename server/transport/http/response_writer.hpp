@@ -1,24 +1,22 @@
 // The sending side of an HTTP session: one response at a time, counted and logged.
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <string>
 
-#include "server/access/admission.hpp"
-#include "server/metrics/metrics.hpp"
 #include "server/transport/http/current_request.hpp"
 #include "server/transport/http/http_owner.hpp"
 #include "server/transport/http/http_wire.hpp"
 
 namespace windsplat::transport {
 
+struct HttpContext;
+
 class ResponseWriter {
  public:
   // Responds to `current`, whose address is charged with the bytes sent.
-  ResponseWriter(HttpOwner& owner, HttpWire& wire, metrics::Metrics& metrics,
-                 access::Admission& admission, const std::atomic<bool>& draining,
+  ResponseWriter(HttpOwner& owner, HttpWire& wire, const HttpContext& context,
                  CurrentRequest& current);
 
   // Ends in HttpOwner::on_written(). Decides whether the connection is kept alive.
@@ -33,9 +31,7 @@ class ResponseWriter {
 
   HttpOwner& owner_;
   HttpWire& wire_;
-  metrics::Metrics& metrics_;
-  access::Admission& admission_;
-  const std::atomic<bool>& draining_;
+  const HttpContext& context_;
   CurrentRequest& current_;
   http::Response response_;
   std::string head_;

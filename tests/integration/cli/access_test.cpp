@@ -218,6 +218,14 @@ TEST_F(CliAccess, CommandLineOverridesEnvironmentOverridesConfiguration) {
   EXPECT_THAT(by_environment.read_until('\n'), HasSubstr("/from-config/"));
 }
 
+TEST_F(CliAccess, AnOriginThatIsNoneIsRefusedByName) {
+  for (const char* const origin : {"*", "null", "site.example", "https://site.example/page"}) {
+    const Outcome outcome = refused({"--allow-origin", origin});
+    EXPECT_EQ(outcome.code, 2) << origin;
+    EXPECT_THAT(outcome.err, HasSubstr("--allow-origin '" + std::string(origin) + "'"));
+  }
+}
+
 TEST_F(CliAccess, InvalidConfigurationIsReportedWithAPointer) {
   const std::string config = folder.file("windsplat.json");
   for (const auto& [text, pointer] : std::vector<std::pair<std::string, std::string>>{
