@@ -19,7 +19,7 @@ from .server import Server
 from .view import View
 
 TIME_NAMES = ("time", "t", "valid_time", "step", "forecast_reference_time")
-# Of the encoding of a variable; the rest, such as sizes of chunks, belongs to the file it came from.
+# Of the encoding of a variable; the rest, such as sizes of chunks, belongs to its file.
 KEPT_ENCODING = ("units", "calendar", "_FillValue", "missing_value", "grid_mapping", "coordinates")
 
 _numbers = itertools.count(1)
