@@ -41,8 +41,9 @@ class Notebooks(unittest.TestCase):
         notebook = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
         kept = os.environ.get("NOTEBOOK_FOLDER")
         with tempfile.TemporaryDirectory() as folder:
-            variables = {"PYTHONPATH": str(CLIENT), "WINDSPLAT": PROGRAM, "PYTHONWARNINGS": "ignore",
-                         "IPYTHONDIR": folder, "PYDEVD_DISABLE_FILE_VALIDATION": "1"}
+            variables = {"PYTHONPATH": str(CLIENT), "WINDSPLAT": PROGRAM,
+                         "PYTHONWARNINGS": "ignore", "IPYTHONDIR": folder,
+                         "PYDEVD_DISABLE_FILE_VALIDATION": "1"}
             with unittest.mock.patch.dict(os.environ, variables):
                 runner = nbconvert.preprocessors.ExecutePreprocessor(timeout=240)
                 runner.preprocess(notebook, {"metadata": {"path": folder}})
