@@ -229,6 +229,13 @@ class View(ViewParts):
         hash = urllib.parse.quote(self.to_json(None))
         return IFrame(f"{self.dataset.server.url}?embed#!{hash}", width, height)
 
+    def live(self, height: int = 450) -> Any:
+        """A live view as a widget of Jupyter, windsplat.widget.LiveView: frames pass through the
+        kernel, so that the browser need not reach the server. Needs the package anywidget."""
+        from .widget import LiveView
+
+        return LiveView(self, height=height)
+
     def _repr_mimebundle_(
         self, include: Any = None, exclude: Any = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
