@@ -1,7 +1,11 @@
 """Requests to a server: base address, token, waiting as asked for, errors as Problems."""
 from __future__ import annotations
 
+import contextlib
+import ipaddress
+import pathlib
 import random
+import ssl
 import time
 from typing import Any, Mapping
 
@@ -22,6 +26,14 @@ def base_of(url: str) -> str:
     return str(parsed.copy_with(query=None, fragment=None)).rstrip("/") + "/"
 
 
+def is_loopback(host: str) -> bool:
+    """Whether a host is this machine, which no proxy of the environment should stand before."""
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
 def seconds_of(header: str | None) -> float | None:
     """The seconds of a Retry-After header; dates are not sent by windsplat."""
     try:
@@ -30,11 +42,27 @@ def seconds_of(header: str | None) -> float | None:
         return None
 
 
+def _tls_of(verify: bool | str | ssl.SSLContext) -> ssl.SSLContext:
+    """How certificates are checked: by those of the system (True), of a file, or not (False)."""
+    if isinstance(verify, ssl.SSLContext):
+        return verify
+    tls = ssl.create_default_context(cafile=verify if isinstance(verify, str) else None)
+    if verify is False:
+        tls.check_hostname = False
+        tls.verify_mode = ssl.CERT_NONE
+    return tls
+
+
 class Http:
     """Requests below one address. Safe to use from several threads."""
 
-    def __init__(self, url: str, token: str | None, timeout: float, patience: float) -> None:
+    def __init__(self, url: str, token: str | None, timeout: float, patience: float,
+                 verify: bool | str | ssl.SSLContext = True) -> None:
         self.base = base_of(url)
+        self.loopback = is_loopback(httpx.URL(self.base).host)
+        self.tls: ssl.SSLContext | None = None
+        if self.base.startswith("https:"):
+            self.tls = _tls_of(verify)
         self.token = token
         self.patience = patience
         headers = {"User-Agent": "windsplat-python"}
@@ -42,7 +70,8 @@ class Http:
             headers["Authorization"] = f"Bearer {token}"
         # Pictures are rendered before the first byte is sent, hence the long time to read.
         self._client = httpx.Client(
-            headers=headers, timeout=httpx.Timeout(timeout, connect=min(timeout, 10.0))
+            headers=headers, timeout=httpx.Timeout(timeout, connect=min(timeout, 10.0)),
+            verify=True if self.tls is None else self.tls, trust_env=not self.loopback,
         )
 
     def close(self) -> None:
@@ -56,26 +85,25 @@ class Http:
         json: Any = None,
         params: Mapping[str, Any] | None = None,
         accept: str | None = None,
-        content: bytes | None = None,
-        content_type: str | None = None,
+        file: pathlib.Path | None = None,
+        headers: Mapping[str, str] | None = None,
     ) -> httpx.Response:
         """The answer to a request. `path` is relative to the base, or begins with a slash as in
-        links of the server. A refusal (429, 503) is repeated after the time that it names, as
+        links of the server; `file` is sent as the body. A refusal (429, 503) is repeated after the time that it names, as
         long as all of them together stay within `patience` seconds.
 
         Raises Problem, ConnectionFailed.
         """
-        headers = {"Accept": accept or "application/json"}
-        if content_type:
-            headers["Content-Type"] = content_type
+        sent = {"Accept": accept or "application/json", **(headers or {})}
         given = {key: value for key, value in (params or {}).items() if value is not None}
         url = self.base + path.lstrip("/")
         end = time.monotonic() + self.patience
         while True:
             try:
-                answer = self._client.request(
-                    method, url, json=json, params=given or None, headers=headers, content=content
-                )
+                with contextlib.ExitStack() as stack:
+                    content = None if file is None else stack.enter_context(file.open("rb"))
+                    answer = self._client.request(method, url, json=json, params=given or None,
+                                                  headers=sent, content=content)
             except httpx.TransportError as error:
                 raise ConnectionFailed(f"{self.base}: {error or type(error).__name__}") from error
             if answer.status_code < 400:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import html
 from typing import TYPE_CHECKING, Any, Mapping
 
 from ._documents import suggestion
@@ -103,6 +104,8 @@ class Dataset:
     def __init__(self, server: Server, id: str) -> None:
         self.server = server
         self.id = id
+        self.upload_id: str | None = None
+        """Name of the upload that it was opened from by Server.upload."""
         self._description: dict[str, Any] | None = None
 
     @property
@@ -253,7 +256,10 @@ class Dataset:
 
     def close(self, forget: bool = False) -> None:
         """Releases the memory of the data at the server; `forget` removes the dataset from the
-        list."""
+        list, and an uploaded file."""
+        if forget and self.upload_id is not None:
+            self.server.http.request("DELETE", f"v1/uploads/{self.upload_id}")
+            return
         self.server.http.request("DELETE", f"v1/datasets/{_quoted(self.id)}",
                                  params={"forget": "true"} if forget else None)
 
@@ -265,6 +271,21 @@ class Dataset:
 
     def __repr__(self) -> str:
         return f"<Dataset '{self.id}' of {self.server.url}>"
+
+    def _repr_html_(self) -> str:
+        """What Jupyter shows: the grid, the times and a table of the fields."""
+        steps = self.steps
+        z, y, x = self.shape
+        times = ""
+        if steps:
+            times = f", {len(steps)} steps from {steps[0].text} to {steps[-1].text}"
+        rows = "".join(
+            f"<tr><td>{html.escape(one.name)}</td><td>{one.kind}</td>"
+            f"<td>{html.escape(one.units)}</td><td>{html.escape(one.long_name)}</td></tr>"
+            for one in self.fields.values())
+        return (f"<b>{html.escape(self.title)}</b> ({html.escape(self.id)})<br>{x} x {y} x {z} "
+                f"samples{html.escape(times)}<table><tr><th>field</th><th>kind</th><th>units</th>"
+                f"<th>long name</th></tr>{rows}</table>")
 
 
 def _quoted(text: str) -> str:

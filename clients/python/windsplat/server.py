@@ -1,8 +1,14 @@
 """A server: one that runs somewhere, or one that this process starts."""
 from __future__ import annotations
 
+import base64
+import contextlib
+import hashlib
 import os
 import pathlib
+import re
+import secrets
+import ssl
 import time
 from typing import TYPE_CHECKING, Any, Iterable, Mapping, Sequence
 
@@ -26,10 +32,11 @@ class Server:
     """A windsplat server. Made by connect() or Server.start()."""
 
     def __init__(self, url: str, token: str | None = None, *, timeout: float = 180,
-                 patience: float = 60) -> None:
+                 patience: float = 60, verify: bool | str | ssl.SSLContext = True) -> None:
         """timeout: seconds to wait for an answer. patience: seconds in all for which a request
-        that the server is too busy for is repeated, as it asks for (Retry-After)."""
-        self.http = Http(url, token, timeout, patience)
+        that the server is too busy for is repeated, as it asks for (Retry-After). verify: of
+        https, a file of certificates to trust instead of those of the system."""
+        self.http = Http(url, token, timeout, patience, verify)
         self._process: Process | None = None
         self._root: pathlib.Path | None = None
         self._schema: dict[str, Any] | None = None
@@ -154,6 +161,34 @@ class Server:
                 body["title"] = title
         return self._opened(body, timeout)
 
+    def upload(self, path: str | os.PathLike[str], *, keep: float = 3600,
+               timeout: float = 300) -> Dataset:
+        """Sends a file to the server and opens it there; for servers that were started with
+        --upload-limit. It is removed after `keep` seconds, or by dataset.close(forget=True).
+
+        Raises Unauthorized if the server takes no uploads, and what open() raises.
+        """
+        whole = pathlib.Path(path)
+        digest = hashlib.sha256()
+        with whole.open("rb") as file:
+            while block := file.read(1 << 20):
+                digest.update(block)
+        # Whoever knows the name may read the file: it is not to be guessed.
+        stem = re.sub(r"[^A-Za-z0-9_]+", "-", whole.stem)[:40].strip("-") or "upload"
+        suffix = whole.suffix if re.fullmatch(r"\.[A-Za-z0-9]{1,12}", whole.suffix) else ""
+        name = f"{stem}-{secrets.token_hex(8)}{suffix}"
+        value = base64.b64encode(digest.digest()).decode()
+        self.http.request("PUT", f"v1/uploads/{name}", file=whole, params={"keep": int(keep)},
+                          headers={"Content-Digest": f"sha-256=:{value}:"})
+        try:
+            dataset = self._opened({"upload": name}, timeout)
+        except BaseException:
+            with contextlib.suppress(WindsplatError):
+                self.http.request("DELETE", f"v1/uploads/{name}")
+            raise
+        dataset.upload_id = name
+        return dataset
+
     def entry(self, dataset: Dataset, timeout: float = 300, **selection: Any) -> Dataset:
         """Another entry of a dataset with choices: server.entry(ds, number=3)."""
         return self._opened({"from": dataset.id, "selection": selection}, timeout)
@@ -170,9 +205,9 @@ class Server:
 
     def _opened(self, body: Mapping[str, Any], timeout: float) -> Dataset:
         job = self.http.request("POST", "v1/datasets", json=dict(body)).json()
-        return Dataset(self, str(self._finished(job, timeout)))
+        return Dataset(self, str(self.finished(job, timeout)))
 
-    def _finished(self, job: Mapping[str, Any], timeout: float) -> Any:
+    def finished(self, job: Mapping[str, Any], timeout: float) -> Any:
         """The result of a job. Raises its Problem or JobTimeout."""
         end = time.monotonic() + timeout
         pause = POLL_FIRST
@@ -199,10 +234,11 @@ class Server:
         return f"<Server {self.url}{' (started here)' if self._process else ''}>"
 
 
-def connect(url: str, token: str | None = None, *, timeout: float = 180,
-            patience: float = 60) -> Server:
-    """Connects to a server. Raises ConnectionFailed or Unauthorized at once."""
-    server = Server(url, token, timeout=timeout, patience=patience)
+def connect(url: str, token: str | None = None, *, timeout: float = 180, patience: float = 60,
+            verify: bool | str | ssl.SSLContext = True) -> Server:
+    """Connects to a server. Raises ConnectionFailed or Unauthorized at once. The options are those
+    of Server."""
+    server = Server(url, token, timeout=timeout, patience=patience, verify=verify)
     try:
         server.http.get("v1")
     except BaseException:

@@ -16,6 +16,7 @@ from .frame import Format, Frame, Report
 from .view import View
 
 if TYPE_CHECKING:
+    from ._http import Http
     from .server import Server
 
 PROTOCOL = "windsplat.v1"
@@ -86,6 +87,16 @@ def frame_of(message: bytes, report: Mapping[str, Any]) -> StreamFrame:
                        bool(head.flags & FINAL))
 
 
+def _options(http: Http) -> dict[str, Any]:
+    """Options of a connection besides the protocol."""
+    options: dict[str, Any] = {} if http.tls is None else {"ssl": http.tls}
+    import websockets.version
+
+    if http.loopback and int(websockets.version.version.split(".")[0]) >= 15:
+        options["proxy"] = None  # earlier versions use none
+    return options
+
+
 def difference_of(old: Any, new: Any) -> dict[str, Any]:
     """The merge patch that makes `new` of `old`."""
     patch: dict[str, Any] = {key: None for key in old if key not in new}
@@ -139,7 +150,7 @@ class Stream:
         url = "ws" + http.base.removeprefix("http") + "v1/stream"
         try:
             self._socket = await websockets.connect(  # type: ignore[attr-defined]
-                url, subprotocols=protocols, max_size=None)
+                url, subprotocols=protocols, max_size=None, **_options(http))
             self.hello = json.loads(await self._socket.recv())
         except (OSError, asyncio.TimeoutError, websockets.exceptions.WebSocketException) as error:
             answer = getattr(error, "response", None)

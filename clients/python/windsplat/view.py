@@ -201,6 +201,34 @@ class View(ViewParts):
         """Writes the picture; the suffix names the format: .png, .jpg, .npy, .pdf or .svg."""
         return self.frame(format_of(path), dpi=dpi).save(path)
 
+    def pick(self, x: float, y: float) -> dict[str, Any] | None:
+        """What the pixel at x, y from the upper left corner shows: its layer, field, value, units
+        and position (`feature` of POST /v1/picks). None: nothing of the data."""
+        answer = self.dataset.server.http.request("POST", "v1/picks", json=self._document,
+                                                  params={"x": x, "y": y})
+        feature = answer.json()["feature"]
+        assert feature is None or isinstance(feature, dict)
+        return feature
+
+    def reference(self, timeout: float = 600) -> tuple[Frame, float]:
+        """The rendering integral of the view, and the error of the view's own picture against it
+        (linear RMSE). May take minutes. Raises JobTimeout after `timeout` seconds."""
+        server = self.dataset.server
+        job = server.http.request("POST", "v1/references", json=self._document).json()
+        result = server.finished(job, timeout)
+        answer = server.http.request("GET", result["picture"], accept=FORMATS["png"])
+        report = Report({"method": "reference", "error": {"value": 0.0, "kind": "measured"}})
+        frame = Frame(answer.content, "png", result["width"], result["height"], report)
+        return frame, float(result["error"]["value"])
+
+    def share(self) -> str:
+        """Stores the view at the server and returns the short address of the page with it. Anyone
+        who has the address may see and change the stored view; without --state-dir it is kept
+        until the server ends."""
+        server = self.dataset.server
+        saved = server.http.request("POST", "v1/views", json=self._document).json()
+        return f"{server.url}#!view={saved['id']}"
+
     def movie(
         self, path: str | os.PathLike[str], steps: Iterable[int] | None = None, fps: float = 12,
         *, workers: int = 2, progress: Any = None,

@@ -1,6 +1,7 @@
 """Accessor `windsplat` of xarray's Dataset and DataArray: `import windsplat.xarray`.
 
-The arrays are written to a netCDF file in a folder that a server on this machine reads.
+The arrays are written to a netCDF file, in a folder that a server on this machine reads, or they are
+uploaded to another one.
 """
 from __future__ import annotations
 
@@ -88,7 +89,8 @@ class Accessor:
         choice of variables: see refresh().
 
         names: variables; by default all with three dimensions in space.
-        server: one that was started with a `data_root`; by default one that the first call starts.
+        server: by default one that the first call starts on this machine. One of Server.start
+            with a `data_root` reads the file there; others get an upload, if they take any.
         rename: names in the file.
 
         Raises ValueError if a variable is not there or has no three dimensions in space.
@@ -96,12 +98,14 @@ class Accessor:
         chosen = self.fields() if names is None else list(dict.fromkeys(names))
         self._check(chosen)
         there = local_server() if server is None else server
-        if there._root is None:
-            raise ValueError("the arrays are handed over in a folder: use a server that was "
-                             "started with Server.start(data_root=...)")
         key = (there.url, tuple(chosen), tuple((rename or {}).items()))
         if key not in self._opened:
-            self._opened[key] = there.open(self._write(chosen, there._root, rename or {}))
+            if there._root is not None:
+                self._opened[key] = there.open(self._write(chosen, there._root, rename or {}))
+            else:
+                with tempfile.TemporaryDirectory(prefix="windsplat-") as folder:
+                    path = self._write(chosen, pathlib.Path(folder), rename or {})
+                    self._opened[key] = there.upload(path)
         return self._opened[key]
 
     def refresh(self) -> None:
@@ -109,8 +113,8 @@ class Accessor:
         place."""
         for dataset in self._opened.values():
             dataset.close(forget=True)
-            assert dataset.server._root is not None
-            (dataset.server._root / f"{dataset.id}.nc").unlink(missing_ok=True)
+            if dataset.server._root is not None:
+                (dataset.server._root / f"{dataset.id}.nc").unlink(missing_ok=True)
         self._opened.clear()
 
     def view(

@@ -4,6 +4,7 @@ import http.server
 import json
 import os
 import pathlib
+import subprocess
 import sys
 import tempfile
 import threading
@@ -11,16 +12,22 @@ import threading
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 CLIENT = ROOT / "clients" / "python"
 sys.path.insert(0, str(CLIENT))
+PROGRAM = os.environ.setdefault("WINDSPLAT", str(ROOT / "build" / "release" / "windsplat"))
 
 import windsplat  # noqa: E402
 
-PROGRAM = os.environ.get("WINDSPLAT", str(ROOT / "build" / "release" / "windsplat"))
 SAMPLES = ("tornado:24", "climate:48x24x8")
 _shared = []
 
 
 def start(*files, **options):
     return windsplat.Server.start(*files, program=PROGRAM, threads=2, **options)
+
+
+def takes_uploads():
+    """Whether the daemon takes files of clients."""
+    words = subprocess.run([PROGRAM, "serve", "--help"], text=True, capture_output=True, check=True)
+    return "--upload-limit" in words.stdout
 
 
 def shared_server():
@@ -37,16 +44,18 @@ def shared_server():
 
 class Prepared:
     """A server that gives prepared answers (status, headers, document) and then repeats the last
-    one; `requests` are the methods and targets that it got."""
+    one; `requests` are the methods and targets that it got, `bodies` and `headers` what came with
+    them."""
 
     def __init__(self, *answers):
-        self.requests = []
+        self.requests, self.bodies, self.headers = [], [], []
         outer, left = self, list(answers)
 
         class Handler(http.server.BaseHTTPRequestHandler):
             def answer(self):
                 outer.requests.append(f"{self.command} {self.path}")
-                self.rfile.read(int(self.headers.get("Content-Length", 0)))
+                outer.bodies.append(self.rfile.read(int(self.headers.get("Content-Length", 0))))
+                outer.headers.append(dict(self.headers))
                 status, headers, document = left.pop(0) if len(left) > 1 else left[0]
                 body = json.dumps(document).encode()
                 self.send_response(status)
@@ -55,7 +64,7 @@ class Prepared:
                 self.end_headers()
                 self.wfile.write(body)
 
-            do_GET = do_POST = answer
+            do_GET = do_POST = do_PUT = do_DELETE = answer
 
             def log_message(self, *_):
                 pass

@@ -62,6 +62,23 @@ class Frames(unittest.TestCase):
         limited = self.view.quality(maxError=0.05).frame().report.error
         self.assertEqual((limited.asked, limited.kept), (0.05, True))
 
+    def test_pixels_are_picked_and_views_are_shared(self):
+        view = self.server["climate:48x24x8"].view(size=(96, 64))
+        picked = [view.pick(x, y) for x in range(8, 96, 16) for y in range(8, 64, 8)]
+        feature = next(one for one in picked if one is not None)
+        self.assertIn(feature["field"], self.server["climate:48x24x8"].fields)
+        self.assertIsNone(view.pick(0, 0))
+        address, _, id = view.share().partition("#!view=")
+        self.assertEqual(address, self.server.url)
+        self.assertEqual(self.server.http.get(f"v1/views/{id}")["view"]["image"],
+                         {"width": 96, "height": 64})
+
+    def test_a_reference_tells_the_error_of_the_picture(self):
+        frame, error = self.view.size(48, 32).reference(timeout=120)
+        self.assertEqual(frame.image.size, (48, 32))
+        self.assertGreater(error, 0)
+        self.assertLess(error, 0.02)
+
     def test_files_are_named_by_format(self):
         with tempfile.TemporaryDirectory() as folder:
             for name, start in (("a.png", b"\x89PNG"), ("a.jpg", b"\xff\xd8"), ("a.pdf", b"%PDF"),
@@ -83,6 +100,9 @@ class Frames(unittest.TestCase):
         self.assertEqual(set(data), {"text/plain", "image/jpeg"})
         self.assertEqual(metadata["image/jpeg"], {"width": 96, "height": 64})
         self.assertTrue(data["image/jpeg"].startswith("/9j/"))  # base64 of a JPEG
+        table = self.view.dataset._repr_html_()
+        self.assertIn("24 x 24 x 24 samples", table)
+        self.assertIn("<td>wind</td><td>vector</td>", table)
         html = self.view.widget(height=300)._repr_html_()
         self.assertIn(f'<iframe src="{self.server.url}?embed#!%7B%22dataset%22%3A', html)
         self.assertIn("height: 300px", html)

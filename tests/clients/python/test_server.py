@@ -1,5 +1,11 @@
 """Servers, datasets and values, against the real daemon; refusals against prepared answers."""
+import asyncio
+import base64
+import hashlib
+import json
 import os
+import pathlib
+import subprocess
 import tempfile
 import threading
 import time
@@ -22,6 +28,12 @@ class Start(unittest.TestCase):
             url = server.url
         with self.assertRaises(windsplat.ConnectionFailed):
             windsplat.connect(url)
+
+    def test_notebooks_of_this_machine_may_show_the_embedded_view(self):
+        server, _ = shared_server()
+        policy = server.http.request("GET", "?embed", accept="text/html").headers[
+            "Content-Security-Policy"]
+        self.assertIn("http://localhost:8888", policy)
 
     def test_a_program_that_is_not_there_is_named(self):
         with self.assertRaisesRegex(windsplat.StartFailed, "argument program.*'/nowhere/w'"):
@@ -190,6 +202,75 @@ class Open(unittest.TestCase):
         dataset = self.server.open("part_1.nc")
         dataset.close(forget=True)
         self.assertNotIn("part_1", self.server.datasets)
+
+
+class Uploads(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.path = pathlib.Path(folder.name) / "my winds.nc"
+        self.path.write_bytes(b"0123456789" * 1000)
+
+    def test_a_file_is_sent_with_its_digest_and_opened(self):
+        done = {"id": "1", "kind": "dataset", "state": "done", "result": "winds", "problem": None}
+        refused = (429, {"Retry-After": "0"}, problem(429))
+        with Prepared(refused, (201, {}, {}), (202, {}, done)) as there:
+            dataset = windsplat.Server(there.url).upload(self.path, keep=60)
+            self.assertEqual(dataset.id, "winds")
+            again, put, post = there.requests
+            self.assertEqual(again, put)
+            self.assertRegex(put, r"^PUT /v1/uploads/my-winds-[0-9a-f]{16}\.nc\?keep=60$")
+            self.assertEqual(post, "POST /v1/datasets")
+            self.assertEqual(there.bodies[1], self.path.read_bytes())
+            digest = base64.b64encode(hashlib.sha256(there.bodies[1]).digest()).decode()
+            self.assertEqual(there.headers[1]["Content-Digest"], f"sha-256=:{digest}:")
+            self.assertEqual(json.loads(there.bodies[2]),
+                             {"upload": put.split("/")[3].split("?")[0]})
+            dataset.close(forget=True)
+            self.assertEqual(there.requests[-1], put.replace("PUT", "DELETE").split("?")[0])
+
+    def test_an_upload_that_cannot_be_opened_is_removed(self):
+        with Prepared((201, {}, {}), (422, {}, problem(422)), (204, {}, {})) as there:
+            with self.assertRaises(windsplat.InvalidView):
+                windsplat.Server(there.url).upload(self.path)
+            self.assertEqual([one.split()[0] for one in there.requests], ["PUT", "POST", "DELETE"])
+
+
+class Secured(unittest.TestCase):
+    def test_certificates_are_checked_by_a_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            key, certificate = f"{folder}/key.pem", f"{folder}/cert.pem"
+            subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+                            "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", "/CN=w",
+                            "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out",
+                            certificate], check=True, capture_output=True)
+            # Server.start speaks http to its own server, so the program is started without it.
+            process = subprocess.Popen([PROGRAM, "serve", "--listen", "127.0.0.1:0", "--tls-cert",
+                                        certificate, "--tls-key", key, "tornado:8"],
+                                       stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+            self.addCleanup(process.stdout.close)
+            self.addCleanup(process.wait)
+            self.addCleanup(process.terminate)
+            url = process.stdout.readline().strip()
+            with self.assertRaisesRegex(windsplat.ConnectionFailed, "CERTIFICATE_VERIFY_FAILED"):
+                windsplat.connect(url)
+            with windsplat.connect(url, verify=certificate) as server:
+                view = server["tornado:8"].view(size=(32, 24))
+                self.assertEqual(view.frame("jpeg").width, 32)
+
+                async def final():
+                    async with server.stream(view) as stream:
+                        return await stream.final()
+
+                self.assertTrue(asyncio.run(final()).final)
+
+    def test_a_proxy_of_the_environment_does_not_stand_before_this_machine(self):
+        server, _ = shared_server()
+        variables = {name: "http://127.0.0.1:9" for name in ("http_proxy", "HTTP_PROXY",
+                                                             "all_proxy", "ALL_PROXY")}
+        with unittest.mock.patch.dict(os.environ, variables):
+            with windsplat.connect(server.url) as again:
+                self.assertIn("tornado:24", again.datasets)
 
 
 class Threads(unittest.TestCase):

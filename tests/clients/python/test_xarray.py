@@ -3,6 +3,7 @@ import tempfile
 import unittest
 
 import numpy as np
+import support
 import xarray
 from support import start, windsplat
 
@@ -127,8 +128,15 @@ class Accessors(unittest.TestCase):
         self.arrays = self.arrays[["t2m"]]
         with self.assertRaisesRegex(ValueError, r"no variable.*t2m \(time, latitude, longitude\)"):
             self.view()
-        with self.assertRaisesRegex(ValueError, "data_root"):
-            example().windsplat.view(server=windsplat.Server("http://127.0.0.1:9/"))
+
+    def test_another_server_gets_an_upload(self):
+        if not support.takes_uploads():
+            self.skipTest("the daemon has no option --upload-limit")
+        with start("tornado:8", upload_limit="64M") as there:
+            with windsplat.connect(there.url) as remote:
+                view = example().windsplat.view("u", "v", scalar="cc", server=remote)
+                self.assertEqual(view.get("/vector/field"), "wind")
+                self.assertEqual(view.frame("jpeg").width, 1280)
 
     def test_a_server_is_started_for_arrays(self):
         with self.assertRaisesRegex(ValueError, "first call"):
