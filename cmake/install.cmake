@@ -15,3 +15,7 @@ configure_file(${CMAKE_CURRENT_LIST_DIR}/install_unit.cmake.in install_unit.cmak
 install(SCRIPT ${CMAKE_CURRENT_BINARY_DIR}/install_unit.cmake COMPONENT runtime)
 
 include(${CMAKE_CURRENT_LIST_DIR}/manuals.cmake)
+if(WINDSPLAT_HAS_VTK)
+  install(FILES server/vtk_loader/windsplat-vtk.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
+    COMPONENT vtk)
+endif()

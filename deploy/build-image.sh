@@ -23,35 +23,10 @@ mkdir -p "$work"
 # Separate storage, so that the machine's own images are not affected.
 buildah=(buildah --storage-driver vfs --root "$work/storage" --runroot "$work/run")
 
-# This machine's Debian 12 sources as "URI suite component"; if none is known, debootstrap chooses.
-sources() {
-  # shellcheck disable=SC2016  # apt fills these in
-  apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' \
-    'Created-By: Packages' 'Origin: Debian' 2>/dev/null |
-    awk '$2 ~ /^bookworm/ && $3 == "main"' | sort -u || true
-}
 proxy=$(apt-config shell value Acquire::http::Proxy | sed -n "s/^value='\(.*\)'$/\1/p")
 [ "${proxy:-DIRECT}" != DIRECT ] || proxy=${http_proxy:-}
 
-make_base() {
-  local mirror root=$work/base.part
-  rm -rf "$root"
-  mirror=$(sources | awk '$2 == "bookworm" {print $1; exit}')
-  echo "build-image: debootstrap (once)" >&2
-  http_proxy=$proxy debootstrap --variant=minbase bookworm "$root" ${mirror:+"$mirror"} \
-    >"$work/debootstrap.log" 2>&1 || {
-    tail -n 20 "$work/debootstrap.log" >&2
-    fail "debootstrap failed; the whole log is build/image/debootstrap.log"
-  }
-  if [ -n "$mirror" ]; then
-    sources | sed 's/^/deb /' >"$root/etc/apt/sources.list"
-  fi
-  rm -rf "$root"/var/cache/apt/* "$root"/var/lib/apt/lists/* "$root"/var/log/*.log
-  tar --numeric-owner -C "$root" -cf "$work/base.tar.part" .
-  rm -rf "$root"
-  mv "$work/base.tar.part" "$work/base.tar"
-}
-[ -f "$work/base.tar" ] || make_base
+deploy/make-base.sh
 
 if ! "${buildah[@]}" inspect --type image "$base" >/dev/null 2>&1; then
   container=$("${buildah[@]}" from scratch)

@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 import unittest
 
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 BUILD = None
 PLAIN = {"PATH": "/usr/bin:/bin"}
 
@@ -86,6 +87,11 @@ class Staged(unittest.TestCase):
                               text=True, capture_output=True, check=False)
         self.assertIn("absent.nc", done.stderr)
         self.assertNotIn("windsplat.json", done.stderr)
+
+    def test_the_package_has_the_version_of_the_program(self):
+        version = output_of(str(self.program), "--version", env=PLAIN).split()[-1]
+        packaged = re.match(r"windsplat \((\S+)-\d+\)", (ROOT / "debian/changelog").read_text())
+        self.assertEqual(packaged.group(1), version)
 
     def test_manual_pages_are_there_for_every_command_if_the_program_prints_them(self):
         listed = output_of(str(self.program), "--help", env=PLAIN).partition("Subcommands:\n")[2]
