@@ -142,6 +142,7 @@ if(WINDSPLAT_SANITIZE)
 else()
   windsplat_long_test(spoiled python3 tests/fuzz/mutate_files.py --count=10000)
   windsplat_long_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py --count=3400)
+  windsplat_long_test(tutorial python3 tests/deploy/tutorial.py)
 endif()
 
 # Short rounds of every fault, and failing library calls by a preloaded library. That library

@@ -3,7 +3,8 @@ import fnmatch
 
 # Pages are taken by the first pattern that they match; what matches none is in "More".
 SECTIONS = {
-    "Start": ["README.md", "docs/gallery/README.md", "docs/gallery/*.md"],
+    "Start": ["README.md", "docs/user/tutorial.md", "docs/gallery/README.md",
+              "docs/gallery/*.md", "docs/user/faq.md", "docs/user/comparison.md"],
     "Use": ["docs/user/page.md", "docs/user/command-line.md", "docs/user/formats.md",
             "docs/user/hosts.md"],
     "Program": ["docs/user/api.md", "reference/rest.md", "docs/design/wire-format.md",
