@@ -2,6 +2,7 @@
 #include "server/cli/serve/config_file.hpp"
 
 #include <algorithm>
+#include <set>
 
 #include "protocol/config.hpp"
 #include "protocol/limits.hpp"
@@ -18,9 +19,13 @@ std::string name_of(const CLI::Option& option) {
   return option.get_lnames().empty() ? option.get_name() : option.get_lnames().front();
 }
 
+// By its name or an alias of it.
 CLI::Option* find_option(CLI::App& command, const std::string& name) {
   for (CLI::Option* const option : command.get_options()) {
-    if (name_of(*option) == name) return option;
+    const std::vector<std::string>& names = option->get_lnames();
+    if (name_of(*option) == name || std::find(names.begin(), names.end(), name) != names.end()) {
+      return option;
+    }
   }
   return nullptr;
 }
@@ -101,8 +106,14 @@ Result<void> apply_config(CLI::App& command, const std::string& path) {
   if (!text) return text.error();
   const auto config = protocol::parse_config(*text);
   if (!config) return in_file(config.error());
+  std::set<const CLI::Option*> named;
   for (const ConfigEntry& entry : config->entries) {
     if (const auto ok = apply(command, entry); !ok) return in_file(ok.error());
+    const CLI::Option* const option = find_option(command, entry.key);
+    if (!named.insert(option).second) {
+      return in_file(protocol::config_error(
+          entry.key, "is another name of " + name_of(*option) + ", which the file has, too"));
+    }
   }
   return {};
 }

@@ -52,7 +52,7 @@ void add_network_options(CLI::App& command, ServeArguments& arguments) {
       ->delimiter(',')
       ->type_name("NAME");
   command
-      .add_option("--allow-embed", arguments.embedders,
+      .add_option("--allow-embed,--frame-ancestors", arguments.embedders,
                   "Web origin whose pages may show the embedded view (?embed) in a frame, such as "
                   "https://site.example; may be repeated")
       ->envname("WINDSPLAT_ALLOW_EMBED")

@@ -218,6 +218,23 @@ TEST_F(CliAccess, CommandLineOverridesEnvironmentOverridesConfiguration) {
   EXPECT_THAT(by_environment.read_until('\n'), HasSubstr("/from-config/"));
 }
 
+TEST_F(CliAccess, FrameAncestorsIsAnotherNameOfAllowEmbed) {
+  const auto policy = [](const std::vector<std::string>& words) {
+    Process daemon(words);
+    return server_test::get(port_of(daemon), "/?embed").header("content-security-policy");
+  };
+  const std::string directive = "frame-ancestors 'self' https://a.example";
+  EXPECT_THAT(policy(serve({"--frame-ancestors", "https://a.example"})), HasSubstr(directive));
+  const std::string config = folder.file("ancestors.json");
+  write_file(config, R"({"frame-ancestors": "https://a.example"})");
+  EXPECT_THAT(policy(serve({"--config", config})), HasSubstr(directive));
+  write_file(config,
+             R"({"allow-embed": "https://a.example", "frame-ancestors": "https://b.example"})");
+  const Outcome both = refused({"--config", config});
+  EXPECT_EQ(both.code, 2);
+  EXPECT_THAT(both.err, HasSubstr("another name of allow-embed"));
+}
+
 TEST_F(CliAccess, AnOriginThatIsNoneIsRefusedByName) {
   for (const char* const origin : {"*", "null", "site.example", "https://site.example/page"}) {
     const Outcome outcome = refused({"--allow-origin", origin});
