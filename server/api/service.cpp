@@ -6,6 +6,7 @@
 #include "server/api/resources.hpp"
 #include "server/api/view_schema.hpp"
 #include "server/data/model/digest.hpp"
+#include "server/http/gzip.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 #include "server/scene/colormap.hpp"
@@ -69,8 +70,16 @@ http::Response tagged_response(const http::Request& request, std::string_view co
                                std::string_view content) {
   http::Response response;
   const std::string etag = etag_of(content);
-  response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
-  if (http::matches_etag(request.header("If-None-Match"), etag)) {
+  // The coding is chosen when the answer is sent; the tag of a 304 is that of the client's form.
+  const std::string known = request.header("If-None-Match");
+  const std::string zipped = http::gzip_etag(etag);
+  const bool has_plain = http::matches_etag(known, etag);
+  const bool has_zipped =
+      http::accepts_gzip(request.header("Accept-Encoding")) && http::matches_etag(known, zipped);
+  response.headers = {{"Cache-Control", "no-cache"},
+                      {"ETag", has_zipped && !has_plain ? zipped : etag},
+                      {"Vary", "Accept-Encoding"}};
+  if (has_plain || has_zipped) {
     response.status = 304;
     return response;
   }

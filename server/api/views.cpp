@@ -9,6 +9,7 @@
 
 #include "protocol/saved_view.hpp"
 #include "server/api/resources.hpp"
+#include "server/http/gzip.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 
@@ -48,8 +49,10 @@ struct Unchanged {
         if_none_match(request.header("If-None-Match")) {}
   bool operator()(const SavedView& now) const {
     const std::string etag = etag_of(text_of(views, now));
-    return http::allows_change(if_match, etag) &&
-           (if_none_match.empty() || !http::matches_etag(if_none_match, etag));
+    const std::string zipped = http::gzip_etag(etag);  // the client may have either form
+    return (http::allows_change(if_match, etag) || http::allows_change(if_match, zipped)) &&
+           (if_none_match.empty() || !(http::matches_etag(if_none_match, etag) ||
+                                       http::matches_etag(if_none_match, zipped)));
   }
 
   const SavedViews& views;

@@ -9,6 +9,7 @@
 
 #include "protocol/limits.hpp"
 #include "server/base/error.hpp"
+#include "server/http/gzip.hpp"
 #include "server/http/problem.hpp"
 
 namespace windsplat::http {
@@ -146,6 +147,7 @@ std::optional<Response> check_request(const Request& request, unsigned version) 
     return problem_response(417, "Expectation Failed",
                             "the only supported expectation is 100-continue");
   }
+  if (auto fault = check_coding(request)) return fault;
   return check_length(request);
 }
 

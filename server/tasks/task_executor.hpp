@@ -68,6 +68,8 @@ inline constexpr TaskExecutor::Settings job_settings{"jobs", protocol::limits::j
 inline constexpr TaskExecutor::Settings look_up_settings{"files to open", 1, requests_waiting_max};
 // Changes saved views; each change may take one disk sync.
 inline constexpr TaskExecutor::Settings view_io_settings{"changes of saved views", 1, 64};
+// Compresses large answers.
+inline constexpr TaskExecutor::Settings packing_settings{"answers to compress", 1, 64};
 // Checks files for changes and reopens them; the server submits one check at a time.
 inline constexpr TaskExecutor::Settings file_check_settings{"file checks", 1, 1};
 

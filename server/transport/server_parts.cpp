@@ -37,6 +37,7 @@ void ServerParts::end() {
   backend.end();
   file_checks.end();
   view_io.end();
+  packing.end();  // after those that submit to it
 }
 
 }  // namespace windsplat::transport

@@ -37,11 +37,12 @@ struct ServerParts {
   tasks::TaskExecutor look_ups{tasks::look_up_settings};
   tasks::TaskExecutor view_io{tasks::view_io_settings};
   tasks::TaskExecutor file_checks{tasks::file_check_settings};
+  tasks::TaskExecutor packing{tasks::packing_settings};
   http::RequestIds request_ids;  // used by the io thread only
   const api::Router router;
   const StreamContext streams{options, backend, admission, draining, connections};
-  const HttpContext http{options,     router,   admission,   metrics,
-                         request_ids, draining, connections, streams};
+  const HttpContext http{options,  router,      admission, metrics, request_ids,
+                         draining, connections, streams,   packing};
 };
 
 }  // namespace windsplat::transport

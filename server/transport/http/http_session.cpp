@@ -8,6 +8,7 @@
 
 #include "server/access/address.hpp"
 #include "server/http/cors.hpp"
+#include "server/http/gzip.hpp"
 #include "server/http/http_checks.hpp"
 #include "server/http/problem.hpp"
 #include "server/transport/http/current_request.hpp"
@@ -91,13 +92,14 @@ class HttpSession final : public Connection, public HttpOwner {
       current_.route = api::route_preflight;
       return writer_.send(http::preflight_response());
     }
+    if (auto fault = http::decode_body(current_.request)) return writer_.send(std::move(*fault));
     if (auto answer =
             answer_login(context_.options, context_.admission, current_.request, wire_.secure())) {
       current_.route = api::route_login;
       return writer_.send(std::move(*answer));
     }
     reader_.watch();
-    work_.start(context_.router, current_);
+    work_.start(context_, current_);
   }
 
   void on_reply(http::Response response) override {

@@ -9,6 +9,7 @@
 #include "server/api/server_options.hpp"
 #include "server/http/request_id.hpp"
 #include "server/metrics/metrics.hpp"
+#include "server/tasks/task_executor.hpp"
 #include "server/transport/connections.hpp"
 
 namespace windsplat::transport {
@@ -26,6 +27,7 @@ struct HttpContext {
   const std::atomic<bool>& draining;
   Connections& connections;
   const StreamContext& streams;  // of connections that are upgraded
+  tasks::TaskExecutor& packing;  // of large answers
 };
 
 // `late`: accepted during a drain, which does not wait for it.

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "server/transport/http/awaited_reply.hpp"
+#include "server/transport/http/http_session.hpp"
+#include "server/transport/http/packed_reply.hpp"
 
 namespace windsplat::transport {
 namespace {
@@ -15,14 +17,16 @@ constexpr std::chrono::milliseconds look_interval{40};
 RequestWork::RequestWork(HttpOwner& owner, HttpWire& wire)
     : owner_(owner), wire_(wire), timer_(wire.wire().get_executor()) {}
 
-void RequestWork::start(const api::Router& router, CurrentRequest& current) {
+void RequestWork::start(const HttpContext& context, CurrentRequest& current) {
   awaited_ = true;
   look();
   const auto awaited =
       std::make_shared<AwaitedReply>(owner_, wire_.wire().get_executor(), reply_lost_);
-  current.route = router.route(current.request, [awaited](http::Response response) {
+  const http::Reply reply = [awaited](http::Response response) {
     awaited->answer(std::move(response));
-  });
+  };
+  current.route =
+      context.router.route(current.request, packed_reply(context.packing, current.request, reply));
 }
 
 bool RequestWork::finish() {

@@ -5,19 +5,20 @@
 #include <boost/asio/steady_timer.hpp>
 #include <memory>
 
-#include "server/api/router.hpp"
 #include "server/transport/http/current_request.hpp"
 #include "server/transport/http/http_owner.hpp"
 #include "server/transport/http/http_wire.hpp"
 
 namespace windsplat::transport {
 
+struct HttpContext;
+
 class RequestWork {
  public:
   RequestWork(HttpOwner& owner, HttpWire& wire);
 
   // Ends in HttpOwner::on_reply(), or in on_end() if the client has disconnected.
-  void start(const api::Router& router, CurrentRequest& current);
+  void start(const HttpContext& context, CurrentRequest& current);
   // The reply has arrived, or is awaited no longer. False: none is awaited.
   bool finish();
   void stop() { timer_.cancel(); }
