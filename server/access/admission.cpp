@@ -239,6 +239,11 @@ std::optional<http::Response> Admission::request(const Visitor& visitor, http::R
   return answer(refusal);
 }
 
+std::vector<http::RateLimit> Admission::left(const std::string& address, bool health) {
+  const std::lock_guard lock(state_->mutex);
+  return state_->quota.left(address, health, state_->now());
+}
+
 bool Admission::count_malformed(const Visitor& visitor, const http::Request& request) {
   const std::string address = client_of(visitor, request);
   const std::lock_guard lock(state_->mutex);

@@ -59,6 +59,8 @@ class Admission {
   // refused.
   std::optional<http::Response> request(const Visitor& visitor, http::Request& request,
                                         bool health);
+  // What the client may still send and receive, for the answer to it (Quota::left).
+  std::vector<http::RateLimit> left(const std::string& address, bool health);
   // Counts a request refused before parsing. False: too many recently, so do not log this one.
   bool count_malformed(const Visitor& visitor, const http::Request& request);
   // Whether a picture may be drawn for the address.

@@ -2,6 +2,7 @@
 #include "server/access/quota.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace windsplat::access {
 namespace {
@@ -11,6 +12,23 @@ using Rate = TokenBucket::Rate;
 constexpr double quota_us_per_s = 1e6;
 constexpr double s_per_minute = 60;
 constexpr double received_at_once_s = 2;  // size of a burst in seconds of the rate
+
+// The state of a bucket that holds ten seconds' worth.
+http::RateLimit left_of(const char* name, TokenBucket& bucket, const Rate& rate, const char* unit,
+                        Quota::Micros now) {
+  static constexpr double integer_max =
+      999'999'999'999'999;  // of structured fields (RFC 9651, 3.3.1)
+  const auto whole = [](double value) {
+    return static_cast<std::int64_t>(std::clamp(value, 0.0, integer_max));
+  };
+  bucket.refill(rate, now);
+  return {name,
+          whole(rate.at_once),
+          whole(std::ceil(rate.at_once / rate.a_second)),
+          whole(rate.at_once - bucket.taken),
+          whole(std::ceil(bucket.taken / rate.a_second)),
+          unit};
+}
 
 bool reached(std::size_t count, std::size_t limit) { return limit > 0 && count >= limit; }
 
@@ -125,6 +143,21 @@ std::optional<Refusal> Quota::picture(const std::string& address, Micros now) {
     return Refusal{metrics::LimitKind::bytes, limits_.bytes_per_address, whole_seconds(bytes)};
   }
   return Refusal{metrics::LimitKind::render, limits_.render_s_per_address, whole_seconds(render)};
+}
+
+std::vector<http::RateLimit> Quota::left(const std::string& address, bool health, Micros now) {
+  std::vector<http::RateLimit> limits;
+  if (limits_.requests_per_address <= 0 && limits_.bytes_per_address <= 0) return limits;
+  AddressUsage& here = addresses_.entry(address, now);
+  if (limits_.requests_per_address > 0) {
+    limits.push_back(left_of("requests", health ? here.health : here.requests,
+                             TokenBucket::rate_for_ten_seconds(limits_.requests_per_address), "",
+                             now));
+  }
+  if (limits_.bytes_per_address > 0) {
+    limits.push_back(left_of("bytes", here.bytes, addresses_.byte_rate(), "content-bytes", now));
+  }
+  return limits;
 }
 
 Quota::Micros Quota::throttle_delay(const std::string& address, Micros now) {

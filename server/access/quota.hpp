@@ -5,12 +5,14 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/access/address_table.hpp"
 #include "server/access/handshake_quota.hpp"
 #include "server/access/limits.hpp"
 #include "server/access/refusal.hpp"
 #include "server/access/token_bucket.hpp"
+#include "server/http/rate_limit.hpp"
 
 namespace windsplat::access {
 
@@ -53,6 +55,9 @@ class Quota {
   std::optional<Refusal> request(const std::string& address, bool health, Micros now);
   // Whether a picture may start: quotas of bytes and render time are not exceeded.
   std::optional<Refusal> picture(const std::string& address, Micros now);
+  // What the address may still send and receive, for clients; empty without such limits. Requests
+  // for health have an allowance of their own.
+  std::vector<http::RateLimit> left(const std::string& address, bool health, Micros now);
   // Time until no quota is exceeded.
   Micros throttle_delay(const std::string& address, Micros now);
 

@@ -12,6 +12,7 @@
 #include "server/http/cors.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
+#include "server/http/rate_limit.hpp"
 #include "server/transport/http/http_session.hpp"
 
 namespace windsplat::transport {
@@ -37,6 +38,12 @@ void ResponseWriter::send(http::Response response) {
   current_.keep_alive =
       current_.keep_alive && !response.close && !context_.draining && !wire_.is_of_reserve();
   http::name_request(response, request.id);
+  if (current_.charged) {
+    http::add_rate_limits(
+        response, context_.admission.left(request.address, context_.router.names_health(request)));
+  }
+  // When to ask for the state of a job: most take less than a second.
+  if (response.status == 202) response.headers.emplace_back("Retry-After", "1");
   http::share_with_origins(response, request, context_.options.allow_origins);
   // Applies to every port of the host, and other programs listen on this machine's loopback.
   if (const std::string host = request.header("Host");

@@ -45,6 +45,30 @@ TEST(Quota, OneAddressCannotUseAllConnections) {
   EXPECT_EQ(quota.connect(here, false, 0).place, Quota::Slot::ordinary);
 }
 
+TEST(Quota, TellsWhatIsLeftOfEachRate) {
+  Limits limits = none();
+  Quota unlimited(limits);
+  EXPECT_TRUE(unlimited.left(here, false, 0).empty());
+  limits.requests_per_address = 2;  // 20 at once
+  limits.bytes_per_address = 50;
+  Quota quota(limits);
+  for (int n = 0; n < 5; ++n) EXPECT_FALSE(quota.request(here, false, 0));
+  quota.sent(here, 600, 0);
+  const auto left = quota.left(here, false, second);
+  ASSERT_EQ(left.size(), 2U);
+  EXPECT_STREQ(left[0].name, "requests");
+  EXPECT_EQ(left[0].quota, 20);
+  EXPECT_EQ(left[0].window_s, 10);
+  EXPECT_EQ(left[0].remaining, 17) << "two of five came back";
+  EXPECT_EQ(left[0].full_in_s, 2) << "three at two a second";
+  EXPECT_STREQ(left[1].name, "bytes");
+  EXPECT_EQ(left[1].quota, 500);
+  EXPECT_EQ(left[1].remaining, 0) << "the last answer may exceed it";
+  EXPECT_EQ(left[1].full_in_s, 11);
+  EXPECT_EQ(quota.left(here, true, second)[0].remaining, 20) << "health has its own";
+  EXPECT_EQ(quota.left(there, false, second)[0].remaining, 20);
+}
+
 TEST(Quota, ReserveIsLimitedInTotalAndPerAddress) {
   Limits limits = none();
   limits.connections = 1;
