@@ -4,7 +4,7 @@
 
 #include "protocol/codec.hpp"
 #include "server/api/resources.hpp"
-#include "server/api/view_schema.hpp"
+#include "server/api/embedded_schemas.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/http/gzip.hpp"
 #include "server/http/negotiate.hpp"

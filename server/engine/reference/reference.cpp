@@ -302,7 +302,8 @@ struct Painting::State {
       if (auto held = reserve_bytes(bytes, reserve); !held) return held;
     }
     ThreadPool alone(1);
-    surfaces.list(scene.surfaces, surface_view(scene.camera), scene.camera.width,
+    shown = scene.surfaces;  // the scene may end before the drawing
+    surfaces.list(shown, surface_view(scene.camera), scene.camera.width,
                   scene.camera.height, alone, cancel);
     frame.surfaces = &surfaces;
     if (cancel.cancelled()) return cancelled_error();
@@ -348,6 +349,7 @@ struct Painting::State {
   ScreenGrid splats, ribbons;
   Rules rules;
   Profile profile;
+  std::vector<surface::Shown> shown;  // to which `surfaces` refers
   surface::Pixels surfaces;
   Frame frame;
   std::vector<Painter> painters;

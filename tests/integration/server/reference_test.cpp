@@ -61,11 +61,12 @@ std::vector<float> values_of(const std::string& npy, std::size_t pixels) {
   return values;
 }
 
-std::string rendered(const std::string& format) {
+std::string rendered(const std::string& format, const std::string& change = "/step=0") {
   const cli_test::Folder folder;
   const std::string file = folder.file("truth" + format);
-  const cli_test::Outcome drawn = cli_test::run(
-      {"render", small_file(), "--size", "96x64", "--set", "/method/name=reference", "-o", file});
+  const cli_test::Outcome drawn =
+      cli_test::run({"render", small_file(), "--size", "96x64", "--set", "/method/name=reference",
+                     "--set", change, "-o", file});
   EXPECT_EQ(drawn.code, 0) << drawn.err;
   return cli_test::read_file(file);
 }
@@ -119,6 +120,20 @@ TEST(References, PostedViewBecomesThePictureOfRender) {
       << "the frame budget does not matter";
   const std::string other = R"({"dataset":"small","step":1,"image":{"width":96,"height":64}})";
   EXPECT_NE(finished(server.port(), begun(server.port(), other))["result"]["id"], result["id"]);
+}
+
+// The surfaces are looked up while it is drawn, when the scene that has them is gone.
+TEST(References, SurfacesAreThoseOfThePictureOfRender) {
+  TestServer server;
+  const std::string surfaces = R"([{"field":"cloud","isovalue":0.2}])";
+  const Json job = finished(
+      server.port(),
+      begun(server.port(),
+            R"({"dataset":"small","image":{"width":96,"height":64},"surfaces":)" + surfaces + "}"));
+  ASSERT_EQ(job["state"], "done") << job;
+  const Answer picture = get(server.port(), job["result"]["picture"]);
+  EXPECT_TRUE(picture.body == rendered(".png", "/surfaces=" + surfaces)) << "the same bytes";
+  EXPECT_FALSE(picture.body == rendered(".png")) << "they are seen";
 }
 
 TEST(References, OtherRequestsAreServedMeanwhileAndNoWorkIsLost) {

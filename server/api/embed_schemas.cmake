@@ -9,7 +9,7 @@ string(REGEX REPLACE "(${byte}${byte}${byte}${byte}${byte}${byte}${byte}${byte})
   schema_bytes "${schema_bytes}")
 file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/generated/view_schema.cpp @ONLY CONTENT
 "// Written by embed_schema.cmake from protocol/view.schema.json.
-#include \"server/api/view_schema.hpp\"
+#include \"server/api/embedded_schemas.hpp\"
 
 namespace windsplat::api {
 namespace {
