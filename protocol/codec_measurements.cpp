@@ -137,6 +137,38 @@ std::string encode_probe(const ProbeDescription& probe) {
                    {"values", std::move(values)}});
 }
 
+std::string encode_values(const ValuesDescription& values, ValuesDetail detail) {
+  constexpr std::array<const char*, 3> keys{"x", "y", "z"};
+  const bool all = detail == ValuesDetail::all;
+  Json axes = Json::object();
+  for (std::size_t a = 0; a < keys.size(); ++a) {
+    const ValuesAxis& axis = values.axes.at(a);
+    WINDSPLAT_CHECK(!axis.coordinates.empty());
+    Json& out = axes[keys.at(a)];
+    out = Json{{"name", axis.name},
+               {"units", axis.units},
+               {"index", axis.index},
+               {"stride", axis.stride},
+               {"count", axis.coordinates.size()},
+               {"first", canonical_number(axis.coordinates.front())},
+               {"last", canonical_number(axis.coordinates.back())}};
+    if (all) out["coordinates"] = numbers_json(axis.coordinates);
+  }
+  if (values.turn > 0) axes["x"]["turn"] = values.turn;
+  Json out{{"field", values.field.name},
+           {"step", values.step},
+           {"time", {{"value", canonical_number(values.time.value)}, {"text", values.time.text}}},
+           {"dims", values.dims},
+           {"shape", values.shape},
+           {"axes", std::move(axes)}};
+  add_units(values.field, out);
+  if (all && !values.longitudes.empty()) {
+    out["longitudes"] = numbers_json(values.longitudes);
+    out["latitudes"] = numbers_json(values.latitudes);
+  }
+  return dump(out);
+}
+
 std::string encode_series(const SeriesDescription& series) {
   Json times = Json::array();
   for (const StepDescription& time : series.times) {

@@ -59,6 +59,29 @@ struct SeriesDescription {
   std::vector<ProbedValue> values;  // one per time
 };
 
+// The samples along an axis that an array of values has.
+struct ValuesAxis {
+  std::string name;  // as in the file
+  std::string units;
+  int index = 0;   // of the first one in the axis
+  int stride = 1;  // samples from one to the next
+  std::vector<double> coordinates;
+};
+
+// An array of values of a field, last dimension fastest.
+struct ValuesDescription {
+  ProbedField field;
+  int step = 0;
+  StepDescription time;
+  std::vector<std::string> dims;  // "component", "z", "y", "x"
+  std::vector<std::size_t> shape;
+  std::array<ValuesAxis, 3> axes;  // x, y, z
+  int turn = 0;                    // samples along x around the globe, if the array passes the seam
+  // Degrees of every column, y and x; empty: the axes determine them.
+  std::vector<double> longitudes;
+  std::vector<double> latitudes;
+};
+
 struct RangeDescription {
   std::optional<Range> range;  // absent if all samples are masked
   std::int64_t masked = 0;
@@ -136,6 +159,8 @@ struct JobDescription {
 
 std::string encode_histogram(const HistogramDescription& histogram);
 std::string encode_probe(const ProbeDescription& probe);
+enum class ValuesDetail { ends, all };  // coordinates: of the first and last sample, of all
+std::string encode_values(const ValuesDescription& values, ValuesDetail detail);
 std::string encode_series(const SeriesDescription& series);
 std::string encode_range(const RangeDescription& range);
 std::string encode_pick(const std::optional<PickedFeature>& feature);

@@ -66,6 +66,8 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(addresses ${SYSTEM_PYTHON} tests/integration/addresses.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(values ${SYSTEM_PYTHON} tests/integration/values.py
+    --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(install python3 tests/integration/install_test.py

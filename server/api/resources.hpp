@@ -58,6 +58,11 @@ void get_histogram(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, cons
                    const std::string& field, const http::Request& request, http::Reply reply);
 void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
                 const std::string& field, const http::Request& request, http::Reply reply);
+// The samples of a box as an array, or what such an array has.
+enum class ValuesFormat { npy, json };
+void get_values(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, ValuesFormat format,
+                const std::string& id, const std::string& field, const http::Request& request,
+                http::Reply reply);
 void get_range(tasks::Backend& backend, const std::string& id, const std::string& field,
                const http::Request& request, http::Reply reply);
 // Of the part of the data in the region of a view, which is the body.

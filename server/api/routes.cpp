@@ -57,6 +57,8 @@ constexpr frame::Format png = frame::Format::png;
 constexpr frame::Format npy = frame::Format::npy;
 constexpr frame::Format pdf = frame::Format::pdf;
 constexpr frame::Format svg = frame::Format::svg;
+constexpr ValuesFormat values_npy = ValuesFormat::npy;
+constexpr ValuesFormat values_json = ValuesFormat::json;
 constexpr const char* frame_name = "/v1/datasets/{id}/frame";
 constexpr const char* view_frame_name = "/v1/views/{id}/frame";
 
@@ -158,6 +160,10 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
             later(get_histogram, catalogue, loads), Charge::picture},
       Route{"GET", "/v1/datasets/{id}/fields/{field}/series", operations::read_series(),
             later(get_series, catalogue, loads), Charge::picture},
+      Route{"GET", "/v1/datasets/{id}/fields/{field}/values.npy", operations::read_values(),
+            later(get_values, catalogue, loads, values_npy), Charge::picture},
+      Route{"GET", "/v1/datasets/{id}/fields/{field}/values.json", operations::describe_values(),
+            later(get_values, catalogue, loads, values_json), Charge::picture},
       Route{"GET", "/v1/datasets/{id}/fields/{field}/range", operations::read_range(),
             later(get_range, backend), Charge::picture},
       Route{"POST", "/v1/datasets/{id}/fields/{field}/range", operations::read_range_in_view(),

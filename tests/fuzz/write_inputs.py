@@ -82,6 +82,8 @@ TARGETS = [
     "/v1/datasets/climate/probe?index=1,2,3&minus=tornado&minusStep=0&fields=wind,cloud",
     "/v1/datasets/climate/fields/wind/histogram?bins=8&range=0,1&log=true&clip=0.1&step=1",
     "/v1/datasets/climate/fields/wind/series?x=1&y=2&z=3",
+    "/v1/datasets/climate/fields/wind/values.npy?bbox=-20,30,40,70&level=1000,500&stride=3,2,1",
+    "/v1/datasets/climate/fields/cloud/values.json?level=500&step=1&minusStep=0",
     "/v1/datasets/climate/fields/wind/range?of=all", "/v1/datasets/climate?forget=true",
     "/%2e%2e/%2f?%00=%ff", "/v1//datasets/./climate/../climate"]
 

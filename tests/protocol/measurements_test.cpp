@@ -50,6 +50,37 @@ TEST(Measurements, ProbeReportsEveryFieldWithUnitsAndNullWhereMasked) {
   EXPECT_EQ(answer["position"]["index"]["z"], 2);
 }
 
+TEST(Measurements, ValuesReportTheEndsOfTheirAxesOrEveryCoordinate) {
+  ValuesDescription values;
+  values.field = mixed_wind();
+  values.step = 2;
+  values.time = {6, "2001-01-01T06:00:00Z"};
+  values.dims = {"component", "y", "x"};
+  values.shape = {3, 2, 3};
+  values.axes = {ValuesAxis{"lon", "degrees_east", 34, 1, {-20, -10, 0}},
+                 ValuesAxis{"lat", "degrees_north", 0, 2, {-80, -60}},
+                 ValuesAxis{"p", "hPa", 1, 1, {700}}};
+  values.turn = 36;
+  const std::string ends = encode_values(values, ValuesDetail::ends);
+  expect_shape("values", ends);
+  const Json x = Json::parse(ends)["axes"]["x"];
+  EXPECT_EQ(x, (Json{{"name", "lon"},
+                     {"units", "degrees_east"},
+                     {"index", 34},
+                     {"stride", 1},
+                     {"count", 3},
+                     {"turn", 36},
+                     {"first", -20},
+                     {"last", 0}}));
+  values.longitudes = {1, 2, 3, 4, 5, 6};
+  values.latitudes = {6, 5, 4, 3, 2, 1};
+  const std::string all = encode_values(values, ValuesDetail::all);
+  expect_shape("values", all);
+  EXPECT_EQ(Json::parse(all)["axes"]["x"]["coordinates"], Json({-20, -10, 0}));
+  EXPECT_EQ(Json::parse(all)["latitudes"], Json({6, 5, 4, 3, 2, 1}));
+  EXPECT_FALSE(Json::parse(all)["axes"]["y"].contains("turn"));
+}
+
 TEST(Measurements, SeriesHistogramAndRangeHaveTheirShapes) {
   SeriesDescription series{
       position(), mixed_wind(), {{0, "a"}, {1, "b"}}, {std::vector{1.0, 2.0, 3.0}, std::nullopt}};

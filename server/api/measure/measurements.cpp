@@ -18,6 +18,7 @@
 #include "protocol/limits.hpp"
 #include "protocol/view.hpp"
 #include "server/api/measure/positions.hpp"
+#include "server/api/measure/subject.hpp"
 #include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/model/measure.hpp"
@@ -31,64 +32,10 @@ namespace {
 
 namespace limits = protocol::limits;
 using Clock = std::chrono::steady_clock;
-using DatasetPtr = std::shared_ptr<data::Dataset>;
 
 constexpr int histogram_bins = 64;
 constexpr std::chrono::milliseconds turn_budget{
     30};  // time for reading steps before yielding to other jobs
-
-// Dataset and field of a query, resolved before loading.
-struct Subject {
-  tasks::Catalogue* catalogue = nullptr;
-  DatasetPtr dataset;
-  data::FieldInfo field;
-  CancelToken cancel;
-};
-
-// With `minus` and `minusStep` of the query the differences from that dataset or step, as those of
-// a view. Errors: not_found, invalid (grids, steps).
-Result<DatasetPtr> find_dataset(const tasks::Catalogue& catalogue, const std::string& id,
-                                http::QueryReader& query) {
-  auto dataset = catalogue.find(id);
-  if (!dataset) return make_error(ErrorKind::not_found, dataset.error().message);
-  const auto minus = read_text(query, parameters::minus);
-  const auto step = read_integer(query, parameters::minus_step);
-  if (!minus && !step) return dataset;
-  protocol::View view;
-  view.dataset = id;
-  view.difference = protocol::DifferenceView{minus, step};
-  auto shown = tasks::find_shown(catalogue, view);
-  if (shown) return shown;
-  const Error& error = shown.error();
-  return make_error(error.kind, "query parameters 'minus' and 'minusStep': " +
-                                    (error.at.empty() ? error.message : error.at.front().detail));
-}
-
-Result<Subject> find_subject(tasks::Catalogue& catalogue, const std::string& id,
-                             const std::string& field, const http::Request& request,
-                             http::QueryReader& query) {
-  auto dataset = find_dataset(catalogue, id, query);
-  if (!dataset) return dataset.error();
-  const data::FieldInfo* found = (*dataset)->info().find(field);
-  if (found == nullptr) {
-    return make_error(ErrorKind::not_found, "dataset '" + printable(id) + "' has no field '" +
-                                                printable(field) + "'" +
-                                                data::absence_text((*dataset)->info(), field));
-  }
-  return Subject{&catalogue, std::move(*dataset), *found, request.cancel};
-}
-
-Result<std::shared_ptr<const data::Volume>> load(const Subject& subject, std::size_t step) {
-  return load_field(*subject.catalogue, *subject.dataset, subject.field.name, step, subject.cancel);
-}
-
-std::optional<int> read_step(http::QueryReader& query, const data::Dataset& dataset) {
-  return read_integer(query, parameters::step, static_cast<int>(dataset.info().steps.size()) - 1);
-}
-
-protocol::ProbedField describe(const data::FieldInfo& field) {
-  return {field.name, field.kind == data::FieldKind::vector, field.units, field.component_units};
-}
 
 // --- over all steps -----------------------------------------------------------------------------
 
@@ -243,7 +190,7 @@ http::Response probe_response(tasks::Catalogue& catalogue, data::Dataset& datase
     if (!volume && !is_wanted && dataset.subtrahend() && volume.error().kind == ErrorKind::invalid)
       continue;
     if (!volume) return http::problem_response(volume.error());
-    out.fields.push_back(describe(field));
+    out.fields.push_back(probed_field(field));
     out.values.push_back(data::value_at(**volume, located->place.index));
   }
   return json_response(protocol::encode_probe(out));
@@ -345,7 +292,7 @@ void get_series(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const s
   if (const auto ok = check_steps(info); !ok) return refuse(ok.error());
 
   const auto series = std::make_shared<protocol::SeriesDescription>();
-  series->field = describe(subject->field);
+  series->field = probed_field(subject->field);
   for (const data::TimeStep& step : info.steps) series->times.push_back({step.value, step.text});
   const auto pass = pass_over(std::move(*subject), request, std::move(reply));
   const auto index = std::make_shared<std::array<int, 3>>();

@@ -43,6 +43,8 @@ Operation cancel_job();
 Operation probe_fields();
 Operation count_values();
 Operation read_series();
+Operation read_values();      // values.npy
+Operation describe_values();  // values.json
 Operation read_range();
 Operation read_range_in_view();
 

@@ -81,6 +81,15 @@ inline constexpr Parameter minus{"minus", Kind::text,
 inline constexpr Parameter minus_step{"minusStep", Kind::integer,
                                       "Time step that is subtracted, counted from 0.", 0,
                                       limits::step_max};
+inline constexpr Parameter box{
+    "bbox", Kind::text,
+    "Four numbers west,south,east,north, ends included: degrees, of data without longitudes "
+    "coordinates of the axes x and y."};
+inline constexpr Parameter levels{
+    "level", Kind::text,
+    "A level of the vertical axis, or the ends of a range of levels as two numbers."};
+inline constexpr Parameter stride{"stride", Kind::text,
+                                  "Every so many samples: integers x,y,z, or one for x and y."};
 inline constexpr Parameter bins{
     "bins", Kind::integer, "Number of bins.", 1, limits::histogram_bins_max, "64"};
 inline constexpr Parameter range{"range", Kind::pair,

@@ -7,6 +7,14 @@ namespace {
 
 constexpr std::string_view values_group = "Values";
 
+Operation values_in_box() {
+  return {
+      .group = values_group,
+      .query = {parameters::box, parameters::levels, parameters::stride, parameters::step,
+                parameters::time, parameters::nearest, parameters::minus, parameters::minus_step},
+      .problems = {404, 422, 507}};
+}
+
 }  // namespace
 
 Operation probe_fields() {
@@ -41,6 +49,27 @@ Operation read_series() {
                     parameters::index, parameters::minus, parameters::minus_step},
           .answers = {json_answer("One value a step.", "series")},
           .problems = {404, 413, 422, 507}};
+}
+
+Operation read_values() {
+  Operation out = values_in_box();
+  out.id = "readValues";
+  out.summary = "Samples of a field in a box, as an array of float32";
+  out.description =
+      "NPY 1.0, dimensions component (of a vector), z, y, x, of which x is fastest; masked samples "
+      "are NaN. Windsplat-Values describes the array as values.json does, without coordinates.";
+  out.answers = {{200, "The array.", {}, {"application/x-npy"}, {"ETag", "Windsplat-Values"}},
+                 not_modified()};
+  return out;
+}
+
+Operation describe_values() {
+  Operation out = values_in_box();
+  out.id = "describeValues";
+  out.summary = "Axes and coordinates of the samples of a field in a box";
+  out.description = "No values are read.";
+  out.answers = {json_answer("Dimensions and axes of the array.", "values"), not_modified()};
+  return out;
 }
 
 Operation read_range() {
