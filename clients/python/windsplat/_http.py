@@ -89,8 +89,8 @@ class Http:
         headers: Mapping[str, str] | None = None,
     ) -> httpx.Response:
         """The answer to a request. `path` is relative to the base, or begins with a slash as in
-        links of the server; `file` is sent as the body. A refusal (429, 503) is repeated after the time that it names, as
-        long as all of them together stay within `patience` seconds.
+        links of the server; `file` is sent as the body. A refusal (429, 503) is repeated after
+        the time that it names, as long as all of them together stay within `patience` seconds.
 
         Raises Problem, ConnectionFailed.
         """

@@ -1,7 +1,7 @@
 """Accessor `windsplat` of xarray's Dataset and DataArray: `import windsplat.xarray`.
 
-The arrays are written to a netCDF file, in a folder that a server on this machine reads, or they are
-uploaded to another one.
+The arrays are written to a netCDF file, in a folder that a server on this machine reads, or they
+are uploaded to another one.
 """
 from __future__ import annotations
 
