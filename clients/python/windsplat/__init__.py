@@ -6,7 +6,7 @@
         view = server["winds"].view(size=(800, 450)).look(azimuth=30, elevation=40)
         view.save("winds.png")
 """
-from .dataset import Dataset, Field, Histogram, Position, Probe, Series, Step
+from .dataset import Dataset, Field, Histogram, Position, Probe, Series, Step, Values
 from .errors import (
     Busy,
     ConnectionFailed,
@@ -32,5 +32,5 @@ __all__ = [
     "Busy", "ConnectionFailed", "Dataset", "Error", "Field", "FieldError", "Frame", "Histogram",
     "InvalidView", "JobTimeout", "Movie", "MovieFailed", "NotFound", "Position", "Probe",
     "Problem", "Report", "Series", "Server", "StartFailed", "Step", "Stream", "StreamFrame",
-    "Unauthorized", "View", "WindsplatError", "connect", "movie", "open",
+    "Unauthorized", "Values", "View", "WindsplatError", "connect", "movie", "open",
 ]

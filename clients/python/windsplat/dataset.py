@@ -92,6 +92,36 @@ class Histogram:
     masked: int
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Values:
+    """Samples of a field in a box."""
+
+    field: str
+    array: NDArray[np.float32]
+    """Masked samples are NaN."""
+    dims: tuple[str, ...]
+    """Of the array: z, y, x; of a vector component before them; without z of one level."""
+    coordinates: Mapping[str, NDArray[np.float64]]
+    """Of the axes x, y and z, from the west, south and bottom."""
+    units: str
+    step: int
+    description: Mapping[str, Any]
+    """The whole description of the server (values.json)."""
+
+    def to_xarray(self) -> Any:
+        """A DataArray with the names, coordinates and units of the axes."""
+        import xarray
+
+        axes = self.description["axes"]
+        names = {axis: str(axes[axis].get("name") or axis) for axis in axes}
+        coords: dict[str, Any] = {
+            names[axis]: (names[axis] if axis in self.dims else (), places if axis in self.dims
+                          else places[0], {"units": axes[axis].get("units", "")})
+            for axis, places in self.coordinates.items()}
+        return xarray.DataArray(self.array, coords, [names.get(one, one) for one in self.dims],
+                                self.field, {"units": self.units})
+
+
 def _position(document: Mapping[str, Any]) -> Position:
     index = document["index"]
     return Position((index["x"], index["y"], index["z"]), document["x"], document["y"],
@@ -246,6 +276,42 @@ class Dataset:
         low, high = document["range"]
         return Histogram(counts, np.linspace(low, high, len(counts) + 1), document["below"],
                          document["above"], document["masked"])
+
+    def values(
+        self, field: str, *, box: tuple[float, float, float, float] | None = None,
+        level: float | tuple[float, float] | None = None, step: int = 0,
+        stride: int | tuple[int, int, int] = 1,
+    ) -> Values:
+        """The samples of a field as an array.
+
+        box: west, south, east, north in degrees, or coordinates of x and y.
+        level: one, or the ends of a range, in the unit of the vertical axis.
+        stride: every so many samples along x and y, or along x, y and z.
+
+        At most 64 MiB at once. Raises NotFound for servers without this resource.
+        """
+        import io
+
+        import numpy as np
+
+        def joined(value: Any) -> str | None:
+            if value is None:
+                return None
+            many = value if isinstance(value, (tuple, list)) else [value]
+            return ",".join(f"{one:g}" if isinstance(one, int) else repr(float(one))
+                            for one in many)
+
+        asked = {"bbox": joined(box), "level": joined(level), "step": step,
+                 "stride": joined(stride)}
+        path = self._field(field)
+        description = self.server.http.get(f"{path}/values.json", **asked)
+        answer = self.server.http.request("GET", f"{path}/values.npy", params=asked,
+                                          accept="application/x-npy")
+        array = np.load(io.BytesIO(answer.content), allow_pickle=False)
+        coordinates = {axis: np.array(one["coordinates"], dtype=np.float64)
+                       for axis, one in description["axes"].items()}
+        return Values(field, array, tuple(description["dims"]), coordinates,
+                      description.get("units", ""), description["step"], description)
 
     def range(self, field: str, *, step: int | None = None) -> tuple[float, float]:
         """Least and greatest value of a field at a step; None: at all steps."""

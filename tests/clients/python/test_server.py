@@ -146,6 +146,29 @@ class Values(unittest.TestCase):
         every = self.dataset.range("cloud")
         self.assertTrue(every[0] <= low and every[1] >= high)
 
+    def test_values_of_a_box_are_those_of_probes(self):
+        try:
+            box = self.dataset.values("wind", box=(-20, 30, 40, 70), level=(1000, 500), step=2,
+                                      stride=2)
+        except windsplat.NotFound:
+            self.skipTest("the daemon has no resource of values")
+        self.assertEqual(box.dims, ("component", "z", "y", "x"))
+        self.assertEqual(box.array.dtype, np.float32)
+        place = {axis: box.coordinates[axis][1] for axis in "xyz"}
+        probe = self.dataset.probe(**place, step=2)
+        self.assertEqual((probe.position.x, probe.position.y), (place["x"], place["y"]))
+        np.testing.assert_array_equal(box.array[:, 1, 1, 1], np.float32(probe["wind"]))
+        arrays = box.to_xarray()
+        self.assertEqual((arrays.dims, arrays.attrs["units"]),
+                         (("component", "level", "lat", "lon"), "m s-1"))
+        level = self.dataset.values("cloud", level=float(box.coordinates["z"][2]))
+        self.assertEqual(level.array.shape, (24, 48))
+        self.assertEqual(float(level.to_xarray().level), box.coordinates["z"][2])
+        whole = self.dataset.values("cloud")
+        np.testing.assert_array_equal(whole.array[2], level.array)
+        with self.assertRaises(windsplat.InvalidView):
+            self.dataset.values("cloud", level=1e9)
+
     def test_names_are_suggested(self):
         with self.assertRaisesRegex(windsplat.NotFound, "did you mean 'tornado:24'"):
             self.server["tornado24"]

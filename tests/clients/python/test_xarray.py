@@ -132,11 +132,19 @@ class Accessors(unittest.TestCase):
     def test_another_server_gets_an_upload(self):
         if not support.takes_uploads():
             self.skipTest("the daemon has no option --upload-limit")
-        with start("tornado:8", upload_limit="64M") as there:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        with start("tornado:8", upload_limit="64M", state_dir=folder.name) as there:
             with windsplat.connect(there.url) as remote:
                 view = example().windsplat.view("u", "v", scalar="cc", server=remote)
                 self.assertEqual(view.get("/vector/field"), "wind")
                 self.assertEqual(view.frame("jpeg").width, 1280)
+                self.assertRegex(view.dataset.upload_id, r"^xarray-\d+-[0-9a-f]{16}\.nc$")
+                self.arrays = example()
+                arrays = self.arrays.windsplat
+                dataset = arrays.open(["cc"], server=remote)
+                arrays.refresh()
+                self.assertNotIn(dataset.id, remote.datasets)
 
     def test_a_server_is_started_for_arrays(self):
         with self.assertRaisesRegex(ValueError, "first call"):
