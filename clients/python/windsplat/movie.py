@@ -19,10 +19,13 @@ from .errors import MovieFailed
 from .view import View
 
 CODECS: Mapping[str, Sequence[str]] = {
-    # Players expect 4:2:0, which needs even edges.
+    # Players expect 4:2:0, which needs even edges (FILTER), and colours of ITU-R BT.709.
     ".mp4": ("-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
     ".webm": ("-c:v", "libvpx-vp9", "-crf", "30", "-b:v", "0", "-pix_fmt", "yuv420p"),
 }
+FILTER = ("scale=in_range=pc:out_range=tv:out_color_matrix=bt709,"
+          "pad=ceil(iw/2)*2:ceil(ih/2)*2")
+COLOURS = ("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1")
 KINDS = {".mp4": "video/mp4", ".webm": "video/webm", ".apng": "image/png"}
 SUFFIXES = (*CODECS, ".apng", ".zip")
 PNG_START = b"\x89PNG\r\n\x1a\n"
@@ -134,8 +137,8 @@ def write_video(path: pathlib.Path, suffix: str, frames: Iterator[bytes], fps: f
                 program: str) -> None:
     """Pictures encoded by the program ffmpeg."""
     command = [program, "-loglevel", "error", "-y", "-f", "image2pipe", "-framerate", f"{fps:g}",
-               "-c:v", "png", "-i", "-", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-               *CODECS[suffix], "-f", suffix[1:], os.fspath(path)]
+               "-c:v", "png", "-i", "-", "-vf", FILTER, *CODECS[suffix], *COLOURS,
+               "-f", suffix[1:], f"file:{os.fspath(path)}"]
     with tempfile.TemporaryFile() as said:
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said) as process:
             assert process.stdin is not None
