@@ -72,6 +72,10 @@ if(NOT WINDSPLAT_SANITIZE)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(install python3 tests/integration/install_test.py
     --build=${PROJECT_BINARY_DIR})
+  if(WINDSPLAT_LIBRARY)
+    windsplat_program_test(library python3 tests/library/library_test.py
+      --build=${PROJECT_BINARY_DIR})
+  endif()
   windsplat_program_test(hardening python3 tests/tidy/check_hardening.py $<TARGET_FILE:windsplat>)
 endif()
 
