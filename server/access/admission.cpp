@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/access/cost_limits.hpp"
+#include "server/access/identity.hpp"
 #include "server/base/log.hpp"
 #include "server/http/problem.hpp"
 
@@ -224,12 +225,22 @@ bool Admission::is_kept_out_by_others(const std::string& peer) {
 }
 
 std::string Admission::client_of(const Visitor& visitor, const http::Request& request) const {
+  if (visitor.trusted && !limits_.identity_header.empty()) {
+    const auto user = named_user(request, limits_.identity_header);
+    if (user && !user->empty()) return counted_user(*user);
+  }
   return counted_address(client_address(visitor.peer, request.header("X-Forwarded-For"), trusted_));
 }
 
 std::optional<http::Response> Admission::request(const Visitor& visitor, http::Request& request,
                                                  bool health) {
   request.address = client_of(visitor, request);
+  if (visitor.trusted && !limits_.identity_header.empty()) {
+    if (const auto user = named_user(request, limits_.identity_header); !user) {
+      count_malformed(visitor, request);
+      return http::problem_response(400, "Bad Request", user.error().message);
+    }
+  }
   if (visitor.reserve && !health) return answer(visitor.reserve);
   std::optional<Refusal> refusal;
   {

@@ -55,8 +55,8 @@ class Admission {
   // Whether a connection in the reserve would be admitted if a slot of the reserve were freed.
   bool is_kept_out_by_others(const std::string& peer);
 
-  // Sets request.address to the address of the client. Returns a response if the request is
-  // refused.
+  // Sets request.address to the address of the client, or to the user that a proxy names
+  // (identity.hpp). Returns a response if the request is refused.
   std::optional<http::Response> request(const Visitor& visitor, http::Request& request,
                                         bool health);
   // What the client may still send and receive, for the answer to it (Quota::left).

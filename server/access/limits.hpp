@@ -44,6 +44,8 @@ struct Limits {
   double wait_ms = 25;
   // Proxies whose X-Forwarded-For is trusted: addresses, or networks as ADDRESS/BITS.
   std::vector<std::string> trusted_proxies;
+  // Header in which they name the user, who is then counted in place of the address; empty: none.
+  std::string identity_header;
 
   // Limits as published to clients, capped by the protocol's own.
   [[nodiscard]] std::int64_t pixels_max_reported() const {

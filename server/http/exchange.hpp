@@ -29,7 +29,7 @@ struct Request {
   std::string body;
   CancelToken cancel;      // raised when the client disconnects
   std::uint64_t peer = 0;  // id of the connection
-  std::string address;     // address of the client, without a port; empty: unknown
+  std::string address;     // of the client, without a port, or its user; empty: unknown
   std::string id;          // sent with the response and logged (request_id.hpp)
 
   // All values of the header in order, joined by ", "; names are case-insensitive.

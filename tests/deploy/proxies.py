@@ -32,6 +32,11 @@ SKIPPED = 77
 NOBODY = 65534
 REQUESTS_A_SECOND, BURST_S = 4, 10  # of an address
 START_S = 30
+PASSWORD_REMOVED = {"nginx": 'proxy_set_header   Authorization   "";',
+                    "caddy": "header_up -Authorization"}
+OAUTH_RECIPE = "nginx-oauth2.conf"
+# What precedes the address of oauth2-proxy in it, for its pages and for its check of requests.
+LOGIN_PAGE, LOGIN_CHECK = "        proxy_pass       ", "        proxy_pass              "
 OPTIONS = argparse.Namespace()
 
 NGINX_MAIN = """daemon off;
@@ -88,9 +93,10 @@ def password_hash(server):
 
 
 class Proxy:
-    """The server with its recipe, unprivileged, in front of the daemon at `upstream`."""
+    """The server with its recipe, unprivileged, in front of the daemon at `upstream`; `logins`: the
+    port of what stands in for oauth2-proxy; `more`: a line beside that for Authorization."""
 
-    def __init__(self, server, folder, upstream):
+    def __init__(self, server, folder, upstream, recipe, logins=None, more=""):
         self.port = free_port()
         chain, key = folder / "chain.pem", folder / "key.pem"
         if not chain.exists():
@@ -100,20 +106,28 @@ class Proxy:
                             "-keyout", key, "-out", chain], check=True, capture_output=True)
         daemon = f"127.0.0.1:{upstream}"
         if server == "nginx":
-            (folder / "users").write_text(f"{USER}:{password_hash(server)}\n")
-            (folder / "site.conf").write_text(adapted("nginx.conf", {
+            replacements = {
                 "server 127.0.0.1:8080;": f"server {daemon};",
                 "    listen 443 ssl http2;": f"    listen 127.0.0.1:{self.port} ssl http2;",
                 "    listen [::]:443 ssl http2;": "",
-                "/etc/nginx/tls/chain.pem": str(chain), "/etc/nginx/tls/key.pem": str(key),
-                "/etc/nginx/windsplat.htpasswd": str(folder / "users")}))
+                "/etc/nginx/tls/chain.pem": str(chain), "/etc/nginx/tls/key.pem": str(key)}
+            if logins:
+                for before in (LOGIN_PAGE, LOGIN_CHECK):
+                    replacements[f"{before}http://127.0.0.1:4180;"] = \
+                        f"{before}http://127.0.0.1:{logins};"
+            else:
+                (folder / "users").write_text(f"{USER}:{password_hash(server)}\n")
+                replacements["/etc/nginx/windsplat.htpasswd"] = str(folder / "users")
+                replacements[PASSWORD_REMOVED["nginx"]] = PASSWORD_REMOVED["nginx"] + "\n" + more
+            (folder / "site.conf").write_text(adapted(recipe, replacements))
             (folder / "nginx.conf").write_text(NGINX_MAIN.format(folder=folder))
             command = ["-c", folder / "nginx.conf", "-p", folder, "-e", "stderr"]
         else:
-            site = adapted("Caddyfile", {
+            site = adapted(recipe, {
                 f"{NAME} {{": f"{ORIGIN}:{self.port} {{\n\tbind 127.0.0.1",
                 "{$WINDSPLAT_UPSTREAM:127.0.0.1:8080}": daemon,
                 "/etc/caddy/tls/chain.pem": str(chain), "/etc/caddy/tls/key.pem": str(key),
+                PASSWORD_REMOVED["caddy"]: PASSWORD_REMOVED["caddy"] + "\n" + more,
                 "$2a$14$HASH": password_hash(server)})
             (folder / "Caddyfile").write_text(CADDY_MAIN.format(folder=folder) + site)
             command = ["run", "--config", folder / "Caddyfile", "--adapter", "caddyfile"]
@@ -192,27 +206,62 @@ def folder_of_test(kind):
     return one, folder
 
 
+def recipe_of_server():
+    return "nginx.conf" if OPTIONS.server == "nginx" else "Caddyfile"
+
+
+def options_of(recipe):
+    """The daemon's options in the comment at the head of the recipe, but for the address."""
+    head = (RECIPES / recipe).read_text().replace("\\\n#", " ")
+    words = re.search(r"windsplat serve winds\.nc (.*)", head)[1].split()
+    assert words[:2] == ["--listen", "127.0.0.1:8080"], words
+    return words[2:]
+
+
+def start_daemon(case, recipe):
+    """The daemon as the recipe says, with a low limit of requests, and the file of its log."""
+    log = tempfile.NamedTemporaryFile("w+", prefix="windsplat-proxy-", suffix=".log")
+    case.addClassCleanup(log.close)
+    daemon = Daemon(OPTIONS.program, "tornado:32", *options_of(recipe),
+                    f"--max-requests-per-address={REQUESTS_A_SECOND}", errors=log)
+    case.addClassCleanup(daemon.stop)
+    case.addClassCleanup(daemon.child.stdout.close)
+    return daemon, pathlib.Path(log.name)
+
+
+def comes_in(log, words):
+    """Whether the log soon has these words: lines may follow the answers."""
+    end = time.monotonic() + START_S
+    while words not in log.read_text():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def statuses_until_refused(visitor, fields):
+    """The statuses of many requests, until one gets 429; `fields(number)`: more header lines."""
+    statuses = []
+    with Connection(visitor) as connection:
+        for number in range(4 * REQUESTS_A_SECOND * BURST_S):
+            connection.raw(f"GET /winds/v1 HTTP/1.1\r\nHost: {NAME}\r\n"
+                           f"{visitor.authorization()}{fields(number)}\r\n".encode())
+            statuses.append(connection.answer().status)
+            if statuses[-1] == 429:
+                break
+    return statuses
+
+
 class Recipe(unittest.TestCase):
     """The server in front of a daemon that is started as the recipe says."""
 
     @classmethod
     def setUpClass(cls):
-        cls.daemon = Daemon(OPTIONS.program, "tornado:32", *cls.options_of_recipe(),
-                            f"--max-requests-per-address={REQUESTS_A_SECOND}")
-        cls.addClassCleanup(cls.daemon.stop)
+        cls.daemon, cls.log = start_daemon(cls, recipe_of_server())
         temporary, folder = folder_of_test("daemon")
         cls.addClassCleanup(temporary.cleanup)
-        cls.proxy = Proxy(OPTIONS.server, folder, cls.daemon.port)
+        cls.proxy = Proxy(OPTIONS.server, folder, cls.daemon.port, recipe_of_server())
         cls.addClassCleanup(cls.proxy.stop)
-
-    @staticmethod
-    def options_of_recipe():
-        """The options in the comment at the head of the recipe, but for the address."""
-        recipe = "nginx.conf" if OPTIONS.server == "nginx" else "Caddyfile"
-        head = (RECIPES / recipe).read_text().replace("\\\n#", " ")
-        words = re.search(r"windsplat serve winds\.nc (.*)", head)[1].split()
-        assert words[:2] == ["--listen", "127.0.0.1:8080"], words
-        return words[2:]
 
     def test_serves_the_page_and_its_files_below_the_path(self):
         visitor = Visitor(self.proxy)
@@ -276,44 +325,117 @@ class Recipe(unittest.TestCase):
         self.assertEqual(request(Visitor(self.proxy), "GET", "metrics").status, 403)
 
     def test_limits_count_for_each_client_whatever_it_writes_in_the_header(self):
-        most = 4 * REQUESTS_A_SECOND * BURST_S
-        statuses = []
         greedy = Visitor(self.proxy, source="127.0.0.2")
-        with Connection(greedy) as connection:
-            for number in range(most):
-                connection.raw(f"GET /winds/v1 HTTP/1.1\r\nHost: {NAME}\r\n"
-                               f"{greedy.authorization()}"
-                               f"X-Forwarded-For: 192.0.2.{number}\r\n\r\n".encode())
-                statuses.append(connection.answer().status)
-                if statuses[-1] == 429:
-                    break
+        statuses = statuses_until_refused(
+            greedy, lambda number: f"X-Forwarded-For: 192.0.2.{number}\r\n")
         self.assertEqual(statuses[0], 200)
-        self.assertEqual(statuses[-1], 429, f"after {most} requests")
+        self.assertEqual(statuses[-1], 429, f"after {len(statuses)} requests")
         other = Visitor(self.proxy, source="127.0.0.3")
         self.assertEqual(request(other, "GET", "v1").status, 200)
+        self.assertTrue(comes_in(self.log, "client=127.0.0.2 "))
+        self.assertTrue(comes_in(self.log, "client=127.0.0.3 "))
+        self.assertNotIn("192.0.2.", self.log.read_text())
 
 
 class Forwarded(unittest.TestCase):
     """What arrives behind the proxy."""
 
-    def test_the_daemon_gets_the_clients_address_and_no_password(self):
+    def seen_with(self, more):
+        """Path and headers of a request by 127.0.0.2 that tries to pass for another."""
         upstream = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Recorder)
         threading.Thread(target=upstream.serve_forever, daemon=True).start()
         temporary, folder = folder_of_test("recorder")
-        proxy = Proxy(OPTIONS.server, folder, upstream.server_port)
+        proxy = Proxy(OPTIONS.server, folder, upstream.server_port, recipe_of_server(), more=more)
+        Recorder.seen.clear()
         try:
             request(Visitor(proxy, source="127.0.0.2"), "GET", "v1?x=%2F",
-                    {"X-Forwarded-For": "192.0.2.1"})
+                    {"X-Forwarded-For": "192.0.2.1", "X-Forwarded-User": "eve"})
         finally:
             proxy.stop()
             upstream.shutdown()
             upstream.server_close()
             temporary.cleanup()
-        (path, headers), = Recorder.seen
+        seen, = Recorder.seen
+        return seen
+
+    def test_the_daemon_gets_the_clients_address_and_no_password(self):
+        path, headers = self.seen_with("")
         self.assertEqual(path, "/winds/v1?x=%2F")
         self.assertEqual(headers.get_all("Host"), [NAME])
         self.assertEqual(headers.get_all("X-Forwarded-For"), ["127.0.0.2"])
         self.assertIn(headers.get("Authorization", ""), [""])
+
+    def test_the_line_of_the_page_names_the_user_of_the_password(self):
+        page = (RECIPES / "proxies.md").read_text()
+        line, = re.findall(rf"^\| {recipe_of_server()} \| `(.* X-Forwarded-User .*)` \|$", page,
+                           re.M)
+        self.assertEqual(self.seen_with(line)[1].get_all("X-Forwarded-User"), [USER])
+
+
+class Logins(http.server.BaseHTTPRequestHandler):
+    """In place of oauth2-proxy: a cookie names the user, whom the answer to a check repeats."""
+    protocol_version = "HTTP/1.1"
+
+    def log_message(self, *_):
+        pass
+
+    def do_GET(self):
+        user = (self.headers["Cookie"] or "").partition("_oauth2_proxy=")[2]
+        check = self.path == "/oauth2/auth"
+        body = b"" if check else b"log in here"
+        self.send_response(200 if not check else 202 if user else 401)
+        if check and user:
+            self.send_header("X-Auth-Request-User", user)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+
+class LoggedIn(Visitor):
+    """A client with the cookie of a login."""
+
+    def authorization(self):
+        return f"Cookie: _oauth2_proxy={self.password}\r\n" if self.password else ""
+
+
+class Users(unittest.TestCase):
+    """nginx with logins of oauth2-proxy: users instead of addresses."""
+
+    @classmethod
+    def setUpClass(cls):
+        if OPTIONS.server != "nginx":
+            raise unittest.SkipTest("the recipe is for nginx")
+        logins = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Logins)
+        threading.Thread(target=logins.serve_forever, daemon=True).start()
+        cls.addClassCleanup(logins.server_close)
+        cls.addClassCleanup(logins.shutdown)
+        cls.daemon, cls.log = start_daemon(cls, OAUTH_RECIPE)
+        temporary, folder = folder_of_test("users")
+        cls.addClassCleanup(temporary.cleanup)
+        cls.proxy = Proxy("nginx", folder, cls.daemon.port, OAUTH_RECIPE, logins.server_port)
+        cls.addClassCleanup(cls.proxy.stop)
+
+    def test_only_those_who_are_logged_in_are_served(self):
+        page = request(LoggedIn(self.proxy, None), "GET", "")
+        self.assertEqual((page.status, page.body), (403, b"log in here"))
+        self.assertEqual(request(LoggedIn(self.proxy, None), "GET", "v1").status, 401)
+        for path in ("", "v1", "v1/datasets/tornado:32/frame.jpg?width=64&height=48"):
+            self.assertEqual(request(LoggedIn(self.proxy, "cleo"), "GET", path).status, 200, path)
+        WebSocket(LoggedIn(self.proxy, "cleo")).close()
+        with self.assertRaises(RuntimeError):
+            WebSocket(LoggedIn(self.proxy, None))
+
+    def test_limits_count_for_users_and_the_log_names_them(self):
+        ada = LoggedIn(self.proxy, "ada", "127.0.0.2")
+        statuses = statuses_until_refused(ada, lambda number: "X-Forwarded-User: eve\r\n")
+        self.assertEqual((statuses[0], statuses[-1]), (200, 429))
+        elsewhere = LoggedIn(self.proxy, "ada", "127.0.0.3")
+        self.assertEqual(request(elsewhere, "GET", "v1").status, 429)
+        beside = LoggedIn(self.proxy, "bob", "127.0.0.2")
+        self.assertEqual(request(beside, "GET", "v1").status, 200)
+        self.assertTrue(comes_in(self.log, "client=user:ada "))
+        self.assertTrue(comes_in(self.log, "client=user:bob "))
+        self.assertNotIn("eve", self.log.read_text())
 
 
 def main():

@@ -6,6 +6,7 @@
 
 #include "protocol/limits.hpp"
 #include "server/access/address.hpp"
+#include "server/access/identity.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -39,6 +40,11 @@ void add(CLI::App& command, const char* flag, const char* environment, Number& v
 std::string fault_of_proxy(const std::string& text) {
   if (access::Network::parse(text)) return "";
   return "must be an address or a network such as 172.17.0.0/16, not '" + text + "'";
+}
+
+std::string fault_of_header(const std::string& text) {
+  if (access::is_field_name(text)) return "";
+  return "must be the name of a header such as X-Forwarded-User, not '" + text + "'";
 }
 
 }  // namespace
@@ -94,6 +100,13 @@ void add_limit_options(CLI::App& command, access::Limits& limits) {
       ->delimiter(',')
       ->check(fault_of_proxy)
       ->type_name("ADDRESS");
+  command
+      .add_option("--identity-header", limits.identity_header,
+                  "Header in which a trusted proxy names the user it has authenticated, such as "
+                  "X-Forwarded-User: limits count for users, and the log names them")
+      ->envname("WINDSPLAT_IDENTITY_HEADER")
+      ->check(fault_of_header)
+      ->type_name("NAME");
 }
 
 }  // namespace windsplat::cli

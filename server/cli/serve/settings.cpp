@@ -139,6 +139,10 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   if (const auto ok = check_host_names(arguments.hosts); !ok) return ok.error();
   if (const auto ok = check_origins(arguments.origins); !ok) return ok.error();
   if (const auto ok = check_embedders(arguments.embedders); !ok) return ok.error();
+  if (!arguments.limits.identity_header.empty() && arguments.limits.trusted_proxies.empty()) {
+    return make_error(ErrorKind::malformed,
+                      "--identity-header needs --trusted-proxy: others could name any user");
+  }
   if (!is_base_path(arguments.base_path)) {
     return make_error(ErrorKind::malformed, "--base-path '" + printable(arguments.base_path) +
                                                 "' is not of the form /windsplat/");

@@ -93,6 +93,7 @@ void ResponseWriter::log_access(int status, std::size_t bytes) const {
              {{"request", current_.request.id},
               {"method", current_.request.method},
               {"route", route},
+              {"client", current_.request.address},
               {"status", status},
               {"bytes", bytes},
               {"ms", static_cast<double>(micros_since(current_.began)) / 1000}});

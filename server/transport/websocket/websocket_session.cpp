@@ -171,7 +171,8 @@ class WebSocketSession final : public Connection, public StreamOwner {
     if (!datasets) return close(close_fault, "cannot list the datasets");
     driver_.begin({WINDSPLAT_VERSION, "session-" + std::to_string(id_), *datasets,
                    context_.options.limits.pixels_max_reported()});
-    log::info("session opened", {{"session", id_}, {"request", request_id_}});
+    log::info("session opened",
+              {{"session", id_}, {"request", request_id_}, {"client", guest_.address}});
     reader_.start();
   }
 

@@ -77,6 +77,16 @@ void stop(Process& daemon) {
   EXPECT_EQ(daemon.wait(), 0) << daemon.messages();
 }
 
+TEST_F(CliAccess, UsersAreNamedByTrustedProxiesOnly) {
+  const Outcome anybody = refused({"--identity-header", "X-Forwarded-User"});
+  EXPECT_EQ(anybody.code, 2);
+  EXPECT_THAT(anybody.err, HasSubstr("--identity-header needs --trusted-proxy"));
+  const Outcome wrong =
+      refused({"--trusted-proxy", "127.0.0.1", "--identity-header", "X Forwarded"});
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("--identity-header: must be the name of a header"));
+}
+
 TEST_F(CliAccess, TokenFileIsRequiredAndItsTokenNeverPrinted) {
   const std::string file = secret("token", first_token + "\n");
   Process daemon(serve({"--token-file", file}));
