@@ -10,7 +10,9 @@ def cell(text):
 
 
 def name_of(pointer):
-    return pointer.rsplit("/", 1)[-1]
+    """The last part of a pointer, as a link where the page has a heading for it."""
+    name = pointer.rsplit("/", 1)[-1]
+    return f"[{name}](#schema-{name})" if pointer == f"#/components/schemas/{name}" else name
 
 
 def resolved(document, value):
@@ -65,23 +67,31 @@ def contents(value):
                      for kind, media in value.get("content", {}).items())
 
 
-def answers(document, given):
+def answers(document, one):
+    """The rows of the table of an operation's answers."""
     rows = []
-    for status, value in given.items():
-        one = resolved(document, value)
-        rows.append(f"| {status} | {cell(one.get('description'))} | {cell(contents(one))} |")
+    for status, value in one.get("responses", {}).items():
+        answer = resolved(document, value)
+        rows.append(f"| {status} | {cell(answer.get('description'))} | {cell(contents(answer))} |")
+    return rows
+
+
+def table(rows):
     return ["| status | meaning | content |", "|---|---|---|", *rows, ""] if rows else []
 
 
-def operation(document, method, path, shared, one):
+def operation(document, method, path, shared, one, common):
+    """`common`: the rows of answers that stand elsewhere."""
     out = [f"### {method.upper()} {path}".replace("{", "&#123;").replace("}", "&#125;"), ""]
-    out += [one[key].strip() + "\n" for key in ("summary", "description") if one.get(key)]
+    summary, description = (one.get(key, "").strip() for key in ("summary", "description"))
+    out += [summary, ""] if summary and summary != description.rstrip(".") else []
+    out += [description, ""] if description else []
     if one.get("deprecated"):
         out += ["**Deprecated.**", ""]
     out += parameters(document, [*shared, *one.get("parameters", [])])
     if body := resolved(document, one.get("requestBody")):
         out += [f"Body: {contents(body)}. {body.get('description', '')}".rstrip(), ""]
-    return out + answers(document, one.get("responses", {}))
+    return out + table([row for row in answers(document, one) if row not in common])
 
 
 def page(document):
@@ -90,20 +100,22 @@ def page(document):
     out = ["# REST reference", "", f"Version {info.get('version', '')} of the "
            "[OpenAPI document](openapi.json) that the daemon serves at `/v1/openapi.json`.", ""]
     out += [info["description"].strip(), ""] if info.get("description") else []
+    found = [(method, path, item.get("parameters", []), item[method])
+             for path, value in document.get("paths", {}).items()
+             for item in [resolved(document, value)] for method in METHODS if method in item]
+    rows = [answers(document, one) for *_, one in found]
+    common = [row for row in rows[0] if all(row in other for other in rows)] if rows[1:] else []
+    if common:
+        out += ["These answers may come from every resource:", "", *table(common)]
     groups = {}
-    for path, item in document.get("paths", {}).items():
-        item = resolved(document, item)
-        for method in METHODS:
-            if method in item:
-                tag = (item[method].get("tags") or ["resources"])[0]
-                groups.setdefault(tag, []).append(
-                    operation(document, method, path, item.get("parameters", []), item[method]))
-    for tag, operations in groups.items():
-        out += [f"## {tag[:1].upper()}{tag[1:]}", ""]
-        for lines in operations:
-            out += lines
+    for method, path, shared, one in found:
+        tag = (one.get("tags") or ["resources"])[0]
+        groups.setdefault(tag, []).extend(operation(document, method, path, shared, one, common))
+    for tag, lines in groups.items():
+        out += [f"## {tag[:1].upper()}{tag[1:]}", "", *lines]
     schemas = document.get("components", {}).get("schemas", {})
     out += ["## Schemas", ""] if schemas else []
     for name, schema in schemas.items():
-        out += [f"### {name}", "", "```json", json.dumps(schema, indent=1), "```", ""]
+        out += [f"### {name} {{#schema-{name}}}", "", "```json", json.dumps(schema, indent=1),
+                "```", ""]
     return "\n".join(out).rstrip() + "\n"

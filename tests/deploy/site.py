@@ -34,7 +34,8 @@ OPENAPI = {
                             "schema": {"$ref": "#/components/schemas/Field"}}}},
                         "404": {"$ref": "#/components/responses/none"}}},
             "put": {"tags": ["fields"], "requestBody": {"content": {"image/png": {}}},
-                    "responses": {}}}},
+                    "summary": "Said once", "description": "Said once.",
+                    "responses": {"404": {"$ref": "#/components/responses/none"}}}}},
     "components": {
         "parameters": {"id": {"name": "id", "in": "path", "required": True,
                               "schema": {"enum": ["a", "b"]}}},
@@ -100,17 +101,21 @@ class Gathering(Folder):
 
 class Navigation(unittest.TestCase):
     def test_every_page_has_one_place_and_new_ones_are_last(self):
-        last, new = f"{DOCS}/design/a.md", f"{DOCS}/user/unknown.md"
+        last, new = f"{DOCS}/design/a.md", f"{DOCS}/user/a.md"
         titles = {path: path.upper() for path in (
             "README.md", "docs/user/api.md", last, "docs/design/overview.md", new,
-            "clients/python/README.md")}
+            "docs/user/configuration.md", "clients/python/README.md", "other/b.md")}
         tree = navigation.tree(titles)
         places = [path for section in tree for pages in section.values()
                   for page in pages for path in page.values()]
         self.assertEqual(sorted(places), sorted(titles))
         self.assertEqual(places[0], "README.md")
         self.assertLess(places.index("docs/design/overview.md"), places.index(last))
-        self.assertEqual(tree[-1], {"More": [{new.upper(): new}]})
+        sections = {name: [path for page in pages for path in page.values()]
+                    for section in tree for name, pages in section.items()}
+        self.assertEqual(sections["Program"], ["docs/user/api.md", "clients/python/README.md", new])
+        self.assertEqual(sections["Operate"], ["docs/user/configuration.md"])
+        self.assertEqual(sections["More"], ["other/b.md"])
 
 
 class Links(Folder):
@@ -153,10 +158,15 @@ class Rest(unittest.TestCase):
                       "### GET /v1/fields/&#123;id&#125;\n\nA field\n", "**Deprecated.**",
                       "| `id` | path, required | `a`, `b` |  |",
                       "| `step` | query | integer, 0 to 7 | one \\| of many |",
-                      "| 200 | it | `application/json` (Field) |", "| 404 | there is none |  |",
-                      "### PUT /v1/fields/&#123;id&#125;", "Body: `image/png`.",
-                      '## Schemas\n\n### Field\n\n```json\n{\n "type": "object"\n}\n```'):
+                      "| 200 | it | `application/json` ([Field](#schema-Field)) |",
+                      "### PUT /v1/fields/&#123;id&#125;\n\nSaid once.\n\n", "Body: `image/png`.",
+                      '## Schemas\n\n### Field {#schema-Field}\n\n```json\n{\n "type"'):
             self.assertIn(words, text)
+
+    def test_answers_that_all_have_are_told_once(self):
+        text = openapi.page(OPENAPI)
+        self.assertEqual(text.count("| 404 | there is none |  |"), 1)
+        self.assertLess(text.index("| 404 |"), text.index("## Fields"))
 
     def test_types_are_short(self):
         for schema, words in (({"type": ["string", "null"]}, "string or null"),
