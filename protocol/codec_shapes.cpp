@@ -7,6 +7,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
+#include "protocol/problem_types.hpp"
 
 namespace windsplat::protocol {
 
@@ -57,65 +58,14 @@ std::string color_text(const std::array<unsigned char, 3>& rgb) {
   return text.data();
 }
 
-// Reason phrases of RFC 9110, and the customary ones of 499 and 507.
-const char* status_title(int status) {
-  switch (status) {
-    case 400:
-      return "Bad Request";
-    case 404:
-      return "Not Found";
-    case 409:
-      return "Conflict";
-    case 413:
-      return "Content Too Large";
-    case 422:
-      return "Unprocessable Content";
-    case 429:
-      return "Too Many Requests";
-    case 499:
-      return "Client Closed Request";
-    case 503:
-      return "Service Unavailable";
-    case 507:
-      return "Insufficient Storage";
-    default:
-      return "Internal Server Error";
-  }
-}
-
-int status_of(ErrorKind kind) {
-  switch (kind) {
-    case ErrorKind::malformed:
-      return 400;
-    case ErrorKind::invalid:
-    case ErrorKind::bad_data:
-      return 422;
-    case ErrorKind::not_found:
-      return 404;
-    case ErrorKind::too_large:
-      return 413;
-    case ErrorKind::not_resident:
-      return 409;
-    case ErrorKind::busy:
-      return 429;
-    case ErrorKind::draining:
-      return 503;
-    case ErrorKind::out_of_memory:
-      return 507;
-    case ErrorKind::cancelled:
-      return 499;
-    case ErrorKind::internal:
-      return 500;
-  }
-  return 500;
-}
-
 }  // namespace
 
 Problem problem_from(const Error& error) {
   Problem problem;
-  problem.status = status_of(error.kind);
-  problem.title = status_title(problem.status);
+  const ProblemType& type = problem_type_of(error.kind);
+  problem.type = problem_reference(type);
+  problem.status = type.status;
+  problem.title = type.title;
   problem.detail = error.message;
   problem.errors = error.at;
   return problem;

@@ -139,6 +139,11 @@ bool is_health(const http::Request& request) {
   return request.path.size() == 1 && (request.path[0] == "livez" || request.path[0] == "readyz");
 }
 
+bool reads_problem_page(const http::Request& request) {
+  return request.below_base && (request.method == "GET" || request.method == "HEAD") &&
+         !request.path.empty() && request.path.size() <= 2 && request.path[0] == "problems";
+}
+
 }  // namespace
 
 Result<Token> Token::parse(std::string_view file) {
@@ -211,14 +216,18 @@ bool is_login(const http::Request& request) {
          request.path == std::vector<std::string>{"login"};
 }
 
+bool needs_no_token(const http::Request& request) {
+  return is_health(request) || reads_problem_page(request);
+}
+
 bool shows_token(const http::Request& request, bool upgrade) {
-  return !is_health(request) && (bearer_of(request) || offered_token(request, upgrade));
+  return !needs_no_token(request) && (bearer_of(request) || offered_token(request, upgrade));
 }
 
 Verdict judge(const http::Request& request, bool upgrade, const Token* token,
               const std::vector<std::string>& allowed_origins, std::int64_t now_s, bool tls) {
   if (names_token(request)) return Verdict::token_in_url;
-  if (is_health(request)) return Verdict::allowed;
+  if (needs_no_token(request)) return Verdict::allowed;
   const std::string origin = request.header("Origin");
   const bool reads = !upgrade && (request.method == "GET" || request.method == "HEAD" ||
                                   request.method == "OPTIONS");

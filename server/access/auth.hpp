@@ -62,11 +62,15 @@ enum class Verdict {
 };
 
 // `token` null: no authentication. `upgrade`: the request opens a WebSocket. `tls`: it uses TLS.
-// Exempt from the token: /livez and /readyz, and the login itself, which must come from a page of
+// Exempt from the token: needs_no_token(), and the login itself, which must come from a page of
 // this server.
 Verdict judge(const http::Request& request, bool upgrade, const Token* token,
               const std::vector<std::string>& allowed_origins, std::int64_t now_s,
               bool tls = false);
+
+// Whether the request is answered without a token: /livez and /readyz, and reading the pages of
+// problem types, to which refusals refer.
+bool needs_no_token(const http::Request& request);
 
 // Whether judge() would compare a token of the request, which may be an attempt to guess it.
 bool shows_token(const http::Request& request, bool upgrade);

@@ -5,6 +5,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/measurements.hpp"
+#include "protocol/problem_types.hpp"
 #include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/files/files.hpp"
@@ -79,6 +80,10 @@ http::Response open_entries(const ServerOptions& options, tasks::Backend& backen
                      [&backend, entries = *entries](const CancelToken& cancel) {
                        return backend.catalogue.open_entries(entries, cancel);
                      });
+}
+
+void resolve_problem(protocol::JobDescription& job, const std::string& base_path) {
+  if (job.problem) job.problem->type = protocol::resolved_type(base_path, job.problem->type);
 }
 
 }  // namespace
@@ -160,13 +165,18 @@ http::Response delete_dataset(tasks::Catalogue& catalogue, const std::string& id
   return no_content();
 }
 
-http::Response get_jobs(const tasks::Jobs& jobs) {
-  return json_response(protocol::encode_jobs(jobs.list()));
+http::Response get_jobs(const tasks::Jobs& jobs, const std::string& base_path) {
+  std::vector<protocol::JobDescription> list = jobs.list();
+  for (protocol::JobDescription& job : list) resolve_problem(job, base_path);
+  return json_response(protocol::encode_jobs(list));
 }
 
-http::Response get_job(const tasks::Jobs& jobs, const std::string& id) {
-  const auto job = jobs.find(id);
-  return job ? json_response(protocol::encode_job(*job)) : http::problem_response(job.error());
+http::Response get_job(const tasks::Jobs& jobs, const std::string& base_path,
+                       const std::string& id) {
+  auto job = jobs.find(id);
+  if (!job) return http::problem_response(job.error());
+  resolve_problem(*job, base_path);
+  return json_response(protocol::encode_job(*job));
 }
 
 http::Response delete_job(tasks::Jobs& jobs, const std::string& id) {

@@ -48,8 +48,9 @@ void get_files(const ServerOptions& options, tasks::TaskExecutor& look_ups,
 // 202 with the location of the job, or the error.
 http::Response job_response(metrics::Metrics& metrics, const std::string& base_path,
                             const Result<protocol::JobDescription>& job);
-http::Response get_jobs(const tasks::Jobs& jobs);
-http::Response get_job(const tasks::Jobs& jobs, const std::string& id);
+http::Response get_jobs(const tasks::Jobs& jobs, const std::string& base_path);
+http::Response get_job(const tasks::Jobs& jobs, const std::string& base_path,
+                       const std::string& id);
 http::Response delete_job(tasks::Jobs& jobs, const std::string& id);
 
 void get_probe(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, const std::string& id,
@@ -105,6 +106,11 @@ bool has_page(const std::string& path);
 // `embedders`: other origins that may show the embedded view in a frame (http/framing.hpp).
 http::Response get_page(const std::vector<std::string>& embedders, const std::string& path,
                         const http::Request& request);
+
+// The page of a problem type, and the list of all, as HTML or plain text (problem_pages.cpp).
+http::Response get_problem_types(const std::string& base_path, const http::Request& request);
+http::Response get_problem_type(const std::string& base_path, const std::string& slug,
+                                const http::Request& request);
 
 // A JSON response.
 http::Response json_response(std::string json);

@@ -119,6 +119,10 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
             Charge::none, Place::root},
 
       Route{"GET", "/view.schema.json", operations::read_view_schema(), at_once(get_view_schema)},
+      Route{"GET", "/problems", operations::list_problem_types(),
+            at_once(get_problem_types, base_path)},
+      Route{"GET", "/problems/{type}", operations::read_problem_type(),
+            at_once(get_problem_type, base_path)},
       Route{"GET", "/v1", operations::read_service(), at_once(get_service, options)},
       Route{"GET", "/v1/colormaps", operations::read_color_maps(), at_once(get_color_maps)},
       Route{"GET", "/v1/presets", operations::read_presets(), at_once(get_presets)},
@@ -142,8 +146,8 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
       Route{"DELETE", "/v1/views/{id}", operations::remove_view(),
             later(delete_view, views, view_io)},
 
-      Route{"GET", "/v1/jobs", operations::list_jobs(), at_once(get_jobs, jobs)},
-      Route{"GET", "/v1/jobs/{id}", operations::read_job(), at_once(get_job, jobs)},
+      Route{"GET", "/v1/jobs", operations::list_jobs(), at_once(get_jobs, jobs, base_path)},
+      Route{"GET", "/v1/jobs/{id}", operations::read_job(), at_once(get_job, jobs, base_path)},
       Route{"DELETE", "/v1/jobs/{id}", operations::cancel_job(), at_once(delete_job, jobs)},
 
       Route{"GET", "/v1/files", operations::list_files(), later(get_files, options, look_ups)},

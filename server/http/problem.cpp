@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "protocol/codec.hpp"
+#include "protocol/problem_types.hpp"
 #include "server/http/request_id.hpp"
 
 namespace windsplat::http {
@@ -34,16 +35,20 @@ Response problem_response(const Error& error) {
 Response problem_response(int status, std::string title, std::string detail, int retry_after_s) {
   protocol::Problem problem;
   problem.status = status;
+  if (const protocol::ProblemType* const type = protocol::problem_type_of_status(status)) {
+    problem.type = protocol::problem_reference(*type);
+  }
   problem.title = std::move(title);
   problem.detail = std::move(detail);
   return respond(problem, retry_after_s);
 }
 
-void name_request(Response& response, const std::string& request_id) {
+void name_request(Response& response, const std::string& request_id, const std::string& base_path) {
   response.headers.emplace_back(request_id_header, request_id);
   if (response.content_type != problem_type) return;
   const std::string problem(response.body.bytes.begin(), response.body.bytes.end());
-  response.body = Body::of(protocol::with_request_id(problem, request_id));
+  response.body = Body::of(
+      protocol::with_request_id(protocol::resolved_problem(base_path, problem), request_id));
 }
 
 }  // namespace windsplat::http

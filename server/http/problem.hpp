@@ -14,7 +14,8 @@ Response problem_response(const Error& error);
 // is sent with 409, 429 and 503; at least 1.
 Response problem_response(int status, std::string title, std::string detail, int retry_after_s = 0);
 
-// Adds the request id: as a header, and as requestId in a problem.
-void name_request(Response& response, const std::string& request_id);
+// Adds the request id: as a header, and as requestId in a problem, whose type becomes the path of
+// its page below `base_path`.
+void name_request(Response& response, const std::string& request_id, const std::string& base_path);
 
 }  // namespace windsplat::http

@@ -11,6 +11,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
+#include "protocol/problem_types.hpp"
 #include "support.hpp"
 
 namespace windsplat::protocol::testing {
@@ -217,7 +218,7 @@ TEST(ServerMessages, ErrorHasOnlyKnownMembers) {
   const Json neither = Json::parse(encode(ErrorMessage{std::nullopt, std::nullopt, problem}));
   EXPECT_FALSE(neither.contains("id"));
   EXPECT_FALSE(neither.contains("rev"));
-  EXPECT_EQ(neither["problem"], Json::parse(R"({"type":"about:blank","status":422,
+  EXPECT_EQ(neither["problem"], Json::parse(R"({"type":"problems/invalid-value","status":422,
       "title":"Unprocessable Content","detail":"/step: too large",
       "errors":[{"pointer":"/step","detail":"too large"}]})"));
   EXPECT_EQ(Json::parse(encode(ErrorMessage{std::nullopt, 5, problem}))["rev"], 5);
@@ -422,7 +423,7 @@ TEST(Problems, StatusFollowsTheKindOfError) {
     const Problem problem = problem_from(make_error(kind, "why"));
     EXPECT_EQ(problem.status, status);
     EXPECT_EQ(problem.detail, "why");
-    EXPECT_EQ(problem.type, "about:blank");
+    EXPECT_EQ(problem.type, "problems/" + std::string(problem_type_of(kind).slug));
     EXPECT_FALSE(problem.title.empty());
     expect_shape("problem", encode_problem(problem));
     EXPECT_FALSE(Json::parse(encode_problem(problem)).contains("errors"));

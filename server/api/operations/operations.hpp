@@ -12,6 +12,8 @@ Operation read_ready();
 Operation read_metrics();
 Operation read_service();
 Operation read_view_schema();
+Operation list_problem_types();
+Operation read_problem_type();
 Operation read_color_maps();
 Operation read_presets();
 Operation read_stream();

@@ -73,6 +73,23 @@ Operation read_view_schema() {
                       not_modified()}};
 }
 
+Operation list_problem_types() {
+  return {.id = "listProblemTypes",
+          .group = service_group,
+          .summary = "The types of problems, as HTML or text",
+          .description = "Needs no token.",
+          .answers = {{200, "The list.", {}, {"text/plain", "text/html"}, {"Vary"}}}};
+}
+
+Operation read_problem_type() {
+  return {.id = "readProblemType",
+          .group = service_group,
+          .summary = "The page of a problem type, as HTML or text",
+          .description = "The member `type` of a problem refers to it. Needs no token.",
+          .answers = {{200, "The page.", {}, {"text/plain", "text/html"}, {"Vary"}}},
+          .problems = {404}};
+}
+
 Operation read_color_maps() {
   return {.id = "listColorMaps",
           .group = service_group,

@@ -50,7 +50,8 @@ std::optional<http::Response> check_access(const api::ServerOptions& options,
   if (verdict == access::Verdict::wrong_token) admission.failed_login(request.address);
   if (verdict != access::Verdict::allowed)
     return access::turned_away(verdict, request, options.base_path, options.embedders);
-  if (token != nullptr && !health && !access::is_login(request)) {
+  if (token != nullptr && !health && !access::needs_no_token(request) &&
+      !access::is_login(request)) {
     admission.authenticated(request.address);
   }
   return std::nullopt;

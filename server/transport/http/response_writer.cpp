@@ -37,7 +37,7 @@ void ResponseWriter::send(http::Response response) {
   const http::Request& request = current_.request;
   current_.keep_alive =
       current_.keep_alive && !response.close && !context_.draining && !wire_.is_of_reserve();
-  http::name_request(response, request.id);
+  http::name_request(response, request.id, context_.options.base_path);
   if (current_.charged) {
     http::add_rate_limits(
         response, context_.admission.left(request.address, context_.router.names_health(request)));

@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "protocol/codec.hpp"
+#include "protocol/problem_types.hpp"
 
 namespace windsplat::transport {
 namespace {
@@ -14,8 +15,14 @@ struct EffectRunner {
   StreamOwner& owner;
   WebSocketWriter& writer;
   SessionWork& work;
+  const std::string& base_path;
 
-  void operator()(session::SendText& effect) const { writer.send(effect.message); }
+  void operator()(session::SendText& effect) const {
+    if (auto* const error = std::get_if<protocol::ErrorMessage>(&effect.message)) {
+      error->problem.type = protocol::resolved_type(base_path, error->problem.type);
+    }
+    writer.send(effect.message);
+  }
   void operator()(session::SendFrame& effect) const { writer.queue_frame(std::move(effect)); }
   void operator()(session::Ping& effect) const { writer.ping(effect.seq); }
   void operator()(session::Close& effect) const { owner.close(effect.code, effect.reason); }
@@ -30,8 +37,10 @@ struct EffectRunner {
 
 SessionDriver::SessionDriver(StreamOwner& owner, WebSocketStream& socket, session::Session session,
                              tasks::Backend& backend, metrics::Metrics& metrics,
-                             access::Admission& admission, const std::string& address)
+                             access::Admission& admission, const std::string& address,
+                             const std::string& base_path)
     : owner_(owner),
+      base_path_(base_path),
       metrics_(metrics),
       writer_(owner, socket, metrics, admission, address, *this),
       work_(
@@ -92,7 +101,7 @@ void SessionDriver::on_pong(std::string_view payload) {
 void SessionDriver::on_frame_written() { apply(session_.on_written(now_us())); }
 
 void SessionDriver::apply(session::Effects effects) {
-  const EffectRunner runner{owner_, writer_, work_};
+  const EffectRunner runner{owner_, writer_, work_, base_path_};
   for (session::Effect& effect : effects) std::visit(runner, effect);
   count_lost();
   writer_.pump();

@@ -17,10 +17,10 @@ namespace windsplat::transport {
 
 class SessionDriver final : public StreamEvents {
  public:
-  // `address` is charged with the work and the bytes sent.
+  // `address` is charged with the work and the bytes sent. `base_path` outlives the session.
   SessionDriver(StreamOwner& owner, WebSocketStream& socket, session::Session session,
                 tasks::Backend& backend, metrics::Metrics& metrics, access::Admission& admission,
-                const std::string& address);
+                const std::string& address, const std::string& base_path);
   ~SessionDriver() override;
 
   void begin(const protocol::HelloMessage& hello);
@@ -42,6 +42,7 @@ class SessionDriver final : public StreamEvents {
   void schedule();
 
   StreamOwner& owner_;
+  const std::string& base_path_;
   metrics::Metrics& metrics_;
   WebSocketWriter writer_;
   SessionWork work_;

@@ -82,7 +82,8 @@ class WebSocketSession final : public Connection, public StreamOwner {
         token_(context.options.token),
         close_timer_(socket_.get_executor()),
         driver_(*this, socket_, new_session(context.options, context.backend), context.backend,
-                context.backend.metrics, context.admission, guest_.address),
+                context.backend.metrics, context.admission, guest_.address,
+                context.options.base_path),
         reader_(*this, socket_, context.admission, guest_.address, driver_.queue(), driver_) {}
   ~WebSocketSession() override { context_.connections.remove(id_); }
   WebSocketSession(const WebSocketSession&) = delete;
