@@ -17,7 +17,7 @@ struct Limits {
   std::size_t connections = 512;
   std::size_t connections_per_address = 256;
   // New connections per second, in bursts of ten seconds' worth; one over TLS counts as
-  // Quota::tls_arrivals. The total limit refuses only addresses with more than a second's worth
+  // five. The total limit refuses only addresses with more than a second's worth
   // recently.
   double arrivals = 2000;
   double arrivals_per_address = 500;

@@ -10,6 +10,7 @@ namespace {
 using Rate = TokenBucket::Rate;
 
 constexpr double quota_us_per_s = 1e6;
+constexpr double tls_arrivals = 5;  // cost of a handshake in plain connections
 constexpr double s_per_minute = 60;
 constexpr double received_at_once_s = 2;  // size of a burst in seconds of the rate
 

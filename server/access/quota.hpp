@@ -24,7 +24,6 @@ class Quota {
   // address may hold a quarter of it.
   static constexpr std::size_t reserve_max = 64;
   static constexpr std::size_t reserve_per_address = reserve_max / 4;
-  static constexpr double tls_arrivals = 5;  // cost of a handshake in plain connections
 
   explicit Quota(const Limits& limits) : limits_(limits), addresses_(limits), handshakes_(limits) {}
 

@@ -32,7 +32,7 @@ CONFINED = [
     ("PROJ", r"proj\.h",
      r"server/data/cf/grid/(proj_context\.hpp|(projected_columns|crs_wkt)\.cpp)|tests/.*"),
     ("a compressor", r"(blosc|lz4|zlib|zstd)\.h",
-     r"server/(data|ground|vtk_loader)/.*|server/movie/zip\.cpp|tests/.*"),
+     r"server/(data|ground|vtk_loader)/.*|server/(http/gzip|movie/zip)\.cpp|tests/.*"),
     ("VTK", r"vtk\w+\.h", r"server/vtk_loader/.*"),
     ("netCDF", r"netcdf(_\w+)?\.h", r"server/data/.*|tests/.*"),
     ("libcurl", r"curl/", r"server/data/fetch/http_client\.cpp"),
@@ -42,7 +42,7 @@ CONFINED = [
     ("Highway", r"hwy/",
      r"server/engine/kernels/.*|server/image/(ycc_rows|highway_targets)\.cpp|tests/.*"),
     ("Beast or Asio", r"boost/(beast|asio)[/.]",
-     r"server/transport/.*|server/api/page\.cpp|tests/.*"),
+     r"server/transport/.*|tests/.*"),
     ("Prometheus", r"prometheus/", r"server/metrics/metrics\.cpp|tests/.*"),
     ("CLI11", r"CLI/", r"server/cli/.*|server/main\.cpp"),
 ]
