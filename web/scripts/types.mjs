@@ -99,21 +99,38 @@ export const viewKeys: Readonly<Record<string, unknown>> = {\n${lines}};
   await writeIfChanged(join(client, "view_keys.ts"), text);
 }
 
+// Answers of REST that no message of the stream contains.
+const answers = ["colorMaps", "fieldRange", "folder", "forecast", "frameInfo", "histogram"];
+answers.push("job", "jobs", "pick", "presets", "probe", "savedView", "series", "service");
+
+async function generateAnswers() {
+  const schema = JSON.parse(await readFile(join(protocol, "messages.schema.json"), "utf8"));
+  const properties = Object.fromEntries(answers.map((name) => [name, { $ref: `#/$defs/${name}` }]));
+  const { $id, $defs } = schema;
+  await writeTypes(client, "answers", "messages", {
+    ...{ $id, $defs, title: "Answers", type: "object", additionalProperties: false, properties },
+  });
+}
+
+async function writeTypes(folder, name, from, schema) {
+  const text = await compile(toOlderDraft(schema), schema.title, {
+    cwd: protocol,
+    bannerComment: `// Made from protocol/${from}.schema.json by web/scripts/types.mjs.`,
+    unreachableDefinitions: name === from,
+    format: false,
+    maxItems: 3,
+  });
+  await writeIfChanged(join(folder, `${name}.ts`), text);
+}
+
 export async function generateTypes() {
   for (const folder of Object.values(schemas)) await mkdir(folder, { recursive: true });
   await generateRanges();
   await generateKeys();
+  await generateAnswers();
   for (const [name, folder] of Object.entries(schemas)) {
     const path = join(protocol, `${name}.schema.json`);
-    const schema = toOlderDraft(JSON.parse(await readFile(path, "utf8")));
-    const text = await compile(schema, schema.title, {
-      cwd: protocol,
-      bannerComment: `// Made from protocol/${name}.schema.json by web/scripts/types.mjs.`,
-      unreachableDefinitions: true,
-      format: false,
-      maxItems: 3,
-    });
-    await writeIfChanged(join(folder, `${name}.ts`), text);
+    await writeTypes(folder, name, name, JSON.parse(await readFile(path, "utf8")));
   }
 }
 

@@ -2,7 +2,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Api, type Feature, type Dataset, type View } from "@windsplat/client";
-import { featureLines, pixelAt, ringAt, sampleOf } from "../src/view/feature";
+import { featureLines, ringAt, sampleOf } from "../src/view/feature";
+import { pixelAt } from "@windsplat/client/parts";
 
 const axis = (name: string, units: string) => ({ name, units });
 const grid = {
@@ -17,6 +18,7 @@ const feature: Feature = {
   layer: "lines",
   field: "wind",
   value: 57.2512,
+  depth: 3,
   units: "m s-1",
   position: {
     x: -23.5,

@@ -44,6 +44,7 @@ const point: ForecastPoint = {
   height: 409,
   coarser: 1,
   ms: 31.4159,
+  timed: true,
   error: 0.0112,
   errorLow: 0.006,
   errorHigh: 0.02,
@@ -56,7 +57,7 @@ test("a setting is formatted with either error metric", () => {
     pointText(point, "rmse"),
     "slab of 2 cells, 568×409, data 1/2: 31.4 ms, error 0.011 (0.006 to 0.02), estimated",
   );
-  const kernel = { ...point, method: "kernel", slabThickness: null, coarser: 0 };
+  const kernel = { ...point, method: "kernel" as const, slabThickness: null, coarser: 0 };
   assert.match(pointText(kernel, "psnr"), /^kernel, 568×409: 31.4 ms, PSNR 39.0 dB/);
 });
 

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { gesture, MoveQueue, pictureSize } from "@windsplat/client/parts";
+import { gesture, MoveQueue, pictureSize, readableTime } from "@windsplat/client/parts";
 import { legendEntries, sampleHeights } from "../src/view/legend_entries";
 import { unitText } from "../src/view/unit_text";
 import { hashOfView, viewOfHash } from "../src/view/link";
@@ -20,7 +20,6 @@ import { patchAt, valueAt } from "../src/panels/panel_kit";
 import type { Dataset, View, Camera } from "@windsplat/client";
 import { problemText } from "../src/base/problem_text";
 import { formatBytes, formatNumber, linearTicks, niceTicks } from "../src/base/ticks";
-import { readableTime } from "../src/base/time_text";
 
 const dataset: Dataset = {
   id: "gcm",

@@ -316,8 +316,10 @@ const grid = {
   },
 } as unknown as Dataset;
 const units = { x: "degrees_east", y: "degrees_north", z: "hPa" };
+const index = { x: 0, y: 0, z: 0 };
 const probe: Probe = {
-  position: { x: -23.5, y: 41, z: 500, units },
+  position: { x: -23.5, y: 41, z: 500, units, index },
+  step: 0,
   values: {
     cloud: { value: null, units: "1" },
     heat: { value: 280.26, units: "K" },
@@ -328,7 +330,7 @@ const probe: Probe = {
 test("places are told in the units of the answer where the axes have others", () => {
   assert.equal(placeText(grid, probe), "");
   const rows = { axes: { ...grid.axes, x: axis("west_east", ""), y: axis("south_north", "") } };
-  const position = { x: -23.5, y: 41, z: 2300, units: { ...units, z: "m" } };
+  const position = { x: -23.5, y: 41, z: 2300, units: { ...units, z: "m" }, index };
   const curved = rows as unknown as Dataset;
   assert.equal(placeText(curved, { ...probe, position }), "at 23.5 °W, 41 °N, height 2300 m");
   const view = { vector: { field: "wind" } } as View;

@@ -2,7 +2,8 @@
 export { viewRanges } from "./generated/view_ranges";
 export * from "./wire/protocol";
 export * from "./wire/api";
-export type { Folder, FolderEntry } from "./wire/folder";
+export type { ConnectionState } from "./wire/connection";
+export type { SocketClass } from "./wire/browser_link";
 export { ProblemError, problemText } from "./wire/requests";
 export * from "./view/camera";
 export { mergePatch, mergeView, type Patch } from "./view/view_state";

@@ -1,7 +1,7 @@
 // "About this dataset": what the file has, how it was read and what was left out of it.
 import { byId, make } from "../base/dom";
 import { formatNumber } from "../base/ticks";
-import { readableTime } from "../base/time_text";
+import { readableTime } from "@windsplat/client/parts";
 import { unitText } from "../view/unit_text";
 import { axisUnit, valueOnAxis } from "../view/sample_position";
 import type { Dataset } from "@windsplat/client";

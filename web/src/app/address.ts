@@ -2,8 +2,14 @@
 // long for a link, the server stores a copy and `#!view=ID` is copied to the clipboard; the page's
 // address always contains the whole view, so that it remains valid after a server restart.
 import { failureText } from "../base/problem_text";
-import { debounced, type FetchLike, loadView, storeView } from "@windsplat/client/parts";
-import { hashOfView, viewOfHash, withoutSize } from "../view/link";
+import {
+  debounced,
+  type FetchLike,
+  loadView,
+  storeView,
+  withoutSize,
+} from "@windsplat/client/parts";
+import { hashOfView, viewOfHash } from "../view/link";
 import type { View } from "@windsplat/client";
 import { linkMax, shortLinkHash, shortLinkId } from "../view/short_link";
 import type { Status } from "./status";

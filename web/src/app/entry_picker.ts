@@ -2,7 +2,7 @@
 // list for each, whose elements persist while its entries are the same, so that stepping through
 // them with the keyboard keeps the focus.
 import { make } from "../base/dom";
-import { readableTime } from "../base/time_text";
+import { readableTime } from "@windsplat/client/parts";
 import type { Dataset } from "@windsplat/client";
 
 type Choice = Dataset["choices"][number];

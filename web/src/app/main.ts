@@ -1,6 +1,6 @@
 // Assembles the page (parts, key bindings, buttons) and starts the application.
 import { takeBeside } from "../view/beside";
-import { drag, pan, roll, withProjection, zoom, type Angles } from "@windsplat/client";
+import { withProjection, type Angles } from "@windsplat/client";
 import { pictureCaption } from "../view/caption";
 import { About } from "./about";
 import { App } from "./app";
@@ -10,7 +10,14 @@ import { DatasetList } from "./dataset_list";
 import { embeddedKeys, isEmbedded, openLink, takesWheel } from "./embed";
 import { entryOf, openEntry } from "./entries";
 import { EntryPicker } from "./entry_picker";
-import { afterResizing, MoveQueue, PointerInput, Turn, Viewport } from "@windsplat/client/parts";
+import {
+  afterResizing,
+  cameraKeys,
+  MoveQueue,
+  PointerInput,
+  Turn,
+  Viewport,
+} from "@windsplat/client/parts";
 import { byId, make } from "../base/dom";
 import { toggleErrorMetric } from "../base/error_text";
 import { FileBrowser } from "./file_browser";
@@ -234,34 +241,19 @@ function foldPanel(): void {
   if (!document.documentElement.classList.contains("no-panel")) togglePanel();
 }
 
-const arrow = (right: number, down: number) => (event: KeyboardEvent) =>
-  steered().push((camera) =>
-    event.shiftKey ? pan(camera, 0.01 * right, 0.01 * down) : drag(camera, right, down),
-  );
-
 function toggleBesideProjection(): void {
   besideMoves.push((camera) =>
     withProjection(camera, camera.projection === "perspective" ? "orthographic" : "perspective"),
   );
 }
 
+const movingKeys = cameraKeys.map(({ move, ...named }) => ({
+  ...named,
+  run: ({ shiftKey }: KeyboardEvent) => steered().push(move(shiftKey)),
+}));
+
 const bindings: Binding[] = [
-  { keys: ["ArrowLeft"], shown: "←", does: "rotate (shift: pan) left", run: arrow(-5, 0) },
-  { keys: ["ArrowRight"], shown: "→", does: "rotate (shift: pan) right", run: arrow(5, 0) },
-  { keys: ["ArrowUp"], shown: "↑", does: "tilt (shift: pan) up", run: arrow(0, -5) },
-  { keys: ["ArrowDown"], shown: "↓", does: "tilt (shift: pan) down", run: arrow(0, 5) },
-  {
-    keys: ["+", "="],
-    shown: "+",
-    does: "zoom in",
-    run: () => steered().push((c) => zoom(c, 1.15)),
-  },
-  {
-    keys: ["-", "_"],
-    shown: "−",
-    does: "zoom out",
-    run: () => steered().push((c) => zoom(c, 1 / 1.15)),
-  },
+  ...movingKeys,
   {
     keys: ["Home", "0"],
     shown: "0",
@@ -274,8 +266,6 @@ const bindings: Binding[] = [
     does: `view ${name}`,
     run: () => lookFrom(angles),
   })),
-  { keys: [","], shown: ",", does: "roll left", run: () => steered().push((c) => roll(c, -5)) },
-  { keys: ["."], shown: ".", does: "roll right", run: () => steered().push((c) => roll(c, 5)) },
   {
     keys: ["o"],
     shown: "o",

@@ -2,7 +2,7 @@
 // passed to it and reports the user's input; it stores no step itself.
 import type { Dataset } from "@windsplat/client";
 import { byId } from "../base/dom";
-import { readableTime } from "../base/time_text";
+import { readableTime } from "@windsplat/client/parts";
 
 export type Direction = 1 | -1; // forward, backward
 

@@ -2,7 +2,7 @@
 import type { SeriesTime } from "@windsplat/client";
 import { makeSvg, svgText } from "../base/dom";
 import { formatNumber } from "../base/ticks";
-import { readableTime } from "../base/time_text";
+import { readableTime } from "@windsplat/client/parts";
 
 export interface SeriesCurve {
   path: string; // x in steps, y 0 (greatest) to 1 (least)

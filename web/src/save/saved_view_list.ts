@@ -1,7 +1,7 @@
 // The list of saved views in the Save dialog: open, rename, delete, add.
 import { byId, make } from "../base/dom";
 import { SavedViews, nameMax, type SavedView } from "./saved_views";
-import { withoutSize } from "../view/link";
+import { withoutSize } from "@windsplat/client/parts";
 import type { Jobs } from "./save_jobs";
 import type { SaveHost } from "./save_work";
 

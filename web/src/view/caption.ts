@@ -1,5 +1,5 @@
 // The caption of a picture that leaves the page: dataset, step and time.
-import { readableTime } from "../base/time_text";
+import { readableTime } from "@windsplat/client/parts";
 import type { Dataset } from "@windsplat/client";
 
 export function pictureCaption({ title, steps }: Dataset, step: number): string {

@@ -1,21 +1,12 @@
 // What a pixel of the picture shows, as the server answers a pick: position and text. Pure.
 import type { Feature, Position, Dataset, View } from "@windsplat/client";
 import { formatNumber } from "../base/ticks";
-import { clamp } from "@windsplat/client/parts";
+import { sizeOf } from "@windsplat/client/parts";
 import { unitText } from "./unit_text";
 import { coordinateText, axisNames, type Sample } from "./sample_position";
 
 // Below this share of a pixel's opacity the text tells the share.
 const wholeShare = 0.5;
-
-const sizeOf = ({ image }: View): [number, number] => [image?.width ?? 1280, image?.height ?? 720];
-
-// The pixel at a position in fractions of the picture: its middle.
-export function pixelAt(view: View, at: [number, number]): [number, number] {
-  const size = sizeOf(view);
-  const pixel = (n: 0 | 1) => clamp(Math.floor(at[n] * size[n]), 0, size[n] - 1) + 0.5;
-  return [pixel(0), pixel(1)];
-}
 
 // Where a feature is, in fractions of the picture; null outside of it.
 export function ringAt(view: View, { at }: Feature): [number, number] | null {

@@ -2,9 +2,8 @@
 // out. The picture size, played steps and flowing lines are not part of the history. Each entry
 // restores only what the user's change affected, so undoing a camera change does not affect the
 // current step.
-import { withoutSize } from "./link";
 import type { View } from "@windsplat/client";
-import { isObject } from "@windsplat/client/parts";
+import { isObject, withoutSize } from "@windsplat/client/parts";
 
 type Node = Record<string, unknown>;
 

@@ -1,7 +1,7 @@
 // View <-> the part of the address after `#`: `#!{...}`, so that a link restores the view. The
 // picture size depends on the window and is omitted.
 import type { View } from "@windsplat/client";
-import { isView } from "@windsplat/client/parts";
+import { isView, withoutSize } from "@windsplat/client/parts";
 
 const start = "#!";
 
@@ -22,11 +22,4 @@ export function hashOfView(view: View): string {
     decodeURIComponent,
   );
   return start + readable;
-}
-
-export function withoutSize(view: View): View {
-  const { image, ...rest } = view;
-  if (typeof image !== "object" || image === null) return rest;
-  const { width: _width, height: _height, ...kept } = image;
-  return Object.keys(kept).length === 0 ? rest : { ...rest, image: kept };
 }

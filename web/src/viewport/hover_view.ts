@@ -5,7 +5,8 @@
 import type { Api, Dataset, View } from "@windsplat/client";
 import { make } from "../base/dom";
 import { Hover } from "./hover";
-import { featureLines, pixelAt, ringAt } from "../view/feature";
+import { featureLines, ringAt } from "../view/feature";
+import { pixelAt } from "@windsplat/client/parts";
 import { derivedIn, fieldsIn } from "../view/view_fields";
 import { hoverLines } from "../view/sample_position";
 import type { Found } from "./probe";

@@ -12,7 +12,8 @@ import {
   type View,
 } from "@windsplat/client";
 import { axisNames, sampleAt, worldOf, type Sample } from "../view/sample_position";
-import { pixelAt, sampleOf } from "../view/feature";
+import { sampleOf } from "../view/feature";
+import { pixelAt } from "@windsplat/client/parts";
 import { hoverOf } from "../view/hover_setting";
 
 // below this angle positions in a horizontal plane are too inaccurate

@@ -58,22 +58,31 @@ test("bearings are those of meridians, the equator and a triangle of right angle
 test("distances are in kilometres, or in the unit of the axes", () => {
   const geographic = { x: "degrees_east", y: "degrees_north", z: "hPa" };
   const dataset = described("storm");
+  const index = { x: 0, y: 0, z: 0 };
   assert.equal(
     wayText(
       dataset,
-      { x: 0, y: 0, z: 1000, units: geographic },
-      { x: 90, y: 0, z: 500, units: geographic },
+      { x: 0, y: 0, z: 1000, units: geographic, index },
+      { x: 90, y: 0, z: 500, units: geographic, index },
     ),
     "10008 km towards 90° (great circle), vertically −500 hPa",
   );
   const metres = { x: "m", y: "m", z: "m" };
   assert.equal(
-    wayText(dataset, { x: 0, y: 0, z: 0, units: metres }, { x: 3, y: 4, z: 0, units: metres }),
+    wayText(
+      dataset,
+      { x: 0, y: 0, z: 0, units: metres, index },
+      { x: 3, y: 4, z: 0, units: metres, index },
+    ),
     "5 m",
   );
   const mixed = { x: "km", y: "s", z: "m" };
   assert.equal(
-    wayText(dataset, { x: 0, y: 0, z: 0, units: mixed }, { x: 3, y: 4, z: 2, units: mixed }),
+    wayText(
+      dataset,
+      { x: 0, y: 0, z: 0, units: mixed, index },
+      { x: 3, y: 4, z: 2, units: mixed, index },
+    ),
     "x 3 km, y 4 s, vertically +2 m",
   );
 });

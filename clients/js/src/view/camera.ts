@@ -45,7 +45,7 @@ export function orbitFrame({ azimuth, elevation }: Angles): Frame3 {
   return { right, up: cross(right, forward), forward };
 }
 
-// Right, up and forward vectors of the camera, as the server computes them.
+/** Right, up and forward vectors of the camera, as the server computes them. */
 export function cameraFrame(camera: Camera): Frame3 {
   const forward = unit(subtract(camera.target, camera.eye));
   const right = unit(cross(forward, camera.up));
@@ -76,7 +76,7 @@ export function lookFrom(camera: Camera, angles: Angles, distance = distanceOf(c
   };
 }
 
-// Turns the picture clockwise in its plane.
+/** Turns the picture clockwise in its plane. */
 export function roll(camera: Camera, degrees: number): Camera {
   if (degrees === 0) return camera;
   const { right, up } = cameraFrame(camera);
@@ -84,8 +84,10 @@ export function roll(camera: Camera, degrees: number): Camera {
   return { ...camera, up: subtract(times(up, Math.cos(angle)), times(right, Math.sin(angle))) };
 }
 
-// Clockwise rotation of the picture from upright, -180..180. For a vertical view direction upright
-// is undefined, and the rotation counts as azimuth.
+/**
+ * Clockwise rotation of the picture from upright, -180..180. For a vertical view direction upright
+ * is undefined, and the rotation counts as azimuth.
+ */
 export function rollOf(camera: Camera): number {
   const angles = anglesOf(camera);
   if (Math.abs(angles.elevation) >= uprightElevation) return 0;
@@ -93,14 +95,14 @@ export function rollOf(camera: Camera): number {
   return Math.atan2(-dot(camera.up, frame.right), dot(camera.up, frame.up)) / degree;
 }
 
-// Orbits about the world's vertical axis and in elevation; the roll is preserved.
+/** Orbits about the world's vertical axis and in elevation; the roll is preserved. */
 export function orbit(camera: Camera, dAzimuth: number, dElevation: number): Camera {
   const { azimuth, elevation } = anglesOf(camera);
   const next = { azimuth: azimuth + dAzimuth, elevation: elevation + dElevation };
   return roll(lookFrom(camera, next), rollOf(camera));
 }
 
-// Orbits as in a drag: degrees by which the near side moves right and down on the screen.
+/** Orbits as in a drag: degrees by which the near side moves right and down on the screen. */
 export function drag(camera: Camera, right: number, down: number): Camera {
   const angle = rollOf(camera) * degree;
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
@@ -108,7 +110,7 @@ export function drag(camera: Camera, right: number, down: number): Camera {
   return orbit(camera, -(right * c + down * s), down * c - right * s);
 }
 
-// Interpolates two cameras at t from 0 to 1: the shorter way round, linear in the angles.
+/** Interpolates two cameras at t from 0 to 1: the shorter way round, linear in the angles. */
 export function between(from: Camera, to: Camera, t: number): Camera {
   const mix = (a: number, b: number): number => a + (b - a) * t;
   const mixAngle = (a: number, b: number): number =>
@@ -127,13 +129,13 @@ export function between(from: Camera, to: Camera, t: number): Camera {
   );
 }
 
-// World units that the picture's height spans at the target.
+/** World units that the picture's height spans at the target. */
 export const heightAtTarget = (camera: Camera): number =>
   camera.projection === "orthographic"
     ? camera.height
     : 2 * distanceOf(camera) * Math.tan(0.5 * camera.fovY * degree);
 
-// Moves the picture right and down by fractions of its height, as in a drag.
+/** Moves the picture right and down by fractions of its height, as in a drag. */
 export function pan(camera: Camera, dx: number, dy: number): Camera {
   const frame = cameraFrame(camera);
   const scale = heightAtTarget(camera);
@@ -141,8 +143,10 @@ export function pan(camera: Camera, dx: number, dy: number): Camera {
   return { ...camera, eye: add(camera.eye, shift), target: add(camera.target, shift) };
 }
 
-// factor > 1: closer, larger. Distance and height change together, so that switching the projection
-// preserves the size.
+/**
+ * factor > 1: closer, larger. Distance and height change together, so that switching the projection
+ * preserves the size.
+ */
 export function zoom(camera: Camera, factor: number): Camera {
   const before = distanceOf(camera);
   const distance = clamp(before / factor, distanceMin, distanceMax);
@@ -155,8 +159,10 @@ export function zoom(camera: Camera, factor: number): Camera {
   };
 }
 
-// Position of a point on the picture as fractions of its width and height from the upper left
-// corner; null behind the eye.
+/**
+ * Position of a point on the picture as fractions of its width and height from the upper left
+ * corner; null behind the eye.
+ */
 export function project(camera: Camera, point: Vec3, aspect: number): [number, number] | null {
   const frame = cameraFrame(camera);
   const p = subtract(point, camera.eye);
@@ -167,8 +173,10 @@ export function project(camera: Camera, point: Vec3, aspect: number): [number, n
   return [0.5 + dot(p, frame.right) / (height * aspect), 0.5 - dot(p, frame.up) / height];
 }
 
-// The point that is visible at this position of the picture and lies in the plane where the world
-// coordinate `axis` equals `value`; null: there is none in front of the eye.
+/**
+ * The point that is visible at this position of the picture and lies in the plane where the world
+ * coordinate `axis` equals `value`; null: there is none in front of the eye.
+ */
 export function pointInPlane(
   camera: Camera,
   [x, y]: [number, number],
@@ -188,7 +196,7 @@ export function pointInPlane(
   return add(from, times(way, distance));
 }
 
-// Changes the projection; objects at the target keep their size.
+/** Changes the projection; objects at the target keep their size. */
 export function withProjection(camera: Camera, projection: Camera["projection"]): Camera {
   if (camera.projection === projection) return camera;
   const height = heightAtTarget(camera);
@@ -202,9 +210,11 @@ export function withProjection(camera: Camera, projection: Camera["projection"])
   return roll(moved, rollOf(camera));
 }
 
-// Views the centre of the box from these angles so that the whole box is in the picture. Each
-// corner p (relative to the centre) requires distance >= |p.x| / slope - p.forward and height >= 2
-// |p.y|.
+/**
+ * Views the centre of the box from these angles so that the whole box is in the picture. Each
+ * corner p (relative to the centre) requires distance >= |p.x| / slope - p.forward and height >= 2
+ * |p.y|.
+ */
 export function frameBox(camera: Camera, box: Box, angles: Angles, aspect: number): Camera {
   const target = times(add(box.min, box.max), 0.5);
   const frame = orbitFrame(angles);
@@ -231,7 +241,9 @@ export function frameBox(camera: Camera, box: Box, angles: Angles, aspect: numbe
   return lookFrom({ ...camera, target, height }, angles, clamp(distance, distanceMin, distanceMax));
 }
 
-// geometry.scale stretches each edge; then the whole box is scaled so that its longest edge is 2.
+/**
+ * geometry.scale stretches each edge; then the whole box is scaled so that its longest edge is 2.
+ */
 export function scaledBox(box: Box, scale: Vec3): Box {
   const edges = subtract(box.max, box.min).map((edge, axis) => edge * scale[axis]!);
   const half = edges.map((edge) => edge / Math.max(...edges)) as Vec3;

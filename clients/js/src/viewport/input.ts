@@ -8,7 +8,7 @@ export interface CameraHost {
   ready(): boolean; // earlier patches have left the send buffer
 }
 
-type Move = (camera: Camera) => Camera;
+export type Move = (camera: Camera) => Camera;
 
 const orbitDegrees = 240; // rotation for a drag over the height of the picture
 const clickPixels = 5; // a shorter movement is a click
@@ -80,6 +80,7 @@ export interface PointerHost {
   // A click or tap that moved nothing; positions are fractions of the element's size.
   clicked(x: number, y: number, event: PointerEvent): void;
   takesWheel(event: WheelEvent): boolean; // false: it scrolls what is around the element
+  active?(): boolean; // false: pointers are left alone
 }
 
 // One finger or the left button orbits; two fingers, another button or shift pan; two fingers also
@@ -102,10 +103,17 @@ export class PointerInput {
       element.addEventListener(end, (event) => this.up(event));
     }
     element.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    element.addEventListener("contextmenu", (event) => event.preventDefault());
+    element.addEventListener("contextmenu", (event) => {
+      if (this.active()) event.preventDefault();
+    });
+  }
+
+  private active(): boolean {
+    return this.host.active?.() ?? true;
   }
 
   private down(event: PointerEvent): void {
+    if (!this.active()) return;
     if (this.fingers.size === 0) {
       this.panning = event.button !== 0 || event.shiftKey;
       this.travelled = 0;

@@ -82,13 +82,16 @@ export class Viewport {
   constructor(
     readonly canvas: HTMLCanvasElement,
     private readonly events: ViewportEvents,
+    private readonly signal?: AbortSignal, // ends the watch of the element's size
   ) {
     const context = canvas.getContext("2d", { alpha: false });
     if (context === null) throw new Error("the browser has no 2-D canvas");
     this.context = context;
     this.video = new VideoPictures(() => this.events.videoFailed());
-    new ResizeObserver(() => this.report()).observe(canvas);
-    window.addEventListener("resize", () => this.report());
+    const sizes = new ResizeObserver(() => this.report());
+    sizes.observe(canvas);
+    window.addEventListener("resize", () => this.report(), this.until());
+    signal?.addEventListener("abort", () => sizes.disconnect(), { once: true });
     this.watchDensity();
   }
 
@@ -99,7 +102,11 @@ export class Viewport {
       this.watchDensity();
       this.report();
     };
-    query.addEventListener("change", changed, { once: true });
+    query.addEventListener("change", changed, { once: true, ...this.until() });
+  }
+
+  private until(): { signal?: AbortSignal } {
+    return this.signal === undefined ? {} : { signal: this.signal };
   }
 
   // Header of the frame on the canvas; null: none of this session.
@@ -125,6 +132,11 @@ export class Viewport {
     this.drawn = null;
     this.waiting = null;
     this.video.end();
+  }
+
+  // Nothing more is shown.
+  end(): void {
+    this.newSession(this.pixelsMax);
   }
 
   // A replaced frame is not acknowledged itself: an acknowledgement covers all earlier frames.

@@ -1,95 +1,52 @@
 // HTTP requests besides the stream: datasets, fields, forecasts -> typed answers. fetch is
 // injected, so that tests can simulate the server.
-import type { Folder } from "./folder";
+import type * as Answered from "../generated/answers";
+import type {
+  FieldRange,
+  Folder,
+  Forecast,
+  Job,
+  PickedFeature,
+  Probe,
+  ProbedValue,
+  Series,
+} from "../generated/answers";
 import type { Dataset, DatasetSummary, View } from "./protocol";
 import { notUnderstood, posted, refusal } from "./requests";
 import { isObject } from "../base/values";
 import type { Vec3 } from "../base/vec3";
 
+export type {
+  FieldRange,
+  Folder,
+  FolderEntry,
+  Forecast,
+  ForecastPoint,
+  FrameInfo,
+  Job,
+  Jobs,
+  Position,
+  Presets,
+  Probe,
+  SavedView,
+  Series,
+  SeriesTime,
+  Service,
+} from "../generated/answers";
+
 export type Range = [number, number];
+export type Value = ProbedValue | (number | null)[]; // null: masked
 
-export interface Histogram {
-  range: Range; // ends of the first and the last bin
-  counts: number[];
-  masked: number; // samples without a value
-  below: number; // samples outside the range
-  above: number;
-  log: boolean;
-}
+/** Ends of the first and the last bin are known. */
+export type Histogram = Answered.Histogram & { range: Range };
 
-export interface FieldRange {
-  range: Range | null; // null: every sample is masked
-  masked: number;
-  rangeOf: "step" | "all";
-  places?: { min: Position; max: Position }; // of a step with a value
-}
+/** The sample that contributes most to a pixel. */
+export type Feature = NonNullable<PickedFeature>;
 
-export interface Position {
-  x: number;
-  y: number;
-  z: number;
-  units: { x: string; y: string; z: string };
-  index?: { x: number; y: number; z: number }; // of the sample
-}
+/** The opening of a dataset, as a job of the server; its result is the id of the dataset. */
+export type OpeningJob = Pick<Job, "id" | "state" | "problem"> & { result: string | null };
 
-export type Value = number | (number | null)[] | null; // null: masked
-
-export interface Probe {
-  position: Position; // position of the sample that was read
-  values: Record<string, { value: Value; units: string }>;
-}
-
-// The sample that contributes most to a pixel.
-export interface Feature {
-  layer: "lines" | "medium" | "surface";
-  field: string;
-  value: number | null; // of a vector the magnitude; null: masked there
-  units: string;
-  position: Position;
-  share: number; // of the pixel's opacity
-  at: [number, number]; // in the picture, pixels
-}
-
-export interface SeriesTime {
-  value: number; // in the dataset's timeUnits
-  text: string;
-}
-
-export interface Series {
-  position: Position;
-  times: SeriesTime[]; // one per step
-  values: Value[]; // one per step
-  units: string;
-}
-
-export interface ForecastPoint {
-  method: string;
-  slabThickness: number | null; // grid cells; null: no slabs
-  width: number; // pixels, as rendered
-  height: number;
-  coarser: number; // levels that the data is coarser than the picture needs
-  ms: number;
-  error: number; // linear RMSE
-  errorLow: number; // the 90 % interval of the error
-  errorHigh: number;
-  kind: "measured" | "estimated";
-  pareto: boolean; // whether no setting of at most this time has a smaller error
-}
-
-export interface Forecast {
-  points: ForecastPoint[];
-  chosen: number | null;
-}
-
-// The opening of a dataset, as a job of the server.
-export interface OpeningJob {
-  id: string;
-  state: "queued" | "running" | "done" | "failed" | "cancelled";
-  result: string | null; // id of the dataset
-  problem: { detail: string; status: number } | null;
-}
-
-// What is subtracted from the fields; null or undefined: nothing.
+/** What is subtracted from the fields; null or undefined: nothing. */
 export type Difference = View["difference"];
 
 export interface ProbeOf {
@@ -120,7 +77,7 @@ export class Api {
     private readonly fetch: Fetch,
   ) {}
 
-  // Of the differences if there are any, like all that follow.
+  /** Of the differences if there are any, like all that follow. */
   async histogram(
     id: string,
     field: string,
@@ -133,7 +90,7 @@ export class Api {
     return this.get<Histogram>(path, (a) => isRange(a.range) && Array.isArray(a.counts));
   }
 
-  // The range of one step, or with null of all steps, which may take a long time.
+  /** The range of one step, or with null of all steps, which may take a long time. */
   async range(
     id: string,
     field: string,
@@ -145,14 +102,16 @@ export class Api {
     return this.get<FieldRange>(path, (a) => a.range === null || isRange(a.range));
   }
 
-  // The range at the step and in the region of a view.
+  /** The range at the step and in the region of a view. */
   async rangeIn(view: View, id: string, field: string): Promise<FieldRange> {
     const looksRight = (a: Record<string, unknown>) => a.range === null || isRange(a.range);
     return this.get<FieldRange>(`${this.field(id, field)}/range`, looksRight, posted(view));
   }
 
-  // of: indices of the sample. With heights its position has the height of the sample there.
-  // derived: fields that the server computes for the answer.
+  /**
+   * of: indices of the sample. With heights its position has the height of the sample there.
+   * derived: fields that the server computes for the answer.
+   */
   async probe(
     id: string,
     of: Vec3,
@@ -163,11 +122,14 @@ export class Api {
     const names = derived.filter((name) => !name.includes(",")).map(encodeURIComponent);
     const fields = names.length === 0 ? "" : `&fields=${names.join(",")}`;
     const query = `${place(of, heights)}&step=${step}${minus(difference)}${fields}`;
-    const path = `${this.dataset(id)}/probe?${query}`;
-    return this.get<Probe>(path, (a) => isObject(a.position) && isObject(a.values), { signal });
+    return this.getProbe(`${this.dataset(id)}/probe?${query}`, { signal: signal ?? null });
   }
 
-  // What the pixel at (x, y) of a view shows; null: nothing of the data.
+  protected getProbe(path: string, init: RequestInit): Promise<Probe> {
+    return this.get<Probe>(path, (a) => isObject(a.position) && isObject(a.values), init);
+  }
+
+  /** What the pixel at (x, y) of a view shows; null: nothing of the data. */
   async pick(view: View, [x, y]: [number, number], signal?: AbortSignal): Promise<Feature | null> {
     type Answer = { feature: Feature | null };
     const path = `v1/picks?x=${x}&y=${y}`;
@@ -175,7 +137,7 @@ export class Api {
     return (await this.get<Answer>(path, looksRight, { ...posted(view), signal })).feature;
   }
 
-  // Reads every step, so it may take a long time.
+  /** Reads every step, so it may take a long time. */
   async series(
     id: string,
     field: string,
@@ -187,7 +149,7 @@ export class Api {
     return this.get<Series>(path, (a) => areTimes(a.times) && Array.isArray(a.values));
   }
 
-  // The server's forecast for the settings that it may choose for a view.
+  /** The server's forecast for the settings that it may choose for a view. */
   async forecast(view: View): Promise<Forecast> {
     return this.get<Forecast>("v1/forecasts", (a) => Array.isArray(a.points), posted(view));
   }
@@ -201,18 +163,20 @@ export class Api {
     return this.get<Dataset>(this.dataset(id), (a) => isObject(a.dims));
   }
 
-  // Opens the files of a listed dataset at other entries of its choices.
+  /** Opens the files of a listed dataset at other entries of its choices. */
   async openEntry(entry: { from: string; selection: Record<string, string> }): Promise<OpeningJob> {
     return this.get<OpeningJob>("v1/datasets", isJob, posted(entry));
   }
 
-  // Opens a file, folder or pattern below the data root.
+  /** Opens a file, folder or pattern below the data root. */
   async openPath(path: string): Promise<OpeningJob> {
     return this.get<OpeningJob>("v1/datasets", isJob, posted({ path }));
   }
 
-  // A page of a folder below the data root: what follows the name `after`. null: the server has no
-  // data root.
+  /**
+   * A page of a folder below the data root: what follows the name `after`. null: the server has no
+   * data root.
+   */
   async folder(folder: string, after: string): Promise<Folder | null> {
     const query = new URLSearchParams({ folder, ...(after === "" ? {} : { after }) }).toString();
     const answer = await this.answer(`v1/files?${query}`);
@@ -228,19 +192,19 @@ export class Api {
     await this.answer(`v1/jobs/${encodeURIComponent(id)}`, { method: "DELETE" });
   }
 
-  // A small picture of the dataset in its default view.
+  /** A small picture of the dataset in its default view. */
   async preview(id: string, width: number, height: number): Promise<Blob> {
     const path = `${this.dataset(id)}/frame.jpg?width=${width}&height=${height}`;
     return (await this.answer(path)).blob();
   }
 
-  // A picture of a view, after the requests of the stream.
+  /** A picture of a view, after the requests of the stream. */
   async picture(view: View, signal: AbortSignal): Promise<Blob> {
     const init = { ...posted(view, { Accept: "image/jpeg" }), signal, priority: "low" as const };
     return (await this.answer("v1/frames", init)).blob();
   }
 
-  private dataset(id: string): string {
+  protected dataset(id: string): string {
     return `v1/datasets/${encodeURIComponent(id)}`;
   }
 
@@ -248,7 +212,7 @@ export class Api {
     return `${this.dataset(id)}/fields/${encodeURIComponent(field)}`;
   }
 
-  private async get<T>(
+  protected async get<T>(
     path: string,
     looksRight: (answer: Record<string, unknown>) => boolean,
     init?: RequestInit,
@@ -256,7 +220,7 @@ export class Api {
     return understood<T>(await this.answer(path, init), looksRight);
   }
 
-  private async answer(path: string, init?: RequestInit): Promise<Answer> {
+  protected async answer(path: string, init?: RequestInit): Promise<Answer> {
     const response = await this.fetch(new URL(path, this.baseUri).href, init);
     if (response.ok) return response;
     throw await refusal(response);

@@ -1,8 +1,10 @@
 // Requests that post a document, and the errors of refused ones.
 import type { Problem, View } from "./protocol";
 
-// The server's refusal of a request: its HTTP status (0: none) and, if it told one, the problem
-// (RFC 9457).
+/**
+ * The server's refusal of a request: its HTTP status (0: none) and, if it told one, the problem
+ * (RFC 9457).
+ */
 export class ProblemError extends Error {
   override name = "ProblemError";
 
@@ -15,7 +17,7 @@ export class ProblemError extends Error {
   }
 }
 
-// The entries of a problem with their places, or else its detail or title.
+/** The entries of a problem with their places, or else its detail or title. */
 export function problemText({ title, detail, errors }: Problem): string {
   const entries = errors?.map((entry) => `${entry.pointer}: ${entry.detail}`) ?? [];
   return entries.length > 0 ? entries.join("; ") : detail || title || "";
@@ -29,7 +31,7 @@ export const posted = (body: View | object, headers = {}): RequestInit => ({
 
 type Refused = Pick<Response, "status" | "json">;
 
-// The error that an answer tells.
+/** The error that an answer tells. */
 export async function refusal(response: Refused): Promise<ProblemError> {
   const { status } = response;
   const problem = (await response.json().catch(() => null)) as Problem | null;
@@ -39,6 +41,6 @@ export async function refusal(response: Refused): Promise<ProblemError> {
 
 export const notUnderstood = "The server's answer could not be understood.";
 
-// Message of a failed promise.
+/** Message of a failed promise. */
 export const failureText = (failure: unknown): string =>
   failure instanceof Error ? failure.message : String(failure);
