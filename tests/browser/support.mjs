@@ -204,10 +204,14 @@ export async function finalPicture(page) {
 }
 
 // Statistics of the canvas pixels: mean and deviation of the brightness (0..255), fraction of
-// pixels that differ from the most frequent colour, and a hash of all pixels.
-export const pixels = (page) =>
-  page.evaluate(() => {
-    const canvas = document.querySelector("#picture");
+// pixels that differ from the most frequent colour, and a hash of all pixels. path: the canvas,
+// with the elements in whose shadow trees it is.
+export const pixels = (page, path = ["#picture"]) =>
+  page.evaluate((selectors) => {
+    const canvas = selectors.reduce(
+      (node, selector) => (node.shadowRoot ?? node).querySelector(selector),
+      document,
+    );
     const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
     const words = new Uint32Array(data.buffer);
     const counts = new Map();
@@ -234,7 +238,7 @@ export const pixels = (page) =>
       colors: counts.size,
       hash,
     };
-  });
+  }, path);
 
 // Asserts that the picture is neither empty nor uniform.
 export function assertDrawn(stats) {

@@ -28,10 +28,12 @@ MAY_IMPORT = {
         "base": [],                       # numbers, sizes of elements
         "wire": ["generated", "base"],    # HTTP and WebSocket: messages, requests, connection
         "view": ["base", "wire"],         # the view document: state, camera, answers
-        "viewport": ["base", "wire", "view"],          # a picture: frames, input
+        "client": ["generated", "base", "wire", "view"],   # REST and streams for programs
+        "viewport": ["base", "wire", "view"],              # a picture: frames, input
+        "element": ["base", "wire", "view", "client", "viewport"],    # <windsplat-view>
     },
 }
-MODULES = ["index", "parts"]          # of the package; what others may import, by its name
+MODULES = ["index", "parts", "element"]    # of the package; what others may import, by its name
 PACKAGE = "@windsplat/client"
 REPORT = "web/report"                 # the report of a study; imports nothing of the page
 GENERATED = "web/generated"           # types of a study; the report may import them

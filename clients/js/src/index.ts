@@ -6,4 +6,6 @@ export type { ConnectionState } from "./wire/connection";
 export type { SocketClass } from "./wire/browser_link";
 export { ProblemError, problemText } from "./wire/requests";
 export * from "./view/camera";
+export * from "./client/client";
+export { ViewStream, type StreamEvents, type StreamOptions } from "./client/view_stream";
 export { mergePatch, mergeView, type Patch } from "./view/view_state";

@@ -1,0 +1,155 @@
+// A server as programs use it: its resources over REST, with a token if it asks for one, and
+// streams of its views.
+import type { ColorMaps, FrameInfo, Jobs, Presets, SavedView, Service } from "../generated/answers";
+import { Api, type Probe } from "../wire/api";
+import type { SocketClass } from "../wire/browser_link";
+import { drawFrame, type FetchLike } from "../wire/frame_request";
+import type { View } from "../wire/protocol";
+import { posted } from "../wire/requests";
+import { ViewStream, type StreamEvents, type StreamOptions } from "./view_stream";
+
+export interface ClientOptions {
+  token?: string | undefined; // of a server with --token-file; sent as a header, never in a URL
+  fetch?: FetchLike; // by default the global one
+  webSocket?: SocketClass | undefined; // by default the global one, which Node has since 22
+}
+
+export interface PictureOptions {
+  type?: "image/png" | "image/jpeg" | "image/svg+xml" | "application/pdf" | "application/x-npy";
+  dotsPerInch?: number; // of PNG, PDF and SVG
+  signal?: AbortSignal;
+}
+
+export interface Place {
+  x: number;
+  y: number;
+  z: number; // a coordinate of the vertical axis; with heightField a height
+  step?: number;
+  heightField?: string;
+  fields?: string[]; // derived fields to compute
+}
+
+// With the token as a header; the options of the caller come first.
+function authorized(fetch: FetchLike, token: string | undefined): FetchLike {
+  if (token === undefined) return fetch;
+  return (url, init = {}) => {
+    const headers = { Authorization: `Bearer ${token}`, ...(init.headers as object) };
+    return fetch(url, { ...init, headers });
+  };
+}
+
+const isList =
+  (key: string) =>
+  (answer: Record<string, unknown>): boolean =>
+    Array.isArray(answer[key]);
+
+const isSaved = (answer: Record<string, unknown>): boolean =>
+  typeof answer.id === "string" && typeof answer.view === "object";
+
+export class Client extends Api {
+  readonly url: string; // ends with a slash
+  private readonly send: FetchLike;
+
+  // url: of the server, with its base path.
+  constructor(
+    url: string | URL,
+    private readonly options: ClientOptions = {},
+  ) {
+    const base = new URL(url);
+    if (!/^https?:$/.test(base.protocol)) throw new TypeError(`${base.href} is no http(s) address`);
+    if (!base.pathname.endsWith("/")) base.pathname += "/";
+    base.search = "";
+    base.hash = "";
+    const fetchIt = options.fetch ?? ((to: string, init: RequestInit) => fetch(to, init));
+    const send = authorized(fetchIt, options.token);
+    super(base.href, (to, init) => send(to, init ?? {}));
+    this.url = base.href;
+    this.send = send;
+  }
+
+  // --- the stream ------------------------------------------------------------------------
+
+  /** Shows a view over a stream of its own, until close(). */
+  stream(view: View, events: StreamEvents = {}, options: StreamOptions = {}): ViewStream {
+    const { token, webSocket } = this.options;
+    return new ViewStream(this.url, view, events, {
+      token,
+      webSocket,
+      fetch: this.send,
+      ...options,
+    });
+  }
+
+  // --- pictures --------------------------------------------------------------------------
+
+  /** A view drawn to a picture. A busy server is asked again after the time that it states. */
+  frame(view: View, { signal, ...asked }: PictureOptions = {}): Promise<Blob> {
+    return drawFrame(this.send, this.url, view, signal ?? new AbortController().signal, asked);
+  }
+
+  // --- resources besides those of the page -----------------------------------------------
+
+  service(): Promise<Service> {
+    return this.get<Service>("v1", (answer) => typeof answer.version === "string");
+  }
+
+  colorMaps(): Promise<ColorMaps> {
+    return this.get<ColorMaps>("v1/colormaps", isList("colormaps"));
+  }
+
+  presets(): Promise<Presets> {
+    return this.get<Presets>("v1/presets", isList("presets"));
+  }
+
+  jobs(): Promise<Jobs> {
+    return this.get<Jobs>("v1/jobs", isList("jobs"));
+  }
+
+  /** Releases the memory of a dataset; with `forget` it is no longer listed. */
+  async closeDataset(id: string, forget = false): Promise<void> {
+    await this.answer(`${this.dataset(id)}${forget ? "?forget=true" : ""}`, { method: "DELETE" });
+  }
+
+  /** Every field at the sample nearest to a place in the coordinates of the dataset. */
+  probeAt(id: string, place: Place, signal?: AbortSignal): Promise<Probe> {
+    const { fields, ...numbers } = place;
+    const query = new URLSearchParams(
+      Object.entries(numbers)
+        .filter(([, value]) => value !== undefined)
+        .map(([key, value]) => [key, String(value)]),
+    );
+    if (fields !== undefined && fields.length > 0) query.set("fields", fields.join(","));
+    return this.getProbe(`${this.dataset(id)}/probe?${query}`, { signal: signal ?? null });
+  }
+
+  // --- saved views -----------------------------------------------------------------------
+
+  saveView(view: View): Promise<SavedView> {
+    return this.get<SavedView>("v1/views", isSaved, posted(view));
+  }
+
+  savedView(id: string): Promise<SavedView> {
+    return this.get<SavedView>(this.saved(id), isSaved);
+  }
+
+  replaceView(id: string, view: View): Promise<SavedView> {
+    return this.get<SavedView>(this.saved(id), isSaved, { ...posted(view), method: "PUT" });
+  }
+
+  /** patch: a merge patch (RFC 7396). */
+  changeView(id: string, patch: object): Promise<SavedView> {
+    const headers = { "Content-Type": "application/merge-patch+json" };
+    const init = { ...posted(patch, headers), method: "PATCH" };
+    return this.get<SavedView>(this.saved(id), isSaved, init);
+  }
+
+  async deleteView(id: string): Promise<void> {
+    await this.answer(this.saved(id), { method: "DELETE" });
+  }
+
+  private saved(id: string): string {
+    return `v1/views/${encodeURIComponent(id)}`;
+  }
+}
+
+export type { ColorMaps, FrameInfo, Jobs, Presets, SavedView, Service };
