@@ -1,6 +1,8 @@
 // Common parts of the commands: parsing of numbers, output to files, errors to stderr.
 #include "server/cli/command.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
@@ -18,8 +20,13 @@ namespace {
 
 constexpr unsigned threads_max = 1024;
 
+// Set while the arguments are parsed, before any other thread is started.
+Verbosity command_verbosity = Verbosity::normal;
+
 struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
+  void operator()(std::FILE* file) const {
+    if (file != stdin) std::fclose(file);
+  }
 };
 using File = std::unique_ptr<std::FILE, CloseFile>;
 
@@ -67,9 +74,78 @@ Result<std::uint64_t> memory_limit(const std::string& text) {
                         "for a loader and fields (a number without K, M, G or T is in bytes)");
 }
 
+void add_verbosity_options(CLI::App& command) {
+  constexpr const char* group = "Messages";
+  command_verbosity = Verbosity::normal;
+  CLI::Option* quiet = command
+                           .add_flag_callback(
+                               "-q,--quiet", [] { command_verbosity = Verbosity::quiet; },
+                               "Write errors only to stderr: no notes, no progress")
+                           ->group(group);
+  command
+      .add_flag_callback(
+          "-v,--verbose", [] { command_verbosity = Verbosity::verbose; },
+          "Also write to stderr what was done")
+      ->excludes(quiet)
+      ->group(group);
+}
+
+Verbosity verbosity() { return command_verbosity; }
+
 void complain(std::string_view message) {
   const std::string line = "windsplat: " + std::string(message) + '\n';
   std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+void note(std::string_view message) {
+  if (verbosity() != Verbosity::quiet) complain(message);
+}
+
+void detail(std::string_view message) {
+  if (verbosity() == Verbosity::verbose) complain(message);
+}
+
+std::string seconds_text(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, seconds < 10 ? "%.2f s" : "%.0f s", seconds);
+  return text;
+}
+
+CLI::Validator between(double min, double max) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.10g to %.10g", min, max);
+  const std::string range = text;
+  return {
+      [min, max, range](std::string& value) {
+        double number = 0;
+        const char* const end = value.data() + value.size();
+        const auto [next, fault] = std::from_chars(value.data(), end, number);
+        const bool valid = fault == std::errc() && next == end && number >= min && number <= max;
+        return valid ? std::string() : "'" + printable(value) + "' is not a number from " + range;
+      },
+      range};
+}
+
+Result<void> check_streams(const std::vector<NamedFile>& inputs,
+                           const std::vector<NamedFile>& outputs) {
+  for (const auto* files : {&inputs, &outputs}) {
+    const char* first = nullptr;
+    for (const NamedFile& file : *files) {
+      if (!is_stdout(file.name)) continue;
+      if (first != nullptr) {
+        return make_error(ErrorKind::invalid, std::string(file.option) +
+                                                  " -: " + (files == &inputs ? "stdin" : "stdout") +
+                                                  " is used by " + first);
+      }
+      first = file.option;
+    }
+  }
+  if (!outputs.empty() && is_stdout(outputs.front().name) && isatty(STDOUT_FILENO) == 1) {
+    return make_error(ErrorKind::invalid,
+                      std::string(outputs.front().option) +
+                          " -: stdout is a terminal; redirect it to a file or a pipe");
+  }
+  return {};
 }
 
 int exit_code(ErrorKind kind) {
@@ -146,7 +222,7 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text) {
 }
 
 Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max) {
-  const File file(std::fopen(path.c_str(), "rbe"));
+  const File file(is_stdin(path) ? stdin : std::fopen(path.c_str(), "rbe"));
   if (!file) return error_of_system(ErrorKind::not_found, "cannot open", path);
   std::string text(bytes_max + 1, '\0');
   text.resize(std::fread(text.data(), 1, text.size(), file.get()));
@@ -168,7 +244,7 @@ Result<void> write_stdout(std::string_view text) {
 
 Result<void> write_output(const std::string& path, std::span<const std::uint8_t> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  return path == "-" ? write_stdout(text) : write_whole_file(path, text);
+  return is_stdout(path) ? write_stdout(text) : write_whole_file(path, text);
 }
 
 }  // namespace windsplat::cli

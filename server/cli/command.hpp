@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/base/error.hpp"
 
@@ -45,8 +46,36 @@ void add_memory_option(CLI::App& command, std::string& bytes);
 // (open_store.hpp).
 Result<std::uint64_t> memory_limit(const std::string& text);
 
-// Prints one line to stderr.
+// How much is written to stderr: errors alone, notes on results too, or also what was done.
+enum class Verbosity { quiet, normal, verbose };
+// -q, --quiet and -v, --verbose; the verbosity is set when the command is parsed.
+void add_verbosity_options(CLI::App& command);
+[[nodiscard]] Verbosity verbosity();
+
+// Prints one line to stderr: an error.
 void complain(std::string_view message);
+// The same for what the user should know of a result, unless --quiet.
+void note(std::string_view message);
+// The same for what was done, with --verbose.
+void detail(std::string_view message);
+std::string seconds_text(double seconds);  // "0.42 s"
+
+// Accepts numbers within the limits; not NaN, which CLI::Range accepts.
+CLI::Validator between(double min, double max);
+
+// Whether a name of a file means standard output or input.
+inline bool is_stdout(const std::string& name) { return name == "-"; }
+inline bool is_stdin(const std::string& name) { return name == "-"; }
+
+// An option and the file that it names.
+struct NamedFile {
+  const char* option;
+  std::string name;
+};
+// At most one input may be standard input, and one output standard output. The first output is
+// binary: a terminal is refused. Errors: invalid.
+Result<void> check_streams(const std::vector<NamedFile>& inputs,
+                           const std::vector<NamedFile>& outputs);
 
 // Prints the error to stderr, with the JSON pointer of each invalid value, and returns the exit
 // code of its kind.
@@ -60,7 +89,7 @@ std::optional<std::array<std::int64_t, 3>> parse_extent(std::string_view text, s
 // above 2^53 rounded. Empty if malformed, less than a byte, or 2^64 and more.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);
 
-// The whole file. Errors: not_found, too_large beyond `bytes_max`.
+// The whole file, or standard input for "-". Errors: not_found, too_large beyond `bytes_max`.
 Result<std::string> read_text_file(const std::string& path, std::size_t bytes_max);
 
 // Writes to a file (see write_whole_file), or to stdout for "-".

@@ -58,6 +58,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
       ->type_name("N");
   add_memory_option(command, arguments.memory);
   add_data_host_options(command, arguments.data_hosts);
+  add_verbosity_options(command);
 }
 
 Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {

@@ -91,17 +91,18 @@ std::string position_text(double value) {
 
 }  // namespace
 
-protocol::CameraView turned(const protocol::CameraView& camera, double degrees) {
-  // Whole turns are exact.
+protocol::CameraView turned(const protocol::CameraView& camera, double degrees,
+                            const protocol::Vec3& centre) {
+  protocol::CameraView out = camera;
   const double angle = std::fmod(degrees, 360.0) * radians_per_degree;
+  if (angle == 0) return out;  // whole turns are exact
   const auto turn = [&](const glm::dvec3& v) {
     return glm::dvec3(v.x * std::cos(angle) - v.y * std::sin(angle),
                       v.x * std::sin(angle) + v.y * std::cos(angle), v.z);
   };
-  protocol::CameraView out = camera;
-  if (angle == 0) return out;
-  const glm::dvec3 target = to_glm(camera.target.value());
-  out.eye = from_glm(target + turn(to_glm(camera.eye.value()) - target));
+  const glm::dvec3 axis = to_glm(centre);
+  out.eye = from_glm(axis + turn(to_glm(camera.eye.value()) - axis));
+  out.target = from_glm(axis + turn(to_glm(camera.target.value()) - axis));
   out.up = from_glm(turn(to_glm(camera.up)));
   return out;
 }

@@ -9,10 +9,12 @@
 
 namespace windsplat::movie {
 
-// The camera turned about the vertical axis (world z) through its target: a positive angle moves
-// the eye eastward, as in orbits. Needs eye and target. With frame n of N at n / N of an angle of
-// 360 degrees the movie repeats without a jump.
-protocol::CameraView turned(const protocol::CameraView& camera, double degrees);
+// Eye, target and upward direction turned about the vertical axis (world z) through `centre`: a
+// positive angle moves the eye eastward, as in orbits. Needs eye and target. With frame n of N at
+// n / N of an angle of 360 degrees a movie repeats without a jump. scene::turn_of() chooses camera
+// and centre.
+protocol::CameraView turned(const protocol::CameraView& camera, double degrees,
+                            const protocol::Vec3& centre);
 
 // A smooth path (docs/user/command-line.md, "Paths of the camera"). Eye and target follow a
 // centripetal Catmull-Rom spline (Yuksel, Schaefer and Keyser 2011, On the parameterization of

@@ -106,10 +106,11 @@ Result<std::vector<Panel>> open_panels(const ViewArguments& arguments) {
   if (!document) return document.error();
   std::vector<Panel> panels(1);
   panels[0].view = document->view();
+  panels[0].asked = panels[0].view;
   if (arguments.is_pair()) {
     auto second = second_view(arguments, *document);
     if (!second) return second.error();
-    panels.push_back({std::move(*second), nullptr, !arguments.beside_step.empty()});
+    panels.push_back({*second, nullptr, !arguments.beside_step.empty(), *second});
   }
   const auto opened = open_datasets(arguments);
   if (!opened) return opened.error();

@@ -15,6 +15,7 @@ struct Panel {
   protocol::View view;
   std::shared_ptr<data::Dataset> dataset;  // the handle that yields the fields of the view
   bool keeps_step = false;                 // whether animate leaves its step as it is
+  protocol::View asked{};                  // before defaults were filled in
 };
 
 // One, or two with --beside, --beside-step or --beside-set: the second has the view of the first

@@ -48,10 +48,13 @@ Result<Sheet> Sheets::draw(const CancelToken& cancel) {
     add_text(reasons, pair, n, sheet.empty_surfaces);
     frames.at(n) = std::move(picture->frame);
   }
+  sheet.width = frames[0].width;
+  sheet.height = frames[0].height;
   if (!pair) {
     sheet.bytes = std::move(frames[0].bytes);
     return sheet;
   }
+  sheet.width += frames[1].width + frame::gap_of_pair(sheet.height);
   auto bytes = frame::encode_pair(frames, encoding_, cancel);
   if (!bytes) return bytes.error();
   sheet.bytes = std::move(*bytes);

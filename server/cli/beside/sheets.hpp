@@ -15,7 +15,9 @@
 namespace windsplat::cli {
 
 struct Sheet {
-  image::Bytes bytes;
+  image::Bytes bytes;  // of a raw encoding the pixels
+  int width = 0;
+  int height = 0;
   std::string reports;  // a line of JSON for each picture, from left to right
   // On each limit that a picture exceeds; why a picture shows nothing of the data. Empty: none.
   std::string exceeded;

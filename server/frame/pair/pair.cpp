@@ -48,7 +48,8 @@ Result<image::Bytes> encode_pair(const std::array<Frame, 2>& frames, const Encod
   const int height = frames[0].height;
   WINDSPLAT_CHECK(frames[0].width == frames[1].width && height == frames[1].height);
   const int width = 2 * frames[0].width + gap_of_pair(height);
-  const image::Bytes rgb = joined_pixels(frames, width);
+  image::Bytes rgb = joined_pixels(frames, width);
+  if (encoding.raw) return rgb;
   std::vector<annotate::Part> parts;
   for (const Frame& frame : frames) {
     if (frame.figure)

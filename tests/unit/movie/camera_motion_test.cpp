@@ -34,19 +34,20 @@ double apart(const Vec3& a, const Vec3& b) {
 }
 
 // From the south by 90 degrees the eye comes to the east; heights and distances stay.
-TEST(CameraTurn, MovesTheEyeEastwardAboutTheVerticalThroughTheTarget) {
+TEST(CameraTurn, MovesTheEyeEastwardAboutTheVerticalThroughTheCentre) {
   CameraView camera = camera_at({1, -3, 2}, {1, 1, 0.5});
   camera.up = {0, 0.6, 0.8};
-  const CameraView quarter = turned(camera, 90);
+  const CameraView quarter = turned(camera, 90, *camera.target);
   expect_near(*quarter.eye, {5, 1, 2}, 1e-12, "eye");
   expect_near(*quarter.target, {1, 1, 0.5}, 0, "target");
   expect_near(quarter.up, {-0.6, 0, 0.8}, 1e-12, "up");
+  expect_near(*turned(camera, 180, {0, 1, 7}).target, {-1, 1, 0.5}, 1e-12, "another centre");
   for (const double degrees : {10.0, 123.0, -200.0}) {
-    const CameraView there = turned(camera, degrees);
+    const CameraView there = turned(camera, degrees, {3, 2, 1});
     EXPECT_NEAR(apart(*there.eye, *there.target), apart(*camera.eye, *camera.target), 1e-12);
-    expect_near(*turned(there, -degrees).eye, *camera.eye, 1e-12, "and back");
+    expect_near(*turned(there, -degrees, {3, 2, 1}).eye, *camera.eye, 1e-12, "and back");
   }
-  EXPECT_EQ(turned(camera, 720), camera) << "whole turns are exact";
+  EXPECT_EQ(turned(camera, 720, {0, 0, 0}), camera) << "whole turns are exact";
 }
 
 TEST(CameraPath, PassesItsKeyframesAndHoldsItsEnds) {

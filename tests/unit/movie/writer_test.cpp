@@ -78,7 +78,9 @@ TEST(MovieWriter, FfmpegGetsTheBytesOfThePicturesAndItsFileTheName) {
 TEST(MovieWriter, FfmpegGetsItsArgumentsAndNothingElse) {
   const MovieFolder folder;
   put_ffmpeg(folder, copies_input);
-  const int secret = ::open("/dev/null", O_RDONLY);  // inherited without O_CLOEXEC
+  const int null = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const int secret = ::fcntl(null, F_DUPFD, 9);  // would be inherited
+  ::close(null);
   auto writer =
       Writer::open(folder.file("a 'b'; $(c).mp4"), options_of(folder, Container::mp4, 6, 4), {});
   ::close(secret);

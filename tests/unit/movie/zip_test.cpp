@@ -150,7 +150,7 @@ TEST(MovieContainer, FollowsFromTheEndingOfAName) {
   EXPECT_EQ(container_of("a/b.MP4"), Container::mp4);
   EXPECT_EQ(container_of("x.y.webm"), Container::webm);
   EXPECT_EQ(container_of("x.zip"), Container::zip);
-  for (const char* other : {"x", "x.mp4/y", "x.jpg", "mp4", "", "."}) {
+  for (const char* other : {"x", "x.mp4/y", "x/mp4", "x.jpg", "mp4", "", "."}) {
     EXPECT_EQ(container_of(other), std::nullopt) << other;
   }
 }
