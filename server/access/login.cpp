@@ -27,17 +27,6 @@ constexpr std::string_view style =
 
 constexpr std::string_view script = "document.forms[0].action+=location.hash";
 
-// "'sha256-...'" source expression of an inline element for the Content-Security-Policy.
-std::string policy_hash(std::string_view text) {
-  std::array<unsigned char, 32> digest{};
-  unsigned int bytes = 0;
-  WINDSPLAT_CHECK(
-      EVP_Digest(text.data(), text.size(), digest.data(), &bytes, EVP_sha256(), nullptr) == 1);
-  std::array<unsigned char, 45> base64{};  // 32 bytes, and the NUL that OpenSSL adds
-  EVP_EncodeBlock(base64.data(), digest.data(), static_cast<int>(digest.size()));
-  return "'sha256-" + std::string(reinterpret_cast<const char*>(base64.data())) + "'";
-}
-
 const std::string& policy() {
   static const std::string text =
       "default-src 'none'; style-src " + policy_hash(style) + "; script-src " +
@@ -161,6 +150,16 @@ std::string posted_token(const std::string& body) {
 }
 
 }  // namespace
+
+std::string policy_hash(std::string_view text) {
+  std::array<unsigned char, 32> digest{};
+  unsigned int bytes = 0;
+  WINDSPLAT_CHECK(
+      EVP_Digest(text.data(), text.size(), digest.data(), &bytes, EVP_sha256(), nullptr) == 1);
+  std::array<unsigned char, 45> base64{};  // 32 bytes, and the NUL that OpenSSL adds
+  EVP_EncodeBlock(base64.data(), digest.data(), static_cast<int>(digest.size()));
+  return "'sha256-" + std::string(reinterpret_cast<const char*>(base64.data())) + "'";
+}
 
 http::Response turned_away(Verdict verdict, const http::Request& request,
                            const std::string& base_path,

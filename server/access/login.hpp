@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/access/auth.hpp"
@@ -22,5 +23,8 @@ http::Response turned_away(Verdict verdict, const http::Request& request,
 // `tls`: the connection uses TLS, so the cookie gets the attribute Secure.
 http::Response log_in(const http::Request& request, const Token& token,
                       const std::string& base_path, bool tls, std::int64_t now_s);
+
+// "'sha256-...'" source expression of an inline element for the Content-Security-Policy.
+std::string policy_hash(std::string_view text);
 
 }  // namespace windsplat::access

@@ -1,4 +1,4 @@
-// protocol/view.schema.json, embedded: embed_schema.cmake writes the definition.
+// protocol/*.schema.json, embedded: embed_schemas.cmake writes the definitions.
 #pragma once
 
 #include <string_view>
@@ -6,5 +6,6 @@
 namespace windsplat::api {
 
 std::string_view view_schema_json();
+std::string_view messages_schema_json();
 
 }  // namespace windsplat::api

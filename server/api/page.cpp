@@ -54,7 +54,7 @@ const WebAsset* find_asset(const std::string& path) {
 
 bool has_page(const std::string& path) { return find_asset(path) != nullptr; }
 
-http::Response get_page(const std::vector<std::string>& embedders, const std::string& path,
+http::Response get_page(const ServerOptions& options, const std::string& path,
                         const http::Request& request) {
   const WebAsset* asset = find_asset(path);
   WINDSPLAT_CHECK(asset != nullptr);
@@ -68,8 +68,11 @@ http::Response get_page(const std::vector<std::string>& embedders, const std::st
                       {"Vary", "Accept-Encoding"},
                       // Headers of a 304 replace the cached ones, so the policy is sent with it
                       // too.
-                      {"Content-Security-Policy", policy_for(embedders, request)},
+                      {"Content-Security-Policy", policy_for(options.embedders, request)},
                       {"Cross-Origin-Opener-Policy", "same-origin"}};
+  if (asset->content_type.starts_with("text/html")) {
+    response.headers.emplace_back("Link", description_links(options.base_path));
+  }
   if (http::matches_etag(request.header("If-None-Match"), etag)) {
     response.status = 304;
     return response;

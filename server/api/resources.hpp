@@ -4,12 +4,14 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "server/access/admission.hpp"
+#include "server/api/documents/documents.hpp"
 #include "server/api/server_options.hpp"
 #include "server/frame/frame.hpp"
 #include "server/http/exchange.hpp"
@@ -22,6 +24,12 @@ http::Response get_service(const ServerOptions& options);
 http::Response get_color_maps();
 http::Response get_presets();
 http::Response get_view_schema(const http::Request& request);
+// The documents of the API (documents/documents.hpp), which need the table of routes.
+std::shared_ptr<documents::Documents> documents_of(const ServerOptions& options);
+http::Response get_description(documents::Documents& documents, documents::Kind kind,
+                               const http::Request& request);
+// Value of a header Link with the descriptions (RFC 8631).
+std::string description_links(const std::string& base_path);
 http::Response get_livez();
 http::Response get_readyz(const std::atomic<bool>& draining);
 http::Response get_metrics(const metrics::Metrics& metrics, const tasks::Catalogue& catalogue);
@@ -103,8 +111,7 @@ void delete_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const s
 
 // An embedded file of the page; `path` as in web_assets().
 bool has_page(const std::string& path);
-// `embedders`: other origins that may show the embedded view in a frame (http/framing.hpp).
-http::Response get_page(const std::vector<std::string>& embedders, const std::string& path,
+http::Response get_page(const ServerOptions& options, const std::string& path,
                         const http::Request& request);
 
 // The page of a problem type, and the list of all, as HTML or plain text (problem_pages.cpp).

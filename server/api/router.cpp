@@ -45,11 +45,10 @@ bool matches(std::string_view path, const Segments& given, PathValues& values) {
 }
 
 // Files of the page. Links to them may have query parameters added by other sites.
-Route page_route(const std::vector<std::string>& embedders) {
-  return {
-      "GET", "", Operation{.any_query = true},
-      [&embedders](const PathValues& values, const http::Request& request,
-                   const http::Reply& reply) { reply(get_page(embedders, values[0], request)); }};
+Route page_route(const ServerOptions& options) {
+  return {"GET", "", Operation{.any_query = true},
+          [&options](const PathValues& values, const http::Request& request,
+                     const http::Reply& reply) { reply(get_page(options, values[0], request)); }};
 }
 
 std::string page_file(const Segments& path) {
@@ -104,7 +103,7 @@ struct Router::Resource {
 Router::Router(std::vector<Route> routes, const ServerOptions& options,
                access::Admission& admission, const std::atomic<bool>& draining)
     : routes_(std::move(routes)),
-      page_(page_route(options.embedders)),
+      page_(page_route(options)),
       base_path_(options.base_path),
       admission_(admission),
       draining_(draining) {}

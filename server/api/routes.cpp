@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <memory>
 #include <type_traits>
 #include <utility>
 
@@ -52,6 +53,23 @@ Handler later(Handle handle, Parts&... parts) {
   };
 }
 
+using documents::Kind;
+using DocumentsPtr = std::shared_ptr<documents::Documents>;
+
+// Handlers of the documents of the API.
+Handler description(const std::shared_ptr<documents::Documents>& documents, documents::Kind kind) {
+  return
+      [documents, kind](const PathValues&, const http::Request& request, const http::Reply& reply) {
+        reply(get_description(*documents, kind, request));
+      };
+}
+
+std::vector<documents::Entry> entries_of(const std::vector<Route>& table) {
+  std::vector<documents::Entry> out;
+  for (const Route& route : table) out.push_back({route.method, route.path, route.operation});
+  return out;
+}
+
 constexpr frame::Format jpeg = frame::Format::jpeg;
 constexpr frame::Format png = frame::Format::png;
 constexpr frame::Format npy = frame::Format::npy;
@@ -61,6 +79,54 @@ constexpr ValuesFormat values_npy = ValuesFormat::npy;
 constexpr ValuesFormat values_json = ValuesFormat::json;
 constexpr const char* frame_name = "/v1/datasets/{id}/frame";
 constexpr const char* view_frame_name = "/v1/views/{id}/frame";
+
+std::vector<Route> service_routes(const ServerOptions& options, const std::atomic<bool>& draining,
+                                  tasks::Backend& backend, const DocumentsPtr& described) {
+  metrics::Metrics& metrics = backend.metrics;
+  tasks::Catalogue& catalogue = backend.catalogue;
+  return {
+      Route{"GET", "/livez", operations::read_live(), at_once(get_livez), Charge::none,
+            Place::root},
+      Route{"GET", "/readyz", operations::read_ready(), at_once(get_readyz, draining), Charge::none,
+            Place::root},
+      Route{"GET", "/metrics", operations::read_metrics(), at_once(get_metrics, metrics, catalogue),
+            Charge::none, Place::root},
+
+      Route{"GET", "/view.schema.json", operations::read_view_schema(), at_once(get_view_schema)},
+      Route{"GET", "/problems", operations::list_problem_types(),
+            at_once(get_problem_types, options.base_path)},
+      Route{"GET", "/problems/{type}", operations::read_problem_type(),
+            at_once(get_problem_type, options.base_path)},
+      Route{"GET", "/v1", operations::read_service(), at_once(get_service, options)},
+      Route{"GET", "/v1/colormaps", operations::read_color_maps(), at_once(get_color_maps)},
+      Route{"GET", "/v1/presets", operations::read_presets(), at_once(get_presets)},
+      Route{"GET", "/v1/openapi.json", operations::read_openapi(),
+            description(described, Kind::openapi)},
+      Route{"GET", "/v1/openapi.html", operations::read_openapi_page(),
+            description(described, Kind::openapi_page)},
+      Route{"GET", "/v1/asyncapi.json", operations::read_asyncapi(),
+            description(described, Kind::asyncapi)},
+      Route{"GET", "/v1/asyncapi.html", operations::read_asyncapi_page(),
+            description(described, Kind::asyncapi_page)},
+      Route{"GET", route_stream, operations::read_stream(), at_once(upgrade_required)},
+  };
+}
+
+std::vector<Route> picture_routes(const std::string& base_path, access::Admission& admission,
+                                  tasks::Backend& backend) {
+  return {
+      Route{"POST", "/v1/frames", operations::draw_view(), later(post_frame, backend, admission),
+            Charge::valid_picture},
+      Route{"POST", "/v1/forecasts", operations::forecast_view(), later(post_forecast, backend)},
+      Route{"POST", "/v1/picks", operations::pick_feature(), later(post_pick, backend),
+            Charge::picture},
+      Route{"POST", "/v1/references", operations::draw_reference(),
+            later(post_reference, backend, admission, base_path), Charge::valid_picture},
+      Route{"GET", "/v1/references/{id}", operations::read_reference(),
+            at_once(get_reference, backend.references)},
+
+  };
+}
 
 // Pictures at addresses of their own, in every format.
 std::vector<Route> frame_routes(tasks::Backend& backend, access::Admission& admission,
@@ -99,45 +165,10 @@ std::vector<Route> frame_routes(tasks::Backend& backend, access::Admission& admi
   };
 }
 
-}  // namespace
-
-std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
-                          access::Admission& admission, tasks::Backend& backend,
-                          tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io) {
-  tasks::Catalogue& catalogue = backend.catalogue;
-  tasks::TaskExecutor& loads = backend.loads;
-  tasks::Jobs& jobs = backend.jobs;
-  metrics::Metrics& metrics = backend.metrics;
+std::vector<Route> view_routes(const ServerOptions& options, tasks::TaskExecutor& view_io) {
   views::SavedViews& views = *options.views;
   const std::string& base_path = options.base_path;
-  std::vector<Route> rows{
-      Route{"GET", "/livez", operations::read_live(), at_once(get_livez), Charge::none,
-            Place::root},
-      Route{"GET", "/readyz", operations::read_ready(), at_once(get_readyz, draining), Charge::none,
-            Place::root},
-      Route{"GET", "/metrics", operations::read_metrics(), at_once(get_metrics, metrics, catalogue),
-            Charge::none, Place::root},
-
-      Route{"GET", "/view.schema.json", operations::read_view_schema(), at_once(get_view_schema)},
-      Route{"GET", "/problems", operations::list_problem_types(),
-            at_once(get_problem_types, base_path)},
-      Route{"GET", "/problems/{type}", operations::read_problem_type(),
-            at_once(get_problem_type, base_path)},
-      Route{"GET", "/v1", operations::read_service(), at_once(get_service, options)},
-      Route{"GET", "/v1/colormaps", operations::read_color_maps(), at_once(get_color_maps)},
-      Route{"GET", "/v1/presets", operations::read_presets(), at_once(get_presets)},
-      Route{"GET", route_stream, operations::read_stream(), at_once(upgrade_required)},
-
-      Route{"POST", "/v1/frames", operations::draw_view(), later(post_frame, backend, admission),
-            Charge::valid_picture},
-      Route{"POST", "/v1/forecasts", operations::forecast_view(), later(post_forecast, backend)},
-      Route{"POST", "/v1/picks", operations::pick_feature(), later(post_pick, backend),
-            Charge::picture},
-      Route{"POST", "/v1/references", operations::draw_reference(),
-            later(post_reference, backend, admission, base_path), Charge::valid_picture},
-      Route{"GET", "/v1/references/{id}", operations::read_reference(),
-            at_once(get_reference, backend.references)},
-
+  return {
       Route{"POST", "/v1/views", operations::save_view(),
             later(post_saved_view, views, view_io, base_path)},
       Route{"GET", "/v1/views/{id}", operations::read_view(), at_once(get_view, views)},
@@ -145,9 +176,18 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
       Route{"PATCH", "/v1/views/{id}", operations::patch_view(), later(patch_view, views, view_io)},
       Route{"DELETE", "/v1/views/{id}", operations::remove_view(),
             later(delete_view, views, view_io)},
+  };
+}
 
-      Route{"GET", "/v1/jobs", operations::list_jobs(), at_once(get_jobs, jobs, base_path)},
-      Route{"GET", "/v1/jobs/{id}", operations::read_job(), at_once(get_job, jobs, base_path)},
+std::vector<Route> dataset_routes(const ServerOptions& options, tasks::Backend& backend,
+                                  tasks::TaskExecutor& look_ups) {
+  tasks::Catalogue& catalogue = backend.catalogue;
+  tasks::TaskExecutor& loads = backend.loads;
+  tasks::Jobs& jobs = backend.jobs;
+  return {
+      Route{"GET", "/v1/jobs", operations::list_jobs(), at_once(get_jobs, jobs, options.base_path)},
+      Route{"GET", "/v1/jobs/{id}", operations::read_job(),
+            at_once(get_job, jobs, options.base_path)},
       Route{"DELETE", "/v1/jobs/{id}", operations::cancel_job(), at_once(delete_job, jobs)},
 
       Route{"GET", "/v1/files", operations::list_files(), later(get_files, options, look_ups)},
@@ -158,6 +198,7 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
             later(get_dataset, catalogue, loads)},
       Route{"DELETE", "/v1/datasets/{id}", operations::release_dataset(),
             at_once(delete_dataset, catalogue)},
+
       Route{"GET", "/v1/datasets/{id}/probe", operations::probe_fields(),
             later(get_probe, catalogue, loads), Charge::picture},
       Route{"GET", "/v1/datasets/{id}/fields/{field}/histogram", operations::count_values(),
@@ -173,8 +214,23 @@ std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>&
       Route{"POST", "/v1/datasets/{id}/fields/{field}/range", operations::read_range_in_view(),
             later(post_range, backend), Charge::picture},
   };
-  std::ranges::move(frame_routes(backend, admission, views), std::back_inserter(rows));
-  return rows;
+}
+
+}  // namespace
+
+std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
+                          access::Admission& admission, tasks::Backend& backend,
+                          tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io) {
+  const DocumentsPtr described = documents_of(options);
+  std::vector<Route> table;
+  for (auto part : {service_routes(options, draining, backend, described),
+                    picture_routes(options.base_path, admission, backend),
+                    frame_routes(backend, admission, *options.views), view_routes(options, view_io),
+                    dataset_routes(options, backend, look_ups)}) {
+    std::move(part.begin(), part.end(), std::back_inserter(table));
+  }
+  described->describe(entries_of(table));
+  return table;
 }
 
 }  // namespace windsplat::api

@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "protocol/codec.hpp"
-#include "server/api/resources.hpp"
 #include "server/api/embedded_schemas.hpp"
+#include "server/api/resources.hpp"
 #include "server/data/model/digest.hpp"
 #include "server/http/gzip.hpp"
 #include "server/http/negotiate.hpp"
@@ -119,10 +119,16 @@ http::Response get_service(const ServerOptions& options) {
                    {"presets", base + "v1/presets"},
                    {"stream", base + "v1/stream"},
                    {"viewSchema", base + "view.schema.json"},
+                   {"openapi", base + "v1/openapi.json"},
+                   {"openapiPage", base + "v1/openapi.html"},
+                   {"asyncapi", base + "v1/asyncapi.json"},
+                   {"asyncapiPage", base + "v1/asyncapi.html"},
                    {"livez", base + "livez"},
                    {"readyz", base + "readyz"},
                    {"metrics", base + "metrics"}};
-  return json_response(protocol::encode_service(service));
+  http::Response response = json_response(protocol::encode_service(service));
+  response.headers.emplace_back("Link", description_links(base));
+  return response;
 }
 
 http::Response get_color_maps() {

@@ -371,7 +371,7 @@ TEST(Shapes, InvalidUtf8IsReplacedWithoutThrowing) {
   expect_shape("problem", encode_problem(problem));
 }
 
-TEST(Shapes, ServiceColorMapsAndPresets) {
+TEST(Shapes, ServiceHealthColorMapsAndPresets) {
   ServiceDescription service;
   service.version = "0.1.0";
   service.links = {{"datasets", "/v1/datasets"}, {"stream", "/v1/stream"}};
@@ -382,6 +382,9 @@ TEST(Shapes, ServiceColorMapsAndPresets) {
   expect_shape("colorMaps", maps);
   EXPECT_EQ(Json::parse(maps), Json::parse(R"({"colormaps":[{"name":"grays","kind":"sequential",
                                                "colors":["#000000","#ff09a0"]}]})"));
+  for (const char* state : {"live", "ready", "draining"}) {
+    expect_shape("health", encode_health(state));
+  }
   expect_shape("presets", encode_presets({"default", "top"}));
   EXPECT_EQ(encode_presets({"default", "top"}), R"({"presets":["default","top"]})");
 }

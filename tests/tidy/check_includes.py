@@ -27,7 +27,7 @@ MAY_INCLUDE = dependencies((PROJECT / "docs/design/overview.md").read_text())
 CONFINED = [
     ("nlohmann/", r"nlohmann/",
      r"protocol/(view/)?codec\w*\.[ch]pp|server/data/formats/(zarr/json|(raw|list)/document)\.cpp|"
-     r"server/data/formats/plain/json_text\.[ch]pp|tests/.*"),
+     r"server/data/formats/plain/json_text\.[ch]pp|server/api/documents/\w+\.[ch]pp|tests/.*"),
     ("ecCodes", r"eccodes\.h", r"server/data/formats/grib/.*|tests/.*"),
     ("PROJ", r"proj\.h",
      r"server/data/cf/grid/(proj_context\.hpp|(projected_columns|crs_wkt)\.cpp)|tests/.*"),

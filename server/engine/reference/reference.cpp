@@ -303,8 +303,8 @@ struct Painting::State {
     }
     ThreadPool alone(1);
     shown = scene.surfaces;  // the scene may end before the drawing
-    surfaces.list(shown, surface_view(scene.camera), scene.camera.width,
-                  scene.camera.height, alone, cancel);
+    surfaces.list(shown, surface_view(scene.camera), scene.camera.width, scene.camera.height, alone,
+                  cancel);
     frame.surfaces = &surfaces;
     if (cancel.cancelled()) return cancelled_error();
     return {};
