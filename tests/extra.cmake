@@ -68,6 +68,8 @@ if(NOT WINDSPLAT_SANITIZE)
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(values ${SYSTEM_PYTHON} tests/integration/values.py
     --program=$<TARGET_FILE:windsplat>)
+  windsplat_program_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi_requests.py
+    --program=$<TARGET_FILE:windsplat> --count=1000)
   windsplat_program_test(scripts python3 tests/integration/scripts_test.py)
   windsplat_program_test(sbom python3 tests/integration/sbom.py --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(install python3 tests/integration/install_test.py
@@ -147,6 +149,8 @@ if(WINDSPLAT_SANITIZE)
   windsplat_long_test(spoiled python3 tests/fuzz/mutate_files.py --count=300)
 else()
   windsplat_long_test(spoiled python3 tests/fuzz/mutate_files.py --count=10000)
+  windsplat_long_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi_requests.py
+    --count=10000 --seed=1)
   windsplat_long_test(drawn ${SYSTEM_PYTHON} tests/fuzz/draw_mutants.py --count=3400)
   windsplat_long_test(tutorial python3 tests/deploy/tutorial.py)
 endif()
