@@ -172,6 +172,17 @@ const char* Router::route(const http::Request& request, const http::Reply& reply
   return resource ? resource->name : route_other;
 }
 
+StreamedBody Router::stream_body(const http::Request& request, std::uint64_t bytes) const {
+  const auto resource = find(request);
+  const Route* const route = resource ? resource->find(request.method) : nullptr;
+  if (route == nullptr || !route->open_sink) return {};
+  if (draining_) {
+    return {nullptr,
+            http::problem_response(make_error(ErrorKind::draining, "the server is shutting down"))};
+  }
+  return route->open_sink(resource->values, request, bytes);
+}
+
 std::vector<const char*> Router::route_names() const {
   std::vector<const char*> names{route_login, route_page, route_preflight, route_other};
   for (const Route& route : routes_) {

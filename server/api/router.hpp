@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ class Router {
   // Calls `reply` once: now, or later from the renderer's thread. Does not throw after the reply.
   // Returns the route name (routes.hpp).
   const char* route(const http::Request& request, const http::Reply& reply) const;
+  // Where the body of the request goes, of which only the header has been received; neither sink
+  // nor refusal: it is read as a whole.
+  [[nodiscard]] StreamedBody stream_body(const http::Request& request, std::uint64_t bytes) const;
   // All values of route(), without repetition: a bounded set.
   [[nodiscard]] std::vector<const char*> route_names() const;
 

@@ -3,13 +3,17 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "server/access/admission.hpp"
 #include "server/api/operations/operation.hpp"
 #include "server/api/server_options.hpp"
+#include "server/http/body_sink.hpp"
 #include "server/http/exchange.hpp"
 #include "server/tasks/backend.hpp"
 
@@ -20,6 +24,15 @@ using PathValues = std::vector<std::string>;
 // Replies once, now or later. Does not throw after the reply.
 using Handler = std::function<void(const PathValues& values, const http::Request& request,
                                    const http::Reply& reply)>;
+
+// Where a body goes that is not read as a whole, or why it is not received.
+struct StreamedBody {
+  std::shared_ptr<http::BodySink> sink;
+  std::optional<http::Response> refusal;
+};
+// `bytes`: of the body that follows.
+using OpenSink = std::function<StreamedBody(const PathValues& values, const http::Request& request,
+                                            std::uint64_t bytes)>;
 
 enum class Charge {
   none,
@@ -39,6 +52,8 @@ struct Route {
   Charge charge = Charge::none;
   Place place = Place::base;
   const char* name = path;  // name by which requests are logged and counted
+  OpenSink open_sink =
+      nullptr;  // called once the header is received; empty: the body is read whole
 };
 
 // The table, with each handler bound to the parts of the server that it uses. In the order of

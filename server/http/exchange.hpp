@@ -18,6 +18,8 @@ namespace windsplat::http {
 using Headers = std::vector<std::pair<std::string, std::string>>;
 using Parameters = std::vector<std::pair<std::string, std::string>>;
 
+class BodySink;
+
 struct Request {
   std::string method;             // "GET"
   std::vector<std::string> path;  // decoded segments below the base path; an empty last segment is
@@ -27,10 +29,11 @@ struct Request {
   Parameters query;  // decoded, in order
   Headers headers;   // in the order received
   std::string body;
-  CancelToken cancel;      // raised when the client disconnects
-  std::uint64_t peer = 0;  // id of the connection
-  std::string address;     // of the client, without a port, or its user; empty: unknown
-  std::string id;          // sent with the response and logged (request_id.hpp)
+  std::shared_ptr<BodySink> sink;  // has taken the body in place of `body`; null: none
+  CancelToken cancel;              // raised when the client disconnects
+  std::uint64_t peer = 0;          // id of the connection
+  std::string address;             // of the client, without a port, or its user; empty: unknown
+  std::string id;                  // sent with the response and logged (request_id.hpp)
 
   // All values of the header in order, joined by ", "; names are case-insensitive.
   [[nodiscard]] std::string header(std::string_view name) const;

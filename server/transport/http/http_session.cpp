@@ -1,11 +1,13 @@
 // HTTP over TCP or TLS. A request is refused if necessary before any of its body is read.
 #include "server/transport/http/http_session.hpp"
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "protocol/limits.hpp"
 #include "server/access/address.hpp"
 #include "server/http/cors.hpp"
 #include "server/http/gzip.hpp"
@@ -84,7 +86,7 @@ class HttpSession final : public Connection, public HttpOwner {
                                     wire_.secure())) {
       return refuse(std::move(*refusal));
     }
-    upgrade ? begin_stream() : reader_.read_body();
+    upgrade ? begin_stream() : receive_body();
   }
 
   void on_request() override {
@@ -142,6 +144,18 @@ class HttpSession final : public Connection, public HttpOwner {
   [[nodiscard]] const std::string& request_id() const override { return current_.request.id; }
 
  private:
+  void receive_body() {
+    http::Request& request = current_.request;
+    const std::uint64_t bytes = reader_.body_bytes();
+    auto streamed = context_.router.stream_body(request, bytes);
+    if (streamed.refusal) return refuse(std::move(*streamed.refusal));
+    if (!streamed.sink && bytes > protocol::limits::http_body_bytes_max) {
+      return refuse(http::body_too_large());
+    }
+    request.sink = std::move(streamed.sink);
+    reader_.read_body();
+  }
+
   // Charged to the peer until the client address is known.
   [[nodiscard]] http::Request blank_request() const {
     http::Request request;

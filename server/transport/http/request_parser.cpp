@@ -20,7 +20,7 @@ namespace limits = protocol::limits;
 void RequestParser::begin() {
   parser_.emplace();
   parser_->header_limit(static_cast<std::uint32_t>(limits::http_header_bytes_max));
-  parser_->body_limit(limits::http_body_bytes_max);
+  parser_->body_limit(boost::none);  // see RequestReader::read_body()
   searched_ = 0;
 }
 

@@ -20,6 +20,7 @@ class RequestParser {
 
   void begin();  // prepares for the next request; received bytes are kept
   [[nodiscard]] Parser& parser() { return *parser_; }
+  [[nodiscard]] const Parser& parser() const { return *parser_; }
   [[nodiscard]] beast::flat_buffer& buffer() { return buffer_; }
   [[nodiscard]] bool has_input() const { return buffer_.size() > 0; }
   // Space for the next read.

@@ -2,13 +2,19 @@
 // need a Content-Length.
 #include "server/transport/http/request_reader.hpp"
 
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/http/read.hpp>
 #include <string_view>
 #include <utility>
 
 #include "protocol/limits.hpp"
+#include "server/http/body_sink.hpp"
 #include "server/http/http_checks.hpp"
+#include "server/transport/guarded.hpp"
+#include "server/transport/post_or_retry.hpp"
 
 namespace windsplat::transport {
 namespace {
@@ -19,6 +25,10 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::seconds first_timeout{5};  // deadline for the first byte of a connection
 constexpr std::chrono::seconds idle_timeout{60};  // deadline for the next request of a connection
 constexpr std::chrono::seconds drain_idle_timeout{2};
+// Of a body that a sink takes: 8 KiB a second at least.
+constexpr std::size_t part_bytes = std::size_t{256} << 10;
+constexpr std::chrono::seconds part_timeout{32};
+constexpr std::chrono::seconds sink_timeout{60};  // deadline for taking a part
 
 }  // namespace
 
@@ -64,8 +74,14 @@ void RequestReader::find_header_end() {
   owner_.on_header();
 }
 
+std::uint64_t RequestReader::body_bytes() const {
+  return input_.parser().content_length().value_or(0);
+}
+
 void RequestReader::read_body() {
   if (input_.parser().is_done()) return complete();
+  unread_bytes_ = body_bytes();
+  input_.parser().body_limit(limits::http_body_bytes_max);
   wire_.within(std::chrono::seconds(limits::http_body_timeout_s));
   // Ignored in HTTP/1.0 (RFC 9110, 10.1.1).
   const bool expects = input_.parser().get().version() == 11 &&
@@ -80,6 +96,7 @@ void RequestReader::read_body() {
 }
 
 void RequestReader::read_rest() {
+  if (current_.request.sink) return stream_some();
   beast::http::async_read(wire_.wire(), input_.buffer(), input_.parser(),
                           owner_.handler([this](ErrorCode fault, std::size_t) {
                             if (fault == beast::http::error::body_limit)
@@ -90,6 +107,44 @@ void RequestReader::read_rest() {
                             if (fault) return owner_.refuse(RequestParser::refusal_of(fault));
                             complete();
                           }));
+}
+
+// One part of the body at a time: the next one is read when the sink has taken the last, so that a
+// fast client waits for a slow disk.
+void RequestReader::stream_some() {
+  if (unread_bytes_ == 0) return complete();
+  auto& buffer = input_.buffer();
+  const std::size_t wanted =
+      static_cast<std::size_t>(std::min<std::uint64_t>(unread_bytes_, part_bytes));
+  std::vector<std::byte> part(wanted);
+  const std::size_t received = asio::buffer_copy(asio::buffer(part), buffer.data());
+  buffer.consume(received);
+  if (received == wanted) return hand_over(std::move(part));
+  wire_.within(part_timeout);
+  const asio::mutable_buffer rest(part.data() + received, wanted - received);
+  asio::async_read(
+      wire_.wire(), rest,
+      owner_.handler([this, part = std::move(part)](ErrorCode fault, std::size_t) mutable {
+        if (fault) return owner_.close();
+        hand_over(std::move(part));
+      }));
+}
+
+void RequestReader::hand_over(std::vector<std::byte> bytes) {
+  unread_bytes_ -= bytes.size();
+  wire_.within(sink_timeout);
+  const auto taken = [this](std::optional<http::Response> refusal) {
+    refusal ? owner_.refuse(std::move(*refusal)) : stream_some();
+  };
+  current_.request.sink->take(std::move(bytes), [taken, weak = owner_.weak_from_this(),
+                                                 executor = wire_.wire().get_executor()](
+                                                    std::optional<http::Response> refusal) {
+    // If this fails, the deadline closes the connection.
+    post_or_retry(executor, [taken, weak, refusal = std::move(refusal)]() mutable {
+      const auto owner = weak.lock();
+      if (owner) guarded(owner, [&] { taken(std::move(refusal)); })();
+    });
+  });
 }
 
 void RequestReader::complete() {

@@ -3,7 +3,10 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "server/transport/http/current_request.hpp"
 #include "server/transport/http/http_owner.hpp"
@@ -21,7 +24,9 @@ class RequestReader {
 
   // Reads the next request up to its header. `draining`: waits a short time for it.
   void next(bool draining);
+  // Into the request, or into its sink.
   void read_body();
+  [[nodiscard]] std::uint64_t body_bytes() const;  // of the request whose header has been read
   // While a request is answered, detects a peer that disconnects. The read continues after the
   // response, since a TLS record must not be abandoned; the data belong to the next request.
   // Skipped if the next request is already buffered.
@@ -38,6 +43,8 @@ class RequestReader {
   void read_some();
   void find_header_end();
   void read_rest();
+  void stream_some();
+  void hand_over(std::vector<std::byte> bytes);
   void complete();
 
   HttpOwner& owner_;
@@ -46,7 +53,8 @@ class RequestReader {
   RequestParser input_;
   Since idle_since_;
   Since unasked_since_ = std::chrono::steady_clock::now();
-  bool in_header_ = false;  // reading a header
+  std::uint64_t unread_bytes_ = 0;  // of a body that a sink takes
+  bool in_header_ = false;          // reading a header
   bool ended_ = false;
 };
 
