@@ -169,6 +169,13 @@ std::string encode_values(const ValuesDescription& values, ValuesDetail detail) 
   return dump(out);
 }
 
+std::string encode_upload(const UploadDescription& upload) {
+  return dump(Json{{"id", upload.id},
+                   {"bytes", upload.bytes},
+                   {"digest", upload.digest},
+                   {"expires", upload.expires}});
+}
+
 std::string encode_series(const SeriesDescription& series) {
   Json times = Json::array();
   for (const StepDescription& time : series.times) {
@@ -284,6 +291,10 @@ Result<DatasetRequest> parse_dataset_request(std::string_view json) {
     faults.add("/selection",
                "is not a key beside path: name the entry behind the path, as in "
                "\"winds.nc?number=3\"");
+  } else if (tree->is_object() && tree->contains("upload")) {
+    ObjectReader reader(*tree, "", faults);
+    reader.text("upload", out.upload, 1, Presence::required);
+    reader.finish();
   } else if (tree->is_object() && tree->contains("files")) {
     read_list(*tree, faults, out);
   } else if (tree->is_object() && (tree->contains("from") || tree->contains("selection"))) {
@@ -300,8 +311,8 @@ Result<DatasetRequest> parse_dataset_request(std::string_view json) {
       faults.add(
           "/path",
           "is required: a body is {\"path\": \"winds.nc\"}, with a file below --data-root or "
-          "a URL of a --data-host, {\"files\": [\"ua_*.nc\", \"va_*.nc\"]}, or {\"from\": "
-          "\"gcm\", \"selection\": {\"number\": 3}}");
+          "a URL of a --data-host, {\"upload\": \"winds.nc\"}, {\"files\": [\"ua_*.nc\", "
+          "\"va_*.nc\"]}, or {\"from\": \"gcm\", \"selection\": {\"number\": 3}}");
     }
     reader.text("path", out.path, 1, is_named ? Presence::required : Presence::optional,
                 limits::path_chars_max);

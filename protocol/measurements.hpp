@@ -82,6 +82,13 @@ struct ValuesDescription {
   std::vector<double> latitudes;
 };
 
+struct UploadDescription {
+  std::string id;
+  std::uint64_t bytes = 0;
+  std::string digest;   // as in Content-Digest
+  std::string expires;  // UTC
+};
+
 struct RangeDescription {
   std::optional<Range> range;  // absent if all samples are masked
   std::int64_t masked = 0;
@@ -161,6 +168,7 @@ std::string encode_histogram(const HistogramDescription& histogram);
 std::string encode_probe(const ProbeDescription& probe);
 enum class ValuesDetail { ends, all };  // coordinates: of the first and last sample, of all
 std::string encode_values(const ValuesDescription& values, ValuesDetail detail);
+std::string encode_upload(const UploadDescription& upload);
 std::string encode_series(const SeriesDescription& series);
 std::string encode_range(const RangeDescription& range);
 std::string encode_pick(const std::optional<PickedFeature>& feature);
@@ -172,6 +180,7 @@ std::string encode_jobs(const std::vector<JobDescription>& jobs);
 // its choices, or a list of files below the data root.
 struct DatasetRequest {
   std::string path;
+  std::string upload;
   std::string list;   // the text of the list, whose content is checked when it is opened
   std::string first;  // its first name or pattern
   std::string from;

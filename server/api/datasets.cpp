@@ -64,6 +64,31 @@ http::Response open_list(const ServerOptions& options, tasks::Backend& backend,
   return open_location(options, backend, location);
 }
 
+// The dataset is removed with the upload.
+http::Response open_upload(const ServerOptions& options, tasks::Backend& backend,
+                           const std::string& id) {
+  const auto& uploads = options.uploads;
+  if (!uploads) {
+    return http::problem_response(403, "Forbidden",
+                                  "uploads are disabled: start the server with --upload-limit");
+  }
+  const auto refuse = [](const Error& error) {
+    return http::problem_response(make_error_at(error.kind, "/upload", error.message));
+  };
+  if (const auto upload = uploads->find(id); !upload) return refuse(upload.error());
+  const auto located =
+      data::locate_beneath(uploads->folder().native(), uploads::Uploads::path_of(id));
+  if (!located) return refuse(located.error());
+  return open_in_job(backend, options.base_path,
+                     [&backend, uploads, location = *located,
+                      id](const CancelToken& cancel) -> Result<std::string> {
+                       auto dataset = backend.catalogue.open(location, cancel);
+                       if (!dataset || uploads->opened(id, *dataset)) return dataset;
+                       backend.catalogue.forget(*dataset);
+                       return make_error(ErrorKind::not_found, "the upload was removed");
+                     });
+}
+
 // No file is named: other entries of the files of a listed dataset.
 http::Response open_entries(const ServerOptions& options, tasks::Backend& backend,
                             const protocol::DatasetRequest& request) {
@@ -105,7 +130,8 @@ void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
   if (!is_json(request.header("Content-Type"))) {
     reply(http::problem_response(415, "Unsupported Media Type",
                                  "Content-Type must be application/json: {\"path\": ...}, "
-                                 "{\"files\": [...]} or {\"from\": ..., \"selection\": {...}}"));
+                                 "{\"upload\": ...}, {\"files\": [...]} or {\"from\": ..., "
+                                 "\"selection\": {...}}"));
     return;
   }
   auto wanted = protocol::parse_dataset_request(request.body);
@@ -115,6 +141,13 @@ void post_dataset(const ServerOptions& options, tasks::TaskExecutor& look_ups,
   }
   if (!wanted->from.empty()) {
     reply(open_entries(options, backend, *wanted));
+    return;
+  }
+  if (!wanted->upload.empty()) {
+    run_later(look_ups, request, std::move(reply), "a look-up", nullptr,
+              [&options, &backend, id = std::move(wanted->upload)] {
+                return open_upload(options, backend, id);
+              });
     return;
   }
   if (options.data_root.empty() && (!options.locate_url || !wanted->list.empty())) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 
 #include "server/access/admission.hpp"
 #include "server/api/documents/documents.hpp"
+#include "server/api/routes.hpp"
 #include "server/api/server_options.hpp"
 #include "server/frame/frame.hpp"
 #include "server/http/exchange.hpp"
@@ -108,6 +110,19 @@ void patch_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const st
                 const http::Request& request, http::Reply reply);
 void delete_view(views::SavedViews& views, tasks::TaskExecutor& view_io, const std::string& id,
                  const http::Request& request, http::Reply reply);
+
+// Where the body of a PUT of an upload goes, or why it is refused; `disk` writes it.
+StreamedBody receive_upload(const ServerOptions& options, tasks::TaskExecutor& disk,
+                            const std::string& id, const http::Request& request,
+                            std::uint64_t bytes);
+// Checks the upload that was received, and makes it visible.
+void put_upload(const ServerOptions& options, tasks::TaskExecutor& disk,
+                const http::Request& request, http::Reply reply);
+http::Response get_upload(const ServerOptions& options, const std::string& id);
+// With the datasets that were opened from it.
+void delete_upload(const ServerOptions& options, tasks::TaskExecutor& disk,
+                   tasks::Catalogue& catalogue, const std::string& id, const http::Request& request,
+                   http::Reply reply);
 
 // An embedded file of the page; `path` as in web_assets().
 bool has_page(const std::string& path);

@@ -216,17 +216,35 @@ std::vector<Route> dataset_routes(const ServerOptions& options, tasks::Backend& 
   };
 }
 
+std::vector<Route> upload_routes(const ServerOptions& options, tasks::TaskExecutor& disk,
+                                 tasks::Catalogue& catalogue) {
+  const OpenSink receive = [&options, &disk](const PathValues& values, const http::Request& request,
+                                             std::uint64_t bytes) {
+    return receive_upload(options, disk, values[0], request, bytes);
+  };
+  const char* const name = "/v1/uploads/{id}";
+  return {
+      Route{"GET", "/v1/uploads/{id}", operations::read_upload(), at_once(get_upload, options)},
+      Route{"PUT", "/v1/uploads/{id}", operations::upload_file(), later(put_upload, options, disk),
+            Charge::none, Place::base, name, receive},
+      Route{"DELETE", "/v1/uploads/{id}", operations::remove_upload(),
+            later(delete_upload, options, disk, catalogue)},
+  };
+}
+
 }  // namespace
 
 std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
                           access::Admission& admission, tasks::Backend& backend,
-                          tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io) {
+                          tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io,
+                          tasks::TaskExecutor& upload_io) {
   const DocumentsPtr described = documents_of(options);
   std::vector<Route> table;
   for (auto part : {service_routes(options, draining, backend, described),
                     picture_routes(options.base_path, admission, backend),
                     frame_routes(backend, admission, *options.views), view_routes(options, view_io),
-                    dataset_routes(options, backend, look_ups)}) {
+                    dataset_routes(options, backend, look_ups),
+                    upload_routes(options, upload_io, backend.catalogue)}) {
     std::move(part.begin(), part.end(), std::back_inserter(table));
   }
   described->describe(entries_of(table));

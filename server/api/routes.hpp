@@ -58,10 +58,11 @@ struct Route {
 
 // The table, with each handler bound to the parts of the server that it uses. In the order of
 // methods that Allow states. Documented in docs/user/api.md. `look_ups` resolve posted names,
-// `view_io` changes saved views.
+// `view_io` changes saved views, `upload_io` uploads.
 std::vector<Route> routes(const ServerOptions& options, const std::atomic<bool>& draining,
                           access::Admission& admission, tasks::Backend& backend,
-                          tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io);
+                          tasks::TaskExecutor& look_ups, tasks::TaskExecutor& view_io,
+                          tasks::TaskExecutor& upload_io);
 
 // Names by which requests are counted, besides the paths of routes().
 inline constexpr const char* route_stream = "/v1/stream";

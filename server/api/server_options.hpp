@@ -12,6 +12,7 @@
 #include "server/access/limits.hpp"
 #include "server/base/error.hpp"
 #include "server/data/files/files.hpp"
+#include "server/uploads/uploads.hpp"
 #include "server/views/saved_views.hpp"
 
 namespace windsplat::transport {
@@ -37,7 +38,8 @@ struct ServerOptions {
   // Locates a URL that it opens too; empty: none. Errors: invalid, also if its host is not
   // permitted.
   std::function<Result<data::Location>(const std::string&)> locate_url;
-  std::shared_ptr<views::SavedViews> views;  // null: in memory only
+  std::shared_ptr<views::SavedViews> views;   // null: in memory only
+  std::shared_ptr<uploads::Uploads> uploads;  // null: none are accepted
   int sessions_max = 64;
   access::Limits limits;
   int idle_timeout_s = 300;

@@ -7,6 +7,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <ctime>
 #include <exception>
 #include <new>
 #include <thread>
@@ -104,8 +105,10 @@ struct Server::State {
       if (!fault) parts.admission.log_refused_handshakes();
       if (fault || parts.draining) return;
       const auto look = [this] {
-        auto found = tasks::run_guarded<std::vector<std::string>>(
-            "file check", never, [this] { return parts.backend.catalogue.look_after(); });
+        auto found = tasks::run_guarded<std::vector<std::string>>("file check", never, [this] {
+          end_expired_uploads();
+          return parts.backend.catalogue.look_after();
+        });
         std::vector<std::string> changed;
         if (found) changed = std::move(*found);
         const auto go_on_looking = [this, changed = std::move(changed)] {
@@ -120,6 +123,14 @@ struct Server::State {
       checking_files = true;
     });
     checking_files = true;
+  }
+
+  // With the datasets opened from them.
+  void end_expired_uploads() {
+    if (!parts.options.uploads) return;
+    for (const std::string& dataset : parts.options.uploads->expire(std::time(nullptr))) {
+      parts.backend.catalogue.forget(dataset);
+    }
   }
 
   void tell_changes(const std::vector<std::string>& datasets) {

@@ -44,6 +44,10 @@ class Daemon:
             self.process.kill()
             self.process.communicate()
 
+    def kill(self):
+        self.process.kill()
+        self.process.communicate()
+
     def ask(self, method, path, body=None, headers=None):
         client = http.client.HTTPConnection(self.host, timeout=60)
         try:

@@ -81,6 +81,14 @@ TEST(Measurements, ValuesReportTheEndsOfTheirAxesOrEveryCoordinate) {
   EXPECT_FALSE(Json::parse(all)["axes"]["y"].contains("turn"));
 }
 
+TEST(Measurements, UploadsHaveTheirShape) {
+  expect_shape("upload", encode_upload({"a.nc", 3, "sha-256=:" + std::string(43, 'A') + "=:",
+                                        "2001-01-01T03:00:00Z"}));
+  EXPECT_EQ(parse_dataset_request(R"({"upload": "a.nc"})")->upload, "a.nc");
+  EXPECT_FALSE(parse_dataset_request(R"({"upload": "a.nc", "path": "b.nc"})"));
+  EXPECT_FALSE(parse_dataset_request(R"({"upload": ""})"));
+}
+
 TEST(Measurements, SeriesHistogramAndRangeHaveTheirShapes) {
   SeriesDescription series{
       position(), mixed_wind(), {{0, "a"}, {1, "b"}}, {std::vector{1.0, 2.0, 3.0}, std::nullopt}};

@@ -59,7 +59,7 @@ struct Header {
   bool required = true;  // of every answer that lists it
 };
 
-constexpr std::array<Header, 10> known_headers{{
+constexpr std::array<Header, 13> known_headers{{
     {"X-Request-Id", "string", "Id of the request, as in the log of the server."},
     {"ETag", "string", "Tag of the content, for If-None-Match and If-Match.", false},
     {"Location", "string", "Path of the job or of what was made."},
@@ -67,6 +67,9 @@ constexpr std::array<Header, 10> known_headers{{
     {"Retry-After", "integer", "Seconds until another attempt may succeed."},
     {"Server-Timing", "string", "Times of queue, render and encode, milliseconds."},
     {"Windsplat-Frame", "string", "FrameInfo as JSON: method, work and error of the picture."},
+    {"Windsplat-Values", "string", "Values as JSON: dimensions and axes of the array."},
+    {"RateLimit", "string", "What is left of the rates of the client (structured field).", false},
+    {"RateLimit-Policy", "string", "The rates of the client (structured field).", false},
     {"Vary", "string", "Headers of the request on which the answer depends."},
     {"Upgrade", "string", "The protocol: websocket."},
     {"WWW-Authenticate", "string", "How to authenticate (RFC 9110)."},
@@ -77,14 +80,20 @@ Json header_reference(const char* name) {
 }
 
 // Of every answer.
-Json request_id() { return {{"X-Request-Id", header_reference("X-Request-Id")}}; }
+Json common_headers() {
+  Json out = Json::object();
+  for (const char* name : {"X-Request-Id", "RateLimit", "RateLimit-Policy"}) {
+    out[name] = header_reference(name);
+  }
+  return out;
+}
 
 Json problem_content(Bundle& bundle) {
   return {{"application/problem+json", {{"schema", bundle.refer("problem")}}}};
 }
 
 Json response_of(const Answer& answer, Bundle& bundle) {
-  Json out{{"description", answer.summary}, {"headers", request_id()}};
+  Json out{{"description", answer.summary}, {"headers", common_headers()}};
   if (answer.status == 101) out.erase("headers");
   for (const std::string_view header : answer.headers) {
     const std::string name(header);
@@ -135,7 +144,7 @@ Json problem_responses(const std::vector<Operation>& operations, bool with_token
   Json out = Json::object();
   for (const Problem& problem : problems) {
     if (used.count(problem.status) == 0) continue;
-    Json headers = request_id();
+    Json headers = common_headers();
     if (std::find(retried.begin(), retried.end(), problem.status) != retried.end()) {
       headers["Retry-After"] = header_reference("Retry-After");
     }

@@ -125,7 +125,10 @@ Json operation_of(const Entry& entry, const About& about, Bundle& bundle) {
   if (operation.body) {
     Json content = Json::object();
     for (const std::string_view media : operation.body->media) {
-      content[std::string(media)] = {{"schema", bundle.refer(std::string(operation.body->shape))}};
+      Json& part = content[std::string(media)] = Json::object();
+      if (!operation.body->shape.empty()) {
+        part["schema"] = bundle.refer(std::string(operation.body->shape));
+      }
     }
     out["requestBody"] = {{"required", true},
                           {"description", operation.body->summary},
@@ -143,7 +146,8 @@ Json tags_of(const std::vector<Entry>& entries) {
       {"Saved views", "Views that the server keeps under an id."},
       {"Jobs", "Work that takes longer than a request."},
       {"Datasets", "Files, and the datasets that are open."},
-      {"Values", "Values of the fields of a dataset."}};
+      {"Values", "Values of the fields of a dataset."},
+      {"Uploads", "Files that clients send."}};
   Json out = Json::array();
   std::set<std::string_view> listed;
   for (const Entry& entry : entries) {

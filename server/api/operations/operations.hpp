@@ -57,6 +57,11 @@ Operation replace_view();
 Operation patch_view();
 Operation remove_view();
 
+// uploads.cpp
+Operation read_upload();
+Operation upload_file();
+Operation remove_upload();
+
 // Bodies and answers that many operations have.
 RequestBody view_body(std::string_view summary);
 Answer json_answer(std::string_view summary, std::string_view shape);

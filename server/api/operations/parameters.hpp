@@ -4,6 +4,7 @@
 #include "protocol/limits.hpp"
 #include "server/api/operations/operation.hpp"
 #include "server/frame/frame.hpp"
+#include "server/uploads/uploads.hpp"
 
 namespace windsplat::api::parameters {
 
@@ -121,5 +122,11 @@ inline constexpr Parameter forget{
     0,
     0,
     "false"};
+
+// --- uploads ------------------------------------------------------------------------------------
+
+inline constexpr Parameter keep{
+    "keep", Kind::integer,       "Seconds after which the upload is removed.",
+    1,      uploads::keep_s_max, "3600"};
 
 }  // namespace windsplat::api::parameters

@@ -22,8 +22,11 @@ Answer json_answer(std::string_view summary, std::string_view shape) {
 }
 
 Answer job_answer() {
-  return {
-      202, "A job, whose state is that of GET /v1/jobs/{id}.", "job", {json_media}, {"Location"}};
+  return {202,
+          "A job, whose state is that of GET /v1/jobs/{id}.",
+          "job",
+          {json_media},
+          {"Location", "Retry-After"}};
 }
 
 RequestBody view_body(std::string_view summary) { return {"view", {json_media}, summary}; }

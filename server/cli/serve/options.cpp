@@ -105,6 +105,14 @@ void add_data_options(CLI::App& command, ServeArguments& arguments) {
       ->envname("WINDSPLAT_STATE_DIR")
       ->type_name("DIR");
   command
+      .add_option(
+          "--upload-limit", arguments.upload_limit,
+          "Let clients upload files, of so many bytes in all, which are kept in --state-dir "
+          "for a limited time; 0: none. K, M, G, T as for --memory-limit")
+      ->envname("WINDSPLAT_UPLOAD_LIMIT")
+      ->type_name("BYTES")
+      ->capture_default_str();
+  command
       .add_flag(
           "--strict", arguments.strict,
           "Do not start if one of the datasets cannot be opened; without it, such a dataset is "

@@ -26,6 +26,7 @@ struct ServeArguments {
   bool strict = false;  // every dataset must open
   DataHostArguments data_hosts;
   std::string state_dir;
+  std::string upload_limit = "0";
   std::string memory_limit = "8G";
   std::string storage = "float32";
   unsigned threads = 0;

@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -29,6 +30,7 @@
 #include "server/scene/completed_view.hpp"
 #include "server/scene/defaults.hpp"
 #include "server/transport/server.hpp"
+#include "server/uploads/uploads.hpp"
 #include "server/views/saved_views.hpp"
 
 namespace windsplat::cli {
@@ -233,6 +235,12 @@ int serve(const CLI::App& given) {
   options.views = std::move(*views);
   options.alive_every = (*manager)->alive_every();
   options.alive = [told = *manager] { told->alive(); };
+  if (const auto bytes = upload_bytes(arguments); bytes && *bytes > 0) {
+    const auto folder = std::filesystem::absolute(arguments.state_dir) / "uploads";
+    auto uploads = uploads::Uploads::open({folder, *bytes});
+    if (!uploads) return answer(uploads.error());
+    options.uploads = std::move(*uploads);
+  }
   transport::Server server(std::move(options), store,
                            std::make_shared<ThreadPool>(arguments.threads));
   if (const auto ok = server.listen(); !ok) return answer(ok.error());

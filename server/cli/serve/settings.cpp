@@ -149,6 +149,7 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   }
   const auto limit = memory_limit(arguments.memory_limit);
   if (!limit) return limit.error();
+  if (const auto uploads = upload_bytes(arguments); !uploads) return uploads.error();
   auto data_root = plain_folder(arguments.data_root);
   if (!data_root) return data_root.error();
   if (!arguments.data_hosts.hosts.empty()) {
@@ -183,6 +184,21 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
 }
 
 }  // namespace
+
+Result<std::uint64_t> upload_bytes(const ServeArguments& arguments) {
+  const std::string& text = arguments.upload_limit;
+  if (text == "0") return std::uint64_t{0};
+  const auto bytes = parse_bytes(text);
+  if (!bytes) {
+    return make_error(ErrorKind::malformed, "--upload-limit '" + printable(text) +
+                                                "' is not a number of bytes such as 10G");
+  }
+  if (arguments.state_dir.empty()) {
+    return make_error(ErrorKind::invalid,
+                      "--upload-limit needs --state-dir, below which uploads are kept");
+  }
+  return *bytes;
+}
 
 Result<void> check_exposure(const ServeArguments& arguments, bool loopback) {
   if (loopback) return {};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <memory>
 
 #include "server/base/error.hpp"
@@ -22,6 +23,9 @@ struct ServeSettings {
 // or file and the reason.
 Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given,
                                                      const ServiceManager& manager);
+
+// Limit on uploads; 0: none are accepted. Errors: malformed; invalid without a folder.
+Result<std::uint64_t> upload_bytes(const ServeArguments& arguments);
 
 // Logs insecure but permitted settings: secrets that others can read or that are sent unencrypted,
 // an expired certificate.

@@ -1,9 +1,12 @@
 #include "server/transport/http/http_gate.hpp"
 
+#include <algorithm>
+#include <cstdint>
 #include <ctime>
 #include <string>
 #include <utility>
 
+#include "protocol/limits.hpp"
 #include "server/access/auth.hpp"
 #include "server/access/login.hpp"
 #include "server/http/http_checks.hpp"
@@ -24,7 +27,9 @@ bool is_known_host(const api::ServerOptions& options, const std::string& host) {
 
 std::optional<http::Response> check_form(const api::ServerOptions& options, http::Request& request,
                                          boost::beast::string_view target, unsigned version) {
-  if (auto fault = http::check_request(request, version)) return fault;
+  const std::uint64_t bytes_max = std::max<std::uint64_t>(
+      protocol::limits::http_body_bytes_max, options.uploads ? options.uploads->bytes_max() : 0);
+  if (auto fault = http::check_request(request, version, bytes_max)) return fault;
   const std::string host = request.header("Host");
   if (!is_known_host(options, host)) {
     return http::problem_response(

@@ -1,0 +1,271 @@
+// Each upload is written to a file of its own among those that are incomplete, and renamed once its
+// digest is right.
+#include "server/uploads/uploads.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <map>
+#include <mutex>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include "server/base/log.hpp"
+
+namespace windsplat::uploads {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::size_t id_chars_max = 80;
+constexpr std::size_t uploads_max = 256;  // that are complete
+constexpr std::size_t at_a_time_max = 16;
+constexpr std::size_t at_a_time_per_address = 4;
+constexpr const char* incomplete = ".incomplete";  // no id begins with a dot
+
+bool is_id_letter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+         c == '_';
+}
+
+std::string disk_words(int fault) { return std::generic_category().message(fault); }
+
+Error disk_error(int fault) {
+  const bool full = fault == ENOSPC || fault == EDQUOT;
+  return make_error(full ? ErrorKind::out_of_memory : ErrorKind::internal,
+                    "the upload cannot be stored: " + disk_words(fault));
+}
+
+std::string group_of(const std::string& id) { return id.substr(0, id.find('.')); }
+
+}  // namespace
+
+bool is_upload_id(std::string_view text) {
+  if (text.empty() || text.size() > id_chars_max) return false;
+  if (text.front() == '.' || text.back() == '.' || text.front() == '-') return false;
+  return text.find("..") == std::string_view::npos &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c == '.' || is_id_letter(c); });
+}
+
+struct Uploads::State {
+  struct Entry {
+    Upload upload;
+    std::string address;
+    std::vector<std::string> datasets;
+  };
+  // Of an address: what its uploads take, complete or not.
+  struct Share {
+    std::uint64_t bytes = 0;
+    std::size_t at_a_time = 0;
+  };
+
+  // All require the mutex.
+  void release(const std::string& address, std::uint64_t bytes) {
+    bytes_taken -= bytes;
+    const auto share = shares.find(address);
+    share->second.bytes -= bytes;
+    if (share->second.bytes == 0 && share->second.at_a_time == 0) shares.erase(share);
+  }
+  void end_receiving(const std::string& id, const std::string& address) {
+    receiving.erase(id);
+    --shares[address].at_a_time;
+  }
+  std::vector<std::string> drop(std::map<std::string, Entry>::iterator at) {
+    const Entry entry = std::move(at->second);
+    entries.erase(at);
+    const fs::path path = options.folder / path_of(entry.upload.id);
+    std::error_code fault;
+    fs::remove_all(path, fault);
+    if (fault) {
+      log::warn("an upload cannot be removed",
+                {{"upload", entry.upload.id}, {"fault", fault.message()}});
+    }
+    fs::remove(path.parent_path(), fault);  // unless it has other files
+    release(entry.address, entry.upload.bytes);
+    return entry.datasets;
+  }
+
+  Options options;
+  std::mutex mutex;
+  std::uint64_t bytes_taken = 0;
+  std::uint64_t count = 0;  // names of incomplete files
+  std::map<std::string, Entry> entries;
+  std::set<std::string> receiving;
+  std::map<std::string, Share> shares;
+};
+
+Uploads::Uploads(std::shared_ptr<State> state) : state_(std::move(state)) {}
+
+Uploads::~Uploads() {
+  std::error_code fault;
+  fs::remove_all(state_->options.folder, fault);
+  if (fault) log::warn("uploads cannot be removed", {{"fault", fault.message()}});
+}
+
+Result<std::shared_ptr<Uploads>> Uploads::open(Options options) {
+  const auto unusable = [&](const std::string& why) {
+    return make_error(ErrorKind::invalid,
+                      "the folder of uploads '" + printable(options.folder.native()) + "' " + why);
+  };
+  std::error_code fault;
+  // What a daemon left that was killed has this folder; other files are not ours to remove.
+  if (fs::exists(options.folder, fault) && !fs::is_empty(options.folder, fault) &&
+      !fs::is_directory(options.folder / incomplete, fault)) {
+    return unusable("has other files: choose another --state-dir");
+  }
+  fs::remove_all(options.folder, fault);
+  if (fault) return unusable("cannot be emptied: " + fault.message());
+  for (const fs::path& folder : {options.folder, options.folder / incomplete}) {
+    if (::mkdir(folder.c_str(), S_IRWXU) != 0) {
+      return unusable("cannot be created: " + disk_words(errno));
+    }
+  }
+  auto state = std::make_shared<State>();
+  state->options = std::move(options);
+  return std::shared_ptr<Uploads>(new Uploads(std::move(state)));
+}
+
+std::uint64_t Uploads::bytes_max() const { return state_->options.bytes_max; }
+
+const fs::path& Uploads::folder() const { return state_->options.folder; }
+
+std::string Uploads::path_of(const std::string& id) { return group_of(id) + '/' + id; }
+
+Result<std::shared_ptr<Incoming>> Uploads::begin(const Announced& announced) {
+  const auto& [id, bytes, keep_s, digest, address] = announced;
+  if (!is_upload_id(id)) {
+    return make_error(ErrorKind::invalid, "the id of an upload is the name of a file, 1 to " +
+                                              std::to_string(id_chars_max) +
+                                              " letters, digits, '-', '_' and single dots, not '" +
+                                              printable(id, id_chars_max) + "'");
+  }
+  if (bytes == 0) return make_error(ErrorKind::invalid, "an upload must have a body");
+  State& state = *state_;
+  const std::lock_guard lock(state.mutex);
+  if (state.entries.contains(id) || state.receiving.contains(id)) {
+    return make_error(ErrorKind::invalid, "an upload '" + id + "' exists: delete it first");
+  }
+  const auto share = state.shares.find(address);
+  const State::Share taken = share == state.shares.end() ? State::Share{} : share->second;
+  if (state.receiving.size() >= at_a_time_max || taken.at_a_time >= at_a_time_per_address ||
+      state.entries.size() + state.receiving.size() >= uploads_max) {
+    return Error{ErrorKind::busy, "too many uploads at a time", {}, 1};
+  }
+  const std::uint64_t all = state.options.bytes_max;
+  const std::uint64_t left = std::min(all - state.bytes_taken, all / 2 - taken.bytes);
+  if (bytes > left) {
+    return make_error(ErrorKind::out_of_memory,
+                      "the upload has " + std::to_string(bytes) + " bytes, and " +
+                          std::to_string(left) + " are left of --upload-limit " +
+                          std::to_string(all) + ", of which an address may have half");
+  }
+  const fs::path path = state.options.folder / incomplete / std::to_string(state.count);
+  const int file =
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR);
+  if (file < 0) return disk_error(errno);
+  ++state.count;
+  state.receiving.insert(id);
+  state.bytes_taken += bytes;
+  state.shares[address].bytes += bytes;
+  ++state.shares[address].at_a_time;
+  return std::shared_ptr<Incoming>(new Incoming(state_, announced, path, file));
+}
+
+Result<Upload> Uploads::find(const std::string& id) const {
+  const std::lock_guard lock(state_->mutex);
+  const auto at = state_->entries.find(id);
+  if (at != state_->entries.end()) return at->second.upload;
+  return make_error(ErrorKind::not_found,
+                    "there is no upload '" + printable(id, id_chars_max) + "'");
+}
+
+bool Uploads::opened(const std::string& id, const std::string& dataset) {
+  const std::lock_guard lock(state_->mutex);
+  const auto at = state_->entries.find(id);
+  if (at == state_->entries.end()) return false;
+  auto& datasets = at->second.datasets;
+  if (std::find(datasets.begin(), datasets.end(), dataset) == datasets.end()) {
+    datasets.push_back(dataset);
+  }
+  return true;
+}
+
+Result<std::vector<std::string>> Uploads::remove(const std::string& id) {
+  const std::lock_guard lock(state_->mutex);
+  const auto at = state_->entries.find(id);
+  if (at != state_->entries.end()) return state_->drop(at);
+  return make_error(ErrorKind::not_found,
+                    "there is no upload '" + printable(id, id_chars_max) + "'");
+}
+
+std::vector<std::string> Uploads::expire(std::time_t now) {
+  std::vector<std::string> out;
+  const std::lock_guard lock(state_->mutex);
+  for (auto at = state_->entries.begin(); at != state_->entries.end();) {
+    const auto one = at++;
+    if (one->second.upload.expires > now) continue;
+    log::info("an upload has expired", {{"upload", one->first}});
+    const auto datasets = state_->drop(one);
+    out.insert(out.end(), datasets.begin(), datasets.end());
+  }
+  return out;
+}
+
+Incoming::Incoming(std::shared_ptr<Uploads::State> state, Announced announced, fs::path path,
+                   int file)
+    : state_(std::move(state)),
+      announced_(std::move(announced)),
+      path_(std::move(path)),
+      file_(file) {}
+
+Incoming::~Incoming() {
+  if (file_ < 0) return;  // finished
+  ::close(file_);
+  ::unlink(path_.c_str());
+  const std::lock_guard lock(state_->mutex);
+  state_->end_receiving(announced_.id, announced_.address);
+  state_->release(announced_.address, announced_.bytes);
+}
+
+Result<void> Incoming::write(std::span<const std::byte> bytes) {
+  if (bytes.size() > announced_.bytes - written_) {
+    return make_error(ErrorKind::invalid, "the upload is longer than announced");
+  }
+  for (auto rest = bytes; !rest.empty();) {
+    const ssize_t done = ::write(file_, rest.data(), rest.size());
+    if (done < 0 && errno == EINTR) continue;
+    if (done < 0) return disk_error(errno);
+    rest = rest.subspan(static_cast<std::size_t>(done));
+  }
+  hasher_.add(bytes);
+  written_ += bytes.size();
+  return {};
+}
+
+Result<Upload> Incoming::finish() {
+  if (written_ != announced_.bytes) {
+    return make_error(ErrorKind::invalid, "the upload is shorter than announced");
+  }
+  const Sha256 digest = hasher_.finish();
+  if (announced_.digest && digest != *announced_.digest) {
+    return make_error(ErrorKind::invalid, "the upload has the digest " + digest_text(digest) +
+                                              ", not the announced " +
+                                              digest_text(*announced_.digest));
+  }
+  const std::lock_guard lock(state_->mutex);
+  const fs::path path = state_->options.folder / Uploads::path_of(announced_.id);
+  if (::mkdir(path.parent_path().c_str(), S_IRWXU) != 0 && errno != EEXIST)
+    return disk_error(errno);
+  if (::rename(path_.c_str(), path.c_str()) != 0) return disk_error(errno);
+  ::close(std::exchange(file_, -1));
+  const Upload upload{announced_.id, announced_.bytes, digest,
+                      std::time(nullptr) + announced_.keep_s};
+  state_->end_receiving(announced_.id, announced_.address);
+  state_->entries[announced_.id] = {upload, announced_.address, {}};
+  return upload;
+}
+
+}  // namespace windsplat::uploads

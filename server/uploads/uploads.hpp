@@ -1,0 +1,110 @@
+// Files that clients send: received into a private folder, within a quota, for a limited time.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <ctime>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/base/error.hpp"
+#include "server/uploads/content_digest.hpp"
+
+namespace windsplat::uploads {
+
+inline constexpr int keep_s_default = 3600;
+inline constexpr int keep_s_max = 7 * 86400;
+
+struct Options {
+  std::filesystem::path folder;  // private; what it holds is removed at both ends
+  std::uint64_t bytes_max = 0;   // of all files; one address may have half of it
+};
+
+struct Upload {
+  std::string id;
+  std::uint64_t bytes = 0;
+  Sha256 digest{};
+  std::time_t expires = 0;
+};
+
+// What is announced of an upload.
+struct Announced {
+  std::string id;
+  std::uint64_t bytes = 0;
+  int keep_s = keep_s_default;
+  std::optional<Sha256> digest;
+  std::string address;  // whose quota it takes
+};
+
+// Names of files: letters, digits, '-' and '_', in parts separated by single dots.
+bool is_upload_id(std::string_view text);
+
+class Incoming;
+
+// Thread-safe. Ids that equal up to their first dot share a folder, so that a description and its
+// data are companions.
+class Uploads {
+ public:
+  // Creates the folder, readable only by its owner, and empties it. Errors: invalid.
+  static Result<std::shared_ptr<Uploads>> open(Options options);
+  ~Uploads();
+  Uploads(const Uploads&) = delete;
+  Uploads& operator=(const Uploads&) = delete;
+
+  [[nodiscard]] std::uint64_t bytes_max() const;
+  [[nodiscard]] const std::filesystem::path& folder() const;
+  // Path of an upload below folder().
+  [[nodiscard]] static std::string path_of(const std::string& id);
+
+  // Reserves room for all of it. Errors: invalid (id, no bytes, or an upload of that id exists);
+  // busy (too many at a time); out_of_memory (quota).
+  Result<std::shared_ptr<Incoming>> begin(const Announced& announced);
+  // Errors: not_found.
+  [[nodiscard]] Result<Upload> find(const std::string& id) const;
+
+  // Notes that a dataset was opened from it. False: it is gone.
+  bool opened(const std::string& id, const std::string& dataset);
+  // Removes an upload; the value: the datasets opened from it. Errors: not_found.
+  Result<std::vector<std::string>> remove(const std::string& id);
+  // The same for those that have expired.
+  std::vector<std::string> expire(std::time_t now);
+
+ private:
+  friend class Incoming;
+  struct State;
+  explicit Uploads(std::shared_ptr<State> state);
+  std::shared_ptr<State> state_;
+};
+
+// One upload that is being received, by one thread at a time. Unless it is finished, nothing of it
+// remains.
+class Incoming {
+ public:
+  ~Incoming();
+  Incoming(const Incoming&) = delete;
+  Incoming& operator=(const Incoming&) = delete;
+
+  // Errors: out_of_memory (disk full), internal (disk).
+  Result<void> write(std::span<const std::byte> bytes);
+  // Makes it visible. Errors: invalid (another digest than announced), those of write().
+  Result<Upload> finish();
+
+ private:
+  friend class Uploads;
+  Incoming(std::shared_ptr<Uploads::State> state, Announced announced, std::filesystem::path path,
+           int file);
+
+  const std::shared_ptr<Uploads::State> state_;
+  const Announced announced_;
+  const std::filesystem::path path_;
+  int file_ = -1;
+  std::uint64_t written_ = 0;
+  Hasher hasher_;
+};
+
+}  // namespace windsplat::uploads
