@@ -40,7 +40,8 @@ class Daemon:
                             root / f"{name}.nc"], check=True, stdout=subprocess.DEVNULL)
         (root / "notes.txt").write_text("not a field")
         words = [program, "serve", root / "small.nc", root / "gusts.nc", "--data-root", root,
-                 "--listen", "127.0.0.1:0", "--threads", "1", "--log-level", "warn"]
+                 "--listen", "127.0.0.1:0", "--threads", "1", "--log-level", "warn",
+                 "--upload-limit", "1M", "--state-dir", root / "state"]
         for name in NO_LIMITS:
             words += [f"--max-{name}", "0"]
         self.child = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
@@ -108,14 +109,15 @@ class Requests:
         self.draw = draw
         self.values = schema_values.Values(document.document, draw)
         self.fields = ["none"]
-        self.ids = {"datasets": ["small", "gusts"], "views": [], "jobs": [], "references": []}
+        self.ids = {"datasets": ["small", "gusts"], "views": [], "jobs": [], "references": [],
+                    "uploads": ["a.nc", "b.raw"], "problems": ["not-found", "invalid-view"]}
         self.tags = []
 
     def learn(self, path, status, headers, body):
         tag = headers.get("etag")
         if tag and len(self.tags) < KEPT:
             self.tags.append(tag)
-        if status not in (201, 202) and "/jobs/" not in path:
+        if status not in (201, 202) and "/jobs/" not in path or "/uploads/" in path:
             return
         if not body or not headers.get("content-type", "").startswith("application/json"):
             return
@@ -137,7 +139,7 @@ class Requests:
             return self.draw.choice(schema_values.WORDS + ["%2e%2e", "\u0000", "a/b"])
         if name == "field":
             return self.draw.choice(self.fields)
-        kind = path.split("/")[2]
+        kind = next(part for part in path.split("/")[1:] if part in self.ids)
         if kind == "datasets":
             return self.draw.choice(self.ids[kind][:2] + self.ids[kind][-2:])
         return self.draw.choice(self.ids[kind] or ["none"])
@@ -156,11 +158,17 @@ class Requests:
         if schema["type"] == "string" and "enum" not in schema:
             known = {"preset": ["default", "top", "clouds", "winds", "none"],
                      "minus": ["small", "gusts", "none"], "folder": ["", ".", "..", "x", "/etc"],
-                     "heightField": self.fields, "after": ["a", "small.nc"]}
+                     "heightField": self.fields, "after": ["a", "small.nc"],
+                     "datetime": ["2001-01-01", "2001-01-01T06:00Z", "now"],
+                     "colormap": ["viridis", "magma", "none"], "bbox": ["-20,-30,40,70", "350,0,10,9",
+                     "0,0,0", "5,1,a,2"], "level": ["500", "1000,300", "x"],
+                     "stride": ["2", "1,2,3", "0", "1.5", "9,9,9,9"]}
             return self.draw.choice(known.get(parameter["name"], schema_values.WORDS)), True
         value = self.values.of(schema)
-        if parameter["name"] == "fields":
+        if parameter["name"] in ("fields", "field"):
             value = [self.draw.choice(self.fields)]
+        if parameter["name"] == "annotate":
+            value = [self.draw.choice(["true", "false", "0", "legend", "axes", "all"])]
         if parameter["name"] in ("width", "height"):
             value = self.draw.randint(1, EDGE)
         if parameter["name"] in ("step", "minusStep") and self.draw.random() < 0.8:
@@ -221,13 +229,18 @@ class Requests:
         if given is None:
             return None, True
         media = self.draw.choice(list(given["content"]))
-        schema = given["content"][media]["schema"]
         headers["Content-Type"] = media
+        if media == "application/octet-stream":
+            headers["Content-Digest"] = self.draw.choice(["", "sha-256=:eA==:", "md5=:eA==:", "x"])
+            return self.draw.randbytes(self.draw.choice([0, 1, 100, 10000])), None
+        schema = given["content"][media]["schema"]
         value = self.values.of(schema)
         if schema.get("$ref", "").endswith("/View"):
             value = self.view(value)
         elif schema.get("type") == "object":
             value = self.view({})
+        elif isinstance(value, dict) and "upload" in value:
+            value["upload"] = self.draw.choice(self.ids["uploads"])
         elif isinstance(value, dict) and "path" in value:
             value["path"] = self.draw.choice(["small.nc", "*.nc", "notes.txt", "../x", "none.nc"])
         way = self.draw.random()
@@ -297,7 +310,7 @@ class Checker:
                 wrong.append("not 405")
             return wrong + self.allow(methods, headers)
         own = self.of.document["paths"][path].get("get" if method == "HEAD" else method.lower())
-        if own is not operation and method != "HEAD":
+        if own is not operation:
             operation, permitted = own, None
         responses = operation["responses"]
         if str(status) not in responses:
