@@ -55,7 +55,8 @@ class Server:
         program: the program; otherwise $WINDSPLAT, otherwise windsplat in PATH.
         data_root: a folder whose files may be opened later, see open().
         allow_embed: web origins of pages that may show view.widget().
-        options: further options of `windsplat serve`: threads=2, memory_limit="4G".
+        options: further options of `windsplat serve`: threads=2, memory_limit="4G". The token of
+            token_file is used, and the certificate tls_cert trusted.
 
         Raises StartFailed with what the program said.
         """
@@ -65,7 +66,12 @@ class Server:
         process = Process(find_program(program), [os.fspath(one) for one in files], given,
                           start_timeout)
         try:
-            server = cls(process.url)
+            token = options.get("token_file")
+            server = cls(
+                process.url,
+                None if token is None else pathlib.Path(token).read_text("utf-8").strip(),
+                verify=os.fspath(options.get("tls_cert", "")) or True,
+            )
         except BaseException:
             process.close()
             raise

@@ -8,12 +8,22 @@ import { createServer } from "node:http";
 import { createInterface } from "node:readline";
 import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { openPage, patience, sharedDaemon, shot } from "../support.mjs";
+import {
+  finalPicture,
+  freePort,
+  openPage,
+  patience,
+  sharedDaemon,
+  shot,
+  state,
+} from "../support.mjs";
 
 const root = fileURLToPath(new URL("../../../", import.meta.url));
 const widget = `${root}clients/python/windsplat/widget.js`;
 const dataset = "climate:48x24x8";
-const shared = sharedDaemon({ args: [dataset] });
+const port = await freePort();
+const origin = `http://127.0.0.1:${port}`;
+const shared = sharedDaemon({ args: [dataset, "--allow-embed", origin] });
 let site;
 
 before(async () => {
@@ -25,7 +35,7 @@ before(async () => {
     const [type, content] = pages[request.url] ?? ["text/plain", () => ""];
     response.setHeader("Content-Type", type).end(content());
   });
-  site.listen(0, "127.0.0.1");
+  site.listen(port, "127.0.0.1");
   await once(site, "listening");
 });
 after(() => site.close());
@@ -59,7 +69,7 @@ async function withWidget(act) {
     else if (document.view) answers.shift()(document.view);
     else deliver(document);
   });
-  const page = await openPage(shared.browser, `http://127.0.0.1:${site.address().port}/`);
+  const page = await openPage(shared.browser, `${origin}/`);
   try {
     await page.exposeFunction("toPython", (message) => {
       sent.push(message);
@@ -202,3 +212,23 @@ test("each frame is answered once it is drawn, and a widget that is removed ends
     assert.equal(sent.filter(({ type }) => type === "shown").length, shown.length);
     assert.ok(sent.length <= count + 1);
   }));
+
+test("view.widget() is a frame of the embedded page, which shows the view", async () => {
+  let told;
+  const first = new Promise((resolve) => (told = resolve));
+  const python = pythonSide(told);
+  const { html } = await first;
+  const page = await openPage(shared.browser, `${origin}/`);
+  try {
+    await page.evaluate((text) => (document.getElementById("cell").innerHTML = text), html);
+    const box = await page.locator("iframe").boundingBox();
+    assert.equal(box.height, 240);
+    const frame = page.frames()[1];
+    await finalPicture(frame);
+    assert.equal((await state(frame)).step, "3");
+    assert.deepEqual(page.faults, []);
+  } finally {
+    await page.context().close();
+    assert.equal(await python.end(), 0);
+  }
+});

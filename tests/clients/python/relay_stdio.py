@@ -27,7 +27,8 @@ def send(message, buffers):
 server = windsplat.connect(sys.argv[1])
 dataset = server[sys.argv[2]]
 relay = Relay(dataset.view(size=(400, 240)), send)
-write({"title": dataset.title, "steps": [step.text for step in dataset.steps]})
+write({"title": dataset.title, "steps": [step.text for step in dataset.steps],
+       "html": dataset.view(step=3).widget(height=240)._repr_html_()})
 for line in sys.stdin:
     document = json.loads(line)
     if document.get("ask") == "view":

@@ -21,7 +21,8 @@ import sys
 data = sys.stdin.buffer.read()
 if "-fail" in sys.argv[0]:
     sys.exit("no such codec")
-open(sys.argv[-1].removeprefix("file:"), "w").write(f"{data.count(b'IHDR')} " + " ".join(sys.argv[1:-1]))
+with open(sys.argv[-1].removeprefix("file:"), "w") as file:
+    file.write(f"{data.count(b'IHDR')} " + " ".join(sys.argv[1:-1]))
 """
 
 

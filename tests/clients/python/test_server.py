@@ -63,6 +63,7 @@ class Start(unittest.TestCase):
             file.write("0123456789abcdefX\n")
             file.flush()
             with start("tornado:16", token_file=file.name) as server:
+                self.assertEqual(list(server.datasets), ["tornado:16"])
                 with self.assertRaises(windsplat.Unauthorized) as caught:
                     windsplat.connect(server.url)
                 self.assertEqual(caught.exception.status, 401)
@@ -267,17 +268,12 @@ class Secured(unittest.TestCase):
                             "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", "/CN=w",
                             "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out",
                             certificate], check=True, capture_output=True)
-            # Server.start speaks http to its own server, so the program is started without it.
-            process = subprocess.Popen([PROGRAM, "serve", "--listen", "127.0.0.1:0", "--tls-cert",
-                                        certificate, "--tls-key", key, "tornado:8"],
-                                       stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-            self.addCleanup(process.stdout.close)
-            self.addCleanup(process.wait)
-            self.addCleanup(process.terminate)
-            url = process.stdout.readline().strip()
+            own = start("tornado:8", tls_cert=certificate, tls_key=key)
+            self.addCleanup(own.close)
+            self.assertEqual(list(own.datasets), ["tornado:8"])
             with self.assertRaisesRegex(windsplat.ConnectionFailed, "CERTIFICATE_VERIFY_FAILED"):
-                windsplat.connect(url)
-            with windsplat.connect(url, verify=certificate) as server:
+                windsplat.connect(own.url)
+            with windsplat.connect(own.url, verify=certificate) as server:
                 view = server["tornado:8"].view(size=(32, 24))
                 self.assertEqual(view.frame("jpeg").width, 32)
 
