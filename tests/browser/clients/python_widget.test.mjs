@@ -226,7 +226,9 @@ test("view.widget() is a frame of the embedded page, which shows the view", asyn
     const frame = page.frames()[1];
     await finalPicture(frame);
     assert.equal((await state(frame)).step, "3");
-    assert.deepEqual(page.faults, []);
+    // Chromium tells that a frame of another site does not take the focus, which is right here.
+    const faults = page.faults.filter((one) => !one.startsWith("Blocked autofocusing"));
+    assert.deepEqual(faults, []);
   } finally {
     await page.context().close();
     assert.equal(await python.end(), 0);
