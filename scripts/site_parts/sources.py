@@ -81,16 +81,28 @@ class Gatherer:
         if place.startswith("../") or not source.exists():
             raise Broken(f"{path}:{number}: {link} leads nowhere")
         if source.is_dir():
-            if not (source / "README.md").exists():
-                raise Broken(f"{path}:{number}: {link} is a folder without README.md")
-            self.add(f"{place}/README.md")
-            return f"{file.rstrip('/')}/README.md{mark}{anchor}"
+            if (source / "README.md").exists():
+                self.add(f"{place}/README.md")
+                return f"{file.rstrip('/')}/README.md{mark}{anchor}"
+            self.write_listing(place)
+            return f"{file.rstrip('/')}/index.md"
         if place.endswith(".md"):
             self.add(place)
             return link
         (self.target / place).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, self.target / place)
         return f"{file}.md" if self.has_page(source, place) else link
+
+    def write_listing(self, place):
+        """The page of a folder without a document: links to its files."""
+        page = f"{place}/index.md"
+        if (self.target / page).exists():
+            return
+        names = sorted(one.name for one in (self.root / place).iterdir()
+                       if one.is_file() and not one.name.startswith("."))
+        lines = [f"- [{name}]({self.link(page, 0, name)})" for name in names]
+        heading = f"# {posixpath.basename(place)}\n\nThe files of the folder `{place}`:\n\n"
+        self.write(page, heading + "\n".join(lines) + "\n")
 
     def has_page(self, source, place):
         """Whether the file gets a page that shows it, which is then written."""

@@ -93,10 +93,17 @@ class Gathering(Folder):
         self.assertEqual(set(out), {"README.md", f"{DOCS}/a.md", f"{DOCS}/README.md",
                                     f"{DOCS}/p.svg", "terms", "terms.md"})
 
+    def test_a_folder_without_a_document_is_listed(self):
+        titles, out = self.gather({"README.md": "# T\n[x](books/)\n", "books/a.txt": "text\n",
+                                   "books/b.svg": "<svg/>", "books/.hidden": "h"})
+        self.assertIn("[x](books/index.md)", out["README.md"])
+        self.assertTrue(out["books/index.md"].endswith("\n- [a.txt](a.txt.md)\n- [b.svg](b.svg)\n"))
+        self.assertEqual((set(titles), "books/.hidden" in out), ({"README.md"}, False))
+
     def test_a_link_that_leads_nowhere_is_refused_with_its_place(self):
-        for link in ("b.md", DOCS, "../outside"):
+        for link in ("b.md", "folder/", "../outside"):
             with self.assertRaisesRegex(sources.Broken, r"README\.md:3: "):
-                self.gather({"README.md": f"# T\n\n[b]({link})\n", f"{DOCS}/x.txt": ""})
+                self.gather({"README.md": f"# T\n\n[b]({link})\n"})
 
 
 class Navigation(unittest.TestCase):
