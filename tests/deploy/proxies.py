@@ -27,6 +27,8 @@ from wire_client import new_key, upgrade_request  # noqa: E402
 
 RECIPES = ROOT / "docs/user/deploy"
 NAME, USER, PASSWORD = "winds.example", "reader", "a password"
+# As of `caddy hash-password`, but of 2^4 rounds instead of 2^14, which take a second.
+BCRYPT_HASH = "$2b$04$twk/NG8tqHONfXzCQN0mf.IK.qJ8SGHK5db1APhEAthUe5cnEagNK"
 ORIGIN = f"https://{NAME}"
 SKIPPED = 77
 NOBODY = 65534
@@ -84,12 +86,10 @@ def adapted(recipe, replacements):
 
 
 def password_hash(server):
-    if server == "nginx":
-        command = ["openssl", "passwd", "-apr1", "-stdin"]
-    else:
-        command = [program_of("caddy"), "hash-password"]
-    return subprocess.run(command, input=PASSWORD + "\n", capture_output=True, text=True,
-                          check=True).stdout.strip()
+    if server == "caddy":
+        return BCRYPT_HASH
+    return subprocess.run(["openssl", "passwd", "-apr1", "-stdin"], input=PASSWORD + "\n",
+                          capture_output=True, text=True, check=True).stdout.strip()
 
 
 class Proxy:
