@@ -7,7 +7,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
-#include "protocol/problem_types.hpp"
+#include "protocol/problems/problem_types.hpp"
 
 namespace windsplat::protocol {
 

@@ -71,7 +71,6 @@ class Quota {
 
   [[nodiscard]] std::size_t known() const { return addresses_.size(); }
   [[nodiscard]] std::size_t connections() const { return connections_; }
-  [[nodiscard]] std::size_t reserved() const { return reserved_; }
 
  private:
   Limits limits_;

@@ -5,7 +5,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/measurements.hpp"
-#include "protocol/problem_types.hpp"
+#include "protocol/problems/problem_types.hpp"
 #include "server/api/operations/parameters.hpp"
 #include "server/api/resources.hpp"
 #include "server/data/files/files.hpp"

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "protocol/problem_types.hpp"
+#include "protocol/problems/problem_types.hpp"
 #include "server/api/resources.hpp"
 #include "server/http/cors.hpp"
 #include "server/http/negotiate.hpp"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "protocol/codec.hpp"
-#include "protocol/problem_types.hpp"
+#include "protocol/problems/problem_types.hpp"
 #include "server/http/request_id.hpp"
 
 namespace windsplat::http {

@@ -11,7 +11,7 @@
 
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
-#include "protocol/problem_types.hpp"
+#include "protocol/problems/problem_types.hpp"
 #include "support.hpp"
 
 namespace windsplat::protocol::testing {

@@ -1,5 +1,5 @@
 // The table of problem types, and its document.
-#include "protocol/problem_types.hpp"
+#include "protocol/problems/problem_types.hpp"
 
 #include <gmock/gmock.h>
 

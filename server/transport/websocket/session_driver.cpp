@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "protocol/codec.hpp"
-#include "protocol/problem_types.hpp"
+#include "protocol/problems/problem_types.hpp"
 
 namespace windsplat::transport {
 namespace {

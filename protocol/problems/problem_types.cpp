@@ -1,4 +1,4 @@
-#include "protocol/problem_types.hpp"
+#include "protocol/problems/problem_types.hpp"
 
 #include <algorithm>
 #include <array>
