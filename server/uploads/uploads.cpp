@@ -1,5 +1,5 @@
 // Each upload is written to a file of its own among those that are incomplete, and renamed once its
-// digest is right.
+// digest is right; of a ZIP archive the folder that it was unpacked into.
 #include "server/uploads/uploads.hpp"
 
 #include <fcntl.h>
@@ -8,13 +8,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <iterator>
 #include <map>
 #include <mutex>
-#include <set>
 #include <system_error>
 #include <utility>
 
 #include "server/base/log.hpp"
+#include "server/uploads/zip.hpp"
 
 namespace windsplat::uploads {
 namespace fs = std::filesystem;
@@ -39,6 +40,21 @@ Error disk_error(int fault) {
                     "the upload cannot be stored: " + disk_words(fault));
 }
 
+bool is_archive(const std::string& id) { return id.ends_with(".zip"); }
+
+// Into which the archive at a path is unpacked.
+fs::path folder_beside(const fs::path& path) { return path.native() + ".folder"; }
+
+// The folder, or the only one that it has, if it has nothing else.
+fs::path innermost(const fs::path& folder) {
+  std::error_code fault;
+  const fs::directory_iterator only(folder, fault);
+  if (fault || only == fs::directory_iterator() || !only->is_directory(fault)) return folder;
+  const fs::path path = only->path();
+  return std::next(fs::directory_iterator(folder, fault)) == fs::directory_iterator() ? path
+                                                                                      : folder;
+}
+
 std::string group_of(const std::string& id) { return id.substr(0, id.find('.')); }
 
 }  // namespace
@@ -54,6 +70,7 @@ struct Uploads::State {
   struct Entry {
     Upload upload;
     std::string address;
+    std::uint64_t taken = 0;  // bytes on disk
     std::vector<std::string> datasets;
   };
   // Of an address: what its uploads take, complete or not.
@@ -62,7 +79,38 @@ struct Uploads::State {
     std::size_t at_a_time = 0;
   };
 
-  // All require the mutex.
+  // Unpacks the archive at a path beside it. Errors: those of zip.hpp; out_of_memory (quota).
+  Result<void> unpack(const Announced& announced, const fs::path& path, int file) {
+    const auto entries = list_zip(file, announced.bytes);
+    if (!entries) return entries.error();
+    {
+      const std::lock_guard lock(mutex);
+      const std::uint64_t bytes = disk_bytes_of(*entries);
+      if (const auto ok = take(announced.address, bytes, "unpacked "); !ok) return ok;
+      receiving[announced.id] += bytes;
+    }
+    const fs::path folder = folder_beside(path);
+    if (::mkdir(folder.c_str(), S_IRWXU) != 0) return disk_error(errno);
+    return unpack_zip(file, *entries, folder);
+  }
+
+  // The others require the mutex.
+  // Errors: out_of_memory.
+  Result<void> take(const std::string& address, std::uint64_t bytes, const char* how) {
+    const auto share = shares.find(address);
+    const std::uint64_t own = share == shares.end() ? 0 : share->second.bytes;
+    const std::uint64_t all = options.bytes_max;
+    const std::uint64_t left = std::min(all - bytes_taken, all / 2 - own);
+    if (bytes > left) {
+      return make_error(ErrorKind::out_of_memory,
+                        std::string("the upload has ") + how + std::to_string(bytes) +
+                            " bytes, and " + std::to_string(left) + " are left of --upload-limit " +
+                            std::to_string(all) + ", of which an address may have half");
+    }
+    bytes_taken += bytes;
+    shares[address].bytes += bytes;
+    return {};
+  }
   void release(const std::string& address, std::uint64_t bytes) {
     bytes_taken -= bytes;
     const auto share = shares.find(address);
@@ -84,7 +132,7 @@ struct Uploads::State {
                 {{"upload", entry.upload.id}, {"fault", fault.message()}});
     }
     fs::remove(path.parent_path(), fault);  // unless it has other files
-    release(entry.address, entry.upload.bytes);
+    release(entry.address, entry.taken);
     return entry.datasets;
   }
 
@@ -93,7 +141,7 @@ struct Uploads::State {
   std::uint64_t bytes_taken = 0;
   std::uint64_t count = 0;  // names of incomplete files
   std::map<std::string, Entry> entries;
-  std::set<std::string> receiving;
+  std::map<std::string, std::uint64_t> receiving;  // ids, and the bytes that each takes
   std::map<std::string, Share> shares;
 };
 
@@ -154,22 +202,17 @@ Result<std::shared_ptr<Incoming>> Uploads::begin(const Announced& announced) {
       state.entries.size() + state.receiving.size() >= uploads_max) {
     return Error{ErrorKind::busy, "too many uploads at a time", {}, 1};
   }
-  const std::uint64_t all = state.options.bytes_max;
-  const std::uint64_t left = std::min(all - state.bytes_taken, all / 2 - taken.bytes);
-  if (bytes > left) {
-    return make_error(ErrorKind::out_of_memory,
-                      "the upload has " + std::to_string(bytes) + " bytes, and " +
-                          std::to_string(left) + " are left of --upload-limit " +
-                          std::to_string(all) + ", of which an address may have half");
-  }
   const fs::path path = state.options.folder / incomplete / std::to_string(state.count);
   const int file =
-      ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR);
+      ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR);
   if (file < 0) return disk_error(errno);
   ++state.count;
-  state.receiving.insert(id);
-  state.bytes_taken += bytes;
-  state.shares[address].bytes += bytes;
+  if (const auto ok = state.take(address, bytes, ""); !ok) {
+    ::close(file);
+    ::unlink(path.c_str());
+    return ok.error();
+  }
+  state.receiving[id] = bytes;
   ++state.shares[address].at_a_time;
   return std::shared_ptr<Incoming>(new Incoming(state_, announced, path, file));
 }
@@ -221,13 +264,18 @@ Incoming::Incoming(std::shared_ptr<Uploads::State> state, Announced announced, f
       path_(std::move(path)),
       file_(file) {}
 
-Incoming::~Incoming() {
+Incoming::~Incoming() { discard(); }
+
+void Incoming::discard() {
   if (file_ < 0) return;  // finished
-  ::close(file_);
+  ::close(std::exchange(file_, -1));
   ::unlink(path_.c_str());
+  std::error_code fault;
+  if (is_archive(announced_.id)) fs::remove_all(folder_beside(path_), fault);
   const std::lock_guard lock(state_->mutex);
+  const std::uint64_t taken = state_->receiving[announced_.id];
   state_->end_receiving(announced_.id, announced_.address);
-  state_->release(announced_.address, announced_.bytes);
+  state_->release(announced_.address, taken);
 }
 
 Result<void> Incoming::write(std::span<const std::byte> bytes) {
@@ -246,6 +294,12 @@ Result<void> Incoming::write(std::span<const std::byte> bytes) {
 }
 
 Result<Upload> Incoming::finish() {
+  auto upload = publish();
+  if (!upload) discard();
+  return upload;
+}
+
+Result<Upload> Incoming::publish() {
   if (written_ != announced_.bytes) {
     return make_error(ErrorKind::invalid, "the upload is shorter than announced");
   }
@@ -255,16 +309,30 @@ Result<Upload> Incoming::finish() {
                                               ", not the announced " +
                                               digest_text(*announced_.digest));
   }
+  const bool archive = is_archive(announced_.id);
+  if (archive) {
+    if (const auto ok = state_->unpack(announced_, path_, file_); !ok) return ok.error();
+  }
+  const fs::path from = archive ? innermost(folder_beside(path_)) : path_;
   const std::lock_guard lock(state_->mutex);
   const fs::path path = state_->options.folder / Uploads::path_of(announced_.id);
-  if (::mkdir(path.parent_path().c_str(), S_IRWXU) != 0 && errno != EEXIST)
+  if (::mkdir(path.parent_path().c_str(), S_IRWXU) != 0 && errno != EEXIST) {
     return disk_error(errno);
-  if (::rename(path_.c_str(), path.c_str()) != 0) return disk_error(errno);
+  }
+  if (::rename(from.c_str(), path.c_str()) != 0) return disk_error(errno);
   ::close(std::exchange(file_, -1));
+  std::uint64_t taken = state_->receiving[announced_.id];
+  if (archive) {
+    std::error_code fault;
+    fs::remove(path_, fault);
+    fs::remove_all(folder_beside(path_), fault);
+    state_->release(announced_.address, announced_.bytes);
+    taken -= announced_.bytes;
+  }
   const Upload upload{announced_.id, announced_.bytes, digest,
                       std::time(nullptr) + announced_.keep_s};
   state_->end_receiving(announced_.id, announced_.address);
-  state_->entries[announced_.id] = {upload, announced_.address, {}};
+  state_->entries[announced_.id] = {upload, announced_.address, taken, {}};
   return upload;
 }
 

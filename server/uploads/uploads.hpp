@@ -91,13 +91,17 @@ class Incoming {
 
   // Errors: out_of_memory (disk full), internal (disk).
   Result<void> write(std::span<const std::byte> bytes);
-  // Makes it visible. Errors: invalid (another digest than announced), those of write().
+  // Makes it visible, or discards it. Errors: invalid (another digest than announced); those of
+  // write(); of a ZIP archive, which is unpacked, bad_data.
   Result<Upload> finish();
 
  private:
   friend class Uploads;
   Incoming(std::shared_ptr<Uploads::State> state, Announced announced, std::filesystem::path path,
            int file);
+
+  Result<Upload> publish();
+  void discard();
 
   const std::shared_ptr<Uploads::State> state_;
   const Announced announced_;

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 import unittest
+import zipfile
 
 import netCDF4
 import numpy as np
@@ -47,7 +48,7 @@ def netcdf(values, folder):
     return path.read_bytes()
 
 
-class Uploads(unittest.TestCase):
+class WithUploads(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory(prefix="windsplat-uploads-")
         self.state = pathlib.Path(self.folder.name) / "state"
@@ -90,6 +91,8 @@ class Uploads(unittest.TestCase):
             self.assertLess(time.monotonic(), end, "waited in vain")
             time.sleep(0.05)
 
+
+class Uploads(WithUploads):
     def test_a_file_is_opened_and_has_its_values(self):
         body = netcdf(cube(), self.folder.name)
         answer = self.put("storm.nc", body, "?keep=600", Content_Digest=digest_of(body))
@@ -294,6 +297,105 @@ class Uploads(unittest.TestCase):
                                   capture_output=True, text=True, check=False, timeout=30)
             self.assertNotEqual(done.returncode, 0)
             self.assertIn(text, done.stderr)
+
+
+def zarr_files(values):
+    """The files of a Zarr store of version 2, one chunk a level."""
+    array = {"zarr_format": 2, "shape": values.shape, "chunks": (1, *values.shape[1:]),
+             "dtype": "<f4", "compressor": None, "fill_value": None, "order": "C",
+             "filters": None}
+    files = {".zgroup": b'{"zarr_format": 2}', "q/.zarray": json.dumps(array).encode(),
+             "q/.zattrs": b'{"_ARRAY_DIMENSIONS": ["z", "y", "x"]}'}
+    return files | {f"q/{k}.0.0": level.tobytes() for k, level in enumerate(values)}
+
+
+def zipped(files, method=zipfile.ZIP_STORED, prefix=""):
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", method) as archive:
+        for name, body in files.items():
+            archive.writestr(prefix + name if isinstance(name, str) else name, body)
+    return out.getvalue()
+
+
+def special(name, mode):
+    entry = zipfile.ZipInfo(name)
+    entry.create_system, entry.external_attr = 3, mode << 16
+    return entry
+
+
+class Archives(WithUploads):
+    """Zarr stores as ZIP archives."""
+
+    def test_a_store_is_unpacked_and_opened(self):
+        for n, (method, prefix) in enumerate(((zipfile.ZIP_STORED, ""), (zipfile.ZIP_DEFLATED, ""),
+                                              (zipfile.ZIP_DEFLATED, "storm.zarr/"))):
+            name = f"store{n}.zarr.zip"
+            files = zarr_files(cube(n))
+            answer = self.put(name, zipped(files, method, prefix))
+            self.assertEqual(answer.status, 201, answer.body)
+            self.assertEqual(len(self.files()), len(files))
+            self.assertTrue(np.array_equal(self.values(self.opened(name)), cube(n)))
+            self.assertEqual(self.daemon.ask("DELETE", f"/v1/uploads/{name}").status, 204)
+            self.assertEqual(self.files(), [])
+
+    def test_hostile_archives_are_refused_and_leave_nothing(self):
+        good = zipped({"a": b"x" * 100, "b": b"y"})
+        end, entry = good.rindex(b"PK\5\6"), good.index(b"PK\1\2")
+
+        packed = zipped({"a": bytes(range(200)) * 2}, zipfile.ZIP_DEFLATED)
+
+        def patched(at, value, width=4):
+            return good[:at] + value.to_bytes(width, "little") + good[at + width:]
+
+        cases = {
+            "whose name is not a path": [zipped({name: b"x"}) for name in (
+                "../x", "/x", "a/../../x", "a//x", "./x", "a\\x", "a\nx", "x" * 600,
+                "/".join("a" * 20))],
+            "a link or a special file": [zipped({special("a", 0o120777): b"/etc/passwd"}),
+                                         zipped({special("a", 0o10644): b""})],
+            "more than 200 times": [zipped({"a": bytes(2 << 20)}, zipfile.ZIP_DEFLATED)],
+            "more than 20000 entries": [zipped({f"{n}": b"" for n in range(20001)})],
+            "twice": [zipped({"a": b"1", special("a", 0o100644): b"2"}),
+                      zipped({"a": b"1", "a/b": b"2"})],
+            "checksum": [good.replace(b"x" * 100, b"x" * 99 + b"z")],
+            "encrypted": [patched(entry + 8, 1, 2)],
+            "neither stored nor deflated": [patched(entry + 10, 12, 2)],
+            "overlap": [good[:entry + 20] + 2 * len(good).to_bytes(4, "little") +
+                        good[entry + 28:]],
+            "ZIP64": [patched(end + 16, 0xffffffff)],
+            "several parts": [patched(end + 4, 1, 2)],
+            "directory": [patched(end + 12, 10), patched(entry, 0),
+                          patched(entry + 28, 9999, 2)],
+            "header": [patched(0, 0)],
+            "end record": [good[:-5], b"PK" * 20, b"noise" * 100],
+            "not deflated": [packed[:31] + b"\xff" * 20 + packed[51:]],
+        }
+        for text, bodies in cases.items():
+            for body in bodies:
+                answer = self.put("a.zip", body)
+                self.assert_refused(answer, 422, text)
+                self.assertEqual(self.files(), [], text)
+        self.assertFalse((self.state.parent / "x").exists())
+        self.assertEqual(self.put("a.zip", good).status, 201)
+
+    def test_a_bomb_writes_no_more_than_it_declares(self):
+        body = zipped({"a": bytes(1 << 20)}, zipfile.ZIP_DEFLATED)
+        entry = body.index(b"PK\1\2")
+        body = body[:entry + 24] + (1000).to_bytes(4, "little") + body[entry + 28:]
+        self.assert_refused(self.put("a.zip", body), 422, "longer than it declares")
+        self.assertEqual(self.files(), [])
+
+    def test_quota_counts_what_is_unpacked(self):
+        noise = os.urandom(1 << 19)
+        for n in range(2):
+            body = zipped({f"{name}": b"" for name in range(100)} | {"noise": noise})
+            answer = self.put(f"{n}.zip", body)
+            if n == 0:
+                self.assertEqual(answer.status, 201, answer.body)
+        self.assert_refused(answer, 507, "--upload-limit")
+        self.assertEqual(len(self.files()), 101)
+        self.daemon.ask("DELETE", "/v1/uploads/0.zip")
+        self.assertEqual(self.put("all.raw", bytes(LIMIT // 2)).status, 201)
 
 
 def main():
