@@ -1,8 +1,8 @@
-// Generates the types, type-checks the page and its tests, bundles the tests (for node versions
+// Generates the types, type-checks the page, the client package and their tests, bundles the tests (for node versions
 // that cannot run TypeScript) and runs them. Usage: node scripts/test.mjs [node --test options]
 import { spawnSync } from "node:child_process";
 import { mkdirSync, readdirSync, rmSync } from "node:fs";
-import { dirname, join } from "node:path";
+import { dirname, join, relative } from "node:path";
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 import { generateTypes } from "./types.mjs";
@@ -19,11 +19,14 @@ await generateTypes();
 run([join(web, "node_modules/typescript/bin/tsc"), "--noEmit"]);
 rmSync(out, { recursive: true, force: true });
 mkdirSync(out, { recursive: true });
-const tests = readdirSync(join(web, "test"), { recursive: true }).filter((name) =>
-  name.endsWith(".test.ts"),
+const folders = [join(web, "test"), join(web, "..", "clients", "js", "test")];
+const tests = folders.flatMap((folder) =>
+  readdirSync(folder, { recursive: true })
+    .filter((name) => name.endsWith(".test.ts"))
+    .map((name) => join(folder, name)),
 );
 await build({
-  entryPoints: tests.map((name) => join(web, "test", name)),
+  entryPoints: tests,
   bundle: true,
   platform: "node",
   target: "node18",
@@ -31,7 +34,7 @@ await build({
   packages: "external",
   sourcemap: "inline",
   outdir: out,
-  outbase: join(web, "test"),
+  outbase: join(web, ".."),
   outExtension: { ".js": ".mjs" },
   logLevel: "warning",
 });
@@ -39,5 +42,5 @@ run([
   "--enable-source-maps",
   "--test",
   ...process.argv.slice(2),
-  ...tests.map((name) => join(out, name.replace(/\.ts$/, ".mjs"))),
+  ...tests.map((path) => join(out, relative(join(web, ".."), path).replace(/\.ts$/, ".mjs"))),
 ]);

@@ -3,6 +3,7 @@ export { viewRanges } from "./generated/view_ranges";
 export * from "./wire/protocol";
 export * from "./wire/api";
 export type { ConnectionState } from "./wire/connection";
+export type { Reach } from "./wire/reach";
 export type { SocketClass } from "./wire/browser_link";
 export { ProblemError, problemText } from "./wire/requests";
 export * from "./view/camera";

@@ -21,6 +21,7 @@ import type {
   StatsMessage,
   View,
 } from "../wire/protocol";
+import type { Reach } from "../wire/reach";
 import { problemText, ProblemError } from "../wire/requests";
 
 export interface StreamEvents {
@@ -32,6 +33,8 @@ export interface StreamEvents {
   /** The frame counts as shown; `chosen` tells how it was drawn. */
   shown?(header: FrameHeader, chosen: ChosenMessage | null): void;
   state?(state: ConnectionState): void;
+  /** After the connection was lost for this reason: what the server answers otherwise. */
+  reached?(reach: Reach, reason: string): void;
   hello?(hello: HelloMessage): void;
   opened?(dataset: Dataset): void; // also after the dataset's files have changed
   refused?(error: ProblemError): void; // of the dataset or a change of the view
@@ -89,6 +92,7 @@ export class ViewStream {
       clock,
       {
         state: (state) => this.onState(state),
+        reached: (reach, reason) => this.events.reached?.(reach, reason),
         hello: (hello) => this.onHello(hello),
         message: (message) => this.onMessage(message),
         frame: (frame) => this.onFrame(frame),

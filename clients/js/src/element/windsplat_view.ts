@@ -8,6 +8,7 @@ import type { Patch } from "../view/view_state";
 import { moveOfKey } from "../viewport/camera_keys";
 import { MoveQueue, PointerInput, type Move } from "../viewport/input";
 import type { ConnectionState } from "../wire/connection";
+import type { Reach } from "../wire/reach";
 import type { ChosenMessage, Dataset, FrameHeader, ProgressMessage, View } from "../wire/protocol";
 import { asked, stepOf, viewOf } from "./attributes";
 import { ControlBar } from "./control_bar";
@@ -209,6 +210,7 @@ export class WindsplatView extends HTMLElement {
     this.live = new LivePicture(this.inside.canvas, client, view, {
       shown: (header, chosen) => this.onShown(header, chosen),
       state: (state) => this.onState(state),
+      reached: (reach, reason) => this.lost(reach, reason),
       opened: (dataset) => this.bar.describe(dataset),
       refused: (error) => this.onRefused(error),
       changed: () => this.onChanged(),
@@ -300,21 +302,32 @@ export class WindsplatView extends HTMLElement {
     this.setPlaying(false);
     if (state.name === "asleep") this.say(`paused: ${state.reason}`);
     if (state.name === "connecting" && !this.told) this.say("connecting …");
-    if (this.told || (state.name !== "waiting" && state.name !== "locked")) return;
-    this.told = true;
-    if (state.name === "waiting") this.fail("connection", this.outageText(state.reason));
-    else this.fail("login", this.secret === undefined ? needsToken : wrongToken);
+    if (state.name === "locked") {
+      this.outage("login", this.secret === undefined ? needsToken : wrongToken);
+    }
+    // The first time what the server answers is awaited.
+    if (state.name === "waiting" && state.attempt > 1) this.lost("silent", state.reason);
   }
 
   // Browsers do not tell a page why another origin refused it.
-  private outageText(reason: string): string {
+  private lost(reach: Reach, reason: string): void {
+    if (reach === "login") return; // the next state tells
     const { origin } = new URL(this.src);
     const here = window.location.origin;
-    if (origin === here) return reason;
-    return (
-      `no stream from ${origin}: the server cannot be reached, ` +
-      `or it does not allow pages of ${here} (--allow-origin) or this token`
+    const foreign = reach === "silent" && origin !== here;
+    this.outage(
+      "connection",
+      !foreign
+        ? reason
+        : `no stream from ${origin}: the server cannot be reached, ` +
+            `or it does not allow pages of ${here} (--allow-origin) or this token`,
     );
+  }
+
+  private outage(kind: ErrorKind, message: string): void {
+    if (this.told) return;
+    this.told = true;
+    this.fail(kind, message);
   }
 
   private onRefused(error: ProblemError): void {

@@ -49,6 +49,8 @@ export type ConnectionState =
 
 export interface ConnectionEvents {
   state(state: ConnectionState): void;
+  // After a connection was lost for this reason: what the server answers otherwise.
+  reached?(reach: Reach, reason: string): void;
   hello(hello: HelloMessage): void;
   message(message: ServerMessage): void;
   frame(frame: Frame): void;
@@ -240,6 +242,7 @@ export class Connection {
     this.fault = null;
     const timer = this.retry(why);
     void this.reach().then((reach) => {
+      if (!this.stopped && !this.greeted) this.events.reached?.(reach, why);
       if (this.retryTimer === timer) this.reached(reach, answered, why);
     });
   }
