@@ -58,7 +58,25 @@ def _read_lines(pipe: IO[str], sink: Any) -> None:
     sink(None)
 
 
-def _end(process: subprocess.Popen[str]) -> None:
+# Ends the server once its input is closed: also when this process is killed and can end nothing.
+GUARD = 'read -r line; kill "$1" 2>/dev/null'
+
+
+def _guard_of(process: subprocess.Popen[str]) -> subprocess.Popen[bytes] | None:
+    try:
+        return subprocess.Popen(
+            ["/bin/sh", "-c", GUARD, "windsplat-guard", str(process.pid)], stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    except OSError:  # a system without a shell: the server ends with close() and at exit
+        return None
+
+
+def _end(process: subprocess.Popen[str], guard: subprocess.Popen[bytes] | None) -> None:
+    if guard is not None:  # first, so that it never signals a process of another number
+        guard.kill()
+        guard.wait()
+        assert guard.stdin is not None
+        guard.stdin.close()
     if process.poll() is None:
         process.terminate()
         try:
@@ -88,7 +106,7 @@ class Process:
         )
         self._process = process
         self._lines: collections.deque[str] = collections.deque(maxlen=LOG_LINES)
-        self._finalizer = weakref.finalize(self, _end, process)
+        self._finalizer = weakref.finalize(self, _end, process, _guard_of(process))
         urls: queue.Queue[str | None] = queue.Queue()
         lines = self._lines
 

@@ -6,13 +6,15 @@ import json
 import os
 import pathlib
 import subprocess
+import sys
 import tempfile
 import threading
+import time
 import unittest
 import unittest.mock
 
 import numpy as np
-from support import PROGRAM, Prepared, shared_server, start, windsplat
+from support import CLIENT, PROGRAM, Prepared, shared_server, start, windsplat
 
 
 def problem(status, **more):
@@ -27,6 +29,27 @@ class Start(unittest.TestCase):
             url = server.url
         with self.assertRaises(windsplat.ConnectionFailed):
             windsplat.connect(url)
+
+    def test_a_server_ends_with_a_process_that_is_killed(self):
+        code = ("import sys, time, windsplat\n"
+                "server = windsplat.Server.start('tornado:8', threads=1)\n"
+                "print(server._process.pid, flush=True)\n"
+                "time.sleep(600)\n")
+        with subprocess.Popen([sys.executable, "-W", "ignore", "-c", code], cwd=CLIENT,
+                              stdout=subprocess.PIPE, text=True) as process:
+            server = int(process.stdout.readline())
+            os.kill(server, 0)
+            process.kill()
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            try:
+                state = pathlib.Path(f"/proc/{server}/stat").read_text().rpartition(")")[2]
+            except (FileNotFoundError, ProcessLookupError):
+                return
+            if state.split()[0] == "Z":  # it waits to be collected by the process that adopted it
+                return
+            time.sleep(0.05)
+        self.fail("the server goes on without the process that started it")
 
     def test_notebooks_of_this_machine_may_show_the_embedded_view(self):
         server, _ = shared_server()
