@@ -1,7 +1,7 @@
-# Two stages: the first builds the release program on Debian 12; the second contains only the
-# program and the libraries it is linked to. BASE may be any Debian 12 image. VTK is not installed, so
-# that cases of OpenFOAM and EnSight are refused: for them add the group vtk to scripts/setup, and
-# libvtk9.1 and windsplat-vtk to the second stage (126 MiB).
+# Three stages: the first builds the release program on Debian 12, the second installs its libraries
+# and collects what it needs, the third contains only that: no shell and no package manager. BASE
+# may be any Debian 12 image. VTK is not installed, so that cases of OpenFOAM and EnSight are
+# refused.
 ARG BASE=debian:bookworm-slim
 
 FROM ${BASE} AS build
@@ -10,28 +10,30 @@ ARG NODE_EXTRA_CA_CERTS=
 WORKDIR /src
 COPY scripts scripts
 COPY web/package.json web/package-lock.json web/
-RUN scripts/setup build web
+RUN scripts/setup build web && apt-get -q -y install --no-install-recommends python3
 COPY . .
 RUN cmake --preset release -DWINDSPLAT_TESTS=OFF -DWINDSPLAT_WERROR=OFF \
     && cmake --build --preset release --target windsplat \
-    && cmake --install build/release --prefix /opt/windsplat --component runtime --strip
+    && install -D --strip build/release/windsplat /opt/windsplat/bin/windsplat \
+    && scripts/sbom >/opt/windsplat/windsplat.cdx.json
 
-FROM ${BASE}
+FROM ${BASE} AS root
 RUN apt-get -q update \
     && DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends \
         ca-certificates libblosc1 libboost-url1.81.0 libcairo2 libcurl4 libeccodes0 libfmt9 \
         libharfbuzz0b liblz4-1 libnetcdf19 libopenh264-7 libpng16-16 libproj25 \
         libprometheus-cpp-core1.0 libpugixml1v5 libseccomp2 \
-        libspdlog1.10 libssl3 libstdc++6 libturbojpeg0 libzstd1 zlib1g \
-    && rm -rf /var/lib/apt/lists/* /var/cache/apt/* /var/log/apt /var/log/dpkg.log \
-    && useradd --system --uid 10001 --user-group --no-create-home --home-dir /nonexistent \
-        --shell /usr/sbin/nologin windsplat \
-    && install -d -o windsplat -g windsplat -m 0700 /var/lib/windsplat /var/cache/windsplat
-COPY --from=build /opt/windsplat/bin/windsplat /usr/local/bin/windsplat
-# For WINDSPLAT_STATE_DIR: a new volume mounted here belongs to the user; so does that of the cache of
-# files fetched from other hosts.
-ENV WINDSPLAT_DATA_CACHE=/var/cache/windsplat
-USER windsplat
+        libspdlog1.10 libssl3 libstdc++6 libturbojpeg0 libzstd1 zlib1g
+COPY --from=build /opt/windsplat /opt/windsplat
+COPY scripts/image-root /usr/local/bin/image-root
+RUN image-root /opt/windsplat /image
+
+FROM scratch
+COPY --from=root /image /
+# For WINDSPLAT_STATE_DIR: a new volume mounted at /var/lib/windsplat belongs to the user; so does
+# that of the cache of files fetched from other hosts.
+ENV PATH=/usr/local/bin WINDSPLAT_DATA_CACHE=/var/cache/windsplat
+USER 10001:10001
 EXPOSE 8080
 HEALTHCHECK --interval=15s --timeout=5s --start-period=20s --retries=3 \
     CMD ["windsplat", "healthcheck"]

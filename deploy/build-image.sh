@@ -2,10 +2,17 @@
 # Builds the container image without a container engine: debootstrap creates the Debian 12 base
 # (cached in build/image), and buildah runs the Dockerfile in a chroot. Needs root. The build uses
 # this machine's apt sources, proxy, npm settings and certificates.
-# Usage: deploy/build-image.sh [TAG]         the image stays in build/image/storage
+# Usage: deploy/build-image.sh [--program BUILD] [TAG]
+# The image stays in build/image/storage. With --program the first stage is left out, and the image
+# holds the program of that build folder, which was built on Debian 12.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 
+build=
+if [ "${1:-}" = --program ]; then
+  build=${2:?usage: deploy/build-image.sh --program BUILD [TAG]}
+  shift 2
+fi
 tag=${1:-windsplat:$(sed -n 's/^project(windsplat VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)}
 work=$PWD/build/image
 base=localhost/windsplat-base:bookworm
@@ -49,9 +56,25 @@ if [ -f "${HOME:-/root}/.npmrc" ]; then
   options+=(--volume "${HOME:-/root}/.npmrc:/root/.npmrc:ro")
 fi
 
+context=.
+file=Dockerfile
+if [ -n "$build" ]; then
+  # The same Dockerfile, with a copy in place of the first stage.
+  context=$work/context
+  file=$context/Dockerfile
+  rm -rf "$context"
+  mkdir -p "$context/scripts"
+  cp scripts/image-root "$context/scripts"
+  install -D --strip "$build/windsplat" "$context/installed/bin/windsplat"
+  scripts/sbom "$build/windsplat" >"$context/installed/windsplat.cdx.json"
+  awk '/^FROM .* AS build$/ {print; print "COPY installed /opt/windsplat"; inside = 1; next}
+    /^FROM / {inside = 0}
+    !inside' Dockerfile >"$file"
+fi
+
 echo "build-image: $tag" >&2
 "${buildah[@]}" bud --isolation chroot --format docker --layers=false --pull-never --force-rm \
-  "${options[@]}" --tag "$tag" --file Dockerfile . >"$work/build.log" 2>&1 || {
+  "${options[@]}" --tag "$tag" --file "$file" "$context" >"$work/build.log" 2>&1 || {
   tail -n 40 "$work/build.log" >&2
   fail "the build failed; the whole log is build/image/build.log"
 }

@@ -52,8 +52,8 @@ Result<std::string> program() {
                       "library: name it by set_program()");
   }
   if (!is_executable(path)) {
-    return make_error(ErrorKind::not_found, "the program that reads files cannot be executed: " +
-                                                in_quotes(path));
+    return make_error(ErrorKind::not_found,
+                      "the program that reads files cannot be executed: " + in_quotes(path));
   }
   return path;
 }

@@ -22,8 +22,8 @@ struct Renderer::State {
     view.dataset = dataset.info().id;
     data::Dataset shown = library::taken(scene::with_difference(view, dataset, nullptr));
     const auto completed = library::taken(frame::complete(view, shown, true));
-    const auto prepared = library::taken(
-        frame::prepare(completed, frame::own_setting(completed), shown, encoding));
+    const auto prepared =
+        library::taken(frame::prepare(completed, frame::own_setting(completed), shown, encoding));
     if (auto done = frame::draw(prepared, shown, pool, CancelToken(), workspace); !done) {
       library::throw_problem(done.error());
     }

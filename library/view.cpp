@@ -25,9 +25,9 @@ View& View::set(const std::string& pointer, const std::string& value) {
 }
 
 View& View::size(int width, int height) {
-  json_ = library::taken(protocol::set_all(document_of(json_),
-                                           {{"/image/width", std::to_string(width)},
-                                            {"/image/height", std::to_string(height)}}))
+  json_ = library::taken(
+              protocol::set_all(document_of(json_), {{"/image/width", std::to_string(width)},
+                                                     {"/image/height", std::to_string(height)}}))
               .canonical();
   return *this;
 }

@@ -183,9 +183,8 @@ Volume Volume::file(const std::string& path, std::uint64_t memory) {
   data::loader::Limits limits;
   limits.budget = std::make_shared<data::Budget>(memory);
   auto source = library::taken(data::loader::open(location, limits));
-  return Volume(std::make_shared<State>(
-      State{dataset_of(std::move(source), std::filesystem::path(path).stem().native(),
-                       limits.budget)}));
+  return Volume(std::make_shared<State>(State{
+      dataset_of(std::move(source), std::filesystem::path(path).stem().native(), limits.budget)}));
 }
 
 std::array<int, 3> Volume::size() const { return state_->dataset->info().grid.dims(); }

@@ -109,8 +109,8 @@ class WINDSPLAT_API View {
   // Changes one key: set("/camera/fovY", "50"), set("/vector/field", "wind"). The value is JSON, or
   // a string if it is none.
   View& set(const std::string& pointer, const std::string& value);
-  View& size(int width, int height);  // pixels; default: 1280 x 720
-  View& step(int step);               // from 0
+  View& size(int width, int height);       // pixels; default: 1280 x 720
+  View& step(int step);                    // from 0
   [[nodiscard]] std::string json() const;  // the keys that were set
 
  private:
