@@ -69,7 +69,7 @@ if(NOT WINDSPLAT_SANITIZE)
   windsplat_program_test(values ${SYSTEM_PYTHON} tests/integration/values.py
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(openapi ${SYSTEM_PYTHON} tests/integration/openapi_requests.py
-    --program=$<TARGET_FILE:windsplat> --count=1000)
+    --program=$<TARGET_FILE:windsplat> --count=600)
   windsplat_program_test(uploads ${SYSTEM_PYTHON} tests/integration/uploads.py
     --program=$<TARGET_FILE:windsplat>)
   windsplat_program_test(scripts python3 tests/integration/scripts_test.py)

@@ -68,6 +68,7 @@ def vectors():
 
 TARGETS = [
     "/", "/livez", "/readyz", "/metrics", "/view.schema.json", "/v1", "/v1/colormaps",
+    "/v1/openapi.json", "/v1/openapi.html", "/v1/asyncapi.json", "/v1/asyncapi.html",
     "/v1/presets", "/v1/datasets", "/v1/datasets/climate", "/v1/jobs", "/v1/jobs/1",
     "/v1/files", "/v1/files?folder=runs&after=a.nc&limit=2", "/v1/files?folder=../..",
     "/v1/views/0123456789", "/v1/references/abc", "/v1/stream", "*", "http://localhost/v1",

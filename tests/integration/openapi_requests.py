@@ -5,7 +5,7 @@ must be those that the document states: status, Content-Type, headers, and JSON 
 
     openapi_requests.py --program=PATH [--count=N] [--seed=N]
 
-Needs python3-jsonschema. Prints the seed, and with --verbose the number of answers by status.
+Needs python3-jsonschema. Prints the seed and the number of answers by status.
 """
 import argparse
 import collections
@@ -53,7 +53,7 @@ class Daemon:
         for is_last in (False, True):
             try:
                 if self.client is None:
-                    self.client = http.client.HTTPConnection(self.address, timeout=60)
+                    self.client = http.client.HTTPConnection(self.address, timeout=240)
                 self.client.putrequest(method, target, skip_accept_encoding=True)
                 for name, value in headers.items():
                     self.client.putheader(name, value)
@@ -356,6 +356,7 @@ def told(request, answer):
 def run(arguments):
     daemon = Daemon(arguments.program)
     counts = collections.Counter()
+    recent = collections.deque(maxlen=5)
     faults = 0
     try:
         _, _, text = daemon.ask("GET", "/v1/openapi.json", {}, None)
@@ -372,9 +373,12 @@ def run(arguments):
             except (OSError, http.client.HTTPException) as fault:
                 answer = 0, {}, repr(fault).encode()
                 print("no answer\n    " + told(request, answer), flush=True)
+                for earlier, its in recent:
+                    print("  after " + told(earlier, its), flush=True)
                 faults += 1
                 break
             counts[answer[0]] += 1
+            recent.append((request, answer))
             requests.learn(request[1], *answer)
             wrong = checker.check(request, answer)
             if wrong:
