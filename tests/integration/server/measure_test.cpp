@@ -171,7 +171,8 @@ TEST_F(Measures, InvalidOrOutsideProbesAreRefused) {
   expect_problem_saying(refused("probe?x=here&y=0&z=500"), 400);
   expect_problem_saying(refused("probe?x=1e999&y=0&z=500"), 400);
   expect_problem_saying(refused("probe?x=0&y=0&z=500&step=3"), 422);
-  expect_problem_saying(refused("probe?lon=0&y=0&z=500"), 400, "x, y, z, heightField, index, step");
+  expect_problem_saying(refused("probe?longitude=0&y=0&z=500"), 400,
+                        "x, y, z, lon, lat, level, heightField, index, step");
   expect_problem_saying(get(port(), "/v1/datasets/none/probe?x=0&y=0&z=0"), 404);
 }
 
