@@ -144,8 +144,18 @@ class Connection:
             if answer.status >= 200 or answer.status == 101:
                 break
         if method != "HEAD" and answer.status not in (101, 204, 304):
-            answer.body = self.take(int(answer.header("Content-Length")))
+            answer.body = (self.chunks() if answer.header("Transfer-Encoding") == "chunked" else
+                           self.take(int(answer.header("Content-Length"))))
         return answer
+
+    def chunks(self):
+        """A body in chunks (RFC 9112, 7.1), as proxies send it; without trailers."""
+        body = b""
+        while size := int(self.until(b"\r\n").split(b";")[0], 16):
+            body += self.take(size)
+            self.until(b"\r\n")
+        self.until(b"\r\n")
+        return body
 
     def ended(self, seconds=5):
         """Whether the peer closes the connection within that time; data received meanwhile are
