@@ -161,7 +161,8 @@ class Requests:
                      "heightField": self.fields, "after": ["a", "small.nc"],
                      "datetime": ["2001-01-01", "2001-01-01T06:00Z", "now"],
                      "colormap": ["viridis", "magma", "none"],
-                     "bbox": ["-20,-30,40,70", "350,0,10,9", "0,0,0", "5,1,a,2"], "level": ["500", "1000,300", "x"],
+                     "bbox": ["-20,-30,40,70", "350,0,10,9", "0,0,0", "5,1,a,2"],
+                     "level": ["500", "1000,300", "x"],
                      "stride": ["2", "1,2,3", "0", "1.5", "9,9,9,9"]}
             return self.draw.choice(known.get(parameter["name"], schema_values.WORDS)), True
         value = self.values.of(schema)

@@ -1,5 +1,6 @@
 // Generates the types, type-checks the page, the client package and their tests, bundles the tests
-// (for node versions that cannot run TypeScript) and runs them. Usage: node scripts/test.mjs [node --test options]
+// (for node versions that cannot run TypeScript) and runs them.
+// Usage: node scripts/test.mjs [node --test options]
 import { spawnSync } from "node:child_process";
 import { mkdirSync, readdirSync, rmSync } from "node:fs";
 import { dirname, join, relative } from "node:path";
