@@ -2,7 +2,7 @@
 function(windsplat_python_test name)
   add_test(NAME clients.python_${name} COMMAND ${SYSTEM_PYTHON} -W ignore -m unittest ${ARGN}
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}/tests/clients/python)
-  set_tests_properties(clients.python_${name} PROPERTIES LABELS integration TIMEOUT 300
+  set_tests_properties(clients.python_${name} PROPERTIES LABELS integration TIMEOUT 600
     ENVIRONMENT "PYTHONDONTWRITEBYTECODE=1;WINDSPLAT=$<TARGET_FILE:windsplat>")
 endfunction()
 

@@ -23,6 +23,13 @@ def orbit_frame(azimuth: float, elevation: float) -> tuple[Vector, Vector, Vecto
     return right, up, forward
 
 
+def turned(place: Sequence[float], centre: Sequence[float], angle: float) -> list[float]:
+    """A place turned about the vertical axis through a centre, radians."""
+    c, s = math.cos(angle), math.sin(angle)
+    x, y = place[0] - centre[0], place[1] - centre[1]
+    return [centre[0] + c * x - s * y, centre[1] + s * x + c * y, place[2]]
+
+
 def _ends(axis: Mapping[str, Any], low: float, high: float, kept: Any) -> tuple[float, float]:
     """World coordinates of an axis's ends, of the range `kept` of its coordinates if there is
     one."""
@@ -42,7 +49,7 @@ def box_of(dataset: Mapping[str, Any], view: Mapping[str, Any]) -> tuple[Vector,
     """Lowest and highest corner of what a view shows, world units."""
     geometry = view.get("geometry", {})
     if geometry.get("mapping") == "sphere":
-        r = GLOBE_RADIUS / math.sqrt(3)
+        r = GLOBE_RADIUS
         return (-r, -r, -r), (r, r, r)
     region = view.get("region", {})
     scale = geometry.get("scale", (1, 1, 1))
@@ -54,6 +61,38 @@ def box_of(dataset: Mapping[str, Any], view: Mapping[str, Any]) -> tuple[Vector,
         low.append(min(a, b) * scale[k])
         high.append(max(a, b) * scale[k])
     return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+
+def corners_of(
+    dataset: Mapping[str, Any], view: Mapping[str, Any]
+) -> tuple[list[list[float]], list[float]]:
+    """The corners of the box that a view shows, from its centre; and the centre."""
+    low, high = box_of(dataset, view)
+    centre = [(a + b) / 2 for a, b in zip(low, high)]
+    return [[(low, high)[corner >> k & 1][k] - centre[k] for k in range(3)]
+            for corner in range(8)], centre
+
+
+def _distance(points: Sequence[tuple[float, float]], tangent: float) -> float:
+    """The least distance at which points (a, f), a along an axis of the picture and f forward, fit.
+
+    A point is in the picture of a target shifted by c if |a - c| <= (distance + f) tangent. With p
+    and q, the greatest values of a - f tangent and -a - f tangent, this is (p + q) / (2 tangent).
+    """
+    p = max(a - f * tangent for a, f in points)
+    q = max(-a - f * tangent for a, f in points)
+    return (p + q) / (2 * tangent)
+
+
+def _middle(points: Sequence[tuple[float, float]], distance: float) -> float:
+    """The shift of the target with which points are as far from both edges of the picture."""
+    low, high = min(a for a, _ in points), max(a for a, _ in points)
+    for _ in range(60):
+        c = (low + high) / 2
+        right = max((a - c) / (distance + f) for a, f in points)
+        left = max((c - a) / (distance + f) for a, f in points)
+        low, high = (c, high) if right > left else (low, c)
+    return (low + high) / 2
 
 
 def looking(
@@ -70,17 +109,21 @@ def looking(
     fov_y = view.get("camera", {}).get("fovY") or default["camera"]["fovY"]
     tan_y = math.tan(math.radians(fov_y) / 2)
     tan_x = tan_y * image["width"] / image["height"]
-    low, high = box_of(dataset, view)
-    target = [(a + b) / 2 for a, b in zip(low, high)]
+    corners, target = corners_of(dataset, view)
     right, up, forward = orbit_frame(azimuth, elevation)
-    distance, half = 1e-3, 1e-3
-    for corner in range(8):
-        p = [(low, high)[corner >> k & 1][k] - target[k] for k in range(3)]
-        across, above, behind = abs(_dot(p, right)), abs(_dot(p, up)), _dot(p, forward)
-        # A point is in the picture if across <= (distance + behind) tan_x, and so above.
-        distance = max(distance, across / tan_x - behind, above / tan_y - behind)
-        half = max(half, above, across * tan_y / tan_x)
-    distance *= ROOM / zoom
+    if view.get("geometry", {}).get("mapping") == "sphere":
+        # The cone of tangents of a sphere has the half angle asin(radius / distance).
+        distance = GLOBE_RADIUS / math.sin(math.atan(min(tan_x, tan_y)))
+        half = GLOBE_RADIUS * max(1.0, tan_y / tan_x)
+    else:
+        sides = [([(_dot(p, axis), _dot(p, forward)) for p in corners], tangent, axis)
+                 for axis, tangent in ((right, tan_x), (up, tan_y))]
+        distance = ROOM * max(_distance(points, tangent) for points, tangent, _ in sides)
+        half = max(max(abs(a) for a, _ in points) * tan_y / tangent for points, tangent, _ in sides)
+        for points, _, axis in sides:
+            shift = _middle(points, distance)
+            target = [t + shift * one for t, one in zip(target, axis)]
+    distance /= zoom
     steep = abs(elevation) > 89.9
     return {
         "eye": [t - distance * f for t, f in zip(target, forward)],

@@ -136,21 +136,21 @@ class View(ViewParts):
         return self.patch({"camera": keys})
 
     def turn(self: SelfView, frames: int, degrees: float = 360) -> list[SelfView]:
-        """Views on a turn about the vertical axis through the target, for `windsplat.movie`. A
-        full turn ends one frame before its start, so that it can be repeated."""
+        """Views on a turn about the vertical axis through the middle of the box of the data, or of
+        the region, for `windsplat.movie`. A full turn ends one frame before its start, so that it
+        can be repeated."""
         eye, target = self.get("/camera/eye"), self.get("/camera/target")
         if eye is None or target is None:
             camera = self.dataset.default_view["camera"]
             eye, target = eye or camera["eye"], target or camera["target"]
         full = math.isclose(abs(degrees) % 360, 0, abs_tol=1e-9)
         parts = frames if full else max(1, frames - 1)
-        x, y = eye[0] - target[0], eye[1] - target[1]
+        _, centre = _camera.corners_of(self.dataset.description, self._document)
         out = []
         for index in range(frames):
             angle = math.radians(degrees * index / parts)
-            c, s = math.cos(angle), math.sin(angle)
-            turned = [target[0] + c * x - s * y, target[1] + s * x + c * y, eye[2]]
-            out.append(self.patch({"camera": {"eye": turned, "target": target}}))
+            out.append(self.patch({"camera": {"eye": _camera.turned(eye, centre, angle),
+                                              "target": _camera.turned(target, centre, angle)}}))
         return out
 
     def volume(self: SelfView, field: str, **keys: Any) -> SelfView:
