@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { test } from "node:test";
 import { assertDrawn, shot } from "../support.mjs";
-import { event, finalOf, pixelsOf, sessions, sharedSite, toldOf } from "./site.mjs";
+import { event, finalOf, pixelsOf, sessions, sessionsOpened, sharedSite, toldOf } from "./site.mjs";
 
 const shared = sharedSite({ args: ["tornado", "climate"] });
 const tornado = `<windsplat-view id="a" src="SRC" dataset="tornado"></windsplat-view>`;
@@ -101,9 +101,10 @@ test("two elements show different datasets, and a removed one closes its stream"
   const steps = await page.evaluate(() => document.querySelector("#b").description.steps.count);
   assert.equal(await page.evaluate(() => document.querySelector("#b").step), 1);
   assert.ok(steps > 2);
+  const opened = await sessionsOpened(shared.daemon);
   await page.evaluate(() => document.body.append(document.querySelector("#a")));
-  await page.waitForTimeout(50);
-  assert.equal(await sessions(shared.daemon), 2, "a node that is moved keeps its stream");
+  await finalOf(page, "#a");
+  assert.equal(await sessionsOpened(shared.daemon), opened, "a moved node keeps its stream");
   await page.evaluate(() => document.querySelector("#a").remove());
   await until(page, async () => (await sessions(shared.daemon)) === 1, "one stream is left");
   await page.evaluate(() => document.querySelector("#b").remove());
@@ -155,6 +156,19 @@ test("attributes and properties change the view in any order", async (t) => {
   await page.evaluate(() => document.querySelector("#a").setAttribute("step", "-1"));
   const { detail } = await event(page, "error", (one) => /step must be/.test(one.detail.message));
   assert.equal(detail.kind, "attribute");
+});
+
+test("properties that were set before the element was defined hold", async (t) => {
+  const page = await shared.pageWith(t, `<windsplat-view id="a"></windsplat-view>`, {
+    defined: false,
+  });
+  await page.evaluate(async (src) => {
+    Object.assign(document.querySelector("#a"), { src, view: { dataset: "climate", step: 1 } });
+    await import("/client/element.js");
+  }, shared.daemon.url);
+  await finalOf(page);
+  const { step, view } = (await toldOf(page, "frame")).at(-1).detail;
+  assert.deepEqual([step, view.dataset], [1, "climate"]);
 });
 
 test("playback shows one step after another", async (t) => {

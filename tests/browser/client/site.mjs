@@ -75,9 +75,10 @@ export function sharedSite({ args = ["tornado"], allowed = true } = {}) {
     shared.site?.stop();
   });
 
-  // Opens a page of the site; it is closed when the test ends. body: HTML in which SRC is the
-  // address of the daemon. Events of the elements are collected in window.told.
-  async function pageWith(t, body, { css = small, ...options } = {}) {
+  // Opens a page of the site; it is closed when the test ends. defined: whether it defines the
+  // element; body: HTML in which SRC is the address of the daemon. Events of the elements are
+  // collected in window.told.
+  async function pageWith(t, body, { css = small, defined = true, ...options } = {}) {
     shared.site.css = css;
     shared.site.html = `${head}<script>
       window.told = [];
@@ -86,7 +87,7 @@ export function sharedSite({ args = ["tornado"], allowed = true } = {}) {
           window.told.push({ name, id: target.id, detail: JSON.parse(JSON.stringify(detail)) }));
       }
     </script>
-    <script type="module" src="/client/element.js"></script>
+    ${defined ? '<script type="module" src="/client/element.js"></script>' : ""}
     <body>${body.replaceAll("SRC", shared.daemon.url)}</body></html>`;
     const page = await openPage(shared.browser, `${shared.site.origin}/`, options);
     t.after(() => page.context().close());
@@ -113,18 +114,25 @@ export async function event(page, name, accepts = () => true) {
 
 // The final picture of the newest view. Input is sent with the next display frame.
 export const finalOf = (page, selector = "windsplat-view") =>
-  page.evaluate(async (which) => {
-    await customElements.whenDefined("windsplat-view");
-    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-    return document.querySelector(which).final();
-  }, selector);
+  page.evaluate(
+    async ([which, ms]) => {
+      await customElements.whenDefined("windsplat-view");
+      const late = new Promise((_, reject) => setTimeout(() => reject(new Error("no final")), ms));
+      await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+      return Promise.race([late, document.querySelector(which).final()]);
+    },
+    [selector, 15_000 * patience],
+  );
 
 // Statistics of the element's picture, as those of the page's.
 export const pixelsOf = (page, selector = "windsplat-view") =>
   pixels(page, [selector, "[part=picture]"]);
 
-// How many streams the daemon has.
-export async function sessions(daemon) {
-  const text = await (await fetch(`${daemon.url}metrics`)).text();
-  return Number(/^windsplat_sessions (\d+)/m.exec(text)?.[1]);
-}
+const metric = async ({ url }, name) => {
+  const text = await (await fetch(`${url}metrics`)).text();
+  return Number(new RegExp(`^${name} (\\d+)`, "m").exec(text)?.[1]);
+};
+
+// How many streams the daemon has, and how many it has had.
+export const sessions = (daemon) => metric(daemon, "windsplat_sessions");
+export const sessionsOpened = (daemon) => metric(daemon, "windsplat_sessions_opened_total");

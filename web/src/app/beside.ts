@@ -2,10 +2,11 @@
 // except for its dataset and step, and for its settings and camera while they are not linked. What
 // the user chooses in its bar -> its view -> its picture.
 import {
+  ViewStream,
   type Camera,
+  type ChosenMessage,
   type Dataset,
   type FrameHeader,
-  type ServerMessage,
   type View,
 } from "@windsplat/client";
 import {
@@ -19,16 +20,12 @@ import {
 } from "../view/beside";
 import {
   roundedCamera,
-  ViewState,
   afterResizing,
   type Clock,
-  type Connection,
   type ConnectionState,
   type CameraHost,
   Viewport,
   type ColorMaps,
-  PatchAnswers,
-  openConnection,
   watchPresence,
 } from "@windsplat/client/parts";
 import { byId } from "../base/dom";
@@ -71,50 +68,33 @@ export class BesidePicture {
   private readonly button = byId("compare-button", HTMLButtonElement);
   private readonly viewport: Viewport;
   private readonly legend: Legend;
-  private readonly connection: Connection;
-  private state = new ViewState();
-  private answers = new PatchAnswers(this.state);
+  private stream: ViewStream | null = null; // while it is shown
   private shows: Beside | null = null;
   private own: View | null = null; // settings that do not follow the first picture, all of them
   private drawn: View | null = null; // as the server drew it
-  private running = false;
   private choices = 0; // of datasets; answers to earlier ones are too late
   private caption = "";
   private sent = ""; // the view sent last, as text; a refused one is not sent again
 
   constructor(
-    baseUri: string,
-    clock: Clock,
+    private readonly baseUri: string,
+    private readonly clock: Clock,
     private readonly host: BesideHost,
   ) {
     this.legend = new Legend(byId("beside-legend", HTMLElement), host.maps);
     this.viewport = new Viewport(this.canvas, {
-      decoded: ({ seq }, decodeMs) => this.acknowledge(seq, decodeMs),
-      drawn: ({ header }) => this.onDrawn(header),
-      broken: ({ seq }) => this.acknowledge(seq, 0),
+      decoded: ({ seq }, decodeMs) => this.stream?.acknowledge(seq, decodeMs),
+      drawn: ({ header }) => this.stream?.show(header),
+      broken: ({ seq }) => this.stream?.acknowledge(seq),
       videoFailed: () => {}, // no video is asked for
       resized: afterResizing(() => this.follow()),
     });
-    this.connection = openConnection(baseUri, clock, {
-      state: (state) => this.onState(state),
-      hello: ({ limits }) => {
-        this.viewport.newSession(limits.imagePixelsMax);
-        this.state = new ViewState();
-        this.answers = new PatchAnswers(this.state);
-        this.sent = "";
-        this.sendVisibility();
-        this.follow();
-      },
-      message: (message) => this.onMessage(message),
-      frame: (frame) => {
-        this.viewport.show(frame).catch(() => this.acknowledge(frame.header.seq, 0));
-      },
-    });
-    watchPresence(this.connection, () => this.sendVisibility());
+    const link = { retryNow: () => this.stream?.connection.retryNow() };
+    watchPresence(link, () => this.sendVisibility());
     this.datasets.addEventListener("change", () => this.choose(this.datasets.value));
     this.step.addEventListener("change", () => this.chooseStep(this.step.value));
     this.linked.addEventListener("change", () => {
-      this.own = this.linked.checked ? null : this.state.document;
+      this.own = this.linked.checked ? null : (this.stream?.explicit ?? null);
       this.show({ ...this.shows, settings: undefined });
     });
     this.sameCamera.addEventListener("change", () => {
@@ -170,7 +150,8 @@ export class BesidePicture {
       if (this.hasOwnCamera) this.setOwnCamera(roundedCamera(camera));
       else this.host.cameras.setCamera(camera);
     },
-    ready: () => (this.hasOwnCamera ? this.connection.ready : this.host.cameras.ready()),
+    ready: () =>
+      this.hasOwnCamera ? (this.stream?.connection.ready ?? true) : this.host.cameras.ready(),
   };
 
   // The server then frames the whole box.
@@ -182,7 +163,7 @@ export class BesidePicture {
   private setOwnCamera(camera: Beside["camera"]): void {
     if (this.shows === null) return;
     this.shows = { ...this.shows, camera };
-    this.connection.wake();
+    this.stream?.connection.wake();
     this.follow();
     this.host.edited();
   }
@@ -214,8 +195,8 @@ export class BesidePicture {
     if (beside === null) {
       this.own = null;
       this.choices += 1;
-      this.running = false;
-      this.connection.stop();
+      this.stream?.close();
+      this.stream = null;
       this.words.textContent = "";
       if (hadFocus) this.returnFocus();
     }
@@ -268,20 +249,43 @@ export class BesidePicture {
   // The first picture, or this one's place, has changed.
   follow(): void {
     if (this.shows === null || !this.host.drawn()) return;
-    if (!this.running) {
-      this.running = true;
-      this.connection.start();
-    }
     this.writeBar();
-    if (!this.connection.live || !this.connection.ready || !this.hasSettings()) return;
+    if (this.stream !== null && !this.stream.connection.ready) return;
+    if (!this.hasSettings()) return;
     const next = besideView(this.host.view(), this.shows, this.viewport.askedSize(), this.own);
     const text = JSON.stringify(next);
-    if (text === this.sent) return;
+    if (text === this.sent && this.stream !== null) return;
     this.sent = text;
-    for (const { rev, patch } of this.state.replace(next)) {
-      this.connection.send({ type: "patch", rev, t: performance.now(), patch });
-    }
-    this.canvas.dataset.wanted = String(this.state.rev);
+    if (this.stream === null) this.stream = this.begin(next);
+    else this.stream.replace(next);
+    this.canvas.dataset.wanted = String(this.stream.model.state.rev);
+  }
+
+  private begin(view: View): ViewStream {
+    const stream: ViewStream = new ViewStream(
+      this.baseUri,
+      view,
+      {
+        frame: (frame) => {
+          this.viewport.show(frame).catch(() => stream.acknowledge(frame.header.seq));
+        },
+        shown: (header, chosen) => this.onShown(header, chosen),
+        settled: (rev) => this.onSettled(rev),
+        state: (state) => this.onState(state),
+        hello: ({ limits }) => {
+          this.viewport.newSession(limits.imagePixelsMax);
+          this.canvas.dataset.wanted = String(stream.model.state.rev);
+          this.follow(); // the limits of the server may be others
+        },
+        refused: ({ problem, message }) => {
+          this.words.textContent = problem === null ? message : problemText(problem);
+          this.words.classList.add("refused");
+        },
+      },
+      { acknowledge: "manual", clock: this.clock },
+    );
+    stream.setHidden(document.hidden);
+    return stream;
   }
 
   // Whether its own settings are known. Those that were kept depart from the settings of the first
@@ -326,21 +330,8 @@ export class BesidePicture {
     this.words.classList.add("refused");
   }
 
-  private onMessage(message: ServerMessage): void {
-    if (message.type === "chosen") this.answers.onChosen(message);
-    if (message.type === "unchanged") {
-      this.answers.onUnchanged(message);
-      this.settleUnchanged();
-    }
-    if (message.type !== "error") return;
-    this.words.textContent = problemText(message.problem);
-    this.words.classList.add("refused");
-    if (message.rev !== undefined) this.answers.refuse(message.rev);
-  }
-
-  private onDrawn(header: FrameHeader): void {
-    const chosen = this.answers.drawn(header);
-    if (chosen !== null && this.answers.isAfterRefusal(header.rev)) {
+  private onShown(header: FrameHeader, chosen: ChosenMessage | null): void {
+    if (chosen !== null && this.stream?.isAfterRefusal(header.rev)) {
       const view = chosen.view as View;
       this.caption = this.captionOf(view, header.step);
       this.showCaption();
@@ -348,14 +339,12 @@ export class BesidePicture {
       this.showLegend();
       markCamera(this.canvas, view.camera as Camera); // as the server drew it
     }
-    this.settleUnchanged();
     this.follow(); // changes that had to wait
   }
 
   // The picture shown is the answer to the newest patch.
-  private settleUnchanged(): void {
-    const rev = this.answers.settleUnchanged();
-    if (rev === null || !this.answers.isAfterRefusal(rev)) return;
+  private onSettled(rev: number): void {
+    if (!this.stream?.isAfterRefusal(rev)) return;
     this.canvas.dataset.rev = String(Math.max(rev, Number(this.canvas.dataset.rev)));
     this.showCaption();
   }
@@ -379,12 +368,7 @@ export class BesidePicture {
     return `${this.host.others().get(dataset) ?? dataset} · step ${step + 1}`;
   }
 
-  private acknowledge(seq: number, decodeMs: number): void {
-    this.connection.send({ type: "ack", seq, decodeMs });
-  }
-
   private sendVisibility(): void {
-    if (!document.hidden) this.connection.wake();
-    this.connection.send({ type: "visibility", hidden: document.hidden });
+    this.stream?.setHidden(document.hidden);
   }
 }

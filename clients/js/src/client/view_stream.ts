@@ -35,7 +35,9 @@ export interface StreamEvents {
   state?(state: ConnectionState): void;
   /** After the connection was lost for this reason: what the server answers otherwise. */
   reached?(reach: Reach, reason: string): void;
-  hello?(hello: HelloMessage): void;
+  hello?(hello: HelloMessage): void; // the view has been sent
+  /** The picture shown before is the answer to this patch, which changed nothing visible. */
+  settled?(rev: number): void;
   opened?(dataset: Dataset): void; // also after the dataset's files have changed
   refused?(error: ProblemError): void; // of the dataset or a change of the view
   changed?(view: View): void; // by change(), or during playback
@@ -70,6 +72,7 @@ export class ViewStream {
   private readonly answers = new PatchAnswers(this.model.state);
   private readonly auto: boolean;
   private wanted: View; // stated again after a restart, also if it was refused
+  private opening: string | undefined; // the dataset of the last `open` of this session
   private opens = 1; // number of the last `open`, which its answer repeats
   private refusedOpen = ""; // detail of the last refusal, which the answer to `open` repeats
   private last: Frame | null = null;
@@ -144,10 +147,9 @@ export class ViewStream {
     if (image?.width !== undefined && image.height !== undefined) {
       next.image = { width: image.width, height: image.height, ...view.image };
     }
-    const other = named !== this.model.open?.id;
-    if (other) this.model.open = null;
+    if (named !== this.model.open?.id) this.model.open = null;
     this.changed(this.model.state.replace(next));
-    if (other) this.open();
+    if (named !== this.opening) this.open();
   }
 
   /** Plays the time steps from `from` to `to`; the steps of the frames tell how far it is. */
@@ -192,6 +194,11 @@ export class ViewStream {
     if (this.last?.header.seq === header.seq) this.answerFinal();
   }
 
+  /** Whether a frame or an answer of this rev is newer than the last refusal. */
+  isAfterRefusal(rev: number): boolean {
+    return this.answers.isAfterRefusal(rev);
+  }
+
   // --- the connection --------------------------------------------------------------------
 
   /** A hidden client is sent no frames. */
@@ -222,7 +229,7 @@ export class ViewStream {
     this.answers.newSession();
     this.last = null;
     this.answered = 0;
-    this.events.hello?.(hello);
+    this.opening = undefined;
     if (state.document.dataset === undefined) {
       const dataset = this.wanted.dataset ?? hello.datasets[0]?.id;
       if (dataset !== undefined) state.change({ ...this.wanted, dataset });
@@ -230,10 +237,11 @@ export class ViewStream {
     if (this.hidden) this.send({ type: "visibility", hidden: true });
     if (state.document.dataset === undefined) {
       this.refuse(new ProblemError("the server has no dataset", 404));
-      return;
+    } else {
+      this.sendAll([state.restate()]);
+      this.open();
     }
-    this.sendAll([state.restate()]);
-    this.open();
+    this.events.hello?.(hello);
   }
 
   // The view is sent before, so that the first picture already shows it; `open` then only asks for
@@ -242,7 +250,8 @@ export class ViewStream {
     const { dataset } = this.explicit;
     if (dataset === undefined) return;
     this.opens += 1;
-    this.send({ type: "open", id: this.opens, dataset });
+    const sent = this.send({ type: "open", id: this.opens, dataset });
+    this.opening = sent ? dataset : undefined;
   }
 
   private onMessage(message: ServerMessage): void {
@@ -298,6 +307,7 @@ export class ViewStream {
   // Both the view with an unknown dataset and the `open` of it are refused; one is told.
   private onError({ id, rev, problem }: ErrorMessage): void {
     if (rev === undefined && id !== undefined && id !== this.opens) return; // of an earlier `open`
+    if (id === this.opens) this.opening = undefined;
     const repeated = id === this.opens && problem.detail === this.refusedOpen;
     this.refusedOpen = problem.detail;
     if (rev !== undefined) this.answers.refuse(rev);
@@ -319,7 +329,9 @@ export class ViewStream {
   // The patch that changed nothing visible is answered by the frame shown before.
   private settleUnchanged(): void {
     const rev = this.answers.settleUnchanged();
-    if (rev !== null) this.answered = Math.max(rev, this.answered);
+    if (rev === null) return;
+    this.answered = Math.max(rev, this.answered);
+    this.events.settled?.(rev);
   }
 
   private answerFinal(): void {

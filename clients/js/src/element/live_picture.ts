@@ -57,6 +57,7 @@ export class LivePicture {
         hello: (hello) => {
           this.viewport.newSession(hello.limits.imagePixelsMax);
           this.video.greet();
+          this.resize(); // to the limits of this server
           events.hello?.(hello);
         },
         changed: (changed) => {

@@ -210,6 +210,7 @@ export class WindsplatView extends HTMLElement {
     this.live = new LivePicture(this.inside.canvas, client, view, {
       shown: (header, chosen) => this.onShown(header, chosen),
       state: (state) => this.onState(state),
+      settled: () => this.say(""),
       reached: (reach, reason) => this.lost(reach, reason),
       opened: (dataset) => this.bar.describe(dataset),
       refused: (error) => this.onRefused(error),
