@@ -32,7 +32,7 @@ std::string beside_the_library() {
   std::filesystem::path folder = std::filesystem::canonical(found.dli_fname, fault).parent_path();
   for (int up = 0; !fault && up < 2; ++up) {
     folder = folder.parent_path();
-    const std::string path = (folder / "bin" / "windsplat").native();
+    std::string path = (folder / "bin" / "windsplat").native();
     if (is_executable(path)) return path;
   }
   return {};

@@ -17,7 +17,8 @@ struct Renderer::State {
   frame::Workspace workspace;
 
   // Draws into the workspace.
-  void draw(data::Dataset dataset, const std::string& json, const frame::Encoding& encoding) {
+  void draw(const data::Dataset& dataset, const std::string& json,
+            const frame::Encoding& encoding) {
     protocol::View view = library::taken(protocol::ViewDocument::parse(json)).view();
     view.dataset = dataset.info().id;
     data::Dataset shown = library::taken(scene::with_difference(view, dataset, nullptr));

@@ -140,7 +140,7 @@ Volume Volume::sample(const std::string& name, std::uint64_t memory) {
 }
 
 Volume Volume::arrays(std::array<Axis, 3> axes, std::vector<Field> fields,
-                      std::vector<double> times, std::uint64_t memory) {
+                      const std::vector<double>& times, std::uint64_t memory) {
   if (fields.empty()) refuse("a volume needs at least one field");
   if (times.empty()) refuse("a volume needs at least one time");
   if (const std::string fault = data::axis_fault(times); !fault.empty()) refuse("times: " + fault);

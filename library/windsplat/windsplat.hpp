@@ -65,7 +65,8 @@ class WINDSPLAT_API Volume {
   // Fields in memory, at least one, on a grid of three axes (x, y, z). `times`: that of each step,
   // in seconds.
   static Volume arrays(std::array<Axis, 3> axes, std::vector<Field> fields,
-                       std::vector<double> times = {0}, std::uint64_t memory = memory_default);
+                       const std::vector<double>& times = {0},
+                       std::uint64_t memory = memory_default);
 
   // A file, or a pattern of files, in any format that the program reads. A separate, confined
   // process reads it: the program windsplat of the same version (set_program()).
