@@ -66,6 +66,7 @@ Handler description(const std::shared_ptr<documents::Documents>& documents, docu
 
 std::vector<documents::Entry> entries_of(const std::vector<Route>& table) {
   std::vector<documents::Entry> out;
+  out.reserve(table.size());
   for (const Route& route : table) out.push_back({route.method, route.path, route.operation});
   return out;
 }

@@ -59,11 +59,24 @@ std::string table(std::string_view caption, std::initializer_list<std::string_vi
   return element_of("table", content) + "\n";
 }
 
+std::string prose(std::string_view text) {
+  std::string out;
+  bool is_name = false;
+  while (true) {
+    const std::size_t end = std::min(text.find('`'), text.size());
+    const std::string_view part = text.substr(0, end);
+    out += is_name ? element("code", part) : escaped(part);
+    if (end == text.size()) return out;
+    text.remove_prefix(end + 1);
+    is_name = !is_name;
+  }
+}
+
 std::string paragraphs(std::string_view text) {
   std::string out;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find("\n\n"), text.size());
-    out += element("p", text.substr(0, end)) + "\n";
+    out += element_of("p", prose(text.substr(0, end))) + "\n";
     text.remove_prefix(std::min(end + 2, text.size()));
   }
   return out;

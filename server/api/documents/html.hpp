@@ -17,7 +17,9 @@ std::string link(std::string_view target, std::string_view text);
 std::string table_row(std::initializer_list<std::string> cells);
 std::string table(std::string_view caption, std::initializer_list<std::string_view> heads,
                   std::string_view rows);
-// Text whose empty lines part paragraphs.
+// Text in which names stand between backquotes.
+std::string prose(std::string_view text);
+// The same with empty lines between paragraphs.
 std::string paragraphs(std::string_view text);
 
 }  // namespace windsplat::api::documents

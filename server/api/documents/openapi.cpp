@@ -174,6 +174,7 @@ std::string openapi(const std::vector<Entry>& entries, const About& about) {
     paths[entry.path][lower(entry.method)] = operation_of(entry, about, bundle);
   }
   std::vector<Operation> operations;
+  operations.reserve(entries.size());
   for (const Entry& entry : entries) operations.push_back(entry.operation);
   Json responses = problem_responses(operations, about.with_token, bundle);
   Json components{{"schemas", bundle.schemas()},

@@ -63,7 +63,7 @@ std::string parameters_of(const Json& operation) {
     rows += table_row({element("code", parameter.at("name").get<std::string>()),
                        place + (parameter.value("required", false) ? ", required" : ""),
                        words_of(parameter.at("schema")),
-                       escaped(parameter.at("description").get<std::string>())});
+                       prose(parameter.at("description").get<std::string>())});
   }
   return table("Parameters", {"name", "in", "value", "meaning"}, rows);
 }
@@ -92,7 +92,7 @@ std::string answers_of(const Json& operation, const Json& components) {
         headers += (headers.empty() ? "" : ", ") + element("code", name);
       }
     }
-    rows += table_row({status, escaped(response.at("description").get<std::string>()),
+    rows += table_row({status, prose(response.at("description").get<std::string>()),
                        content_of(response), headers});
   }
   return table("Answers", {"status", "meaning", "body", "headers"}, rows);
@@ -101,7 +101,7 @@ std::string answers_of(const Json& operation, const Json& components) {
 std::string body_of(const Json& operation) {
   if (!operation.contains("requestBody")) return {};
   const Json& body = operation.at("requestBody");
-  return element_of("p", "Body: " + escaped(body.at("description").get<std::string>()) + " " +
+  return element_of("p", "Body: " + prose(body.at("description").get<std::string>()) + " " +
                              content_of(body)) +
          "\n";
 }
@@ -144,7 +144,7 @@ std::string schemas_section(const Json& components) {
   std::string out = "<h2 id=\"schemas\">Schemas</h2>\n";
   for (const auto& [name, schema] : components.at("schemas").items()) {
     const std::string summary =
-        element("strong", name) + " " + escaped(schema.value("description", ""));
+        element("strong", name) + " " + prose(schema.value("description", ""));
     out += element_of("details", element_of("summary", summary) +
                                      element_of("pre id=\"schema-" + name + "\" tabindex=\"0\"",
                                                 linked_json(schema))) +
@@ -215,7 +215,7 @@ std::string asyncapi_page(std::string_view text) {
       const std::string name = name_in(reference.at("$ref"));
       const Json& message = components.at("messages").at(name);
       section += element_of("h3 id=\"message-" + name + "\"", element("code", name)) + "\n" +
-                 element("p", message.at("summary").get<std::string>()) + "\n" +
+                 paragraphs(message.at("summary").get<std::string>()) + "\n" +
                  element_of("p", element("code", message.at("contentType").get<std::string>()) +
                                      " " + words_of(message.at("payload"))) +
                  "\n";
@@ -227,7 +227,7 @@ std::string asyncapi_page(std::string_view text) {
   for (const auto& [name, part] :
        components.at("schemas").at("FrameHeader").at("properties").items()) {
     rows += table_row({part.at("x-offset").dump(), part.at("x-encoding").get<std::string>(),
-                       element("code", name), escaped(part.at("description").get<std::string>())});
+                       element("code", name), prose(part.at("description").get<std::string>())});
   }
   main +=
       element_of("section id=\"header\"",

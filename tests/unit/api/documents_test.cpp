@@ -233,6 +233,7 @@ TEST(ApiPages, HaveEveryOperationAndMessageAndNothingFromElsewhere) {
   const std::string stream = documents::asyncapi_page(documents::asyncapi(about_of("/")));
   EXPECT_THAT(stream, HasSubstr("<h3 id=\"message-patch\">"));
   EXPECT_THAT(stream, HasSubstr("<code>jpegError</code>"));
+  EXPECT_THAT(stream, HasSubstr("the key <code>type</code>"));
   for (const std::string& page : {requests, stream}) {
     EXPECT_THAT(page, Not(HasSubstr("<script")));
     EXPECT_THAT(page, Not(HasSubstr("://")));
