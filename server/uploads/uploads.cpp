@@ -86,7 +86,7 @@ struct Uploads::State {
     {
       const std::lock_guard lock(mutex);
       const std::uint64_t bytes = disk_bytes_of(*entries);
-      if (const auto ok = take(announced.address, bytes, "unpacked "); !ok) return ok;
+      if (auto ok = take(announced.address, bytes, "unpacked "); !ok) return ok;
       receiving[announced.id] += bytes;
     }
     const fs::path folder = folder_beside(path);

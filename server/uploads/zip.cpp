@@ -235,7 +235,7 @@ class Inflater {
       const int state = ::inflate(&stream_, Z_NO_FLUSH);
       const std::size_t made = room_.size() - stream_.avail_out;
       if (made > entry.bytes - out.written()) return bad_entry(entry, "longer than it declares");
-      if (const auto ok = out.write(std::span(room_).first(made)); !ok) return ok;
+      if (auto ok = out.write(std::span(room_).first(made)); !ok) return ok;
       ended_ = state == Z_STREAM_END;
       if (state == Z_BUF_ERROR || (state == Z_OK && made == 0 && stream_.avail_in == 0)) break;
       if (state != Z_OK && !ended_) return bad_entry(entry, "that is not deflated");
@@ -274,7 +274,7 @@ Result<void> unpack_entry(int file, const ZipEntry& entry, std::uint64_t at, int
                          static_cast<std::size_t>(std::min<std::uint64_t>(left, piece_bytes)));
     if (!piece) return piece.error();
     done += piece->size();
-    const auto ok = inflater ? inflater->take(*piece, entry, out) : out.write(*piece);
+    auto ok = inflater ? inflater->take(*piece, entry, out) : out.write(*piece);
     if (!ok) return ok;
   }
   if (inflater && !inflater->has_ended()) return bad_entry(entry, "that is not deflated");
@@ -333,7 +333,7 @@ Result<void> unpack_zip(int file, const std::vector<ZipEntry>& entries, const fs
   if (::fstat(file, &facts) != 0) return unpack_disk_error(errno);
   const auto file_bytes = static_cast<std::uint64_t>(facts.st_size);
   for (const ZipEntry& entry : entries) {
-    if (const auto ok = make_folders(entry, folder); !ok) return ok;
+    if (auto ok = make_folders(entry, folder); !ok) return ok;
     if (entry.name.back() == '/') continue;
     const auto at = data_at(file, entry, file_bytes);
     if (!at) return at.error();
@@ -342,7 +342,7 @@ Result<void> unpack_zip(int file, const std::vector<ZipEntry>& entries, const fs
     if (to < 0 && (errno == EEXIST || errno == ENOTDIR))
       return bad_entry(entry, "that it has twice");
     if (to < 0) return unpack_disk_error(errno);
-    const auto ok = unpack_entry(file, entry, *at, to);
+    auto ok = unpack_entry(file, entry, *at, to);
     ::close(to);
     if (!ok) return ok;
   }
