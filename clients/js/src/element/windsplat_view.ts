@@ -315,13 +315,15 @@ export class WindsplatView extends HTMLElement {
     if (reach === "login") return; // the next state tells
     const { origin } = new URL(this.src);
     const here = window.location.origin;
-    const foreign = reach === "silent" && origin !== here;
+    if (reach === "answers" || origin === here) {
+      this.outage("connection", reason);
+      return;
+    }
+    const ofToken = this.secret === undefined ? "asks for a token" : "refuses this token";
     this.outage(
       "connection",
-      !foreign
-        ? reason
-        : `no stream from ${origin}: the server cannot be reached, ` +
-            `or it does not allow pages of ${here} (--allow-origin) or this token`,
+      `no stream from ${origin}: the server cannot be reached, ` +
+        `does not allow pages of ${here} (--allow-origin), or ${ofToken}`,
     );
   }
 
