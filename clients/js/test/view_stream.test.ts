@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { Client } from "../src/client/client";
 import { ViewStream, type StreamEvents, type StreamOptions } from "../src/client/view_stream";
 import type { Dataset, View } from "../src/wire/protocol";
-import type { ProblemError } from "../src/wire/requests";
+import { problemText, type ProblemError } from "../src/wire/requests";
 
 type Sent = Record<string, unknown> & { type: string; rev: number };
 
@@ -284,4 +284,15 @@ test("refusals of saved views and probes are typed problems; parameters are enco
     "PATCH http://host/v1/views/x application/merge-patch+json",
     "GET http://host/v1/datasets/a%20b/probe?x=-1.5&y=2&z=0&fields=u+v%2Cw ",
   ]);
+});
+
+test("a problem is told by all of its entries, else by its detail or title", () => {
+  const problem = { type: "about:blank", title: "Unprocessable", status: 422, detail: "/a: wrong" };
+  const errors = [
+    { pointer: "/a", detail: "wrong" },
+    { pointer: "/b/0", detail: "too large" },
+  ] as [{ pointer: string; detail: string }, ...{ pointer: string; detail: string }[]];
+  assert.equal(problemText({ ...problem, errors }), "/a: wrong; /b/0: too large");
+  assert.equal(problemText(problem), "/a: wrong");
+  assert.equal(problemText({ ...problem, detail: "" }), "Unprocessable");
 });
