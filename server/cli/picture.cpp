@@ -18,7 +18,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
       ->required()
       ->type_name("DATASET");
   command.add_option("--view", arguments.view_file, "A view as JSON; DATASET replaces its dataset")
-      ->type_name("F");
+      ->type_name("FILE");
   command.add_option("--size", arguments.size, "Pixels, for example 1280x720")->type_name("WxH");
   command.add_flag("--figure", arguments.figure,
                    "Draw box, axes, north arrow, scale bar, legend, title and time, and lines in "
@@ -54,7 +54,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
   command
       .add_option("--dpi", arguments.dots_per_inch,
                   "Pixels to the inch of .pdf and .svg (300), and of .png if given")
-      ->check(CLI::Range(frame::dots_per_inch_min, frame::dots_per_inch_max))
+      ->check(between(frame::dots_per_inch_min, frame::dots_per_inch_max))
       ->type_name("N");
   add_memory_option(command, arguments.memory);
   add_data_host_options(command, arguments.data_hosts);
@@ -97,6 +97,11 @@ Result<protocol::ViewDocument> assemble_view(const ViewArguments& arguments) {
   for (const std::string& setting : arguments.settings) {
     auto change = parse_setting("--set", setting);
     if (!change) return change.error();
+    if (change->first == "/dataset") {
+      return make_error_at(ErrorKind::invalid, "/dataset",
+                           "--set: the dataset is that of the argument DATASET, which would "
+                           "replace it");
+    }
     changes.push_back(std::move(*change));
   }
   if (!document || changes.empty()) return document;

@@ -185,5 +185,18 @@ TEST(CliUsage, CommandLineOverridesTheEnvironment) {
   EXPECT_EQ(run({"serve"}, {"WINDSPLAT_LOG_LEVEL=loud"}).code, 2);
 }
 
+// NaN passes comparisons with both limits; a dataset that is set would be replaced.
+TEST(CliUsage, ValuesThatHadNoMeaningAreRefused) {
+  for (const char* dpi : {"nan", "inf", "9.99", "2401", "1e400", "300x"}) {
+    const Outcome refused = run({"render", "tornado:8", "-o", "x.svg", "--dpi", dpi});
+    EXPECT_EQ(refused.code, 2) << dpi;
+    EXPECT_THAT(refused.err, HasSubstr("is not a number from 10 to 2400")) << dpi;
+  }
+  const Outcome refused = run({"render", "tornado:8", "-o", "x.png", "--set", "/dataset=climate"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err,
+              HasSubstr("/dataset: --set: the dataset is that of the argument DATASET"));
+}
+
 }  // namespace
 }  // namespace cli_test
