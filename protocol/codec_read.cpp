@@ -4,6 +4,7 @@
 
 #include "protocol/codec_json.hpp"
 #include "protocol/limits.hpp"
+#include "server/base/nearest_word.hpp"
 
 namespace windsplat::protocol {
 
@@ -167,8 +168,12 @@ std::optional<std::size_t> ObjectReader::read_name(const Json& value, const std:
     if (value.is_string() && value.get_ref<const std::string&>() == names[i]) return i;
     list += (i == 0 ? "\"" : ", \"") + std::string(names[i]) + "\"";
   }
+  std::string meant;
+  if (value.is_string()) {
+    meant = did_you_mean(value.get_ref<const std::string&>(), {names.begin(), names.end()});
+  }
   faults_.add(pointer, (names.size() == 1 ? "must be " : "must be one of ") + list + ", not " +
-                           described(value));
+                           described(value) + meant);
   return std::nullopt;
 }
 
@@ -207,7 +212,11 @@ void ObjectReader::finish() {
   for (const auto& member : value_->items()) {
     const std::string& key = member.key();
     if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) {
-      faults_.add(join_pointer(pointer_, key), "unknown key; known keys: " + known_keys());
+      const std::vector<std::string> known(asked_.begin(), asked_.end());
+      const std::string meant = did_you_mean(key, known);
+      faults_.add(join_pointer(pointer_, key),
+                  "unknown key" + (meant.empty() ? "; known keys: " : meant + " Known keys: ") +
+                      known_keys());
     }
   }
 }

@@ -12,6 +12,7 @@
 #include "server/cli/greatest.hpp"
 #include "server/cli/inspect_text.hpp"
 #include "server/cli/open_store.hpp"
+#include "server/cli/progress.hpp"
 #include "server/data/bytes/decode_limits.hpp"
 #include "server/data/resident/budget.hpp"
 #include "server/data/resident/store.hpp"
@@ -152,9 +153,14 @@ Result<std::string> described(const InspectArguments& arguments, const std::stri
 int inspect(const InspectArguments& arguments) {
   int code = exit_ok;
   bool first = true;
+  Progress progress;
+  std::size_t done_files = 0;
+  const auto files = static_cast<double>(arguments.datasets.size());
   for (const std::string& name : arguments.datasets) {
+    progress.show(static_cast<double>(done_files++) / files, name);
     auto text = described(arguments, name);
     if (text && !arguments.json && !first) text->insert(0, "\n");
+    progress.clear();
     const auto done = text ? write_stdout(*text) : Result<void>(text.error());
     if (text && !done) return answer(done.error());
     if (!done) {
@@ -176,7 +182,7 @@ void add_inspect(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<InspectArguments>();
   command->add_option("files", arguments->datasets, "Files, or names of samples")
       ->required()
-      ->type_name("FILE");
+      ->type_name("DATASET");
   add_memory_option(*command, arguments->memory);
   add_data_host_options(*command, arguments->data_hosts);
   command
@@ -186,6 +192,7 @@ void add_inspect(CLI::App& app, Action& chosen) {
       ->check(CLI::IsMember({"auto", "all", "first", "none"}))
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one line of JSON for each file");
+  add_verbosity_options(*command);
   command->callback([&chosen, arguments] { chosen = [arguments] { return inspect(*arguments); }; });
 }
 

@@ -1,12 +1,6 @@
 // windsplat study: writes a report of error against run time of every method, or of extreme cases.
 #include "server/study/study.hpp"
 
-#include <unistd.h>
-
-#include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <utility>
@@ -15,11 +9,11 @@
 #include "protocol/codec.hpp"
 #include "protocol/limits.hpp"
 #include "server/base/cancel.hpp"
-#include "server/base/elapsed.hpp"
 #include "server/base/thread_pool.hpp"
 #include "server/cli/command.hpp"
 #include "server/cli/data_hosts.hpp"
 #include "server/cli/open_store.hpp"
+#include "server/cli/progress.hpp"
 #include "server/cli/signals.hpp"
 #include "server/data/resident/store.hpp"
 #include "server/engine/reference/reference.hpp"
@@ -30,7 +24,6 @@
 namespace windsplat::cli {
 namespace {
 
-constexpr int bar_width = 28;
 // Tolerance of the integral: a hundredth of the least error of a float picture with few layers.
 constexpr double truth_tolerance = 1e-7;
 constexpr double quick_tolerance = 1e-6;
@@ -52,41 +45,20 @@ struct StudyArguments {
   std::string output;
 };
 
-// A progress bar with the remaining time on a terminal, else one line per scene.
+// The progress of a study: a line with the time left on a terminal, else one line per scene.
 class Reporter {
  public:
-  explicit Reporter(bool terminal) : terminal_(terminal) {}
-
   void operator()(const study::Progress& progress) {
-    if (!terminal_) {
-      if (progress.doing == "done") complain("study: " + printable(progress.scene) + " done");
-      return;
+    if (line_.is_shown()) {
+      line_.show(progress.done, progress.scene + " " + progress.doing);
+    } else if (progress.doing == "done") {
+      note("study: " + printable(progress.scene) + " done");
     }
-    const int full = static_cast<int>(progress.done * bar_width);
-    std::string line = "\r\x1b[K[";
-    line.append(static_cast<std::size_t>(full), '#');
-    line.append(static_cast<std::size_t>(bar_width - full), '.');
-    line += "] " + std::to_string(static_cast<int>(100 * progress.done)) + " %";
-    if (progress.done > 0.02) {
-      const double spent = seconds_since(start_);
-      const auto left = std::lround(spent / progress.done * (1 - progress.done));
-      line += ", " + std::to_string(left / 60) + (left % 60 < 10 ? ":0" : ":");
-      line += std::to_string(left % 60) + " left";
-    }
-    line += "  " + printable(progress.scene, 40) + " " + printable(progress.doing, 40);
-    std::fwrite(line.data(), 1, line.size(), stderr);
-    std::fflush(stderr);
-    shown_ = true;
   }
-
-  void finish() const {
-    if (shown_) std::fputs("\r\x1b[K", stderr);
-  }
+  void finish() { line_.clear(); }
 
  private:
-  bool terminal_;
-  bool shown_ = false;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  Progress line_;
 };
 
 Result<study::Subject> given_subject(const StudyArguments& arguments, data::Store& store) {
@@ -177,7 +149,7 @@ int extremes_command(const StudyArguments& arguments) {
   const CancelToken cancel;
   const SignalWatch watch([&cancel] { cancel.cancel(); }, nullptr, {exit_interrupted});
   ThreadPool pool(arguments.threads);
-  Reporter reporter(isatty(STDERR_FILENO) == 1);
+  Reporter reporter;
   auto report = study::study_extremes(arguments.groups, arguments.output, pool, cancel,
                                       [&reporter](const std::string& group, double done) {
                                         reporter({group, "", done});
@@ -217,7 +189,7 @@ int study_command(const StudyArguments& arguments) {
   options.tolerance = arguments.quick ? quick_tolerance : truth_tolerance;
   options.calibrate = !arguments.no_calibration;
   if (!arguments.no_reference) options.truth = integral(options.tolerance, pool, cancel);
-  Reporter reporter(isatty(STDERR_FILENO) == 1);
+  Reporter reporter;
   const auto report =
       study::run_study(*subjects, options, pool, cancel,
                        [&reporter](const study::Progress& progress) { reporter(progress); });
@@ -259,7 +231,7 @@ void add_study(CLI::App& app, Action& chosen) {
       ->allow_extra_args(false)
       ->check(CLI::IsMember(study::group_names()));
   command->add_option("--view", arguments->view_file, "A view of DATASET as JSON")
-      ->type_name("F")
+      ->type_name("FILE")
       ->excludes(extremes);
   command->add_option("--size", arguments->size, "Pixels of DATASET's pictures, default 160x120")
       ->type_name("WxH")
@@ -274,12 +246,15 @@ void add_study(CLI::App& app, Action& chosen) {
       ->add_flag("--no-calibration", arguments->no_calibration,
                  "Do not compare reported errors with measured ones")
       ->excludes(extremes);
-  command->add_option("-o", arguments->output, "Folder of the report; existing results are reused")
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "Folder of the report; existing results are reused")
       ->required()
       ->type_name("DIR");
   add_threads_option(*command, arguments->threads);
   add_memory_option(*command, arguments->memory);
   add_data_host_options(*command, arguments->data_hosts);
+  add_verbosity_options(*command);
   command->callback(
       [&chosen, arguments] { chosen = [arguments] { return study_command(*arguments); }; });
 }

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "server/base/log.hpp"
+#include "server/base/nearest_word.hpp"
 #include "server/data/derived/source.hpp"
 #include "server/data/files/locate_parts.hpp"
 #include "server/data/open/open.hpp"
@@ -287,7 +288,9 @@ Result<DatasetPtr> Store::add(const std::string& sample_or_path) {
   if (location) return add(*location);
   Error error = location.error();
   if (error.kind == ErrorKind::not_found && sample_or_path.find('/') == std::string::npos) {
-    error.message += "; the built-in samples are";
+    const std::string meant = did_you_mean(sample_or_path, sample_names());
+    error.message += meant.empty() ? "; the" : meant + " The";
+    error.message += " built-in samples are";
     for (const std::string& name : sample_names()) {
       error.message += ' ' + name;
     }

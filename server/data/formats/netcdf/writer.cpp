@@ -177,7 +177,7 @@ class Writer {
     if (is_part_) std::remove(part_.c_str());
   }
 
-  Result<void> write() {
+  Result<void> write(const std::function<void(double)>& progress) {
     std::remove(part_.c_str());  // left by a killed process with the same id
     if (auto done =
             call("creating the file",
@@ -193,7 +193,7 @@ class Writer {
     if (auto done = call("writing coordinates", [&] { return write_coordinates(); }); !done) {
       return done;
     }
-    if (auto done = write_fields(); !done) {
+    if (auto done = write_fields(progress); !done) {
       return done;
     }
     if (auto done = call("closing the file", [&] { return close_library(); }); !done) {
@@ -324,12 +324,17 @@ class Writer {
     return status_;
   }
 
-  Result<void> write_fields() {
+  Result<void> write_fields(const std::function<void(double)>& progress) {
+    const std::size_t fields = info_.fields.size();
+    const auto steps = static_cast<double>(info_.steps.size());
     for (std::size_t step = 0; step < info_.steps.size(); ++step) {
       for (std::size_t field = 0; field < info_.fields.size(); ++field) {
         if (cancel_.cancelled()) {
           return interrupted();
         }
+        if (progress)
+          progress(static_cast<double>(step * fields + field) /
+                   (steps * static_cast<double>(fields)));
         if (auto done = write_field(field, step); !done) {
           return done;
         }
@@ -416,13 +421,14 @@ class Writer {
 
 std::string netcdf_part(const std::string& path) { return part_of(end_of_links(path)).native(); }
 
-Result<void> write_netcdf(Source& source, const std::string& path, const CancelToken& cancel) {
+Result<void> write_netcdf(Source& source, const std::string& path, const CancelToken& cancel,
+                          const std::function<void(double)>& progress) {
   try {
     auto plain = netcdf::writable_path(path);
     if (!plain) {
       return plain.error();
     }
-    auto done = Writer(source, *plain, cancel).write();
+    auto done = Writer(source, *plain, cancel).write(progress);
     return done ? done : with_room_left(done.error(), *plain);
   } catch (const std::bad_alloc&) {
     return make_error(ErrorKind::out_of_memory, "no memory to write " + in_quotes(path));
