@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "server/cli/command.hpp"
+#include "server/cli/help/suggest.hpp"
 #include "server/data/loader/loader.hpp"
 
 namespace windsplat::cli {
@@ -25,57 +26,6 @@ constexpr const char* description =
     "windsplat draws winds and clouds from a 3-D field, on the CPU, for a browser or a file.\n"
     "Exit codes: 0 ok, 1 failed, 2 usage, 3 bad data, 130 interrupted (animate, study, synth).\n"
     "Where an option names an environment variable, that may set it; the option has precedence.";
-
-// Edit distance of two words: letters changed, added, removed or swapped with a neighbour.
-std::size_t letters_between(std::string_view one, std::string_view other) {
-  std::vector<std::vector<std::size_t>> to(one.size() + 1,
-                                           std::vector<std::size_t>(other.size() + 1));
-  for (std::size_t i = 0; i <= one.size(); ++i) {
-    for (std::size_t j = 0; j <= other.size(); ++j) {
-      if (i == 0 || j == 0) {
-        to[i][j] = i + j;
-        continue;
-      }
-      const std::size_t changed = to[i - 1][j - 1] + (one[i - 1] == other[j - 1] ? 0 : 1);
-      to[i][j] = std::min({changed, to[i - 1][j] + 1, to[i][j - 1] + 1});
-      const bool swapped =
-          i > 1 && j > 1 && one[i - 1] == other[j - 2] && one[i - 2] == other[j - 1];
-      if (swapped) to[i][j] = std::min(to[i][j], to[i - 2][j - 2] + 1);
-    }
-  }
-  return to.back().back();
-}
-
-// Describes an unknown word, with a suggestion.
-std::string unknown_argument(const CLI::App& app) {
-  const std::vector<std::string> extras = app.remaining(true);
-  const auto is_option = [](const std::string& word) { return word.starts_with('-'); };
-  const auto first = std::find_if(extras.begin(), extras.end(), is_option);
-  const auto chosen = app.get_subcommands();
-  const CLI::App& command = chosen.empty() ? app : *chosen.front();
-  if (first == extras.end()) {
-    const std::string& word = extras.empty() ? app.get_name() : extras.front();
-    std::error_code ignored;
-    const bool is_file = std::filesystem::exists(word, ignored);
-    return "'" + printable(word) + "' is an unexpected argument of '" + command.get_name() + "'" +
-           (is_file ? "; a pattern of files must be in quotes, as must a list, such as "
-                      "'{a,b}.nc'"
-                    : "");
-  }
-  const std::string word = first->substr(0, std::min<std::size_t>(first->find('='), 64));
-  std::string nearest;
-  std::size_t least = 3;  // more distant words are unrelated
-  for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& name : option->get_lnames()) {
-      const std::size_t letters = letters_between(word, "--" + name);
-      if (letters >= least) continue;
-      least = letters;
-      nearest = name;
-    }
-  }
-  return "'" + printable(word) + "' is not an option of '" + command.get_name() + "'" +
-         (nearest.empty() ? "" : "; did you mean --" + nearest + "?");
-}
 
 // The first option or argument with an empty value, as "--size"; empty if there is none. An empty
 // value probably comes from an unset variable, so it is an error.
@@ -104,18 +54,17 @@ int run_parsed(CLI::App& app, const Action& chosen, int argc, const char* const*
   }
   const auto is_meant = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argv[1][0] != '-' && app.get_subcommands(is_meant).empty()) {
-    complain("unknown command '" + printable(argv[1]) + "'; run with --help to list the commands");
+    complain(unknown_command(app, argv[1]));
+    complain("run with --help to list the commands");
     return exit_usage;
   }
   try {
     app.parse(argc, argv);
-  } catch (const CLI::ExtrasError&) {
-    complain(unknown_argument(app));
-    complain("run with --help for more information");
-    return exit_usage;
   } catch (const CLI::ParseError& stop) {  // --help and --version too
     if (stop.get_exit_code() == 0) return print(app, stop);
-    complain(printable(stop.what(), 2000));
+    const bool has_extras = dynamic_cast<const CLI::ExtrasError*>(&stop) != nullptr;
+    const auto unknown = has_extras ? unknown_word(app) : unknown_option(app);
+    complain(unknown.value_or(printable(stop.what(), 2000)));
     complain("run with --help for more information");
     return exit_usage;
   }
@@ -188,6 +137,7 @@ int run(int argc, const char* const* argv) {
     add_synth(app, chosen);
     add_healthcheck(app, chosen);
     add_study(app, chosen);
+    add_help(app, chosen);
     return run_parsed(app, chosen, argc, argv);
   } catch (const std::bad_alloc&) {
     complain("out of memory" + memory_limits());

@@ -32,6 +32,7 @@ void add_inspect(CLI::App& app, Action& chosen);
 void add_synth(CLI::App& app, Action& chosen);
 void add_healthcheck(CLI::App& app, Action& chosen);
 void add_study(CLI::App& app, Action& chosen);
+void add_help(CLI::App& app, Action& chosen);  // help, man and completions
 
 // The internal command `load`, which reads files in a separate process. Returns the exit code.
 int load();
