@@ -84,6 +84,11 @@ test("what the server says of its documents is said as people say it", () => {
   assert.match(slice, /requires the shape “flat”: use “Place, /);
   const unknown = entryText("/vector/glow", "unknown key; known keys: color, field, length");
   assert.match(unknown, /: is not known to this server$/);
+  const misspelt = entryText(
+    "/vector/colour",
+    "unknown key; did you mean 'color'? Known keys: color, field, length",
+  );
+  assert.match(misspelt, /: is not known to this server; did you mean 'color'\?$/);
 });
 
 test("repeated parts have ordinals: words up to the fourth, then numbers", () => {
