@@ -26,6 +26,10 @@
 namespace windsplat::transport {
 namespace {
 
+bool is_preflight(const HttpContext& context, const CurrentRequest& current) {
+  return http::is_preflight(current.request, context.options.allow_origins);
+}
+
 class HttpSession final : public Connection, public HttpOwner {
  public:
   HttpSession(const HttpContext& context, Wire wire, access::Visitor visitor)
@@ -78,7 +82,7 @@ class HttpSession final : public Connection, public HttpOwner {
     if (auto refusal = context_.admission.request(visitor_, request, health)) {
       return refuse(std::move(*refusal));
     }
-    if (is_preflight()) return reader_.read_body();
+    if (is_preflight(context_, current_)) return reader_.read_body();
     const bool upgrade =
         http::asks_for_websocket(request, message.version()) && api::names_stream(request);
     if (upgrade) current_.route = api::route_stream;
@@ -90,7 +94,7 @@ class HttpSession final : public Connection, public HttpOwner {
   }
 
   void on_request() override {
-    if (is_preflight()) {
+    if (is_preflight(context_, current_)) {
       current_.route = api::route_preflight;
       return writer_.send(http::preflight_response());
     }
@@ -162,10 +166,6 @@ class HttpSession final : public Connection, public HttpOwner {
     request.peer = id_;
     request.address = access::counted_address(visitor_.peer);
     return request;
-  }
-
-  [[nodiscard]] bool is_preflight() const {
-    return http::is_preflight(current_.request, context_.options.allow_origins);
   }
 
   void next_request() {
