@@ -62,6 +62,11 @@ std::string counted_address(std::string_view address) {
 }
 
 std::optional<Network> Network::parse(std::string_view text) {
+  if (text == "unix") {
+    Network local;
+    local.unix_ = true;
+    return local;
+  }
   const std::size_t slash = text.find('/');
   const auto bytes = parse_bytes(text.substr(0, slash));
   if (!bytes || text.find('%') != std::string_view::npos) return std::nullopt;
@@ -79,6 +84,7 @@ std::optional<Network> Network::parse(std::string_view text) {
 }
 
 bool Network::holds(std::string_view address) const {
+  if (unix_) return address.starts_with(unix_peer);
   const auto bytes = parse_bytes(address);
   if (!bytes) return false;
   const std::size_t whole = bits_ / 8;

@@ -15,7 +15,10 @@ namespace windsplat::access {
 // address is returned unchanged.
 std::string counted_address(std::string_view address);
 
-// ADDRESS or ADDRESS/BITS.
+// Peers of a UNIX socket: this and the number of their user. Each user counts as an address.
+inline constexpr const char* unix_peer = "unix:";
+
+// ADDRESS, ADDRESS/BITS, or "unix": every peer of a UNIX socket.
 class Network {
  public:
   static std::optional<Network> parse(std::string_view text);
@@ -24,6 +27,7 @@ class Network {
  private:
   std::array<std::uint8_t, 16> bytes_{};  // IPv4 mapped into IPv6
   unsigned bits_ = 128;
+  bool unix_ = false;
 };
 
 // The client's address: the peer's, or behind a trusted proxy the last untrusted element of

@@ -21,10 +21,19 @@ struct TlsContext;
 
 namespace windsplat::api {
 
+// Where the server listens: an address and port, or a UNIX socket.
+struct ListenPlace {
+  std::string address = "127.0.0.1";  // IPv4 or IPv6, without brackets; unused with `path`
+  std::uint16_t port = 8080;          // 0: any free port
+  std::string path = {};              // of a UNIX socket, absolute; empty: TCP
+  unsigned mode = 0660;               // of the socket's file
+  int socket = -1;                    // of TCP, listens already at the above; owned by the server
+  bool may_lack = false;              // one of several addresses of a name: skipped if this machine
+                                      // lacks it
+};
+
 struct ServerOptions {
-  std::string address = "127.0.0.1";
-  std::uint16_t port = 8080;  // 0: any free port, returned by port()
-  int listen_socket = -1;     // listens already, instead of on the above; owned by the server
+  std::vector<ListenPlace> listen{ListenPlace{}};
   std::string base_path = "/";
   // Answer only requests whose Host is a loopback name or the host of an allowed origin, as a
   // protection against DNS rebinding.

@@ -1,12 +1,14 @@
 // windsplat healthcheck: queries whether a running daemon is ready.
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "server/cli/command.hpp"
 #include "server/cli/settings_file.hpp"
 #include "server/transport/http_client.hpp"
 #include "server/transport/server.hpp"
+#include "server/transport/unix_socket.hpp"
 
 namespace windsplat::cli {
 namespace {
@@ -21,6 +23,8 @@ int healthcheck(std::string url, const std::string& ca_file) {
     if (!text) return answer(text.error());
     ca = std::move(*text);
   }
+  constexpr std::string_view unix_prefix = "unix:";
+  if (url.starts_with(unix_prefix)) url = transport::unix_url(url.substr(unix_prefix.size()), "/");
   if (url.empty() || url.back() != '/') url += '/';
   url += "readyz";
   const auto status = transport::http_status(url, timeout_s, ca);
@@ -36,7 +40,10 @@ void add_healthcheck(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("healthcheck", "Exit 0 if a daemon is ready to serve, 1 if not");
   const auto url = std::make_shared<std::string>("http://127.0.0.1:8080/");
-  command->add_option("url", *url, "Base URL of the daemon")
+  command
+      ->add_option("url", *url,
+                   "Base URL of the daemon, or unix: and the path of its "
+                   "socket")
       ->envname("WINDSPLAT_URL")
       ->type_name("URL")
       ->capture_default_str();

@@ -42,7 +42,7 @@ constexpr std::size_t last_read_bytes = std::size_t{17} * 1024;
 
 class TlsTask final : public HandshakeTask {
  public:
-  TlsTask(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls, HandshakeThread& thread,
+  TlsTask(StreamSocket socket, std::shared_ptr<TlsContext> tls, HandshakeThread& thread,
           access::Admission& admission, const access::Visitor& visitor)
       : HandshakeTask(thread, access::counted_address(visitor.peer)),
         handle_(socket.native_handle()),
@@ -118,7 +118,7 @@ class TlsTask final : public HandshakeTask {
 
 class Handshake : public Connection, public std::enable_shared_from_this<Handshake> {
  public:
-  Handshake(const HttpContext& context, asio::ip::tcp::socket socket, HandshakeThread& thread,
+  Handshake(const HttpContext& context, StreamSocket socket, HandshakeThread& thread,
             access::Visitor visitor)
       : context_(context),
         id_(context.connections.next_id()),
@@ -204,8 +204,8 @@ class Handshake : public Connection, public std::enable_shared_from_this<Handsha
 
 }  // namespace
 
-void start_connection(const HttpContext& context, asio::ip::tcp::socket socket,
-                      HandshakeThread* handshakes, access::Visitor visitor) {
+void start_connection(const HttpContext& context, StreamSocket socket, HandshakeThread* handshakes,
+                      access::Visitor visitor) {
   if (handshakes == nullptr) {
     start_http_session(context, Wire(std::move(socket), nullptr), std::move(visitor),
                        context.draining);

@@ -1,7 +1,7 @@
 // Turns an accepted connection into an HTTP session, after a TLS handshake if TLS is enabled.
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/generic/stream_protocol.hpp>
 
 #include "server/access/admission.hpp"
 #include "server/transport/handshake_thread.hpp"
@@ -10,7 +10,8 @@
 namespace windsplat::transport {
 
 // `handshakes` null: plain TCP. Stop it before the socket's io_context ends.
-void start_connection(const HttpContext& context, boost::asio::ip::tcp::socket socket,
+void start_connection(const HttpContext& context,
+                      boost::asio::generic::stream_protocol::socket socket,
                       HandshakeThread* handshakes, access::Visitor visitor);
 
 }  // namespace windsplat::transport

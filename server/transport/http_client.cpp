@@ -7,6 +7,7 @@
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/read_until.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/ssl/stream.hpp>
@@ -19,6 +20,8 @@
 #include <istream>
 #include <optional>
 #include <string>
+
+#include "server/transport/unix_socket.hpp"
 
 namespace windsplat::transport {
 namespace {
@@ -35,6 +38,7 @@ struct Question {
   std::string port;
   std::string text;
   bool secure = false;
+  std::string path;  // of a UNIX socket, instead of host and port
 };
 
 // The root certificates for verification. Errors: invalid.
@@ -59,10 +63,25 @@ Result<void> trust(asio::ssl::context& context, const std::string& ca) {
 struct Exchange {
   Exchange(Question asked, asio::ssl::context& context)
       : question(std::move(asked)), stream(io, context) {
+    question.path.empty() ? resolve() : connect_to_socket();
+  }
+
+  void resolve() {
     resolver.async_resolve(question.host, question.port,
                            [this](ErrorCode ec, const Tcp::resolver::results_type& to) {
                              if (!failed(ec)) connect(to);
                            });
+  }
+
+  void connect_to_socket() {
+    if (question.path.size() > unix_path_bytes_max) {
+      fault = asio::error::name_too_long;
+      return;
+    }
+    local.async_connect(asio::local::stream_protocol::endpoint(question.path),
+                        [this](ErrorCode ec) {
+                          if (!failed(ec)) ask(local);
+                        });
   }
 
   void connect(const Tcp::resolver::results_type& to) {
@@ -117,6 +136,7 @@ struct Exchange {
   Tcp::resolver resolver{io};
   Question question;
   asio::ssl::stream<Tcp::socket> stream;
+  asio::local::stream_protocol::socket local{io};
   asio::streambuf answer{status_line_bytes_max};
   ErrorCode fault;
   bool done = false;
@@ -141,9 +161,11 @@ std::optional<int> status_of(asio::streambuf& answer) {
 Result<int> http_status(const std::string& url, int timeout_s, const std::string& ca) {
   const auto parts = boost::urls::parse_uri(url);
   const bool secure = parts && parts->scheme() == "https";
-  if (!parts || (!secure && parts->scheme() != "http") || parts->host().empty()) {
-    return make_error(ErrorKind::malformed,
-                      "'" + printable(url) + "' is not an http:// or https:// URL");
+  const bool is_local = parts && parts->scheme() == "http+unix";
+  if (!parts || (!secure && !is_local && parts->scheme() != "http") || parts->host().empty()) {
+    return make_error(ErrorKind::malformed, "'" + printable(url) +
+                                                "' is not an http://, https:// or http+unix:// "
+                                                "URL");
   }
   asio::ssl::context context(asio::ssl::context::tls_client);
   if (secure) {
@@ -155,10 +177,11 @@ Result<int> http_status(const std::string& url, int timeout_s, const std::string
   Question question;
   question.host = parts->host_address();
   question.port = parts->has_port() ? std::string(parts->port()) : secure ? "443" : "80";
-  question.text = "GET " + target +
-                  " HTTP/1.1\r\nHost: " + std::string(parts->encoded_host_and_port()) +
+  question.text = "GET " + target + " HTTP/1.1\r\nHost: " +
+                  (is_local ? "localhost" : std::string(parts->encoded_host_and_port())) +
                   "\r\nUser-Agent: windsplat\r\nConnection: close\r\n\r\n";
   question.secure = secure;
+  if (is_local) question.path = parts->host();
   Exchange exchange(std::move(question), context);
   exchange.io.run_for(std::chrono::seconds(timeout_s));
   if (exchange.fault) {

@@ -5,17 +5,20 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
 #include <chrono>
 #include <exception>
 #include <utility>
 
 #include "server/base/log.hpp"
+#include "server/transport/peer.hpp"
 
 namespace windsplat::transport {
 namespace {
 
 namespace asio = boost::asio;
-using Tcp = asio::ip::tcp;
+using Protocol = asio::generic::stream_protocol;
 using ErrorCode = boost::system::error_code;
 
 constexpr std::chrono::milliseconds retry_delay{100};
@@ -27,22 +30,16 @@ constexpr int send_buffer_bytes = 128 * 1024;
 constexpr int unsent_bytes = 16 * 1024;
 
 // Best effort: failure only increases latency.
-void hasten(Tcp::socket& socket) {
-  ErrorCode ignored;
-  socket.set_option(Tcp::no_delay(true), ignored);
+void hasten(Protocol::socket& socket) {
+  const int on = 1;
+  (void)setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   (void)setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent_bytes,
                    sizeof unsent_bytes);
 }
 
-ErrorCode bind(Tcp::acceptor& acceptor, const Tcp::endpoint& endpoint) {
-  ErrorCode fault;
-  acceptor.open(endpoint.protocol(), fault);
-  if (!fault) acceptor.set_option(Tcp::acceptor::reuse_address(true), fault);
-  // Accepted sockets inherit these options.
-  if (!fault) acceptor.set_option(asio::socket_base::send_buffer_size(send_buffer_bytes), fault);
-  if (!fault) acceptor.bind(endpoint, fault);
-  if (!fault) acceptor.listen(asio::socket_base::max_listen_connections, fault);
-  return fault;
+bool is_lacking(ErrorCode fault) {
+  return fault == boost::system::errc::address_not_available ||
+         fault == boost::system::errc::address_family_not_supported;
 }
 
 }  // namespace
@@ -50,45 +47,69 @@ ErrorCode bind(Tcp::acceptor& acceptor, const Tcp::endpoint& endpoint) {
 Listener::Listener(asio::io_context& io, Accepted accepted, Failed failed)
     : accepted_(std::move(accepted)), failed_(std::move(failed)), acceptor_(io), retry_(io) {}
 
-Result<void> Listener::listen(const std::string& address, std::uint16_t port) {
-  const std::string where = printable(address) + " port " + std::to_string(port);
+Result<void> Listener::listen(const api::ListenPlace& place) {
+  if (!place.path.empty()) return listen_on_unix(place);
   ErrorCode fault;
-  Tcp::endpoint endpoint;
-  const auto ip = asio::ip::make_address(address, fault);
-  if (!fault) {
-    endpoint = Tcp::endpoint(ip, port);
-  } else {
-    Tcp::resolver resolver(acceptor_.get_executor());
-    const auto found = resolver.resolve(address, std::to_string(port), fault);
-    if (fault || found.empty()) {
-      return make_error(ErrorKind::internal,
-                        "cannot listen on " + where + ": no such address here");
-    }
-    endpoint = found.begin()->endpoint();
-  }
-  fault = bind(acceptor_, endpoint);
+  const auto ip = asio::ip::make_address(place.address, fault);
   if (fault) {
-    const bool taken = fault == boost::system::errc::address_in_use;
-    return make_error(ErrorKind::internal, "cannot listen on " + where + ": " + fault.message() +
-                                               (taken ? "; use port 0 for any free port" : ""));
+    return make_error(ErrorKind::internal, "cannot listen on " + printable(place.address) +
+                                               ": the address is not numeric");
   }
-  endpoint_ = acceptor_.local_endpoint(fault);
+  if (const auto ok = place.socket < 0 ? bind_tcp(ip, place) : adopt(ip, place.socket); !ok) {
+    return ok;
+  }
+  port_ = port_of(acceptor_.native_handle());
+  host_ = ip.is_unspecified() ? "127.0.0.1"
+          : ip.is_v6()        ? '[' + ip.to_string() + ']'
+                              : ip.to_string();
   return {};
 }
 
-Result<void> Listener::adopt(int socket) {
-  sockaddr_storage name{};
-  socklen_t size = sizeof name;
+Result<void> Listener::bind_tcp(const asio::ip::address& ip, const api::ListenPlace& place) {
   ErrorCode fault;
-  const bool known = ::getsockname(socket, reinterpret_cast<sockaddr*>(&name), &size) == 0;
-  acceptor_.assign(known && name.ss_family == AF_INET6 ? Tcp::v6() : Tcp::v4(), socket, fault);
+  const asio::ip::tcp::endpoint endpoint(ip, place.port);
+  acceptor_.open(endpoint.protocol(), fault);
+  if (!fault) acceptor_.set_option(asio::socket_base::reuse_address(true), fault);
+  // Accepted sockets inherit these options.
   if (!fault) acceptor_.set_option(asio::socket_base::send_buffer_size(send_buffer_bytes), fault);
-  if (!fault) endpoint_ = acceptor_.local_endpoint(fault);
-  if (fault) {
-    return make_error(ErrorKind::internal,
-                      "cannot listen on the socket that was passed: " + fault.message());
+  if (!fault) acceptor_.bind(endpoint, fault);
+  if (!fault) acceptor_.listen(asio::socket_base::max_listen_connections, fault);
+  if (!fault) return {};
+  const bool taken = fault == boost::system::errc::address_in_use;
+  return make_error(is_lacking(fault) ? ErrorKind::not_found : ErrorKind::internal,
+                    "cannot listen on " + printable(place.address) + " port " +
+                        std::to_string(place.port) + ": " + fault.message() +
+                        (taken ? "; use port 0 for any free port" : ""));
+}
+
+Result<void> Listener::adopt(const asio::ip::address& ip, int socket) {
+  ErrorCode fault;
+  const asio::ip::tcp::endpoint endpoint(ip, 0);
+  acceptor_.assign(endpoint.protocol(), socket, fault);
+  if (!fault) acceptor_.set_option(asio::socket_base::send_buffer_size(send_buffer_bytes), fault);
+  if (!fault) return {};
+  return make_error(ErrorKind::internal,
+                    "cannot listen on the socket that was passed: " + fault.message());
+}
+
+Result<void> Listener::listen_on_unix(const api::ListenPlace& place) {
+  if (auto stale = remove_stale_socket(place.path); !stale) return stale;
+  ErrorCode fault;
+  acceptor_.open(asio::local::stream_protocol(), fault);
+  if (!fault) acceptor_.bind(asio::local::stream_protocol::endpoint(place.path), fault);
+  // Nobody can connect before listen(), so the mode holds from the first connection on.
+  if (!fault) {
+    if (auto owned = file_.own(place.path, place.mode); !owned) return owned;
+    acceptor_.listen(asio::socket_base::max_listen_connections, fault);
   }
-  return {};
+  if (!fault) return {};
+  return make_error(ErrorKind::internal,
+                    "cannot listen on unix:" + printable(place.path) + ": " + fault.message());
+}
+
+std::string Listener::url(bool tls, const std::string& base_path) const {
+  if (port_ == 0) return unix_url(file_.path(), base_path);
+  return (tls ? "https://" : "http://") + host_ + ':' + std::to_string(port_) + base_path;
 }
 
 void Listener::start() {
@@ -98,11 +119,12 @@ void Listener::start() {
 void Listener::close() {
   ErrorCode ignored;
   acceptor_.close(ignored);
+  file_.remove();
   retry_.cancel();
 }
 
 void Listener::accept() {
-  acceptor_.async_accept([this, waits = waiting_](ErrorCode fault, Tcp::socket socket) {
+  acceptor_.async_accept([this, waits = waiting_](ErrorCode fault, Protocol::socket socket) {
     if (!acceptor_.is_open()) return;
     if (!fault) {
       hasten(socket);

@@ -12,12 +12,14 @@
 #include <new>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "server/base/check.hpp"
 #include "server/base/log.hpp"
 #include "server/tasks/run_guarded.hpp"
 #include "server/transport/handshake.hpp"
 #include "server/transport/listener.hpp"
+#include "server/transport/peer.hpp"
 #include "server/transport/post_or_retry.hpp"
 #include "server/transport/server_parts.hpp"
 
@@ -36,9 +38,6 @@ struct Server::State {
   State(api::ServerOptions options, std::shared_ptr<data::Store> store,
         std::shared_ptr<ThreadPool> pool)
       : parts(std::move(options), std::move(store), std::move(pool)),
-        listener(
-            io, [this](asio::ip::tcp::socket socket) { accepted(std::move(socket)); },
-            [this] { parts.metrics.accept_failed(); }),
         look_timer(io),
         alive_timer(io),
         cancel_timer(io),
@@ -68,20 +67,41 @@ struct Server::State {
     }
   }
 
-  void accepted(asio::ip::tcp::socket socket) {
-    boost::system::error_code fault;
-    const auto peer = socket.remote_endpoint(fault);
-    const std::string address = fault ? "" : peer.address().to_string();
-    auto visitor = admit(address);
+  // UNIX sockets are not encrypted: they do not leave the machine.
+  void accepted(asio::generic::stream_protocol::socket socket, bool over_tcp) {
+    const std::string address = peer_of(socket.native_handle());
+    HandshakeThread* const tls = over_tcp ? handshakes.get() : nullptr;
+    auto visitor = admit(address, tls != nullptr);
     if (!visitor) return parts.metrics.connection_refused();
-    start_connection(parts.http, std::move(socket), handshakes.get(), std::move(*visitor));
+    start_connection(parts.http, std::move(socket), tls, std::move(*visitor));
+  }
+
+  Result<void> listen() {
+    for (const api::ListenPlace& place : parts.options.listen) {
+      auto listener = std::make_unique<Listener>(
+          io,
+          [this, over_tcp = place.path.empty()](asio::generic::stream_protocol::socket socket) {
+            accepted(std::move(socket), over_tcp);
+          },
+          [this] { parts.metrics.accept_failed(); });
+      const auto bound = listener->listen(place);
+      if (bound) {
+        listeners.push_back(std::move(listener));
+      } else if (!place.may_lack || bound.error().kind != ErrorKind::not_found) {
+        return bound;
+      } else {
+        log::warn("an address is left out", {{"fault", bound.error().message}});
+      }
+    }
+    if (!listeners.empty()) return {};
+    return make_error(ErrorKind::internal, "cannot listen: this machine has none of the addresses");
   }
 
   // Frees a slot by closing the connection that has been idle longest, or in the reserve the one
   // that has waited longest without a request.
-  std::optional<access::Visitor> admit(const std::string& address) {
+  std::optional<access::Visitor> admit(const std::string& address, bool tls) {
     access::Admission& admission = parts.admission;
-    if (!admission.arrive(address, parts.options.tls != nullptr)) return std::nullopt;
+    if (!admission.arrive(address, tls)) return std::nullopt;
     auto visitor = admission.connect(address);
     const auto& reason = visitor ? visitor->reserve : std::nullopt;
     if (visitor && reason && reason->kind == metrics::LimitKind::connections &&
@@ -159,7 +179,7 @@ struct Server::State {
     if (!telling_alive) tell_alive();
     if (parts.draining && !drain_timers_set) begin_drain();
     if (parts.draining) return;
-    listener.start();
+    for (const auto& listener : listeners) listener->start();
     if (!checking_files) check_data_files();
   }
 
@@ -218,7 +238,7 @@ struct Server::State {
   }
 
   void end() {
-    listener.close();
+    for (const auto& listener : listeners) listener->close();
     parts.connections.each(
         [](Connection& connection) { connection.abort(); });  // accepted during the drain
     look_timer.cancel();
@@ -241,7 +261,7 @@ struct Server::State {
   // Null for plain TCP. Its thread also posts to io.
   const std::unique_ptr<HandshakeThread> handshakes{
       parts.options.tls ? std::make_unique<HandshakeThread>() : nullptr};
-  Listener listener;
+  std::vector<std::unique_ptr<Listener>> listeners;
   asio::steady_timer look_timer;
   asio::steady_timer alive_timer;
   asio::steady_timer cancel_timer;
@@ -259,28 +279,31 @@ Server::Server(api::ServerOptions options, std::shared_ptr<data::Store> store,
 
 Server::~Server() = default;
 
-Result<void> Server::listen() {
-  const api::ServerOptions& options = state_->parts.options;
-  if (options.listen_socket >= 0) return state_->listener.adopt(options.listen_socket);
-  return state_->listener.listen(options.address, options.port);
+Result<void> Server::listen() { return state_->listen(); }
+
+std::uint16_t Server::port() const {
+  for (const auto& listener : state_->listeners) {
+    if (listener->port() != 0) return listener->port();
+  }
+  return 0;
 }
 
-std::uint16_t Server::port() const { return state_->listener.endpoint().port(); }
-
 std::string Server::url() const {
-  auto address = state_->listener.endpoint().address();
-  std::string host = address.to_string();
-  if (address.is_unspecified()) {
-    host = "127.0.0.1";  // the wildcard address includes this one
-  } else if (address.is_v6()) {
-    host = '[' + host + ']';
+  const std::vector<std::string> all = urls();
+  return all.empty() ? "" : all.front();
+}
+
+std::vector<std::string> Server::urls() const {
+  const api::ServerOptions& options = state_->parts.options;
+  std::vector<std::string> all;
+  for (const auto& listener : state_->listeners) {
+    all.push_back(listener->url(options.tls != nullptr, options.base_path));
   }
-  const char* const scheme = state_->parts.options.tls != nullptr ? "https://" : "http://";
-  return scheme + host + ':' + std::to_string(port()) + state_->parts.options.base_path;
+  return all;
 }
 
 void Server::run() {
-  WINDSPLAT_CHECK(port() != 0);
+  WINDSPLAT_CHECK(!state_->listeners.empty());
   while (!state_->io.stopped()) {
     try {
       state_->go_on();

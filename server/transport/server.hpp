@@ -1,4 +1,4 @@
-// The daemon's network side: one listener, HTTP and WebSocket sessions, one renderer.
+// The daemon's network side: listeners, HTTP and WebSocket sessions, one renderer.
 #pragma once
 
 #include <cstdint>
@@ -30,9 +30,11 @@ class Server {
          std::shared_ptr<ThreadPool> pool);
   ~Server();
 
-  Result<void> listen();  // binds; errors name address and port
-  [[nodiscard]] std::uint16_t port() const;
-  [[nodiscard]] std::string url() const;  // to open in a browser, with the base path
+  // Binds all places of the options. Errors name the place.
+  Result<void> listen();
+  [[nodiscard]] std::uint16_t port() const;  // of the first TCP place; 0 if there is none
+  [[nodiscard]] std::string url() const;     // of the first place, with the base path
+  [[nodiscard]] std::vector<std::string> urls() const;  // of each
 
   void run();  // serves until drained; blocks
   // May be called from any thread. /readyz fails, streams close with 1001, current frames end or

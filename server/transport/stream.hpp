@@ -1,8 +1,9 @@
-// The TCP stream of HTTP and WebSocket sessions, with the deadlines of Beast and a count of
-// received bytes. Include it in session sources only, because it includes all of Beast.
+// The stream, over TCP or a UNIX socket, of HTTP and WebSocket sessions, with the deadlines of
+// Beast and a count of received bytes. Include it in session sources only, because it includes all
+// of Beast.
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/basic_stream.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
@@ -39,7 +40,10 @@ class WireMeter {
   std::size_t bytes_read_ = 0;
 };
 
-using TcpStream = beast::basic_stream<asio::ip::tcp, asio::any_io_executor, WireMeter>;
+// A socket of TCP or UNIX, in one type, so that Beast's templates are compiled once.
+using StreamSocket = asio::generic::stream_protocol::socket;
+using TcpStream =
+    beast::basic_stream<asio::generic::stream_protocol, asio::any_io_executor, WireMeter>;
 using UpgradeRequest = beast::http::request<beast::http::empty_body>;
 
 // Timeout for a peer to receive `bytes`: a fixed part and 64 KiB/s.

@@ -26,7 +26,7 @@ struct Wire::Tls {
   asio::cancellation_signal stop_writing;
 };
 
-Wire::Wire(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls)
+Wire::Wire(StreamSocket socket, std::shared_ptr<TlsContext> tls)
     : tcp_(std::make_unique<TcpStream>(std::move(socket))),
       tls_(tls ? std::make_unique<Tls>(*tcp_, std::move(tls)) : nullptr) {}
 

@@ -58,7 +58,7 @@ class Wire {
   using next_layer_type = TcpStream;
 
   // `tls` null: plain TCP. Otherwise call handshake() first.
-  Wire(asio::ip::tcp::socket socket, std::shared_ptr<TlsContext> tls);
+  Wire(StreamSocket socket, std::shared_ptr<TlsContext> tls);
   ~Wire();
   Wire(Wire&&) noexcept;
   Wire& operator=(Wire&&) = delete;

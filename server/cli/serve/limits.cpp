@@ -93,13 +93,13 @@ void add_limit_options(CLI::App& command, access::Limits& limits) {
       "MS");
   command
       .add_option("--trusted-proxy", limits.trusted_proxies,
-                  "Address or network of a proxy whose X-Forwarded-For header is trusted; may be "
-                  "repeated")
+                  "Address or network of a proxy whose X-Forwarded-For header is trusted, or "
+                  "unix: all that connect to a UNIX socket; may be repeated")
       ->envname("WINDSPLAT_TRUSTED_PROXY")
       ->allow_extra_args(false)
       ->delimiter(',')
       ->check(fault_of_proxy)
-      ->type_name("ADDRESS");
+      ->type_name("ADDRESS|unix");
   command
       .add_option("--identity-header", limits.identity_header,
                   "Header in which a trusted proxy names the user it has authenticated, such as "

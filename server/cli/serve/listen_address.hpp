@@ -1,21 +1,26 @@
-// "--listen HOST:PORT" -> address and port.
+// "--listen" -> the places where the server listens.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "server/api/server_options.hpp"
 #include "server/base/error.hpp"
 
 namespace windsplat::cli {
 
-struct ListenAddress {
-  std::string address = "127.0.0.1";  // IPv4 or IPv6, numeric, without brackets
-  std::uint16_t port = 8080;          // 0: any free port
-  bool loopback = true;               // reachable only from this machine
+struct ListenPlaces {
+  std::vector<api::ListenPlace> places;
+  bool loopback = true;  // all are reachable only from this machine
 };
 
-// "127.0.0.1:8080", "[::1]:8080", "localhost:80", ":0" (127.0.0.1). Errors: malformed.
-Result<ListenAddress> parse_listen_address(std::string_view text);
+// "127.0.0.1:8080", "[::1]:8080", ":0" (127.0.0.1), "name:80" with all addresses of the name, or
+// "unix:/run/windsplat.sock". A name is looked up. Errors: malformed; invalid: the name has no
+// address.
+Result<ListenPlaces> parse_listen_place(std::string_view text);
+
+// Several of them; `mode` of the files of UNIX sockets, in octal digits.
+Result<ListenPlaces> listen_places(const std::vector<std::string>& texts, std::string_view mode);
 
 }  // namespace windsplat::cli

@@ -12,9 +12,18 @@ constexpr int sessions_max = 100000;
 constexpr int idle_timeout_s_max = 7 * 24 * 3600;
 
 void add_network_options(CLI::App& command, ServeArguments& arguments) {
-  command.add_option("--listen", arguments.listen, "Address and port; port 0: any free port")
+  command
+      .add_option("--listen", arguments.listen,
+                  "Address or name and port, or unix: and the path of a socket; port 0: any free "
+                  "port; may be repeated")
       ->envname("WINDSPLAT_LISTEN")
-      ->type_name("HOST:PORT")
+      ->allow_extra_args(false)
+      ->delimiter(',')
+      ->type_name("HOST:PORT|unix:PATH")
+      ->default_str("127.0.0.1:8080");
+  command.add_option("--listen-mode", arguments.listen_mode, "Mode of the file of UNIX sockets")
+      ->envname("WINDSPLAT_LISTEN_MODE")
+      ->type_name("OCTAL")
       ->capture_default_str();
   command
       .add_flag("--allow-remote", arguments.allow_remote,

@@ -14,7 +14,8 @@ namespace windsplat::cli {
 struct ServeArguments {
   std::vector<std::string> datasets;
   std::string config;
-  std::string listen = "127.0.0.1:8080";
+  std::vector<std::string> listen{"127.0.0.1:8080"};
+  std::string listen_mode = "0660";
   bool allow_remote = false;
   bool allow_root = false;
   std::string token_file;

@@ -244,13 +244,14 @@ int serve(const CLI::App& given) {
   transport::Server server(std::move(options), store,
                            std::make_shared<ThreadPool>(arguments.threads));
   if (const auto ok = server.listen(); !ok) return answer(ok.error());
-  const std::string url = server.url();
+  std::string urls;
+  for (const std::string& url : server.urls()) urls += url + '\n';
   control->arm(server, store, std::move(*settings));
   int code = exit_ok;
-  if (const auto ok = write_stdout(url + "\n"); !ok) {
+  if (const auto ok = write_stdout(urls); !ok) {
     code = answer(ok.error());
   } else {
-    (*manager)->ready("serving " + url);
+    (*manager)->ready("serving " + server.url());
     server.run();
     if (*fetcher) (*fetcher)->end();
     log::info("drained");

@@ -133,7 +133,7 @@ Result<void> check_origins(const std::vector<std::string>& origins) {
 }
 
 Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
-  const auto listen = parse_listen_address(arguments.listen);
+  auto listen = listen_places(arguments.listen, arguments.listen_mode);
   if (!listen) return listen.error();
   if (const auto ok = check_exposure(arguments, listen->loopback); !ok) return ok.error();
   if (const auto ok = check_host_names(arguments.hosts); !ok) return ok.error();
@@ -167,8 +167,7 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   options.tls = std::move(*tls);
   options.data_root = std::move(*data_root);
   options.fixed_entries = arguments.fixed_entries;
-  options.address = listen->address;
-  options.port = listen->port;
+  options.listen = std::move(listen->places);
   options.local_hosts_only = listen->loopback;
   // Without a token, a page whose name was rebound to this machine could connect.
   options.known_hosts_only = options.token == nullptr || !arguments.hosts.empty();
@@ -181,6 +180,12 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   options.allow_origins = arguments.origins;
   options.embedders = arguments.embedders;
   return options;
+}
+
+std::string listen_text(const ServeArguments& arguments) {
+  std::string text;
+  for (const std::string& place : arguments.listen) text += (text.empty() ? "" : ",") + place;
+  return text;
 }
 
 }  // namespace
@@ -203,7 +208,7 @@ Result<std::uint64_t> upload_bytes(const ServeArguments& arguments) {
 Result<void> check_exposure(const ServeArguments& arguments, bool loopback) {
   if (loopback) return {};
   const std::string reached =
-      "--listen '" + printable(arguments.listen) + "' is reachable from other machines, and ";
+      "--listen '" + printable(listen_text(arguments)) + "' is reachable from other machines, and ";
   if (!arguments.allow_remote && arguments.token_file.empty()) {
     return make_error(ErrorKind::invalid, reached +
                                               "clients are not authenticated: use --token-file, or "
@@ -241,7 +246,7 @@ void warn_of(const ServeSettings& settings) {
   }
   if (!options.local_hosts_only && options.token != nullptr && options.tls == nullptr) {
     log::warn("the token is sent unencrypted: use --tls-cert or a proxy with TLS",
-              {{"listen", arguments.listen}});
+              {{"listen", listen_text(arguments)}});
   }
 }
 
@@ -253,10 +258,10 @@ Result<std::unique_ptr<ServeSettings>> read_settings(const CLI::App& given,
   if (const std::string& path = settings->arguments.config; !path.empty()) {
     if (const auto ok = apply_config(settings->command, path); !ok) return ok.error();
   }
-  if (manager.socket()) settings->arguments.listen = manager.socket()->address;
+  if (manager.socket()) settings->arguments.listen = {manager.socket()->address};
   auto options = server_options(settings->arguments);
   if (!options) return options.error();
-  if (manager.socket()) options->listen_socket = manager.socket()->descriptor;
+  if (manager.socket()) options->listen.front().socket = manager.socket()->descriptor;
   settings->options = std::move(*options);
   return settings;
 }

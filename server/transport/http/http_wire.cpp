@@ -43,7 +43,7 @@ void HttpWire::linger(RequestParser& into) {
 
 void HttpWire::end_sending(RequestParser& into) {
   ErrorCode ignored;
-  wire_.next_layer().socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+  wire_.next_layer().socket().shutdown(asio::socket_base::shutdown_send, ignored);
   discard_input(into);
 }
 

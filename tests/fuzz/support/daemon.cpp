@@ -39,7 +39,7 @@ transport::Server& server() {
     auto store = std::make_shared<data::Store>(std::uint64_t{512} << 20);
     expect(store->add("climate:8x6x4").has_value(), "the sample exists");
     api::ServerOptions options;
-    options.port = 0;
+    options.listen.front().port = 0;
     options.local_hosts_only = true;
     auto* made = new transport::Server(std::move(options), std::move(store),
                                        std::make_shared<ThreadPool>(1));

@@ -271,7 +271,7 @@ TEST_F(CliAccess, InvalidConfigurationIsReportedWithAPointer) {
            {R"({"allow-remote": 1})", "/allow-remote"},
            {R"({"allow-remote": "true"})", "/allow-remote"},
            {R"({"listen": 8080})", "/listen"},
-           {R"({"listen": ["a", "b"]})", "/listen"},
+           {R"({"listen": ["127.0.0.1:0", 5]})", "/listen/1"},
            {R"({"allow-origin": true})", "/allow-origin"},
            {R"({"storage": "float16"})", "/storage"},
            {R"({"log-level": "loud"})", "/log-level"},

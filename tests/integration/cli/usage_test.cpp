@@ -79,7 +79,7 @@ TEST(CliUsage, InvalidArgumentsExitWith2AndReportOnStderrOnly) {
                                  {"healthcheck", "not a url"},
                                  {"serve", "--listen", "8080"},
                                  {"serve", "--listen", "127.0.0.1:99999"},
-                                 {"serve", "--listen", "example.org:80"},
+                                 {"serve", "--listen", "no-such-name.invalid:80"},
                                  {"serve", "--listen", "0.0.0.0:0"},
                                  {"serve", "--listen", "[::]:0"},
                                  {"serve", "--base-path", "no-slash"},

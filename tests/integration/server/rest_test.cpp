@@ -483,10 +483,10 @@ TEST(RestListen, UnavailableAddressIsReported) {
   const auto store = std::make_shared<windsplat::data::Store>(1 << 20);
   const auto pool = std::make_shared<windsplat::ThreadPool>(1);
   windsplat::api::ServerOptions options;
-  options.port = 0;
+  options.listen.front().port = 0;
   windsplat::transport::Server first(options, store, pool);
   ASSERT_TRUE(first.listen());
-  options.port = first.port();
+  options.listen.front().port = first.port();
   windsplat::transport::Server second(options, store, pool);
   const auto taken = second.listen();
   ASSERT_FALSE(taken);

@@ -67,7 +67,7 @@ class TestServer {
   explicit TestServer(windsplat::api::ServerOptions options = {},
                       decltype(windsplat::data::StoreOptions::open) open = {},
                       std::uint64_t bytes_max = std::uint64_t{1} << 30) {
-    options.port = 0;
+    options.listen.front().port = 0;
     store_ = std::make_shared<windsplat::data::Store>(windsplat::data::StoreOptions{
         bytes_max, windsplat::data::Storage::float32, std::move(open)});
     const auto added = store_->add(small_file());

@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <chrono>
 #include <cstdlib>
 #include <functional>
@@ -240,17 +241,18 @@ TEST(NoMemory, LostConnectionDoesNotStopTheListener) {
   asio::io_context clients;
   int accepted = 0;
   transport::Listener listener(
-      io, [&](asio::ip::tcp::socket) { ++accepted; }, [] {});
-  ASSERT_TRUE(listener.listen("127.0.0.1", 0));
+      io, [&](asio::generic::stream_protocol::socket) { ++accepted; }, [] {});
+  ASSERT_TRUE(listener.listen({"127.0.0.1", 0}));
+  const asio::ip::tcp::endpoint endpoint(asio::ip::make_address("127.0.0.1"), listener.port());
   listener.start();
   io.poll();
   asio::ip::tcp::socket first(clients);
-  first.connect(listener.endpoint());
+  first.connect(endpoint);
   ASSERT_FALSE(with_allocations(0, [&] { io.run_one_for(std::chrono::seconds(2)); }));
   EXPECT_EQ(accepted, 0);
   listener.start();
   asio::ip::tcp::socket next(clients);
-  next.connect(listener.endpoint());
+  next.connect(endpoint);
   for (int turn = 0; turn < 100 && accepted == 0; ++turn) {
     io.run_one_for(std::chrono::milliseconds(20));
   }
