@@ -219,18 +219,17 @@ std::vector<Route> dataset_routes(const ServerOptions& options, tasks::Backend& 
 
 std::vector<Route> upload_routes(const ServerOptions& options, tasks::TaskExecutor& disk,
                                  tasks::Catalogue& catalogue) {
-  const OpenSink receive = [&options, &disk](const PathValues& values, const http::Request& request,
-                                             std::uint64_t bytes) {
+  std::vector<Route> rows{
+      Route{"GET", "/v1/uploads/{id}", operations::read_upload(), at_once(get_upload, options)},
+      Route{"PUT", "/v1/uploads/{id}", operations::upload_file(), later(put_upload, options, disk)},
+  };
+  rows.back().open_sink = [&options, &disk](const PathValues& values, const http::Request& request,
+                                            std::uint64_t bytes) {
     return receive_upload(options, disk, values[0], request, bytes);
   };
-  const char* const name = "/v1/uploads/{id}";
-  return {
-      Route{"GET", "/v1/uploads/{id}", operations::read_upload(), at_once(get_upload, options)},
-      Route{"PUT", "/v1/uploads/{id}", operations::upload_file(), later(put_upload, options, disk),
-            Charge::none, Place::base, name, receive},
-      Route{"DELETE", "/v1/uploads/{id}", operations::remove_upload(),
-            later(delete_upload, options, disk, catalogue)},
-  };
+  rows.push_back(Route{"DELETE", "/v1/uploads/{id}", operations::remove_upload(),
+                       later(delete_upload, options, disk, catalogue)});
+  return rows;
 }
 
 }  // namespace

@@ -28,8 +28,8 @@ http::Response uploads_are_off() {
 // Writes on a thread of the executor.
 class UploadSink final : public http::BodySink {
  public:
-  UploadSink(std::shared_ptr<Incoming> into, tasks::TaskExecutor& disk, CancelToken cancel)
-      : into_(std::move(into)), disk_(disk), cancel_(std::move(cancel)) {}
+  UploadSink(std::shared_ptr<Incoming> into, tasks::TaskExecutor& disk, const CancelToken& cancel)
+      : into_(std::move(into)), disk_(disk), cancel_(cancel) {}
 
   void take(std::vector<std::byte> bytes, Done done) override {
     // Admitted: one part of each upload at a time, of which there are few.
