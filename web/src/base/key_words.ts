@@ -119,7 +119,8 @@ const withNamesUnquoted = (text: string): string =>
 const plain: readonly [RegExp, string][] = [
   [/\bmust ascend by at least\b/g, "the second value must exceed the first by at least"],
   [/, not an? (?:object|array|string)\b.*$/, ""],
-  [/\bunknown key(; did you mean '[^']*'\?)?;? [Kk]nown keys: .*$/, "is not known to this server$1"],
+  [/(\bunknown key; did you mean '[^']*'\?) Known keys: .*$/, "$1"],
+  [/\bunknown key(; known keys: .*)?/, "is not known to this server"],
   [/\bset one to null\b/g, "switch one off"],
   [/\bthe mapping flat\b/g, "the shape “flat”"],
   [/\bheightField\b/g, "a height field"],
