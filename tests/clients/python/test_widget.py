@@ -1,5 +1,5 @@
 """The widget of notebooks without a browser: gestures, frames, and the class for anywidget, which
-is replaced by one with its interface. (tests/browser/clients has the page's side.)"""
+is replaced by one with its interface. (tests/browser/client has the page's side.)"""
 import math
 import queue
 import subprocess
