@@ -27,9 +27,9 @@ struct ListenPlace {
   std::uint16_t port = 8080;          // 0: any free port
   std::string path = {};              // of a UNIX socket, absolute; empty: TCP
   unsigned mode = 0660;               // of the socket's file
-  int socket = -1;                    // of TCP, listens already at the above; owned by the server
   bool may_lack = false;              // one of several addresses of a name: skipped if this machine
                                       // lacks it
+  int socket = -1;                    // of TCP, listens already at the above; owned by the server
 };
 
 struct ServerOptions {

@@ -129,7 +129,7 @@ TEST(ViewDocument, ReportsTheLimitAndTheValue) {
   EXPECT_EQ(angle.error().message, "/camera/fovY: must be a number from 0.001 to 179, not 180");
   const auto method = ViewDocument::parse(R"({"method": {"name": "splat"}})");
   EXPECT_EQ(method.error().at[0].detail,
-            R"(must be one of "kernel", "slab", "reference", not "splat")");
+            R"(must be one of "kernel", "slab", "reference", not "splat"; did you mean 'slab'?)");
 }
 
 TEST(ViewDocument, RefusedValuesAreNotComparedWithOthers) {
