@@ -52,11 +52,12 @@ int completions(const CLI::App& app, const std::string& shell) {
                                      : fish_completion(program));
 }
 
-// A command with one argument, which is passed to run(app, argument).
-template <class Run>
+using RunWithText = int (*)(const CLI::App& app, const std::string& argument);
+
+// A command with one argument, which is passed to `run`.
 CLI::Option* add_text_command(CLI::App& app, Action& chosen, const char* name,
                               const char* description, const char* argument_name,
-                              const char* argument_text, const Run& run) {
+                              const char* argument_text, RunWithText run) {
   CLI::App* command = app.add_subcommand(name, description);
   const auto argument = std::make_shared<std::string>();
   CLI::Option* option = command->add_option(argument_name, *argument, argument_text);
