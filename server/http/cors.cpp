@@ -8,13 +8,13 @@ namespace {
 
 constexpr const char* shared_methods = "GET, HEAD, POST, PUT, PATCH, DELETE";
 constexpr const char* accepted_headers =
-    "Accept, Authorization, Content-Encoding, Content-Type, If-Match, If-None-Match, Range, "
-    "X-Request-Id";
+    "Accept, Authorization, Content-Digest, Content-Encoding, Content-Type, If-Match, "
+    "If-None-Match, Repr-Digest, X-Request-Id";
 // What answers carry besides the headers that scripts may always read.
 constexpr const char* exposed_headers =
-    "Accept-Encoding, Accept-Patch, Accept-Ranges, Allow, Content-Disposition, Content-Encoding, "
-    "Content-Range, Deprecation, ETag, Link, Location, RateLimit, RateLimit-Policy, Retry-After, "
-    "Server-Timing, Sunset, WWW-Authenticate, Windsplat-Frame, X-Request-Id";
+    "Accept-Encoding, Accept-Patch, Allow, Content-Disposition, Content-Encoding, Deprecation, "
+    "ETag, Link, Location, RateLimit, RateLimit-Policy, Retry-After, Server-Timing, Sunset, "
+    "WWW-Authenticate, Windsplat-Frame, Windsplat-Values, X-Request-Id";
 // Seconds for which a browser keeps the answer to a preflight. Requests are judged by their own
 // Origin, so an origin that is no longer allowed gains nothing by an old answer.
 constexpr const char* preflight_lasts_s = "7200";

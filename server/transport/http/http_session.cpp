@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "protocol/limits.hpp"
 #include "server/access/address.hpp"
 #include "server/http/cors.hpp"
 #include "server/http/gzip.hpp"
@@ -150,12 +149,8 @@ class HttpSession final : public Connection, public HttpOwner {
  private:
   void receive_body() {
     http::Request& request = current_.request;
-    const std::uint64_t bytes = reader_.body_bytes();
-    auto streamed = context_.router.stream_body(request, bytes);
+    auto streamed = context_.router.stream_body(request, reader_.body_bytes());
     if (streamed.refusal) return refuse(std::move(*streamed.refusal));
-    if (!streamed.sink && bytes > protocol::limits::http_body_bytes_max) {
-      return refuse(http::body_too_large());
-    }
     request.sink = std::move(streamed.sink);
     reader_.read_body();
   }

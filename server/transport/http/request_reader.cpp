@@ -81,7 +81,11 @@ std::uint64_t RequestReader::body_bytes() const {
 void RequestReader::read_body() {
   if (input_.parser().is_done()) return complete();
   unread_bytes_ = body_bytes();
-  input_.parser().body_limit(limits::http_body_bytes_max);
+  // The parser compares its limit while it parses the header, when it is not known who takes the
+  // body.
+  if (!current_.request.sink && unread_bytes_ > limits::http_body_bytes_max) {
+    return owner_.refuse(http::body_too_large());
+  }
   wire_.within(std::chrono::seconds(limits::http_body_timeout_s));
   // Ignored in HTTP/1.0 (RFC 9110, 10.1.1).
   const bool expects = input_.parser().get().version() == 11 &&
@@ -99,8 +103,6 @@ void RequestReader::read_rest() {
   if (current_.request.sink) return stream_some();
   beast::http::async_read(wire_.wire(), input_.buffer(), input_.parser(),
                           owner_.handler([this](ErrorCode fault, std::size_t) {
-                            if (fault == beast::http::error::body_limit)
-                              return owner_.refuse(http::body_too_large());
                             // Other errors are those of the connection, or its deadline.
                             if (fault && !RequestParser::is_fault_of_text(fault))
                               return owner_.close();

@@ -24,7 +24,7 @@ class RequestReader {
 
   // Reads the next request up to its header. `draining`: waits a short time for it.
   void next(bool draining);
-  // Into the request, or into its sink.
+  // Into the request, or into its sink. Refused if it is too large for the request.
   void read_body();
   [[nodiscard]] std::uint64_t body_bytes() const;  // of the request whose header has been read
   // While a request is answered, detects a peer that disconnects. The read continues after the

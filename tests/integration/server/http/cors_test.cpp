@@ -1,7 +1,11 @@
 // Scripts of pages of other origins: preflights, and which answers they may read.
 #include <gmock/gmock.h>
 
+#include <cstdlib>
+#include <filesystem>
+
 #include "server/access/auth.hpp"
+#include "server/uploads/uploads.hpp"
 #include "tests/integration/server/test_server.hpp"
 
 namespace server_test {
@@ -35,8 +39,9 @@ void expect_shared(const Answer& answer, const std::string& what) {
   EXPECT_EQ(answer.header("access-control-allow-origin"), cors_friend) << what;
   EXPECT_EQ(answer.header("access-control-allow-credentials"), "") << what;
   EXPECT_THAT(answer.header("vary"), HasSubstr("Origin")) << what;
-  for (const char* const name : {"Windsplat-Frame", "Server-Timing", "X-Request-Id", "Location",
-                                 "ETag", "Retry-After", "RateLimit", "RateLimit-Policy"}) {
+  for (const char* const name :
+       {"Windsplat-Frame", "Windsplat-Values", "Server-Timing", "X-Request-Id", "Location", "ETag",
+        "Retry-After", "RateLimit", "RateLimit-Policy"}) {
     EXPECT_THAT(answer.header("access-control-expose-headers"), HasSubstr(name)) << what;
   }
 }
@@ -49,8 +54,8 @@ TEST(CrossOrigin, APreflightOfAListedOriginIsAnsweredBeforeAuthentication) {
     EXPECT_EQ(answer.status, 204) << target;
     expect_shared(answer, target);
     EXPECT_THAT(answer.header("access-control-allow-methods"), HasSubstr("PATCH"));
-    for (const char* const name :
-         {"Authorization", "Content-Type", "If-Match", "If-None-Match", "Accept"}) {
+    for (const char* const name : {"Authorization", "Content-Digest", "Content-Type", "If-Match",
+                                   "If-None-Match", "Accept", "Repr-Digest"}) {
       EXPECT_THAT(answer.header("access-control-allow-headers"), HasSubstr(name));
     }
     EXPECT_GT(std::stoi(answer.header("access-control-max-age")), 0);
@@ -130,6 +135,25 @@ TEST(CrossOrigin, APreflightKeepsItsConnectionAndHasItsOwnNameInTheMetrics) {
   }
   EXPECT_THAT(get(server.port(), "/metrics", cors_bearer).body,
               HasSubstr(R"(route="preflight",status="2xx"} 2)"));
+}
+
+// Uploads may be long, but nobody takes the body of a preflight, which needs no token.
+TEST(CrossOrigin, APreflightHasNoLargeBodyAlsoWhereUploadsMayBe) {
+  std::string folder =
+      (std::filesystem::temp_directory_path() / "windsplat-preflight-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  ServerOptions options = cors_options();
+  options.uploads = windsplat::uploads::Uploads::open({folder + "/uploads", 1U << 30U}).value();
+  {
+    const TestServer server(std::move(options));
+    Socket socket(server.port());
+    socket.send("OPTIONS /v1/uploads/a.nc HTTP/1.1\r\nHost: x\r\nOrigin: " + cors_friend +
+                "\r\nAccess-Control-Request-Method: PUT\r\nContent-Length: 1000000\r\n\r\n");
+    const Answer answer = read_answer(socket);  // before any of it is sent
+    EXPECT_EQ(answer.status, 413);
+    expect_shared(answer, "413");
+  }
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
