@@ -70,8 +70,9 @@ inline constexpr TaskExecutor::Settings look_up_settings{"files to open", 1, req
 inline constexpr TaskExecutor::Settings view_io_settings{"changes of saved views", 1, 64};
 // Compresses large answers.
 inline constexpr TaskExecutor::Settings packing_settings{"answers to compress", 1, 64};
-// Writes parts of uploads, and removes them.
-inline constexpr TaskExecutor::Settings upload_io_settings{"changes of uploads", 1, 64};
+// Writes parts of uploads, and removes them. The spare threads are for archives that are unpacked,
+// and large ones that are removed.
+inline constexpr TaskExecutor::Settings upload_io_settings{"changes of uploads", 1, 64, 7};
 // Checks files for changes and reopens them; the server submits one check at a time.
 inline constexpr TaskExecutor::Settings file_check_settings{"file checks", 1, 1};
 

@@ -73,6 +73,11 @@ struct Uploads::State {
     std::uint64_t taken = 0;  // bytes on disk
     std::vector<std::string> datasets;
   };
+  // An upload that is no longer visible.
+  struct Dropped {
+    Entry entry;
+    fs::path path;
+  };
   // Of an address: what its uploads take, complete or not.
   struct Share {
     std::uint64_t bytes = 0;
@@ -92,6 +97,19 @@ struct Uploads::State {
     const fs::path folder = folder_beside(path);
     if (::mkdir(folder.c_str(), S_IRWXU) != 0) return disk_error(errno);
     return unpack_zip(file, *entries, folder);
+  }
+
+  // Removes the files, perhaps thousands, for which nobody else waits.
+  void remove_files(const Dropped& dropped) {
+    const auto& [entry, path] = dropped;
+    std::error_code fault;
+    fs::remove_all(path, fault);
+    if (fault) {
+      log::warn("an upload cannot be removed",
+                {{"upload", entry.upload.id}, {"fault", fault.message()}});
+    }
+    const std::lock_guard lock(mutex);
+    release(entry.address, entry.taken);
   }
 
   // The others require the mutex.
@@ -121,19 +139,16 @@ struct Uploads::State {
     receiving.erase(id);
     --shares[address].at_a_time;
   }
-  std::vector<std::string> drop(std::map<std::string, Entry>::iterator at) {
-    const Entry entry = std::move(at->second);
+  // The id is free again; its room only after remove_files().
+  Dropped drop(std::map<std::string, Entry>::iterator at) {
+    Dropped out{std::move(at->second), options.folder / incomplete / std::to_string(count++)};
     entries.erase(at);
-    const fs::path path = options.folder / path_of(entry.upload.id);
+    const fs::path path = options.folder / path_of(out.entry.upload.id);
     std::error_code fault;
-    fs::remove_all(path, fault);
-    if (fault) {
-      log::warn("an upload cannot be removed",
-                {{"upload", entry.upload.id}, {"fault", fault.message()}});
-    }
+    fs::rename(path, out.path, fault);
+    if (fault) fs::remove_all(path, fault);
     fs::remove(path.parent_path(), fault);  // unless it has other files
-    release(entry.address, entry.taken);
-    return entry.datasets;
+    return out;
   }
 
   Options options;
@@ -237,21 +252,35 @@ bool Uploads::opened(const std::string& id, const std::string& dataset) {
 }
 
 Result<std::vector<std::string>> Uploads::remove(const std::string& id) {
-  const std::lock_guard lock(state_->mutex);
-  const auto at = state_->entries.find(id);
-  if (at != state_->entries.end()) return state_->drop(at);
-  return make_error(ErrorKind::not_found,
-                    "there is no upload '" + printable(id, id_chars_max) + "'");
+  std::optional<State::Dropped> dropped;
+  {
+    const std::lock_guard lock(state_->mutex);
+    const auto at = state_->entries.find(id);
+    if (at != state_->entries.end()) dropped = state_->drop(at);
+  }
+  if (!dropped) {
+    return make_error(ErrorKind::not_found,
+                      "there is no upload '" + printable(id, id_chars_max) + "'");
+  }
+  state_->remove_files(*dropped);
+  return std::move(dropped->entry.datasets);
 }
 
 std::vector<std::string> Uploads::expire(std::time_t now) {
+  std::vector<State::Dropped> all;
+  {
+    const std::lock_guard lock(state_->mutex);
+    for (auto at = state_->entries.begin(); at != state_->entries.end();) {
+      const auto one = at++;
+      if (one->second.upload.expires > now) continue;
+      log::info("an upload has expired", {{"upload", one->first}});
+      all.push_back(state_->drop(one));
+    }
+  }
   std::vector<std::string> out;
-  const std::lock_guard lock(state_->mutex);
-  for (auto at = state_->entries.begin(); at != state_->entries.end();) {
-    const auto one = at++;
-    if (one->second.upload.expires > now) continue;
-    log::info("an upload has expired", {{"upload", one->first}});
-    const auto datasets = state_->drop(one);
+  for (const State::Dropped& dropped : all) {
+    state_->remove_files(dropped);
+    const auto& datasets = dropped.entry.datasets;
     out.insert(out.end(), datasets.begin(), datasets.end());
   }
   return out;
