@@ -71,15 +71,11 @@ http::Response tagged_response(const http::Request& request, std::string_view co
   http::Response response;
   const std::string etag = etag_of(content);
   // The coding is chosen when the answer is sent; the tag of a 304 is that of the client's form.
-  const std::string known = request.header("If-None-Match");
-  const std::string zipped = http::gzip_etag(etag);
-  const bool has_plain = http::matches_etag(known, etag);
-  const bool has_zipped =
-      http::accepts_gzip(request.header("Accept-Encoding")) && http::matches_etag(known, zipped);
-  response.headers = {{"Cache-Control", "no-cache"},
-                      {"ETag", has_zipped && !has_plain ? zipped : etag},
-                      {"Vary", "Accept-Encoding"}};
-  if (has_plain || has_zipped) {
+  const auto known =
+      http::known_etag(request.header("If-None-Match"), request.header("Accept-Encoding"), etag);
+  response.headers = {
+      {"Cache-Control", "no-cache"}, {"ETag", known.value_or(etag)}, {"Vary", "Accept-Encoding"}};
+  if (known) {
     response.status = 304;
     return response;
   }

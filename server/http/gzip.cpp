@@ -8,6 +8,7 @@
 
 #include "protocol/limits.hpp"
 #include "server/http/http_checks.hpp"
+#include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 
 namespace windsplat::http {
@@ -77,6 +78,14 @@ std::string gzip_etag(std::string_view etag) {
   std::string tag(etag);
   if (tag.size() > 1 && tag.back() == '"') tag.insert(tag.size() - 1, "-gzip");
   return tag;
+}
+
+std::optional<std::string> known_etag(std::string_view if_none_match,
+                                      std::string_view accept_encoding, std::string_view etag) {
+  if (matches_etag(if_none_match, etag)) return std::string(etag);
+  std::string zipped = gzip_etag(etag);
+  if (!accepts_gzip(accept_encoding) || !matches_etag(if_none_match, zipped)) return std::nullopt;
+  return zipped;
 }
 
 Result<std::string> ungzip(std::string_view bytes, std::size_t bytes_max) {

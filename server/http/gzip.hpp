@@ -23,6 +23,10 @@ void compress(Response& response);
 // "abc" -> "abc-gzip", both in quotes.
 std::string gzip_etag(std::string_view etag);
 
+// The tag that a 304 states if the client has the representation: that of its form, plain or gzip.
+std::optional<std::string> known_etag(std::string_view if_none_match,
+                                      std::string_view accept_encoding, std::string_view etag);
+
 // Decodes one gzip member of at most `bytes_max` bytes. Errors: malformed: not gzip, damaged, cut
 // short or with bytes behind its end; too_large.
 Result<std::string> ungzip(std::string_view bytes, std::size_t bytes_max);

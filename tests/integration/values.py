@@ -232,6 +232,17 @@ class Values(unittest.TestCase):
         at_time = self.ask("datetime=2001-01-01T06:00Z", If_None_Match=first.headers["ETag"])
         self.assertEqual(at_time.status, 304)
 
+    def test_json_is_revalidated_in_either_form(self):
+        for coding in ("identity", "gzip"):
+            sent = {"query": "stride=2,2,2", "field": "q", "dataset": "large", "kind": "json",
+                    "Accept_Encoding": coding}
+            first = self.ask(**sent)
+            self.assertEqual(first.headers.get("Content-Encoding", "identity"), coding)
+            again = self.ask(**sent, If_None_Match=first.headers["ETag"])
+            self.assertEqual((again.status, again.body), (304, b""), coding)
+            for name in ("ETag", "Vary"):
+                self.assertEqual(again.headers[name], first.headers[name], coding)
+
     def test_what_is_not_understood_is_refused(self):
         for query, status, text in (("bbox=1,2,3", 400, "four numbers"),
                                     ("bbox=1,2,3,x", 400, "four numbers"),

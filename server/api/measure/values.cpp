@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -24,6 +25,7 @@
 #include "server/api/resources.hpp"
 #include "server/api/step_of_time.hpp"
 #include "server/base/npy_head.hpp"
+#include "server/http/gzip.hpp"
 #include "server/http/negotiate.hpp"
 #include "server/http/problem.hpp"
 #include "server/scene/region/select.hpp"
@@ -356,9 +358,12 @@ std::string signature_of(const Subject& subject, const Selection& selection,
   return text;
 }
 
+// The tag of a 304, of one that would be sent.
+using KnownEtag = std::function<std::optional<std::string>(const std::string&)>;
+
 http::Response values_response(const Subject& subject, const ValuesQuery& asked,
                                const Selection& selection, ValuesFormat format,
-                               const std::string& if_none_match) {
+                               const KnownEtag& known_etag) {
   const data::Grid& grid = subject.dataset->info().grid;
   auto description = describe_values(asked, subject, selection);
   const bool is_json = format == ValuesFormat::json;
@@ -366,8 +371,10 @@ http::Response values_response(const Subject& subject, const ValuesQuery& asked,
   const std::string etag =
       etag_of(signature_of(subject, selection, ends + (is_json ? "json" : "npy")));
   http::Response response;
-  response.headers = {{"Cache-Control", "no-cache"}, {"ETag", etag}};
-  if (http::matches_etag(if_none_match, etag)) {
+  const auto known = known_etag(etag);
+  response.headers = {{"Cache-Control", "no-cache"}, {"ETag", known.value_or(etag)}};
+  if (is_json) response.headers.emplace_back("Vary", "Accept-Encoding");
+  if (known) {
     response.status = 304;
     return response;
   }
@@ -407,13 +414,17 @@ void get_values(tasks::Catalogue& catalogue, tasks::TaskExecutor& loads, ValuesF
   auto asked = read_asked(query, *subject->dataset);
   if (!asked) return fail(asked.error());
   const data::Dataset* const of = subject->dataset.get();
-  run_later(loads, request, std::move(reply), "values of a field", of,
-            [subject = std::move(*subject), asked = std::move(*asked), format,
-             if_none_match = request.header("If-None-Match")] {
-              const auto selection = select_samples(asked, subject);
-              if (!selection) return http::problem_response(selection.error());
-              return values_response(subject, asked, *selection, format, if_none_match);
-            });
+  run_later(
+      loads, request, std::move(reply), "values of a field", of,
+      [subject = std::move(*subject), asked = std::move(*asked), format,
+       known_etag = [if_none_match = request.header("If-None-Match"),
+                     accept_encoding = request.header("Accept-Encoding")](const std::string& etag) {
+         return http::known_etag(if_none_match, accept_encoding, etag);
+       }] {
+        const auto selection = select_samples(asked, subject);
+        if (!selection) return http::problem_response(selection.error());
+        return values_response(subject, asked, *selection, format, known_etag);
+      });
 }
 
 }  // namespace windsplat::api
