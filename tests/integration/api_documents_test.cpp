@@ -9,6 +9,7 @@
 #include <sstream>
 #include <string>
 
+#include "server/access/auth.hpp"
 #include "tests/integration/server/test_server.hpp"
 
 namespace server_test {
@@ -58,6 +59,27 @@ TEST(ApiDocuments, AreLinkedAndTheirPagesHaveAPolicy) {
                 testing::StartsWith("default-src 'none'; style-src 'sha256-"));
     EXPECT_EQ(get(server.port(), path, {{"If-None-Match", page.header("etag")}}).status, 304);
   }
+}
+
+// What the document says of the token is what the server asks for.
+TEST(ApiDocuments, NameTheOperationsThatNeedNoToken) {
+  windsplat::api::ServerOptions options;
+  options.token = std::make_shared<const windsplat::access::Token>(
+      windsplat::access::Token::parse("correct-horse_battery.staple").value());
+  const TestServer server(std::move(options));
+  const Headers bearer{{"Authorization", "Bearer correct-horse_battery.staple"}};
+  const Json document = json_of(get(server.port(), "/v1/openapi.json", bearer));
+  int open = 0;
+  for (const auto& [path, methods] : document["paths"].items()) {
+    if (!methods.contains("get")) continue;
+    const Json& operation = methods["get"];
+    const bool needs_none = operation.contains("security") && operation["security"].empty();
+    EXPECT_NE(operation["responses"].contains("401"), needs_none) << path;
+    const std::string target = std::regex_replace(path, std::regex("\\{[^}]*\\}"), "x");
+    EXPECT_EQ(get(server.port(), target).status != 401, needs_none) << path;
+    open += needs_none ? 1 : 0;
+  }
+  EXPECT_EQ(open, 4) << "health and problem types";
 }
 
 }  // namespace

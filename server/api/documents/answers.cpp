@@ -111,7 +111,7 @@ std::vector<int> problems_of(const Operation& operation, bool with_token) {
   std::vector<int> out = operation.problems;
   out.insert(out.end(), always.begin(), always.end());
   if (operation.body) out.insert(out.end(), with_body.begin(), with_body.end());
-  if (with_token) out.push_back(unauthorized);
+  if (with_token && !operation.needs_no_token) out.push_back(unauthorized);
   return out;
 }
 

@@ -114,6 +114,7 @@ Json operation_of(const Entry& entry, const About& about, Bundle& bundle) {
   out["description"] = operation.description.empty() ? std::string(operation.summary) + "."
                                                      : std::string(operation.description);
   if (operation.deprecated) out["deprecated"] = true;
+  if (about.with_token && operation.needs_no_token) out["security"] = Json::array();
   Json parameters = Json::array();
   for (const std::string& name : placeholders(entry.path)) {
     parameters.push_back(path_parameter(name, entry.path));

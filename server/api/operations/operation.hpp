@@ -79,6 +79,7 @@ struct Operation {
   std::vector<int> problems = {};
   bool any_query = false;  // other parameters are ignored
   bool deprecated = false;
+  bool needs_no_token = false;  // see access::needs_no_token()
 };
 
 // Refuses repeated parameters and those that the operation does not have. Errors: malformed.

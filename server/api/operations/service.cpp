@@ -39,7 +39,8 @@ Operation read_live() {
   return {.id = "readLive",
           .group = service_group,
           .summary = "Whether the process answers",
-          .answers = {json_answer("It does.", "health")}};
+          .answers = {json_answer("It does.", "health")},
+          .needs_no_token = true};
 }
 
 Operation read_ready() {
@@ -47,7 +48,8 @@ Operation read_ready() {
           .group = service_group,
           .summary = "Whether the server takes requests",
           .answers = {json_answer("It does.", "health"),
-                      {503, "It is shutting down.", "health", {json_media}}}};
+                      {503, "It is shutting down.", "health", {json_media}}},
+          .needs_no_token = true};
 }
 
 Operation read_metrics() {
@@ -81,7 +83,8 @@ Operation list_problem_types() {
           .group = service_group,
           .summary = "The types of problems, as HTML or text",
           .description = "Needs no token.",
-          .answers = {{200, "The list.", {}, {"text/plain", "text/html"}, {"Vary"}}}};
+          .answers = {{200, "The list.", {}, {"text/plain", "text/html"}, {"Vary"}}},
+          .needs_no_token = true};
 }
 
 Operation read_problem_type() {
@@ -90,7 +93,8 @@ Operation read_problem_type() {
           .summary = "The page of a problem type, as HTML or text",
           .description = "The member `type` of a problem refers to it. Needs no token.",
           .answers = {{200, "The page.", {}, {"text/plain", "text/html"}, {"Vary"}}},
-          .problems = {404}};
+          .problems = {404},
+          .needs_no_token = true};
 }
 
 Operation read_color_maps() {

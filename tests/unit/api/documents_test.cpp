@@ -142,7 +142,11 @@ TEST(OpenApi, TellsBasePathAndToken) {
   EXPECT_EQ(closed["servers"][0]["url"], "/a/b");
   EXPECT_EQ(closed["components"]["securitySchemes"]["token"]["scheme"], "bearer");
   EXPECT_TRUE(closed["security"][0].contains("token"));
-  EXPECT_TRUE(closed["paths"]["/readyz"]["get"]["responses"].contains("401"));
+  EXPECT_TRUE(closed["paths"]["/v1/frames"]["post"]["responses"].contains("401"));
+  EXPECT_FALSE(closed["paths"]["/v1/frames"]["post"].contains("security"));
+  const Json& ready = closed["paths"]["/readyz"]["get"];
+  EXPECT_FALSE(ready["responses"].contains("401")) << "needs no token";
+  EXPECT_EQ(ready["security"], Json::array());
   EXPECT_EQ(closed["info"]["version"], "1.2.3");
 }
 
