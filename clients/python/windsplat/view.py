@@ -138,20 +138,33 @@ class View(ViewParts):
     def turn(self: SelfView, frames: int, degrees: float = 360) -> list[SelfView]:
         """Views on a turn about the vertical axis through the middle of the box of the data, or of
         the region, for `windsplat.movie`. A full turn ends one frame before its start, so that it
-        can be repeated."""
-        eye, target = self.get("/camera/eye"), self.get("/camera/target")
-        if eye is None or target is None:
-            camera = self.dataset.default_view["camera"]
-            eye, target = eye or camera["eye"], target or camera["target"]
+        can be repeated.
+
+        If the view shows the whole box, as by default and after look(), all of them do: they are
+        at one distance, from which the box fits at every angle. A view that shows a part of it is
+        turned as it is."""
+        first = self._first_of_turn(degrees)
         full = math.isclose(abs(degrees) % 360, 0, abs_tol=1e-9)
         parts = frames if full else max(1, frames - 1)
         _, centre = _camera.corners_of(self.dataset.description, self._document)
+        axes = {"eye": centre, "target": centre, "up": (0, 0, 0)}
         out = []
         for index in range(frames):
             angle = math.radians(degrees * index / parts)
-            out.append(self.patch({"camera": {"eye": _camera.turned(eye, centre, angle),
-                                              "target": _camera.turned(target, centre, angle)}}))
+            out.append(self.patch({"camera": {**first, **{
+                key: _camera.turned(first[key], axis, angle) for key, axis in axes.items()}}}))
         return out
+
+    def _first_of_turn(self, degrees: float) -> dict[str, Any]:
+        """The keys eye, target, up and height of the first camera of a turn."""
+        description = self.dataset.description
+        camera = {**self.dataset.default_view["camera"], **(self.get("/camera") or {})}
+        if self.get("/camera/eye") is None and self.get("/camera/target") is None:
+            # The side of the default camera; where it is depends on region and picture.
+            sides = _camera.sides_of(camera["eye"], camera["target"])
+            camera.update(_camera.looking(description, self._document, *sides, zoom=1))
+        return {**_camera.turning(description, self._document, camera, degrees),
+                "up": camera["up"]}
 
     def volume(self: SelfView, field: str, **keys: Any) -> SelfView:
         """The view with one more translucent medium of a scalar field; keys are those of

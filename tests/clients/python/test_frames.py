@@ -109,6 +109,34 @@ class Frames(unittest.TestCase):
         self.assertIn("height: 300px", html)
 
 
+def ends_of_box(view):
+    """Lowest and highest place of the corners of the box of a view in its picture, of which -1 and
+    1 are the edges: shape (2, 2)."""
+    description, camera = view.dataset.description, view.get("/camera")
+    eye, target = np.array(camera["eye"]), np.array(camera["target"])
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, camera["up"])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    aspect = view.get("/image/width") / view.get("/image/height")
+    low, high = np.array(description["world"]["min"]), np.array(description["world"]["max"])
+    for k, name in enumerate("xyz"):
+        ends = view.get(f"/region/{name}")
+        if ends is not None:
+            axis = description["axes"][name]
+            inside = [world for place, world in zip(axis["coordinates"], axis["world"])
+                      if ends[0] <= place <= ends[1]]
+            low[k], high[k] = min(inside), max(inside)
+    places = []
+    for corner in range(8):
+        point = np.where([corner >> k & 1 for k in range(3)], high, low) - eye
+        half = math.tan(math.radians(35 / 2)) * (point @ forward)
+        if camera.get("projection") == "orthographic":
+            half = camera["height"] / 2
+        places.append((point @ right / half / aspect, point @ up / half))
+    return np.min(places, axis=0), np.max(places, axis=0)
+
+
 class Looking(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -119,25 +147,15 @@ class Looking(unittest.TestCase):
         for azimuth, elevation in ((0, 90), (30, 40), (90, 0), (200, -35), (-45, 10)):
             with self.subTest(azimuth=azimuth, elevation=elevation):
                 view = self.dataset.view(size=(96, 64)).look(azimuth, elevation)
-                camera = view.get("/camera")
-                eye, target = np.array(camera["eye"]), np.array(camera["target"])
-                forward = (target - eye) / np.linalg.norm(target - eye)
-                right = np.cross(forward, camera["up"])
-                right /= np.linalg.norm(right)
-                up = np.cross(right, forward)
-                world = self.dataset.description["world"]
-                tangent = math.tan(math.radians(35 / 2))
-                places = []  # in the picture: -1 and 1 are its edges
-                for corner in range(8):
-                    point = np.array([world["max" if corner >> k & 1 else "min"][k]
-                                      for k in range(3)]) - eye
-                    depth = point @ forward
-                    places.append((point @ right / depth / tangent / 1.5,
-                                   point @ up / depth / tangent))
-                low, high = np.min(places, axis=0), np.max(places, axis=0)
+                low, high = ends_of_box(view)
                 np.testing.assert_allclose(low, -high, atol=1e-6)  # in the middle
                 self.assertLess(high.max(), 1)
                 self.assertGreater(high.max(), 0.9)
+
+    def test_the_box_fits_a_parallel_projection(self):
+        for side in ((30, 40), (0, 10), (200, -35)):
+            view = self.dataset.view(size=(96, 64)).look(*side, projection="orthographic")
+            self.assertLess(np.abs(ends_of_box(view)).max(), 1)
 
     def test_sides_are_those_of_the_rest_interface(self):
         # Azimuth 90 looks west, so that the eye is in the east.
@@ -161,6 +179,34 @@ class Looking(unittest.TestCase):
             np.testing.assert_allclose(places[4][:2], -places[0][:2], atol=1e-12)
             half = np.array(view.turn(3, degrees=180)[2].get(f"/camera/{key}")) - middle
             np.testing.assert_allclose(half, places[4], atol=1e-12)
+
+    def test_a_turn_keeps_the_whole_box_at_every_angle_from_one_distance(self):
+        wide = self.server["climate:48x24x8"].view(size=(400, 225))
+        for name, view in (("default", wide), ("side", wide.look(0, 30)),
+                           ("narrow", wide.size(200, 300).look(70, 10)),
+                           ("from above", wide.look(0, 90)),
+                           ("region", wide.region(x=(0, 40), y=(-80, 80))),
+                           ("parallel", wide.look(0, 30, projection="orthographic")),
+                           ("part of a turn", wide.look(0, 30))):
+            with self.subTest(name):
+                turn = view.turn(24, degrees=100 if name == "part of a turn" else 360)
+                ends = [np.abs(ends_of_box(one)).max() for one in turn]
+                self.assertLess(max(ends), 1)
+                self.assertGreater(max(ends), 0.93)  # no farther away than that takes
+                far = [math.dist(one.get("/camera/eye"), one.get("/camera/target"))
+                       for one in turn]
+                np.testing.assert_allclose(far, far[0])
+        turn = wide.look(0, 90).turn(4)
+        np.testing.assert_allclose(turn[1].get("/camera/up"), [-1, 0, 0], atol=1e-12)
+
+    def test_a_view_of_a_part_or_from_afar_is_turned_at_its_own_distance(self):
+        wide = self.server["climate:48x24x8"].view(size=(400, 225))
+        for zoom in (3, 0.3):
+            view = wide.look(0, 30, zoom=zoom)
+            for one in view.turn(3):
+                self.assertAlmostEqual(
+                    math.dist(one.get("/camera/eye"), one.get("/camera/target")),
+                    math.dist(view.get("/camera/eye"), view.get("/camera/target")))
 
 
 class Movies(unittest.TestCase):
