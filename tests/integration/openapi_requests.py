@@ -34,6 +34,7 @@ KEPT = 40  # ids of each kind that are used again
 class Daemon:
     def __init__(self, program):
         self.folder = tempfile.TemporaryDirectory(prefix="windsplat-openapi-")
+        self.state = tempfile.TemporaryDirectory(prefix="windsplat-openapi-state-")
         root = pathlib.Path(self.folder.name)
         for name, sample in (("small", "climate"), ("gusts", "tornado")):
             subprocess.run([program, "synth", sample, "--dims", "16x12x6", "--steps", "3", "-o",
@@ -41,7 +42,7 @@ class Daemon:
         (root / "notes.txt").write_text("not a field")
         words = [program, "serve", root / "small.nc", root / "gusts.nc", "--data-root", root,
                  "--listen", "127.0.0.1:0", "--threads", "1", "--log-level", "warn",
-                 "--upload-limit", "1M", "--state-dir", root / "state"]
+                 "--upload-limit", "1M", "--state-dir", self.state.name]
         for name in NO_LIMITS:
             words += [f"--max-{name}", "0"]
         self.child = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
@@ -77,6 +78,7 @@ class Daemon:
         self.child.terminate()
         self.child.communicate()
         self.folder.cleanup()
+        self.state.cleanup()
         return self.child.returncode
 
 

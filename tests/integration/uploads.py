@@ -108,6 +108,15 @@ class Uploads(WithUploads):
         self.assertEqual(self.daemon.get(f"/v1/datasets/{dataset}/frame.png?width=64&height=48")
                          .status, 200)
 
+    def test_uploads_are_not_kept_below_the_data_root(self):
+        root = pathlib.Path(self.folder.name)
+        for state in (root / "a" / "state", root, root / "a" / ".." / "state"):
+            refused = subprocess.run(
+                [PROGRAM, "serve", "tornado", "--data-root", root, "--state-dir", state,
+                 "--upload-limit", "4M"], capture_output=True, text=True, check=False)
+            self.assertEqual(refused.returncode, 2, refused.stderr)
+            self.assertIn("lies below --data-root", refused.stderr)
+
     def test_a_description_and_its_data_are_two_uploads(self):
         file = io.BytesIO()
         np.save(file, cube(2))

@@ -132,6 +132,15 @@ Result<void> check_origins(const std::vector<std::string>& origins) {
                         "without a path; no wildcard)");
 }
 
+// Whether a folder, which need not exist yet, is `root` or lies below it; false without a root.
+bool lies_below(const std::filesystem::path& folder, const std::filesystem::path& root) {
+  if (root.empty()) return false;
+  std::error_code fault;
+  const auto inner = std::filesystem::weakly_canonical(folder, fault);
+  const auto outer = std::filesystem::weakly_canonical(root, fault);
+  return std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end();
+}
+
 Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   auto listen = listen_places(arguments.listen, arguments.listen_mode);
   if (!listen) return listen.error();
@@ -149,9 +158,15 @@ Result<api::ServerOptions> server_options(const ServeArguments& arguments) {
   }
   const auto limit = memory_limit(arguments.memory_limit);
   if (!limit) return limit.error();
-  if (const auto uploads = upload_bytes(arguments); !uploads) return uploads.error();
+  const auto uploads = upload_bytes(arguments);
+  if (!uploads) return uploads.error();
   auto data_root = plain_folder(arguments.data_root);
   if (!data_root) return data_root.error();
+  if (*uploads > 0 && lies_below(arguments.state_dir, *data_root)) {
+    return make_error(ErrorKind::invalid,
+                      "--state-dir '" + printable(arguments.state_dir) +
+                          "' lies below --data-root: uploads would be listed for everybody");
+  }
   if (!arguments.data_hosts.hosts.empty()) {
     if (const auto hosts = fetch_options(arguments.data_hosts); !hosts) return hosts.error();
   }
