@@ -72,7 +72,7 @@ class PathReader {
     }
     reader.finish();
     if (!first) check_order(keyframe, path_.keyframes.back(), key, pointer);
-    path_.keyframes.push_back(std::move(keyframe));
+    path_.keyframes.push_back(keyframe);
   }
 
   void check_order(const CameraKeyframe& keyframe, const CameraKeyframe& last, const char* key,

@@ -35,8 +35,8 @@ std::string description_links(const std::string& base_path) {
   for (const char* name : {"openapi", "asyncapi"}) {
     const std::string path = base_path + "v1/" + name;
     if (!out.empty()) out += ", ";
-    out += "<" + path + ".json>; rel=\"service-desc\"; type=\"application/json\", <" + path +
-           ".html>; rel=\"service-doc\"; type=\"text/html\"";
+    out += '<' + path + R"(.json>; rel="service-desc"; type="application/json", )";
+    out += '<' + path + R"(.html>; rel="service-doc"; type="text/html")";
   }
   return out;
 }
