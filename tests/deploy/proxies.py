@@ -166,10 +166,10 @@ class Visitor(Target):
 
     def __init__(self, proxy, password=PASSWORD, source="127.0.0.1"):
         super().__init__("127.0.0.1", proxy.port, proxy.tls, base="/winds/")
-        self.password, self.source = password, source
+        self.password, self.source, self.name = password, source, NAME
 
     def authority(self):
-        return NAME
+        return self.name
 
     def authorization(self):
         if self.password is None:
@@ -305,7 +305,7 @@ class Recipe(unittest.TestCase):
 
     def upgrade(self, origin, visitor):
         with Connection(visitor) as connection:
-            connection.raw(upgrade_request(NAME, new_key(), "/winds/v1/stream",
+            connection.raw(upgrade_request(visitor.authority(), new_key(), "/winds/v1/stream",
                                            fields=visitor.authorization() +
                                            f"Origin: {origin}\r\n"))
             return connection.answer().status
@@ -313,6 +313,17 @@ class Recipe(unittest.TestCase):
     def test_accepts_streams_of_its_own_pages_only(self):
         self.assertEqual(self.upgrade(ORIGIN, Visitor(self.proxy)), 101)
         self.assertEqual(self.upgrade("https://other.example", Visitor(self.proxy)), 403)
+
+    def test_pages_on_another_port_than_443_may_post_and_stream(self):
+        visitor = Visitor(self.proxy)
+        visitor.name = f"{NAME}:{self.proxy.port}"
+        view = {"dataset": "tornado:32", "image": {"width": 64, "height": 48}}
+        for origin, posted, upgraded in ((f"https://{visitor.name}", 200, 101), (ORIGIN, 403, 403)):
+            answer = request(visitor, "POST", "v1/frames",
+                             {"Content-Type": "application/json", "Origin": origin},
+                             json.dumps(view).encode())
+            self.assertEqual(answer.status, posted, answer.body[:300])
+            self.assertEqual(self.upgrade(origin, visitor), upgraded, origin)
 
     def test_refuses_visitors_without_the_password(self):
         for password in (None, "wrong"):
