@@ -177,7 +177,7 @@ def turning(
     that have to fit one picture.
     """
     eye, target = camera["eye"], camera["target"]
-    kept = {"eye": list(eye), "target": list(target)}
+    kept: dict[str, Any] = {"eye": list(eye), "target": list(target)}
     if camera.get("height") is not None:
         kept["height"] = camera["height"]
     if is_globe(view):
@@ -202,9 +202,9 @@ def turning(
             return 2 * max(abs(a - shift) * tan_y / tangent for points, shift, (_, tangent)
                            in zip(sides, shifts, axes) for a, _ in points)
 
-        height = camera.get("height")
-        if height is None or height * (1 + 1e-9) >= extent(first):
-            kept["height"] = max(height or 0.0, ROOM * extent(every))
+        height = float(camera.get("height") or 0)  # 0: that of the default, which fits
+        if height == 0 or height * (1 + 1e-9) >= extent(first):
+            kept["height"] = max(height, ROOM * extent(every))
         return kept
     distance = math.dist(eye, target)
     if any(_needed(points, shift, tangent) > distance * (1 + 1e-9)

@@ -2,11 +2,11 @@
 from __future__ import annotations
 
 import dataclasses
-import datetime
 import html
 from typing import TYPE_CHECKING, Any, Mapping
 
 from ._documents import suggestion
+from ._times import step_of
 from .errors import NotFound
 from .view import View
 
@@ -191,21 +191,25 @@ class Dataset:
             raise ValueError(f"{self.id}: {error}: its calendar has dates that datetime64 has "
                              "not; see dataset.steps") from None
 
-    def step_at(self, time: Any) -> int:
-        """The step nearest to a time: a text as 2001-01-01T06:00, datetime or datetime64; a
-        number where the steps have no dates."""
-        import numpy as np
+    def step_at(self, time: Any, *, nearest: bool = False) -> int:
+        """The step at a time: a text as 2001-01-01T06:00 (UTC, or with an offset), datetime or
+        datetime64; a number where the steps have no dates.
 
-        times = self.times
-        if times.dtype.kind == "M":
-            if isinstance(time, datetime.datetime) and time.tzinfo is not None:
-                time = time.astimezone(datetime.timezone.utc).replace(tzinfo=None)
-            if isinstance(time, str):
-                time = time.removesuffix("Z")
-            distance = np.abs(times - np.datetime64(time, "ms"))
-        else:
-            distance = np.abs(times - float(time))
-        return int(np.argmin(distance))
+        nearest: take the nearest step, of two the earlier, where there is none at that time.
+
+        Raises InvalidView with the steps before and after it if there is none.
+        """
+        return step_of(self.times, time, nearest, [step.text for step in self.steps])
+
+    def _step(self, step: int | None, time: Any, nearest: bool) -> int:
+        """The step of a request: number, or time; without either the first."""
+        if step is not None and time is not None:
+            raise ValueError("give either step or time")
+        if time is not None:
+            return self.step_at(time, nearest=nearest)
+        if nearest:
+            raise ValueError("nearest requires time")
+        return 0 if step is None else step
 
     def coordinates(self, axis: str) -> NDArray[np.float64]:
         """The coordinates of the axis x, y or z, in its unit."""
@@ -233,15 +237,23 @@ class Dataset:
 
     def probe(
         self, x: float | None = None, y: float | None = None, z: float | None = None, *,
-        index: tuple[int, int, int] | None = None, step: int = 0,
-        fields: list[str] | None = None,
+        lon: float | None = None, lat: float | None = None, level: float | None = None,
+        index: tuple[int, int, int] | None = None, step: int | None = None, time: Any = None,
+        nearest: bool = False, fields: list[str] | None = None,
     ) -> Probe:
-        """The value of every field at the sample nearest to a place in the coordinates of the
-        axes (longitude and latitude where there are), or with a number along each axis.
-        `fields` computes derived ones, too."""
+        """The value of every field at the sample nearest to a place.
+
+        x, y, z: coordinates of the axes (longitude and latitude where columns have them).
+        lon, lat, level: other names of them: degrees, and the unit of the vertical axis; refused
+            where columns have no longitude and latitude.
+        index: instead of coordinates the number of the sample along x, y and z.
+        step, time, nearest: the first step, or that number, or the step at a time: see step_at().
+        fields: derived fields to be computed, too.
+        """
         document = self.server.http.get(
-            f"v1/datasets/{_quoted(self.id)}/probe", **_place(x, y, z, index), step=step,
-            fields=",".join(fields) if fields else None)
+            f"v1/datasets/{_quoted(self.id)}/probe",
+            **_place(x, y, z, lon, lat, level, index),
+            step=self._step(step, time, nearest), fields=",".join(fields) if fields else None)
         values = document["values"]
         return Probe(_position(document["position"]), document["step"],
                      {name: one["value"] for name, one in values.items()},
@@ -249,12 +261,14 @@ class Dataset:
 
     def series(
         self, field: str, x: float | None = None, y: float | None = None,
-        z: float | None = None, *, index: tuple[int, int, int] | None = None,
+        z: float | None = None, *, lon: float | None = None, lat: float | None = None,
+        level: float | None = None, index: tuple[int, int, int] | None = None,
     ) -> Series:
-        """A field at one place over all steps."""
+        """A field over all steps at one place, named as for probe()."""
         import numpy as np
 
-        document = self.server.http.get(f"{self._field(field)}/series", **_place(x, y, z, index))
+        document = self.server.http.get(f"{self._field(field)}/series",
+                                        **_place(x, y, z, lon, lat, level, index))
         vector = self.fields[field].kind == "vector"
         hole = [np.nan] * 3 if vector else np.nan
         values = np.array([hole if one is None else one for one in document["values"]],
@@ -279,13 +293,14 @@ class Dataset:
 
     def values(
         self, field: str, *, box: tuple[float, float, float, float] | None = None,
-        level: float | tuple[float, float] | None = None, step: int = 0,
-        stride: int | tuple[int, int, int] = 1,
+        level: float | tuple[float, float] | None = None, step: int | None = None,
+        time: Any = None, nearest: bool = False, stride: int | tuple[int, int, int] = 1,
     ) -> Values:
         """The samples of a field as an array.
 
         box: west, south, east, north in degrees, or coordinates of x and y.
         level: one, or the ends of a range, in the unit of the vertical axis.
+        step, time, nearest: the first step, or that number, or the step at a time: see step_at().
         stride: every so many samples along x and y, or along x, y and z.
 
         At most 64 MiB at once. Raises NotFound for servers without this resource.
@@ -301,8 +316,8 @@ class Dataset:
             return ",".join(f"{one:g}" if isinstance(one, int) else repr(float(one))
                             for one in many)
 
-        asked = {"bbox": joined(box), "level": joined(level), "step": step,
-                 "stride": joined(stride)}
+        asked = {"bbox": joined(box), "level": joined(level),
+                 "step": self._step(step, time, nearest), "stride": joined(stride)}
         path = self._field(field)
         description = self.server.http.get(f"{path}/values.json", **asked)
         answer = self.server.http.request("GET", f"{path}/values.npy", params=asked,
@@ -361,8 +376,9 @@ def _quoted(text: str) -> str:
 
 
 def _place(
-    x: float | None, y: float | None, z: float | None, index: tuple[int, int, int] | None
+    x: float | None, y: float | None, z: float | None, lon: float | None, lat: float | None,
+    level: float | None, index: tuple[int, int, int] | None,
 ) -> dict[str, Any]:
-    if index is not None:
-        return {"index": ",".join(str(int(one)) for one in index)}
-    return {"x": x, "y": y, "z": z}
+    """The parameters of a place. The server refuses what it cannot take together."""
+    return {"x": x, "y": y, "z": z, "lon": lon, "lat": lat, "level": level,
+            "index": None if index is None else ",".join(str(int(one)) for one in index)}

@@ -111,12 +111,19 @@ class View(ViewParts):
         """The view with a picture of this size, pixels."""
         return self.patch({"image": {"width": width, "height": height}})
 
-    def at(self: SelfView, step: int | None = None, *, time: Any = None) -> SelfView:
-        """The view at a step, or at the step nearest to a time (text, datetime, datetime64)."""
+    def at(self: SelfView, step: int | None = None, *, time: Any = None,
+           nearest: bool = False) -> SelfView:
+        """The view at a step, or at a time (text, datetime, datetime64).
+
+        nearest: take the nearest step where there is none at that time. Without it, InvalidView
+            names the steps before and after it (see Dataset.step_at).
+        """
         if (step is None) == (time is None):
             raise ValueError("give either step or time")
         if step is None:
-            step = self.dataset.step_at(time)
+            step = self.dataset.step_at(time, nearest=nearest)
+        elif nearest:
+            raise ValueError("nearest requires time")
         return self.patch({"step": int(step)})
 
     def look(

@@ -1,6 +1,7 @@
 """Servers, datasets and values, against the real daemon; refusals against prepared answers."""
 import asyncio
 import base64
+import datetime
 import hashlib
 import json
 import os
@@ -15,6 +16,8 @@ import unittest.mock
 
 import numpy as np
 from support import CLIENT, PROGRAM, Prepared, shared_server, start, windsplat
+
+from windsplat._times import step_of
 
 
 def problem(status, **more):
@@ -149,11 +152,71 @@ class Values(unittest.TestCase):
         times = self.dataset.times
         self.assertEqual(times.dtype, np.dtype("datetime64[ms]"))
         self.assertEqual(times[1] - times[0], np.timedelta64(6, "h"))
-        self.assertEqual(self.dataset.step_at("2001-01-01T11:00"), 2)
+        self.assertEqual(self.dataset.step_at("2001-01-01T12:00"), 2)
         self.assertEqual(self.dataset.step_at(times[5]), 5)
         self.assertEqual(self.dataset.view().at(time=times[3]).get("/step"), 3)
         self.assertEqual(self.dataset.shape, (8, 24, 48))
         self.assertEqual(self.dataset.coordinates("z")[0], 1000)
+
+    def test_a_time_without_a_step_is_refused_with_its_neighbours(self):
+        at = self.dataset.view().at
+        with self.assertRaises(windsplat.InvalidView) as caught:
+            at(time="2001-01-01T11:00")
+        self.assertIn("is 2001-01-01T12:00:00Z (step 2); nearest=True", str(caught.exception))
+        # The same word as of REST, which names the same neighbours and takes the same step.
+        path = "v1/datasets/climate%3A48x24x8/fields/cloud/values.json"
+        with self.assertRaises(windsplat.InvalidView) as theirs:
+            self.server.http.get(path, datetime="2001-01-01T11:00")
+        said = "the one before is 2001-01-01T06:00:00Z (step 1), the one after is"
+        self.assertIn(said, theirs.exception.detail)
+        self.assertIn(said, caught.exception.detail)
+        for time, step in (("2001-01-01T11:00", 2), ("2001-01-01T09:00", 1), ("1990-01-01", 0),
+                           ("2001-01-01T11:00+02:00", 1)):
+            self.assertEqual(at(time=time, nearest=True).get("/step"), step)
+            there = self.server.http.get(path, datetime=time, nearest="true")
+            self.assertEqual(there["step"], step)
+        for time in ("2001-01-01T14:00+02:00", datetime.datetime(2001, 1, 1, 12),
+                     np.datetime64("2001-01-01T12", "h"), "2001-01-01 12:00:00.000",
+                     datetime.datetime(2001, 1, 1, 12, tzinfo=datetime.timezone.utc)):
+            self.assertEqual(at(time=time).get("/step"), 2)
+        with self.assertRaisesRegex(windsplat.InvalidView, r"the one before is [^,]*\(step 7\); n"):
+            at(time="2099-01-01")
+        for time in ("noon", 3):
+            with self.assertRaisesRegex(ValueError, "is no time.*2001-01-01T06:00"):
+                at(time=time)
+        with self.assertRaisesRegex(ValueError, "nearest requires time"):
+            at(2, nearest=True)
+
+    def test_values_and_probes_take_times_and_the_names_of_places_of_rest(self):
+        place = {"lon": 10, "lat": 40, "level": 500}
+        probe = self.dataset.probe(**place, time="2001-01-01T12:00")
+        self.assertEqual((probe.step, probe["wind"]),
+                         (2, self.dataset.probe(10, 40, 500, step=2)["wind"]))
+        self.assertEqual(self.dataset.probe(**place, time="2001-01-01T11:00", nearest=True).step, 2)
+        np.testing.assert_array_equal(self.dataset.series("cloud", **place).values,
+                                      self.dataset.series("cloud", 10, 40, 500).values)
+        values = self.dataset.values("cloud", level=1000, time="2001-01-01T12:00")
+        self.assertEqual(values.step, 2)
+        for call in (lambda **more: self.dataset.probe(**place, **more),
+                     lambda **more: self.dataset.values("cloud", **more)):
+            with self.assertRaisesRegex(windsplat.InvalidView, "the one after is"):
+                call(time="2001-01-01T11:00")
+            with self.assertRaisesRegex(ValueError, "either step or time"):
+                call(time="2001-01-01T12:00", step=1)
+            with self.assertRaisesRegex(ValueError, "nearest requires time"):
+                call(nearest=True)
+        with self.assertRaisesRegex(windsplat.InvalidView, "lon"):
+            self.server["tornado:24"].probe(lon=1, lat=1, level=1)
+
+    def test_steps_without_dates_are_chosen_by_their_coordinates(self):
+        times = np.array([0.0, 0.1, 0.3])
+        texts = ["0 s", "0.1 s", "0.3 s"]
+        self.assertEqual(step_of(times, 0.1 + 1e-12, False, texts), 1)
+        self.assertEqual(step_of(times, 0.19, True, texts), 1)
+        with self.assertRaisesRegex(windsplat.InvalidView, r"0\.1 s \(step 1\).*0\.3 s \(step 2"):
+            step_of(times, 0.2, False, texts)
+        with self.assertRaisesRegex(ValueError, "no dates, give a number from 0 to 0.3"):
+            step_of(times, "2001-01-01", False, texts)
 
     def test_probes_series_histograms_and_ranges_agree(self):
         probe = self.dataset.probe(10, 40, 500, step=2, fields=["wind_speed"])
