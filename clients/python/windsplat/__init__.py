@@ -13,6 +13,7 @@ from .errors import (
     FieldError,
     InvalidView,
     JobTimeout,
+    MissingPackage,
     MovieFailed,
     NotFound,
     Problem,
@@ -30,7 +31,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Busy", "ConnectionFailed", "Dataset", "Error", "Field", "FieldError", "Frame", "Histogram",
-    "InvalidView", "JobTimeout", "Movie", "MovieFailed", "NotFound", "Position", "Probe",
-    "Problem", "Report", "Series", "Server", "StartFailed", "Step", "Stream", "StreamFrame",
-    "Unauthorized", "Values", "View", "WindsplatError", "connect", "movie", "open",
+    "InvalidView", "JobTimeout", "MissingPackage", "Movie", "MovieFailed", "NotFound", "Position",
+    "Probe", "Problem", "Report", "Series", "Server", "StartFailed", "Step", "Stream",
+    "StreamFrame", "Unauthorized", "Values", "View", "WindsplatError", "connect", "movie", "open",
 ]

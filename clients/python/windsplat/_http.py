@@ -99,6 +99,9 @@ class Http:
         url = self.base + path.lstrip("/")
         end = time.monotonic() + self.patience
         while True:
+            if self._client.is_closed:
+                raise ConnectionFailed(f"{self.base}: this server was closed by close(): start or "
+                                       "connect to one again")
             try:
                 with contextlib.ExitStack() as stack:
                     content = None if file is None else stack.enter_context(file.open("rb"))

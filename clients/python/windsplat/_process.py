@@ -135,7 +135,9 @@ class Process:
             if line is None:
                 reader.join(5)
                 code = self._process.wait()
-                said = "\n".join(self._lines) or "without a message"
+                # The message of the program says what its log says, too.
+                own = [one for one in self._lines if one.startswith("windsplat: ")]
+                said = "\n".join(own or self._lines) or "without a message"
                 raise StartFailed(f"windsplat serve ended with exit code {code}: {said}")
             if line.startswith("http"):
                 return line.strip()

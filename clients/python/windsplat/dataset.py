@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import html
-from typing import TYPE_CHECKING, Any, Mapping
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 from ._documents import suggestion
 from ._times import step_of
@@ -230,6 +230,9 @@ class Dataset:
         """A view of the dataset. size: width and height, pixels; keys: parts of the document."""
         out = View({"dataset": self.id}, dataset=self)
         if size is not None:
+            if isinstance(size, str) or not isinstance(size, Sequence) or len(size) != 2:
+                raise ValueError("size must be the width and height in pixels, as (400, 200), "
+                                 f"not {size!r}")
             out = out.size(*size)
         if step is not None:
             out = out.at(step)

@@ -25,6 +25,10 @@ class MovieFailed(WindsplatError):
     """A movie could not be encoded."""
 
 
+class MissingPackage(WindsplatError, ImportError):
+    """A Python package that is only needed for this is not installed."""
+
+
 @dataclasses.dataclass(frozen=True)
 class FieldError:
     """An invalid value of a document."""

@@ -2,16 +2,18 @@
 from __future__ import annotations
 
 import copy
+import functools
+import inspect
 import json
 import math
 import os
 import pathlib
 import urllib.parse
-from typing import TYPE_CHECKING, Any, Iterable, Literal, Mapping, Sequence, TypeVar
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Literal, Mapping, Sequence, TypeVar
 
 from . import _camera
 from ._documents import at_pointer, check, merged, own_schema, plain
-from .errors import InvalidView
+from .errors import InvalidView, MissingPackage
 from .frame import FORMATS, Format, Frame, Report, format_of
 from .generated.view_types import UNSET, ViewDocument, ViewParts
 
@@ -21,6 +23,26 @@ if TYPE_CHECKING:
     from .movie import Movie
 
 SelfView = TypeVar("SelfView", bound="View")
+
+
+def _with_checked_keys(key: str, method: Callable[..., Any]) -> Callable[..., Any]:
+    """A method of ViewParts whose unknown keywords are checked like keys of a document: refused
+    with a suggestion, unless the server knows them."""
+    known = inspect.signature(method).parameters
+
+    @functools.wraps(method)
+    def checked(self: View, *items: Any, **given: Any) -> Any:
+        if items or all(name in known for name in given):
+            return method(self, *items, **given)
+        return self._merged(key, given)
+
+    return checked
+
+
+for _name, _method in list(vars(ViewParts).items()):
+    if inspect.isfunction(_method) and not _name.startswith("_") and any(
+            one.kind is one.KEYWORD_ONLY for one in inspect.signature(_method).parameters.values()):
+        setattr(ViewParts, _name, _with_checked_keys(_name, _method))
 
 
 class View(ViewParts):
@@ -279,8 +301,16 @@ class View(ViewParts):
 
     def live(self, height: int = 450) -> Any:
         """A live view as a widget of Jupyter, windsplat.widget.LiveView: frames pass through the
-        kernel, so that the browser need not reach the server. Needs the package anywidget."""
-        from .widget import LiveView
+        kernel, so that the browser need not reach the server. Raises MissingPackage without the
+        package anywidget."""
+        try:
+            from .widget import LiveView
+        except ModuleNotFoundError as error:
+            if error.name not in ("anywidget", "traitlets"):
+                raise
+            raise MissingPackage(f"view.live() needs the package anywidget ({error}): install it "
+                                 "by 'pip install anywidget', or use view.widget(), which needs no "
+                                 "package") from error
 
         return LiveView(self, height=height)
 

@@ -1,4 +1,5 @@
 """Views as documents: the schema, its vectors, suggestions, merge patches."""
+import inspect
 import json
 import subprocess
 import sys
@@ -69,6 +70,14 @@ class Keys(unittest.TestCase):
         self.assertIn("did you mean 'image'?", str(self.refused(lambda: view.patch({"imag": {}}))))
         self.assertIn("did you mean 'sphere'?",
                       str(self.refused(lambda: view.geometry(mapping="spher"))))
+
+    def test_an_unknown_keyword_of_a_part_is_refused_as_a_key(self):
+        view = windsplat.View()
+        self.assertEqual(str(self.refused(lambda: view.vector(colour={"by": "magnitude"}))),
+                         "/vector/colour: unknown key: did you mean 'color'?")
+        self.assertIn("/camera/fov: unknown key", str(self.refused(
+            lambda: view.camera(eye=[0, -3, 1], fov=30))))
+        self.assertIn("opacity", str(inspect.signature(windsplat.View.vector)))
 
     def test_each_invalid_value_is_named_by_its_pointer(self):
         error = self.refused(lambda: windsplat.View(

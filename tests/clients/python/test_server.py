@@ -29,7 +29,10 @@ class Start(unittest.TestCase):
         with start("tornado:16") as server:
             self.assertEqual(list(server.datasets), ["tornado:16"])
             self.assertRegex(server.version, r"^\d+\.\d+\.\d+")
-            url = server.url
+            url, view = server.url, server["tornado:16"].view(size=(16, 16))
+            view.frame()
+        with self.assertRaisesRegex(windsplat.ConnectionFailed, f"{url}.*closed by close"):
+            view.frame()
         with self.assertRaises(windsplat.ConnectionFailed):
             windsplat.connect(url)
 
@@ -74,8 +77,9 @@ class Start(unittest.TestCase):
     def test_what_the_program_says_is_in_the_error(self):
         with self.assertRaisesRegex(windsplat.StartFailed, "exit code 2.*--max-pixels.*'many'"):
             start("tornado:16", max_pixels="many")
-        with self.assertRaisesRegex(windsplat.StartFailed, "nowhere.nc"):
+        with self.assertRaises(windsplat.StartFailed) as caught:
             start("nowhere.nc", strict=True)
+        self.assertEqual(str(caught.exception).count("'nowhere.nc': no such file"), 1)
 
     def test_one_dataset_is_opened_by_open(self):
         with unittest.mock.patch.dict(os.environ, {"WINDSPLAT": PROGRAM}):
@@ -255,6 +259,12 @@ class Values(unittest.TestCase):
         np.testing.assert_array_equal(whole.array[2], level.array)
         with self.assertRaises(windsplat.InvalidView):
             self.dataset.values("cloud", level=1e9)
+
+    def test_a_size_that_is_no_pair_is_refused(self):
+        for size in ("400x200", (400,), 400):
+            with self.assertRaisesRegex(ValueError, r"size must be .*\(400, 200\), not .*400"):
+                self.dataset.view(size=size)
+        self.assertEqual(self.dataset.view(size=[40, 20]).get("/image/height"), 20)
 
     def test_names_are_suggested(self):
         with self.assertRaisesRegex(windsplat.NotFound, "did you mean 'tornado:24'"):

@@ -82,6 +82,15 @@ class Widgets(unittest.TestCase):
                               text=True, capture_output=True, check=False)
         self.assertEqual(done.stdout.split()[:1], ["True"], done.stderr)
 
+    def test_a_live_view_without_its_package_says_what_to_install(self):
+        view = shared_server()[0]["tornado:24"].view()
+        with unittest.mock.patch.dict(sys.modules, {"anywidget": None}):
+            sys.modules.pop("windsplat.widget", None)
+            with self.assertRaises(windsplat.WindsplatError) as caught:
+                view.live()
+        self.assertIsInstance(caught.exception, ImportError)
+        self.assertRegex(str(caught.exception), r"pip install anywidget.*view\.widget\(\)")
+
     def test_a_live_view_passes_on_frames_and_takes_gestures(self):
         server, _ = shared_server()
         module = types.SimpleNamespace(AnyWidget=AnyWidget)
