@@ -141,6 +141,35 @@ test("a frame is acknowledged after the promise of its handler", async () => {
   assert.equal(socket.of("ack").length, 1);
 });
 
+test("a first view that is refused leaves its dataset, of which the default is shown", () => {
+  const told: string[] = [];
+  const { stream, socket } = open(
+    { dataset: "a", vector: { stride: -1 }, image: { width: 64, height: 48, background: "#000" } },
+    {
+      refused: (error) => void told.push(error.message),
+      opened: ({ id }) => void told.push(`opened ${id}`),
+    },
+  );
+  socket.hello("b", "a");
+  const errors = [{ pointer: "/vector/stride", detail: "must be at least 1" }];
+  const refuse = () =>
+    socket.says({
+      type: "error",
+      rev: socket.rev,
+      problem: { status: 422, title: "t", detail: "invalid", errors },
+    });
+  refuse();
+  assert.deepEqual(socket.of("patch").at(-1)!.patch, {
+    dataset: "a",
+    image: { width: 64, height: 48 },
+  });
+  socket.says({ type: "opened", id: socket.of("open").at(-1)!.id, dataset });
+  assert.deepEqual(told, ["/vector/stride: must be at least 1", "opened a"]);
+  assert.equal(stream.dataset?.id, "a");
+  refuse();
+  assert.equal(socket.of("patch").length, 2, "not again and again");
+});
+
 test("without a dataset the first one of the server is shown", () => {
   const { socket } = open({ step: 1 });
   socket.hello("b", "a");

@@ -198,6 +198,77 @@ test("a dataset that is not there is told once, in words and as a problem", asyn
   assert.equal(await page.locator("windsplat-view [part=message]").innerText(), "");
 });
 
+test("an invalid view is written on the picture of the default, and the controls work", async (t) => {
+  const wrong = `<windsplat-view id="a" src="SRC" dataset="climate" controls
+    view='{"vector":{"strid":3}}'></windsplat-view>`;
+  const page = await shared.pageWith(t, wrong);
+  const { detail } = await event(page, "error");
+  assert.deepEqual([detail.kind, /strid/.test(detail.message)], ["view", true]);
+  await event(page, "frame", (one) => one.detail.final);
+  const message = page.locator("windsplat-view [part=message]");
+  assert.equal(await message.innerText(), detail.message);
+  await shot(page, "foreign-page-invalid");
+  await page.getByRole("slider", { name: "Time step" }).fill("2");
+  await event(page, "frame", (one) => one.detail.step === 2 && one.detail.final);
+  assert.equal(await message.innerText(), "", "until a later change is shown");
+  assert.equal((await toldOf(page, "error")).length, 1);
+  await page.getByRole("button", { name: "Play" }).click();
+  await event(page, "frame", (one) => one.detail.step === 3);
+});
+
+test("loading and controls cover nothing of the picture", async (t) => {
+  const page = await shared.pageWith(t, tornado.replace('"tornado"', '"climate" controls'));
+  const element = page.locator("#a");
+  await finalOf(page);
+  const [picture, bar] = await Promise.all(
+    ["picture", "controls"].map((name) => element.locator(`[part=${name}]`).boundingBox()),
+  );
+  assert.ok(bar.y >= picture.y + picture.height, "the bar is below the picture");
+  assert.ok(bar.y + bar.height <= picture.y + 300.5, "and within the element");
+  const loading = element.locator("[part=loading]");
+  assert.equal(await loading.isHidden(), true);
+  // As if the server told that it loads.
+  const shown = await page.evaluate(async () => {
+    const element = document.querySelector("#a");
+    const [message, line] = ["message", "loading"].map((name) =>
+      element.shadowRoot.querySelector(`[part=${name}]`),
+    );
+    element.live.stream.onMessage({ type: "progress", phase: "loading cloud", done: 0.4 });
+    const atOnce = line.hidden;
+    while (line.hidden) await new Promise((done) => setTimeout(done, 20));
+    const box = line.getBoundingClientRect();
+    return [atOnce, message.textContent, line.ariaLabel, line.ariaValueNow, box.height <= 3];
+  });
+  assert.deepEqual(shown, [true, "", "loading cloud", "40", true]);
+  await shot(page, "foreign-page-loading");
+  await page.evaluate(() => document.querySelector("#a").change({ step: 1 }));
+  await finalOf(page);
+  assert.equal(await loading.isHidden(), true, "until the next picture");
+});
+
+test("an element opens one stream, also if its properties are set in the same task", async (t) => {
+  const page = await shared.pageWith(t, "");
+  const warnings = [];
+  page.on("console", (one) => warnings.push(one.text()));
+  let sockets = 0;
+  page.on("websocket", () => (sockets += 1));
+  const before = await sessionsOpened(shared.daemon);
+  await page.evaluate(async (src) => {
+    await customElements.whenDefined("windsplat-view");
+    document.body.innerHTML = `<windsplat-view id="a" src="${src}" dataset="tornado"
+      view='{"scalars":[]}'></windsplat-view>`;
+    const element = document.querySelector("#a");
+    element.token = "a-token";
+    element.step = 0;
+    element.controls = true;
+  }, shared.daemon.url);
+  await finalOf(page);
+  assert.deepEqual((await toldOf(page, "frame")).at(-1).detail.view.scalars, []);
+  assert.equal(sockets, 1);
+  assert.equal((await sessionsOpened(shared.daemon)) - before, 1);
+  assert.deepEqual(warnings, []);
+});
+
 test("a refused change is told, and the picture stays", async (t) => {
   const page = await shared.pageWith(t, tornado);
   await finalOf(page);

@@ -74,6 +74,7 @@ export class ViewStream {
   private wanted: View; // stated again after a restart, also if it was refused
   private opening: string | undefined; // the dataset of the last `open` of this session
   private opens = 1; // number of the last `open`, which its answer repeats
+  private plainRev = 0; // rev of the last view without the keys of a refused one
   private refusedOpen = ""; // detail of the last refusal, which the answer to `open` repeats
   private last: Frame | null = null;
   private answered = 0; // rev of the newest view that the last frame shows
@@ -310,9 +311,27 @@ export class ViewStream {
     if (id === this.opens) this.opening = undefined;
     const repeated = id === this.opens && problem.detail === this.refusedOpen;
     this.refusedOpen = problem.detail;
-    if (rev !== undefined) this.answers.refuse(rev);
-    if (!repeated) this.refuse(problemError(problem));
+    const error = problemError(problem);
+    if (rev !== undefined) this.withdraw(rev, error);
+    if (!repeated) this.refuse(error);
     if (rev !== undefined) this.events.changed?.(this.explicit); // back to the view before
+  }
+
+  // If the first view of a session is refused, nothing is left to go back to: its dataset is shown
+  // by default, so that what is drawn and described belongs to the view.
+  private withdraw(rev: number, error: ProblemError): void {
+    const { dataset, image } = this.explicit;
+    this.answers.refuse(rev);
+    const left = this.explicit.dataset !== undefined || dataset === undefined;
+    if (left || rev === this.plainRev || isOfDataset(error)) return;
+    const { width, height } = image ?? {};
+    const sized = width !== undefined && height !== undefined && !names(error, "/image");
+    const plain = this.model.state.change({
+      dataset,
+      ...(sized ? { image: { width, height } } : {}),
+    });
+    this.plainRev = plain.rev;
+    this.sendAll([plain]);
   }
 
   private refuse(error: ProblemError): void {
@@ -363,6 +382,13 @@ export class ViewStream {
     for (const { rev, patch } of outgoing) this.send({ type: "patch", rev, t, patch });
   }
 }
+
+const names = ({ problem }: ProblemError, place: string): boolean =>
+  problem?.errors?.some(({ pointer }) => pointer.startsWith(place)) ?? false;
+
+/** Whether a dataset is refused, not what a view says of it. */
+export const isOfDataset = (error: ProblemError): boolean =>
+  error.status === 404 || names(error, "/dataset");
 
 const problemError = (problem: Problem): ProblemError =>
   new ProblemError(problemText(problem), problem.status, problem);

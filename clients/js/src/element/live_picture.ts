@@ -28,6 +28,7 @@ export class LivePicture {
   private readonly ended = new AbortController();
   private inSight = true;
   private sizing = false;
+  private refusedRev = 0; // rev of the view that is left after the last refusal
 
   constructor(canvas: HTMLCanvasElement, client: Client, view: View, events: LiveEvents) {
     const { signal } = this.ended;
@@ -63,6 +64,10 @@ export class LivePicture {
         changed: (changed) => {
           if (!this.sizing) events.changed?.(changed);
         },
+        refused: (error) => {
+          this.refusedRev = this.stream.model.state.rev;
+          events.refused?.(error);
+        },
       },
       { acknowledge: "manual", clock },
     );
@@ -93,6 +98,21 @@ export class LivePicture {
     this.viewport.end();
   }
 
+  /** Whether a picture of this session is shown. */
+  get hasShown(): boolean {
+    return this.viewport.frame !== null;
+  }
+
+  /** Whether the last refusal holds: nothing else was asked for since. */
+  get hasRefused(): boolean {
+    return !this.isAfterRefusal(this.stream.model.state.rev);
+  }
+
+  /** Whether the view of this rev was asked for after the last refusal. */
+  isAfterRefusal(rev: number): boolean {
+    return rev > this.refusedRev;
+  }
+
   private tellSight(): void {
     if (!this.ended.signal.aborted) this.stream.setHidden(document.hidden || !this.inSight);
   }
@@ -102,8 +122,11 @@ export class LivePicture {
     const [width, height] = this.viewport.size();
     const { image } = this.stream.explicit;
     if (image?.width === width && image.height === height) return;
+    const { state } = this.stream.model;
+    const refused = state.rev === this.refusedRev;
     this.sizing = true;
     this.stream.change({ image: { width, height } });
     this.sizing = false;
+    if (refused) this.refusedRev = state.rev; // another size is no answer to it
   }
 }

@@ -5,7 +5,8 @@ const css = `
 :host { display: block; position: relative; aspect-ratio: 8 / 5; overflow: hidden;
   background: #0b0e14; color: #e8ecf2; font: 13px/1.4 system-ui, sans-serif; }
 :host([hidden]) { display: none; }
-canvas { display: block; width: 100%; height: 100%; touch-action: none; cursor: grab;
+.frame { display: grid; grid-template: minmax(0, 1fr) auto / minmax(0, 1fr); height: 100%; }
+canvas { display: block; grid-area: 1 / 1; width: 100%; height: 100%; touch-action: none; cursor: grab;
   outline: none; }
 canvas.dragging { cursor: grabbing; }
 :host([interactive="false"]) canvas { touch-action: auto; cursor: default; }
@@ -13,8 +14,11 @@ canvas:focus-visible { box-shadow: inset 0 0 0 2px #6cb2ff; }
 [part="message"] { position: absolute; inset: 0.6em 0.6em auto; margin: 0; padding: 0.4em 0.7em;
   width: fit-content; max-width: calc(100% - 2.6em); border-radius: 4px; background: #000b; }
 [part="message"]:empty { display: none; }
-[part="controls"] { position: absolute; inset: auto 0.5em 0.5em; display: flex; gap: 0.3em;
-  align-items: center; }
+[part="loading"] { grid-area: 1 / 1; align-self: end; height: 3px; background: #6cb2ff;
+  pointer-events: none; }
+[part="loading"][hidden] { display: none; }
+[part="controls"] { grid-area: 2 / 1; display: flex; gap: 0.3em; align-items: center;
+  padding: 0.3em 0.5em; }
 [part="controls"][hidden], [part="controls"] > [hidden] { display: none; }
 button { font: inherit; color: inherit; background: #000a; border: 1px solid #fff4;
   border-radius: 4px; min-width: 2.2em; min-height: 2.2em; cursor: pointer; }
@@ -27,6 +31,7 @@ output { background: #000a; border-radius: 4px; padding: 0.2em 0.5em; white-spac
 export interface Inside {
   canvas: HTMLCanvasElement;
   message: HTMLElement;
+  loading: HTMLElement;
   controls: HTMLElement;
   play: HTMLButtonElement;
   slider: HTMLInputElement;
@@ -63,6 +68,9 @@ export function fill(root: ShadowRoot): Inside {
   canvas.setAttribute("role", "img");
   const message = part("p", "message");
   message.setAttribute("role", "status");
+  const loading = part("div", "loading");
+  loading.setAttribute("role", "progressbar");
+  loading.hidden = true;
   const controls = part("div", "controls");
   controls.setAttribute("role", "group");
   controls.setAttribute("aria-label", "Controls of the picture");
@@ -74,6 +82,7 @@ export function fill(root: ShadowRoot): Inside {
   const inside: Inside = {
     canvas,
     message,
+    loading,
     controls,
     play: button("▶", "Play"),
     slider,
@@ -84,6 +93,9 @@ export function fill(root: ShadowRoot): Inside {
   };
   const { play, time, zoomOut, zoomIn, reset } = inside;
   controls.append(play, slider, time, zoomOut, zoomIn, reset);
-  root.append(canvas, message, controls);
+  const frame = document.createElement("div");
+  frame.className = "frame";
+  frame.append(canvas, loading, controls);
+  root.append(frame, message);
   return inside;
 }

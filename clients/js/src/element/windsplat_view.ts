@@ -1,5 +1,6 @@
 // <windsplat-view src="https://your.host/" dataset="winds">: a live picture of a view in any page.
 import { Client } from "../client/client";
+import { isOfDataset } from "../client/view_stream";
 import { failureText, ProblemError } from "../wire/requests";
 import type { Camera } from "../view/camera";
 import { zoom } from "../view/camera";
@@ -9,11 +10,12 @@ import { moveOfKey } from "../viewport/camera_keys";
 import { MoveQueue, PointerInput, type Move } from "../viewport/input";
 import type { ConnectionState } from "../wire/connection";
 import type { Reach } from "../wire/reach";
-import type { ChosenMessage, Dataset, FrameHeader, ProgressMessage, View } from "../wire/protocol";
+import type { ChosenMessage, Dataset, FrameHeader, View } from "../wire/protocol";
 import { asked, stepOf, viewOf } from "./attributes";
 import { ControlBar } from "./control_bar";
 import type { ErrorKind, WindsplatEvents } from "./events";
 import { LivePicture } from "./live_picture";
+import { Loading } from "./loading";
 import { fill } from "./template";
 
 const observed = ["src", "dataset", "view", "step", "label", "controls", "interactive"] as const;
@@ -29,12 +31,14 @@ export class WindsplatView extends HTMLElement {
   private readonly inside = fill(this.attachShadow({ mode: "open" }));
   private readonly bar: ControlBar;
   private readonly moves: MoveQueue;
+  private readonly loading = new Loading(this.inside, (text) => this.sayFirst(text));
   private live: LivePicture | null = null;
   private client: Client | null = null;
   private given: View | null = null; // by the property `view`
   private kept: View | null = null; // while there is no stream
   private secret: string | undefined;
-  private changes = new Set<string>(); // attributes that changed since the last microtask
+  // attributes that changed since the last microtask; "page": came into a page
+  private changes = new Set<string>();
   private playing = false;
   private told = false; // the present outage
 
@@ -68,7 +72,7 @@ export class WindsplatView extends HTMLElement {
   connectedCallback(): void {
     for (const name of properties) this.upgrade(name);
     this.showAttributes();
-    if (this.live === null) this.start();
+    if (this.live === null) this.schedule("page");
   }
 
   /** A node that is only moved within the page keeps its stream. */
@@ -201,7 +205,7 @@ export class WindsplatView extends HTMLElement {
 
   // --- the stream ------------------------------------------------------------------------
 
-  private start(attributesFirst = false): void {
+  private start(attributesFirst: boolean): void {
     const view = this.attempt(() => this.kept ?? this.askedView(attributesFirst));
     const client = this.attempt(() => new Client(this.src, { token: this.secret }));
     if (view === undefined || client === undefined) return;
@@ -210,12 +214,12 @@ export class WindsplatView extends HTMLElement {
     this.live = new LivePicture(this.inside.canvas, client, view, {
       shown: (header, chosen) => this.onShown(header, chosen),
       state: (state) => this.onState(state),
-      settled: () => this.say(""),
+      settled: (rev) => this.settled(rev),
       reached: (reach, reason) => this.lost(reach, reason),
       opened: (dataset) => this.bar.describe(dataset),
       refused: (error) => this.onRefused(error),
       changed: () => this.onChanged(),
-      progress: (progress) => this.onProgress(progress),
+      progress: (progress) => this.loading.show(progress),
       broken: () => this.fail("frame", "a frame could not be decoded"),
     });
   }
@@ -239,6 +243,7 @@ export class WindsplatView extends HTMLElement {
     const { changes } = this;
     this.changes = new Set();
     const anew = changes.has("dataset") || changes.has("view");
+    const attributesFirst = !changes.has("view") && (changes.has("dataset") || changes.has("step"));
     const step = changes.has("step") ? this.attempt(() => stepOf(this.getAttribute("step"))) : null;
     if (changes.has("src")) this.stop();
     if (anew) this.kept = null;
@@ -246,9 +251,9 @@ export class WindsplatView extends HTMLElement {
     if (!this.isConnected) return;
     this.showAttributes();
     if (this.live === null) {
-      this.start(!changes.has("view"));
+      this.start(attributesFirst);
     } else if (anew) {
-      const view = this.attempt(() => this.askedView(!changes.has("view")));
+      const view = this.attempt(() => this.askedView(attributesFirst));
       if (view !== undefined) this.live.stream.replace(view);
     } else if (typeof step === "number") {
       this.seek(step);
@@ -283,10 +288,16 @@ export class WindsplatView extends HTMLElement {
   // --- what the server tells -------------------------------------------------------------
 
   private onShown(header: FrameHeader, chosen: ChosenMessage | null): void {
-    this.say("");
+    this.settled(header.rev);
+    this.loading.end();
     this.bar.showStep(header.step);
     const view = (chosen?.view ?? null) as View | null;
     this.emit("windsplat-frame", { header, final: header.final, step: header.step, view });
+  }
+
+  // The words of a refusal stay until the picture of a later change.
+  private settled(rev: number): void {
+    if (this.live?.isAfterRefusal(rev) ?? true) this.say("");
   }
 
   private onChanged(): void {
@@ -301,6 +312,7 @@ export class WindsplatView extends HTMLElement {
       return;
     }
     this.setPlaying(false);
+    this.loading.end();
     if (state.name === "asleep") this.say(`paused: ${state.reason}`);
     if (state.name === "connecting" && !this.told) this.say("connecting …");
     if (state.name === "locked") {
@@ -334,13 +346,7 @@ export class WindsplatView extends HTMLElement {
   }
 
   private onRefused(error: ProblemError): void {
-    const pointers = error.problem?.errors?.map(({ pointer }) => pointer) ?? [];
-    const ofDataset = error.status === 404 || pointers.includes("/dataset");
-    this.fail(ofDataset ? "dataset" : "view", error.message, error);
-  }
-
-  private onProgress({ phase, done }: ProgressMessage): void {
-    if (phase.startsWith("loading")) this.say(`${phase} ${Math.round(100 * done)} %`);
+    this.fail(isOfDataset(error) ? "dataset" : "view", error.message, error);
   }
 
   // --- input -----------------------------------------------------------------------------
@@ -395,6 +401,14 @@ export class WindsplatView extends HTMLElement {
 
   private say(text: string): void {
     this.inside.message.textContent = text;
+  }
+
+  // Where nothing is shown yet there is room for words, but not in place of an error.
+  private sayFirst(text: string): boolean {
+    const { live } = this;
+    if (live === null || live.hasShown) return false;
+    if (!live.hasRefused) this.say(text);
+    return true;
   }
 
   private fail(kind: ErrorKind, message: string, cause?: unknown, shown = true): void {
