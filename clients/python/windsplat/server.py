@@ -16,7 +16,14 @@ from ._documents import suggestion
 from ._http import Http
 from ._process import Process, find_program, is_below
 from .dataset import Dataset
-from .errors import JobTimeout, NotFound, WindsplatError, problem_of
+from .errors import (
+    JobTimeout,
+    NotFound,
+    Problem,
+    Unauthorized,
+    WindsplatError,
+    problem_of,
+)
 from .view import View
 
 if TYPE_CHECKING:
@@ -170,7 +177,8 @@ class Server:
     def upload(self, path: str | os.PathLike[str], *, keep: float = 3600,
                timeout: float = 300) -> Dataset:
         """Sends a file to the server and opens it there; for servers that were started with
-        --upload-limit. It is removed after `keep` seconds, or by dataset.close(forget=True).
+        --upload-limit and --state-dir. It is removed after `keep` seconds, or by
+        dataset.close(forget=True).
 
         Raises Unauthorized if the server takes no uploads, and what open() raises.
         """
@@ -184,8 +192,16 @@ class Server:
         suffix = whole.suffix if re.fullmatch(r"\.[A-Za-z0-9]{1,12}", whole.suffix) else ""
         name = f"{stem}-{secrets.token_hex(8)}{suffix}"
         value = base64.b64encode(digest.digest()).decode()
-        self.http.request("PUT", f"v1/uploads/{name}", file=whole, params={"keep": int(keep)},
-                          headers={"Content-Digest": f"sha-256=:{value}:"})
+        try:
+            self.http.request("PUT", f"v1/uploads/{name}", file=whole, params={"keep": int(keep)},
+                              headers={"Content-Digest": f"sha-256=:{value}:"})
+        except Problem as problem:
+            if problem.status != 413 or problem.type == "about:blank":  # or that of a proxy
+                raise
+            # The limit of other bodies, met before uploads are known to be disabled.
+            raise Unauthorized(403, "Forbidden", "uploads are disabled: start the server with "
+                               "--upload-limit and --state-dir",
+                               request_id=problem.request_id) from problem
         try:
             dataset = self._opened({"upload": name}, timeout)
         except BaseException:

@@ -47,9 +47,11 @@ class Documents(unittest.TestCase):
     def test_the_tutorial_does_what_it_says(self):
         said = self.run_examples(TUTORIAL)
         for text in ("wind vector m s-1", "404", "/camera/fov_y: unknown key: did you mean 'fovY'?",
-                     "magnitude {'dataset': 'winds'", "(450, 800, 4) float32", "final, rev 1"):
+                     "magnitude {'dataset': 'winds'", "(450, 800, 4) float32", "final, rev 1",
+                     "('z', 'y', 'x') (4, 11, 16)", "winds-", "403 uploads are disabled"):
             self.assertIn(text, said)
         for name, start in (("winds.png", b"\x89PNG"), ("figure.pdf", b"%PDF"),
+                            ("section.png", b"\x89PNG"),
                             ("steps.apng", b"\x89PNG"), ("turn.zip", b"PK"),
                             ("arrays.png", b"\x89PNG"), ("cloud.png", b"\x89PNG")):
             self.assertTrue((self.folder / name).read_bytes().startswith(start), name)
