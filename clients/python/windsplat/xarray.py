@@ -83,7 +83,7 @@ class Accessor:
 
     def open(
         self, names: Sequence[str] | None = None, *, server: Server | None = None,
-        rename: Mapping[str, str] | None = None,
+        rename: Mapping[str, str] | None = None, title: str | None = None,
     ) -> Dataset:
         """Hands variables over to a server and returns the dataset there. It is done once for each
         choice of variables: see refresh().
@@ -92,19 +92,22 @@ class Accessor:
         server: by default one that the first call starts on this machine. One of Server.start
             with a `data_root` reads the file there; others get an upload, if they take any.
         rename: names in the file.
+        title: of the pictures; by default the attribute `title` of the Dataset, without one the
+            long name or name of a variable that is handed over alone, otherwise "xarray".
 
         Raises ValueError if a variable is not there or has no three dimensions in space.
         """
         chosen = self.fields() if names is None else list(dict.fromkeys(names))
         self._check(chosen)
         there = local_server() if server is None else server
-        key = (there.url, tuple(chosen), tuple((rename or {}).items()))
+        key = (there.url, tuple(chosen), tuple((rename or {}).items()), title)
         if key not in self._opened:
             if there._root is not None:
-                self._opened[key] = there.open(self._write(chosen, there._root, rename or {}))
+                path = self._write(chosen, there._root, rename or {}, title)
+                self._opened[key] = there.open(path)
             else:
                 with tempfile.TemporaryDirectory(prefix="windsplat-") as folder:
-                    path = self._write(chosen, pathlib.Path(folder), rename or {})
+                    path = self._write(chosen, pathlib.Path(folder), rename or {}, title)
                     self._opened[key] = there.upload(path)
         return self._opened[key]
 
@@ -120,13 +123,15 @@ class Accessor:
     def view(
         self, u: str | None = None, v: str | None = None, w: str | None = None,
         scalar: str | Sequence[str] | None = None, *, server: Server | None = None,
-        size: tuple[int, int] | None = None, step: int | None = None, **keys: Any,
+        title: str | None = None, size: tuple[int, int] | None = None, step: int | None = None,
+        **keys: Any,
     ) -> View:
         """A view of lines of the vector (u, v, w) and media of scalars. Without names: the default
         view of all variables with three dimensions in space.
 
         u, v, w: names of the components to the east, north and up (w may be left out).
         scalar: one name or several.
+        title: of the pictures: see open().
         keys: parts of the view, as of Dataset.view.
         """
         components = [one for one in (u, v, w) if one is not None]
@@ -134,14 +139,14 @@ class Accessor:
             raise ValueError("lines need the components u and v")
         scalars = [scalar] if isinstance(scalar, str) else list(scalar or [])
         if not components and not scalars:
-            return self.open(server=server).view(size=size, step=step, **keys)
+            return self.open(server=server, title=title).view(size=size, step=step, **keys)
         names = [*components, *scalars]
-        dataset = self.open(names, server=server)
+        dataset = self.open(names, server=server, title=title)
         field = _vector_of(dataset, components) if components else None
         if components and field is None:
             # The server knows vectors by the usual names of their components.
             usual = {one: name for one, name in zip((u, v, w), "uvw") if one is not None}
-            dataset = self.open(names, server=server, rename=usual)
+            dataset = self.open(names, server=server, rename=usual, title=title)
             field = _vector_of(dataset, [usual[one] for one in components])
             if field is None:
                 raise ValueError(f"{', '.join(components)} form no vector: "
@@ -168,7 +173,7 @@ class Accessor:
                                  "windsplat draws fields of three")
 
     def _write(self, names: Sequence[str], folder: pathlib.Path,
-               rename: Mapping[str, str]) -> pathlib.Path:
+               rename: Mapping[str, str], title: str | None) -> pathlib.Path:
         part = self._dataset[[*names, *_related(self._dataset, names)]].copy(deep=False)
         for name in part.variables:
             variable = part[name]
@@ -181,8 +186,12 @@ class Accessor:
             taken = {new: f"{new}_" for old, new in rename.items()
                      if new in part.variables and new != old and new not in rename}
             part = part.rename({**taken, **rename})
-        if "title" not in part.attrs:
-            part.attrs["title"] = ", ".join(names)
+        if title is not None:
+            part.attrs["title"] = title
+        elif not part.attrs.get("title"):
+            # The server would take the name of the file.
+            alone = self._dataset[names[0]].attrs.get("long_name", names[0])
+            part.attrs["title"] = str(alone) if len(names) == 1 else "xarray"
         path = _new_file(folder)
         try:
             part.to_netcdf(path)
@@ -219,10 +228,12 @@ class ArrayAccessor:
         self._name = name
         self._accessor = Accessor(array.to_dataset(name=name))
 
-    def view(self, *, server: Server | None = None, size: tuple[int, int] | None = None,
-             step: int | None = None, **keys: Any) -> View:
-        """A view of the array as a medium."""
-        return self._accessor.view(scalar=self._name, server=server, size=size, step=step, **keys)
+    def view(self, *, server: Server | None = None, title: str | None = None,
+             size: tuple[int, int] | None = None, step: int | None = None, **keys: Any) -> View:
+        """A view of the array as a medium. title: of the pictures, by default its long name or
+        name."""
+        return self._accessor.view(scalar=self._name, server=server, title=title, size=size,
+                                   step=step, **keys)
 
     def refresh(self) -> None:
         """See Accessor.refresh."""

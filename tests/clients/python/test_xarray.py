@@ -76,6 +76,16 @@ class Accessors(unittest.TestCase):
         self.assertEqual(dataset.description["axes"]["z"]["kind"], "pressure")
         self.assertEqual(self.view("u", "v").dataset.fields["wind"].units, "m s-1")
 
+    def test_the_title_is_that_of_the_arrays_or_the_one_given(self):
+        self.assertEqual(self.view(scalar="cc").dataset.title, "fraction of cloud cover")
+        self.assertEqual(self.view("u", "v", scalar="cc").dataset.title, "xarray")
+        self.assertEqual(self.view("u", "v", scalar="cc", title="My run").dataset.title, "My run")
+        one = self.arrays["a1"].windsplat
+        self.assertEqual(one.view(server=self.server).dataset.title, "a1")
+        self.assertEqual(one.view(server=self.server, title="First").dataset.title, "First")
+        self.arrays.attrs["title"] = "Reanalysis"
+        self.assertEqual(self.view("a1", "a2", "a3").dataset.title, "Reanalysis")
+
     def test_components_of_any_name_form_a_vector(self):
         view = self.view("a1", "a2", "a3")
         field = view.dataset.fields[view.get("/vector/field")]
